@@ -1,0 +1,23 @@
+"""Motion of mechanical systems with impacts.
+
+State a system (vector field, gap, impact law), simulate it, and differentiate what
+comes out. Importing this package turns on 64-bit floats in JAX.
+"""
+
+from importlib.metadata import version as _version
+
+import jax as _jax
+
+
+# before anything below makes an array
+_jax.config.update("jax_enable_x64", True)
+
+from .hybrid import (
+    HybridSystem as HybridSystem,
+    Settings as Settings,
+    simulate as simulate,
+    Trajectory as Trajectory,
+)
+
+
+__version__ = _version("jaxcam")

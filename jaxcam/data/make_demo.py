@@ -1,0 +1,223 @@
+"""Make the recordings of the demonstration rig: `python -m jaxcam.data.make_demo`.
+
+The rig is simulated here with a scalar Runge-Kutta loop that shares nothing with
+`jaxcam.hybrid`, so that comparing the two means something. It has a viscous hinge,
+which the textbook model lacks, a drive that wanders, and encoders with noise.
+"""
+
+import dataclasses
+import gzip
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+
+# A gap that opens from zero is not yet closed again by rounding errors (rad)
+_ROUNDING = 1e-13
+
+
+@dataclasses.dataclass(frozen=True)
+class RealRig:
+    """A rig as it is, not as its maker states it (SI units).
+
+    - `height`: cam radius plus half height of the follower (m).
+    - `damping`: viscous, of the follower's velocity (1/s).
+    - `wander`: slow relative variation of the cam's speed.
+    """
+
+    height: float = 0.0663
+    eccentricity: float = 0.01505
+    center_x: float = 0.249
+    center_y: float = 0.0002
+    half_height: float = 0.0206
+    stiffness_over_inertia: float = 2465.0
+    spring_hook_x: float = -0.0313
+    spring_elongation: float = 0.1722
+    restitution: float = 0.56
+    damping: float = 0.3
+    wander: float = 2e-4
+
+    def acceleration(self, angle: float, velocity: float) -> float:
+        """Of the free follower (rad/s^2): spring (4.9) and viscous hinge."""
+        sine, secant = math.sin(angle), 1 / math.cos(angle)
+        stretch = (self.spring_hook_x * sine + self.half_height) * secant
+        arm = (self.spring_hook_x + self.half_height * sine) * secant**2
+        torque = -self.stiffness_over_inertia * (stretch - self.spring_elongation) * arm
+        return torque - self.damping * velocity
+
+    def profile(self, harmonics: int = 14) -> np.ndarray:
+        """Complex Fourier coefficients of the contact angle of a clockwise cam."""
+        turned = 2 * np.pi * np.arange(256) / 256
+        x = self.eccentricity * np.cos(turned) + self.center_x
+        y = -self.eccentricity * np.sin(turned) + self.center_y
+        contact = np.arcsin(self.height / np.hypot(x, y)) + np.arctan2(y, x)
+        coefficients = 2 * np.fft.rfft(contact)[: harmonics + 1] / 256
+        coefficients[0] /= 2
+        return coefficients
+
+
+@dataclasses.dataclass(frozen=True)
+class Truth:
+    """What happened: true samples, impacts, and contacts as (landing, release)."""
+
+    time: np.ndarray
+    turned: np.ndarray
+    angle: np.ndarray
+    velocity: np.ndarray
+    impact_time: np.ndarray
+    approach: np.ndarray
+    contacts: tuple[tuple[float, float], ...]
+
+
+def simulate_rig(
+    rig: RealRig,
+    speed: float,
+    duration: float,
+    *,
+    settle: float = 20.0,
+    interval: float = 5e-4,
+    phase: float = 0.0,
+) -> Truth:
+    """Run the rig at `speed` (rad/s) and keep the last `duration` (s)."""
+    coefficients = rig.profile()
+    order = 1j * np.arange(len(coefficients))
+    first, second = coefficients * order, coefficients * order**2
+
+    def drive(t):
+        angle, rate, change = speed * t + phase, speed, 0.0
+        for share, frequency in ((0.7, 0.31), (0.3, 0.87)):
+            w, a = 2 * math.pi * frequency, rig.wander * speed * share
+            angle += a / w * math.sin(w * t)
+            rate += a * math.cos(w * t)
+            change -= a * w * math.sin(w * t)
+        return angle, rate, change
+
+    def surface(t):
+        angle, rate, change = drive(t)
+        turn = np.exp(order * angle)
+        slope, bend = (first @ turn).real, (second @ turn).real
+        acceleration = bend * rate**2 + slope * change
+        return float((coefficients @ turn).real), slope * rate, acceleration
+
+    def fly(x, v, h):
+        f = rig.acceleration
+        a1 = f(x, v)
+        v2 = v + h / 2 * a1
+        a2 = f(x + h / 2 * v, v2)
+        v3 = v + h / 2 * a2
+        a3 = f(x + h / 2 * v2, v3)
+        v4 = v + h * a3
+        a4 = f(x + h * v3, v4)
+        return (
+            x + h / 6 * (v + 2 * v2 + 2 * v3 + v4),
+            v + h / 6 * (a1 + 2 * a2 + 2 * a3 + a4),
+        )
+
+    def bisect(h, crossed):
+        low, high = 0.0, h
+        for _ in range(45):
+            middle = (low + high) / 2
+            low, high = (low, middle) if crossed(middle) else (middle, high)
+        return high
+
+    def lifts(t):
+        x, v, a = surface(t)
+        return rig.acceleration(x, v) > a
+
+    t, (x, v, _) = 0.0, surface(0.0)
+    x += 0.01
+    resting, landed = False, 0.0
+    rows, impacts, contacts = [], [], []
+    total = round((settle + duration) / interval)
+    longest = interval
+    for sample in range(total):
+        rows.append((t, drive(t)[0], x, v))
+        target = (sample + 1) * interval
+        while t < target:
+            h = min(target - t, longest)
+            if resting:
+                if lifts(t + h):
+                    t += bisect(h, lambda part, t=t: lifts(t + part))
+                    resting = False
+                    contacts.append((landed, t))
+                else:
+                    t = target if h == target - t else t + h
+                x, v, _ = surface(t)
+                continue
+            ahead, later = fly(x, v, h)
+            if ahead >= surface(t + h)[0] - _ROUNDING:
+                x, v, longest = ahead, later, interval
+                t = target if h == target - t else t + h
+                continue
+
+            def hit(part, x=x, v=v, t=t):
+                return fly(x, v, part)[0] < surface(t + part)[0] - _ROUNDING
+
+            h = bisect(h, hit)
+            _, v = fly(x, v, h)
+            t += h
+            x, rate, acceleration = surface(t)
+            approach = rate - v
+            v = rate + rig.restitution * approach
+            impacts.append((t, approach))
+            pull = acceleration - rig.acceleration(x, v)
+            flight = 2 * rig.restitution * approach / pull if pull > 0 else interval
+            # the bounces left take this long together
+            if 0 < flight < 1e-6 * (1 - rig.restitution):
+                resting, landed, v, longest = True, t, rate, interval
+                continue
+            # the next bounce must not end inside its own first step
+            longest = min(interval, max(flight / 2, 1e-8))
+    start = total - round(duration / interval)
+    time, turned, angle, velocity = np.array(rows[start:]).T
+    begin = time[0]
+    hits = np.array(impacts).reshape(-1, 2)
+    hits = hits[hits[:, 0] >= begin]
+    kept = tuple((a - begin, b - begin) for a, b in contacts if b > begin)
+    return Truth(
+        time - begin, turned, angle, velocity, hits[:, 0] - begin, hits[:, 1], kept
+    )
+
+
+def measure(samples: np.ndarray, noise: float, counts: int, rng) -> np.ndarray:
+    """What an encoder says: noise, then a whole number of counts."""
+    step = 2 * math.pi / counts
+    return np.round((samples + noise * rng.standard_normal(len(samples))) / step) * step
+
+
+def recording_text(truth: Truth, rng, *, sensors: Sequence[float]) -> str:
+    """A recording as CSV; `sensors` are noise and counts of cam and follower."""
+    cam_noise, cam_counts, noise, counts = sensors
+    # as an encoder that is zeroed once a turn before the record begins
+    turned = truth.turned - 2 * np.pi * np.floor(truth.turned[0] / (2 * np.pi))
+    columns = zip(
+        truth.time,
+        measure(turned, cam_noise, int(cam_counts), rng),
+        measure(truth.angle, noise, int(counts), rng),
+    )
+    rows = [f"{t:.4f},{cam:.6f},{angle:.6f}" for t, cam, angle in columns]
+    return "\n".join(["time_s,cam_angle_rad,follower_angle_rad", *rows, ""])
+
+
+#: noise (rad) and counts a turn of the two encoders of the demonstration rig
+DEMO_SENSORS = (9e-5, 16384, 7e-5, 36000)
+DEMO_SPEEDS_RPM = (136.5, 146.0, 158.0)
+
+
+def main() -> None:
+    """Write the runs of the demonstration rig beside its rig.toml."""
+    folder = Path(__file__).parent / "demo_rig"
+    rng = np.random.default_rng(20081)
+    for number, rpm in enumerate(DEMO_SPEEDS_RPM, start=1):
+        truth = simulate_rig(RealRig(), rpm * math.pi / 30, 4.0)
+        text = recording_text(truth, rng, sensors=DEMO_SENSORS)
+        file = folder / f"run{number}_{rpm:.1f}rpm.csv.gz"
+        # no time stamp, so that the same files come out each time
+        file.write_bytes(gzip.compress(text.encode(), 9, mtime=0))
+        print(f"{file.name}: {file.stat().st_size / 1e3:.0f} kB")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,87 @@
+"""Bad input, found before anything is compiled, with a sentence that names the fix."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from ._normal import gaps
+from ._settings import Settings
+from ._system import HybridSystem
+
+
+def is_traced(tree) -> bool:
+    """Whether any array in `tree` is being transformed, so its value is not known."""
+    return any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(tree))
+
+
+def check_start(system: HybridSystem, settings: Settings, t0, state, t1) -> None:
+    """Raise `ValueError` for a start that cannot be simulated."""
+    settings.check()
+    if state.ndim != 1:
+        raise ValueError(
+            f"state has shape {state.shape}; pass one vector, and jax.vmap for many"
+        )
+    if not bool(jnp.all(jnp.isfinite(state))):
+        raise ValueError(
+            f"state is {np.asarray(state).tolist()}; every component must be finite"
+        )
+    if not (bool(jnp.isfinite(t0)) and bool(jnp.isfinite(t1))):
+        raise ValueError("t0 and t1 must be finite times in seconds")
+    if float(t1) < float(t0):
+        raise ValueError(
+            f"t1 = {float(t1):g} s lies before t0 = {float(t0):g} s; motion runs "
+            "forward, so exchange them"
+        )
+    for leaf in jax.tree.leaves(eqx.filter(system, eqx.is_inexact_array)):
+        if not bool(jnp.all(jnp.isfinite(leaf))):
+            raise ValueError(
+                "a parameter of the system is not finite; print the system to see which"
+            )
+    _check_shapes(system, t0, state)
+    system.check()
+    values = np.asarray(_gaps(system, t0, state))
+    size = 1.0 + float(jnp.max(jnp.abs(state)))
+    if not np.all(np.isfinite(values)):
+        raise ValueError("the gap is not finite at t0; check the state and parameters")
+    if np.min(values) < -1e-12 * size:
+        raise ValueError(
+            f"gap is negative ({np.min(values):.1e}) at t0; start outside the "
+            "constraint, or pass state=None to start at the release point"
+        )
+
+
+_gaps = eqx.filter_jit(gaps)
+
+
+def _check_shapes(system, t0, state) -> None:
+    n = state.shape[0]
+    wanted = len(type(system).state_names)
+    if wanted and wanted != n:
+        names = ", ".join(type(system).state_names)
+        raise ValueError(
+            f"state has {n} components but {type(system).__name__} has {wanted}: {names}"
+        )
+    rate = jax.eval_shape(system.vector_field, t0, state)
+    if rate.shape != (n,):
+        raise ValueError(
+            f"vector_field returns shape {rate.shape} for a state of shape {(n,)}; "
+            "return one rate for each component, such as jnp.stack([...])"
+        )
+    gap = jax.eval_shape(system.gap, t0, state)
+    if len(gap.shape) > 1:
+        raise ValueError(
+            f"gap returns shape {gap.shape}; return a scalar or a vector of gaps"
+        )
+    after = jax.eval_shape(system.impact, t0, state)
+    if after.shape != (*gap.shape, n):
+        raise ValueError(
+            f"impact returns shape {after.shape} but gap has shape {gap.shape} and the "
+            f"state {(n,)}; return shape {(*gap.shape, n)}, one row for each gap"
+        )
+    for name, made in (("vector_field", rate), ("gap", gap), ("impact", after)):
+        if made.dtype != jnp.float64:
+            raise ValueError(
+                f"{name} returns {made.dtype}; use 64-bit floats (importing jaxcam turns "
+                "them on)"
+            )

@@ -1,0 +1,79 @@
+"""What one trajectory carries from one iteration of the loop to the next."""
+
+from typing import NamedTuple
+
+import jax.numpy as jnp
+
+from ._functions import Functions
+from ._gap_polynomial import Jet
+
+
+RUNNING, FINISHED, STEP_FAILED, NOT_FINITE = 0.0, 1.0, 2.0, 3.0
+
+
+class Lane(NamedTuple):
+    """All scalars, so that a batch of lanes is a set of plain vectors."""
+
+    t: object
+    x: tuple
+    contact: tuple
+    jets: tuple
+    # the next step to try, and the longest one that the error allows
+    step: object
+    longest: object
+    # the end of this step is an accumulation of impacts, not a choice
+    completing: object
+    next_stop: object
+    # fastest rebound since the last release; largest gap of each constraint
+    fastest: object
+    scale: tuple
+    failures: object
+    status: object
+    steps: object
+    impacts: object
+
+
+def first_lane(functions: Functions, t0, x, t1, first_stop) -> Lane:
+    """The lane at its start: in contact where gap and velocity are zero and a < 0."""
+    free = tuple(jnp.asarray(False) for _ in range(functions.m))
+    jets = functions.jets(t0, x, free)
+    size = _largest([jnp.abs(e) for e in x])
+    tiny = 1e-12 * (1.0 + size)
+    contact, settled = [], []
+    for jet in jets:
+        touching = (jnp.abs(jet.gap) <= tiny) & (jnp.abs(jet.velocity) <= tiny)
+        contact.append(touching & (jet.acceleration < 0))
+        # off the surface a start is taken as it is; on it, rounding is removed
+        settled.append(
+            Jet(
+                jnp.where(touching, 0.0, jet.gap),
+                jnp.where(touching, 0.0, jet.velocity),
+                jet.acceleration,
+                jet.jerk,
+            )
+        )
+    whole = t1 - t0
+    one = jnp.ones_like(t0)
+    return Lane(
+        t=t0,
+        x=x,
+        contact=tuple(contact),
+        jets=tuple(settled),
+        step=whole / 64,
+        longest=whole / 64,
+        completing=jnp.asarray(False),
+        next_stop=first_stop,
+        fastest=0.0 * one,
+        scale=tuple(jnp.abs(j.gap) for j in settled),
+        failures=0.0 * one,
+        status=RUNNING * one,
+        steps=0.0 * one,
+        impacts=0.0 * one,
+    )
+
+
+def _largest(values):
+    largest = values[0]
+    for v in values[1:]:
+        largest = jnp.maximum(largest, v)
+    return largest

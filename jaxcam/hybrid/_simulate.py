@@ -1,0 +1,225 @@
+"""The front door: `simulate`."""
+
+from collections.abc import Callable
+from typing import Literal
+
+import diffrax
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from ._check import check_start, is_traced
+from ._functions import Functions
+from ._lane import RUNNING, Lane, first_lane
+from ._loop import Plan
+from ._release_point import release_point
+from ._run import Log, run, run_reversible
+from ._runge_kutta import tableau_of
+from ._segments import simulate_segments
+from ._settings import Settings
+from ._system import HybridSystem
+from ._trajectory import Contacts, Impacts, Parts, Steps, Trajectory, assemble
+from ._types import RealScalar
+
+
+# rows run before Python looks again: for progress, interruption and growing logs
+_CHUNK = 2048
+
+
+def simulate(
+    system: HybridSystem,
+    state: Float[Array, " n"] | None,
+    t0: RealScalar,
+    t1: RealScalar,
+    *,
+    tolerance: RealScalar = 1e-10,
+    solver: diffrax.AbstractSolver | None = None,
+    settings: Settings | None = None,
+    max_steps: int | None = None,
+    derivatives: Literal["forward", "reverse"] = "forward",
+    engine: Literal["loop", "diffeqsolve"] = "loop",
+    progress: Callable[[float], None] | None = None,
+) -> Trajectory:
+    """The exact trajectory of a hybrid system from `t0` to `t1`.
+
+    **Arguments:**
+
+    - `system`: a [`jaxcam.hybrid.HybridSystem`][].
+    - `state`: shape `(n,)`, with every gap >= 0; or `None` for the orbit released last
+      from contact (systems with a period, two states and one constraint).
+    - `t0`, `t1`: s, t1 >= t0.
+    - `tolerance`: error allowed in a step, relative and absolute.
+    - `solver`: any explicit Runge-Kutta solver of diffrax, `Dopri8` by default.
+    - `settings`: everything else about accuracy; overrides `tolerance` and `solver`.
+    - `max_steps`: budget of attempted steps. Without it a run outside of any
+      transformation grows as needed, up to a million; inside `jit`, `vmap`, `jvp` or
+      `grad`, where sizes must be known, it is 4096 and arrays are padded.
+    - `derivatives`: "forward" (jvp, jacfwd) or "reverse" (grad): the latter always runs
+      `max_steps` attempts.
+    - `engine`: "loop", or "diffeqsolve" for one diffrax call a flight (implicit
+      solvers, an independent check).
+    - `progress`: called with the fraction done, now and then.
+
+    **Returns:** a [`jaxcam.hybrid.Trajectory`][]. Where it did not reach t1,
+    `trajectory.result` says why.
+
+    **Raises:** `ValueError` naming the fix: a state that is not finite or behind the
+    constraint, t1 < t0, a setting out of range, functions of the wrong shape.
+    """
+    if settings is None:
+        chosen = diffrax.Dopri8() if solver is None else solver
+        settings = Settings(tolerance=tolerance, solver=chosen)
+    if engine not in ("loop", "diffeqsolve"):
+        raise ValueError(f'engine is {engine!r}; choose "loop" or "diffeqsolve"')
+    if derivatives not in ("forward", "reverse"):
+        raise ValueError(
+            f'derivatives is {derivatives!r}; choose "forward" or "reverse"'
+        )
+    t0, t1 = jnp.asarray(t0, dtype=jnp.float64), jnp.asarray(t1, dtype=jnp.float64)
+    traced = is_traced((system, state, t0, t1, settings))
+    if state is None:
+        state, t_start = _released(system, t0, traced)
+    else:
+        state, t_start = jnp.asarray(state, dtype=jnp.float64), t0
+    if not traced:
+        check_start(system, settings, t_start, state, t1)
+    if engine == "diffeqsolve":
+        return simulate_segments(system, settings, t0, t_start, state, t1, max_steps)
+    tableau_of(settings.solver)
+    if traced or derivatives == "reverse":
+        rows = 4096 if max_steps is None else max_steps
+        log, contact, code = _whole(
+            system, settings, t_start, state, t1, rows, derivatives
+        )
+        parts = assemble(system, t_start, t1, state, contact, log, (rows, rows))
+        if traced:
+            return Trajectory(system, settings, t0, t1, *parts, code)
+    else:
+        budget = 1_000_000 if max_steps is None else max_steps
+        log, contact, code = _chunks(
+            system, settings, t_start, state, t1, budget, progress
+        )
+        rows = log.kind.shape[0]
+        parts = _assemble(system, t_start, t1, state, contact, log, (rows, rows))
+    return Trajectory(system, settings, t0, t1, *_trim(parts), code)
+
+
+def _released(system, t0, traced):
+    """Start of the orbit released last before t0."""
+    if not traced:
+        system.check()
+    if system.period is None:
+        raise ValueError(
+            "state=None needs a system with a forcing period; pass the state to start "
+            "from"
+        )
+    point = _release_point(system, t0)
+    if not traced and float(point.holds) == 2:
+        raise ValueError(
+            "there is no contact anywhere in the period, so no release point; pass the "
+            "state to start from"
+        )
+    return point.state, point.time
+
+
+@eqx.filter_jit
+def _release_point(system, t0):
+    return release_point(system, t0)
+
+
+def _prepare(system, settings, t0, state, t1):
+    system = system.prepared()
+    functions = Functions(system, state.shape[0])
+    period = system.period
+    longest = jnp.inf if period is None else period / 8
+    plan = Plan(
+        t1=t1,
+        stop_period=jnp.inf,
+        longest_contact=longest,
+        tolerance=settings.tolerance,
+        smallness=settings.chatter_smallness,
+        depth=settings.chatter_depth,
+        tableau=tableau_of(settings.solver),
+    )
+    x = tuple(state[i] for i in range(state.shape[0]))
+    lane = first_lane(functions, t0, x, t1, jnp.full_like(t1, jnp.inf))
+    return functions, plan, lane
+
+
+def _whole(system, settings, t0, state, t1, rows, derivatives):
+    functions, plan, lane = _prepare(system, settings, t0, state, t1)
+    contact = jnp.stack(lane.contact)
+    runner = run if derivatives == "forward" else run_reversible
+    lane, log = runner(functions, plan, lane, rows)
+    return log, contact, _code(lane)
+
+
+@eqx.filter_jit
+def _begin(system, settings, t0, state, t1, rows):
+    functions, plan, lane = _prepare(system, settings, t0, state, t1)
+    contact = jnp.stack(lane.contact)
+    lane, log = run(functions, plan, lane, rows)
+    return lane, log, contact
+
+
+@eqx.filter_jit
+def _go_on(system, settings, t0, state, t1, lane: Lane, rows):
+    functions, plan, _ = _prepare(system, settings, t0, state, t1)
+    return run(functions, plan, lane, rows)
+
+
+_assemble = eqx.filter_jit(assemble)
+
+
+def _chunks(system, settings, t0, state, t1, budget, progress):
+    """Run chunk by chunk; the log is padded to a power of two times the chunk."""
+    size = min(_CHUNK, budget)
+    lane, log, contact = _begin(system, settings, t0, state, t1, size)
+    logs, used = [log], size
+    span = max(float(t1 - t0), 1e-300)
+    while float(lane.status) == RUNNING and used < budget:
+        if progress is not None:
+            progress(float(lane.t - t0) / span)
+        lane, log = _go_on(system, settings, t0, state, t1, lane, size)
+        logs.append(log)
+        used += size
+    if progress is not None:
+        progress(1.0)
+    if len(logs) > 1:
+        target = size
+        while target < used:
+            target *= 2
+        pieces = [np.concatenate(part) for part in zip(*logs, strict=True)]
+        padded = [
+            np.pad(p, [(0, target - used)] + [(0, 0)] * (p.ndim - 1)) for p in pieces
+        ]
+        log = Log(*map(jnp.asarray, padded))
+    else:
+        log = logs[0]
+    return log, contact, _code(lane)
+
+
+def _code(lane: Lane):
+    """Index into `RESULTS`; a lane that still runs has used up its budget."""
+    order = jnp.array([1, 0, 2, 3], dtype=jnp.int32)
+    return order[lane.status.astype(jnp.int32)]
+
+
+def _trim(parts: Parts) -> Parts:
+    def cut(part):
+        number = int(part.count)
+        arrays = jax.tree.map(lambda a: a[:number] if a.ndim else a, part)
+        return arrays
+
+    return Parts(
+        _as(Impacts, cut(parts.impacts)),
+        _as(Contacts, cut(parts.contacts)),
+        _as(Steps, cut(parts.steps)),
+    )
+
+
+def _as(kind, part):
+    assert isinstance(part, kind)
+    return part

@@ -1,0 +1,62 @@
+"""A ball on a floor that may vibrate."""
+
+from typing import ClassVar
+
+import jax
+import jax.numpy as jnp
+
+from ..hybrid import HybridSystem
+from ._parameters import (
+    parameter,
+    require_finite,
+    require_positive,
+    require_restitution,
+)
+
+
+class BouncingBall(HybridSystem):
+    """A ball in free fall above a floor at `amplitude sin(frequency t)`.
+
+    The state is the height above the floor's mean position and the velocity (m, m/s).
+
+    **Arguments:**
+
+    - `gravity`: acceleration of free fall (m/s^2).
+    - `restitution`: coefficient of restitution, between 0 and 1.
+    - `amplitude`: amplitude of the floor's motion (m); zero for a floor at rest.
+    - `frequency`: angular frequency of the floor's motion (rad/s).
+    """
+
+    state_names: ClassVar[tuple[str, ...]] = ("height", "velocity")
+    state_units: ClassVar[tuple[str, ...]] = ("m", "m/s")
+
+    gravity: jax.Array = parameter(9.81)
+    restitution: jax.Array = parameter(0.8)
+    amplitude: jax.Array = parameter(0.0)
+    frequency: jax.Array = parameter(1.0)
+
+    def vector_field(self, t, state) -> jax.Array:
+        """Velocity and acceleration, shape `(2,)`."""
+        del t
+        return jnp.stack([state[1], -self.gravity])
+
+    def gap(self, t, state) -> jax.Array:
+        """Height above the floor (m), a scalar."""
+        return state[0] - self.amplitude * jnp.sin(self.frequency * t)
+
+    def impact(self, t, state) -> jax.Array:
+        """State after an impact: the velocity relative to the floor is reversed."""
+        floor_velocity = self.amplitude * self.frequency * jnp.cos(self.frequency * t)
+        velocity = state[1] - floor_velocity
+        return jnp.stack([state[0], state[1] - (1 + self.restitution) * velocity])
+
+    @property
+    def period(self) -> jax.Array:
+        """Period of the floor's motion (s), also where its amplitude is zero."""
+        return 2 * jnp.pi / self.frequency
+
+    def check(self) -> None:
+        """Raise `ValueError` where a parameter has no physical meaning."""
+        require_positive(gravity=self.gravity, frequency=self.frequency)
+        require_restitution(self.restitution)
+        require_finite(amplitude=self.amplitude)

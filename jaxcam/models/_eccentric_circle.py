@@ -1,0 +1,103 @@
+"""The thesis' cam: a circular disc that turns about a point off its centre."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from ._fourier_profile import FourierProfile
+from ._parameters import is_concrete, parameter, require_finite, require_positive
+from ._profile import CamProfile
+
+
+#: largest part of the profile (rad) that its Fourier series may leave out
+_TAIL = 1e-13
+
+
+class EccentricCircle(CamProfile):
+    """A flat follower, hinged at the origin, on an eccentric circular cam. (4.23)
+
+    The defaults are Table 4.4.
+
+    **Arguments:**
+
+    - `radius`: radius of the cam R (m).
+    - `eccentricity`: distance of its centre from the axis it turns about, e (m).
+    - `center_x`, `center_y`: the axis it turns about (x0, y0), from the follower's
+        hinge (m).
+    - `half_height`: distance of the follower's flat face from its hinge, d (m).
+    - `harmonics`: number of harmonics that `prepared` keeps.
+    """
+
+    radius: jax.Array = parameter(0.045)
+    eccentricity: jax.Array = parameter(0.015)
+    center_x: jax.Array = parameter(0.249)
+    center_y: jax.Array = parameter(0.0)
+    half_height: jax.Array = parameter(0.021)
+    harmonics: int = eqx.field(default=16, static=True)
+
+    def __check_init__(self):
+        if self.harmonics < 1:
+            raise ValueError(
+                f"Keep at least one of the `harmonics`; they are {self.harmonics}."
+            )
+
+    def __call__(self, cam_angle) -> jax.Array:
+        x = self.eccentricity * jnp.cos(cam_angle) + self.center_x
+        y = self.eccentricity * jnp.sin(cam_angle) + self.center_y
+        height = self.radius + self.half_height
+        return jnp.arcsin(height / jnp.sqrt(x * x + y * y)) + jnp.arctan2(y, x)
+
+    def prepared(self) -> FourierProfile:
+        """The same profile as a Fourier series, differentiable in the geometry.
+
+        The coefficients come from an FFT of (4.23) over one turn.
+
+        **Raises:** `ValueError` if the harmonics left out add up to more than
+        1e-13 rad. Inside `jax.jit` the values cannot be seen and nothing is raised;
+        call `check` before.
+        """
+        mean, cosines, sines = self._spectrum()
+        keep = self.harmonics
+        if is_concrete(cosines, sines):
+            tail = np.max(
+                np.sum(np.hypot(cosines[..., keep:], sines[..., keep:]), axis=-1)
+            )
+            if not tail <= _TAIL:
+                raise ValueError(
+                    f"Raise `harmonics` of the cam profile: the {keep} kept now leave "
+                    f"out up to {tail:.1e} rad of it."
+                )
+        return FourierProfile(mean, cosines[:keep], sines[:keep])
+
+    def check(self) -> None:
+        """Raise `ValueError` for an impossible geometry or too few harmonics."""
+        require_positive(radius=self.radius, half_height=self.half_height)
+        require_finite(
+            eccentricity=self.eccentricity,
+            center_x=self.center_x,
+            center_y=self.center_y,
+        )
+        offset = np.abs(self.eccentricity)
+        if not np.all(np.asarray(self.center_x) > offset):
+            raise ValueError(
+                "Place the cam's axis to the right of the follower's hinge: `center_x` "
+                "must exceed `eccentricity`."
+            )
+        nearest = np.hypot(self.center_x, self.center_y) - offset
+        if not np.all(nearest > np.asarray(self.radius + self.half_height)):
+            raise ValueError(
+                "Move the cam away from the follower's hinge, or make it smaller: the "
+                "distance of its centre from the hinge must exceed `radius + "
+                "half_height` at every cam angle."
+            )
+        self.prepared()
+
+    def _spectrum(self):
+        # four times the kept harmonics: what is folded back onto them by sampling is
+        # then far smaller than the first harmonic left out
+        points = max(64, 4 * self.harmonics)
+        angles = 2 * np.pi * np.arange(points) / points
+        spectrum = jnp.fft.rfft(self(jnp.asarray(angles, dtype=float))) / points
+        harmonics = spectrum[1 : points // 2]
+        return spectrum[0].real, 2 * harmonics.real, -2 * harmonics.imag

@@ -1,0 +1,86 @@
+"""A cam profile given by its Fourier coefficients."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax.custom_derivatives import SymbolicZero
+
+from ._parameters import parameter, require_finite
+from ._profile import CamProfile
+
+
+class FourierProfile(CamProfile):
+    """A profile `mean + sum_k cosines[k-1] cos(k a) + sines[k-1] sin(k a)`.
+
+    Smooth to all orders, and the cheapest profile: one sine and one cosine for any
+    number of harmonics.
+
+    **Arguments:**
+
+    - `mean`: contact angle averaged over a turn (rad).
+    - `cosines`, `sines`: coefficients of harmonics 1, 2, ... (rad), both of shape
+        `(harmonics,)`.
+
+    **Raises:** `ValueError` if the two lists are empty or differ in length.
+    """
+
+    mean: jax.Array = parameter()
+    cosines: jax.Array = parameter()
+    sines: jax.Array = parameter()
+
+    def __check_init__(self):
+        if self.cosines.shape != self.sines.shape or self.cosines.size == 0:
+            raise ValueError(
+                "Give as many sines as cosines, one of each for at least one harmonic; "
+                f"their shapes are {self.sines.shape} and {self.cosines.shape}."
+            )
+
+    def __call__(self, cam_angle) -> jax.Array:
+        return _series(cam_angle, self.mean, self.cosines, self.sines)
+
+    def check(self) -> None:
+        require_finite(mean=self.mean, cosines=self.cosines, sines=self.sines)
+
+
+def _sum(angle, mean, cosines, sines):
+    # Clenshaw's recurrence, for the cosine and the sine sum side by side. The loop is
+    # unrolled in Python: inside a simulation's loop it must fuse into plain arithmetic.
+    # It starts at the last coefficients, since the compiler would keep products with 0.
+    cosine, sine = jnp.cos(angle), jnp.sin(angle)
+    twice = 2 * cosine
+    c1, s1 = cosines[-1], sines[-1]
+    c2 = s2 = jnp.zeros_like(c1)
+    for k in reversed(range(cosines.shape[-1] - 1)):
+        c1, c2 = cosines[k] + twice * c1 - c2, c1
+        s1, s2 = sines[k] + twice * s1 - s2, s1
+    return mean + (cosine * c1 - c2) + sine * s1
+
+
+# The derivative of a series is again a series. Saying so halves the work of gap,
+# velocity, acceleration and jerk together, against differentiating the recurrence.
+_series = jax.custom_jvp(_sum)
+
+
+def _series_jvp(primals, tangents):
+    angle, mean, cosines, sines = primals
+    angle_dot, *coefficients_dot = tangents
+    value = _series(angle, mean, cosines, sines)
+    tangent = jnp.zeros_like(value)
+    if not _is_zero(angle_dot):
+        order = np.arange(1, cosines.shape[-1] + 1, dtype=cosines.dtype)
+        slope = _series(angle, jnp.zeros_like(mean), order * sines, -order * cosines)
+        tangent = tangent + slope * angle_dot
+    if not all(map(_is_zero, coefficients_dot)):
+        given = [
+            jnp.zeros(dot.shape, dot.dtype) if _is_zero(dot) else dot
+            for dot in coefficients_dot
+        ]
+        tangent = tangent + _series(angle, *given)
+    return value, tangent
+
+
+def _is_zero(tangent) -> bool:
+    return isinstance(tangent, SymbolicZero)
+
+
+_series.defjvp(_series_jvp, symbolic_zeros=True)

@@ -1,0 +1,66 @@
+"""The forced linear oscillator with a rigid wall."""
+
+from typing import ClassVar
+
+import jax
+import jax.numpy as jnp
+
+from ..hybrid import HybridSystem
+from ._parameters import (
+    parameter,
+    require_finite,
+    require_not_negative,
+    require_positive,
+    require_restitution,
+)
+
+
+class ImpactOscillator(HybridSystem):
+    """`x'' + 2 damping x' + x = cos(omega t)` with `x <= wall`; state (x, x').
+
+    Dimensionless. Many of its periodic orbits and their bifurcations are known in
+    closed form.
+
+    **Arguments:**
+
+    - `omega`: angular frequency of the forcing.
+    - `restitution`: coefficient of restitution at the wall, between 0 and 1.
+    - `wall`: position of the wall.
+    - `damping`: damping ratio.
+    """
+
+    state_names: ClassVar[tuple[str, ...]] = ("position", "velocity")
+    state_units: ClassVar[tuple[str, ...]] = ("-", "-")
+
+    omega: jax.Array = parameter(2.8)
+    restitution: jax.Array = parameter(0.8)
+    wall: jax.Array = parameter(0.0)
+    damping: jax.Array = parameter(0.0)
+
+    def vector_field(self, t, state) -> jax.Array:
+        """Velocity and acceleration, shape `(2,)`."""
+        x, velocity = state[0], state[1]
+        acceleration = jnp.cos(self.omega * t) - x - 2 * self.damping * velocity
+        return jnp.stack([velocity, acceleration])
+
+    def gap(self, t, state) -> jax.Array:
+        """Distance to the wall, a scalar."""
+        del t
+        return self.wall - state[0]
+
+    def impact(self, t, state) -> jax.Array:
+        """State after an impact: the velocity is multiplied by -restitution."""
+        del t
+        return jnp.stack([state[0], -self.restitution * state[1]])
+
+    @property
+    def period(self) -> jax.Array:
+        """Period of the forcing."""
+        return 2 * jnp.pi / self.omega
+
+    def check(self) -> None:
+        """Raise `ValueError` where a parameter has no physical meaning."""
+        require_positive(omega=self.omega)
+        require_restitution(self.restitution)
+        require_finite(wall=self.wall)
+        require_not_negative(damping=self.damping)

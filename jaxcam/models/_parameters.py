@@ -1,0 +1,55 @@
+"""Parameters of models: how they are stored, and what makes one meaningless."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax.core import Tracer
+
+
+def as_parameter(value) -> jax.Array:
+    """A number, list or traced value as a floating-point array."""
+    return jnp.asarray(value, dtype=float)
+
+
+def parameter(default=None):
+    """A floating-point field; without a default it must be given."""
+    if default is None:
+        return eqx.field(converter=as_parameter)
+    return eqx.field(default=default, converter=as_parameter)
+
+
+def is_concrete(*values) -> bool:
+    """Whether all values can be looked at, which they cannot inside a `jax.jit`."""
+    return not any(isinstance(value, Tracer) for value in values)
+
+
+def require_finite(**values) -> None:
+    for name, value in values.items():
+        if not np.all(np.isfinite(value)):
+            raise ValueError(f"Give a finite number for `{name}`; it is {value}.")
+
+
+def require_positive(**values) -> None:
+    require_finite(**values)
+    for name, value in values.items():
+        if not np.all(np.asarray(value) > 0):
+            raise ValueError(f"Give a positive number for `{name}`; it is {value}.")
+
+
+def require_not_negative(**values) -> None:
+    require_finite(**values)
+    for name, value in values.items():
+        if not np.all(np.asarray(value) >= 0):
+            raise ValueError(
+                f"Give a number that is not negative for `{name}`; it is {value}."
+            )
+
+
+def require_restitution(value, where: str = "") -> None:
+    """Restitution outside [0, 1] would let a body stick in, or gain energy."""
+    if not np.all((np.asarray(value) >= 0) & (np.asarray(value) <= 1)):
+        raise ValueError(
+            "Choose a coefficient of restitution between 0 and 1; it is "
+            f"{value}{where}."
+        )

@@ -1,0 +1,73 @@
+"""Laws of restitution: how much of the approach speed an impact gives back."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+
+from ._parameters import parameter
+from ._units import rad_s_to_rpm
+
+
+# Laws are called as `law(speed, approach_speed)`, with the speed of the drive (rad/s)
+# and the magnitude of the normal velocity just before the impact, in the units of the
+# gap a second. Any Module with this call is a law.
+
+
+class ConstantRestitution(eqx.Module):
+    """The same coefficient of restitution in every impact.
+
+    **Arguments:**
+
+    - `r`: coefficient of restitution, between 0 and 1.
+    """
+
+    r: jax.Array = parameter()
+
+    def __call__(self, speed, approach_speed) -> jax.Array:
+        del speed, approach_speed
+        return self.r
+
+
+class LinearInSpeed(eqx.Module):
+    """Restitution that grows linearly with the speed of the drive, kept in [0, 1].
+
+    The thesis identifies such a law (section 4.6.1, Figure 4.15) but does not print
+    it. Its Table 5.2 does so indirectly: free flight is conservative, hence the
+    product of the two multipliers of an orbit with one impact a turn is r^2. The
+    defaults are the line through the ten values of r found that way, rounded (which
+    moves r by 5e-7).
+
+    **Arguments:**
+
+    - `slope`: change of the coefficient with the speed (s/rad).
+    - `intercept`: value of the line at speed zero.
+    """
+
+    slope: jax.Array = parameter(rad_s_to_rpm(0.00795658))
+    intercept: jax.Array = parameter(-0.62122908)
+
+    def __call__(self, speed, approach_speed) -> jax.Array:
+        del approach_speed
+        return jnp.clip(self.slope * speed + self.intercept, 0.0, 1.0)
+
+
+class PowerLawRestitution(eqx.Module):
+    """Restitution that falls with the approach speed: r = r0 (1 + v / v_ref)^-b.
+
+    **Arguments:**
+
+    - `r0`: coefficient of the slowest impacts, between 0 and 1.
+    - `reference_speed`: approach speed at which the coefficient has fallen to
+        r0 / 2^b, in the units of the gap a second.
+    - `exponent`: b; zero makes the coefficient constant.
+    """
+
+    r0: jax.Array = parameter()
+    reference_speed: jax.Array = parameter()
+    exponent: jax.Array = parameter()
+
+    def __call__(self, speed, approach_speed) -> jax.Array:
+        del speed
+        # log1p keeps full accuracy for the slow impacts at the end of chatter
+        fall = jnp.log1p(approach_speed / self.reference_speed)
+        return self.r0 * jnp.exp(-self.exponent * fall)

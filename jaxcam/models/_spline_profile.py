@@ -1,0 +1,181 @@
+"""A cam profile given by a table of measured or designed points."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from ._parameters import as_parameter, is_concrete, parameter
+from ._profile import CamProfile
+
+
+_TURN = 2 * np.pi
+_FEWEST_POINTS = 6
+# A quintic c0 + c1 u + ... + c5 u^5 from value, slope and curvature at 0 and at 1.
+_HERMITE = np.array(
+    [
+        [1.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+        [0.0, 1.0, 0.0, 0.0, 0.0, 0.0],
+        [0.0, 0.0, 0.5, 0.0, 0.0, 0.0],
+        [-10.0, -6.0, -1.5, 10.0, -4.0, 0.5],
+        [15.0, 8.0, 1.5, -15.0, 7.0, -1.0],
+        [-6.0, -3.0, -0.5, 6.0, -3.0, 0.5],
+    ]
+)
+
+
+class SplineProfile(CamProfile):
+    """The periodic quintic spline through a table of points, continuous to order four.
+
+    **Arguments:**
+
+    - `angles`: cam angles (rad), shape `(points,)`, strictly increasing within one
+        turn, evenly spaced or not. The first point may be repeated a turn later.
+    - `lifts`: the follower's contact angles there (rad), shape `(points,)`.
+
+    The coefficients need a dense solve of twice as many unknowns as points. They are
+    found once for each simulation; thousands of points are better smoothed first.
+
+    **Raises:** `ValueError` if the table is too short, is not finite or not
+    increasing, spans more than a turn, does not close, or looks like degrees.
+    """
+
+    angles: jax.Array
+    lifts: jax.Array
+
+    def __init__(self, angles, lifts):
+        angles, lifts = as_parameter(angles), as_parameter(lifts)
+        if angles.ndim != 1 or angles.shape != lifts.shape:
+            raise ValueError(
+                "Give one list of cam angles and one of lifts of the same length; "
+                f"their shapes are {angles.shape} and {lifts.shape}."
+            )
+        if is_concrete(angles, lifts):
+            keep = _checked_table(np.asarray(angles), np.asarray(lifts))
+            angles, lifts = angles[:keep], lifts[:keep]
+        self.angles = angles
+        self.lifts = lifts
+
+    def __call__(self, cam_angle) -> jax.Array:
+        return self.prepared()(cam_angle)
+
+    def prepared(self) -> "PiecewiseProfile":
+        """The spline's polynomial pieces, differentiable in the table."""
+        widths = jnp.diff(self.angles, append=self.angles[:1] + _TURN)
+        coefficients = _quintic_pieces(widths, self.lifts)
+        return PiecewiseProfile(self.angles, widths, coefficients)
+
+    def check(self) -> None:
+        """Raise `ValueError` for a table that is no profile."""
+        _checked_table(np.asarray(self.angles), np.asarray(self.lifts))
+
+
+class PiecewiseProfile(CamProfile):
+    """A periodic profile of polynomial pieces; `SplineProfile.prepared` makes it.
+
+    **Arguments:**
+
+    - `starts`: cam angle at which each piece begins (rad), shape `(pieces,)`.
+    - `widths`: length of each piece (rad), shape `(pieces,)`.
+    - `coefficients`: shape `(pieces, order)`, lowest power first, of the fraction of
+        the piece that has been passed.
+    """
+
+    starts: jax.Array = parameter()
+    widths: jax.Array = parameter()
+    coefficients: jax.Array = parameter()
+
+    def __call__(self, cam_angle) -> jax.Array:
+        angle = jnp.mod(cam_angle - self.starts[0], _TURN)
+        starts = self.starts - self.starts[0]
+        # unrolled: an inner loop would keep a simulation's loop from fusing
+        after = jnp.searchsorted(starts, angle, side="right", method="scan_unrolled")
+        piece = after - 1
+        local = (angle - starts[piece]) / self.widths[piece]
+        coefficients = self.coefficients[piece]
+        value = coefficients[..., -1]
+        for k in reversed(range(self.coefficients.shape[-1] - 1)):
+            value = coefficients[..., k] + local * value
+        return value
+
+
+@jax.jit
+def _quintic_pieces(widths, lifts):
+    # Unknown are slope and curvature at each point. With them and the lifts each piece
+    # is a quintic Hermite polynomial, and continuity of the third and fourth derivative
+    # at each point are as many linear equations. Scaled by the mean width so that the
+    # equations are well balanced for tables of any length.
+    points = widths.shape[0]
+    scale = _TURN / points
+    h = widths / scale
+    hermite = jnp.asarray(_HERMITE, dtype=widths.dtype)
+    following = np.roll(np.arange(points), -1)
+
+    # value, h slope, h^2 curvature at both ends -> third and fourth derivative there
+    third = 6 * hermite[3], 6 * hermite[3] + 24 * hermite[4] + 60 * hermite[5]
+    fourth = 24 * hermite[4], 24 * hermite[4] + 120 * hermite[5]
+    powers = jnp.stack([jnp.ones_like(h), h, h**2] * 2, axis=-1)
+
+    # the columns that belong to the points i, i + 1 and i + 2
+    here = np.eye(points)
+    after, second = np.roll(here, 1, axis=1), np.roll(here, 2, axis=1)
+    rows = []
+    for derivative, order in ((third, 3), (fourth, 4)):
+        # at the end of piece i, minus at the start of piece i + 1, is zero
+        weights = powers / h[:, None] ** order
+        end = derivative[1][None] * weights
+        begin = (derivative[0][None] * weights)[following]
+        rows.append(
+            [
+                end[:, k, None] * here
+                + (end[:, k + 3] - begin[:, k])[:, None] * after
+                - begin[:, k + 3, None] * second
+                for k in range(3)
+            ]
+        )
+    known = jnp.concatenate([row[0] for row in rows]) @ lifts
+    unknown = jnp.block([row[1:] for row in rows])
+    slope, curvature = jnp.linalg.solve(unknown, -known).reshape(2, points)
+
+    ends = jnp.stack([lifts, slope, curvature], axis=-1)
+    ends = jnp.concatenate([ends, ends[following]], axis=-1) * powers
+    return ends @ hermite.T
+
+
+def _checked_table(angles, lifts) -> int:
+    """Number of points to keep: all, or all but a repetition of the first."""
+    if len(angles) < _FEWEST_POINTS:
+        raise ValueError(
+            f"Give at least {_FEWEST_POINTS} points of the cam profile; there are "
+            f"{len(angles)}."
+        )
+    if not (np.all(np.isfinite(angles)) and np.all(np.isfinite(lifts))):
+        raise ValueError(
+            "Remove the points of the cam profile whose angle or lift is not finite."
+        )
+    if not np.all(np.diff(angles) > 0):
+        index = int(np.argmin(np.diff(angles) > 0))
+        raise ValueError(
+            "Sort the cam profile by strictly increasing cam angle: point "
+            f"{index + 1} at {angles[index + 1]} does not come after {angles[index]}."
+        )
+    span = angles[-1] - angles[0]
+    if span > _TURN * (1 + 1e-6):
+        hint = "; it looks like degrees, see `numpy.deg2rad`" if span > 90 else ""
+        raise ValueError(
+            "Give the cam angles in radians and within one turn: the table spans "
+            f"{span:g}{hint}."
+        )
+    if np.max(np.abs(lifts)) >= np.pi / 2:
+        raise ValueError(
+            "Give the lifts in radians, between -pi/2 and pi/2: the largest is "
+            f"{np.max(np.abs(lifts)):g}, which looks like degrees."
+        )
+    if span < _TURN * (1 - 1e-6):
+        return len(angles)
+    jump = abs(lifts[-1] - lifts[0])
+    if jump > 1e-6:
+        raise ValueError(
+            "Make the cam profile close: its last point is the first one a turn later, "
+            f"but their lifts differ by {jump:.2e} rad."
+        )
+    return len(angles) - 1

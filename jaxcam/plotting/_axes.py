@@ -1,0 +1,52 @@
+"""Axes to draw on: those that are given, or a new figure; and what all axes share."""
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+
+# of the legend's font
+_LETTERS_PER_INCH = 11.0
+
+
+def one_axes(ax: Axes | None) -> Axes:
+    """The axes given, or those of a new figure."""
+    return plt.subplots()[1] if ax is None else ax
+
+
+def several_axes(axes, shape: tuple[int, int], **layout) -> tuple[Figure, np.ndarray]:
+    """A figure and its axes, shape `shape`; `layout` goes to `plt.subplots`.
+
+    **Raises:** `ValueError` where `axes` has another number of them.
+    """
+    rows, columns = shape
+    if axes is None:
+        return plt.subplots(rows, columns, squeeze=False, **layout)
+    axes = np.asarray(axes, dtype=object)
+    if axes.size != rows * columns:
+        raise ValueError(
+            f"This figure has {rows * columns} panels ({rows} rows, {columns} columns) "
+            f"and `axes` has {axes.size}; make them with "
+            f"`plt.subplots({rows}, {columns})` or leave `axes` out."
+        )
+    axes = axes.reshape(shape)
+    return axes[0, 0].figure, axes
+
+
+def legend_above(ax: Axes) -> None:
+    """A legend on top of the axes, where it hides no curve; in two rows if need be."""
+    handles, labels = ax.get_legend_handles_labels()
+    unique = dict(zip(labels, handles, strict=True))
+    if unique:
+        width = ax.get_window_extent().width / ax.figure.dpi
+        # the lines and spaces between take the room of about six letters each
+        letters = sum(map(len, unique)) + 6 * len(unique)
+        rows = 1 if letters <= _LETTERS_PER_INCH * width else 2
+        ax.legend(
+            unique.values(),
+            unique.keys(),
+            loc="lower left",
+            bbox_to_anchor=(0.0, 1.0),
+            ncols=-(-len(unique) // rows),
+        )

@@ -1,0 +1,128 @@
+"""A recording and simulations of it, a few turns of the cam, and what is left over."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from jaxtyping import ArrayLike
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from ..recordings import Recording
+from ._axes import legend_above, several_axes
+from ._channels import channel_label, name_and_unit
+from ._labels import labelled
+from ._prefix import scaled
+from ._style import BAND, CAM, RECORDED, styled
+
+
+@styled
+def compare_recording(
+    recording: Recording,
+    simulated: ArrayLike | Mapping[str, ArrayLike],
+    axes: Sequence[Axes] | np.ndarray | None = None,
+    *,
+    channel: str = "follower_angle_rad",
+    contact: ArrayLike | None = None,
+    noise: float | None = None,
+    turns: float = 3.0,
+    start: float | None = None,
+) -> Figure:
+    """Draw a recorded channel with its simulations, and the residuals below.
+
+    With a channel `cam_angle_rad` the horizontal axis counts turns of the cam, without
+    one it is time.
+
+    **Arguments:**
+
+    - `recording`: the run.
+    - `simulated`: the channel as simulated at the samples of the recording, shape
+        `(k,)`, NaN where it was not; or several of them by name.
+    - `axes`: two of them; a new figure without.
+    - `channel`: the channel to compare.
+    - `contact`: what the channel would be in contact with the cam, shape `(k,)`; drawn
+        as the surface below the motion.
+    - `noise`: standard deviation of a sample of the channel, in its unit; drawn as a
+        band of twice that on either side.
+    - `turns`: how many turns of the cam to draw; without a cam, all is drawn.
+    - `start`: where to begin (s), at the first sample without.
+
+    **Returns:** the figure.
+
+    **Raises:** `ValueError` where a simulation has another length than the recording.
+    """
+    runs = dict(simulated) if isinstance(simulated, Mapping) else {"": simulated}
+    runs = {name: _fitting(recording, values) for name, values in runs.items()}
+    samples = recording[channel]
+    over, keep, label = _horizontal(recording, turns, start)
+
+    figure, grid = several_axes(
+        axes, (2, 1), sharex=True, figsize=(6.4, 4.8), height_ratios=(2.2, 1)
+    )
+    above, below = grid[:, 0]
+    if contact is not None:
+        cam = _fitting(recording, contact)[keep]
+        above.plot(over[keep], cam, color=CAM, linewidth=1.0, label="cam")
+        floor = np.nanmin([np.nanmin(cam), samples[keep].min()])
+        above.fill_between(over[keep], cam, floor, color=CAM, alpha=0.25, linewidth=0)
+    above.plot(
+        over[keep],
+        samples[keep],
+        # wide and pale, so that it is seen behind a simulation that agrees with it
+        color=RECORDED,
+        linewidth=4.5,
+        label="recorded",
+    )
+    left_over = {name: samples - values for name, values in runs.items()}
+    kept = np.concatenate([values[keep] for values in left_over.values()])
+    name, unit = name_and_unit(channel)
+    factor, unit = scaled(unit, _largest(kept))
+    for k, (run, values) in enumerate(runs.items()):
+        above.plot(
+            over[keep],
+            values[keep],
+            color=f"C{k}",
+            linewidth=1.2,
+            label=f"simulated {run}".strip(),
+        )
+        below.plot(
+            over[keep], factor * left_over[run][keep], color=f"C{k}", linewidth=0.9
+        )
+    if noise is not None:
+        band = 2 * factor * noise
+        below.axhspan(-band, band, color=BAND, alpha=0.5, lw=0, label="noise ± 2σ")
+        legend_above(below)
+    below.axhline(0.0, color="black", linewidth=0.8)
+    above.set_ylabel(channel_label(channel))
+    below.set_ylabel(labelled("residual", unit))
+    below.set_xlabel(label)
+    legend_above(above)
+    figure.align_ylabels([above, below])
+    return figure
+
+
+def _fitting(recording: Recording, values: ArrayLike) -> np.ndarray:
+    array = np.asarray(values, dtype=float)
+    if array.shape != recording.time.shape:
+        raise ValueError(
+            f"{recording.name} has {len(recording)} samples and what is to be drawn "
+            f"with it has shape {array.shape}; sample it at `recording.time`."
+        )
+    return array
+
+
+def _horizontal(recording: Recording, turns: float, start: float | None):
+    """Horizontal positions, which samples are drawn, and the label."""
+    first = 0 if start is None else int(np.searchsorted(recording.time, start))
+    later = np.arange(len(recording)) >= first
+    if "cam_angle_rad" not in recording.channels:
+        return recording.time, later, labelled("time", "s")
+    turned = recording["cam_angle_rad"] / (2 * np.pi)
+    # the cam's angle grows or falls, as its sense of rotation says
+    turned = turned if turned[-1] >= turned[0] else -turned
+    begin = turned[min(first, len(turned) - 1)]
+    return turned - np.floor(begin), later & (turned - begin <= turns), "cam (turns)"
+
+
+def _largest(values: np.ndarray) -> float:
+    values = np.abs(values[np.isfinite(values)])
+    return float(values.max()) if len(values) else 0.0

@@ -1,0 +1,144 @@
+"""A trajectory as curves to draw: broken at impacts, rich in points between them."""
+
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from ..hybrid import Trajectory
+
+
+# points in a flight that is too short for the even sampling to see
+_SHORT_FLIGHT = 8
+
+
+class Curve(NamedTuple):
+    """What is drawn of a trajectory between two times.
+
+    A row of NaN ends every flight and every contact, so that a line through the rows
+    shows no jump; the jumps are apart.
+    """
+
+    time: Float[np.ndarray, " k"]
+    state: Float[np.ndarray, "k n"]
+    gap: Float[np.ndarray, "k constraints"]
+    #: (k,) whether the row belongs to a contact
+    contact: Bool[np.ndarray, " k"]
+    impact_time: Float[np.ndarray, " impacts"]
+    before: Float[np.ndarray, "impacts n"]
+    after: Float[np.ndarray, "impacts n"]
+    #: (contacts, 2) start and end (s)
+    contacts: Float[np.ndarray, "contacts 2"]
+
+
+class Hits(NamedTuple):
+    """The impacts within a span of time, without padding."""
+
+    time: Float[np.ndarray, " k"]
+    before: Float[np.ndarray, "k n"]
+    after: Float[np.ndarray, "k n"]
+    constraint: Int[np.ndarray, " k"]
+    #: speed of approach, positive
+    speed: Float[np.ndarray, " k"]
+
+
+def window(
+    trajectory: Trajectory, between: tuple[float, float] | None
+) -> tuple[float, float]:
+    """The span of time (s) to draw; the whole trajectory for `None`.
+
+    **Raises:** `ValueError` where the trajectory does not cover it.
+    """
+    last = int(trajectory.steps.count) - 1
+    t0, t1 = float(trajectory.t0), float(np.asarray(trajectory.steps.time)[last])
+    if between is None:
+        return t0, t1
+    start, stop = float(between[0]), float(between[1])
+    if not t0 <= start < stop <= t1:
+        raise ValueError(
+            f"The trajectory covers {t0:g} to {t1:g} s; give `between` as two "
+            f"increasing times in it, not {start:g} and {stop:g}."
+        )
+    return start, stop
+
+
+def hits(trajectory: Trajectory, start: float, stop: float) -> Hits:
+    """The impacts with `start <= time <= stop`."""
+    impacts = trajectory.impacts
+    number = int(impacts.count)
+    time = np.asarray(impacts.time)[:number]
+    keep = (time >= start) & (time <= stop)
+
+    def kept(values):
+        return np.asarray(values)[:number][keep]
+
+    return Hits(
+        time[keep],
+        kept(impacts.before),
+        kept(impacts.after),
+        kept(impacts.constraint),
+        np.abs(kept(impacts.speed_before)),
+    )
+
+
+def contact_spans(
+    trajectory: Trajectory, start: float, stop: float
+) -> Float[np.ndarray, "contacts 2"]:
+    """Start and end of every contact that overlaps the span, cut to it."""
+    contacts = trajectory.contacts
+    spans = np.stack([np.asarray(contacts.start), np.asarray(contacts.end)], axis=1)
+    spans = spans[: int(contacts.count)].clip(start, stop)
+    return spans[spans[:, 1] > spans[:, 0]]
+
+
+def curve(
+    trajectory: Trajectory,
+    between: tuple[float, float] | None = None,
+    samples: int = 1500,
+) -> Curve:
+    """The part of a trajectory within `between` (s), with about `samples` points."""
+    start, stop = window(trajectory, between)
+    found = hits(trajectory, start, stop)
+    spans = contact_spans(trajectory, start, stop)
+    knots = np.unique(np.concatenate([[start, stop], found.time, spans.ravel()]))
+    pieces = [
+        np.linspace(a, b, _points((b - a) / (stop - start), samples))
+        for a, b in zip(knots[:-1], knots[1:], strict=True)
+    ]
+    ends = np.cumsum([len(piece) for piece in pieces])
+    time = np.concatenate(pieces)
+    padded = _padded(time)
+    state = np.array(trajectory.at(padded))[: len(time)]
+    gap = np.asarray(trajectory.gap(padded))[: len(time)].reshape(len(time), -1)
+
+    # `at` answers with the state after an impact; a flight ends in the one before
+    for end, knot in zip(ends, knots[1:], strict=True):
+        (hit,) = np.nonzero(found.time == knot)
+        if len(hit):
+            state[end - 1] = found.before[hit[0]]
+
+    middles = (knots[:-1] + knots[1:]) / 2
+    held = np.any(
+        (middles[:, None] > spans[:, 0]) & (middles[:, None] < spans[:, 1]), 1
+    )
+    contact = np.repeat(held, [len(piece) for piece in pieces])
+    return Curve(
+        np.insert(time, ends, np.nan),
+        np.insert(state, ends, np.nan, axis=0),
+        np.insert(gap, ends, np.nan, axis=0),
+        np.insert(contact, ends, held),
+        found.time,
+        found.before,
+        found.after,
+        spans,
+    )
+
+
+def _points(part: float, samples: int) -> int:
+    return max(int(np.ceil(part * samples)) + 1, _SHORT_FLIGHT)
+
+
+def _padded(times):
+    # a power of two, so that few programs are compiled for many figures
+    size = 1 << (len(times) - 1).bit_length()
+    return np.pad(times, (0, size - len(times)), mode="edge")

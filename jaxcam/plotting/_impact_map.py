@@ -1,0 +1,107 @@
+"""Each impact against the one before: its phase (or time) and its speed."""
+
+from collections.abc import Sequence
+from typing import Literal
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from ..hybrid import Trajectory
+from ._axes import legend_above, several_axes
+from ._curve import Hits, hits, window
+from ._labels import labelled, speed_unit, time_unit
+from ._style import BAND, IMPACT, styled
+
+
+# speeds that differ by more than this factor are drawn on a logarithmic scale
+_MANY_SCALES = 1e3
+
+
+@styled
+def impact_map(
+    trajectory: Trajectory,
+    axes: Sequence[Axes] | np.ndarray | None = None,
+    *,
+    against: Literal["phase", "time"] = "phase",
+    period: float | None = None,
+    between: tuple[float, float] | None = None,
+) -> Figure:
+    """Draw impact k+1 against impact k, with the line on which they are equal.
+
+    The first panel shows when the impacts happen, the second their speed of approach
+    (the normal speed just before). Points on the line are impacts that repeat.
+
+    **Arguments:**
+
+    - `trajectory`: what `jaxcam.simulate` returned.
+    - `axes`: two of them; a new figure without.
+    - `against`: "phase" for the phase of the forcing (rad, from 0 to 2 pi), "time" for
+        the time itself (s), which is also drawn where there is no period.
+    - `period`: of the forcing (s); the system's own without.
+    - `between`: the span of time to draw (s), for example without a transient.
+
+    **Returns:** the figure.
+
+    **Raises:** `ValueError` for another `against` or a wrong number of axes.
+    """
+    if against not in ("phase", "time"):
+        raise ValueError(f'against is {against!r}; choose "phase" or "time".')
+    system = trajectory.system
+    period = system.period if period is None else period
+    found = hits(trajectory, *window(trajectory, between))
+    figure, grid = several_axes(axes, (1, 2), figsize=(6.8, 3.2))
+    left, right = grid[0]
+    if against == "phase" and period is not None:
+        turns = np.mod(found.time / float(period), 1.0)
+        _draw(left, 2 * np.pi * turns, found, "phase", "rad", (0.0, 2 * np.pi))
+        ticks = np.arange(5) * np.pi / 2
+        names = ["0", r"$\pi/2$", r"$\pi$", r"$3\pi/2$", r"$2\pi$"]
+        left.set_xticks(ticks, names)
+        left.set_yticks(ticks, names)
+    else:
+        _draw(left, found.time, found, "time", time_unit(system), None)
+    wide = len(found.speed) > 1 and found.speed.max() > _MANY_SCALES * found.speed.min()
+    if wide and found.speed.min() > 0:
+        right.set_xscale("log")
+        right.set_yscale("log")
+    _draw(right, found.speed, found, "speed", speed_unit(system), None)
+    if np.ptp(found.constraint) if len(found.constraint) else False:
+        legend_above(right)
+    return figure
+
+
+def _draw(ax: Axes, values, found: Hits, name: str, unit: str, limits) -> None:
+    if limits is None:
+        limits = _limits(values, ax.get_xscale() == "log")
+    ax.plot(limits, limits, color=BAND, linewidth=1.2, zorder=1, label="_identity")
+    this, following = values[:-1], values[1:]
+    kinds = np.unique(found.constraint)
+    for k in kinds:
+        # the constraint that the later of the two impacts hits
+        chosen = found.constraint[1:] == k
+        ax.plot(
+            this[chosen],
+            following[chosen],
+            "o",
+            color=IMPACT if len(kinds) == 1 else f"C{k}",
+            markersize=4,
+            markeredgecolor="white",
+            markeredgewidth=0.4,
+            label=f"constraint {k}",
+        )
+    ax.set_xlim(*limits)
+    ax.set_ylim(*limits)
+    ax.set_aspect("equal", adjustable="box")
+    ax.set_xlabel(labelled(f"{name} of impact $k$", unit))
+    ax.set_ylabel(labelled(f"{name} of impact $k+1$", unit))
+
+
+def _limits(values, logarithmic: bool) -> tuple[float, float]:
+    if not len(values):
+        return 0.0, 1.0
+    low, high = float(values.min()), float(values.max())
+    if logarithmic:
+        return low / 1.5, high * 1.5
+    room = 0.05 * (high - low) or 0.05 * abs(high) or 1.0
+    return low - room, high + room

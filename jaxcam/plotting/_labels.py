@@ -1,0 +1,53 @@
+"""Axis labels: a name and a unit for every quantity of a system."""
+
+from ..hybrid import HybridSystem
+
+
+def labelled(name: str, unit: str) -> str:
+    """`name (unit)`; a dimensionless quantity has the unit -."""
+    return f"{name} ({_dash(unit)})"
+
+
+def state_label(system: HybridSystem, component: int) -> str:
+    """Label of one component of the state."""
+    names, units = system.state_names, system.state_units
+    name = names[component] if component < len(names) else f"$x_{{{component + 1}}}$"
+    unit = units[component] if component < len(units) else "-"
+    return labelled(name, unit)
+
+
+def gap_unit(system: HybridSystem) -> str:
+    """Unit of the gap: `gap_unit` of the system, or else that of its first state.
+
+    A system whose gap is not in the unit of its first state declares
+    `gap_unit: ClassVar[str] = "m"`.
+    """
+    units = system.state_units
+    return getattr(system, "gap_unit", "") or (units[0] if units else "-")
+
+
+def gap_label(system: HybridSystem) -> str:
+    return labelled("gap", gap_unit(system))
+
+
+def time_unit(system: HybridSystem) -> str:
+    """Seconds, or - for a system all of whose states are dimensionless."""
+    units = system.state_units
+    return "-" if units and all(unit in ("-", "") for unit in units) else "s"
+
+
+def time_label(system: HybridSystem) -> str:
+    return labelled("time", time_unit(system))
+
+
+def speed_unit(system: HybridSystem) -> str:
+    """Unit of the normal velocity, the rate of change of the gap."""
+    unit, time = gap_unit(system), time_unit(system)
+    if time == "-":
+        return unit
+    return f"1/{time}" if unit in ("-", "") else f"{unit}/{time}"
+
+
+def _dash(unit: str) -> str:
+    # a hyphen in parentheses is easily overlooked
+    return "–" if unit in ("-", "") else unit

@@ -1,0 +1,111 @@
+"""One component of the state against another, usually velocity against position."""
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from ..hybrid import Trajectory
+from ._axes import legend_above, one_axes
+from ._curve import Curve, curve, window
+from ._labels import state_label
+from ._style import CONTACT, FLIGHT, IMPACT, SECTION, styled
+
+
+@styled
+def phase_portrait(
+    trajectory: Trajectory,
+    ax: Axes | None = None,
+    *,
+    components: tuple[int, int] = (0, 1),
+    period: float | None = None,
+    phase: float = 0.0,
+    between: tuple[float, float] | None = None,
+    samples: int = 1500,
+) -> Axes:
+    """Draw a trajectory in the plane of two components of the state.
+
+    Flights and contacts are lines of different colour, jumps at impacts are thin and
+    dashed, and the stroboscopic points, one a period, are dots.
+
+    **Arguments:**
+
+    - `trajectory`: what `jaxcam.simulate` returned.
+    - `ax`: where to draw; a new figure without.
+    - `components`: which component goes to the right and which goes up.
+    - `period`: time between stroboscopic points (s); the period of the forcing without,
+        and no points for a system that has none.
+    - `phase`: time of the first point after t0 (s).
+    - `between`: the span of time to draw (s), the whole trajectory without.
+    - `samples`: points of a curve, besides those that short flights need.
+
+    **Returns:** the axes.
+    """
+    drawn = curve(trajectory, between, samples)
+    ax = one_axes(ax)
+    _draw_motion(ax, drawn, *components)
+    _draw_jumps(ax, drawn, *components)
+    points = _stroboscopic(trajectory, period, phase, between)
+    if len(points):
+        ax.plot(
+            points[:, components[0]],
+            points[:, components[1]],
+            "o",
+            color=SECTION,
+            markersize=5,
+            markeredgecolor="white",
+            markeredgewidth=0.6,
+            label="once a period",
+            zorder=4,
+        )
+    ax.set_xlabel(state_label(trajectory.system, components[0]))
+    ax.set_ylabel(state_label(trajectory.system, components[1]))
+    legend_above(ax)
+    return ax
+
+
+def _draw_motion(ax: Axes, drawn: Curve, right: int, up: int) -> None:
+    for held, colour, width, label in (
+        (False, FLIGHT, 1.3, "flight"),
+        (True, CONTACT, 2.6, "contact"),
+    ):
+        if np.any(drawn.contact == held):
+            shown = np.where((drawn.contact == held)[:, None], drawn.state, np.nan)
+            ax.plot(shown[:, right], shown[:, up], color=colour, lw=width, label=label)
+    # on a surface at rest a contact is a point, and its line cannot be seen
+    begins = np.flatnonzero(drawn.contact & ~np.roll(drawn.contact, 1))
+    ax.plot(
+        drawn.state[begins, right],
+        drawn.state[begins, up],
+        "s",
+        color=CONTACT,
+        markersize=6,
+        markeredgecolor="white",
+        zorder=3,
+    )
+
+
+def _draw_jumps(ax: Axes, drawn: Curve, right: int, up: int) -> None:
+    if not len(drawn.impact_time):
+        return
+    gap = np.full_like(drawn.before, np.nan)
+    jumps = np.stack([drawn.before, drawn.after, gap], axis=1)
+    jumps = jumps.reshape(-1, drawn.before.shape[1])
+    ax.plot(
+        jumps[:, right],
+        jumps[:, up],
+        color=IMPACT,
+        linestyle=(0, (4, 2)),
+        linewidth=0.8,
+        label="impact",
+    )
+
+
+def _stroboscopic(trajectory, period, phase, between) -> np.ndarray:
+    period = trajectory.system.period if period is None else period
+    if period is None:
+        return np.empty((0, 0))
+    start, stop = window(trajectory, between)
+    points = np.asarray(trajectory.stroboscopic(period, phase))
+    times = float(trajectory.t0) + phase + float(period) * np.arange(len(points))
+    # a point at the very end of the span is not lost to round-off
+    room = 1e-9 * float(period)
+    return points[(times >= start - room) & (times <= stop + room)]

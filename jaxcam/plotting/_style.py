@@ -1,0 +1,53 @@
+"""One style for all figures, and what its colours stand for."""
+
+import functools
+from collections.abc import Callable
+from pathlib import Path
+from typing import ParamSpec, TypeVar
+
+import matplotlib.pyplot as plt
+from matplotlib.figure import Figure
+
+
+_STYLE_FILE = Path(__file__).with_name("jaxcam.mplstyle")
+
+# colours of Okabe and Ito, by what they mean in every figure
+FLIGHT = "#0072B2"
+IMPACT = "#D55E00"
+CONTACT = "#E69F00"
+SECTION = "#000000"
+RECORDED = "#ABABAB"
+BAND = "#BDBDBD"
+CAM = "#E69F00"
+
+_P = ParamSpec("_P")
+_R = TypeVar("_R")
+
+
+def style():
+    """Context manager: figures made inside it follow the project's style."""
+    return plt.style.context(_STYLE_FILE)
+
+
+def styled(function: Callable[_P, _R]) -> Callable[_P, _R]:
+    """Draw in the project's style, and leave the reader's own settings as they were."""
+
+    @functools.wraps(function)
+    def wrapper(*args: _P.args, **kwargs: _P.kwargs) -> _R:
+        with style():
+            return function(*args, **kwargs)
+
+    return wrapper
+
+
+def save_figure(figure: Figure, path: str | Path) -> Path:
+    """Write a figure to a file, in the style's resolution, and close it.
+
+    The folder is made where it is missing; the ending of the name sets the format.
+    """
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with style():
+        figure.savefig(path)
+    plt.close(figure)
+    return path

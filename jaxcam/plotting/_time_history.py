@@ -1,0 +1,108 @@
+"""State and gap against time, with impacts marked and contacts shaded."""
+
+import textwrap
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from ..hybrid import Trajectory
+from ._axes import legend_above, several_axes
+from ._curve import Curve, curve
+from ._labels import gap_label, state_label, time_label
+from ._style import CONTACT, FLIGHT, IMPACT, styled
+
+
+@styled
+def time_history(
+    trajectory: Trajectory,
+    axes: Sequence[Axes] | np.ndarray | None = None,
+    *,
+    components: Sequence[int] | None = None,
+    between: tuple[float, float] | None = None,
+    samples: int = 1500,
+) -> Figure:
+    """Draw each component of the state, and the gap, against time.
+
+    Impacts are dots on the curves and thin dashed jumps; contacts are shaded.
+
+    **Arguments:**
+
+    - `trajectory`: what `jaxcam.simulate` returned.
+    - `axes`: one for each component and one more for the gap; a new figure without.
+    - `components`: the components to draw, all of them without.
+    - `between`: the span of time to draw (s), the whole trajectory without.
+    - `samples`: points of a curve, besides those that short flights need.
+
+    **Returns:** the figure.
+
+    **Raises:** `ValueError` for a wrong number of axes, or a span that the trajectory
+    does not cover.
+    """
+    drawn = curve(trajectory, between, samples)
+    system = trajectory.system
+    if components is None:
+        components = range(drawn.state.shape[1])
+    rows = len(components) + 1
+    figure, grid = several_axes(
+        axes, (rows, 1), sharex=True, figsize=(6.4, 1.2 + 1.45 * rows)
+    )
+    panels = grid[:, 0]
+    for ax, component in zip(panels[:-1], components, strict=True):
+        _draw_component(ax, drawn, component)
+        ax.set_ylabel(_narrow(state_label(system, component)))
+    _draw_gap(panels[-1], drawn)
+    panels[-1].set_ylabel(_narrow(gap_label(system)))
+    panels[-1].set_xlabel(time_label(system))
+    panels[-1].locator_params(axis="x", nbins=7)
+    for ax in panels:
+        _shade(ax, drawn)
+    legend_above(panels[0])
+    figure.align_ylabels(list(panels))
+    return figure
+
+
+def _draw_component(ax: Axes, drawn: Curve, component: int) -> None:
+    ax.plot(drawn.time, drawn.state[:, component], color=FLIGHT, label="state")
+    before, after = drawn.before[:, component], drawn.after[:, component]
+    jumps = np.stack([before, after, np.full_like(before, np.nan)], axis=1)
+    ax.plot(
+        np.repeat(drawn.impact_time, 3),
+        jumps.ravel(),
+        color=IMPACT,
+        linestyle=(0, (3, 2)),
+        linewidth=0.8,
+    )
+    _mark_impacts(ax, drawn.impact_time, before)
+
+
+def _draw_gap(ax: Axes, drawn: Curve) -> None:
+    number = drawn.gap.shape[1]
+    for k in range(number):
+        # one constraint needs no name, several are told apart by the colour cycle
+        one = number == 1
+        colour, label = (FLIGHT, None) if one else (f"C{k}", f"gap {k}")
+        ax.plot(drawn.time, drawn.gap[:, k], color=colour, label=label)
+    if number > 1:
+        legend_above(ax)
+    ax.axhline(0.0, color="black", linewidth=0.8)
+    _mark_impacts(ax, drawn.impact_time, np.zeros_like(drawn.impact_time))
+
+
+def _mark_impacts(ax: Axes, time, height) -> None:
+    if len(time):
+        ax.plot(time, height, ".", color=IMPACT, markersize=5, label="impact", zorder=3)
+
+
+def _shade(ax: Axes, drawn: Curve) -> None:
+    for start, end in drawn.contacts:
+        ax.axvspan(
+            start, end, color=CONTACT, alpha=0.3, linewidth=0, zorder=0, label="contact"
+        )
+
+
+def _narrow(label: str) -> str:
+    # a panel is lower than many labels are long
+    name, _, unit = label.rpartition(" (")
+    return f"{textwrap.fill(name, 17)}\n({unit}"

@@ -1,0 +1,45 @@
+"""Impacts without a model: places where the velocity of a smooth motion jumps up."""
+
+import numpy as np
+from jaxtyping import Float, Int
+from scipy.signal import find_peaks
+
+
+def find_kinks(
+    samples: Float[np.ndarray, " k"],
+    interval: float,
+    noise: float,
+    *,
+    window: float = 0.01,
+    threshold: float = 7.0,
+) -> Int[np.ndarray, " kinks"]:
+    """Index of the first sample after each jump in velocity.
+
+    Parabolas through the `window` (s) before and after each sample are compared; a
+    kink is a local maximum of the jump in slope that exceeds `threshold` of its
+    standard errors.
+    """
+    score = jump_score(samples, interval, noise, window)
+    apart = max(1, int(window / interval / 2))
+    return find_peaks(score, height=threshold, distance=apart)[0]
+
+
+def jump_score(
+    samples: Float[np.ndarray, " k"], interval: float, noise: float, window: float
+) -> Float[np.ndarray, " k"]:
+    """Jump in slope just before each sample over its standard error, shape `(k,)`."""
+    count = max(6, round(window / interval))
+    score = np.zeros(len(samples))
+    if len(samples) < 2 * count:
+        return score
+    # time is counted from half a sample before the first sample after the boundary
+    offsets = (np.arange(count) + 0.5) * interval
+    design = (offsets / offsets[-1])[:, None] ** np.arange(3)
+    slope = np.linalg.pinv(design)[1] / offsets[-1]
+    windows = np.lib.stride_tricks.sliding_window_view(samples, count)
+    after = windows @ slope
+    before = -(windows @ slope[::-1])
+    jump = after[count:] - before[:-count]
+    error = noise * np.sqrt(2 * np.sum(slope**2))
+    score[count : len(samples) - count + 1] = jump / error
+    return score

@@ -1,0 +1,87 @@
+"""Polynomials through one side of a boundary, with the errors of what they say."""
+
+import dataclasses
+
+import numpy as np
+from jaxtyping import Float
+
+
+@dataclasses.dataclass(frozen=True)
+class LocalFit:
+    """A polynomial in `time - origin` and the covariance of its coefficients."""
+
+    origin: float
+    coefficients: Float[np.ndarray, " p"]
+    covariance: Float[np.ndarray, " p p"]
+
+    def value(self, time: float) -> float:
+        return float(self._row(time) @ self.coefficients)
+
+    def slope(self, time: float) -> float:
+        return float(self._slope_row(time) @ self.coefficients)
+
+    def value_stderr(self, time: float) -> float:
+        row = self._row(time)
+        return float(np.sqrt(row @ self.covariance @ row))
+
+    def slope_stderr(self, time: float) -> float:
+        row = self._slope_row(time)
+        return float(np.sqrt(row @ self.covariance @ row))
+
+    def _row(self, time):
+        return (time - self.origin) ** np.arange(len(self.coefficients))
+
+    def _slope_row(self, time):
+        powers = np.arange(1, len(self.coefficients))
+        return np.concatenate([[0.0], powers * (time - self.origin) ** (powers - 1)])
+
+
+def fit_local(
+    time: Float[np.ndarray, " k"],
+    samples: Float[np.ndarray, " k"],
+    noise: float,
+    origin: float,
+) -> LocalFit:
+    """Least squares, of the degree that so many samples can bear: one to three.
+
+    **Arguments:**
+
+    - `noise`: standard deviation of a sample, which sets the covariance.
+    - `origin`: time at which the fit will be asked.
+    """
+    degree = 3 if len(time) >= 24 else 2 if len(time) >= 8 else 1
+    degree = min(degree, len(time) - 1)
+    # scaled to about one, or the normal matrix is near singular
+    scale = max(float(np.max(np.abs(time - origin))), np.finfo(float).tiny)
+    powers = np.arange(degree + 1)
+    design = ((time - origin) / scale)[:, None] ** powers
+    inverse = np.linalg.pinv(design)
+    unscale = scale**-powers.astype(float)
+    covariance = noise**2 * (inverse @ inverse.T) * np.outer(unscale, unscale)
+    return LocalFit(origin, (inverse @ samples) * unscale, covariance)
+
+
+def crossing(before: LocalFit, after: LocalFit, time: float) -> tuple[float, float]:
+    """Where two fits meet, and the standard error of that time (s), by Newton."""
+    for _ in range(5):
+        jump = after.slope(time) - before.slope(time)
+        if jump == 0:
+            break
+        time = time - (after.value(time) - before.value(time)) / jump
+    jump = after.slope(time) - before.slope(time)
+    error = np.hypot(before.value_stderr(time), after.value_stderr(time))
+    return float(time), float(error / abs(jump)) if jump else float("inf")
+
+
+def measured_noise(samples: Float[np.ndarray, " k"]) -> float:
+    """Standard deviation of white noise on a smooth signal, from third differences.
+
+    The few differences that stand out, as those across an impact do, are left out.
+    """
+    if len(samples) < 8:
+        return float("nan")
+    third = np.diff(samples, 3)
+    spread = np.median(np.abs(third)) / 0.6745
+    usual = third[np.abs(third) <= 5 * spread]
+    # a third difference of white noise has the variance 1 + 9 + 9 + 1
+    return float(np.sqrt(np.mean(usual**2) / 20))

@@ -1,0 +1,155 @@
+"""Recordings and cases from files."""
+
+import math
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from ._check import check_channels, check_drive, find_gaps
+from ._errors import RecordingError
+from ._recording import Case, Recording
+from ._table import read_table, SUFFIXES
+from ._units import si
+
+
+#: what a recording of a cam-follower rig must contain
+CAM_FOLLOWER = ("cam_angle_rad", "follower_angle_rad")
+
+
+def read_recordings(
+    file: str | Path,
+    *,
+    channels: Sequence[str] = (),
+    split: str | None = None,
+    gaps: Literal["refuse", "split"] = "refuse",
+) -> tuple[Recording, ...]:
+    """Every recording in one file: CSV with a header, plain or gz.
+
+    The end of a column's name is its unit; `_deg`, `_rpm`, `_ms`, `_mm` and the like
+    are converted and the column is renamed (`cam_angle_deg` -> `cam_angle_rad`). One
+    column is the time.
+
+    **Arguments:**
+
+    - `file`: the file. `..._150.7rpm.csv` in its name is the nominal speed.
+    - `channels`: columns that must be there (SI names).
+    - `split`: a column that numbers the runs in a file that holds several.
+    - `gaps`: `"refuse"` a record with samples missing, or `"split"` it in pieces.
+
+    **Returns:** a tuple of `Recording`, one for each run and piece.
+
+    **Raises:** `RecordingError`, one sentence that says what to do.
+    """
+    file = Path(file)
+    columns = {}
+    for name, numbers in read_table(file).items():
+        renamed, factor = (name, 1.0) if name == split else si(name)
+        if renamed in columns:
+            raise RecordingError(
+                f"{file}: two columns give `{renamed}` once their units are converted; "
+                f"remove one of them."
+            )
+        columns[renamed] = numbers * factor
+    _require(file, columns, ("time_s", *channels, *([split] if split else [])))
+
+    stem = _stem(file)
+    runs = {stem: np.arange(len(columns["time_s"]))}
+    if split is not None:
+        numbers = columns.pop(split)
+        runs = {
+            f"{stem}_{split}{number:g}": np.flatnonzero(numbers == number)
+            for number in np.unique(numbers)
+        }
+    speed = _nominal_speed(file)
+    recordings = []
+    for name, rows in runs.items():
+        time = columns["time_s"][rows]
+        values = {c: v[rows] for c, v in columns.items() if c != "time_s"}
+        breaks = find_gaps(f"{file}: {name}" if split else str(file), time, gaps)
+        pieces = np.split(np.arange(len(time)), breaks)
+        pieces = [piece for piece in pieces if len(piece) > 1]
+        for number, piece in enumerate(pieces, start=1):
+            recording = Recording(
+                name=name if len(pieces) == 1 else f"{name}_piece{number}",
+                time=time[piece],
+                channels={c: v[piece] for c, v in values.items()},
+                nominal_speed=speed,
+                meta={"file": str(file), "piece": number, "pieces": len(pieces)},
+            )
+            check_channels(recording)
+            check_drive(recording)
+            recordings.append(recording)
+    return tuple(recordings)
+
+
+def read_recording(
+    file: str | Path, *, channels: Sequence[str] = CAM_FOLLOWER
+) -> Recording:
+    """The one recording in a file; see `read_recordings` for files with several.
+
+    **Raises:** `RecordingError`, one sentence that says what to do.
+    """
+    (recording,) = read_recordings(file, channels=channels)
+    return recording
+
+
+def read_case(
+    folder: str | Path,
+    *,
+    channels: Sequence[str] = CAM_FOLLOWER,
+    split: str | None = None,
+    gaps: Literal["refuse", "split"] = "refuse",
+) -> Case:
+    """All recordings in a folder, in the order of their names.
+
+    **Arguments:** as for `read_recordings`; `channels=()` for something other than a
+    cam-follower rig.
+
+    **Raises:** `RecordingError`, one sentence that says what to do.
+    """
+    folder = Path(folder)
+    if not folder.exists():
+        raise RecordingError(f"{folder}: there is no such folder; check the path.")
+    if not folder.is_dir():
+        raise RecordingError(
+            f"{folder}: a case is a folder of recordings, and this is a file; name the "
+            f"folder that holds it."
+        )
+    files = sorted(
+        file for file in folder.iterdir() if file.is_file() and _is_table(file)
+    )
+    if not files:
+        cases = sorted(sub.name for sub in folder.iterdir() if sub.is_dir())
+        hint = f"; name one of its folders ({', '.join(cases[:4])})" if cases else ""
+        raise RecordingError(
+            f"{folder}: there is no recording (*.csv, *.csv.gz) in this folder{hint}."
+        )
+    recordings = []
+    for file in files:
+        recordings += read_recordings(file, channels=channels, split=split, gaps=gaps)
+    return Case(folder.resolve().name, tuple(recordings), folder)
+
+
+def _require(file, columns, needed) -> None:
+    missing = [name for name in needed if name not in columns]
+    if missing:
+        there = ", ".join(f"`{name}`" for name in columns)
+        raise RecordingError(
+            f"{file}: the column `{missing[0]}` is missing; the file has {there}."
+        )
+
+
+def _is_table(file: Path) -> bool:
+    return file.name.lower().endswith(SUFFIXES)
+
+
+def _stem(file: Path) -> str:
+    return re.sub(r"\.(csv|tsv)(\.gz)?$", "", file.name, flags=re.IGNORECASE)
+
+
+def _nominal_speed(file: Path) -> float | None:
+    found = re.search(r"(\d+(?:\.\d+)?)\s*rpm", file.name)
+    return float(found[1]) * 2 * math.pi / 60 if found else None

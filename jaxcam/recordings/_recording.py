@@ -1,0 +1,104 @@
+"""A recording is what the sensors of one run said; a case is a folder of runs."""
+
+import dataclasses
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from ._errors import RecordingError
+
+
+@dataclasses.dataclass(frozen=True)
+class Recording:
+    """One run of one rig, in SI units.
+
+    Arguments:
+
+    - `name`: the name of the run, for tables and messages.
+    - `time`: seconds, shape `(k,)`, strictly increasing.
+    - `channels`: what was measured, each of shape `(k,)`. The end of a name is the
+        unit: `follower_angle_rad`, `gyro_rad_s`, `height_m`.
+    - `nominal_speed`: speed of the drive as the file name states it (rad/s), or `None`.
+    - `meta`: anything else that is known (the file, the piece of it, ...).
+    """
+
+    name: str
+    time: Float[np.ndarray, " k"]
+    channels: Mapping[str, Float[np.ndarray, " k"]]
+    nominal_speed: float | None = None
+    meta: Mapping[str, Any] = dataclasses.field(default_factory=dict)
+
+    def __getitem__(self, channel: str) -> Float[np.ndarray, " k"]:
+        """The samples of one channel, shape `(k,)`.
+
+        **Raises:** `RecordingError` that lists the channels there are.
+        """
+        if channel not in self.channels:
+            raise RecordingError(
+                f"{self.name}: there is no channel `{channel}`; this recording has "
+                f"{_listed(self.channels)}."
+            )
+        return self.channels[channel]
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    @property
+    def interval(self) -> float:
+        """Time between samples (s), the median of it."""
+        return float(np.median(np.diff(self.time)))
+
+    @property
+    def duration(self) -> float:
+        """Time between the first and the last sample (s)."""
+        return float(self.time[-1] - self.time[0])
+
+    def between(self, start: float, stop: float) -> "Recording":
+        """The part with `start <= time < stop`, under the same name.
+
+        **Raises:** `RecordingError` where fewer than two samples are left.
+        """
+        keep = (self.time >= start) & (self.time < stop)
+        if keep.sum() < 2:
+            raise RecordingError(
+                f"{self.name}: there are fewer than two samples between {start:g} s "
+                f"and {stop:g} s; it runs from {self.time[0]:g} s to "
+                f"{self.time[-1]:g} s."
+            )
+        channels = {name: samples[keep] for name, samples in self.channels.items()}
+        return dataclasses.replace(self, time=self.time[keep], channels=channels)
+
+
+@dataclasses.dataclass(frozen=True)
+class Case:
+    """Several runs of the same rig, usually one folder of files."""
+
+    name: str
+    recordings: tuple[Recording, ...]
+    folder: Path | None = None
+
+    def __iter__(self) -> Iterator[Recording]:
+        return iter(self.recordings)
+
+    def __len__(self) -> int:
+        return len(self.recordings)
+
+    def __getitem__(self, index: int | str) -> Recording:
+        """A run by its place or by the beginning of its name (`"run4"`)."""
+        if isinstance(index, int):
+            return self.recordings[index]
+        found = [run for run in self.recordings if run.name.startswith(index)]
+        if len(found) != 1:
+            names = _listed(run.name for run in self.recordings)
+            raise RecordingError(
+                f"{self.name}: `{index}` is the beginning of {len(found)} names; the "
+                f"runs are {names}."
+            )
+        return found[0]
+
+
+def _listed(names) -> str:
+    return ", ".join(f"`{name}`" for name in names) or "none"

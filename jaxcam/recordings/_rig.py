@@ -1,0 +1,286 @@
+"""The rig as its maker states it: nominal parameters, tolerances and sensors."""
+
+import dataclasses
+import difflib
+import math
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import equinox as eqx
+
+from ..models import CamFollower, ConstantRestitution, EccentricCircle
+from ._errors import RigError
+
+
+@dataclasses.dataclass(frozen=True)
+class Quantity:
+    """A nominal value and how far a real one may differ from it, in SI units."""
+
+    value: float
+    tolerance: float = 0.0
+
+
+@dataclasses.dataclass(frozen=True)
+class Gyro:
+    """A rate sensor: first-order bandwidth (Hz), range and noise (rad/s)."""
+
+    bandwidth_hz: float
+    range_rad_s: float
+    noise_rad_s: float
+
+
+@dataclasses.dataclass(frozen=True)
+class Sensors:
+    """Sample rate (Hz), counts a turn and noise (rad) of the two encoders."""
+
+    sample_rate: float
+    cam_counts_per_turn: int
+    follower_counts_per_turn: int
+    cam_noise: float
+    follower_noise: float
+    gyro: Gyro | None = None
+
+    @property
+    def follower_floor(self) -> float:
+        """Standard deviation of the follower's angle (rad): noise and quantisation."""
+        return _floor(self.follower_noise, self.follower_counts_per_turn)
+
+    @property
+    def cam_floor(self) -> float:
+        """Standard deviation of the cam's angle (rad): noise and quantisation."""
+        return _floor(self.cam_noise, self.cam_counts_per_turn)
+
+
+@dataclasses.dataclass(frozen=True)
+class Rig:
+    """What `rig.toml` says, typed and checked; `system` turns it into a model.
+
+    Lengths are m, the inertia kg m^2, the stiffness N/m. Only the ratio of stiffness
+    and inertia can be seen in a recording.
+    """
+
+    cam_radius: Quantity
+    cam_eccentricity: Quantity
+    cam_center_x: Quantity
+    cam_center_y: Quantity
+    follower_half_height: Quantity
+    cam_rotation: str
+    inertia: Quantity
+    spring_stiffness: Quantity
+    spring_hook_x: Quantity
+    spring_elongation: Quantity
+    restitution: Quantity
+    sensors: Sensors
+
+    def replace(self, **values: float) -> "Rig":
+        """The rig with other nominal values; tolerances stay.
+
+        **Raises:** `RigError` for a name that is not a quantity of the rig.
+        """
+        changes = {}
+        for name, value in values.items():
+            before = getattr(self, name, None)
+            if not isinstance(before, Quantity):
+                raise RigError(f"A rig has no quantity `{name}`{_meant(name, self)}.")
+            changes[name] = dataclasses.replace(before, value=float(value))
+        return dataclasses.replace(self, **changes)
+
+    def profile(self) -> EccentricCircle:
+        """The nominal cam."""
+        return EccentricCircle(
+            radius=self.cam_radius.value,
+            eccentricity=self.cam_eccentricity.value,
+            center_x=self.cam_center_x.value,
+            center_y=self.cam_center_y.value,
+            half_height=self.follower_half_height.value,
+        )
+
+    def system(
+        self,
+        speed: float,
+        phase: float = 0.0,
+        *,
+        restitution: eqx.Module | None = None,
+    ) -> CamFollower:
+        """The nominal rig as a `CamFollower` with its cam at `speed` (rad/s).
+
+        **Arguments:**
+
+        - `speed`: speed of the cam (rad/s).
+        - `phase`: angle that the cam has turned at time zero (rad).
+        - `restitution`: another law than the rig's constant one.
+        """
+        if restitution is None:
+            restitution = ConstantRestitution(self.restitution.value)
+        return CamFollower(
+            speed=speed,
+            phase=phase,
+            inertia=self.inertia.value,
+            stiffness=self.spring_stiffness.value,
+            spring_hook_x=self.spring_hook_x.value,
+            spring_elongation=self.spring_elongation.value,
+            spring_half_height=self.follower_half_height.value,
+            profile=self.profile(),
+            restitution=restitution,
+            rotation=self.cam_rotation,
+        )
+
+
+def read_rig(file: str | Path) -> Rig:
+    """The rig described in a TOML file.
+
+    A quantity is `{value = 0.045, tolerance = 0.002, unit = "m"}` or a bare number;
+    `unit` may be left out, and is refused where it is not the SI unit.
+
+    **Raises:** `RigError`, one sentence that names the file and the key.
+    """
+    file = Path(file)
+    if not file.is_file():
+        raise RigError(f"{file}: there is no such file; give the path of a rig.toml.")
+    try:
+        tables = tomllib.loads(file.read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise RigError(f"{file}: this is not a TOML file: {error}.") from None
+    _known(file, "", tables, ("geometry", "dynamics", "impact", "sensors"))
+    geometry = _Section(file, "geometry", tables)
+    dynamics = _Section(file, "dynamics", tables)
+    impact = _Section(file, "impact", tables)
+    center_x, center_y = geometry.pair("cam_center", "m")
+    rig = Rig(
+        cam_radius=geometry.quantity("cam_radius", "m"),
+        cam_eccentricity=geometry.quantity("cam_eccentricity", "m"),
+        cam_center_x=center_x,
+        cam_center_y=center_y,
+        follower_half_height=geometry.quantity("follower_half_height", "m"),
+        cam_rotation=geometry.choice("cam_rotation", "clockwise", "counterclockwise"),
+        inertia=dynamics.quantity("inertia", "kg m^2"),
+        spring_stiffness=dynamics.quantity("spring_stiffness", "N/m"),
+        spring_hook_x=dynamics.quantity("spring_hook_x", "m"),
+        spring_elongation=dynamics.quantity("spring_elongation", "m"),
+        restitution=impact.quantity("restitution", ""),
+        sensors=_sensors(_Section(file, "sensors", tables)),
+    )
+    for section in (geometry, dynamics, impact):
+        section.done()
+    try:
+        rig.system(speed=10.0).check()
+    except ValueError as error:
+        raise RigError(f"{file}: {error}") from None
+    return rig
+
+
+def _sensors(section: "_Section") -> Sensors:
+    gyro = None
+    if "gyro" in section.table:
+        inner = _Section(section.file, "gyro", section.table)
+        names = [field.name for field in dataclasses.fields(Gyro)]
+        gyro = Gyro(**{name: inner.positive(name, "") for name in names})
+        inner.done()
+        section.read.append("gyro")
+    sensors = Sensors(
+        sample_rate=section.positive("sample_rate", "Hz"),
+        cam_counts_per_turn=int(section.positive("cam_counts_per_turn", "")),
+        follower_counts_per_turn=int(section.positive("follower_counts_per_turn", "")),
+        cam_noise=section.positive("cam_noise", "rad"),
+        follower_noise=section.positive("follower_noise", "rad"),
+        gyro=gyro,
+    )
+    section.done()
+    return sensors
+
+
+class _Section:
+    """One table of the file, which remembers the keys that were asked for."""
+
+    def __init__(self, file: Path, name: str, tables: dict[str, Any]):
+        if not isinstance(tables.get(name), dict):
+            raise RigError(f"{file}: the table [{name}] is missing; add it.")
+        self.file, self.name, self.table = file, name, tables[name]
+        self.read: list[str] = []
+
+    def quantity(self, key: str, unit: str) -> Quantity:
+        value, tolerance = self._parts(key, unit)
+        return Quantity(self._number(key, value), self._tolerance(key, tolerance))
+
+    def pair(self, key: str, unit: str) -> tuple[Quantity, Quantity]:
+        value, tolerance = self._parts(key, unit)
+        tolerance = [0.0, 0.0] if tolerance is None else tolerance
+        for part in (value, tolerance):
+            if not isinstance(part, list) or len(part) != 2:
+                raise self._error(key, "needs two numbers, [x, y]")
+        first, second = (
+            Quantity(self._number(key, v), self._tolerance(key, t))
+            for v, t in zip(value, tolerance)
+        )
+        return first, second
+
+    def positive(self, key: str, unit: str) -> float:
+        number = self.quantity(key, unit).value
+        if number <= 0:
+            raise self._error(key, f"is {number:g}, and must be positive")
+        return number
+
+    def choice(self, key: str, *choices: str) -> str:
+        value, _ = self._parts(key, "")
+        if value not in choices:
+            quoted = " or ".join(f'"{choice}"' for choice in choices)
+            raise self._error(key, f"is {value!r}, and must be {quoted}")
+        return value
+
+    def done(self) -> None:
+        _known(self.file, self.name, self.table, self.read)
+
+    def _parts(self, key: str, unit: str) -> tuple[Any, Any]:
+        self.read.append(key)
+        if key not in self.table:
+            # a misspelt key is the usual reason, so look at what is there
+            found = difflib.get_close_matches(key, self.table, n=1)
+            hint = f"; is `{found[0]}` meant?" if found else "; add it."
+            raise RigError(f"{self.file}: [{self.name}] has no `{key}`{hint}")
+        entry = self.table[key]
+        if not isinstance(entry, dict):
+            return entry, None
+        if "value" not in entry:
+            raise self._error(key, "has no `value`")
+        place = f"{self.name}.{key}"
+        _known(self.file, place, entry, ("value", "tolerance", "unit"))
+        if entry.get("unit", unit) != unit:
+            raise self._error(key, f'is given in "{entry["unit"]}", and "{unit}" is used')
+        return entry["value"], entry.get("tolerance")
+
+    def _number(self, key: str, value: Any) -> float:
+        number = isinstance(value, int | float) and not isinstance(value, bool)
+        if not number or not math.isfinite(value):
+            raise self._error(key, f"is {value!r}, and must be a number")
+        return float(value)
+
+    def _tolerance(self, key: str, value: Any) -> float:
+        tolerance = 0.0 if value is None else self._number(key, value)
+        if tolerance < 0:
+            raise self._error(key, f"has the tolerance {tolerance:g}, below zero")
+        return tolerance
+
+    def _error(self, key: str, what: str) -> RigError:
+        return RigError(f"{self.file}: `{key}` in [{self.name}] {what}; correct it.")
+
+
+def _known(file: Path, place: str, table: dict[str, Any], names) -> None:
+    for key in table:
+        if key not in names:
+            where = f"[{place}]" if place else "a rig file"
+            found = difflib.get_close_matches(key, names, n=1)
+            hint = f"is `{found[0]}` meant?" if found else "remove it."
+            raise RigError(f"{file}: {where} has an unknown key `{key}`; {hint}")
+
+
+def _meant(name: str, rig: Rig) -> str:
+    names = [field.name for field in dataclasses.fields(rig)]
+    found = difflib.get_close_matches(name, names, n=1)
+    return f"; is `{found[0]}` meant?" if found else "; see `Rig` for the names"
+
+
+def _floor(noise: float, counts: int) -> float:
+    step = 2 * math.pi / counts
+    # a rounded number is off by a uniform error of variance step^2 / 12
+    return math.sqrt(noise**2 + step**2 / 12)

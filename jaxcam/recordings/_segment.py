@@ -1,0 +1,133 @@
+"""Recordings of a rig, or of any system, cut into flights, contacts and impacts."""
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Float
+
+from ._cut import cut, Motion
+from ._drive import Drive, read_drive
+from ._polynomial import measured_noise
+from ._recording import Recording
+from ._rig import Rig
+from ._segments import Boundary, Flight, no_impacts, Segments
+from ._surface import fit_surface, refine_surface, Surface
+
+
+def segment_case(
+    recordings: Sequence[Recording],
+    rig: Rig,
+    *,
+    channel: str = "follower_angle_rad",
+    surface: Surface | None = None,
+) -> tuple[Segments, ...]:
+    """Cut all recordings of a cam-follower rig, with one surface for all of them.
+
+    **Arguments:**
+
+    - `recordings`: a `Case`, or any recordings of the same rig.
+    - `rig`: its nominal geometry, tolerances and sensors.
+    - `surface`: the profile, where it is known; otherwise it is estimated from the
+        impacts and contacts of all recordings.
+
+    **Raises:** `RecordingError` where a channel is missing or the cam cannot be read.
+    """
+    recordings = tuple(recordings)
+    drives = [read_drive(recording) for recording in recordings]
+
+    def cut_all(surface):
+        return tuple(
+            _segment_rig(recording, rig, drive, surface, channel)
+            for recording, drive in zip(recordings, drives)
+        )
+
+    if surface is not None:
+        return cut_all(surface)
+    surface = fit_surface(recordings, rig, drives, channel)
+    for _ in range(2):
+        surface = refine_surface(surface, rig, cut_all(surface))
+    return cut_all(surface)
+
+
+def segment(
+    recording: Recording,
+    channel: str,
+    contact: Float[np.ndarray, " k"] | None = None,
+    *,
+    contact_rate: Float[np.ndarray, " k"] | None = None,
+    noise: float | None = None,
+    restitution: float = 0.5,
+) -> Segments:
+    """Cut a recording of any system with one constraint.
+
+    **Arguments:**
+
+    - `recording`, `channel`: the motion.
+    - `contact`: what the channel would be in contact at each sample, shape `(k,)`;
+        the motion is above it. `None`: the whole record is one flight.
+    - `contact_rate`: its rate of change; by default from differences of `contact`.
+    - `noise`: standard deviation of a sample; by default it is measured.
+    - `restitution`: expected, for the bounces that are too low to be seen.
+    """
+    samples = recording[channel]
+    noise = noise or measured_noise(samples)
+    if contact is None:
+        return _one_flight(recording, channel, noise)
+    if contact_rate is None:
+        contact_rate = np.gradient(contact, recording.time)
+    motion = Motion(
+        time=recording.time,
+        samples=samples,
+        contact=contact,
+        rate=contact_rate,
+        noise=noise,
+        interval=recording.interval,
+    )
+    flights, contacts, impacts = cut(motion, restitution)
+    return Segments(
+        recording,
+        channel,
+        noise,
+        recording.time,
+        flights,
+        contacts,
+        impacts,
+        gap=motion.gap,
+    )
+
+
+def _segment_rig(recording, rig: Rig, drive: Drive, surface: Surface, channel):
+    contact = surface.angle(drive.angle)
+    rate = surface.slope(drive.angle) * drive.rate
+    found = segment(
+        recording,
+        channel,
+        contact,
+        contact_rate=rate,
+        noise=rig.sensors.follower_floor,
+        restitution=rig.restitution.value,
+    )
+    turned = np.interp(found.impacts.time, recording.time, drive.angle)
+    error = surface.slope_stderr(turned) * drive.speed if len(turned) else turned
+    return dataclasses.replace(
+        found,
+        clock=drive.clock,
+        drive=drive,
+        surface=surface,
+        impacts=dataclasses.replace(
+            found.impacts, turned=turned, surface_stderr=error
+        ),
+    )
+
+
+def _one_flight(recording, channel, noise) -> Segments:
+    why = "no surface was given, so the whole record is one flight"
+    start, stop = (
+        Boundary(float(recording.time[i]), float("nan"), "end of record", why)
+        for i in (0, -1)
+    )
+    height = float(np.ptp(recording[channel]))
+    flight = Flight(start, stop, 0, len(recording), height)
+    clock = recording.time
+    return Segments(recording, channel, noise, clock, (flight,), (), no_impacts())

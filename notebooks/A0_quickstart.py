@@ -1,0 +1,119 @@
+# ---
+# jupyter:
+#   jupytext:
+#     text_representation:
+#       extension: .py
+#       format_name: light
+# ---
+
+# # A0. Two masses, two stops
+#
+# A system that ships with nothing: two masses in a chain of springs, the first one
+# shaken, each with a stop of its own. Systems of this kind were studied by Wagg (2004,
+# 2005), who found that a mass can stick to its stop while the other one goes on.
+#
+# We write it down, simulate it, and look at impacts, sticking and the steady motion.
+
+# +
+from typing import ClassVar
+
+import jax.numpy as jnp
+import matplotlib.pyplot as plt
+
+import jaxcam
+
+
+# -
+
+# ## The system
+#
+# State: the two displacements and the two velocities, in units of the first mass and of
+# one spring. Mass 1 hangs between the frame and mass 2. The stops are at `stop_1` and
+# `stop_2`; a gap for each, and one row of `impact` for each.
+
+
+class TwoMasses(jaxcam.HybridSystem):
+    """Two masses in a chain, each with a rigid stop."""
+
+    state_names: ClassVar[tuple[str, ...]] = ("x1", "x2", "v1", "v2")
+    state_units: ClassVar[tuple[str, ...]] = ("-", "-", "-", "-")
+
+    mass_ratio: float = 1.0
+    damping: float = 0.1
+    force: float = 1.0
+    frequency: float = 0.4
+    stop_1: float = 0.9
+    stop_2: float = 1.2
+    restitution: float = 0.6
+
+    def vector_field(self, t, state):
+        x1, x2, v1, v2 = state
+        link = (x2 - x1) + self.damping * (v2 - v1)
+        frame = -x1 - self.damping * v1
+        shaken = self.force * jnp.cos(self.frequency * t)
+        return jnp.stack([v1, v2, frame + link + shaken, -link / self.mass_ratio])
+
+    def gap(self, t, state):
+        return jnp.stack([self.stop_1 - state[0], self.stop_2 - state[1]])
+
+    def impact(self, t, state):
+        x1, x2, v1, v2 = state
+        r = self.restitution
+        return jnp.stack(
+            [jnp.stack([x1, x2, -r * v1, v2]), jnp.stack([x1, x2, v1, -r * v2])]
+        )
+
+    @property
+    def period(self):
+        return 2 * jnp.pi / self.frequency
+
+
+# ## Its motion
+
+# +
+system = TwoMasses()
+turns = 12
+trajectory = jaxcam.simulate(system, jnp.zeros(4), 0.0, turns * float(system.period))
+assert trajectory.successful, trajectory.result
+
+for k in range(2):
+    hits = int((trajectory.impacts.constraint == k).sum())
+    held = trajectory.contacts.constraint == k
+    rest = float((trajectory.contacts.end - trajectory.contacts.start)[held].sum())
+    share = rest / float(trajectory.t1)
+    print(f"stop {k + 1}: {hits} impacts listed, in contact {share:.1%} of the time")
+# -
+
+# Neither mass was ever behind its stop, between the steps of the integration either:
+
+times = jnp.linspace(0.0, trajectory.t1, 20_001)
+lowest = trajectory.gap(times).min(axis=0)
+print("smallest gaps:", lowest)
+assert (lowest > -1e-9).all()
+
+# ## Pictures
+
+# +
+figure, (left, right) = plt.subplots(1, 2, figsize=(10, 3.6), layout="constrained")
+last = trajectory.t1 - 2 * system.period
+times = jnp.linspace(last, trajectory.t1, 2001)
+states = trajectory.at(times)
+for k, colour in enumerate(["tab:blue", "tab:orange"]):
+    left.plot(times, states[:, k], color=colour, label=f"mass {k + 1}")
+    stop = (system.stop_1, system.stop_2)[k]
+    left.axhline(stop, color=colour, linestyle=":", label=f"stop {k + 1}")
+    contacts = trajectory.contacts
+    for start, end, which in zip(contacts.start, contacts.end, contacts.constraint):
+        if which == k and end > last:
+            span = [max(float(start), float(last)), float(end)]
+            left.plot(span, [stop, stop], color=colour, linewidth=4, alpha=0.5)
+    right.plot(states[:, k], states[:, 2 + k], color=colour)
+    points = trajectory.stroboscopic()[-6:]
+    right.plot(points[:, k], points[:, 2 + k], "o", color=colour)
+left.set(xlabel="time [-]", ylabel="displacement [-]", title="the last two turns")
+left.legend(loc="lower left", fontsize="small")
+right.set(xlabel="displacement [-]", ylabel="velocity [-]", title="phase portraits")
+# -
+
+# Thick lines are contact; dots are the states once a turn. That they fall on each other
+# says that the motion has become periodic.

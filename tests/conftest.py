@@ -1,0 +1,37 @@
+"""What every test runs under: strict arrays, no windows, a shared compilation cache."""
+
+import os
+import tempfile
+from pathlib import Path
+
+import jax
+import matplotlib
+from hypothesis import settings
+
+import jaxcam  # noqa: F401  64-bit floats, and everything it does on import is allowed
+
+
+jax.config.update("jax_numpy_rank_promotion", "raise")
+jax.config.update("jax_numpy_dtype_promotion", "strict")
+matplotlib.use("Agg")
+
+# compiling takes longer than any deadline; a run elsewhere must be repeatable
+settings.register_profile("jaxcam", deadline=None)
+settings.register_profile("ci", deadline=None, derandomize=True)
+settings.load_profile("ci" if os.environ.get("CI") else "jaxcam")
+
+
+def _cache_folder() -> Path:
+    """A folder of the user's, or a temporary one where there is no home."""
+    root = os.environ.get("XDG_CACHE_HOME") or "~/.cache"
+    try:
+        folder = Path(root).expanduser() / "jaxcam" / "tests"
+        folder.mkdir(parents=True, exist_ok=True)
+    except (OSError, RuntimeError):
+        folder = Path(tempfile.mkdtemp(prefix="jaxcam-tests-"))
+    return folder
+
+
+jax.config.update("jax_compilation_cache_dir", str(_cache_folder()))
+jax.config.update("jax_persistent_cache_min_compile_time_secs", 0)
+jax.config.update("jax_persistent_cache_min_entry_size_bytes", 0)

@@ -1,0 +1,325 @@
+"""Figures draw without a warning and show what the trajectory has."""
+
+import matplotlib
+import numpy as np
+import pytest
+
+
+matplotlib.use("Agg")
+
+import jax.numpy as jnp
+import matplotlib.pyplot as plt
+from matplotlib.colors import to_rgba
+
+from jaxcam import plotting
+from jaxcam.hybrid import (
+    Contacts,
+    HybridSystem,
+    Impacts,
+    Settings,
+    Steps,
+    Trajectory,
+)
+from jaxcam.models import BouncingBall
+from jaxcam.plotting._curve import curve
+from jaxcam.plotting._prefix import scaled
+from jaxcam.recordings import Recording
+
+
+pytestmark = pytest.mark.filterwarnings("error")
+
+RESTITUTION, GRAVITY = 0.5, 10.0
+
+
+class ClosedForm(Trajectory):
+    """Parabolas between impacts, then rest: a trajectory that needs no solver."""
+
+    def at(self, times):
+        hits = np.concatenate([[0.0], np.asarray(self.impacts.time)])
+        starts = np.concatenate([self.steps.state[:1], self.impacts.after])
+        times = np.asarray(times)
+        last = np.searchsorted(hits, times, side="right") - 1
+        t, (x, v) = times - hits[last], starts[last].T
+        g = float(getattr(self.system, "gravity", 0.0))
+        state = np.stack([x + v * t - g * t**2 / 2, v - g * t], axis=1)
+        rests = np.any(
+            (times[:, None] >= self.contacts.start)
+            & (times[:, None] <= self.contacts.end),
+            axis=1,
+        )
+        return np.where(rests[:, None], 0.0, state)
+
+    def gap(self, times):
+        height = self.at(times)[:, 0]
+        if isinstance(self.system, BouncingBall):
+            return height
+        return np.stack([height, 1 - height], axis=1)
+
+
+class TwoWalls(HybridSystem):
+    """A particle between two walls, without units or a forcing."""
+
+    def vector_field(self, t, state):
+        return jnp.stack([state[1], 0.0 * state[0]])
+
+    def gap(self, t, state):
+        return jnp.stack([state[0], 1 - state[0]])
+
+    def impact(self, t, state):
+        bounced = jnp.stack([state[0], -state[1]])
+        return jnp.stack([bounced, bounced])
+
+
+def closed_form(system, t1, start, time, before, after, constraint, rest=None):
+    k = len(time)
+    impacts = Impacts(
+        np.asarray(time),
+        np.asarray(before).reshape(k, 2),
+        np.asarray(after).reshape(k, 2),
+        np.asarray(constraint, dtype=int),
+        -np.abs(np.asarray(before).reshape(k, 2)[:, 1]),
+        np.abs(np.asarray(after).reshape(k, 2)[:, 1]),
+        np.asarray(k),
+    )
+    spans = np.zeros((0, 2)) if rest is None else np.array([[rest, t1]])
+    none = np.zeros(len(spans), dtype=int)
+    contacts = Contacts(
+        spans[:, 0], spans[:, 1], none.astype(bool), none, np.asarray(len(spans))
+    )
+    ends = np.array([0.0, t1])
+    states = np.array([start, start], dtype=float)
+    steps = Steps(ends, states, np.zeros((2, 1), dtype=bool), np.asarray(2))
+    return ClosedForm(
+        system,
+        Settings(),
+        np.asarray(0.0),
+        np.asarray(t1),
+        impacts,
+        contacts,
+        steps,
+        np.asarray(0),
+    )
+
+
+@pytest.fixture
+def ball():
+    """Dropped from 0.2 m: impacts at 0.2 s and then after flights of 0.2 / 2^k s."""
+    number, t1 = 30, 0.8
+    flights = 0.2 * RESTITUTION ** np.arange(number - 1)
+    time = 0.2 + np.concatenate([[0.0], np.cumsum(flights)])
+    speed = 2.0 * RESTITUTION ** np.arange(number)
+    none = np.zeros(number)
+    system = BouncingBall(
+        gravity=GRAVITY, restitution=RESTITUTION, frequency=2 * np.pi / 0.25
+    )
+    before, after = np.stack([none, -speed], 1), np.stack([none, speed / 2], 1)
+    constraint = np.zeros(number, dtype=int)
+    return closed_form(system, t1, [0.2, 0.0], time, before, after, constraint, 0.6)
+
+
+@pytest.fixture
+def walls():
+    """From the left wall at unit speed: a wall is hit every second."""
+    time = np.arange(1.0, 6.0)
+    right = np.arange(5) % 2 == 0
+    speed = np.where(right, 1.0, -1.0)
+    before, after = np.stack([right, speed], 1), np.stack([right, -speed], 1)
+    return closed_form(TwoWalls(), 5.5, [0.0, 1.0], time, before, after, right)
+
+
+@pytest.fixture
+def recording():
+    time = np.arange(4000) / 2000
+    turned = 15.0 * time + 0.3
+    channels = {
+        "cam_angle_rad": turned,
+        "follower_angle_rad": 0.27 + 0.06 * np.cos(turned),
+    }
+    return Recording("run1", time, channels)
+
+
+@pytest.fixture(autouse=True)
+def _close():
+    yield
+    plt.close("all")
+
+
+def line(ax, label):
+    (found,) = [each for each in ax.lines if each.get_label() == label]
+    return found
+
+
+def has_unit(label):
+    return label.rstrip().endswith(")") and "(" in label
+
+
+def test_time_history_marks_every_impact_and_contact(ball):
+    figure = plotting.time_history(ball)
+    figure.canvas.draw()
+    height, velocity, gap = figure.axes
+    for ax in (height, velocity, gap):
+        assert len(line(ax, "impact").get_xdata()) == 30
+        assert len(ax.patches) == 1
+    assert height.get_ylabel() == "height\n(m)"
+    assert velocity.get_ylabel() == "velocity\n(m/s)"
+    assert gap.get_ylabel() == "gap\n(m)"
+    assert gap.get_xlabel() == "time (s)"
+    np.testing.assert_array_equal(line(gap, "impact").get_ydata(), 0.0)
+
+
+def test_time_history_of_a_part_and_of_one_component(ball):
+    figure = plotting.time_history(ball, components=[1], between=(0.3, 0.58))
+    velocity, gap = figure.axes
+    inside = np.sum((ball.impacts.time >= 0.3) & (ball.impacts.time <= 0.58))
+    assert 0 < inside < 30
+    assert len(line(velocity, "impact").get_xdata()) == inside
+    assert not velocity.patches and not gap.patches
+
+
+def test_time_history_of_several_constraints(walls):
+    figure = plotting.time_history(walls)
+    figure.canvas.draw()
+    first, second, gap = figure.axes
+    assert "x_{1}" in first.get_ylabel() and has_unit(second.get_ylabel())
+    assert line(gap, "gap 0") and line(gap, "gap 1")
+
+
+def test_a_curve_ends_in_the_state_before_an_impact(ball):
+    drawn = curve(ball)
+    ends = np.flatnonzero(np.isnan(drawn.time)) - 1
+    first = ends[0]
+    assert drawn.time[first] == pytest.approx(0.2, abs=1e-15)
+    np.testing.assert_allclose(drawn.state[first], [0.0, -2.0], atol=1e-15)
+    np.testing.assert_allclose(drawn.state[first + 2], [0.0, 1.0], atol=1e-15)
+    # every flight is drawn, however short
+    assert len(ends) == 31
+    assert np.nanmin(drawn.gap) >= -1e-12
+    assert drawn.contact[-1] and not drawn.contact[first]
+
+
+def test_phase_portrait_has_jumps_and_stroboscopic_points(ball):
+    ax = plotting.phase_portrait(ball)
+    ax.figure.canvas.draw()
+    assert line(ax, "impact").get_linestyle() == "--"
+    jumps = line(ax, "impact").get_ydata()
+    assert np.sum(np.isnan(jumps)) == 30
+    # 0, 0.25, 0.5 and 0.75 s
+    assert len(line(ax, "once a period").get_xdata()) == 4
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("height (m)", "velocity (m/s)")
+
+
+def test_phase_portrait_turns_round_and_takes_axes(ball, walls):
+    _, own = plt.subplots()
+    ax = plotting.phase_portrait(ball, own, components=(1, 0), period=0.1)
+    assert ax is own
+    assert ax.get_xlabel() == "velocity (m/s)"
+    assert len(line(ax, "once a period").get_xdata()) == 9
+    # no forcing, no points
+    labels = [each.get_label() for each in plotting.phase_portrait(walls).lines]
+    assert "once a period" not in labels
+
+
+def test_impact_map_has_a_point_for_every_pair(ball):
+    figure = plotting.impact_map(ball)
+    figure.canvas.draw()
+    phase, speed = figure.axes
+    points = line(speed, "constraint 0")
+    assert len(points.get_xdata()) == 29
+    np.testing.assert_allclose(points.get_ydata(), RESTITUTION * points.get_xdata())
+    assert speed.get_xscale() == "log"
+    assert np.all(line(phase, "constraint 0").get_xdata() <= 2 * np.pi)
+    assert phase.get_ylabel() == "phase of impact $k+1$ (rad)"
+    assert speed.get_xlabel() == "speed of impact $k$ (m/s)"
+
+
+def test_impact_map_against_time_and_without_a_period(ball, walls):
+    left, _ = plotting.impact_map(ball, against="time").axes
+    assert left.get_xlabel() == "time of impact $k$ (s)"
+    left, right = plotting.impact_map(walls).axes
+    assert left.get_xlabel().startswith("time of impact")
+    first, second = line(right, "constraint 0"), line(right, "constraint 1")
+    assert len(first.get_xdata()) == 2 and len(second.get_xdata()) == 2
+    with pytest.raises(ValueError, match='choose "phase" or "time"'):
+        plotting.impact_map(ball, against="speed")
+
+
+def test_figures_of_a_flight_without_impacts(ball):
+    alone = (0.0, 0.1)
+    for figure in (
+        plotting.time_history(ball, between=alone),
+        plotting.phase_portrait(ball, between=alone).figure,
+        plotting.impact_map(ball, between=alone),
+    ):
+        figure.canvas.draw()
+
+
+def test_wrong_axes_and_wrong_span_say_what_to_do(ball):
+    _, two = plt.subplots(2)
+    with pytest.raises(ValueError, match="has 3 panels"):
+        plotting.time_history(ball, two)
+    with pytest.raises(ValueError, match="covers 0 to 0.8 s"):
+        plotting.time_history(ball, between=(0.5, 1.0))
+
+
+def test_own_axes_are_used(ball):
+    own, axes = plt.subplots(3, 1)
+    assert plotting.time_history(ball, axes) is own
+    own, axes = plt.subplots(1, 2)
+    assert plotting.impact_map(ball, axes) is own
+
+
+def test_compare_recording_in_turns_of_the_cam(recording):
+    simulated = recording["follower_angle_rad"] + 3e-4
+    figure = plotting.compare_recording(
+        recording, simulated, contact=simulated - 0.01, noise=1e-4, turns=2
+    )
+    figure.canvas.draw()
+    above, below = figure.axes
+    turns = line(above, "recorded").get_xdata()
+    assert np.ptp(turns) == pytest.approx(2, abs=0.01)
+    assert 0 <= turns[0] < 1
+    assert above.get_ylabel() == "follower angle (rad)"
+    assert below.get_ylabel() == "residual (mrad)"
+    assert below.get_xlabel() == "cam (turns)"
+    residual = below.lines[0].get_ydata()
+    np.testing.assert_allclose(residual, -0.3)
+
+
+def test_compare_recording_with_several_simulations_and_without_a_cam(recording):
+    fall = Recording("drop", recording.time, {"height_m": recording.time})
+    runs = {"textbook": fall.time + 1.0, "with drag": fall.time}
+    figure = plotting.compare_recording(fall, runs, channel="height_m", start=1.0)
+    above, below = figure.axes
+    assert line(above, "simulated textbook") and line(above, "simulated with drag")
+    assert above.get_ylabel() == "height (m)"
+    assert below.get_xlabel() == "time (s)"
+    assert line(above, "recorded").get_xdata()[0] == 1.0
+    with pytest.raises(ValueError, match="sample it at `recording.time`"):
+        plotting.compare_recording(fall, np.zeros(3), channel="height_m")
+
+
+@pytest.mark.parametrize(
+    "unit, largest, expected",
+    [
+        ("rad", 3e-4, (1e3, "mrad")),
+        ("rad/s", 3e-6, (1e6, "µrad/s")),
+        ("m", 0.3, (1.0, "m")),
+        ("-", 1e-4, (1.0, "-")),
+        ("rad", 0.0, (1.0, "rad")),
+    ],
+)
+def test_prefixes_suit_the_size(unit, largest, expected):
+    assert scaled(unit, largest) == expected
+
+
+def test_the_style_leaves_the_reader_settings_alone(ball, tmp_path):
+    before = dict(matplotlib.rcParams)
+    figure = plotting.time_history(ball)
+    written = plotting.save_figure(figure, tmp_path / "new" / "history.png")
+    assert written.stat().st_size > 10_000
+    assert dict(matplotlib.rcParams) == before
+    assert not plt.get_fignums()
+    with plotting.style():
+        cycle = plt.rcParams["axes.prop_cycle"].by_key()["color"]
+    assert to_rgba(cycle[0]) == to_rgba("#0072B2")
+    assert len(set(cycle)) == 7
