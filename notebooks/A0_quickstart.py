@@ -41,10 +41,10 @@ class TwoMasses(jaxcam.HybridSystem):
     mass_ratio: float = 1.0
     damping: float = 0.1
     force: float = 1.0
-    frequency: float = 0.4
-    stop_1: float = 0.9
-    stop_2: float = 1.2
-    restitution: float = 0.6
+    frequency: float = 0.2
+    stop_1: float = 0.5
+    stop_2: float = 0.3
+    restitution: float = 0.5
 
     def vector_field(self, t, state):
         x1, x2, v1, v2 = state

@@ -11,7 +11,7 @@ import jax.numpy as jnp
 import matplotlib.pyplot as plt
 from matplotlib.colors import to_rgba
 
-from jaxcam import plotting
+from jaxcam import plotting, simulate
 from jaxcam.hybrid import (
     Contacts,
     HybridSystem,
@@ -191,8 +191,9 @@ def test_a_curve_ends_in_the_state_before_an_impact(ball):
     assert drawn.time[first] == pytest.approx(0.2, abs=1e-15)
     np.testing.assert_allclose(drawn.state[first], [0.0, -2.0], atol=1e-15)
     np.testing.assert_allclose(drawn.state[first + 2], [0.0, 1.0], atol=1e-15)
-    # every flight is drawn, however short
-    assert len(ends) == 31
+    # every flight is drawn, however short: one before each impact, the one that the
+    # accumulation of the impacts ends, and the contact
+    assert len(ends) == 30 + 1 + 1
     assert np.nanmin(drawn.gap) >= -1e-12
     assert drawn.contact[-1] and not drawn.contact[first]
 
@@ -241,6 +242,24 @@ def test_impact_map_against_time_and_without_a_period(ball, walls):
     assert len(first.get_xdata()) == 2 and len(second.get_xdata()) == 2
     with pytest.raises(ValueError, match='choose "phase" or "time"'):
         plotting.impact_map(ball, against="speed")
+
+
+def test_figures_of_a_simulated_trajectory(ball):
+    simulated = simulate(ball.system, jnp.array([0.2, 0.0]), 0.0, 0.8)
+    height, _, gap = plotting.time_history(simulated).axes
+    number = int(simulated.impacts.count)
+    assert number > 10
+    assert len(line(gap, "impact").get_xdata()) == number
+    assert len(height.patches) == 1
+    drawn = curve(simulated)
+    flying = ~np.isnan(drawn.time) & (drawn.time < 0.55)
+    np.testing.assert_allclose(
+        drawn.gap[flying, 0], ball.gap(drawn.time[flying]), atol=1e-9
+    )
+    ax = plotting.phase_portrait(simulated)
+    assert len(line(ax, "once a period").get_xdata()) == 4
+    _, speed = plotting.impact_map(simulated).axes
+    assert len(line(speed, "constraint 0").get_xdata()) == number - 1
 
 
 def test_figures_of_a_flight_without_impacts(ball):

@@ -29,3 +29,4 @@ from ._trajectory import (
     Steps as Steps,
     Trajectory as Trajectory,
 )
+from ._stroboscope import Stroboscope as Stroboscope, stroboscope as stroboscope

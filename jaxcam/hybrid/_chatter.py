@@ -39,10 +39,11 @@ def completion_time(speed, acceleration, rate, damping, restitution, softening=0
     **Returns:** T, in the units of u/A.
     """
     rest = 1 - restitution
-    small = speed / (acceleration * rest)
+    inverse = 1 / acceleration
+    small = speed * inverse / rest
     series = 1 + softening * speed / (1 - restitution * restitution)
     return -2 * small * series + small * small * (
-        2 * damping / 3 - 4 * rate / (3 * acceleration)
+        (2 * damping - 4 * rate * inverse) / 3
     )
 
 
@@ -56,10 +57,11 @@ def completion_coefficients(system, t, before, after):
     velocity_after = normal_velocity(system, t, after)
     jump = velocity_after - velocity_before
     safe = jnp.where(jump > 0, jump, jnp.ones_like(jump))
-    share = -velocity_before / safe
+    inverse = 1 / safe
+    share = -velocity_before * inverse
     damping, restitution, rest = [], [], []
     for k in range(jump.shape[0]):
-        direction = (after - before) / safe[k]
+        direction = (after - before) * inverse[k]
         point = before + share[k] * (after - before)
         damping.append(
             jax.jvp(

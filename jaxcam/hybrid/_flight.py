@@ -18,6 +18,8 @@ from ._gap_polynomial import (
 # a landing is taken over by the Taylor series from this fraction of the step on: the
 # series then errs by its fourth power
 _CLOSE = 1e-3
+# and the gap is nearly a straight line there, so that its root is a short series
+_STRAIGHT = 4e-3
 
 
 class Verdict(NamedTuple):
@@ -43,7 +45,7 @@ def judge(left: Jet, right: Jet, h, slack, at_stop) -> Verdict:
     now = (left.gap <= 0) & (left.velocity < 0) & (h == 0)
     offset = jnp.where(now, 0.0, time_to_root(right))
     near = (jnp.abs(offset) <= _CLOSE * h) & (
-        jnp.abs(offset * right.acceleration) <= 0.05 * jnp.abs(right.velocity)
+        jnp.abs(offset * right.acceleration) <= _STRAIGHT * jnp.abs(right.velocity)
     )
     lands = ((right.velocity < 0) & near & ~(at_stop & (offset > 0))) | now
     dips = (lowest(polynomial) < -slack) & ~behind & ~now

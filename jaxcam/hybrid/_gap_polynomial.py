@@ -94,7 +94,7 @@ def _value_and_slope(c, s):
     return value, slope
 
 
-def crossing(c, halvings: int = 3, newtons: int = 3):
+def crossing(c, halvings: int = 3, newtons: int = 2):
     """Where in (0, 1) the polynomial falls below zero, given that it does by the end.
 
     A few halvings find the neighbourhood, Newton inside the bracket finds the root.
@@ -124,51 +124,38 @@ def lowest_point(polynomial: Bernstein, c):
     for k in range(2, 7):
         s = jnp.where(b[k] < best, k / 7, s)
         best = jnp.minimum(b[k], best)
-    slope_of = tuple(k * c[k] for k in range(1, 8))
-    for _ in range(3):
-        slope, bend = _value_and_slope(slope_of, s)
-        step = s - slope / jnp.where(bend == 0, 1.0, bend)
-        s = jnp.where(bend > 0, jnp.clip(step, 0.02, 0.98), s)
-    return s
+    slope, bend = _value_and_slope(tuple(k * c[k] for k in range(1, 8)), s)
+    step = s - slope / jnp.where(bend == 0, 1.0, bend)
+    return jnp.where(bend > 0, jnp.clip(step, 0.02, 0.98), s)
 
 
 def time_to_contact(jet: Jet):
     """Time until the cubic through the jet reaches zero from above; inf where it does not.
 
-    Two cases: leaving the surface (gap zero, v > 0), where the cubic has an exact
-    smallest root, and approaching it, where the parabola's root is refined twice.
+    Leaving the surface (v > 0, little height) the cubic has an exact smallest root;
+    else the root of the parabola is refined once.
     """
     g, v, a, j = jet
-    infinite = jnp.full_like(v, jnp.inf)
-
-    square = a * a / 4 - 2 * v * j / 3
-    below = jnp.sqrt(jnp.where(square > 0, square, 1.0)) - a / 2
-    hop = jnp.where(
-        (square > 0) & (below > 0), 2 * v / jnp.where(below > 0, below, 1.0), infinite
-    )
-
-    square = v * v - 2 * a * g
-    below = jnp.sqrt(jnp.where(square > 0, square, 1.0)) - v
-    fall = jnp.where(
-        (square > 0) & (below > 0), 2 * g / jnp.where(below > 0, below, 1.0), infinite
-    )
-    finite = jnp.where(jnp.isfinite(fall), fall, 0.0)
-    for _ in range(2):
-        value = g + finite * (v + finite * (a / 2 + finite * j / 6))
-        slope = v + finite * (a + finite * j / 2)
-        finite = finite - value / jnp.where(slope < 0, slope, -jnp.inf)
-    fall = jnp.where(jnp.isfinite(fall) & (finite > 0), finite, fall)
-    # the start of a hop: the height already gained is small against the apex
     leaving = (v > 0) & (jnp.abs(g * a) < 1e-3 * v * v)
-    return jnp.where(leaving, hop, fall)
+    square = jnp.where(leaving, a * a / 4 - 2 * v * j / 3, v * v - 2 * a * g)
+    possible = square > 0
+    root = jnp.sqrt(jnp.where(possible, square, 1.0))
+    below = root - jnp.where(leaving, a / 2, v)
+    possible = possible & (below > 0)
+    time = 2 * jnp.where(leaving, v, g) / jnp.where(possible, below, 1.0)
+    value = g + time * (v + time * (a / 2 + time * j / 6))
+    slope = v + time * (a + time * j / 2)
+    refined = time - value / jnp.where(slope < 0, slope, -1.0)
+    refined = jnp.where((slope < 0) & (refined > 0), refined, time)
+    return jnp.where(possible, jnp.where(leaving, time, refined), jnp.inf)
 
 
-def time_to_root(jet: Jet, newtons: int = 3):
-    """Signed time from here to the nearby zero of the cubic, by Newton's method."""
+def time_to_root(jet: Jet):
+    """Signed time to the nearby zero of the cubic, where |g a| is small against v^2.
+
+    The series that inverts the cubic, to fourth order in g/v.
+    """
     g, v, a, j = jet
-    tau = jnp.zeros_like(g)
-    for _ in range(newtons):
-        value = g + tau * (v + tau * (a / 2 + tau * j / 6))
-        slope = v + tau * (a + tau * j / 2)
-        tau = tau - value / jnp.where(slope == 0, 1.0, slope)
-    return tau
+    inverse = 1.0 / jnp.where(v == 0, 1.0, v)
+    w, p, q = -g * inverse, a * inverse / 2, j * inverse / 6
+    return w * (1 - w * (p - w * (2 * p * p - q - 5 * w * p * (p * p - q))))

@@ -23,7 +23,7 @@ class Lane(NamedTuple):
     longest: object
     # the end of this step is an accumulation of impacts, not a choice
     completing: object
-    next_stop: object
+    stops: object
     # fastest rebound since the last release; largest gap of each constraint
     fastest: object
     scale: tuple
@@ -33,7 +33,7 @@ class Lane(NamedTuple):
     impacts: object
 
 
-def first_lane(functions: Functions, t0, x, t1, first_stop) -> Lane:
+def first_lane(functions: Functions, t0, x, t1) -> Lane:
     """The lane at its start: in contact where gap and velocity are zero and a < 0."""
     free = tuple(jnp.asarray(False) for _ in range(functions.m))
     jets = functions.jets(t0, x, free)
@@ -62,7 +62,7 @@ def first_lane(functions: Functions, t0, x, t1, first_stop) -> Lane:
         step=whole / 64,
         longest=whole / 64,
         completing=jnp.asarray(False),
-        next_stop=first_stop,
+        stops=0.0 * one,
         fastest=0.0 * one,
         scale=tuple(jnp.abs(j.gap) for j in settled),
         failures=0.0 * one,

@@ -28,7 +28,9 @@ _PATIENCE = 80
 class Plan(NamedTuple):
     """What does not change during a run; scalars, except for the tableau."""
 
+    t0: object
     t1: object
+    # the run also stops, and records, at t0 + k stop_period
     stop_period: object
     longest_contact: object
     tolerance: object
@@ -61,7 +63,7 @@ def _iterate(functions: Functions, plan: Plan, lane: Lane) -> tuple[Lane, Record
     free = [~c for c in lane.contact]
 
     # where the step ends
-    stop = jnp.minimum(lane.next_stop, plan.t1)
+    stop = jnp.minimum(plan.t0 + (lane.stops + 1) * plan.stop_period, plan.t1)
     # already in contact and moving in, or in contact and pulled away: no time passes
     now = _any(
         [
@@ -230,7 +232,8 @@ def _chatter(
     rate = j - damping * a
     r0 = jnp.where(possible, r0, 0.0)
     incoming = jnp.where(v_before < 0, -v_before, 1.0)
-    softening = (rebound / incoming - r0) / incoming
+    inverse = 1 / incoming
+    softening = (rebound * inverse - r0) * inverse
     duration = completion_time(rebound, a, rate, damping, r0, softening)
     at_end = a + rate * duration
     soon = (t + duration <= stop) | (duration <= 1e-13 * jnp.abs(t))
@@ -246,7 +249,10 @@ def _advance(
     """The lane after this attempt, and the next length to try."""
     active = lane.status == RUNNING
     order = plan.tableau.order
-    factor = jnp.clip(0.9 * (effort + 1e-30) ** (-1.0 / order), 0.2, 6.0)
+    # single precision is plenty for choosing a step, and much cheaper
+    rough = jnp.asarray(jnp.clip(effort, 1e-12, 1e12), dtype=jnp.float32)
+    rough = jnp.exp2(jnp.log2(rough) * jnp.float32(-1.0 / order))
+    factor = jnp.clip(0.9 * jnp.asarray(rough, dtype=jnp.float64), 0.2, 6.0)
     factor = jnp.where(jnp.isfinite(effort), factor, 0.1)
     grown = jnp.where(
         h < 0.999 * lane.longest, jnp.maximum(lane.longest, h * factor), h * factor
@@ -281,7 +287,6 @@ def _advance(
         FINISHED,
         jnp.where(active & gave_up, jnp.where(bad, NOT_FINITE, STEP_FAILED), lane.status),
     )
-    passed = stopped & (t >= lane.next_stop)
     guess = _select(active & sticking & ~good & finite, guess, lane.x)
     stop_gradient = jax.lax.stop_gradient
     return Lane(
@@ -301,7 +306,7 @@ def _advance(
         ),
         longest=stop_gradient(jnp.where(active, longest, lane.longest)),
         completing=jnp.where(good, begins, lane.completing),
-        next_stop=jnp.where(passed, lane.next_stop + plan.stop_period, lane.next_stop),
+        stops=lane.stops + jnp.where(stopped, 1.0, 0.0),
         fastest=stop_gradient(
             jnp.where(good, jnp.where(released, 0.0, fastest), lane.fastest)
         ),

@@ -42,7 +42,7 @@ def _root(a0, s0, a1, s1):
     c2 = 3 * rise - 2 * s0 - s1
     c3 = s0 + s1 - 2 * rise
     s = -a0 / jnp.where(rise == 0, 1.0, rise)
-    for _ in range(3):
+    for _ in range(2):
         value = a0 + s * (s0 + s * (c2 + s * c3))
         slope = s0 + s * (2 * c2 + 3 * s * c3)
         s = jnp.clip(s - value / jnp.where(slope > 0, slope, jnp.inf), 0.02, 1.0)

@@ -12,6 +12,7 @@ from ._codes import Row
 from ._functions import Functions
 from ._lane import RUNNING, Lane
 from ._loop import Plan, Record, iterate
+from ._materialise import depend_on, while_loop
 
 
 class Log(NamedTuple):
@@ -31,7 +32,13 @@ def run(functions: Functions, plan: Plan, lane: Lane, rows: int) -> tuple[Lane, 
     Forward mode only. Under `vmap` the iterations are shared by all lanes, so that one
     row of the log is written for all of them at once.
     """
-    width = len(_row(_empty_record(functions)))
+    lane, log = run_raw(functions, plan, lane, rows, _row)
+    return lane, _unpack(log, functions)
+
+
+def run_raw(functions: Functions, plan: Plan, lane: Lane, rows: int, row):
+    """`run` with a log of what `row` makes of each record: a list of scalars."""
+    width = len(row(_empty_record(functions)))
     log = jnp.zeros((rows, width))
 
     def unfinished(carry):
@@ -41,12 +48,11 @@ def run(functions: Functions, plan: Plan, lane: Lane, rows: int) -> tuple[Lane, 
     def body(carry):
         count, lane, log = carry
         lane, record = iterate(functions, plan, lane)
-        return count + 1, lane, _write(log, jnp.stack(_row(record)), count)
+        return count + 1, lane, _write(log, jnp.stack(row(record)), count)
 
-    _, lane, log = jax.lax.while_loop(
-        unfinished, body, (jnp.asarray(0, jnp.int32), lane, log)
-    )
-    return lane, _unpack(log, functions)
+    start = (jnp.asarray(0, jnp.int32), lane, log)
+    (_, lane, log), witness = while_loop(unfinished, body, start)
+    return lane._replace(steps=depend_on(lane.steps, witness)), log
 
 
 def run_reversible(

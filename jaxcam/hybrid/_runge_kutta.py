@@ -34,11 +34,14 @@ def tableau_of(solver) -> Tableau:
             f"{name} has no error estimate; pass an adaptive solver such as "
             "diffrax.Dopri8() or diffrax.Tsit5()"
         )
+    weights = np.asarray(table.b_sol, dtype=float)
+    # a last stage that serves only the next step is not needed here
+    last = int(np.max(np.nonzero((weights != 0) | (error != 0)))) + 1
     return Tableau(
-        lower=tuple(tuple(map(float, row)) for row in table.a_lower),
-        nodes=(0.0, *map(float, table.c)),
-        weights=tuple(map(float, table.b_sol)),
-        error=tuple(map(float, error)),
+        lower=tuple(tuple(map(float, row)) for row in table.a_lower[: last - 1]),
+        nodes=(0.0, *map(float, table.c[: last - 1])),
+        weights=tuple(map(float, weights[:last])),
+        error=tuple(map(float, error[:last])),
         order=int(solver.order(diffrax.ODETerm(lambda t, y, args: y))),
     )
 

@@ -135,6 +135,7 @@ def _prepare(system, settings, t0, state, t1):
     period = system.period
     longest = jnp.inf if period is None else period / 8
     plan = Plan(
+        t0=t0,
         t1=t1,
         stop_period=jnp.inf,
         longest_contact=longest,
@@ -144,7 +145,7 @@ def _prepare(system, settings, t0, state, t1):
         tableau=tableau_of(settings.solver),
     )
     x = tuple(state[i] for i in range(state.shape[0]))
-    lane = first_lane(functions, t0, x, t1, jnp.full_like(t1, jnp.inf))
+    lane = first_lane(functions, t0, x, t1)
     return functions, plan, lane
 
 

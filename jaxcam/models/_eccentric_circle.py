@@ -34,7 +34,7 @@ class EccentricCircle(CamProfile):
     center_x: jax.Array = parameter(0.249)
     center_y: jax.Array = parameter(0.0)
     half_height: jax.Array = parameter(0.021)
-    harmonics: int = eqx.field(default=16, static=True)
+    harmonics: int = eqx.field(default=12, static=True)
 
     def __check_init__(self):
         if self.harmonics < 1:

@@ -1,24 +1,29 @@
 """A recording and simulations of it, a few turns of the cam, and what is left over."""
 
 from collections.abc import Mapping, Sequence
+from typing import TypeAlias
 
 import numpy as np
 from jaxtyping import ArrayLike
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ..recordings import Recording
+from ..recordings import Comparison, Recording
 from ._axes import legend_above, several_axes
 from ._channels import channel_label, name_and_unit
 from ._labels import labelled
 from ._prefix import scaled
+from ._simulated import simulated_channel
 from ._style import BAND, CAM, RECORDED, styled
+
+
+Simulated: TypeAlias = ArrayLike | Comparison
 
 
 @styled
 def compare_recording(
     recording: Recording,
-    simulated: ArrayLike | Mapping[str, ArrayLike],
+    simulated: Simulated | Mapping[str, Simulated],
     axes: Sequence[Axes] | np.ndarray | None = None,
     *,
     channel: str = "follower_angle_rad",
@@ -36,7 +41,8 @@ def compare_recording(
 
     - `recording`: the run.
     - `simulated`: the channel as simulated at the samples of the recording, shape
-        `(k,)`, NaN where it was not; or several of them by name.
+        `(k,)`, NaN where it was not; or a comparison that the recording is in; or
+        several of these by name.
     - `axes`: two of them; a new figure without.
     - `channel`: the channel to compare.
     - `contact`: what the channel would be in contact with the cam, shape `(k,)`; drawn
@@ -51,7 +57,7 @@ def compare_recording(
     **Raises:** `ValueError` where a simulation has another length than the recording.
     """
     runs = dict(simulated) if isinstance(simulated, Mapping) else {"": simulated}
-    runs = {name: _fitting(recording, values) for name, values in runs.items()}
+    runs = {name: _samples(recording, run, channel) for name, run in runs.items()}
     samples = recording[channel]
     over, keep, label = _horizontal(recording, turns, start)
 
@@ -98,6 +104,12 @@ def compare_recording(
     legend_above(above)
     figure.align_ylabels([above, below])
     return figure
+
+
+def _samples(recording: Recording, run: Simulated, channel: str) -> np.ndarray:
+    if isinstance(run, Comparison):
+        return simulated_channel(run, recording, channel)
+    return _fitting(recording, run)
 
 
 def _fitting(recording: Recording, values: ArrayLike) -> np.ndarray:

@@ -33,7 +33,7 @@ def phase_portrait(
     - `components`: which component goes to the right and which goes up.
     - `period`: time between stroboscopic points (s); the period of the forcing without,
         and no points for a system that has none.
-    - `phase`: time of the first point after t0 (s).
+    - `phase`: time from t0 to one of these points (s).
     - `between`: the span of time to draw (s), the whole trajectory without.
     - `samples`: points of a curve, besides those that short flights need.
 
@@ -104,8 +104,10 @@ def _stroboscopic(trajectory, period, phase, between) -> np.ndarray:
     if period is None:
         return np.empty((0, 0))
     start, stop = window(trajectory, between)
-    points = np.asarray(trajectory.stroboscopic(period, phase))
-    times = float(trajectory.t0) + phase + float(period) * np.arange(len(points))
+    first, period = float(trajectory.t0) + phase, float(period)
     # a point at the very end of the span is not lost to round-off
-    room = 1e-9 * float(period)
-    return points[(times >= start - room) & (times <= stop + room)]
+    count = np.floor(np.array([first - start, stop - first]) / period + 1e-9)
+    times = first + period * np.arange(-count[0], count[1] + 1)
+    if not len(times):
+        return np.empty((0, 0))
+    return np.asarray(trajectory.at(np.clip(times, start, stop)))

@@ -6,6 +6,7 @@ noise. A jump in velocity cuts a flight in two, however fast the impact is over.
 """
 
 import dataclasses
+from typing import TypeAlias
 
 import numpy as np
 from jaxtyping import Float
@@ -17,6 +18,9 @@ from ._release import release_time
 from ._segments import Boundary, Contact, Flight, Impacts
 from ._surface import stretches
 
+
+# First sample of a stretch, and one past its last
+Span: TypeAlias = tuple[int, int]
 
 _LOW, _HIGH = 4.0, 6.0
 _SHORTEST_CONTACT = 0.005
@@ -65,8 +69,17 @@ def cut(
 
     - `restitution`: expected, for the bounces that are too low to be seen.
     """
-    resting = _contact_stretches(motion)
+    resting, doubtful = _contact_stretches(motion)
     marks = _impact_marks(motion, resting)
+    # what is near the surface for long, without an impact, is no flight either
+    doubtful = [
+        pair
+        for pair in doubtful
+        if not any(_overlap(pair, (mark, mark + 1)) for mark in marks)
+        and not any(_overlap(pair, other) for other in resting)
+    ]
+    resting = sorted([*resting, *doubtful])
+    marks = _away(motion, marks, resting)
     spans = _spans(len(motion.time), resting, marks)
     before = {last: motion.fit(first, last, at_end=True) for first, last in spans}
     after = {first: motion.fit(first, last, at_end=False) for first, last in spans}
@@ -89,6 +102,12 @@ def cut(
     contacts = [
         _contact(motion, span, boundaries, flights, restitution) for span in resting
     ]
+    contacts = [
+        dataclasses.replace(contact, settled=contact.stop.time)
+        if span in doubtful
+        else contact
+        for span, contact in zip(resting, contacts)
+    ]
     impacts = [
         (_crossed(motion, place, before[place], after[place]), number)
         for number, (_, place) in enumerate(spans)
@@ -97,20 +116,24 @@ def cut(
     return tuple(flights), tuple(contacts), _gather(impacts)
 
 
-def _contact_stretches(motion: Motion) -> list[tuple[int, int]]:
-    """Stretches near the surface that last, with lower bounces between them."""
+def _contact_stretches(motion: Motion) -> tuple[list[Span], list[Span]]:
+    """Stretches near the surface that last, with lower bounces between them.
+
+    And those that may as well be slow impacts, or grazes.
+    """
     near = motion.gap < _LOW * motion.noise
     # one outlier in thousands of samples is no flight
     near = binary_closing(np.pad(near, 3, mode="edge"), np.ones(3))[3:-3]
     shortest = max(4, round(_SHORTEST_CONTACT / motion.interval))
     long = [pair for pair in stretches(near) if pair[1] - pair[0] >= shortest]
     starts = [first for first, _ in long[1:]] + [len(near)]
-    found = [
+    doubtful = [
         (first, last)
         for (first, last), end in zip(long, starts)
-        if not _grazes(motion, first, last) and not _bounces(motion, first, last, end)
+        if _grazes(motion, first, last) or _bounces(motion, first, last, end)
     ]
-    joined: list[tuple[int, int]] = []
+    found = [pair for pair in long if pair not in doubtful]
+    joined: list[Span] = []
     for first, last in found:
         between = slice(joined[-1][1], first) if joined else slice(0, first)
         low = np.max(motion.gap[between], initial=-np.inf) < _HIGH * motion.noise
@@ -119,7 +142,13 @@ def _contact_stretches(motion: Motion) -> list[tuple[int, int]]:
         joined.append((first, last))
     if joined and len(near) - joined[-1][1] < _SHORTEST_FLIGHT:
         joined[-1] = (joined[-1][0], len(near))
-    return joined
+    return joined, doubtful
+
+
+def _overlap(one: Span, other: Span) -> bool:
+    """Whether two stretches are closer than the shortest flight."""
+    margin = _SHORTEST_FLIGHT
+    return one[0] - margin < other[1] and other[0] < one[1] + margin
 
 
 def _grazes(motion: Motion, first: int, last: int) -> bool:
@@ -158,42 +187,64 @@ def _impact_marks(motion: Motion, resting) -> list[int]:
     """Index of the first sample after each impact between two flights."""
     kinks = find_kinks(motion.samples, motion.interval, motion.noise)
     marks = [int(kink) for kink in kinks]
-    near = motion.gap < _LOW * motion.noise
-    for first, last in stretches(near):
-        lowest = first + int(np.argmin(motion.gap[first:last]))
-        if all(abs(lowest - mark) > _SHORTEST_FLIGHT for mark in marks):
-            if _jumps(motion, lowest):
-                marks.append(lowest)
-    inside = np.zeros(len(motion.time) + 1, dtype=bool)
-    margin = _SHORTEST_FLIGHT
-    for first, last in resting:
-        inside[max(0, first - margin) : last + margin] = True
-    inside[:margin] = inside[-margin:] = True
+    near = stretches(motion.gap < _LOW * motion.noise)
+    for first, last in near:
+        taken = [*resting, *((mark, mark + 1) for mark in marks)]
+        if any(_overlap((first, last), other) for other in taken):
+            continue
+        # only samples that belong to the flights on both sides
+        begin = max([0, *(m for m in marks if m <= first)])
+        begin = max([begin, *(b for _, b in resting if b <= first)])
+        end = min([len(motion.time), *(m for m in marks if m >= last)])
+        end = min([end, *(a for a, _ in resting if a >= last)])
+        place, significance = _hinge(motion, (first, last), (begin, end))
+        if significance > _SIGNIFICANT:
+            marks.append(place)
+    return _away(motion, marks, resting)
+
+
+def _away(motion: Motion, marks: list[int], resting: list[Span]) -> list[int]:
+    """Marks that leave a flight on both sides."""
+    ends = [(-1, 0), (len(motion.time), len(motion.time) + 1)]
     kept: list[int] = []
     for mark in sorted(marks):
-        if not inside[mark] and (not kept or mark - kept[-1] >= margin):
+        here = (mark, mark + 1)
+        if any(_overlap(here, other) for other in [*resting, *ends]):
+            continue
+        if not kept or mark - kept[-1] >= _SHORTEST_FLIGHT:
             kept.append(mark)
     return kept
 
 
-def _jumps(motion: Motion, place: int) -> bool:
-    """Whether the velocity jumps up here, in a window that suits low bounces."""
-    count = max(6, round(0.006 / motion.interval))
-    left = slice(max(0, place - count), place)
-    right = slice(place + 1, place + 1 + count)
-    if left.stop - left.start < 6 or len(motion.time[right]) < 6:
-        return False
-    origin = float(motion.time[place])
-    fits = [
-        fit_local(motion.time[side], motion.gap[side], motion.noise, origin)
-        for side in (left, right)
-    ]
-    jump = fits[1].slope(origin) - fits[0].slope(origin)
-    error = np.hypot(fits[0].slope_stderr(origin), fits[1].slope_stderr(origin))
-    return bool(jump > _SIGNIFICANT * error)
+def _hinge(motion: Motion, where, limits) -> tuple[int, float]:
+    """The best place of a slow impact, and the significance of its jump in velocity.
+
+    Only the velocity jumps in an impact; the acceleration hardly changes. So one cubic
+    and a hinge describe both sides, which finds jumps that two separate fits miss.
+    """
+    reach = round(0.02 / motion.interval)
+    best = (where[0], 0.0)
+    least = np.inf
+    for place in range(max(where[0], limits[0] + 3), min(where[1], limits[1] - 3)):
+        rows = slice(max(limits[0], place - reach), min(limits[1], place + reach))
+        time = motion.time[rows] - motion.time[place] + motion.interval / 2
+        if len(time) < 12:
+            continue
+        scaled = time / np.max(np.abs(time))
+        design = np.column_stack(
+            [scaled[:, None] ** np.arange(4), np.maximum(0.0, scaled)]
+        )
+        inverse = np.linalg.pinv(design)
+        coefficients = inverse @ motion.samples[rows]
+        misfit = motion.samples[rows] - design @ coefficients
+        left = float(np.sum(misfit**2) / (len(time) - 5))
+        if left < least:
+            error = motion.noise * np.linalg.norm(inverse[4])
+            least, best = left, (place, float(coefficients[4] / error))
+    return best
 
 
-def _spans(count: int, resting, marks) -> list[tuple[int, int]]:
+def _spans(count: int, resting: list[Span], marks: list[int]) -> list[Span]:
     """First sample and one past the last of each flight."""
     spans = []
     begin = 0
@@ -207,11 +258,17 @@ def _spans(count: int, resting, marks) -> list[tuple[int, int]]:
 def _crossed(motion: Motion, place: int, before: LocalFit, after: LocalFit) -> dict:
     """What the fits on both sides say about an impact; they meet at its time."""
     origin = float(motion.time[place] - motion.interval / 2)
-    time, stderr = crossing(before, after, origin)
-    if abs(time - origin) > 4 * motion.interval:
+    reach = 5 * motion.interval
+    time, stderr = crossing(before, after, origin, reach)
+    if abs(time - origin) >= reach:
         time, stderr = origin, 2 * motion.interval
     surface = float(np.interp(time, motion.time, motion.rate))
-    error = before.value_stderr(time) + after.value_stderr(time)
+    approach, separation = surface - before.slope(time), after.slope(time) - surface
+    # the fits meet at a weighted mean of both, as seen from the surface
+    shares = np.array([separation, approach])
+    shares = shares / np.sum(shares) if np.sum(shares) > 0 else np.full(2, 0.5)
+    errors = np.array([before.value_stderr(time), after.value_stderr(time)])
+    error = float(np.linalg.norm(shares * errors))
     return {
         "time": time,
         "time_stderr": stderr,
@@ -222,8 +279,8 @@ def _crossed(motion: Motion, place: int, before: LocalFit, after: LocalFit) -> d
         "before_stderr": before.slope_stderr(time),
         "after": after.slope(time),
         "after_stderr": after.slope_stderr(time),
-        "approach": surface - before.slope(time),
-        "separation": after.slope(time) - surface,
+        "approach": approach,
+        "separation": separation,
         "surface_stderr": 0.0,
     }
 

@@ -56,18 +56,25 @@ def fit_local(
     powers = np.arange(degree + 1)
     design = ((time - origin) / scale)[:, None] ** powers
     inverse = np.linalg.pinv(design)
-    unscale = scale**-powers.astype(float)
+    unscale = scale ** -powers.astype(float)
     covariance = noise**2 * (inverse @ inverse.T) * np.outer(unscale, unscale)
     return LocalFit(origin, (inverse @ samples) * unscale, covariance)
 
 
-def crossing(before: LocalFit, after: LocalFit, time: float) -> tuple[float, float]:
-    """Where two fits meet, and the standard error of that time (s), by Newton."""
+def crossing(
+    before: LocalFit, after: LocalFit, time: float, reach: float
+) -> tuple[float, float]:
+    """Where two fits meet, and the standard error of that time (s), by Newton.
+
+    The search goes no further than `reach` (s) from `time`, where both were fitted.
+    """
+    earliest, latest = time - reach, time + reach
     for _ in range(5):
         jump = after.slope(time) - before.slope(time)
         if jump == 0:
             break
         time = time - (after.value(time) - before.value(time)) / jump
+        time = min(max(time, earliest), latest)
     jump = after.slope(time) - before.slope(time)
     error = np.hypot(before.value_stderr(time), after.value_stderr(time))
     return float(time), float(error / abs(jump)) if jump else float("inf")

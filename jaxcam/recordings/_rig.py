@@ -8,6 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import equinox as eqx
+import jax
+import jax.numpy as jnp
 
 from ..models import CamFollower, ConstantRestitution, EccentricCircle
 from ._errors import RigError
@@ -19,6 +21,11 @@ class Quantity:
 
     value: float
     tolerance: float = 0.0
+
+    @property
+    def array(self) -> jax.Array:
+        """The nominal value as a parameter of a model."""
+        return jnp.asarray(self.value, dtype=float)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -89,11 +96,11 @@ class Rig:
     def profile(self) -> EccentricCircle:
         """The nominal cam."""
         return EccentricCircle(
-            radius=self.cam_radius.value,
-            eccentricity=self.cam_eccentricity.value,
-            center_x=self.cam_center_x.value,
-            center_y=self.cam_center_y.value,
-            half_height=self.follower_half_height.value,
+            radius=self.cam_radius.array,
+            eccentricity=self.cam_eccentricity.array,
+            center_x=self.cam_center_x.array,
+            center_y=self.cam_center_y.array,
+            half_height=self.follower_half_height.array,
         )
 
     def system(
@@ -112,15 +119,15 @@ class Rig:
         - `restitution`: another law than the rig's constant one.
         """
         if restitution is None:
-            restitution = ConstantRestitution(self.restitution.value)
+            restitution = ConstantRestitution(self.restitution.array)
         return CamFollower(
-            speed=speed,
-            phase=phase,
-            inertia=self.inertia.value,
-            stiffness=self.spring_stiffness.value,
-            spring_hook_x=self.spring_hook_x.value,
-            spring_elongation=self.spring_elongation.value,
-            spring_half_height=self.follower_half_height.value,
+            speed=jnp.asarray(speed, dtype=float),
+            phase=jnp.asarray(phase, dtype=float),
+            inertia=self.inertia.array,
+            stiffness=self.spring_stiffness.array,
+            spring_hook_x=self.spring_hook_x.array,
+            spring_elongation=self.spring_elongation.array,
+            spring_half_height=self.follower_half_height.array,
             profile=self.profile(),
             restitution=restitution,
             rotation=self.cam_rotation,
@@ -246,7 +253,8 @@ class _Section:
         place = f"{self.name}.{key}"
         _known(self.file, place, entry, ("value", "tolerance", "unit"))
         if entry.get("unit", unit) != unit:
-            raise self._error(key, f'is given in "{entry["unit"]}", and "{unit}" is used')
+            found = entry["unit"]
+            raise self._error(key, f'is given in "{found}", and "{unit}" is used')
         return entry["value"], entry.get("tolerance")
 
     def _number(self, key: str, value: Any) -> float:

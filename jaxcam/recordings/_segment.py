@@ -75,7 +75,7 @@ def segment(
     if contact is None:
         return _one_flight(recording, channel, noise)
     if contact_rate is None:
-        contact_rate = np.gradient(contact, recording.time)
+        contact_rate = np.asarray(np.gradient(contact, recording.time))
     motion = Motion(
         time=recording.time,
         samples=samples,
@@ -115,9 +115,7 @@ def _segment_rig(recording, rig: Rig, drive: Drive, surface: Surface, channel):
         clock=drive.clock,
         drive=drive,
         surface=surface,
-        impacts=dataclasses.replace(
-            found.impacts, turned=turned, surface_stderr=error
-        ),
+        impacts=dataclasses.replace(found.impacts, turned=turned, surface_stderr=error),
     )
 
 

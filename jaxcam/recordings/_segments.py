@@ -67,7 +67,8 @@ class Impacts:
     """Impacts between two flights that were both seen, one entry each.
 
     - `time`, `time_stderr`: seconds.
-    - `angle`, `angle_stderr`: the measured channel at the impact.
+    - `angle`, `angle_stderr`: the measured channel at the impact, and the error of its
+        distance from the surface.
     - `turned`: what the cam has turned (rad), or not a number without a drive.
     - `before`, `after`: rate of the channel on either side, and their errors.
     - `approach`, `separation`: speeds relative to the surface, both positive.
@@ -139,10 +140,15 @@ class Segments:
         rested = sum(contact.last - contact.first for contact in self.contacts)
         total = len(self.recording)
         return (
-            f"{self.recording.name}: {len(self.flights)} flights "
-            f"({flown / total:.0%} of the time), {self.impacts.count} impacts, "
-            f"{len(self.contacts)} contacts ({rested / total:.0%})."
+            f"{self.recording.name}: {_counted(len(self.flights), 'flight')} "
+            f"({flown / total:.0%} of the time), "
+            f"{_counted(self.impacts.count, 'impact')}, "
+            f"{_counted(len(self.contacts), 'contact')} ({rested / total:.0%})."
         )
+
+
+def _counted(number: int, noun: str) -> str:
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
 def no_impacts() -> Impacts:

@@ -6,7 +6,6 @@ low flight. The impacts and contacts of the recordings themselves lie on the tru
 profile, and correct it within the tolerances of the rig.
 """
 
-import dataclasses
 from collections.abc import Sequence
 
 import equinox as eqx
@@ -51,7 +50,7 @@ class Surface(eqx.Module):
     def __call__(self, turned: Float[Array, "*k"]) -> Float[Array, "*k"]:
         order = jnp.asarray(_HARMONICS, dtype=float)
         angle = self.sense * jnp.asarray(turned)
-        phases = angle[..., None] * order
+        phases = jnp.multiply.outer(angle, order)
         extra = jnp.cos(phases) @ self.cosines + jnp.sin(phases) @ self.sines
         return self.profile(angle) + extra
 
@@ -97,7 +96,9 @@ def fit_surface(
         _impact_points(recording, drive, channel, noise)
         for recording, drive in zip(recordings, drives)
     ]
-    surface = _solve(nominal_surface(rig), rig, *(np.concatenate(p) for p in zip(*points)))
+    surface = _solve(
+        nominal_surface(rig), rig, *(np.concatenate(p) for p in zip(*points))
+    )
     for band in _BANDS:
         both = [
             _with_contacts(surface, recording, drive, channel, band, noise, found)
@@ -144,8 +145,8 @@ def _impact_points(recording, drive, channel, noise):
         origin = float(time[kink] - interval / 2)
         before = fit_local(time[left], samples[left], noise, origin)
         after = fit_local(time[right], samples[right], noise, origin)
-        moment, _ = crossing(before, after, origin)
-        if abs(moment - origin) > 3 * interval:
+        moment, _ = crossing(before, after, origin, 3 * interval)
+        if abs(moment - origin) >= 3 * interval:
             continue
         turned.append(np.interp(moment, time, drive.angle))
         angle.append(0.5 * (before.value(moment) + after.value(moment)))

@@ -106,8 +106,8 @@ def _refuse_cut_line(file, text, rows, separator, width) -> None:
         )
 
 
-def _numbers(file: Path, name: str, column: pd.Series) -> Float[np.ndarray, " k"]:
-    numbers = pd.to_numeric(column, errors="coerce").to_numpy(dtype=float)
+def _numbers(file: Path, name: str, column) -> Float[np.ndarray, " k"]:
+    numbers = np.asarray(pd.to_numeric(column, errors="coerce"), dtype=float)
     bad = np.flatnonzero(~np.isfinite(numbers))
     if len(bad):
         row = int(bad[0])

@@ -1,0 +1,163 @@
+"""Many trajectories at once, sampled once a period."""
+
+from collections.abc import Callable
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from ._codes import Row
+from ._functions import Functions
+from ._lane import RUNNING, first_lane
+from ._loop import Plan
+from ._run import run_raw
+from ._runge_kutta import tableau_of
+from ._settings import Settings
+from ._system import HybridSystem
+
+
+class Stroboscope(eqx.Module):
+    """Samples of many trajectories, as numpy arrays; NaN where a lane failed."""
+
+    #: (lanes, turns, n) states at t0 + k period, k = 1..turns
+    states: np.ndarray
+    #: (lanes,) number of impacts and of attempted steps
+    impacts: np.ndarray
+    steps: np.ndarray
+    #: (lanes,) 0 where the lane reached its end, else an index into `RESULTS`
+    code: np.ndarray
+
+
+def stroboscope(
+    system: HybridSystem,
+    states,
+    turns: int,
+    *,
+    t0: float = 0.0,
+    where: Callable | None = None,
+    values=None,
+    period: float | None = None,
+    settings: Settings | None = None,
+    block: int = 256,
+    rows: int = 256,
+    max_steps: int = 1_000_000,
+    progress: Callable[[float], None] | None = None,
+) -> Stroboscope:
+    """Follow many trajectories for `turns` periods and sample each once a period.
+
+    **Arguments:**
+
+    - `system`: the system; `where(system)` picks one of its parameters, which takes the
+      value `values[i]` in lane i (`where=lambda s: s.speed`). Without it all lanes
+      share the system.
+    - `states`: shape `(lanes, n)`, or `(n,)` for all lanes alike.
+    - `period`: s; the system's own forcing period by default.
+    - `settings`: accuracy; the default completes chatter as soon as theory allows.
+    - `block`: lanes that advance together; `rows`: attempts between looks at them.
+    - `progress`: called with the fraction of lanes done.
+
+    **Returns:** a [`jaxcam.hybrid.Stroboscope`][].
+
+    **Raises:** `ValueError` where shapes do not fit, or there is no period.
+    """
+    settings = Settings(tolerance=1e-9, chatter_depth=1.0) if settings is None else settings
+    settings.check()
+    states = np.asarray(states, dtype=float)
+    values = None if values is None else np.asarray(values, dtype=float)
+    lanes = states.shape[0] if states.ndim == 2 else (1 if values is None else len(values))
+    if states.ndim == 1:
+        states = np.broadcast_to(states, (lanes, states.shape[0]))
+    if (where is None) != (values is None) or (values is not None and values.shape != (lanes,)):
+        raise ValueError(
+            "give where and values together, with one value for each lane: "
+            f"{lanes} lanes here"
+        )
+    if period is None and system.period is None:
+        raise ValueError("this system has no forcing period; pass period=... in seconds")
+    out, impacts, steps, codes = [], [], [], []
+    for first in range(0, lanes, block):
+        some = slice(first, first + block)
+        part = None if values is None else values[some]
+        made = _block(
+            system, where, part, states[some], t0, period, turns, settings, rows, max_steps
+        )
+        for store, piece in zip((out, impacts, steps, codes), made, strict=True):
+            store.append(piece)
+        if progress is not None:
+            progress(min(1.0, (first + block) / lanes))
+    return Stroboscope(*[np.concatenate(p) for p in (out, impacts, steps, codes)])
+
+
+def _block(system, where, values, states, t0, period, turns, settings, rows, max_steps):
+    lanes, n = states.shape
+    batched, shared = _batch(system, where, values)
+    lane = _first(batched, shared, period, jnp.asarray(states), t0, turns, settings)
+    samples = np.full((lanes, turns, n), np.nan)
+    filled = np.zeros(lanes, dtype=int)
+    used = 0
+    while used < max_steps and bool(np.any(np.asarray(lane.status) == RUNNING)):
+        lane, log = _some(batched, shared, period, t0, turns, settings, lane, rows)
+        kind, after = np.asarray(log[..., 0]), np.asarray(log[..., 1:])
+        hit = kind == float(Row.STOP)
+        rank = filled[:, None] + np.cumsum(hit, axis=1) - 1
+        who, row = np.nonzero(hit)
+        samples[who, rank[who, row]] = after[who, row]
+        filled += hit.sum(axis=1)
+        used += rows
+    status = np.asarray(lane.status).astype(int)
+    code = np.array([1, 0, 2, 3])[status]
+    return samples, np.asarray(lane.impacts).astype(int), np.asarray(lane.steps).astype(int), code
+
+
+def _batch(system, where, values):
+    """The system as a batched and a shared part for `filter_vmap`."""
+    if where is None:
+        return None, system
+    nothing = jax.tree.map(lambda _: False, system)
+    picked = eqx.tree_at(where, nothing, True)
+    full = eqx.tree_at(where, system, jnp.asarray(values))
+    return eqx.partition(full, picked)
+
+
+def _plan(system, period, t0, turns, settings):
+    period = system.period if period is None else period
+    return Plan(
+        t0=t0,
+        t1=t0 + turns * period,
+        stop_period=period,
+        longest_contact=period / 8,
+        tolerance=settings.tolerance,
+        smallness=settings.chatter_smallness,
+        depth=settings.chatter_depth,
+        tableau=tableau_of(settings.solver),
+    )
+
+
+def _sample_row(record):
+    return [jnp.asarray(v) for v in (record.kind, *record.after)]
+
+
+@eqx.filter_jit
+def _first(batched, shared, period, states, t0, turns, settings):
+    t0 = jnp.asarray(t0, dtype=jnp.float64)
+
+    def one(batched, state):
+        system = eqx.combine(batched, shared).prepared()
+        plan = _plan(system, period, t0, turns, settings)
+        x = tuple(state[i] for i in range(state.shape[0]))
+        return first_lane(Functions(system, len(x)), t0, x, plan.t1)
+
+    return eqx.filter_vmap(one, in_axes=(eqx.if_array(0), 0))(batched, states)
+
+
+@eqx.filter_jit
+def _some(batched, shared, period, t0, turns, settings, lane, rows):
+    t0 = jnp.asarray(t0, dtype=jnp.float64)
+
+    def one(batched, lane):
+        system = eqx.combine(batched, shared).prepared()
+        plan = _plan(system, period, t0, turns, settings)
+        return run_raw(Functions(system, len(lane.x)), plan, lane, rows, _sample_row)
+
+    return eqx.filter_vmap(one, in_axes=(eqx.if_array(0), 0))(batched, lane)

@@ -1,0 +1,175 @@
+"""What a model leaves over: in flight, in contact and in the impacts."""
+
+from collections.abc import Sequence
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Float
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from scipy.stats import norm
+
+from ..recordings import Comparison, Residuals
+from ._axes import legend_above, several_axes
+from ._channels import name_and_unit
+from ._labels import labelled
+from ._prefix import scaled
+from ._style import BAND, FLIGHT, styled
+
+
+_BINS = 36
+_ANGLE_TICKS = ("0", r"$\pi/2$", r"$\pi$", r"$3\pi/2$", r"$2\pi$")
+
+
+@styled
+def residual_by_mode(
+    comparison: Comparison,
+    axes: Sequence[Axes] | np.ndarray | None = None,
+    *,
+    record: str | None = None,
+    against: Literal["time", "phase"] = "time",
+) -> Figure:
+    """Draw recording minus model, one row for each mode and channel.
+
+    On the left the residuals, with a grey band of twice the noise on either side; on
+    the right how many there are of each size (bars), and how many there would be if
+    there were noise alone (black line). Impacts carry their standard errors.
+
+    **Arguments:**
+
+    - `comparison`: what `jaxcam.recordings.compare` or `compare_case` returned.
+    - `axes`: two for each mode and channel, row by row; a new figure without.
+    - `record`: name of the only recording to draw; all of them without, each in its
+        own colour.
+    - `against`: "time" (s), or "phase" for the angle of the cam within its turn (rad).
+
+    **Returns:** the figure.
+
+    **Raises:** `ValueError` where there is nothing to draw, no cam to take the phase
+    of, or for another `against`.
+    """
+    if against not in ("time", "phase"):
+        raise ValueError(f'against is {against!r}; choose "time" or "phase".')
+    groups = _groups(comparison, record)
+    figure, grid = several_axes(
+        axes,
+        (len(groups), 2),
+        sharex="col",
+        sharey="row",
+        width_ratios=(3.2, 1.0),
+        figsize=(6.8, 1.0 + 1.6 * len(groups)),
+    )
+    names = sorted({part.record for parts in groups for part in parts})
+    colours = {
+        name: f"C{k % 7}" if len(names) > 1 else FLIGHT for k, name in enumerate(names)
+    }
+    for (left, right), parts in zip(grid, groups, strict=True):
+        _draw_row(left, right, parts, colours, against)
+    if len(names) > 1:
+        legend_above(grid[0, 0])
+    left, right = grid[-1]
+    left.set_xlabel("time (s)" if against == "time" else "cam angle in its turn (rad)")
+    right.set_xlabel("share (%)")
+    if against == "phase":
+        left.set_xticks(np.arange(5) * np.pi / 2, _ANGLE_TICKS)
+    figure.align_ylabels(list(grid[:, 0]))
+    return figure
+
+
+def _groups(comparison: Comparison, record: str | None) -> list[list[Residuals]]:
+    """Residuals by mode and channel, in the order of the comparison."""
+    groups: dict[tuple[str, str], list[Residuals]] = {}
+    for part in comparison.residuals:
+        if record in (None, part.record) and len(part.value):
+            groups.setdefault((part.mode, part.channel), []).append(part)
+    if not groups:
+        there = sorted({part.record for part in comparison.residuals})
+        raise ValueError(
+            f"There are no residuals to draw{f' of {record}' if record else ''}; the "
+            f"comparison has {', '.join(there) or 'no recording'}."
+        )
+    return list(groups.values())
+
+
+def _draw_row(left: Axes, right: Axes, parts, colours, against) -> None:
+    value = np.concatenate([part.value for part in parts])
+    stderr = np.concatenate([part.stderr for part in parts])
+    rms, noise = float(np.sqrt(np.mean(value**2))), float(np.sqrt(np.mean(stderr**2)))
+    largest = float(max(np.max(np.abs(value)), 4 * noise))
+    factor, unit = scaled(parts[0].unit, largest)
+    band = 2 * factor * noise
+    for ax in (left, right):
+        ax.axhspan(-band, band, color=BAND, alpha=0.5, linewidth=0, zorder=0.5)
+        ax.axhline(0.0, color="black", linewidth=0.8)
+    for part in parts:
+        _draw_part(left, part, factor, colours[part.record], against)
+    limit = 1.08 * factor * largest
+    _draw_shares(right, factor * value, factor * stderr, limit)
+    left.set_ylim(-limit, limit)
+    left.set_ylabel(labelled("residual", unit))
+    left.set_title(
+        f"{_title(parts[0])}: {factor * rms:.3g} {unit} rms, noise {factor * noise:.2g}",
+        fontsize="medium",
+    )
+    right.tick_params(labelleft=False)
+
+
+def _draw_part(ax: Axes, part: Residuals, factor, colour, against) -> None:
+    if against == "time":
+        place = part.time
+    elif np.all(np.isnan(part.turned)):
+        raise ValueError(
+            f"{part.record} was compared without a cam, so there is no phase; choose "
+            'against="time".'
+        )
+    else:
+        place = np.mod(part.turned, 2 * np.pi)
+    if part.mode.startswith("impact"):
+        ax.errorbar(
+            place,
+            factor * part.value,
+            factor * part.stderr,
+            fmt="o",
+            color=colour,
+            markersize=3,
+            elinewidth=0.8,
+            label=part.record,
+        )
+        return
+    # thousands of dots make a file of vectors large and slow
+    ax.plot(
+        place,
+        factor * part.value,
+        ".",
+        color=colour,
+        markersize=2,
+        alpha=0.5,
+        markeredgewidth=0,
+        rasterized=True,
+        label=part.record,
+    )
+
+
+def _draw_shares(
+    ax: Axes, value: Float[np.ndarray, " k"], stderr: Float[np.ndarray, " k"], limit
+) -> None:
+    edges = np.linspace(-limit, limit, _BINS + 1)
+    share = 100 * np.histogram(value, edges)[0] / len(value)
+    ax.barh(edges[:-1], share, np.diff(edges), align="edge", color=FLIGHT, alpha=0.75)
+    sizes, counts = np.unique(stderr, return_counts=True)
+    below = norm.cdf(edges[:, None] / sizes) @ counts / len(stderr)
+    ax.stairs(
+        100 * np.diff(below),
+        edges,
+        orientation="horizontal",
+        color="black",
+        linewidth=1.0,
+        baseline=None,
+    )
+    ax.set_xlim(left=0.0)
+
+
+def _title(part: Residuals) -> str:
+    # the channel of an impact is the one that was cut; flights may have several
+    channel = name_and_unit(part.channel)[0]
+    return f"{part.mode}, {channel}" if part.mode == "flight" else part.mode

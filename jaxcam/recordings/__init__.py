@@ -1,0 +1,39 @@
+"""Recordings: reading, sensors, segmentation, and comparison with a model."""
+
+from ._compare import compare as compare, compare_case as compare_case
+from ._comparison import (
+    Comparison as Comparison,
+    merge as merge,
+    Residuals as Residuals,
+    Row as Row,
+)
+from ._drive import Drive as Drive, read_drive as read_drive
+from ._errors import RecordingError as RecordingError, RigError as RigError
+from ._read import (
+    CAM_FOLLOWER as CAM_FOLLOWER,
+    read_case as read_case,
+    read_recording as read_recording,
+    read_recordings as read_recordings,
+)
+from ._recording import Case as Case, Recording as Recording
+from ._rig import (
+    Gyro as Gyro,
+    Quantity as Quantity,
+    read_rig as read_rig,
+    Rig as Rig,
+    Sensors as Sensors,
+)
+from ._segment import segment as segment, segment_case as segment_case
+from ._segments import (
+    Boundary as Boundary,
+    Contact as Contact,
+    Flight as Flight,
+    Impacts as Impacts,
+    Segments as Segments,
+)
+from ._surface import (
+    fit_surface as fit_surface,
+    nominal_surface as nominal_surface,
+    refine_surface as refine_surface,
+    Surface as Surface,
+)

@@ -1,0 +1,216 @@
+"""What a comparison of recordings with a model says: by mode, in words and numbers."""
+
+import dataclasses
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+from rich.table import Table
+
+
+@dataclasses.dataclass(frozen=True)
+class Residuals:
+    """Recording minus model in one mode of one recording.
+
+    - `mode`: `"flight"`, `"contact"`, `"impact place"` or `"impact speed"`.
+    - `time`: seconds of the record; `turned`: angle of the cam (rad), or nothing.
+    - `value`: the differences, in `unit`; `stderr`: what the noise alone would give.
+    - `piece`: which flight, contact or impact each one belongs to.
+    - `fitted`: number of parameters that were fitted to them.
+    """
+
+    record: str
+    mode: str
+    channel: str
+    unit: str
+    time: Float[np.ndarray, " k"]
+    turned: Float[np.ndarray, " k"]
+    value: Float[np.ndarray, " k"]
+    stderr: Float[np.ndarray, " k"]
+    piece: Float[np.ndarray, " k"]
+    fitted: int = 0
+
+
+@dataclasses.dataclass(frozen=True)
+class Row:
+    """One mode of a comparison.
+
+    - `count`: flights, contacts or impacts; `samples`: numbers compared.
+    - `rms`, `noise`: in `unit`; `ratio`: what is left, in units of the noise: one
+        where the model says all that the sensors can see.
+    - `worst_record`, `worst_time`, `worst_phase`: the middle of the 10 ms in which the
+        mean difference is the most significant; `worst_score`: how many standard
+        errors it is there. The phase is the angle of the cam within its turn (rad).
+    """
+
+    mode: str
+    channel: str
+    unit: str
+    count: int
+    samples: int
+    rms: float
+    noise: float
+    ratio: float
+    worst_record: str
+    worst_time: float
+    worst_phase: float
+    worst_score: float
+
+
+@dataclasses.dataclass(frozen=True)
+class Comparison:
+    """Recordings against a model, flight by flight.
+
+    `residuals` has one entry for each recording, mode and channel; everything else is
+    computed from it.
+    """
+
+    residuals: tuple[Residuals, ...]
+    notes: tuple[str, ...] = ()
+
+    @property
+    def rows(self) -> tuple[Row, ...]:
+        """One `Row` for each mode and channel, over all recordings."""
+        groups: dict[tuple[str, str], list[Residuals]] = {}
+        for part in self.residuals:
+            groups.setdefault((part.mode, part.channel), []).append(part)
+        modes = list(_PLACES)
+        ordered = sorted(groups.items(), key=lambda item: modes.index(item[0][0]))
+        return tuple(_row(parts) for _, parts in ordered)
+
+    def row(self, mode: str, channel: str | None = None) -> Row:
+        """The row of a mode.
+
+        **Raises:** `KeyError` that names the modes there are.
+        """
+        for row in self.rows:
+            if row.mode == mode and channel in (None, row.channel):
+                return row
+        there = ", ".join(f"{row.mode} of {row.channel}" for row in self.rows)
+        raise KeyError(f"there is no {mode!r} in this comparison; there is {there}")
+
+    def table(self) -> Table:
+        """Residuals by mode, as a table for the terminal."""
+        table = Table(title="Recording minus model, by mode")
+        several = len({row.channel for row in self.rows}) > 1
+        for heading in ("mode", "unit"):
+            table.add_column(heading, no_wrap=True)
+        for heading in ("pieces", "rms", "noise", "ratio"):
+            table.add_column(heading, justify="right", no_wrap=True)
+        table.add_column("most clearly in")
+        for row in self.rows:
+            table.add_row(
+                f"{row.mode} of {_plain_channel(row)}" if several else row.mode,
+                row.unit,
+                str(row.count),
+                f"{row.rms:.1e}",
+                f"{row.noise:.1e}",
+                f"{row.ratio:.2f}",
+                _place(row).replace(" at ", "\n", 1),
+            )
+        return table
+
+    def sentence(self) -> str:
+        """What was found, in words."""
+        words = [_words(row) for row in self.rows]
+        if not words:
+            return "Nothing could be compared: " + " ".join(self.notes)
+        return " ".join([". ".join(words) + ".", *self.notes])
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain numbers, strings and lists; numbers that are missing are `None`."""
+        rows = [_plain(dataclasses.asdict(row)) for row in self.rows]
+        return {"rows": rows, "sentence": self.sentence(), "notes": list(self.notes)}
+
+
+def merge(comparisons: Sequence[Comparison]) -> Comparison:
+    """Several recordings in one comparison."""
+    residuals = [part for one in comparisons for part in one.residuals]
+    notes = [note for one in comparisons for note in one.notes]
+    return Comparison(tuple(residuals), tuple(notes))
+
+
+def _row(parts: list[Residuals]) -> Row:
+    value = np.concatenate([part.value for part in parts])
+    stderr = np.concatenate([part.stderr for part in parts])
+    free = max(1, len(value) - sum(part.fitted for part in parts))
+    record, time, turned, score = _worst(parts)
+    return Row(
+        mode=parts[0].mode,
+        channel=parts[0].channel,
+        unit=parts[0].unit,
+        count=sum(len(np.unique(part.piece)) for part in parts),
+        samples=len(value),
+        rms=float(np.sqrt(np.sum(value**2) / free)),
+        noise=float(np.sqrt(np.mean(stderr**2))),
+        ratio=float(np.sqrt(np.sum((value / stderr) ** 2) / free)),
+        worst_record=record,
+        worst_time=time,
+        worst_phase=turned % (2 * math.pi),
+        worst_score=score,
+    )
+
+
+def _worst(parts: list[Residuals]) -> tuple[str, float, float, float]:
+    """Where the mean of 10 ms of one piece is the most significant."""
+    best = ("", float("nan"), float("nan"), 0.0)
+    for part in parts:
+        scaled = part.value / part.stderr
+        for piece in np.unique(part.piece):
+            rows = np.flatnonzero(part.piece == piece)
+            steps = np.diff(part.time[rows])
+            width = round(0.01 / np.median(steps)) if len(steps) else 1
+            width = int(np.clip(width, 1, len(rows)))
+            window = np.ones(width) / math.sqrt(width)
+            score = np.abs(np.convolve(scaled[rows], window, mode="valid"))
+            place = int(np.argmax(score))
+            if score[place] > best[3]:
+                at = rows[place + width // 2]
+                moment = float(part.time[at])
+                turned = float(part.turned[at])
+                best = (part.record, moment, turned, float(score[place]))
+    return best
+
+
+_PLACES = {
+    "flight": "In flight {channel} departs from the model by {ratio} times the noise",
+    "contact": "In contact it departs from the cam by {ratio} times the noise",
+    "impact place": "Impacts happen off the surface by {ratio} times their error",
+    "impact speed": "Speeds after impacts differ from the law by {ratio} times their "
+    "error",
+}
+
+
+def _words(row: Row) -> str:
+    channel = f"the {_plain_channel(row)}"
+    start = _PLACES[row.mode].format(channel=channel, ratio=f"{row.ratio:.1f}")
+    size = f" ({row.rms:.1e} {row.unit} rms over {row.count} {_plural(row)})"
+    # noise alone has a most significant place too; it is not worth a word
+    where = f", most clearly in {_place(row)}" if row.ratio > 1.15 else ""
+    return start + size + where
+
+
+def _plain_channel(row: Row) -> str:
+    for ending in ("_rad_s", "_m_s", "_rad", "_m"):
+        if row.channel.endswith(ending):
+            return row.channel.removesuffix(ending).replace("_", " ")
+    return row.channel.replace("_", " ")
+
+
+def _plural(row: Row) -> str:
+    noun = row.mode.split()[0]
+    return noun if row.count == 1 else f"{noun}s"
+
+
+def _place(row: Row) -> str:
+    phase = "" if math.isnan(row.worst_phase) else f", cam at {row.worst_phase:.2f} rad"
+    return f"{row.worst_record} at {row.worst_time:.3f} s{phase}"
+
+
+def _plain(row: Mapping[str, Any]) -> dict[str, Any]:
+    def plain(value):
+        return None if isinstance(value, float) and not math.isfinite(value) else value
+
+    return {name: plain(value) for name, value in row.items()}
