@@ -21,6 +21,7 @@ import jax.numpy as jnp
 import matplotlib.pyplot as plt
 
 import jaxcam
+from jaxcam.plotting import phase_portrait, time_history
 
 
 # -
@@ -82,6 +83,9 @@ for k in range(2):
     rest = float((trajectory.contacts.end - trajectory.contacts.start)[held].sum())
     share = rest / float(trajectory.t1)
     print(f"stop {k + 1}: {hits} impacts listed, in contact {share:.1%} of the time")
+
+turn = trajectory.stroboscopic()
+print("change of the state over the last turn:", abs(turn[-1] - turn[-2]).max())
 # -
 
 # Neither mass was ever behind its stop, between the steps of the integration either:
@@ -93,27 +97,16 @@ assert (lowest > -1e-9).all()
 
 # ## Pictures
 
-# +
-figure, (left, right) = plt.subplots(1, 2, figsize=(10, 3.6), layout="constrained")
-last = trajectory.t1 - 2 * system.period
-times = jnp.linspace(last, trajectory.t1, 2001)
-states = trajectory.at(times)
-for k, colour in enumerate(["tab:blue", "tab:orange"]):
-    left.plot(times, states[:, k], color=colour, label=f"mass {k + 1}")
-    stop = (system.stop_1, system.stop_2)[k]
-    left.axhline(stop, color=colour, linestyle=":", label=f"stop {k + 1}")
-    contacts = trajectory.contacts
-    for start, end, which in zip(contacts.start, contacts.end, contacts.constraint):
-        if which == k and end > last:
-            span = [max(float(start), float(last)), float(end)]
-            left.plot(span, [stop, stop], color=colour, linewidth=4, alpha=0.5)
-    right.plot(states[:, k], states[:, 2 + k], color=colour)
-    points = trajectory.stroboscopic()[-6:]
-    right.plot(points[:, k], points[:, 2 + k], "o", color=colour)
-left.set(xlabel="time [-]", ylabel="displacement [-]", title="the last two turns")
-left.legend(loc="lower left", fontsize="small")
-right.set(xlabel="displacement [-]", ylabel="velocity [-]", title="phase portraits")
-# -
+history = time_history(
+    trajectory,
+    components=(0, 1),
+    between=(trajectory.t1 - system.period, trajectory.t1),
+)
 
-# Thick lines are contact; dots are the states once a turn. That they fall on each other
-# says that the motion has become periodic.
+portraits, panels = plt.subplots(1, 2, figsize=(9, 4), layout="constrained")
+for k, ax in enumerate(panels):
+    last = (trajectory.t1 - 2 * system.period, trajectory.t1)
+    phase_portrait(trajectory, ax, components=(k, 2 + k), between=last)
+
+# The states once a turn fall on each other: the motion has become periodic. In each
+# turn both masses chatter against their stops, stick, and are released.

@@ -34,9 +34,8 @@ def test_continuous_integration_runs_the_test_command_of_the_readme():
 
 @pytest.mark.parametrize("name", ["simulate", "demo"])
 def test_commands_of_the_readme_exist(name):
-    from typer.main import get_command
-
     from jaxcam.cli import app
+    from typer.main import get_command
 
     assert f"`jaxcam {name}`" in README
     assert name in get_command(app).commands  # pyright: ignore

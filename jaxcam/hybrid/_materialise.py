@@ -50,50 +50,49 @@ def _chosen(jaxpr) -> list:
     return kept
 
 
-def while_loop(condition: Callable, body: Callable, carry):
-    """`jax.lax.while_loop` whose body keeps its shared scalars in memory."""
+def with_kept(body: Callable, carry):
+    """A loop body that also carries its shared scalars.
+
+    **Arguments:** `body(carry) -> (carry, row)` and an example of the carry, all scalars.
+
+    **Returns:** the new body, on `(carry, kept)`, and the first `kept`.
+    """
     leaves, treedef = jax.tree.flatten(carry)
-    leaves = [jnp.asarray(leaf) for leaf in leaves]
 
     def flat_body(*arguments):
-        return jax.tree.leaves(body(jax.tree.unflatten(treedef, arguments)))
+        after, row = body(jax.tree.unflatten(treedef, arguments))
+        return [*jax.tree.leaves(after), row]
 
     closed = jax.make_jaxpr(flat_body)(*leaves)
     # without this, unused values would be kept too
     pruned, _ = partial_eval.dce_jaxpr(
-        closed.jaxpr, [True] * len(leaves), instantiate=True
+        closed.jaxpr, [True] * (len(leaves) + 1), instantiate=True
     )
-    closed = closed.replace(jaxpr=pruned)
-    kept = _chosen(closed.jaxpr)
+    kept = _chosen(pruned)
     shown = closed.replace(
-        jaxpr=closed.jaxpr.replace(
-            outvars=[*closed.jaxpr.outvars, *kept],
-            debug_info=closed.jaxpr.debug_info.with_unknown_names(),
+        jaxpr=pruned.replace(
+            outvars=[*pruned.outvars, *kept],
+            debug_info=pruned.debug_info.with_unknown_names(),
         )
     )
     number = len(leaves)
 
-    def run(arguments):
+    def whole(arguments):
         state, _ = arguments
-        outputs = jaxpr_as_fun(shown)(*state)
-        return outputs[:number], outputs[number:]
+        outputs = jaxpr_as_fun(shown)(*jax.tree.leaves(state))
+        after = jax.tree.unflatten(treedef, outputs[:number])
+        return (after, outputs[number + 1 :]), outputs[number]
 
-    def unfinished(arguments):
-        return condition(jax.tree.unflatten(treedef, arguments[0]))
-
-    nothing = [jnp.zeros((), v.aval.dtype) for v in kept]
-    state, values = jax.lax.while_loop(unfinished, run, (leaves, nothing))
-    return jax.tree.unflatten(treedef, state), _witness(values)
+    return whole, [jnp.zeros((), v.aval.dtype) for v in kept]
 
 
-def _witness(values):
-    """A number that depends on all kept values, else they would be removed as unused."""
+def depend_on(value, kept):
+    """`value`, in a way that needs all kept scalars, which else would be dropped.
+
+    Adding 1e-300 changes no number that a count can be.
+    """
     total = jnp.zeros(())
-    for v in values:
+    for v in kept:
         total = total + v.astype(jnp.float64)
-    return jax.lax.stop_gradient(total)
-
-
-def depend_on(value, witness):
-    """`value`, in a way that needs the witness. Adding 1e-300 changes no normal number."""
-    return jnp.where(witness == 1.2345678901e-301, value + 1e-300, value)
+    total = jax.lax.stop_gradient(total)
+    return jnp.where(total == 1.2345678901e-301, value + 1e-300, value)

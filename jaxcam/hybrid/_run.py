@@ -5,14 +5,18 @@ from typing import NamedTuple
 import equinox.internal as eqxi
 import jax
 import jax.numpy as jnp
-from jax.custom_batching import custom_vmap
 from jaxtyping import Array, Float
 
 from ._codes import Row
 from ._functions import Functions
 from ._lane import RUNNING, Lane
 from ._loop import Plan, Record, iterate
-from ._materialise import depend_on, while_loop
+from ._materialise import depend_on, with_kept
+
+
+# iterations between two looks at whether any lane still runs, and between two writes to
+# the log, which under vmap are costly
+_BLOCK = 16
 
 
 class Log(NamedTuple):
@@ -38,21 +42,30 @@ def run(functions: Functions, plan: Plan, lane: Lane, rows: int) -> tuple[Lane, 
 
 def run_raw(functions: Functions, plan: Plan, lane: Lane, rows: int, row):
     """`run` with a log of what `row` makes of each record: a list of scalars."""
+    lane = jax.tree.map(jnp.asarray, lane)
+
+    def body(lane):
+        lane, record = iterate(functions, plan, lane)
+        return lane, jnp.stack(row(record))
+
+    body, kept = with_kept(body, lane)
     width = len(row(_empty_record(functions)))
-    log = jnp.zeros((rows, width))
+    blocks = -(-rows // _BLOCK)
+    log = jnp.zeros((blocks * _BLOCK, width))
 
     def unfinished(carry):
-        count, lane, _ = carry
-        return (count < rows) & eqxi.unvmap_any(lane.status == RUNNING)
+        count, (lane, _), _ = carry
+        return (count < blocks) & eqxi.unvmap_any(lane.status == RUNNING)
 
-    def body(carry):
-        count, lane, log = carry
-        lane, record = iterate(functions, plan, lane)
-        return count + 1, lane, _write(log, jnp.stack(row(record)), count)
+    def several(carry):
+        count, state, log = carry
+        state, some = jax.lax.scan(lambda s, _: body(s), state, None, length=_BLOCK)
+        start = (count * _BLOCK, jnp.zeros_like(count))
+        return count + 1, state, jax.lax.dynamic_update_slice(log, some, start)
 
-    start = (jnp.asarray(0, jnp.int32), lane, log)
-    (_, lane, log), witness = while_loop(unfinished, body, start)
-    return lane._replace(steps=depend_on(lane.steps, witness)), log
+    start = (jnp.asarray(0, jnp.int32), (lane, kept), log)
+    _, (lane, kept), log = jax.lax.while_loop(unfinished, several, start)
+    return lane._replace(steps=depend_on(lane.steps, kept)), log
 
 
 def run_reversible(
@@ -76,26 +89,6 @@ def run_reversible(
 
     lane, log = jax.lax.scan(many, lane, None, length=blocks)
     return lane, _unpack(log.reshape(blocks * block, -1), functions)
-
-
-@custom_vmap
-def _write(log, row, count):
-    return jax.lax.dynamic_update_slice(log, row[None], (count, jnp.zeros_like(count)))
-
-
-@_write.def_vmap
-def _write_batch(size, in_batched, log, row, count):
-    """All lanes write the same row: one contiguous update, not a scatter."""
-    log_batched, row_batched, count_batched = in_batched
-    if count_batched:
-        raise NotImplementedError("lanes of one batch share their iteration count")
-    if not log_batched:
-        log = jnp.broadcast_to(log, (size, *log.shape))
-    if not row_batched:
-        row = jnp.broadcast_to(row, (size, *row.shape))
-    zero = jnp.zeros_like(count)
-    start = (zero, count, zero)
-    return jax.lax.dynamic_update_slice(log, row[:, None], start), True
 
 
 def _empty_record(functions: Functions) -> Record:

@@ -1,2 +1,571 @@
-"""placeholder"""
-def simulate_segments(*a): raise NotImplementedError
+"""The other engine: one call of `diffrax.diffeqsolve` for each piece of motion.
+
+A piece is flight or contact, up to the next event. Everything is arranged in plain
+Python around a few compiled functions: slower than the loop, easier to follow, open to
+implicit solvers, and a check on the loop, with which it shares only the derivatives of
+the gap and the formula for the duration of a chatter.
+
+diffrax looks at the sign of an event at the ends of its steps and locates it on an
+interpolant. That is where a piece ends at the latest. Each step is then looked through
+at points inside it, made by steps of their own, for anything earlier; and what is found
+is located by Newton's method on the length of such a step.
+"""
+
+import functools
+from typing import NamedTuple
+
+import diffrax
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import optimistix as optx
+
+from ._chatter import completion_time
+from ._codes import Row
+from ._normal import (
+    field_in_force,
+    free_jet,
+    impacts,
+    lie_derivative,
+    mode_jet,
+    normal_directions,
+    normal_velocity,
+    restitution_coefficients,
+)
+from ._one_step import one_step
+from ._run import Log
+
+
+# attempted steps in one call of diffrax
+_BATCH = 64
+# points at which each of its steps is looked through
+_FRACTIONS = np.arange(1, 9) / 8
+# a hop whose lambda = v |j| / a^2 is smaller is one step, not a call of diffrax
+_SHORT = 1e-3
+_SUCCESSFUL, _BUDGET, _STEP_FAILED, _NOT_FINITE = 0, 1, 2, 3
+
+
+def simulate_segments(
+    system, settings, t0, state, t1, max_steps, progress=None
+) -> tuple[Log, jax.Array, jax.Array]:
+    """Run from `t0` to `t1` (s) and log it as the loop does.
+
+    **Arguments:** as in [`jaxcam.simulate`][], with concrete values.
+
+    **Returns:** the log, the constraints in contact at the start `(m,)`, and the index
+    into `RESULTS`.
+    """
+    engine = _Engine(system, settings, float(t0), np.asarray(state), float(t1))
+    contact = engine.contact.copy()
+    span = max(float(t1) - float(t0), 1e-300)
+    while engine.code is None:
+        if progress is not None:
+            progress((engine.t - float(t0)) / span)
+        if engine.t >= engine.t1:
+            engine.code = _SUCCESSFUL
+        elif engine.steps >= max_steps:
+            engine.code = _BUDGET
+        else:
+            engine.advance()
+    if progress is not None:
+        progress(1.0)
+    return engine.log(), jnp.asarray(contact), jnp.asarray(engine.code, jnp.int32)
+
+
+class _Event(NamedTuple):
+    """What ends a piece: the constraint, the last point before, the way from there."""
+
+    constraint: int
+    row: int
+    length: float
+
+
+class _Engine:
+    """The state of a run. `contact` says for each constraint whether it is held."""
+
+    def __init__(self, system, settings, t0, state, t1):
+        self.settings = settings
+        self.motion = _Motion(_prepared(system), settings)
+        self.t, self.x, self.t1 = t0, state, t1
+        jets = np.asarray(self.motion.free_jets(t0, state))
+        self.tiny = 1e-12 * (1.0 + np.max(np.abs(state)))
+        touching = np.all(np.abs(jets[:, :2]) <= self.tiny, axis=1)
+        self.contact = touching & (jets[:, 2] < 0)
+        period = system.period
+        self.longest = (t1 - t0) / 8 if period is None else float(period) / 8
+        # the first step of the next piece, shortened where it proves too long
+        self.first = np.inf
+        self.fastest = 0.0
+        # let go at this instant: its gap and velocity are zero, and grow
+        self.released: int | None = None
+        self.steps = 0
+        self.rows: list[tuple] = []
+        self.code: int | None = None
+
+    def advance(self):
+        """One piece of motion, or one event that takes no time."""
+        jets = self._jets()
+        if not np.all(np.isfinite(jets)):
+            self.code = _NOT_FINITE
+            return
+        for k in range(len(jets)):
+            gap, velocity, acceleration, rate = jets[k]
+            if self.contact[k]:
+                # rounding may leave a start at a release on either side of it
+                wait = -acceleration / rate if rate > 0 else np.inf
+                if acceleration > 0 or wait <= 1e-15 * (1.0 + abs(self.t)):
+                    self._release(k, self.t, self.x)
+                    return
+            elif gap <= 0 and velocity < 0 and k != self.released:
+                self._impact(k, self.t, self.x)
+                return
+        if not self._hop(jets):
+            self._fly(jets)
+
+    def log(self) -> Log:
+        """The rows, padded to a power of two so that few lengths are compiled."""
+        n, m = len(self.x), len(self.contact)
+        length = 64
+        while length < len(self.rows):
+            length *= 2
+        table = np.zeros((length, 3 + 2 * n + m))
+        for i, (kind, k, t, before, after, contact) in enumerate(self.rows):
+            table[i] = [float(kind), float(k), t, *before, *after, *contact]
+        columns = np.split(table, [1, 2, 3, 3 + n, 3 + 2 * n], axis=1)
+        head = [jnp.asarray(c[:, 0]) for c in columns[:3]]
+        return Log(*head, *map(jnp.asarray, columns[3:]))
+
+    def _fly(self, jets):
+        """Up to the next event, or as far as one call of diffrax goes."""
+        first = min(self.first, self.longest / 16)
+        for k, jet in enumerate(jets):
+            if not self.contact[k] and k != self.released:
+                first = min(first, _time_to_contact(jet) / 4)
+        piece = self.motion.fly(
+            self.t, self.x, self.contact, self.t1, first, self.longest
+        )
+        times, states, count, attempts, fired = map(np.asarray, piece)
+        self.steps += int(attempts)
+        points = int(count) - int(fired)
+        if count < 2:
+            bad = not np.all(np.isfinite(self._jets()))
+            self.code = _NOT_FINITE if bad else _STEP_FAILED
+            return
+        event = self._find(times, states, int(count), bool(fired))
+        if event is _TOO_LONG:
+            self.first = first / 10
+            if first <= 1e-16 * (1.0 + abs(self.t)):
+                self.code = _STEP_FAILED
+            return
+        self.first = np.inf
+        if event is not None:
+            points = event.row + 1
+        elif fired:
+            # the interpolant erred: try again with shorter steps
+            self.first = float(times[count - 1] - times[count - 2]) / 4
+        if points > 1 or event is not None:
+            self.released = None
+        for i in range(1, points):
+            self._row(Row.STEP, 0, times[i], states[i])
+        if event is None:
+            i = points - 1
+            self.t, self.x = float(times[i]), states[i]
+            if np.any(self.contact):
+                self.x = self._probe(i, times, states, 0.0).state
+            if self.t >= self.t1:
+                self.rows[-1] = (Row.STOP, *self.rows[-1][1:])
+            return
+        there = self._probe(event.row, times, states, event.length)
+        t = float(times[event.row]) + event.length
+        if self.contact[event.constraint]:
+            self._release(event.constraint, t, there.state)
+        else:
+            self._impact(event.constraint, t, there.state)
+
+    def _find(self, times, states, count, fired):
+        """The first event among the steps; `_TOO_LONG` where the first step hid one."""
+        scan = self.motion.scan(times, states, self.contact, count - 1)
+        level, rate = np.asarray(scan.level), np.asarray(scan.rate)
+        start = self.motion.probe(times[0], states[0], self.contact, 0.0)
+        found: list[_Event] = []
+        for k in range(len(self.contact)):
+            before, slope = float(start.level[k]), float(start.rate[k])
+            if abs(before) <= self.tiny:
+                slope = max(slope, 0.0)
+            for i in range(count - 1):
+                h = float(times[i + 1] - times[i])
+                low = 0.0
+                for p, fraction in enumerate(_FRACTIONS):
+                    high = fraction * h
+                    after, next_slope = level[i, p, k], rate[i, p, k]
+                    bottom = high
+                    if slope < 0 < next_slope and min(before, after) < (high - low) * (
+                        max(-slope, next_slope)
+                    ):
+                        bottom = self._bottom(k, i, times, states, low, high)
+                        after_low = self._probe(i, times, states, bottom).level[k]
+                    else:
+                        after_low = after
+                    if after_low < -self.tiny / 10:
+                        if i == 0 and p == 0 and before <= self.tiny:
+                            return _TOO_LONG
+                        found.append(
+                            self._locate(k, i, times, states, low, bottom)
+                        )
+                        break
+                    before, slope, low = after, next_slope, high
+                else:
+                    continue
+                break
+            else:
+                # the piece ends at the event: nothing was behind the surface by then
+                if fired and abs(before) <= self._reach(slope, times, count):
+                    i = count - 2
+                    h = float(times[i + 1] - times[i])
+                    event = self._locate(k, i, times, states, 0.0, None, h)
+                    found.append(event)
+        found = [e for e in found if times[e.row] + e.length <= self.t1]
+        if not found:
+            return None
+        return min(found, key=lambda e: times[e.row] + e.length)
+
+    def _reach(self, slope, times, count):
+        """How far from zero the level may be where diffrax put an event."""
+        return abs(slope) * 1e-2 * (times[count - 1] - times[count - 2]) + 10 * self.tiny
+
+    def _locate(self, k, i, times, states, low, high, start=None) -> _Event:
+        """Newton on the length from point `i`, kept between `low` and `high`."""
+        h = high if start is None else start
+        change = np.inf
+        for _ in range(60):
+            there = self._probe(i, times, states, h)
+            level, slope = float(there.level[k]), float(there.rate[k])
+            if high is not None:
+                low, high = (h, high) if level > 0 else (low, h)
+            moved = h - level / slope if slope < 0 else -np.inf
+            if high is not None and not low <= moved <= high:
+                moved = (low + high) / 2
+            if not np.isfinite(moved):
+                break
+            smaller = abs(moved - h) < 0.5 * change
+            change, h = abs(moved - h), moved
+            if change <= 1e-15 * h or (not smaller and change < 1e-12 * (1.0 + h)):
+                break
+        return _Event(k, i, float(h))
+
+    def _bottom(self, k, i, times, states, low, high):
+        """Where the level is lowest between two lengths, by halving its rate."""
+        for _ in range(50):
+            middle = (low + high) / 2
+            falls = self._probe(i, times, states, middle).rate[k] < 0
+            low, high = (middle, high) if falls else (low, middle)
+        return high
+
+    def _hop(self, jets) -> bool:
+        """A hop too low for its gap to rise above rounding; whether there was one.
+
+        The height is taken from the integral of the normal velocity instead.
+        """
+        if not self.rows or self.rows[-1][0] != Row.IMPACT:
+            return False
+        k = int(self.rows[-1][1])
+        _, u, a, j = jets[k]
+        if self.contact[k] or not (a < 0 < u and u * abs(j) <= _SHORT * a * a):
+            return False
+        h = _time_to_contact((0.0, u, a, j))
+        for _ in range(8):
+            there = self.motion.hop(self.t, self.x, self.contact, h)
+            change = float(there.climbed[k] / there.velocity[k])
+            h = h - change
+            if abs(change) <= 1e-15 * h:
+                break
+        there = self.motion.hop(self.t, self.x, self.contact, h)
+        others = np.delete(np.asarray(there.level), k)
+        near = np.delete(np.asarray(there.rate), k) * h
+        if float(there.effort) > 1 or self.t + h > self.t1:
+            return False
+        if np.any(others - 2 * np.abs(near) <= self.tiny):
+            return False
+        self.steps += 1
+        self._impact(k, self.t + h, np.asarray(there.state))
+        return True
+
+    def _impact(self, k, t, before):
+        """Apply the impact law; complete the chatter if it is due."""
+        after = np.asarray(self.motion.impact(t, before))[k]
+        velocity = np.asarray(self.motion.velocity(t, after))
+        u = max(float(velocity[k]), 0.0)
+        self.fastest = max(self.fastest, u)
+        # an impact on one constraint may throw the system off another it rests on
+        kept = np.abs(velocity) <= 1e-12 * (1.0 + self.fastest)
+        self.contact = self.contact & kept
+        self.t, self.x = t, after
+        if u <= self.settings.chatter_depth * self.fastest:
+            incoming = -float(self.motion.velocity(t, before)[k])
+            end = self.motion.completion(t, after, self.contact, k, u, incoming)
+            if bool(end.possible) and t + float(end.duration) <= self.t1:
+                self.contact = self.contact.copy()
+                self.contact[k] = True
+                self._row(Row.LAST_IMPACT, k, t, after, before)
+                self.t, self.x = t + float(end.duration), np.asarray(end.state)
+                self._row(Row.CONTACT, k, self.t, self.x)
+                return
+        self._row(Row.IMPACT, k, t, after, before)
+
+    def _release(self, k, t, x):
+        self.contact = self.contact.copy()
+        self.contact[k] = False
+        self.released = k
+        self.fastest = 0.0
+        self.t, self.x = t, np.asarray(x)
+        self._row(Row.RELEASE, k, self.t, self.x)
+
+    def _row(self, kind, k, t, after, before=None):
+        before = after if before is None else before
+        self.rows.append((kind, k, float(t), before, after, self.contact))
+
+    def _jets(self):
+        return np.asarray(self.motion.jets(self.t, self.x, self.contact))
+
+    def _probe(self, i, times, states, h):
+        return self.motion.probe(times[i], states[i], self.contact, h)
+
+
+_TOO_LONG = object()
+
+
+def _time_to_contact(jet) -> float:
+    """Smallest positive time at which the cubic through the jet is zero, else inf."""
+    gap, velocity, acceleration, jerk = map(float, jet)
+    cubic = [jerk / 6, acceleration / 2, velocity, gap]
+    if velocity > 0 and abs(gap * acceleration) <= 1e-6 * velocity**2:
+        # leaving the surface: the root at the start is known
+        cubic = cubic[:3]
+    roots = np.roots(cubic)
+    times = roots.real[(np.abs(roots.imag) <= 1e-9 * np.abs(roots)) & (roots.real > 0)]
+    return float(times.min()) if times.size else np.inf
+
+
+class _Point(NamedTuple):
+    """A state on the way, and for each constraint how far it is from its event.
+
+    The level is the gap of a free constraint and the pressure (minus the multiplier)
+    of one in contact; the event is where it falls through zero.
+    """
+
+    state: jax.Array
+    level: jax.Array
+    rate: jax.Array
+
+
+class _Hop(NamedTuple):
+    """The end of a short hop: as `_Point`, normal velocity and height climbed `(m,)`."""
+
+    state: jax.Array
+    level: jax.Array
+    rate: jax.Array
+    velocity: jax.Array
+    climbed: jax.Array
+    effort: jax.Array
+
+
+class _End(NamedTuple):
+    """The end of a chatter, and whether the series for it may be used."""
+
+    possible: jax.Array
+    duration: jax.Array
+    state: jax.Array
+
+
+@eqx.filter_jit
+def _prepared(system):
+    return system.prepared()
+
+
+def _compiled(method):
+    """Compile once: numbers become arrays, which are not part of the program."""
+    compiled = eqx.filter_jit(method)
+
+    @functools.wraps(method)
+    def call(self, *arguments):
+        return compiled(self, *map(np.asarray, arguments))
+
+    return call
+
+
+class _Motion(eqx.Module):
+    """The compiled functions: of time, state and the constraints in contact."""
+
+    system: eqx.Module
+    tolerance: float
+    smallness: float
+    solver: diffrax.AbstractSolver = eqx.field(static=True)
+
+    def __init__(self, system, settings):
+        self.system = system
+        # arrays, so that another value does not compile again
+        self.tolerance = jnp.asarray(settings.tolerance, dtype=jnp.float64)
+        self.smallness = jnp.asarray(settings.chatter_smallness, dtype=jnp.float64)
+        self.solver = settings.solver
+
+    @_compiled
+    def fly(self, t0, x, contact, t1, first, longest):
+        """Steps up to an event, `t1` or the end of the batch, and how many are real."""
+
+        def lowest(t, y, args, **kwargs):
+            del kwargs
+            return jnp.min(self._levels(t, y, args)[0])
+
+        solution = diffrax.diffeqsolve(
+            diffrax.ODETerm(self._field),
+            self.solver,
+            t0,
+            t1,
+            jnp.minimum(first, t1 - t0),
+            x,
+            contact,
+            saveat=diffrax.SaveAt(t0=True, steps=True),
+            stepsize_controller=diffrax.PIDController(
+                rtol=self.tolerance, atol=self.tolerance, dtmax=longest
+            ),
+            event=diffrax.Event(
+                lowest, optx.Bisection(1e-12, 1e-12, flip=True), direction=False
+            ),
+            adjoint=diffrax.ForwardMode(),
+            max_steps=_BATCH,
+            throw=False,
+        )
+        assert solution.ts is not None
+        count = jnp.sum(jnp.isfinite(solution.ts))
+        fired = solution.event_mask
+        return solution.ts, solution.ys, count, solution.stats["num_steps"], fired
+
+    @_compiled
+    def probe(self, t, x, contact, h) -> _Point:
+        """The point a step of length `h` after `(t, x)`."""
+        return self._point(t, x, contact, h)
+
+    @_compiled
+    def scan(self, times, states, contact, count) -> _Point:
+        """Points inside the first `count` steps: `(steps, fractions, m)`."""
+        real = jnp.arange(times.shape[0] - 1) < count
+        lengths = jnp.where(real, jnp.diff(times), 0.0)
+        starts = jnp.where(real, times[:-1], times[0])
+        origins = jnp.where(real[:, None], states[:-1], states[0])
+
+        def inside(t, x, length):
+            return jax.vmap(lambda f: self._point(t, x, contact, f * length))(
+                jnp.asarray(_FRACTIONS)
+            )
+
+        return jax.vmap(inside)(starts, origins, lengths)
+
+    @_compiled
+    def hop(self, t, x, contact, h) -> _Hop:
+        """The end of a hop, its height by Gauss's quadrature of the velocity."""
+        nodes, weights = np.polynomial.legendre.leggauss(5)
+
+        def velocity_at(s):
+            after, _ = self._step(t, x, contact, s)
+            return normal_velocity(self.system, t + s, after)
+
+        lengths = h * jnp.asarray((nodes + 1) / 2)
+        speeds = jax.vmap(velocity_at)(lengths)
+        after, error = self._step(t, x, contact, h)
+        level, rate = self._levels(t + h, after, contact)
+        size = self.tolerance * (1.0 + jnp.max(jnp.abs(x)))
+        return _Hop(
+            after,
+            level,
+            rate,
+            normal_velocity(self.system, t + h, after),
+            h * jnp.sum(jnp.asarray(weights / 2)[:, None] * speeds, axis=0),
+            jnp.max(jnp.abs(error)) / size,
+        )
+
+    @_compiled
+    def jets(self, t, x, contact):
+        return mode_jet(self.system, t, x, contact)
+
+    @_compiled
+    def free_jets(self, t, x):
+        return free_jet(self.system, t, x)
+
+    @_compiled
+    def velocity(self, t, x):
+        return normal_velocity(self.system, t, x)
+
+    @_compiled
+    def impact(self, t, x):
+        return impacts(self.system, t, x)
+
+    @_compiled
+    def completion(self, t, x, contact, k, speed, incoming) -> _End:
+        """The rest of the chatter on constraint `k` after a rebound at `speed`.
+
+        As [`jaxcam.hybrid.chatter_completion`][], for one of several constraints.
+        """
+        held = contact.at[k].set(True)
+
+        def pressing(s, y):
+            # acceleration along the motion that the other contacts allow
+            return lie_derivative(
+                lambda r, z: normal_velocity(self.system, r, z)[k],
+                lambda r, z: self._field(r, z, contact),
+            )(s, y)
+
+        direction = normal_directions(self.system, t, x)[k]
+        rest = x - speed * direction
+        r0 = restitution_coefficients(self.system, t, rest)[k]
+        softening = (speed / incoming - r0) / incoming
+        a = pressing(t, rest)
+        rate = lie_derivative(pressing, lambda s, y: self._field(s, y, held))(t, rest)
+        damping = jax.jvp(lambda y: pressing(t, y), (rest,), (direction,))[1]
+        jerk = lie_derivative(pressing, lambda s, y: self._field(s, y, contact))(t, x)
+        acceleration = pressing(t, x)
+        small = speed * jnp.abs(jerk) <= self.smallness * (1 - r0) * acceleration**2
+        duration = completion_time(speed, a, rate, damping, r0, softening)
+        possible = small & (r0 < 1) & (a < 0) & (a + rate * duration < 0)
+        return _End(possible, duration, self._point(t, rest, held, duration).state)
+
+    def _field(self, t, x, contact):
+        # free flight does not pay for the multipliers of contact
+        return jax.lax.cond(
+            jnp.any(contact),
+            lambda: field_in_force(self.system, t, x, contact),
+            lambda: self.system.vector_field(t, x),
+        )
+
+    def _step(self, t, x, contact, h):
+        return one_step(
+            self.solver,
+            self.tolerance,
+            lambda s, y: self._field(s, y, contact),
+            t,
+            x,
+            h,
+        )
+
+    def _point(self, t, x, contact, h) -> _Point:
+        after, _ = self._step(t, x, contact, h)
+        after = jax.lax.cond(
+            jnp.any(contact),
+            lambda: self._onto(t + h, self._onto(t + h, after, contact), contact),
+            lambda: after,
+        )
+        return _Point(after, *self._levels(t + h, after, contact))
+
+    def _levels(self, t, x, contact):
+        value, velocity, pull, rate = mode_jet(self.system, t, x, contact).T
+        return jnp.where(contact, -pull, value), jnp.where(contact, -rate, velocity)
+
+    def _onto(self, t, x, contact):
+        """One Newton step onto gap = normal velocity = 0 where in contact."""
+
+        def conditions(y):
+            jet = free_jet(self.system, t, y)
+            return jnp.where(contact[:, None], jet[:, :2], 0.0).ravel()
+
+        slope = jax.jacfwd(conditions)(x)
+        return x - jnp.linalg.pinv(slope, rtol=1e-10) @ conditions(x)

@@ -86,7 +86,18 @@ def simulate(
     if not traced:
         check_start(system, settings, t_start, state, t1)
     if engine == "diffeqsolve":
-        return simulate_segments(system, settings, t0, t_start, state, t1, max_steps)
+        if traced:
+            raise ValueError(
+                'engine="diffeqsolve" is driven from Python and cannot be traced by '
+                'jit, vmap or grad; use engine="loop" there'
+            )
+        budget = 1_000_000 if max_steps is None else max_steps
+        log, contact, code = simulate_segments(
+            system, settings, t_start, state, t1, budget, progress
+        )
+        rows = log.kind.shape[0]
+        parts = _assemble(system, t_start, t1, state, contact, log, (rows, rows))
+        return Trajectory(system, settings, t0, t1, *_trim(parts), code)
     tableau_of(settings.solver)
     if traced or derivatives == "reverse":
         rows = 4096 if max_steps is None else max_steps

@@ -2,6 +2,7 @@
 
 from typing import NamedTuple
 
+import diffrax
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -9,7 +10,8 @@ from jaxtyping import Array, Bool, Float, Int
 
 from ._codes import RESULTS, Row
 from ._functions import Functions
-from ._normal import gaps, normal_velocity
+from ._normal import field_in_force, gaps, normal_velocity
+from ._one_step import one_step
 from ._run import Log, kinds
 from ._runge_kutta import step, tableau_of
 from ._settings import Settings
@@ -241,22 +243,23 @@ def _sample(trajectory: Trajectory, times):
     system = trajectory.system.prepared()
     n = steps.state.shape[1]
     functions = Functions(system, n)
-    tableau = tableau_of(trajectory.settings.solver)
+    settings = trajectory.settings
 
     def one(t):
-        found = jnp.searchsorted(steps.time, t, side="right") - 1
-        k = jnp.clip(found, 0, steps.count - 1)
+        found = jnp.searchsorted(steps.time, t, side="right").astype(jnp.int64) - 1
+        k = jnp.clip(found, 0, steps.count.astype(jnp.int64) - 1)
         x = tuple(steps.state[k, i] for i in range(n))
         contact = tuple(steps.contact[k, i] for i in range(functions.m))
         start = steps.time[k]
-        return jnp.stack(advance(functions, tableau, start, x, contact, t - start))
+        moved = advance(system, functions, settings, start, x, contact, t - start)
+        return jnp.stack(moved)
 
     return jax.vmap(one)(times)
 
 
-def advance(functions: Functions, tableau, t, x, contact, h):
+def advance(system, functions: Functions, settings: Settings, t, x, contact, h):
     """The state a time `h` after `(t, x)` in one mode, by one step."""
-    moved, _, _ = step(tableau, lambda s, y: functions.field(s, y, contact), t, x, h)
+    moved = _move(system, functions, settings, t, x, contact, h)
     held = contact[0]
     for c in contact[1:]:
         held = held | c
@@ -266,6 +269,22 @@ def advance(functions: Functions, tableau, t, x, contact, h):
         jets = functions.jets(t + h, moved, contact)
         frame = functions.frame(t + h, moved)
         moved = functions.onto(frame, jets, moved, contact)
+    return moved
+
+
+def _move(system, functions, settings, t, x, contact, h):
+    if isinstance(settings.solver, diffrax.AbstractImplicitSolver):
+        held = jnp.stack(contact)
+
+        def field(s, y):
+            return field_in_force(system, s, y, held)
+
+        after, _ = one_step(
+            settings.solver, settings.tolerance, field, t, jnp.stack(x), h
+        )
+        return tuple(after[i] for i in range(functions.n))
+    tableau = tableau_of(settings.solver)
+    moved, _, _ = step(tableau, lambda s, y: functions.field(s, y, contact), t, x, h)
     return moved
 
 

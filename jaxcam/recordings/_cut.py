@@ -290,6 +290,8 @@ def _impact(motion: Motion, place: int, before: LocalFit, after: LocalFit) -> Bo
     jump = found["after"] - found["before"]
     error = np.hypot(found["before_stderr"], found["after_stderr"])
     evidence = f"the velocity jumps by {jump:.3g}, {jump / error:.0f} standard errors"
+    if jump < _SIGNIFICANT * error:
+        evidence = "a cubic with a hinge describes both sides of a slow impact"
     return Boundary(found["time"], found["time_stderr"], "impact", evidence)
 
 
@@ -314,8 +316,14 @@ def _release(motion: Motion, first: int, last: int, end: int) -> Boundary:
     stop = min(end, max(int(high), last + 8))
     begin = max(first, last - round(0.06 / motion.interval))
     rows = slice(begin, stop)
-    time, stderr = release_time(motion.time[rows], motion.gap[rows], motion.noise)
-    evidence = "the gap opens as a cubic from here"
+    time, stderr = release_time(
+        motion.time[rows],
+        motion.gap[rows],
+        motion.contact[rows],
+        motion.rate[rows],
+        motion.noise,
+    )
+    evidence = "the surface bends away from a free parabola from here"
     return Boundary(time, stderr, "release", evidence)
 
 

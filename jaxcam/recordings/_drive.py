@@ -58,8 +58,9 @@ def read_drive(recording: Recording, channel: str = "cam_angle_rad") -> Drive:
             f"are too few to follow the cam; give a record that is longer than "
             f"{_WINDOW:g} s and sampled above {4 / _WINDOW:g} Hz."
         )
-    angle = savgol_filter(raw, count, 2)
-    rate = savgol_filter(raw, count, 2, deriv=1, delta=recording.interval)
+    angle = np.asarray(savgol_filter(raw, count, 2))
+    interval = recording.interval
+    rate = np.asarray(savgol_filter(raw, count, 2, deriv=1, delta=interval))
     speed, phase = np.polyfit(recording.time, raw, 1)
     if abs(angle[-1] - angle[0]) < np.pi:
         raise RecordingError(

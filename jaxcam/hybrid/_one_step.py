@@ -1,0 +1,33 @@
+"""One step of any diffrax Runge-Kutta solver, explicit or implicit, by itself."""
+
+import diffrax
+import equinox as eqx
+import jax.numpy as jnp
+import optimistix as optx
+
+
+def one_step(solver: diffrax.AbstractSolver, tolerance, field, t, x, h):
+    """One step of length `h` from `(t, x)` along `field(t, x)`.
+
+    **Arguments:** the solver; the tolerance of the run, from which implicit solvers
+    take that of their equations; time (s), state `(n,)` and length (s, zero allowed).
+
+    **Returns:** the state after the step and the estimate of its error, both `(n,)`.
+    """
+    # time counts from t: t + h - t would lose the digits of a short step
+    terms = diffrax.ODETerm(lambda s, y, args: field(t + s, y))
+    solver = _with_root_finder(solver, 1e-2 * tolerance)
+    zero = jnp.zeros_like(h)
+    state = solver.init(terms, zero, h, x, None)
+    after, error, _, _, _ = solver.step(terms, zero, h, x, None, state, made_jump=True)
+    still = h == 0
+    return jnp.where(still, x, after), jnp.where(still, jnp.zeros_like(x), error)
+
+
+def _with_root_finder(solver, tolerance):
+    """The solver with a tolerance for its equations, as `diffeqsolve` would set it."""
+    if not isinstance(solver, diffrax.AbstractImplicitSolver):
+        return solver
+    tolerance = jnp.maximum(tolerance, 1e-14)
+    finder = diffrax.VeryChord(rtol=tolerance, atol=tolerance, norm=optx.max_norm)
+    return eqx.tree_at(lambda s: s.root_finder, solver, finder)

@@ -1,0 +1,175 @@
+"""Segmentation against a rig of which everything is known."""
+
+import math
+
+import numpy as np
+import pytest
+
+from jaxcam.data import DEMO_RIG
+from jaxcam.data.make_demo import (
+    DEMO_SENSORS,
+    measure,
+    RealRig,
+    recording_text,
+    simulate_rig,
+)
+from jaxcam.recordings import (
+    read_recording,
+    read_rig,
+    Recording,
+    RecordingError,
+    segment,
+    segment_case,
+)
+
+
+RIG = RealRig()
+SPEEDS_RPM = (136.5, 146.0, 158.0)
+
+
+def found_and_true(found, truth):
+    """Errors of the times found, each against the nearest true one."""
+    distance = np.abs(found[:, None] - truth)
+    return np.min(distance, axis=1), np.argmin(distance, axis=1)
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("rig")
+    rng = np.random.default_rng(7)
+    truths, recordings = [], []
+    for rpm in SPEEDS_RPM:
+        truth = simulate_rig(RIG, rpm * math.pi / 30, 4.0, settle=15.0)
+        file = folder / f"run_{rpm}rpm.csv"
+        file.write_text(recording_text(truth, rng, sensors=DEMO_SENSORS))
+        truths.append(truth)
+        recordings.append(read_recording(file))
+    return truths, segment_case(recordings, read_rig(DEMO_RIG / "rig.toml"))
+
+
+def test_impacts_are_found_where_they_were(runs):
+    for truth, segments in zip(*runs):
+        errors, nearest = found_and_true(segments.impacts.time, truth.impact_time)
+        assert segments.impacts.count > 10
+        assert np.max(errors) < 1e-3
+        assert len(set(nearest)) == len(nearest)
+        # and none is missing that made a flight one can see
+        after = np.diff(truth.impact_time, append=np.inf)
+        before = np.diff(truth.impact_time, prepend=-np.inf)
+        clear = (truth.approach > 0.4) & (np.minimum(after, before) > 0.03)
+        clear &= (truth.impact_time > 0.01) & (truth.impact_time < 3.98)
+        assert np.max(found_and_true(truth.impact_time[clear], _cuts(segments))[0]) < (
+            1e-3
+        )
+
+
+def _cuts(segments):
+    landings = [contact.start.time for contact in segments.contacts]
+    return np.array([*segments.impacts.time, *landings])
+
+
+def test_speeds_and_their_errors(runs):
+    for truth, segments in zip(*runs):
+        impacts = segments.impacts
+        _, nearest = found_and_true(impacts.time, truth.impact_time)
+        sure = impacts.restitution_stderr < 0.1
+        off = (impacts.restitution - RIG.restitution) / impacts.restitution_stderr
+        assert np.sum(sure) >= 5
+        assert 0.5 < np.sqrt(np.mean(off[sure] ** 2)) < 1.6
+        clear = impacts.approach > 0.5
+        wrong = impacts.approach[clear] - truth.approach[nearest][clear]
+        assert np.max(np.abs(wrong), initial=0.0) < 0.02
+
+
+def test_contacts(runs):
+    for truth, segments in zip(*runs):
+        true = [pair for pair in truth.contacts if pair[0] > 0.1 and pair[1] < 3.9]
+        for landed, released in true:
+            nearest = min(segments.contacts, key=lambda c: abs(c.stop.time - released))
+            assert abs(nearest.stop.time - released) < 0.004
+            # accumulation, from the last bounce that could be seen
+            assert nearest.start.time < landed + 1e-3
+            assert abs(nearest.settled - landed) < 0.015
+        inside = [
+            segments.gap[(segments.clock >= c.settled) & (segments.clock < c.stop.time)]
+            for c in segments.contacts
+        ]
+        gap = np.concatenate(inside) / segments.noise
+        if len(gap) > 500:
+            assert abs(np.mean(gap)) < 0.2 and 0.9 < np.std(gap) < 1.1
+
+
+def test_the_profile_is_recovered_where_it_was_touched(runs):
+    truths, found = runs
+    surface = found[0].surface
+    touched = np.concatenate([s.impacts.turned for s in found])
+    coefficients = RIG.profile()
+    order = 1j * np.arange(len(coefficients))
+    true = (np.exp(np.outer(touched, order)) @ coefficients).real
+    assert np.max(np.abs(surface.angle(touched) - true)) < 5e-5
+    assert truths[0].angle.shape == (8000,)
+
+
+def test_every_sample_is_in_one_part(runs):
+    for segments in runs[1]:
+        parts = sorted(
+            [(p.first, p.last) for p in (*segments.flights, *segments.contacts)]
+        )
+        assert parts[0][0] == 0 and parts[-1][1] == len(segments.recording)
+        # a release is found among samples that the threshold called contact
+        assert all(a[1] - 1 <= b[0] <= a[1] + 1 for a, b in zip(parts, parts[1:]))
+        boundaries = [b for f in segments.flights for b in (f.start, f.stop)]
+        assert all(boundary.evidence for boundary in boundaries)
+        assert segments.recording.name in segments.sentence()
+
+
+@pytest.mark.parametrize("noise", [1e-6, 1e-4, 1e-3])
+def test_a_ball_on_a_floor(noise):
+    gravity, r, interval = 9.81, 0.8, 1e-3
+    time = np.arange(0, 2.0, interval)
+    hits = [math.sqrt(2 * 0.5 / gravity)]
+    speed = gravity * hits[0]
+    height = 0.5 - gravity * time**2 / 2
+    while hits[-1] < 2.0:
+        speed *= r
+        later = time > hits[-1]
+        past = time[later] - hits[-1]
+        height[later] = speed * past - gravity * past**2 / 2
+        hits.append(hits[-1] + 2 * speed / gravity)
+    rng = np.random.default_rng(3)
+    height = height + noise * rng.standard_normal(len(time))
+    recording = Recording("ball", time, {"height_m": height})
+    segments = segment(recording, "height_m", np.zeros(len(time)))
+    assert segments.noise == pytest.approx(noise, rel=0.1)
+    true = np.array([hit for hit in hits if hit < 1.99])
+    assert segments.impacts.count == len(true)
+    assert np.max(np.abs(segments.impacts.time - true)) < 1e-3
+    off = (segments.impacts.restitution - r) / segments.impacts.restitution_stderr
+    assert np.max(np.abs(off)) < 4
+
+
+def test_noise_alone_makes_no_cut():
+    rng = np.random.default_rng(5)
+    time = np.arange(4000) * 1e-3
+    resting = Recording("rest", time, {"height_m": 1e-4 * rng.standard_normal(4000)})
+    found = segment(resting, "height_m", np.zeros(4000), noise=1e-4)
+    assert (len(found.contacts), len(found.flights)) == (1, 0)
+    flying = Recording("fly", time, {"height_m": resting["height_m"] + 1 + time})
+    found = segment(flying, "height_m", np.zeros(4000), noise=1e-4)
+    assert (len(found.contacts), len(found.flights), found.impacts.count) == (0, 1, 0)
+
+
+def test_free_motion_is_one_flight():
+    time = np.linspace(0, 1, 50)
+    recording = Recording("drop", time, {"height_m": 5 - 4.9 * time**2})
+    found = segment(recording, "height_m", noise=0.01)
+    assert len(found.flights) == 1 and found.flights[0].last == 50
+
+
+def test_a_cam_that_cannot_be_read():
+    rig = read_rig(DEMO_RIG / "rig.toml")
+    time = np.arange(8) * 0.1
+    channels = {"cam_angle_rad": time, "follower_angle_rad": 0.2 + 0.01 * time}
+    with pytest.raises(RecordingError, match="too few to follow the cam"):
+        segment_case([Recording("slow", time, channels)], rig)
+    assert measure(time, 0.0, 36000, np.random.default_rng(0)).shape == (8,)
