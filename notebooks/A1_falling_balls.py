@@ -20,6 +20,7 @@ import sys
 from pathlib import Path
 
 import jax.numpy as jnp
+import matplotlib.pyplot as plt
 from rich.console import Console
 
 import jaxcam
@@ -77,10 +78,15 @@ Console().print(comparison.table())
 
 # ## Picture
 
-first_drops = [part for name, part in parts.items() if name.endswith("drop1")]
-figure = residual_by_mode(merge(first_drops))
+# The heaviest ball above, the lightest below; grey is the noise.
 
-# A start fitted to the whole drop hides part of the mismatch, and leaves a bow: high at
-# both ends, low in between. That is a body that does not keep its acceleration. The
-# lighter a ball is for its size, the deeper the bow: what is missing is the drag of the
-# air.
+# +
+figure, grid = plt.subplots(2, 2, figsize=(8, 5), layout="constrained")
+for panels, name in zip(grid, ("bowling_ball_drop1", "whiffle_ball_1_drop1")):
+    residual_by_mode(comparison, panels, record=name)
+# -
+
+# A start fitted to the whole drop hides part of the mismatch and leaves a bow: high at
+# both ends, low in between. That is a body that loses acceleration as it gets faster.
+# The bow is deepest for the lightest ball and hardly there for the heaviest: what is
+# missing is the drag of the air.

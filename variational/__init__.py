@@ -1,3 +1,3 @@
-"""Derivatives of trajectories with impacts: saltation, monodromy, local theory."""
+"""Derivatives of trajectories: saltation matrices."""
 
-import jaxcam as jaxcam  # 64-bit floats
+from ._saltation import saltation_matrix as saltation_matrix

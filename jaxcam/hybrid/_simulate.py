@@ -19,7 +19,7 @@ from ._run import Log, run, run_reversible
 from ._runge_kutta import tableau_of
 from ._segments import simulate_segments
 from ._settings import Settings
-from ._system import HybridSystem
+from ._system import HybridSystem, with_array_parameters
 from ._trajectory import Contacts, Impacts, Parts, Steps, Trajectory, assemble
 from ._types import RealScalar
 
@@ -78,6 +78,7 @@ def simulate(
             f'derivatives is {derivatives!r}; choose "forward" or "reverse"'
         )
     t0, t1 = jnp.asarray(t0, dtype=jnp.float64), jnp.asarray(t1, dtype=jnp.float64)
+    system = with_array_parameters(system)
     traced = is_traced((system, state, t0, t1, settings))
     if state is None:
         state, t_start = _released(system, t0, traced)

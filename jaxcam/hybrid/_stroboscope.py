@@ -14,7 +14,7 @@ from ._loop import Plan
 from ._run import run_raw
 from ._runge_kutta import tableau_of
 from ._settings import Settings
-from ._system import HybridSystem
+from ._system import HybridSystem, with_array_parameters
 
 
 class Stroboscope(eqx.Module):
@@ -63,6 +63,7 @@ def stroboscope(
     """
     settings = Settings(tolerance=1e-9, chatter_depth=1.0) if settings is None else settings
     settings.check()
+    system = with_array_parameters(system)
     states = np.asarray(states, dtype=float)
     values = None if values is None else np.asarray(values, dtype=float)
     lanes = states.shape[0] if states.ndim == 2 else (1 if values is None else len(values))

@@ -4,6 +4,8 @@ import abc
 from typing import ClassVar
 
 import equinox as eqx
+import jax
+import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ._types import RealScalar
@@ -66,3 +68,13 @@ class HybridSystem(eqx.Module):
         Called with concrete parameters, before a simulation starts.
         """
         return None
+
+
+def with_array_parameters(system: HybridSystem) -> HybridSystem:
+    """The system with Python floats among its parameters turned into arrays.
+
+    A field declared as `stiffness: float = 3.0` is a parameter like any other.
+    """
+    return jax.tree.map(
+        lambda leaf: jnp.asarray(leaf) if type(leaf) is float else leaf, system
+    )
