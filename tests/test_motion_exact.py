@@ -281,15 +281,21 @@ def test_ball_leaves_the_table_where_it_falls_faster_than_free():
     trajectory = run(table, [2 * amplitude, 0.0], 0.0, 2.0)
     ends = np.asarray(trajectory.contacts.end[trajectory.contacts.released])
     assert len(ends) >= 9
-    turns = np.round((frequency * ends - np.arcsin(1 / gamma)) / (2 * np.pi))
-    exact = (np.arcsin(1 / gamma) + 2 * np.pi * turns) / frequency
-    assert np.max(np.abs(ends - exact)) < 1e-10
+    assert np.max(np.abs(ends - nearest_release(ends, gamma, frequency))) < 1e-10
     # once it sticks every turn is the same
     assert np.max(np.abs(np.diff(ends) - 2 * np.pi / frequency)) < 1e-10
     released = simulate(table, None, 0.0, 2.0)
-    assert released.successful
-    again = np.asarray(released.contacts.end[released.contacts.released])
-    assert np.max(np.abs(again[:9] - exact[:9])) < 1e-10
+    assert released.result == ""
+    ends = np.asarray(released.contacts.end[released.contacts.released])
+    assert len(ends) >= 9
+    assert np.max(np.abs(ends - nearest_release(ends, gamma, frequency))) < 1e-10
+
+
+def nearest_release(times, gamma, frequency):
+    """Where sin(frequency t) = 1 / gamma and rises."""
+    phase = np.arcsin(1 / gamma)
+    turns = np.round((frequency * times - phase) / (2 * np.pi))
+    return (phase + 2 * np.pi * turns) / frequency
 
 
 # --- events that are easily missed
@@ -357,7 +363,7 @@ def test_elastic_wall_close_to_the_top(eps):
         Spring(jnp.asarray(1 - eps)), [0.0, 1.0], 0.0, 40.0, tolerance=1e-13
     )
     up = np.arcsin(1 - eps)
-    exact = up + np.arange(7) * (2 * up + np.pi)
+    exact = up + np.arange(9) * (2 * up + np.pi)
     exact = exact[exact < 40]
     assert int(trajectory.impacts.count) == len(exact)
     energy = np.sum(np.asarray(trajectory.impacts.after) ** 2, axis=1)

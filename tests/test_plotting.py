@@ -23,7 +23,7 @@ from jaxcam.hybrid import (
 from jaxcam.models import BouncingBall
 from jaxcam.plotting._curve import curve
 from jaxcam.plotting._prefix import scaled
-from jaxcam.recordings import Recording
+from jaxcam.recordings import Comparison, Recording, Residuals
 
 
 pytestmark = pytest.mark.filterwarnings("error")
@@ -342,3 +342,97 @@ def test_the_style_leaves_the_reader_settings_alone(ball, tmp_path):
         cycle = plt.rcParams["axes.prop_cycle"].by_key()["color"]
     assert to_rgba(cycle[0]) == to_rgba("#0072B2")
     assert len(set(cycle)) == 7
+
+
+def residuals(record, mode, channel, unit, size, number=200, turned=True):
+    rng = np.random.default_rng(number)
+    time = np.linspace(0.0, 2.0, number)
+    return Residuals(
+        record,
+        mode,
+        channel,
+        unit,
+        time,
+        15.0 * time if turned else np.full(number, np.nan),
+        size * rng.standard_normal(number),
+        np.full(number, size),
+        np.arange(number) // 20,
+    )
+
+
+@pytest.fixture
+def comparison():
+    angle = "follower_angle_rad"
+    return Comparison(
+        (
+            residuals("run1", "flight", angle, "rad", 9e-5),
+            residuals("run1", "impact speed", angle, "rad/s", 0.03, 12),
+            residuals("run2", "flight", angle, "rad", 9e-5, 300),
+        )
+    )
+
+
+def test_residual_by_mode_has_a_row_for_every_mode(comparison):
+    figure = plotting.residual_by_mode(comparison)
+    figure.canvas.draw()
+    flight, flight_shares, impact, shares = figure.axes
+    assert flight.get_title(loc="left").startswith("flight, follower angle: ")
+    assert "rms, noise" in impact.get_title(loc="left")
+    assert flight.get_ylabel() == "residual (mrad)"
+    assert impact.get_ylabel() == "residual (rad/s)"
+    assert impact.get_xlabel() == "time (s)"
+    assert shares.get_xlabel() == "share (%)"
+    assert len(line(flight, "run1").get_xdata()) == 200
+    assert len(line(flight, "run2").get_xdata()) == 300
+    # the bars are all of the samples, and agree with what noise alone would give
+    bars = [bar.get_width() for bar in flight_shares.containers[0]]
+    assert sum(bars) == pytest.approx(100)
+    (expected,) = [p for p in flight_shares.patches if hasattr(p, "get_data")]
+    np.testing.assert_allclose(bars, expected.get_data().values, atol=4.0)
+    names = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert names == ["run1", "run2"]
+
+
+def test_residual_by_mode_of_one_record_and_against_phase(comparison):
+    figure = plotting.residual_by_mode(comparison, record="run1", against="phase")
+    figure.canvas.draw()
+    flight = figure.axes[0]
+    assert not figure.legends
+    assert np.max(line(flight, "run1").get_xdata()) < 2 * np.pi
+    assert figure.axes[2].get_xlabel() == "cam angle in its turn (rad)"
+
+
+def test_residual_by_mode_says_what_is_missing(comparison):
+    with pytest.raises(ValueError, match="has run1, run2"):
+        plotting.residual_by_mode(comparison, record="run9")
+    with pytest.raises(ValueError, match='choose "time" or "phase"'):
+        plotting.residual_by_mode(comparison, against="angle")
+    fall = Comparison(
+        (residuals("drop", "flight", "height_m", "m", 0.1, turned=False),)
+    )
+    with pytest.raises(ValueError, match='choose against="time"'):
+        plotting.residual_by_mode(fall, against="phase")
+
+
+def test_compare_recording_takes_a_comparison(recording):
+    angle = recording["follower_angle_rad"]
+    rows = np.arange(100, 300)
+    part = Residuals(
+        "run1",
+        "flight",
+        "follower_angle_rad",
+        "rad",
+        recording.time[rows],
+        recording["cam_angle_rad"][rows],
+        np.full(200, 2e-4),
+        np.full(200, 1e-4),
+        np.zeros(200),
+    )
+    figure = plotting.compare_recording(recording, Comparison((part,)))
+    above, below = figure.axes
+    drawn = line(above, "simulated").get_ydata()
+    assert np.sum(np.isfinite(drawn)) == 200
+    np.testing.assert_allclose(drawn[rows], angle[rows] - 2e-4)
+    np.testing.assert_allclose(below.lines[0].get_ydata()[rows], 0.2)
+    with pytest.raises(ValueError, match="it has follower_angle_rad of run1"):
+        plotting.compare_recording(recording, Comparison((part,)), channel="gyro_rad_s")

@@ -2,8 +2,9 @@
 
 import jax
 import jax.numpy as jnp
-from jaxcam.hybrid import HybridSystem
 from jaxtyping import Array, Float
+
+from jaxcam.hybrid import HybridSystem
 
 
 def saltation_matrix(

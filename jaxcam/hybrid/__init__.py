@@ -1,8 +1,8 @@
 """What a hybrid system is, and its exact trajectory."""
 
 from ._chatter import (
-    Completion as Completion,
     chatter_completion as chatter_completion,
+    Completion as Completion,
     completion_time as completion_time,
 )
 from ._codes import RESULTS as RESULTS
@@ -15,13 +15,14 @@ from ._normal import (
     sticking_field as sticking_field,
 )
 from ._release_point import (
-    ReleasePoint as ReleasePoint,
     contact_acceleration as contact_acceleration,
     contact_state as contact_state,
     release_point as release_point,
+    ReleasePoint as ReleasePoint,
 )
 from ._settings import Settings as Settings
 from ._simulate import simulate as simulate
+from ._stroboscope import Stroboscope as Stroboscope, stroboscope as stroboscope
 from ._system import HybridSystem as HybridSystem
 from ._trajectory import (
     Contacts as Contacts,
@@ -29,4 +30,4 @@ from ._trajectory import (
     Steps as Steps,
     Trajectory as Trajectory,
 )
-from ._stroboscope import Stroboscope as Stroboscope, stroboscope as stroboscope
+from ._tuning import tune_compiler as tune_compiler

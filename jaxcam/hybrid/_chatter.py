@@ -119,9 +119,9 @@ def chatter_completion(
     point = state - speed * direction
     restitution = restitution_coefficients(system, t, point)[0]
     acceleration = acceleration_of(t, point)
-    rate = lie_derivative(
-        acceleration_of, lambda s, y: sticking_field(system, s, y)
-    )(t, point)
+    rate = lie_derivative(acceleration_of, lambda s, y: sticking_field(system, s, y))(
+        t, point
+    )
     damping = jax.jvp(lambda y: acceleration_of(t, y), (point,), (direction,))[1]
     jerk = lie_derivative(acceleration_of, field)(t, state)
     smallness = speed * jnp.abs(jerk) / (acceleration**2 * (1 - restitution))

@@ -60,7 +60,8 @@ def _check_shapes(system, t0, state) -> None:
     if wanted and wanted != n:
         names = ", ".join(type(system).state_names)
         raise ValueError(
-            f"state has {n} components but {type(system).__name__} has {wanted}: {names}"
+            f"state has {n} components but {type(system).__name__} has {wanted}: "
+            f"{names}"
         )
     rate = jax.eval_shape(system.vector_field, t0, state)
     if rate.shape != (n,):
@@ -82,6 +83,6 @@ def _check_shapes(system, t0, state) -> None:
     for name, made in (("vector_field", rate), ("gap", gap), ("impact", after)):
         if made.dtype != jnp.float64:
             raise ValueError(
-                f"{name} returns {made.dtype}; use 64-bit floats (importing jaxcam turns "
-                "them on)"
+                f"{name} returns {made.dtype}; use 64-bit floats (importing jaxcam "
+                "turns them on)"
             )

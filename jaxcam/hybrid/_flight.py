@@ -1,13 +1,13 @@
 """Judging a step of free flight: accept it, retake it shorter, or land."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 
 from ._gap_polynomial import (
-    Jet,
     bernstein,
     crossing,
+    Jet,
     lowest,
     lowest_point,
     power_coefficients,
@@ -25,19 +25,19 @@ _STRAIGHT = 4e-3
 class Verdict(NamedTuple):
     """What became of a step; for one constraint, or the earliest of several."""
 
-    retake: object
-    length: object
-    lands: object
-    offset: object
-    constraint: object
+    retake: Any
+    length: Any
+    lands: Any
+    offset: Any
+    constraint: Any
 
 
-def judge(left: Jet, right: Jet, h, slack, at_stop) -> Verdict:
+def judge(left: Jet, right: Jet, h, slack, rounding, at_stop) -> Verdict:
     """Judge the step of one free constraint.
 
     **Arguments:** the jets at both ends, the length of the step, the gap below zero
-    that counts as rounding, and whether the step ends at a time that was asked for (an
-    impact just behind it waits for the next step).
+    that is let pass, the gap that cannot be told from zero, and whether the step ends
+    at a time that was asked for (an impact just behind it waits for the next step).
     """
     polynomial = bernstein(left, right, h)
     behind = (right.gap < -slack) | ((right.gap < 0) & (right.velocity < 0))
@@ -47,6 +47,7 @@ def judge(left: Jet, right: Jet, h, slack, at_stop) -> Verdict:
     near = (jnp.abs(offset) <= _CLOSE * h) & (
         jnp.abs(offset * right.acceleration) <= _STRAIGHT * jnp.abs(right.velocity)
     )
+    near = near | (jnp.abs(right.gap) <= rounding)
     lands = ((right.velocity < 0) & near & ~(at_stop & (offset > 0))) | now
     dips = (lowest(polynomial) < -slack) & ~behind & ~now
     lands = lands & ~dips

@@ -63,7 +63,9 @@ class Functions:
             return lambda *a: scalar(self._parameters, *a, memory=self._memory)
 
         if self.planar:
-            self._field = bind(lambda s, t, x, c: s.vector_field(t, x), time, state, flags)
+            self._field = bind(
+                lambda s, t, x, c: s.vector_field(t, x), time, state, flags
+            )
             self._jets = bind(_planar_jet, time, state, flags)
             self._taylor = bind(_free_taylor, time, state, flags)
         else:

@@ -7,7 +7,7 @@ jerks tells how far the polynomial itself can be trusted. All functions take sca
 are free of branches.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 
@@ -15,23 +15,27 @@ import jax.numpy as jnp
 class Jet(NamedTuple):
     """Gap and its first three derivatives along the motion, at one instant."""
 
-    gap: object
-    velocity: object
-    acceleration: object
-    jerk: object
+    gap: Any
+    velocity: Any
+    acceleration: Any
+    jerk: Any
 
 
 class Bernstein(NamedTuple):
     """Coefficients of degree seven on the step, and the trust in them."""
 
     coefficients: tuple
-    error: object
+    error: Any
 
 
 def bernstein(left: Jet, right: Jet, h) -> Bernstein:
     """Bernstein coefficients of the gap over a step of length `h`."""
     h2, h3 = h * h, h * h * h
-    v0, a0, j0 = h * left.velocity / 7, h2 * left.acceleration / 42, h3 * left.jerk / 210
+    v0, a0, j0 = (
+        h * left.velocity / 7,
+        h2 * left.acceleration / 42,
+        h3 * left.jerk / 210,
+    )
     v1, a1, j1 = (
         h * right.velocity / 7,
         h2 * right.acceleration / 42,
@@ -130,7 +134,7 @@ def lowest_point(polynomial: Bernstein, c):
 
 
 def time_to_contact(jet: Jet):
-    """Time until the cubic through the jet reaches zero from above; inf where it does not.
+    """Time until the cubic through the jet falls to zero; inf where it does not.
 
     Leaving the surface (v > 0, little height) the cubic has an exact smallest root;
     else the root of the parabola is refined once.

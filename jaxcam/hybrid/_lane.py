@@ -1,11 +1,12 @@
 """What one trajectory carries from one iteration of the loop to the next."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 
 from ._functions import Functions
 from ._gap_polynomial import Jet
+from ._select import largest
 
 
 RUNNING, FINISHED, STEP_FAILED, NOT_FINITE = 0.0, 1.0, 2.0, 3.0
@@ -14,30 +15,30 @@ RUNNING, FINISHED, STEP_FAILED, NOT_FINITE = 0.0, 1.0, 2.0, 3.0
 class Lane(NamedTuple):
     """All scalars, so that a batch of lanes is a set of plain vectors."""
 
-    t: object
+    t: Any
     x: tuple
     contact: tuple
     jets: tuple
     # the next step to try, and the longest one that the error allows
-    step: object
-    longest: object
+    step: Any
+    longest: Any
     # the end of this step is an accumulation of impacts, not a choice
-    completing: object
-    stops: object
+    completing: Any
+    stops: Any
     # fastest rebound since the last release; largest gap of each constraint
-    fastest: object
+    fastest: Any
     scale: tuple
-    failures: object
-    status: object
-    steps: object
-    impacts: object
+    failures: Any
+    status: Any
+    steps: Any
+    impacts: Any
 
 
 def first_lane(functions: Functions, t0, x, t1) -> Lane:
     """The lane at its start: in contact where gap and velocity are zero and a < 0."""
     free = tuple(jnp.asarray(False) for _ in range(functions.m))
     jets = functions.jets(t0, x, free)
-    size = _largest([jnp.abs(e) for e in x])
+    size = largest([jnp.abs(e) for e in x])
     tiny = 1e-12 * (1.0 + size)
     contact, settled = [], []
     for jet in jets:
@@ -70,10 +71,3 @@ def first_lane(functions: Functions, t0, x, t1) -> Lane:
         steps=0.0 * one,
         impacts=0.0 * one,
     )
-
-
-def _largest(values):
-    largest = values[0]
-    for v in values[1:]:
-        largest = jnp.maximum(largest, v)
-    return largest

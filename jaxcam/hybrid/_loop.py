@@ -6,45 +6,29 @@ Everything is arithmetic on scalars and selection, so that a batch of lanes, eac
 own mode, advances together; lengths of steps carry no derivative, times of events do.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 
+from ._advance import advance_lane, Attempt, Plan
 from ._chatter import completion_time
 from ._codes import Row
 from ._flight import earliest, judge
 from ._functions import Functions
-from ._gap_polynomial import Jet, time_to_contact
-from ._lane import FINISHED, NOT_FINITE, RUNNING, STEP_FAILED, Lane
+from ._gap_polynomial import Jet
+from ._lane import Lane, RUNNING
 from ._release import judge_contact
-from ._runge_kutta import Tableau, step
-
-
-# consecutive failures after which a lane gives up
-_PATIENCE = 80
-
-
-class Plan(NamedTuple):
-    """What does not change during a run; scalars, except for the tableau."""
-
-    t0: object
-    t1: object
-    # the run also stops, and records, at t0 + k stop_period
-    stop_period: object
-    longest_contact: object
-    tolerance: object
-    smallness: object
-    depth: object
-    tableau: Tableau
+from ._runge_kutta import step
+from ._select import any_of, largest, pick, select
 
 
 class Record(NamedTuple):
     """One row of the log."""
 
-    kind: object
-    constraint: object
-    t: object
+    kind: Any
+    constraint: Any
+    t: Any
     before: tuple
     after: tuple
     contact: tuple
@@ -57,15 +41,15 @@ def iterate(functions: Functions, plan: Plan, lane: Lane) -> tuple[Lane, Record]
 
 
 def _iterate(functions: Functions, plan: Plan, lane: Lane) -> tuple[Lane, Record]:
-    n, m = functions.n, functions.m
+    m = functions.m
     active = lane.status == RUNNING
-    sticking = _any(lane.contact)
+    sticking = any_of(lane.contact)
     free = [~c for c in lane.contact]
 
     # where the step ends
     stop = jnp.minimum(plan.t0 + (lane.stops + 1) * plan.stop_period, plan.t1)
     # already in contact and moving in, or in contact and pulled away: no time passes
-    now = _any(
+    now = any_of(
         [
             jnp.where(c, j.acceleration > 0, (j.gap <= 0) & (j.velocity < 0))
             for j, c in zip(lane.jets, lane.contact, strict=True)
@@ -79,24 +63,29 @@ def _iterate(functions: Functions, plan: Plan, lane: Lane) -> tuple[Lane, Record
 
     # the step itself
     x1, error, _ = step(
-        plan.tableau, lambda t, x: functions.field(t, x, lane.contact), lane.t, lane.x, h
+        plan.tableau,
+        lambda t, x: functions.field(t, x, lane.contact),
+        lane.t,
+        lane.x,
+        h,
     )
     effort = _error_norm(error, lane.x, x1, plan.tolerance)
     if functions.planar:
         # contact is algebraic: the old state is the guess
-        x1 = _select(sticking, lane.x, x1)
+        x1 = select(sticking, lane.x, x1)
         effort = jnp.where(sticking, 0.0, effort)
     jets1 = functions.jets(t1, x1, lane.contact)
     frame = functions.frame(t1, x1)
     projected = functions.onto(frame, jets1, x1, lane.contact)
 
     # what happened in it
-    size = _largest([jnp.abs(e) for e in lane.x])
+    size = largest([jnp.abs(e) for e in lane.x])
+    rounding = 4e-16 * size
     slack = [2e-12 * s + 1e-15 * size for s in lane.scale]
     flown = earliest(
         [
             _where_free(
-                free[k], judge(lane.jets[k], jets1[k], h, slack[k], at_stop)
+                free[k], judge(lane.jets[k], jets1[k], h, slack[k], rounding, at_stop)
             )
             for k in range(m)
         ]
@@ -113,27 +102,37 @@ def _iterate(functions: Functions, plan: Plan, lane: Lane) -> tuple[Lane, Record
     after_each = functions.impact(t2, landed)
     x_after = after_each[0]
     for k in range(1, m):
-        x_after = _select(flown.constraint == k, after_each[k], x_after)
-    v_before = _pick(
+        x_after = select(flown.constraint == k, after_each[k], x_after)
+    v_before = pick(
         [j.velocity + offset * (j.acceleration + offset * j.jerk / 2) for j in jets1],
         flown.constraint,
     )
-    x3 = _select(lands, x_after, projected)
+    x3 = select(lands, x_after, projected)
     contact = _kept_contacts(functions, lane, lands, t2, x3)
     jets3 = functions.jets(t2, x3, contact)
 
     # does the rest of the impacts follow in no time?
     hit = [lands & (flown.constraint == k) for k in range(m)]
-    rebound = jnp.maximum(_pick([j.velocity for j in jets3], flown.constraint), 0.0)
+    rebound = jnp.maximum(pick([j.velocity for j in jets3], flown.constraint), 0.0)
     fastest = jnp.where(lands, jnp.maximum(lane.fastest, rebound), lane.fastest)
     chatter = _chatter(
-        functions, plan, lane, t2, landed, x_after, v_before, rebound, jets3, flown, stop
+        functions,
+        plan,
+        lane,
+        t2,
+        landed,
+        x_after,
+        v_before,
+        rebound,
+        jets3,
+        flown,
+        stop,
     )
     begins = lands & chatter.possible & (rebound <= plan.depth * fastest)
 
     # contact: the state is put on the surface a second time, then judged
     settled = functions.onto(frame, jets3, x3, contact)
-    moved = _largest([jnp.abs(a - b) for a, b in zip(settled, x3, strict=True)])
+    moved = largest([jnp.abs(a - b) for a, b in zip(settled, x3, strict=True)])
     converged = ~sticking | (moved <= 1e-7 * (1.0 + size))
     scale = jnp.minimum(lane.longest, plan.longest_contact)
     held = earliest(
@@ -151,8 +150,8 @@ def _iterate(functions: Functions, plan: Plan, lane: Lane) -> tuple[Lane, Record
     good = good & ~(held.retake & sticking & ~lands) & converged
     delay = jnp.where(released, held.offset, 0.0)
     left = _taylor_of_release(functions, settled, rates, frame, jets3, delay, contact)
-    x4 = _select(sticking & ~lands, left, x3)
-    x4 = _select(begins, chatter.state, x4)
+    x4 = select(sticking & ~lands, left, x3)
+    x4 = select(begins, chatter.state, x4)
     t4 = t2 + delay
 
     # the lane after the step
@@ -176,11 +175,28 @@ def _iterate(functions: Functions, plan: Plan, lane: Lane) -> tuple[Lane, Record
     finite = jnp.isfinite(sum(x4) + t4 + sum(j.gap + j.velocity for j in jets4))
     good = good & finite
     stopped = at_stop & good & ~lands & ~released
-    lane4 = _advance(
-        plan, lane, good, t4, x4, contact4, jets4, h, effort, stopped, lands, begins,
-        released, fastest, chatter.duration, jnp.minimum(flown.length, held.length),
-        fits, converged, settled, sticking, finite,
+    attempt = Attempt(
+        t=t4,
+        x=x4,
+        contact=contact4,
+        jets=jets4,
+        length=h,
+        effort=effort,
+        good=good,
+        fits=fits,
+        finite=finite,
+        shorter=jnp.minimum(flown.length, held.length),
+        # algebraic contact may start its next attempt from here
+        guess=settled if functions.planar else lane.x,
+        settling=~converged,
+        stopped=stopped,
+        lands=lands,
+        begins=begins,
+        released=released,
+        fastest=fastest,
+        completion=chatter.duration,
     )
+    lane4 = advance_lane(plan, lane, attempt)
     kind = jnp.where(
         lands,
         jnp.where(begins, float(Row.LAST_IMPACT), float(Row.IMPACT)),
@@ -198,19 +214,19 @@ def _iterate(functions: Functions, plan: Plan, lane: Lane) -> tuple[Lane, Record
         kind=jnp.where(good & active, kind, float(Row.NOTHING)),
         constraint=jnp.where(released, held.constraint, flown.constraint),
         t=t4,
-        before=_select(lands, landed, x4),
-        after=_select(begins, x_after, x4),
+        before=select(lands, landed, x4),
+        after=select(begins, x_after, x4),
         contact=contact4,
     )
     return lane4, record
 
 
 class _Chatter(NamedTuple):
-    possible: object
-    duration: object
+    possible: Any
+    duration: Any
     state: tuple
-    acceleration: object
-    rate: object
+    acceleration: Any
+    rate: Any
 
 
 def _chatter(
@@ -218,13 +234,13 @@ def _chatter(
 ) -> _Chatter:
     """The completion of the sequence after this impact, and whether it may be used."""
     dampings, restitutions, states = functions.chatter(t, before, after)
-    damping = _pick(dampings, flown.constraint)
-    r0 = _pick(restitutions, flown.constraint)
+    damping = pick(dampings, flown.constraint)
+    r0 = pick(restitutions, flown.constraint)
     state = states[0]
     for k in range(1, functions.m):
-        state = _select(flown.constraint == k, states[k], state)
-    a = _pick([j.acceleration for j in jets], flown.constraint)
-    j = _pick([j.jerk for j in jets], flown.constraint)
+        state = select(flown.constraint == k, states[k], state)
+    a = pick([j.acceleration for j in jets], flown.constraint)
+    j = pick([j.jerk for j in jets], flown.constraint)
     small = rebound * jnp.abs(j) <= plan.smallness * (1 - r0) * a * a
     possible = (a < 0) & small & (r0 < 1)
     # quantities of the state without normal velocity
@@ -237,88 +253,7 @@ def _chatter(
     duration = completion_time(rebound, a, rate, damping, r0, softening)
     at_end = a + rate * duration
     soon = (t + duration <= stop) | (duration <= 1e-13 * jnp.abs(t))
-    return _Chatter(
-        possible & (a < 0) & (at_end < 0) & soon, duration, state, a, rate
-    )
-
-
-def _advance(
-    plan, lane, good, t, x, contact, jets, h, effort, stopped, lands, begins,
-    released, fastest, duration, shorter, fits, converged, guess, sticking, finite,
-) -> Lane:
-    """The lane after this attempt, and the next length to try."""
-    active = lane.status == RUNNING
-    order = plan.tableau.order
-    # single precision is plenty for choosing a step, and much cheaper
-    rough = jnp.asarray(jnp.clip(effort, 1e-12, 1e12), dtype=jnp.float32)
-    rough = jnp.exp2(jnp.log2(rough) * jnp.float32(-1.0 / order))
-    factor = jnp.clip(0.9 * jnp.asarray(rough, dtype=jnp.float64), 0.2, 6.0)
-    factor = jnp.where(jnp.isfinite(effort), factor, 0.1)
-    grown = jnp.where(
-        h < 0.999 * lane.longest, jnp.maximum(lane.longest, h * factor), h * factor
-    )
-    grown = jnp.where(sticking & (effort == 0.0), lane.longest, grown)
-    longest = jnp.where(good, grown, jnp.where(fits, lane.longest, h * factor))
-    longest = jnp.minimum(longest, plan.t1 - lane.t + h)
-
-    ahead = longest
-    for k, jet in enumerate(jets):
-        flight = time_to_contact(jet)
-        rise = -jet.acceleration / jnp.where(jet.jerk > 0, jet.jerk, 1.0)
-        held = jnp.where(
-            (jet.jerk > 0) & (jet.acceleration < 0),
-            jnp.minimum(rise, plan.longest_contact),
-            plan.longest_contact,
-        )
-        limit = jnp.where(contact[k], held, jnp.where(flight > 0, flight, jnp.inf))
-        ahead = jnp.minimum(ahead, limit)
-    again = jnp.where(fits, jnp.minimum(shorter, h), longest)
-    again = jnp.where(converged & finite, again, jnp.where(finite, h, 0.25 * h))
-    trial = jnp.where(good, ahead, again)
-    trial = jnp.where(good & begins, duration, trial)
-    trial = jnp.where(lane.completing & ~good, lane.step, trial)
-
-    failures = jnp.where(good | ~active, 0.0, lane.failures + 1.0)
-    gave_up = failures > _PATIENCE
-    bad = ~finite | ~jnp.isfinite(effort)
-    reached = stopped & (t >= plan.t1)
-    status = jnp.where(
-        active & reached,
-        FINISHED,
-        jnp.where(active & gave_up, jnp.where(bad, NOT_FINITE, STEP_FAILED), lane.status),
-    )
-    guess = _select(active & sticking & ~good & finite, guess, lane.x)
-    stop_gradient = jax.lax.stop_gradient
-    return Lane(
-        t=jnp.where(good, t, lane.t),
-        x=_select(good, x, guess),
-        contact=tuple(
-            jnp.where(good, new, old)
-            for new, old in zip(contact, lane.contact, strict=True)
-        ),
-        jets=tuple(
-            Jet(*[jnp.where(good, a, b) for a, b in zip(new, old, strict=True)])
-            for new, old in zip(jets, lane.jets, strict=True)
-        ),
-        # the length of a completion is a physical time and keeps its derivative
-        step=jnp.where(
-            (good & begins) | (lane.completing & ~good), trial, stop_gradient(trial)
-        ),
-        longest=stop_gradient(jnp.where(active, longest, lane.longest)),
-        completing=jnp.where(good, begins, lane.completing),
-        stops=lane.stops + jnp.where(stopped, 1.0, 0.0),
-        fastest=stop_gradient(
-            jnp.where(good, jnp.where(released, 0.0, fastest), lane.fastest)
-        ),
-        scale=tuple(
-            stop_gradient(jnp.where(good, jnp.maximum(s, jnp.abs(j.gap)), s))
-            for s, j in zip(lane.scale, jets, strict=True)
-        ),
-        failures=failures,
-        status=status,
-        steps=lane.steps + jnp.where(active, 1.0, 0.0),
-        impacts=lane.impacts + jnp.where(good & lands, 1.0, 0.0),
-    )
+    return _Chatter(possible & (a < 0) & (at_end < 0) & soon, duration, state, a, rate)
 
 
 def _kept_contacts(functions, lane, lands, t, x):
@@ -366,7 +301,7 @@ def _error_norm(error, before, after, tolerance):
         jnp.abs(e) / (tolerance * (1.0 + jnp.maximum(jnp.abs(a), jnp.abs(b))))
         for e, a, b in zip(error, before, after, strict=True)
     ]
-    return _largest(parts)
+    return largest(parts)
 
 
 def _where_free(free, verdict):
@@ -375,30 +310,3 @@ def _where_free(free, verdict):
         length=jnp.where(free, verdict.length, jnp.inf),
         lands=verdict.lands & free,
     )
-
-
-def _any(flags):
-    out = flags[0]
-    for f in flags[1:]:
-        out = out | f
-    return out
-
-
-def _largest(values):
-    out = values[0]
-    for v in values[1:]:
-        out = jnp.maximum(out, v)
-    return out
-
-
-def _select(condition, when_true, when_false):
-    return tuple(
-        jnp.where(condition, a, b) for a, b in zip(when_true, when_false, strict=True)
-    )
-
-
-def _pick(values, constraint):
-    out = values[0]
-    for k, v in enumerate(values[1:], start=1):
-        out = jnp.where(constraint == k, v, out)
-    return out

@@ -11,12 +11,15 @@ from collections.abc import Callable
 
 import jax
 import jax.numpy as jnp
-from jax.extend.core import Literal, jaxpr_as_fun
+from jax.core import eval_jaxpr
+from jax.extend.core import jaxpr_as_fun, Literal
 from jax.interpreters import partial_eval
+
+from ._tuning import one_kernel
 
 
 # a value is kept when computing it again in its users would cost more operations
-_THRESHOLD = 12
+_THRESHOLD = 60
 # operations that cost more than an addition
 _COST = {"div": 4, "sqrt": 6, "custom_jvp_call": 40, "sin": 30, "cos": 30, "pow": 40}
 _COST |= {"exp": 20, "log": 20, "atan2": 30, "atan": 20, "asin": 30, "acos": 30}
@@ -24,6 +27,8 @@ _COST |= {"exp": 20, "log": 20, "atan2": 30, "atan": 20, "asin": 30, "acos": 30}
 
 def _chosen(jaxpr) -> list:
     """The variables of a jaxpr that are worth keeping."""
+    if one_kernel():
+        return []
     uses: dict = {}
     for equation in jaxpr.eqns:
         for v in equation.invars:
@@ -50,10 +55,34 @@ def _chosen(jaxpr) -> list:
     return kept
 
 
+def _hoisted(jaxpr, constants):
+    """The body without the operations on constants alone, which are done here, once."""
+    known = set(jaxpr.constvars)
+    early, late = [], []
+    for equation in jaxpr.eqns:
+        inputs = [v for v in equation.invars if not isinstance(v, Literal)]
+        fixed = all(v in known for v in inputs) and not equation.effects
+        (early if fixed else late).append(equation)
+        if fixed:
+            known.update(equation.outvars)
+    needed = {v for e in late for v in e.invars if not isinstance(v, Literal)}
+    needed |= {v for v in jaxpr.outvars if not isinstance(v, Literal)}
+    made = [v for e in early for v in e.outvars if v in needed]
+    plain = jaxpr.debug_info.with_unknown_names()
+    first = jaxpr.replace(
+        invars=[], outvars=made, eqns=early, debug_info=plain, effects=set()
+    )
+    values = eval_jaxpr(first, constants)
+    rest = jaxpr.replace(
+        constvars=[*jaxpr.constvars, *made], eqns=late, debug_info=plain
+    )
+    return rest, [*constants, *values]
+
+
 def with_kept(body: Callable, carry):
     """A loop body that also carries its shared scalars.
 
-    **Arguments:** `body(carry) -> (carry, row)` and an example of the carry, all scalars.
+    **Arguments:** `body(carry) -> (carry, row)` and an example of the carry, scalars.
 
     **Returns:** the new body, on `(carry, kept)`, and the first `kept`.
     """
@@ -68,12 +97,10 @@ def with_kept(body: Callable, carry):
     pruned, _ = partial_eval.dce_jaxpr(
         closed.jaxpr, [True] * (len(leaves) + 1), instantiate=True
     )
-    kept = _chosen(pruned)
+    rest, constants = _hoisted(pruned, closed.consts)
+    kept = _chosen(rest)
     shown = closed.replace(
-        jaxpr=pruned.replace(
-            outvars=[*pruned.outvars, *kept],
-            debug_info=pruned.debug_info.with_unknown_names(),
-        )
+        jaxpr=rest.replace(outvars=[*rest.outvars, *kept]), consts=constants
     )
     number = len(leaves)
 

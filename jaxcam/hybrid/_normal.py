@@ -28,7 +28,7 @@ def impacts(system: HybridSystem, t: RealScalar, x: State) -> Float[Array, "m n"
 
 
 def lie_derivative(function: Callable, field: Callable) -> Callable:
-    """Rate of change of `function(t, x)` along `field(t, x)`, explicit time included."""
+    """Rate of change of `function(t, x)` along `field`, explicit time included."""
 
     def derivative(t, x):
         return jax.jvp(function, (t, x), (jnp.ones_like(t), field(t, x)))[1]
@@ -49,9 +49,7 @@ def lie_series(function: Callable, field: Callable, order: int) -> Callable:
     for _ in range(order):
 
         def series(t, x, below=series):
-            values, rates = jax.jvp(
-                below, (t, x), (jnp.ones_like(t), field(t, x))
-            )
+            values, rates = jax.jvp(below, (t, x), (jnp.ones_like(t), field(t, x)))
             return (*values, rates[-1])
 
     return series
@@ -90,9 +88,7 @@ def normal_directions(system, t, x) -> Float[Array, "m n"]:
     return jnp.stack(rows)
 
 
-def contact_multipliers(
-    system, t, x, contact: Bool[Array, " m"]
-) -> Float[Array, " m"]:
+def contact_multipliers(system, t, x, contact: Bool[Array, " m"]) -> Float[Array, " m"]:
     """q with F_s = F - sum q_k D_k over the constraints in contact.
 
     With one constraint q = a. The constraint presses while q < 0 and lets go where q
@@ -197,7 +193,9 @@ def _solve_masked(matrix, right, mask):
         ]
         for i in range(number)
     ]
-    values = [jnp.where(mask[i], right[i], jnp.zeros_like(right[i])) for i in range(number)]
+    values = [
+        jnp.where(mask[i], right[i], jnp.zeros_like(right[i])) for i in range(number)
+    ]
     for p in range(number):
         for i in range(p + 1, number):
             factor = rows[i][p] / rows[p][p]

@@ -16,8 +16,8 @@ def judge_contact(left: Jet, right: Jet, h, scale, at_stop, completing) -> Verdi
 
     The multiplier (the acceleration a that contact suppresses) is negative while the
     constraint presses. Inside the step it is the cubic through values and rates at
-    both ends, trusted up to what the trapezoidal rule misses. `scale` is the length of a
-    step that errors alone would allow.
+    both ends, trusted up to what the trapezoidal rule misses. `scale` is the length of
+    a step that errors alone would allow.
     """
     a0, a1 = left.acceleration, right.acceleration
     s0, s1 = h * left.jerk, h * right.jerk
@@ -32,8 +32,12 @@ def judge_contact(left: Jet, right: Jet, h, scale, at_stop, completing) -> Verdi
     # short of its end a step that only might have let go is halved
     suspect = inside & ~passed & (left.acceleration < 0)
     retake = (passed | suspect) & ~lets_go & ~completing
-    length = jnp.where(retake, h * jnp.where(passed, _root(a0, s0, a1, s1), 0.5), jnp.inf)
-    return Verdict(retake, length, lets_go, jnp.where(now, 0.0, offset), jnp.zeros_like(h))
+    length = jnp.where(
+        retake, h * jnp.where(passed, _root(a0, s0, a1, s1), 0.5), jnp.inf
+    )
+    return Verdict(
+        retake, length, lets_go, jnp.where(now, 0.0, offset), jnp.zeros_like(h)
+    )
 
 
 def _root(a0, s0, a1, s1):

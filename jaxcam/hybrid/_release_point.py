@@ -31,7 +31,7 @@ def contact_state(system: HybridSystem, times, guess) -> Float[Array, "times n"]
 
 
 def contact_acceleration(system: HybridSystem, times, guess) -> Float[Array, " times"]:
-    """Normal acceleration that contact suppresses at each of `times`; below zero it holds.
+    """Normal acceleration that contact suppresses at each of `times`; it holds below 0.
 
     The follower detaches where its maximum over the period is positive.
     """
@@ -91,9 +91,7 @@ def release_point(
 
     first = jnp.where(held, t, start)
     from_grid = jnp.where(held, states[-1], states[last])
-    time, x = jax.lax.fori_loop(
-        0, 16, newton, (first, (from_grid[0], from_grid[1]))
-    )
+    time, x = jax.lax.fori_loop(0, 16, newton, (first, (from_grid[0], from_grid[1])))
     never = ~held & ~jnp.any(rises)
     holds = jnp.where(never, 2.0, jnp.where(held, 1.0, 0.0))
     return ReleasePoint(time, jnp.stack(x), holds)

@@ -7,10 +7,11 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from ._advance import Plan
 from ._codes import Row
 from ._functions import Functions
-from ._lane import RUNNING, Lane
-from ._loop import Plan, Record, iterate
+from ._lane import Lane, RUNNING
+from ._loop import iterate, Record
 from ._materialise import depend_on, with_kept
 
 

@@ -25,8 +25,8 @@ def tableau_of(solver) -> Tableau:
     name = type(solver).__name__
     if not isinstance(solver, diffrax.AbstractERK) or table is None:
         raise ValueError(
-            f"{name} is not an explicit Runge-Kutta solver; pass one (diffrax.Dopri8(), "
-            'diffrax.Tsit5()) or use engine="diffeqsolve"'
+            f"{name} is not an explicit Runge-Kutta solver; pass one "
+            '(diffrax.Dopri8(), diffrax.Tsit5()) or use engine="diffeqsolve"'
         )
     error = np.asarray(table.b_error, dtype=float)
     if not np.any(error):

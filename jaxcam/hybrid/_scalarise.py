@@ -108,7 +108,9 @@ def scalarise(function: Callable, *example) -> Callable:
 
 def _constants(values) -> list[np.ndarray]:
     """Constants of a jaxpr; those with known values become numbers."""
-    return [split(v if isinstance(v, jax.core.Tracer) else np.asarray(v)) for v in values]
+    return [
+        split(v if isinstance(v, jax.core.Tracer) else np.asarray(v)) for v in values
+    ]
 
 
 def _boxed(leaf) -> np.ndarray:
@@ -181,9 +183,7 @@ def _compute(equation, arrays) -> list[np.ndarray]:
         made = arrays
     else:
         with jax.ensure_compile_time_eval():
-            made = equation.primitive.bind(
-                *map(jnp.asarray, arrays), **equation.params
-            )
+            made = equation.primitive.bind(*map(jnp.asarray, arrays), **equation.params)
         made = made if equation.primitive.multiple_results else [made]
     return [
         np.asarray(m, dtype=o.aval.dtype) for m, o in zip(made, outputs, strict=True)
@@ -221,9 +221,7 @@ def _move(equation, inputs):
     indices = np.arange(first.size, dtype=np.int64).reshape(first.shape)
     with jax.ensure_compile_time_eval():
         target = np.asarray(
-            equation.primitive.bind(
-                *map(jnp.asarray, (indices, *others)), **params
-            )
+            equation.primitive.bind(*map(jnp.asarray, (indices, *others)), **params)
         )
     if target.size and (target.min() < 0 or target.max() >= first.size):
         # a gather that fills what lies outside

@@ -24,11 +24,12 @@ import optimistix as optx
 from ._chatter import completion_time
 from ._codes import Row
 from ._normal import (
+    contact_multipliers,
     field_in_force,
-    free_jet,
+    gaps,
     impacts,
     lie_derivative,
-    mode_jet,
+    lie_series,
     normal_directions,
     normal_velocity,
     restitution_coefficients,
@@ -88,7 +89,7 @@ class _Engine:
         self.settings = settings
         self.motion = _Motion(_prepared(system), settings)
         self.t, self.x, self.t1 = t0, state, t1
-        jets = np.asarray(self.motion.free_jets(t0, state))
+        jets = np.asarray(self.motion.jets(t0, state))
         self.tiny = 1e-12 * (1.0 + np.max(np.abs(state)))
         touching = np.all(np.abs(jets[:, :2]) <= self.tiny, axis=1)
         self.contact = touching & (jets[:, 2] < 0)
@@ -105,23 +106,23 @@ class _Engine:
 
     def advance(self):
         """One piece of motion, or one event that takes no time."""
-        jets = self._jets()
-        if not np.all(np.isfinite(jets)):
+        _, level, rate = map(np.asarray, self._probe_here())
+        if not np.all(np.isfinite([level, rate])):
             self.code = _NOT_FINITE
             return
-        for k in range(len(jets)):
-            gap, velocity, acceleration, rate = jets[k]
+        for k in range(len(level)):
             if self.contact[k]:
                 # rounding may leave a start at a release on either side of it
-                wait = -acceleration / rate if rate > 0 else np.inf
-                if acceleration > 0 or wait <= 1e-15 * (1.0 + abs(self.t)):
+                wait = -level[k] / rate[k] if rate[k] < 0 else np.inf
+                if level[k] < 0 or wait <= 1e-15 * (1.0 + abs(self.t)):
                     self._release(k, self.t, self.x)
                     return
-            elif gap <= 0 and velocity < 0 and k != self.released:
+            elif level[k] <= 0 and rate[k] < 0 and k != self.released:
                 self._impact(k, self.t, self.x)
                 return
+        jets = np.asarray(self.motion.jets(self.t, self.x))
         if not self._hop(jets):
-            self._fly(jets)
+            self._fly(jets, level, rate)
 
     def log(self) -> Log:
         """The rows, padded to a power of two so that few lengths are compiled."""
@@ -136,7 +137,7 @@ class _Engine:
         head = [jnp.asarray(c[:, 0]) for c in columns[:3]]
         return Log(*head, *map(jnp.asarray, columns[3:]))
 
-    def _fly(self, jets):
+    def _fly(self, jets, level, rate):
         """Up to the next event, or as far as one call of diffrax goes."""
         first = min(self.first, self.longest / 16)
         for k, jet in enumerate(jets):
@@ -149,10 +150,10 @@ class _Engine:
         self.steps += int(attempts)
         points = int(count) - int(fired)
         if count < 2:
-            bad = not np.all(np.isfinite(self._jets()))
+            bad = not np.all(np.isfinite(jets))
             self.code = _NOT_FINITE if bad else _STEP_FAILED
             return
-        event = self._find(times, states, int(count), bool(fired))
+        event = self._find(times, states, int(count), bool(fired), level, rate)
         if event is _TOO_LONG:
             self.first = first / 10
             if first <= 1e-16 * (1.0 + abs(self.t)):
@@ -183,15 +184,15 @@ class _Engine:
         else:
             self._impact(event.constraint, t, there.state)
 
-    def _find(self, times, states, count, fired):
+    def _find(self, times, states, count, fired, first, first_rate):
         """The first event among the steps; `_TOO_LONG` where the first step hid one."""
         scan = self.motion.scan(times, states, self.contact, count - 1)
         level, rate = np.asarray(scan.level), np.asarray(scan.rate)
-        start = self.motion.probe(times[0], states[0], self.contact, 0.0)
         found: list[_Event] = []
         for k in range(len(self.contact)):
-            before, slope = float(start.level[k]), float(start.rate[k])
-            if abs(before) <= self.tiny:
+            before, slope = first[k], first_rate[k]
+            if before <= self.tiny:
+                # leaves the surface: its rate may be zero up to rounding
                 slope = max(slope, 0.0)
             for i in range(count - 1):
                 h = float(times[i + 1] - times[i])
@@ -210,9 +211,7 @@ class _Engine:
                     if after_low < -self.tiny / 10:
                         if i == 0 and p == 0 and before <= self.tiny:
                             return _TOO_LONG
-                        found.append(
-                            self._locate(k, i, times, states, low, bottom)
-                        )
+                        found.append(self._locate(k, i, times, states, low, bottom))
                         break
                     before, slope, low = after, next_slope, high
                 else:
@@ -232,7 +231,9 @@ class _Engine:
 
     def _reach(self, slope, times, count):
         """How far from zero the level may be where diffrax put an event."""
-        return abs(slope) * 1e-2 * (times[count - 1] - times[count - 2]) + 10 * self.tiny
+        return (
+            abs(slope) * 1e-2 * (times[count - 1] - times[count - 2]) + 10 * self.tiny
+        )
 
     def _locate(self, k, i, times, states, low, high, start=None) -> _Event:
         """Newton on the length from point `i`, kept between `low` and `high`."""
@@ -271,7 +272,7 @@ class _Engine:
             return False
         k = int(self.rows[-1][1])
         _, u, a, j = jets[k]
-        if self.contact[k] or not (a < 0 < u and u * abs(j) <= _SHORT * a * a):
+        if np.any(self.contact) or not (a < 0 < u and u * abs(j) <= _SHORT * a * a):
             return False
         h = _time_to_contact((0.0, u, a, j))
         for _ in range(8):
@@ -325,8 +326,8 @@ class _Engine:
         before = after if before is None else before
         self.rows.append((kind, k, float(t), before, after, self.contact))
 
-    def _jets(self):
-        return np.asarray(self.motion.jets(self.t, self.x, self.contact))
+    def _probe_here(self):
+        return self.motion.probe(self.t, self.x, self.contact, 0.0)
 
     def _probe(self, i, times, states, h):
         return self.motion.probe(times[i], states[i], self.contact, h)
@@ -415,7 +416,13 @@ class _Motion(eqx.Module):
 
         def lowest(t, y, args, **kwargs):
             del kwargs
-            return jnp.min(self._levels(t, y, args)[0])
+            values = gaps(self.system, t, y)
+            pressure = jax.lax.cond(
+                jnp.any(args),
+                lambda: -contact_multipliers(self.system, t, y, args),
+                lambda: values,
+            )
+            return jnp.min(jnp.where(args, pressure, values))
 
         solution = diffrax.diffeqsolve(
             diffrax.ODETerm(self._field),
@@ -454,12 +461,15 @@ class _Motion(eqx.Module):
         starts = jnp.where(real, times[:-1], times[0])
         origins = jnp.where(real[:, None], states[:-1], states[0])
 
-        def inside(t, x, length):
-            return jax.vmap(lambda f: self._point(t, x, contact, f * length))(
-                jnp.asarray(_FRACTIONS)
+        def inside(step):
+            t, x, length = step
+            return jax.lax.map(
+                lambda f: self._point(t, x, contact, f * length),
+                jnp.asarray(_FRACTIONS),
             )
 
-        return jax.vmap(inside)(starts, origins, lengths)
+        # one after the other: a batch of them takes much longer to compile
+        return jax.lax.map(inside, (starts, origins, lengths))
 
     @_compiled
     def hop(self, t, x, contact, h) -> _Hop:
@@ -485,12 +495,9 @@ class _Motion(eqx.Module):
         )
 
     @_compiled
-    def jets(self, t, x, contact):
-        return mode_jet(self.system, t, x, contact)
-
-    @_compiled
-    def free_jets(self, t, x):
-        return free_jet(self.system, t, x)
+    def jets(self, t, x):
+        """Gap and its first three derivatives in free flight, `(m, 4)`."""
+        return jnp.stack(self._free_series(3)(t, x), axis=1)
 
     @_compiled
     def velocity(self, t, x):
@@ -557,15 +564,33 @@ class _Motion(eqx.Module):
         return _Point(after, *self._levels(t + h, after, contact))
 
     def _levels(self, t, x, contact):
-        value, velocity, pull, rate = mode_jet(self.system, t, x, contact).T
-        return jnp.where(contact, -pull, value), jnp.where(contact, -rate, velocity)
+        gap = self._free_series(1)(t, x)
+
+        def pressed():
+            pressure = lie_series(
+                lambda s, y: -contact_multipliers(self.system, s, y, contact),
+                lambda s, y: field_in_force(self.system, s, y, contact),
+                1,
+            )(t, x)
+            return tuple(
+                jnp.where(contact, p, g) for p, g in zip(pressure, gap, strict=True)
+            )
+
+        return jax.lax.cond(jnp.any(contact), pressed, lambda: gap)
+
+    def _free_series(self, order):
+        return lie_series(
+            lambda s, y: gaps(self.system, s, y),
+            lambda s, y: self.system.vector_field(s, y),
+            order,
+        )
 
     def _onto(self, t, x, contact):
         """One Newton step onto gap = normal velocity = 0 where in contact."""
 
         def conditions(y):
-            jet = free_jet(self.system, t, y)
-            return jnp.where(contact[:, None], jet[:, :2], 0.0).ravel()
+            jet = jnp.stack(self._free_series(1)(t, y), axis=1)
+            return jnp.where(contact[:, None], jet, 0.0).ravel()
 
         slope = jax.jacfwd(conditions)(x)
         return x - jnp.linalg.pinv(slope, rtol=1e-10) @ conditions(x)

@@ -40,5 +40,6 @@ class Settings(eqx.Module):
             )
         if not 0 < float(self.chatter_depth) <= 1:
             raise ValueError(
-                f"chatter_depth is {float(self.chatter_depth):g}; give a value in (0, 1]"
+                f"chatter_depth is {float(self.chatter_depth):g}; give a value in "
+                "(0, 1]"
             )

@@ -10,17 +10,17 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from ._advance import Plan
 from ._check import check_start, is_traced
 from ._functions import Functions
-from ._lane import RUNNING, Lane, first_lane
-from ._loop import Plan
+from ._lane import first_lane, Lane, RUNNING
 from ._release_point import release_point
 from ._run import Log, run, run_reversible
 from ._runge_kutta import tableau_of
 from ._segments import simulate_segments
 from ._settings import Settings
 from ._system import HybridSystem, with_array_parameters
-from ._trajectory import Contacts, Impacts, Parts, Steps, Trajectory, assemble
+from ._trajectory import assemble, Contacts, Impacts, Parts, Steps, Trajectory
 from ._types import RealScalar
 
 
@@ -223,8 +223,10 @@ def _code(lane: Lane):
 def _trim(parts: Parts) -> Parts:
     def cut(part):
         number = int(part.count)
-        arrays = jax.tree.map(lambda a: a[:number] if a.ndim else a, part)
-        return arrays
+        # in numpy: jax would compile a slice for every new length
+        return jax.tree.map(
+            lambda a: jnp.asarray(np.asarray(a)[:number]) if a.ndim else a, part
+        )
 
     return Parts(
         _as(Impacts, cut(parts.impacts)),

@@ -1,16 +1,17 @@
 """Many trajectories at once, sampled once a period."""
 
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 
+from ._advance import Plan
 from ._codes import Row
 from ._functions import Functions
-from ._lane import RUNNING, first_lane
-from ._loop import Plan
+from ._lane import first_lane, RUNNING
 from ._run import run_raw
 from ._runge_kutta import tableau_of
 from ._settings import Settings
@@ -42,6 +43,7 @@ def stroboscope(
     block: int = 256,
     rows: int = 256,
     max_steps: int = 1_000_000,
+    workers: int = 1,
     progress: Callable[[float], None] | None = None,
 ) -> Stroboscope:
     """Follow many trajectories for `turns` periods and sample each once a period.
@@ -55,39 +57,51 @@ def stroboscope(
     - `period`: s; the system's own forcing period by default.
     - `settings`: accuracy; the default completes chatter as soon as theory allows.
     - `block`: lanes that advance together; `rows`: attempts between looks at them.
+    - `max_steps`: budget of attempted steps of a lane.
+    - `workers`: threads that work on blocks; results do not depend on their number.
     - `progress`: called with the fraction of lanes done.
 
     **Returns:** a [`jaxcam.hybrid.Stroboscope`][].
 
     **Raises:** `ValueError` where shapes do not fit, or there is no period.
     """
-    settings = Settings(tolerance=1e-9, chatter_depth=1.0) if settings is None else settings
+    settings = (
+        Settings(tolerance=1e-9, chatter_depth=1.0) if settings is None else settings
+    )
     settings.check()
     system = with_array_parameters(system)
     states = np.asarray(states, dtype=float)
     values = None if values is None else np.asarray(values, dtype=float)
-    lanes = states.shape[0] if states.ndim == 2 else (1 if values is None else len(values))
+    lanes = (
+        states.shape[0] if states.ndim == 2 else (1 if values is None else len(values))
+    )
     if states.ndim == 1:
         states = np.broadcast_to(states, (lanes, states.shape[0]))
-    if (where is None) != (values is None) or (values is not None and values.shape != (lanes,)):
+    if (where is None) != (values is None) or (
+        values is not None and values.shape != (lanes,)
+    ):
         raise ValueError(
             "give where and values together, with one value for each lane: "
             f"{lanes} lanes here"
         )
     if period is None and system.period is None:
-        raise ValueError("this system has no forcing period; pass period=... in seconds")
-    out, impacts, steps, codes = [], [], [], []
-    for first in range(0, lanes, block):
+        raise ValueError(
+            "this system has no forcing period; pass period=... in seconds"
+        )
+
+    def work(first):
         some = slice(first, first + block)
         part = None if values is None else values[some]
-        made = _block(
-            system, where, part, states[some], t0, period, turns, settings, rows, max_steps
-        )
-        for store, piece in zip((out, impacts, steps, codes), made, strict=True):
-            store.append(piece)
-        if progress is not None:
-            progress(min(1.0, (first + block) / lanes))
-    return Stroboscope(*[np.concatenate(p) for p in (out, impacts, steps, codes)])
+        shape = (t0, period, turns, settings, rows, max_steps)
+        return _block(system, where, part, states[some], *shape)
+
+    pieces = []
+    with ThreadPoolExecutor(workers) as pool:
+        for piece in pool.map(work, range(0, lanes, block)):
+            pieces.append(piece)
+            if progress is not None:
+                progress(min(1.0, len(pieces) * block / lanes))
+    return Stroboscope(*map(np.concatenate, zip(*pieces, strict=True)))
 
 
 def _block(system, where, values, states, t0, period, turns, settings, rows, max_steps):
@@ -108,7 +122,8 @@ def _block(system, where, values, states, t0, period, turns, settings, rows, max
         used += rows
     status = np.asarray(lane.status).astype(int)
     code = np.array([1, 0, 2, 3])[status]
-    return samples, np.asarray(lane.impacts).astype(int), np.asarray(lane.steps).astype(int), code
+    counts = [np.asarray(c).astype(int) for c in (lane.impacts, lane.steps)]
+    return samples, *counts, code
 
 
 def _batch(system, where, values):

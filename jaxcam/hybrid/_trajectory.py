@@ -6,13 +6,15 @@ import diffrax
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
+from ._check import is_traced
 from ._codes import RESULTS, Row
 from ._functions import Functions
 from ._normal import field_in_force, gaps, normal_velocity
 from ._one_step import one_step
-from ._run import Log, kinds
+from ._run import kinds, Log
 from ._runge_kutta import step, tableau_of
 from ._settings import Settings
 from ._system import HybridSystem
@@ -104,7 +106,7 @@ class Trajectory(eqx.Module):
                 f"times has shape {times.shape}; pass a vector, such as "
                 "jnp.linspace(t0, t1, 100) or jnp.array([t])"
             )
-        known = not any(isinstance(a, jax.core.Tracer) for a in (times, self.t1))
+        known = not is_traced((self, times))
         if known and times.size:
             low, high = float(times.min()), float(times.max())
             end = float(self.steps.time[self.steps.count - 1])
@@ -114,7 +116,11 @@ class Trajectory(eqx.Module):
                     f"times reach from {low:g} to {high:g} s but the trajectory covers "
                     f"{float(self.t0):g} to {end:g} s"
                 )
-        return _sample(self, times)
+        if not known:
+            return _sample(self.system, self.settings, self.steps, times)
+        steps, padded = _padded(self.steps), _pad(times, np.nan)
+        found = _sample(self.system, self.settings, steps, padded)
+        return jnp.asarray(np.asarray(found)[: times.shape[0]])
 
     def gap(self, times):
         """Gap at each of `times`: shape `(times,)`, or `(times, m)` for m > 1."""
@@ -237,13 +243,30 @@ def _gaps(system, times, states):
     return values[:, 0] if values.shape[1] == 1 else values
 
 
+def _pad(array, fill):
+    """`array` continued to a power of two, so that few lengths are compiled."""
+    array = np.asarray(array)
+    length = 64
+    while length < array.shape[0]:
+        length *= 2
+    rest = [(0, length - array.shape[0])] + [(0, 0)] * (array.ndim - 1)
+    return jnp.asarray(np.pad(array, rest, constant_values=fill))
+
+
+def _padded(steps: Steps) -> Steps:
+    return Steps(
+        _pad(steps.time, np.inf),
+        _pad(steps.state, np.nan),
+        _pad(steps.contact, False),
+        steps.count,
+    )
+
+
 @eqx.filter_jit
-def _sample(trajectory: Trajectory, times):
-    steps = trajectory.steps
-    system = trajectory.system.prepared()
+def _sample(system, settings: Settings, steps: Steps, times):
+    system = system.prepared()
     n = steps.state.shape[1]
     functions = Functions(system, n)
-    settings = trajectory.settings
 
     def one(t):
         found = jnp.searchsorted(steps.time, t, side="right").astype(jnp.int64) - 1

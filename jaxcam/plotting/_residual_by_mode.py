@@ -7,17 +7,19 @@ import numpy as np
 from jaxtyping import Float
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from scipy.stats import norm
 
 from ..recordings import Comparison, Residuals
-from ._axes import legend_above, several_axes
+from ._axes import several_axes
 from ._channels import name_and_unit
 from ._labels import labelled
 from ._prefix import scaled
 from ._style import BAND, FLIGHT, styled
 
 
-_BINS = 36
+# odd, so that one of them is about zero
+_BINS = 37
 _ANGLE_TICKS = ("0", r"$\pi/2$", r"$\pi$", r"$3\pi/2$", r"$2\pi$")
 
 
@@ -63,13 +65,17 @@ def residual_by_mode(
     colours = {
         name: f"C{k % 7}" if len(names) > 1 else FLIGHT for k, name in enumerate(names)
     }
+    highest = 0.0
     for (left, right), parts in zip(grid, groups, strict=True):
-        _draw_row(left, right, parts, colours, against)
+        share = _draw_row(left, right, parts, colours, against)
+        highest = max(highest, share)
     if len(names) > 1:
-        legend_above(grid[0, 0])
+        _name_records(figure, colours)
     left, right = grid[-1]
     left.set_xlabel("time (s)" if against == "time" else "cam angle in its turn (rad)")
     right.set_xlabel("share (%)")
+    # for all rows; the noise of a large residual is all in one bin, and may be cut off
+    right.set_xlim(0.0, 1.25 * highest)
     if against == "phase":
         left.set_xticks(np.arange(5) * np.pi / 2, _ANGLE_TICKS)
     figure.align_ylabels(list(grid[:, 0]))
@@ -91,7 +97,8 @@ def _groups(comparison: Comparison, record: str | None) -> list[list[Residuals]]
     return list(groups.values())
 
 
-def _draw_row(left: Axes, right: Axes, parts, colours, against) -> None:
+def _draw_row(left: Axes, right: Axes, parts, colours, against) -> float:
+    """Draw both panels; return the length of the longest bar."""
     value = np.concatenate([part.value for part in parts])
     stderr = np.concatenate([part.stderr for part in parts])
     rms, noise = float(np.sqrt(np.mean(value**2))), float(np.sqrt(np.mean(stderr**2)))
@@ -104,14 +111,16 @@ def _draw_row(left: Axes, right: Axes, parts, colours, against) -> None:
     for part in parts:
         _draw_part(left, part, factor, colours[part.record], against)
     limit = 1.08 * factor * largest
-    _draw_shares(right, factor * value, factor * stderr, limit)
+    highest = _draw_shares(right, factor * value, factor * stderr, limit)
     left.set_ylim(-limit, limit)
     left.set_ylabel(labelled("residual", unit))
     left.set_title(
-        f"{_title(parts[0])}: {factor * rms:.3g} {unit} rms, noise {factor * noise:.2g}",
+        f"{_title(parts[0])}: {factor * rms:.3g} {unit} rms, "
+        f"noise {factor * noise:.2g}",
         fontsize="medium",
     )
     right.tick_params(labelleft=False)
+    return highest
 
 
 def _draw_part(ax: Axes, part: Residuals, factor, colour, against) -> None:
@@ -152,7 +161,7 @@ def _draw_part(ax: Axes, part: Residuals, factor, colour, against) -> None:
 
 def _draw_shares(
     ax: Axes, value: Float[np.ndarray, " k"], stderr: Float[np.ndarray, " k"], limit
-) -> None:
+) -> float:
     edges = np.linspace(-limit, limit, _BINS + 1)
     share = 100 * np.histogram(value, edges)[0] / len(value)
     ax.barh(edges[:-1], share, np.diff(edges), align="edge", color=FLIGHT, alpha=0.75)
@@ -166,7 +175,17 @@ def _draw_shares(
         linewidth=1.0,
         baseline=None,
     )
-    ax.set_xlim(left=0.0)
+    return float(share.max())
+
+
+def _name_records(figure: Figure, colours: dict[str, str]) -> None:
+    # the titles are above the axes, so the records are named above them all
+    dots = [
+        Line2D([], [], marker="o", linestyle="", color=colour, label=name)
+        for name, colour in colours.items()
+    ]
+    place = "outside upper left" if figure.get_constrained_layout() else "upper left"
+    figure.legend(handles=dots, loc=place, ncols=3, handletextpad=0.2)
 
 
 def _title(part: Residuals) -> str:

@@ -19,6 +19,7 @@ from ..models import CamFollower
 from ._comparison import Comparison, merge, Residuals
 from ._errors import RecordingError
 from ._flight_fit import fit_flights, Observe, observed, rate_of, state_at
+from ._padding import padded
 from ._polynomial import measured_noise
 from ._rig import Rig
 from ._segments import Flight, Segments
@@ -216,7 +217,7 @@ def _contacts(system, segments, pick, clock) -> list[Residuals]:
             _unit(segments.channel),
             time[rows],
             _turned(segments)[rows],
-            np.asarray(_off_surface(system, pick, clock[rows], state)),
+            _distance(system, pick, clock[rows], state),
             np.full(len(rows), segments.noise),
             np.concatenate([np.full(len(rows), i) for i, rows in kept]),
         )
@@ -233,15 +234,17 @@ def _impacts(system, segments, pick, clock) -> list[Residuals]:
     at = np.interp(moment, segments.recording.time, clock)
     size = _size(system, {segments.channel: pick})
     before = state_at(system, [pick], at, angle[:, None], rate[:, None], size)
-    place = np.asarray(_off_surface(system, pick, at, before))
-    after, gain = _after_impact(system, pick, at, before)
+    place = _distance(system, pick, at, before)
+    count = len(at)
+    after, gain = _after_impact(system, pick, padded(at), padded(before))
     error = np.hypot(
-        found.after_stderr[sharp], np.asarray(gain) * found.before_stderr[sharp]
+        found.after_stderr[sharp],
+        np.asarray(gain)[:count] * found.before_stderr[sharp],
     )
     unit = _unit(segments.channel)
     turned = found.turned[sharp]
     number = np.flatnonzero(sharp)
-    speed = found.after[sharp] - np.asarray(after)
+    speed = found.after[sharp] - np.asarray(after)[:count]
     head = (segments.recording.name,)
     return [
         Residuals(
@@ -267,6 +270,12 @@ def _impacts(system, segments, pick, clock) -> list[Residuals]:
             number,
         ),
     ]
+
+
+def _distance(system, pick, clock, state) -> Float[np.ndarray, " k"]:
+    """How far the channel is from its value on the surface, shape `(k,)`."""
+    off = _off_surface(system, pick, padded(clock), padded(state))
+    return np.asarray(off)[: len(clock)]
 
 
 @eqx.filter_jit

@@ -14,6 +14,7 @@ import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from ..hybrid import HybridSystem
+from ._padding import padded
 from ._polynomial import fit_local
 
 
@@ -80,10 +81,11 @@ def fit_flights(
 
     picks = tuple(observe)
     guess = _match(system, picks, clock, start, rates, np.zeros((rows, size)))
-    batch = (clock, time, values, mask, jnp.asarray(noise))
     substeps = 1
     while True:
-        state, covariance, predicted = _fit(system, picks, substeps, guess, *batch)
+        state, covariance, predicted = _fit(
+            system, picks, substeps, guess, clock, time, values, mask, noise
+        )
         finer = _predict_all(system, picks, 2 * substeps, state, clock, time)
         change = np.abs(finer - predicted) / noise[:, None]
         change = np.max(np.where(mask[:, None], change, 0.0))
@@ -110,8 +112,11 @@ def state_at(
 
     Where they do not determine the state, the one nearest to zero.
     """
+    count = len(clock)
+    clock, values, rates = padded(clock), padded(values), padded(rates)
     guess = np.zeros((len(clock), size))
-    return np.asarray(_match(system, tuple(observe), clock, values, rates, guess))
+    state = _match(system, tuple(observe), clock, values, rates, guess)
+    return np.asarray(state)[:count]
 
 
 def observed(pick: int | Callable[[Array], Array], state: Array) -> Array:
@@ -166,6 +171,8 @@ def _predict_all(system, picks, substeps, state, clock, time) -> Float[Array, "b
 
 @eqx.filter_jit
 def _fit(system, picks, substeps, guess, clock, time, values, mask, noise):
+    noise = jnp.asarray(noise)
+
     def one(guess, clock, time, values, mask: Bool[Array, " k"]):
         def predicted(state):
             channels = _predict(system, picks, substeps, state, clock, time)

@@ -109,7 +109,7 @@ def _segment_rig(recording, rig: Rig, drive: Drive, surface: Surface, channel):
         restitution=rig.restitution.value,
     )
     turned = np.interp(found.impacts.time, recording.time, drive.angle)
-    error = surface.slope_stderr(turned) * drive.speed if len(turned) else turned
+    error = surface.slope_stderr(turned) * drive.speed
     return dataclasses.replace(
         found,
         clock=drive.clock,

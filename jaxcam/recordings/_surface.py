@@ -17,6 +17,7 @@ from jaxtyping import Array, Float
 from ..models import EccentricCircle
 from ._drive import Drive, read_drive
 from ._kinks import find_kinks
+from ._padding import padded
 from ._polynomial import crossing, fit_local
 from ._recording import Recording
 from ._rig import Rig
@@ -54,17 +55,21 @@ class Surface(eqx.Module):
         extra = jnp.cos(phases) @ self.cosines + jnp.sin(phases) @ self.sines
         return self.profile(angle) + extra
 
-    def angle(self, turned) -> Float[np.ndarray, "*k"]:
-        """The contact angle as a numpy array."""
-        return np.asarray(_evaluate(self, turned)[0])
+    def angle(self, turned) -> Float[np.ndarray, " k"]:
+        """The contact angle as a numpy array, shape `(k,)`."""
+        turned = np.asarray(turned)
+        return np.asarray(_evaluate(self, padded(turned))[0])[: len(turned)]
 
-    def slope(self, turned) -> Float[np.ndarray, "*k"]:
+    def slope(self, turned) -> Float[np.ndarray, " k"]:
         """Its derivative to the angle that the cam has turned."""
-        return np.asarray(_evaluate(self, turned)[1])
+        turned = np.asarray(turned)
+        return np.asarray(_evaluate(self, padded(turned))[1])[: len(turned)]
 
-    def slope_stderr(self, turned) -> Float[np.ndarray, "*k"]:
+    def slope_stderr(self, turned) -> Float[np.ndarray, " k"]:
         """Standard error of `slope`, large where no impact or contact was seen."""
-        rows = np.asarray(_slope_jacobian(self, _vector(self), turned))
+        turned = np.asarray(turned)
+        rows = np.asarray(_slope_jacobian(self, _vector(self), padded(turned)))
+        rows = rows[: len(turned)]
         return np.sqrt(np.einsum("...i,ij,...j", rows, self.covariance, rows))
 
 
@@ -180,14 +185,12 @@ def _solve(surface: Surface, rig: Rig, turned, angle, error) -> Surface:
     """Gauss-Newton with the tolerances as prior and Huber weights on the points."""
     nominal = _vector(nominal_surface(rig))
     sizes = _prior_sizes(rig)
-    # padded, so that few different programs are compiled
     count = len(turned)
-    padded = np.zeros(4096 * (1 + (count - 1) // 4096))
-    padded[:count] = turned
+    places = padded(turned)
     vector = _vector(surface)
     covariance = np.diag(sizes**2)
     for _ in range(8):
-        fitted, jacobian = _linearise(surface, vector, padded)
+        fitted, jacobian = _linearise(surface, vector, places)
         misfit = (angle - np.asarray(fitted)[:count]) / error
         scale = max(1.0, np.median(np.abs(misfit)) / 0.6745) if count else 1.0
         weight = 1 / np.maximum(1.0, np.abs(misfit) / (2 * scale))

@@ -1,0 +1,54 @@
+"""The commands of `jaxcam`, and the options that come before them."""
+
+from typing import Annotated
+
+import typer
+
+from ._demo import demo
+from ._errors import one_sentence
+from ._simulate import simulate
+
+
+app = typer.Typer(
+    add_completion=False,
+    no_args_is_help=True,
+    rich_markup_mode="rich",
+    context_settings={"help_option_names": ["-h", "--help"]},
+    # a bug shows an ordinary traceback, which is easier to send on
+    pretty_exceptions_enable=False,
+)
+app.command()(one_sentence(simulate))
+app.command()(one_sentence(demo))
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        from importlib.metadata import version
+
+        typer.echo(f"jaxcam {version('jaxcam')}")
+        raise typer.Exit()
+
+
+@app.callback()
+def _options(
+    version: Annotated[
+        bool,
+        typer.Option(
+            "--version", callback=_version, is_eager=True, help="Print the version."
+        ),
+    ] = False,
+) -> None:
+    """
+    Motion of mechanical systems that fly, hit and stick.
+
+    \b
+    Examples:
+      jaxcam demo
+      jaxcam simulate cam-follower --speed 140
+    """
+    del version
+
+
+def main() -> None:
+    """Run the command that the arguments of the process name."""
+    app()

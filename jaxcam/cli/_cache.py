@@ -1,0 +1,36 @@
+"""Compiled programs are kept on disk, so that a second run starts at once."""
+
+import os
+import sys
+import warnings
+from pathlib import Path
+
+
+def keep_compiled_programs() -> None:
+    """Turn on JAX's compilation cache, in the user's cache folder.
+
+    A folder named by `JAX_COMPILATION_CACHE_DIR` is left as it is. Without a place to
+    write there is no cache, and everything is compiled anew.
+    """
+    import jax
+
+    if not os.environ.get("JAX_COMPILATION_CACHE_DIR"):
+        try:
+            folder = _user_cache() / "jaxcam" / "compiled"
+            folder.mkdir(parents=True, exist_ok=True)
+        except (OSError, RuntimeError):
+            return
+        jax.config.update("jax_compilation_cache_dir", str(folder))
+    # the many small programs between the large ones add up to seconds
+    jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
+    jax.config.update("jax_persistent_cache_min_entry_size_bytes", -1)
+    # an entry that cannot be read or written is compiled again, and nothing is lost
+    warnings.filterwarnings("ignore", "Error (reading|writing) persistent compilation")
+
+
+def _user_cache() -> Path:
+    if sys.platform == "win32" and os.environ.get("LOCALAPPDATA"):
+        return Path(os.environ["LOCALAPPDATA"])
+    if sys.platform == "darwin":
+        return Path("~/Library/Caches").expanduser()
+    return Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser()

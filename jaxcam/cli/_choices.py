@@ -1,0 +1,73 @@
+"""What can be chosen by name at the command line: systems and solvers."""
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+from ..hybrid import HybridSystem
+
+
+class Ready(NamedTuple):
+    """A system with a name, and how it is started where nothing else is said."""
+
+    model: str
+    #: None is the release point
+    state: tuple[float, ...] | None
+    #: periods of the forcing, or else s
+    turns: float | None
+    duration: float
+
+
+SYSTEMS = {
+    "cam-follower": Ready("CamFollower", None, 10.0, 0.0),
+    "impact-oscillator": Ready("ImpactOscillator", None, 10.0, 0.0),
+    "bouncing-ball": Ready("BouncingBall", (1.0, 0.0), None, 3.0),
+    "triple-integrator": Ready("TripleIntegrator", (0.0, 1.0, -3.0), None, 6.0),
+}
+SOLVERS = {
+    "dopri8": "Dopri8",
+    "tsit5": "Tsit5",
+    "dopri5": "Dopri5",
+    "kvaerno5": "Kvaerno5",
+}
+ENGINES = ("loop", "diffeqsolve")
+CAM = "cam-follower"
+
+
+def choose(option: str, name: str, known: Iterable[str]) -> str:
+    """The name, if it is known. **Raises:** `ValueError` that lists those that are."""
+    known = tuple(known)
+    if name not in known:
+        raise ValueError(f"{option} is {name!r}; choose one of {', '.join(known)}.")
+    return name
+
+
+def make_system(name: str, preset: str | None, rpm: float | None) -> HybridSystem:
+    """A ready system; `preset` and a speed in rpm are for the cam-follower alone.
+
+    **Raises:** `ValueError` that names the fix.
+    """
+    import equinox as eqx
+    import jax.numpy as jnp
+
+    from .. import models
+
+    if name != CAM:
+        for option, value in (("--preset", preset), ("--speed", rpm)):
+            if value is not None:
+                raise ValueError(
+                    f"{option} belongs to {CAM}; leave it out, and use --set for the "
+                    f"parameters of {name}."
+                )
+        return getattr(models, SYSTEMS[name].model)()
+    system = models.CamFollower() if preset is None else models.preset(preset)
+    if rpm is not None:
+        speed = jnp.asarray(models.rpm_to_rad_s(rpm), dtype=float)
+        system = eqx.tree_at(lambda s: s.speed, system, speed)
+    return system
+
+
+def make_solver(name: str):
+    """A diffrax solver. **Raises:** `ValueError` that lists the names."""
+    import diffrax
+
+    return getattr(diffrax, SOLVERS[choose("--solver", name, SOLVERS)])()

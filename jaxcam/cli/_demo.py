@@ -1,0 +1,141 @@
+"""`jaxcam demo`: recordings of a cam-follower rig beside the simulated motion."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def demo(
+    case: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="A folder of recordings, one CSV a run."),
+    ] = None,
+    rig: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="The rig; DIR/rig.toml without."),
+    ] = None,
+    gaps: Annotated[
+        str,
+        typer.Option(
+            metavar="NAME", help="Runs with samples missing: refuse them, or split."
+        ),
+    ] = "refuse",
+    out: Annotated[
+        Path, typer.Option(metavar="DIR", help="Write report and figures there.")
+    ] = Path("jaxcam-demo"),
+    json_file: Annotated[
+        Path | None,
+        typer.Option("--json", metavar="FILE", help="Write the result; - to print it."),
+    ] = None,
+) -> None:
+    """
+    Compare recordings of a rig with its simulation, flight by flight.
+
+    Without --case, a small recording that ships with the package. The report is
+    DIR/index.html, with the figures in it, and DIR/result.json.
+
+    \b
+    Examples:
+      jaxcam demo
+      jaxcam demo --out ./jaxcam-first-look --json -
+    """
+    from ._choices import choose
+
+    choose("--gaps", gaps, ("refuse", "split"))
+
+    from ._cache import keep_compiled_programs
+    from ._output import Output, to_text
+    from ._progress import progress
+
+    output = Output(json_file, out)
+    keep_compiled_programs()
+
+    from ..data import DEMO_RIG
+    from ..recordings import compare_case, merge, read_case, read_rig, segment_case
+    from ._demo_figures import draw
+    from ._page import page, Report
+    from ._rests import rest_table, rests, simulate_run
+
+    folder = DEMO_RIG if case is None else case
+    with progress("reading") as report:
+        runs = read_case(folder, gaps=gaps)  # pyright: ignore
+        nominal = read_rig(_rig_file(folder, rig))
+        report("finding impacts and contacts", None)
+        segments = segment_case(runs, nominal)
+        parts = []
+        for k, run in enumerate(segments):
+            report(f"comparing {run.recording.name}", k / len(segments))
+            parts.append(compare_case(nominal, [run]))
+        comparison = merge(parts)
+        simulated = []
+        for k, run in enumerate(segments):
+            report(f"simulating {run.recording.name}", k / len(segments))
+            simulated.append(simulate_run(nominal, run))
+        found = [rests(run, motion) for run, motion in zip(segments, simulated)]
+        report("drawing", None)
+        figures = draw(out, segments, comparison, simulated)
+    result = {
+        "command": "demo",
+        "case": runs.name,
+        "runs": [
+            {
+                "name": run.recording.name,
+                "speed": run.drive.speed if run.drive else None,
+                "sentence": run.sentence(),
+                "rests": rest.to_json(),
+            }
+            for run, rest in zip(segments, found)
+        ],
+        "comparison": comparison.to_json(),
+        "figures": [file.name for file, _ in figures],
+    }
+    report_of = Report(
+        title=f"Recording beside simulation: {runs.name}",
+        sentence=comparison.sentence(),
+        runs=[run.sentence() for run in segments],
+        comparison=comparison.rows,
+        rests=found,
+        figures=figures,
+        next_steps=_next_steps(found),
+    )
+    (out / "index.html").write_text(page(report_of), encoding="utf-8")
+    (out / "result.json").write_text(to_text(result) + "\n", encoding="utf-8")
+
+    for run in segments:
+        output.print(run.sentence())
+    output.print(comparison.table())
+    output.print(comparison.sentence())
+    output.print(rest_table(found))
+    output.print(f"Report: {out / 'index.html'}")
+    output.write_json(result)
+
+
+def _rig_file(folder: Path, rig: Path | None) -> Path:
+    if rig is not None:
+        return rig
+    file = folder / "rig.toml"
+    if not file.is_file():
+        raise ValueError(f"{folder}: there is no rig.toml in it; name one with --rig.")
+    return file
+
+
+def _next_steps(found) -> list[tuple[str, str]]:
+    """What to type next, and what it is for."""
+    rpm = found[0].rpm if found else 140.0
+    return [
+        (
+            f"jaxcam simulate cam-follower --speed {rpm:.1f} --turns 40 "
+            f"--out ./jaxcam-{rpm:.1f}rpm",
+            "The motion of the first run with the parameters of Table 4.4.",
+        ),
+        (
+            f"jaxcam simulate cam-follower --speed {rpm:.1f} --set restitution.r=0.5",
+            "The same with another restitution.",
+        ),
+        (
+            "jaxcam demo --case DIR --rig DIR/rig.toml",
+            "Recordings of your own: a folder DIR of CSV files with the columns "
+            "time_s, cam_angle_rad and follower_angle_rad, and a file with the rig.",
+        ),
+    ]

@@ -1,0 +1,62 @@
+"""From exceptions to one sentence on the error stream and an exit code."""
+
+import functools
+from collections.abc import Callable
+from typing import ParamSpec, TypeVar
+
+import typer
+
+
+_P = ParamSpec("_P")
+_R = TypeVar("_R")
+
+BAD_INPUT = 2
+STOPPED_EARLY = 1
+INTERRUPTED = 130
+
+# messages written for Python name arguments; here they are options
+_OPTIONS = (
+    ("or pass state=None to start", "or give --state release to start"),
+    ("pass the state to start from", "give the state to start from with --state"),
+    ('engine="diffeqsolve"', "--engine diffeqsolve"),
+    ("pass one (diffrax.Dopri8(), diffrax.Tsit5())", "choose --solver dopri8"),
+    ('gaps="split"', "--gaps split"),
+)
+
+
+def one_sentence(command: Callable[_P, _R]) -> Callable[_P, _R]:
+    """A command that ends with a sentence where its input is at fault."""
+
+    @functools.wraps(command)
+    def wrapper(*args: _P.args, **kwargs: _P.kwargs) -> _R:
+        try:
+            return command(*args, **kwargs)
+        except KeyboardInterrupt:
+            fail("Stopped by Ctrl-C before the end; run it again to finish.")
+            raise typer.Exit(INTERRUPTED) from None
+        except BrokenPipeError:
+            # whoever read the output has seen enough (jaxcam ... | head)
+            raise
+        except OSError as error:
+            fail(_about_file(error))
+            raise typer.Exit(BAD_INPUT) from None
+        except ValueError as error:
+            fail(str(error))
+            raise typer.Exit(BAD_INPUT) from None
+
+    return wrapper
+
+
+def fail(message: str) -> None:
+    """Print one line on the error stream."""
+    line = " ".join(message.split())
+    for python, option in _OPTIONS:
+        line = line.replace(python, option)
+    typer.echo(line if line.endswith((".", "?")) else f"{line}.", err=True)
+
+
+def _about_file(error: OSError) -> str:
+    if error.filename is None or error.strerror is None:
+        return str(error)
+    reason = error.strerror[0].lower() + error.strerror[1:]
+    return f"{error.filename}: {reason}; check the path and its permissions."

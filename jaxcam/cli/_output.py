@@ -1,0 +1,87 @@
+"""Where a command writes: the terminal, a JSON file, a folder of figures."""
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import typer
+from rich.console import Console
+
+
+class Output:
+    """Terminal, `--json FILE` and `--out DIR` of one command.
+
+    Places that cannot be written are found before the work begins, not after it.
+
+    **Raises:** `ValueError` or `OSError` for those.
+    """
+
+    def __init__(self, json_file: Path | None, folder: Path | None):
+        self.json_file = json_file
+        self.folder = folder
+        self.to_stdout = str(json_file) == "-"
+        if folder is not None:
+            if folder.exists() and not folder.is_dir():
+                raise ValueError(f"{folder}: this is a file; give --out a folder.")
+            _make(folder)
+            _try(folder / ".jaxcam-can-write")
+        if json_file is not None and not self.to_stdout:
+            if json_file.is_dir():
+                raise ValueError(
+                    f"{json_file}: this is a folder; give --json a file in it."
+                )
+            _make(json_file.parent)
+            if not json_file.exists():
+                _try(json_file)
+        # nothing but JSON goes to standard output where that is asked for
+        self.console = Console(quiet=self.to_stdout, highlight=False)
+
+    def print(self, *what) -> None:
+        """Tables as tables, and sentences word by word as they are."""
+        self.console.print(*what, markup=False)
+
+    def write_json(self, found: dict[str, Any]) -> None:
+        """Write what was found, where `--json` says so."""
+        if self.json_file is None:
+            return
+        text = to_text(found)
+        if self.to_stdout:
+            typer.echo(text)
+        else:
+            self.json_file.write_text(text + "\n", encoding="utf-8")
+            self.print(f"Data: {self.json_file}")
+
+
+def to_text(found: dict[str, Any]) -> str:
+    """Valid JSON: numbers that are not finite are null."""
+    return json.dumps(_plain(found), indent=1, allow_nan=False, ensure_ascii=False)
+
+
+def _plain(value):
+    if isinstance(value, dict):
+        return {str(name): _plain(part) for name, part in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(part) for part in value]
+    if hasattr(value, "dtype"):
+        return _plain(np.asarray(value).tolist())
+    if isinstance(value, Path):
+        return str(value)
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
+
+
+def _make(folder: Path) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except (FileExistsError, NotADirectoryError):
+        raise ValueError(
+            f"{folder}: a part of this path is a file; choose another folder."
+        ) from None
+
+
+def _try(file: Path) -> None:
+    file.touch()
+    file.unlink()

@@ -1,0 +1,132 @@
+"""The report of `jaxcam demo`: one HTML file with everything in it."""
+
+import base64
+import dataclasses
+from collections.abc import Sequence
+from html import escape
+from pathlib import Path
+
+from ..recordings import Row
+from ._rests import HEADINGS, rest_rows, Rests
+
+
+@dataclasses.dataclass(frozen=True)
+class Report:
+    """What is on the page, from top to bottom; figures have captions."""
+
+    title: str
+    sentence: str
+    runs: Sequence[str]
+    comparison: Sequence[Row]
+    rests: Sequence[Rests]
+    figures: Sequence[tuple[Path, str]]
+    next_steps: Sequence[tuple[str, str]]
+
+
+_STYLE = """
+:root { color-scheme: light dark; --ink: #1b1f24; --paper: #ffffff; --quiet: #57606a;
+  --line: #d0d7de; --shade: #f3f5f7; }
+@media (prefers-color-scheme: dark) {
+  :root { --ink: #e6e9ed; --paper: #14181d; --quiet: #9aa5b1; --line: #39424d;
+    --shade: #1f252c; } }
+* { box-sizing: border-box; }
+body { margin: 0 auto; max-width: 56rem; padding: 1.2rem 1rem 4rem; color: var(--ink);
+  background: var(--paper); font: 1rem/1.55 system-ui, sans-serif; }
+h1 { font-size: 1.5rem; line-height: 1.25; }
+h2 { font-size: 1.15rem; margin-top: 2.4rem; }
+.sentence { font-size: 1.1rem; border-left: 4px solid #0072b2; padding-left: .9rem; }
+.wide { overflow-x: auto; }
+table { border-collapse: collapse; width: 100%; font-variant-numeric: tabular-nums; }
+th, td { padding: .4rem .6rem; text-align: right; white-space: nowrap;
+  border-bottom: 1px solid var(--line); }
+th { color: var(--quiet); font-weight: 600; }
+.text { text-align: left; }
+figure { margin: 1.4rem 0; }
+img { display: block; width: 100%; max-width: 46rem; height: auto; background: #fff;
+  border-radius: 6px; border: 1px solid var(--line); }
+figcaption, .note { color: var(--quiet); font-size: .92rem; margin-top: .4rem; }
+pre { background: var(--shade); padding: .7rem .9rem; border-radius: 6px;
+  white-space: pre-wrap; overflow-wrap: anywhere; margin: .9rem 0 .2rem; }
+"""
+
+
+def page(report: Report) -> str:
+    """The page as text; nothing in it is loaded from elsewhere."""
+    parts = [
+        f"<h1>{escape(report.title)}</h1>",
+        # one idea a line is easier to take in than a paragraph of numbers
+        *(f'<p class="sentence">{escape(s)}</p>' for s in _split(report.sentence)),
+        "<h2>Residuals by mode</h2>",
+        _table(_MODES, [_cells(row) for row in report.comparison], text=(0, 7)),
+        '<p class="note">Each flight is started where the recording says it started, '
+        "so that what is left over is what the model lacks in that mode. The ratio is "
+        "what is left in units of the noise of the sensors: 1 where nothing is "
+        "missing.</p>",
+        "<h2>Rests of the follower on the cam</h2>",
+        _table(
+            HEADINGS, [row for one in report.rests for row in rest_rows(one)], (0, 1)
+        ),
+        '<p class="note">Simulated: the rig as its file states it, at the mean speed '
+        "of the run, in its own motion after twenty turns. Angles are those of the "
+        "cam in its turn; ± is the spread from rest to rest.</p>",
+        "<h2>Figures</h2>",
+        *(_figure(file, caption) for file, caption in report.figures),
+        "<h2>The runs</h2>",
+        f"<ul>{''.join(f'<li>{escape(run)}</li>' for run in report.runs)}</ul>",
+        "<h2>To go on from here</h2>",
+        *(
+            f'<pre>{escape(command)}</pre><p class="note">{escape(purpose)}</p>'
+            for command, purpose in report.next_steps
+        ),
+    ]
+    return (
+        '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        f"<title>{escape(report.title)}</title>\n<style>{_STYLE}</style>\n</head>\n"
+        "<body>\n" + "\n".join(parts) + "\n</body>\n</html>\n"
+    )
+
+
+_MODES = ("mode", "unit", "pieces", "samples", "rms", "noise", "ratio", "clearest in")
+
+
+def _cells(row: Row) -> tuple[str, ...]:
+    numbers = (f"{row.rms:.1e}", f"{row.noise:.1e}", f"{row.ratio:.2f}")
+    place = f"{row.worst_record}, {row.worst_time:.3f} s"
+    if row.worst_phase == row.worst_phase:
+        place += f", cam at {row.worst_phase:.2f} rad"
+    return (row.mode, row.unit, str(row.count), str(row.samples), *numbers, place)
+
+
+def _table(
+    headings: Sequence[str], rows: Sequence[Sequence[str]], text: Sequence[int]
+) -> str:
+    def line(tag: str, cells: Sequence[str]) -> str:
+        marked = (
+            f"<{tag}{' class=text' if k in text else ''}>{escape(cell)}</{tag}>"
+            for k, cell in enumerate(cells)
+        )
+        return f"<tr>{''.join(marked)}</tr>"
+
+    body = "".join(line("td", row) for row in rows)
+    head = f"<thead>{line('th', headings)}</thead>"
+    return f'<div class="wide"><table>{head}<tbody>{body}</tbody></table></div>'
+
+
+def _figure(file: Path, caption: str) -> str:
+    data = base64.b64encode(file.read_bytes()).decode("ascii")
+    caption = escape(caption)
+    return (
+        f'<figure><img alt="{caption}" src="data:image/png;base64,{data}">'
+        f"<figcaption>{caption}</figcaption></figure>"
+    )
+
+
+def _split(sentence: str) -> list[str]:
+    """The sentences of a text, where a full stop comes before a capital letter."""
+    lines, begin = [], 0
+    for k in range(len(sentence) - 2):
+        if sentence[k : k + 2] == ". " and sentence[k + 2].isupper():
+            lines.append(sentence[begin : k + 1])
+            begin = k + 2
+    return [*lines, sentence[begin:]]

@@ -1,0 +1,84 @@
+"""Parameters of a system by name: `profile.radius`, `restitution.slope`."""
+
+import math
+from collections.abc import Sequence
+from operator import attrgetter
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from ..hybrid import HybridSystem
+from ..models import CamFollower, ConstantRestitution
+
+
+# in rad/s, while speeds are rpm at the command line: it has an option of its own
+_SPEED = "speed"
+_CONSTANT = "restitution.r"
+
+
+def parameters(system: HybridSystem) -> dict[str, float]:
+    """All parameters and their values, in SI units."""
+    return {name: _plain(leaf) for name, leaf in _leaves(system).items()}
+
+
+def set_parameters(system: HybridSystem, assignments: Sequence[str]) -> HybridSystem:
+    """The system with `name=value` for some of its parameters.
+
+    `restitution.r=0.6` gives a cam-follower a constant restitution.
+
+    **Raises:** `ValueError` for a name that is not a parameter, or no number.
+    """
+    for assignment in assignments:
+        name, value = _split(assignment)
+        if name == _CONSTANT and isinstance(system, CamFollower):
+            law = ConstantRestitution(jnp.asarray(value, dtype=float))
+            system = eqx.tree_at(lambda s: s.restitution, system, law)
+            continue
+        leaves = _leaves(system)
+        if name == _SPEED and name in leaves:
+            raise ValueError(f"--set {assignment}: give the speed in rpm, as --speed.")
+        if name not in leaves:
+            raise ValueError(
+                f"--set {assignment}: there is no parameter {name!r}; the parameters "
+                f"are {', '.join(_names(system, leaves))}."
+            )
+        number = jnp.full_like(leaves[name], value)
+        system = eqx.tree_at(attrgetter(name), system, number)
+    return system
+
+
+def _split(assignment: str) -> tuple[str, float]:
+    name, equals, text = assignment.partition("=")
+    if not equals or not name.strip():
+        raise ValueError(
+            f"--set {assignment}: give a name and a value, such as restitution.r=0.6."
+        )
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise ValueError(
+            f"--set {assignment}: {text.strip() or 'nothing'} is no finite number; "
+            f"give one, such as {name.strip()}=0.6."
+        )
+    return name.strip(), value
+
+
+def _leaves(system) -> dict[str, jax.Array]:
+    kept = eqx.filter(system, eqx.is_inexact_array)
+    found, _ = jax.tree_util.tree_flatten_with_path(kept)
+    return {jax.tree_util.keystr(path).lstrip("."): leaf for path, leaf in found}
+
+
+def _names(system, leaves) -> list[str]:
+    names = [name for name in leaves if name != _SPEED]
+    if isinstance(system, CamFollower) and _CONSTANT not in names:
+        names.append(f"{_CONSTANT} (a constant restitution)")
+    return names
+
+
+def _plain(leaf):
+    return np.asarray(leaf).tolist()

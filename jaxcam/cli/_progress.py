@@ -1,0 +1,37 @@
+"""A bar on the error stream while something takes long."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+from rich.console import Console
+from rich.progress import (
+    BarColumn,
+    Progress,
+    SpinnerColumn,
+    TextColumn,
+    TimeElapsedColumn,
+)
+
+
+@contextmanager
+def progress(first: str) -> Iterator[Callable[[str, float | None], None]]:
+    """Yields `report(what, fraction)`; a fraction of None is a time nobody knows.
+
+    Nothing is shown where the error stream is not a terminal.
+    """
+    console = Console(stderr=True)
+    columns = (
+        SpinnerColumn(),
+        TextColumn("{task.description}", markup=False),
+        BarColumn(bar_width=24),
+        TimeElapsedColumn(),
+    )
+    shown = console.is_terminal
+    with Progress(*columns, console=console, transient=True, disable=not shown) as bar:
+        task = bar.add_task(first, total=None)
+
+        def report(what: str, fraction: float | None) -> None:
+            total = None if fraction is None else 1.0
+            bar.update(task, description=what, total=total, completed=fraction or 0.0)
+
+        yield report

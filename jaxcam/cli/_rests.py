@@ -1,0 +1,147 @@
+"""When the follower rests on the cam: as recorded, and as simulated."""
+
+import dataclasses
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from jaxtyping import Float
+from rich.table import Table
+
+import jaxcam
+
+from ..hybrid import Trajectory
+from ..models import rad_s_to_rpm
+from ..recordings import Rig, Segments
+
+
+# turns before the recording begins, for the motion to settle
+_SETTLE = 20.0
+
+
+class Intervals(NamedTuple):
+    """Rests between their beginning and the release that ends them.
+
+    - `begins`, `ends`: angle of the cam (rad) at either end of each, not wrapped.
+    - `turns`: how many turns of the cam were looked at.
+    - `share`: part of the time that the follower rests, also where an end was not seen.
+    """
+
+    begins: Float[np.ndarray, " k"]
+    ends: Float[np.ndarray, " k"]
+    turns: float
+    share: float
+
+
+@dataclasses.dataclass(frozen=True)
+class Rests:
+    """One run: its rests as recorded and as simulated."""
+
+    name: str
+    rpm: float
+    recorded: Intervals
+    simulated: Intervals
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data; angles of the cam in its turn (rad)."""
+        return {
+            which: {
+                "per_turn": len(part.begins) / part.turns,
+                "share_of_time": part.share,
+                "from": np.mod(part.begins, 2 * math.pi),
+                "to": np.mod(part.ends, 2 * math.pi),
+            }
+            for which, part in self.parts
+        }
+
+    @property
+    def parts(self) -> tuple[tuple[str, Intervals], ...]:
+        return ("recorded", self.recorded), ("simulated", self.simulated)
+
+
+def simulate_run(rig: Rig, run: Segments) -> Trajectory:
+    """The nominal rig at the mean speed of a run, until the run's end.
+
+    It starts at a release point, twenty turns before the run does.
+    """
+    assert run.drive is not None
+    system = rig.system(run.drive.speed, run.drive.phase)
+    begin, end = (float(run.recording.time[i]) for i in (0, -1))
+    return jaxcam.simulate(system, None, begin - _SETTLE * float(system.period), end)
+
+
+def rests(run: Segments, motion: Trajectory) -> Rests:
+    """The rests of a run, and those of `simulate_run` in the same span of time."""
+    assert run.drive is not None
+    name, rpm = run.recording.name, float(rad_s_to_rpm(run.drive.speed))
+    return Rests(name, rpm, _recorded(run), _simulated(run, motion))
+
+
+def rest_table(found: list[Rests]) -> Table:
+    """One row for each run and kind, for the terminal."""
+    table = Table(title="Rests of the follower on the cam")
+    table.add_column("run", no_wrap=True)
+    table.add_column("")
+    for heading in HEADINGS[2:]:
+        table.add_column(heading, justify="right")
+    for one in found:
+        for cells in rest_rows(one):
+            table.add_row(*cells)
+    return table
+
+
+HEADINGS = ("run", "", "a turn", "from (rad)", "to (rad)", "of the time")
+
+
+def rest_rows(one: Rests) -> list[tuple[str, ...]]:
+    """The cells of the two rows of a run, under `HEADINGS`."""
+    rows = []
+    for which, part in one.parts:
+        name = one.name if which == "recorded" else ""
+        per_turn = f"{len(part.begins) / part.turns:.2f}"
+        spans = (_typical(part.begins), _typical(part.ends))
+        rows.append((name, which, per_turn, *spans, f"{100 * part.share:.0f} %"))
+    return rows
+
+
+def _recorded(run: Segments) -> Intervals:
+    drive, time = run.drive, run.recording.time
+    assert drive is not None
+    whole = [
+        part
+        for part in run.contacts
+        if part.start.kind == "landing" and part.stop.kind == "release"
+    ]
+    begins, ends = (
+        np.interp(moments, time, drive.angle)
+        for moments in (
+            [part.settled for part in whole],
+            [part.stop.time for part in whole],
+        )
+    )
+    rested = sum(max(0.0, part.stop.time - part.settled) for part in run.contacts)
+    turns = abs(drive.angle[-1] - drive.angle[0]) / (2 * math.pi)
+    return Intervals(begins, ends, turns, rested / run.recording.duration)
+
+
+def _simulated(run: Segments, motion: Trajectory) -> Intervals:
+    drive, contacts = run.drive, motion.contacts
+    assert drive is not None
+    first, last = (float(run.recording.time[i]) for i in (0, -1))
+    start, end = np.asarray(contacts.start), np.asarray(contacts.end)
+    inside = np.clip(end, first, last) - np.clip(start, first, last)
+    whole = np.asarray(contacts.released) & (start >= first) & (end > start)
+    begins, ends = (drive.speed * t[whole] + drive.phase for t in (start, end))
+    turns = drive.speed * (last - first) / (2 * math.pi)
+    return Intervals(begins, ends, turns, float(inside.sum()) / (last - first))
+
+
+def _typical(angle: Float[np.ndarray, " k"]) -> str:
+    """Mean angle in its turn, and the spread about it where there are several."""
+    if not len(angle):
+        return "-"
+    mean = np.mean(np.exp(1j * angle))
+    turned = np.mod(angle - np.angle(mean) + math.pi, 2 * math.pi) - math.pi
+    middle = (np.angle(mean) + np.mean(turned)) % (2 * math.pi)
+    spread = f" ± {np.std(turned):.2f}" if len(angle) > 1 else ""
+    return f"{middle:.2f}{spread}"

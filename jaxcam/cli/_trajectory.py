@@ -1,0 +1,176 @@
+"""A trajectory as tables, a sentence, plain data and figures."""
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.table import Table
+
+from ..hybrid import Trajectory
+from ..models import CamFollower, rad_s_to_rpm
+from ._parameters import parameters
+
+
+# rows shown at either end of a table
+_ENDS = 6
+# more periods than these fill a time history, and a phase portrait, with ink
+_HISTORY, _PORTRAIT = 6.0, 40.0
+
+
+def impact_table(trajectory: Trajectory) -> Table | None:
+    """The first and the last impacts; None where there was none."""
+    impacts, system = trajectory.impacts, trajectory.system
+    time = np.asarray(impacts.time)
+    if not len(time):
+        return None
+    name, unit = (*system.state_names, "state")[0], (*system.state_units, "")[0]
+    second = _unit(system)
+    rate = f"{unit}/{second}" if second else unit
+    headings = ["", _heading("time", second)]
+    if system.period is not None:
+        headings.append(_heading("phase", "rad"))
+    headings += [_heading(name, unit)]
+    headings += [_heading(f"{which} speed", rate) for which in ("approach", "rebound")]
+    several = bool(np.any(impacts.constraint))
+    headings += ["constraint"] if several else []
+    table = Table(title="Impacts")
+    for heading in headings:
+        table.add_column(heading, justify="right", no_wrap=True)
+    before, after = np.abs(impacts.speed_before), np.abs(impacts.speed_after)
+    for k in _shown(len(time)):
+        if k is None:
+            table.add_row("…")
+            continue
+        row = [str(k + 1), f"{time[k]:.9g}"]
+        if system.period is not None:
+            row.append(f"{_phase(time[k], float(system.period)):.5f}")
+        row += [f"{float(impacts.before[k, 0]):.6g}"]
+        row += [f"{before[k]:.6g}", f"{after[k]:.6g}"]
+        table.add_row(*row, *([str(int(impacts.constraint[k]))] if several else []))
+    return table
+
+
+def contact_table(trajectory: Trajectory) -> Table | None:
+    """The first and the last contacts; None where there was none."""
+    contacts, system = trajectory.contacts, trajectory.system
+    start, end = np.asarray(contacts.start), np.asarray(contacts.end)
+    if not len(start):
+        return None
+    unit = _unit(system)
+    table = Table(title="Contacts")
+    table.add_column("", justify="right", no_wrap=True)
+    for heading in ("from", "to", "length"):
+        table.add_column(_heading(heading, unit), justify="right", no_wrap=True)
+    table.add_column("ended by")
+    for k in _shown(len(start)):
+        if k is None:
+            table.add_row("…")
+            continue
+        why = "release" if bool(contacts.released[k]) else "end of the run"
+        length = f"{end[k] - start[k]:.6g}"
+        table.add_row(str(k + 1), f"{start[k]:.9g}", f"{end[k]:.9g}", length, why)
+    return table
+
+
+def summary(name: str, trajectory: Trajectory) -> str:
+    """What happened, in one sentence."""
+    system, unit = trajectory.system, _unit(trajectory.system)
+    reached = float(trajectory.steps.time[-1])
+    at = ""
+    if isinstance(system, CamFollower):
+        at = f" at {float(rad_s_to_rpm(system.speed)):.6g} rpm"
+    impacts = _counted(int(trajectory.impacts.count), "impact")
+    contacts = _counted(int(trajectory.contacts.count), "contact")
+    # a run that begins at the release point begins there, a little before t0
+    began = float(trajectory.steps.time[0])
+    span = f"from {began:.6g} to {reached:.6g}{unit and f' {unit}'}"
+    kept = bool(np.any(trajectory.steps.contact[-1]))
+    last = "in contact" if kept else "in flight"
+    stopped = "" if bool(trajectory.successful) else "stopped early, "
+    return f"{name}{at}, {span}: {impacts}, {contacts}; {stopped}{last} at the end."
+
+
+def about(trajectory: Trajectory) -> dict[str, Any]:
+    """Everything about it as plain data, in SI units."""
+    system, impacts = trajectory.system, trajectory.impacts
+    contacts = trajectory.contacts
+    return {
+        "parameters": parameters(system),
+        "state_names": list(system.state_names),
+        "state_units": list(system.state_units),
+        "t0": float(trajectory.t0),
+        "t1": float(trajectory.t1),
+        "tolerance": float(trajectory.settings.tolerance),
+        "successful": bool(trajectory.successful),
+        "result": trajectory.result,
+        "impacts": {
+            "count": int(impacts.count),
+            "time": impacts.time,
+            "before": impacts.before,
+            "after": impacts.after,
+            "constraint": impacts.constraint,
+            "speed_before": impacts.speed_before,
+            "speed_after": impacts.speed_after,
+        },
+        "contacts": {
+            "count": int(contacts.count),
+            "start": contacts.start,
+            "end": contacts.end,
+            "released": contacts.released,
+            "constraint": contacts.constraint,
+        },
+        "final": {"time": trajectory.steps.time[-1], "state": trajectory.final},
+    }
+
+
+def draw(trajectory: Trajectory, folder: Path) -> list[Path]:
+    """Time history, phase portrait and impact map, as files in a folder."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from .. import plotting
+
+    history = plotting.time_history(trajectory, between=last(trajectory, _HISTORY))
+    portrait = plotting.phase_portrait(trajectory, between=last(trajectory, _PORTRAIT))
+    figures = {"time_history": history, "phase_portrait": portrait.figure}
+    if int(trajectory.impacts.count) > 1:
+        figures["impact_map"] = plotting.impact_map(trajectory)
+    return [
+        plotting.save_figure(figure, folder / f"{name}.png")  # pyright: ignore
+        for name, figure in figures.items()
+    ]
+
+
+def last(trajectory: Trajectory, periods: float) -> tuple[float, float] | None:
+    """The last periods of a run that has more of them; None for all of it."""
+    period = trajectory.system.period
+    if period is None:
+        return None
+    start, stop = float(trajectory.t0), float(trajectory.steps.time[-1])
+    length = periods * float(period)
+    return None if stop - start <= 1.5 * length else (stop - length, stop)
+
+
+def _shown(number: int) -> list[int | None]:
+    if number <= 2 * _ENDS + 1:
+        return list(range(number))
+    return [*range(_ENDS), None, *range(number - _ENDS, number)]
+
+
+def _heading(name: str, unit: str) -> str:
+    return f"{name}\n({unit})" if unit not in ("", "-") else name
+
+
+def _phase(time: float, period: float) -> float:
+    return 2 * math.pi * ((time / period) % 1.0)
+
+
+def _unit(system) -> str:
+    """Of time: a system all of whose states are dimensionless has none."""
+    units = system.state_units
+    return "" if units and all(unit == "-" for unit in units) else "s"
+
+
+def _counted(number: int, noun: str) -> str:
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"

@@ -1,0 +1,32 @@
+"""Choosing between scalars, and tuples of scalars, without branches."""
+
+from typing import Any
+
+import jax.numpy as jnp
+
+
+def any_of(flags) -> Any:
+    out = flags[0]
+    for f in flags[1:]:
+        out = out | f
+    return out
+
+
+def largest(values) -> Any:
+    out = values[0]
+    for v in values[1:]:
+        out = jnp.maximum(out, v)
+    return out
+
+
+def select(condition, when_true, when_false) -> tuple:
+    return tuple(
+        jnp.where(condition, a, b) for a, b in zip(when_true, when_false, strict=True)
+    )
+
+
+def pick(values, constraint) -> Any:
+    out = values[0]
+    for k, v in enumerate(values[1:], start=1):
+        out = jnp.where(constraint == k, v, out)
+    return out

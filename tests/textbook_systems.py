@@ -1,0 +1,82 @@
+"""Systems with more than one wall or mass, stated as a reader of the package would."""
+
+from typing import ClassVar
+
+import jax
+import jax.numpy as jnp
+from jaxcam import HybridSystem
+
+
+class BallBetweenWalls(HybridSystem):
+    """A ball in a uniform field between walls at 0 and `width`; state (x, x')."""
+
+    state_names: ClassVar[tuple[str, ...]] = ("position", "velocity")
+
+    gravity: jax.Array
+    width: jax.Array
+    restitution: jax.Array
+
+    def vector_field(self, t, state):
+        return jnp.stack([state[1], -self.gravity])
+
+    def gap(self, t, state):
+        return jnp.stack([state[0], self.width - state[0]])
+
+    def impact(self, t, state):
+        after = jnp.stack([state[0], -self.restitution * state[1]])
+        return jnp.stack([after, after])
+
+
+class TwoMasses(HybridSystem):
+    """A chain of two unit masses, springs and dampers, forced, mass 1 against a stop.
+
+    State (x1, x2, x1', x2'); the stop is at x1 = `stop`. Two masses with stops are
+    studied by Wagg (Chaos, Solitons and Fractals 22, 2004).
+    """
+
+    state_names: ClassVar[tuple[str, ...]] = ("x1", "x2", "v1", "v2")
+
+    omega: jax.Array
+    stop: jax.Array
+    restitution: jax.Array
+    force: jax.Array
+    stiffness: jax.Array
+    damping: jax.Array
+
+    def vector_field(self, t, state):
+        x1, x2, v1, v2 = state
+        push = self.stiffness * (x2 - x1) + self.damping * (v2 - v1)
+        drive = self.force * jnp.cos(self.omega * t)
+        a1 = drive + push - self.stiffness * x1 - self.damping * v1
+        a2 = drive - push
+        return jnp.stack([v1, v2, a1, a2])
+
+    def gap(self, t, state):
+        return self.stop - state[0]
+
+    def impact(self, t, state):
+        return state.at[2].multiply(-self.restitution)
+
+    @property
+    def period(self):
+        return 2 * jnp.pi / self.omega
+
+
+class TwoStops(TwoMasses):
+    """The same chain with a stop for each mass, both at `stop`."""
+
+    def gap(self, t, state):
+        return self.stop - state[:2]
+
+    def impact(self, t, state):
+        return jnp.stack(
+            [
+                state.at[2].multiply(-self.restitution),
+                state.at[3].multiply(-self.restitution),
+            ]
+        )
+
+
+def parameters(**values):
+    """Plain numbers as arrays, so that one compiled program serves them all."""
+    return {name: jnp.asarray(value, jnp.float64) for name, value in values.items()}
