@@ -204,6 +204,9 @@ def test_phase_portrait_has_jumps_and_stroboscopic_points(ball):
     assert line(ax, "impact").get_linestyle() == "--"
     jumps = line(ax, "impact").get_ydata()
     assert np.sum(np.isnan(jumps)) == 30
+    # the ball rests in one point, which is marked
+    (rest,) = [each for each in ax.lines if each.get_marker() == "s"]
+    np.testing.assert_array_equal(rest.get_xydata(), [[0.0, 0.0]])
     # 0, 0.25, 0.5 and 0.75 s
     assert len(line(ax, "once a period").get_xdata()) == 4
     assert (ax.get_xlabel(), ax.get_ylabel()) == ("height (m)", "velocity (m/s)")

@@ -28,10 +28,11 @@ def impact_table(trajectory: Trajectory) -> Table | None:
     second = _unit(system)
     rate = f"{unit}/{second}" if second else unit
     headings = ["", _heading("time", second)]
-    if system.period is not None:
+    period = _period(system)
+    if period is not None:
         headings.append(_heading("phase", "rad"))
     headings += [_heading(name, unit)]
-    headings += [_heading(f"{which} speed", rate) for which in ("approach", "rebound")]
+    headings += [_heading(which, rate) for which in ("approach", "rebound")]
     several = bool(np.any(impacts.constraint))
     headings += ["constraint"] if several else []
     table = Table(title="Impacts")
@@ -42,11 +43,11 @@ def impact_table(trajectory: Trajectory) -> Table | None:
         if k is None:
             table.add_row("…")
             continue
-        row = [str(k + 1), f"{time[k]:.9g}"]
-        if system.period is not None:
-            row.append(f"{_phase(time[k], float(system.period)):.5f}")
-        row += [f"{float(impacts.before[k, 0]):.6g}"]
-        row += [f"{before[k]:.6g}", f"{after[k]:.6g}"]
+        row = [str(k + 1), f"{time[k]:.8f}"]
+        if period is not None:
+            row.append(f"{_phase(time[k], period):.5f}")
+        row += [f"{float(impacts.before[k, 0]):z.6f}"]
+        row += [f"{before[k]:.4e}", f"{after[k]:.4e}"]
         table.add_row(*row, *([str(int(impacts.constraint[k]))] if several else []))
     return table
 
@@ -68,8 +69,8 @@ def contact_table(trajectory: Trajectory) -> Table | None:
             table.add_row("…")
             continue
         why = "release" if bool(contacts.released[k]) else "end of the run"
-        length = f"{end[k] - start[k]:.6g}"
-        table.add_row(str(k + 1), f"{start[k]:.9g}", f"{end[k]:.9g}", length, why)
+        length = f"{end[k] - start[k]:.8f}"
+        table.add_row(str(k + 1), f"{start[k]:.8f}", f"{end[k]:.8f}", length, why)
     return table
 
 
@@ -156,6 +157,13 @@ def _shown(number: int) -> list[int | None]:
     if number <= 2 * _ENDS + 1:
         return list(range(number))
     return [*range(_ENDS), None, *range(number - _ENDS, number)]
+
+
+def _period(system) -> float | None:
+    """Period of a forcing that is there: a floor at rest has no phase."""
+    if system.period is None or float(getattr(system, "amplitude", 1.0)) == 0:
+        return None
+    return float(system.period)
 
 
 def _heading(name: str, unit: str) -> str:

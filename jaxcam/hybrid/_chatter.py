@@ -24,8 +24,10 @@ from ._normal import (
     impacts,
     lie_derivative,
     normal_acceleration,
+    normal_directions,
     normal_velocity,
     restitution_coefficients,
+    sticking_field,
 )
 from ._system import HybridSystem
 from ._types import RealScalar, State
@@ -106,13 +108,13 @@ def chatter_completion(
     if order not in (1, 2):
         raise ValueError(f"order is {order}; the completion map has order 1 or 2")
 
+    t = jnp.asarray(t, dtype=jnp.float64)
+
     def field(s, y):
         return system.vector_field(s, y)
 
     def acceleration_of(s, y):
         return normal_acceleration(system, s, y)[0]
-
-    from ._normal import normal_directions, sticking_field
 
     speed = normal_velocity(system, t, state)[0]
     direction = normal_directions(system, t, state)[0]

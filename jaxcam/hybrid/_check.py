@@ -4,6 +4,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jax.core import Tracer
 
 from ._normal import gaps
 from ._settings import Settings
@@ -12,7 +13,7 @@ from ._system import HybridSystem
 
 def is_traced(tree) -> bool:
     """Whether any array in `tree` is being transformed, so its value is not known."""
-    return any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(tree))
+    return any(isinstance(leaf, Tracer) for leaf in jax.tree.leaves(tree))
 
 
 def check_start(system: HybridSystem, settings: Settings, t0, state, t1) -> None:

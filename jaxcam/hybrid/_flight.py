@@ -32,23 +32,31 @@ class Verdict(NamedTuple):
     constraint: Any
 
 
-def judge(left: Jet, right: Jet, h, slack, rounding, at_stop) -> Verdict:
+def judge(left: Jet, right: Jet, h, slack, rounding, room) -> Verdict:
     """Judge the step of one free constraint.
 
     **Arguments:** the jets at both ends, the length of the step, the gap below zero
-    that is let pass, the gap that cannot be told from zero, and whether the step ends
-    at a time that was asked for (an impact just behind it waits for the next step).
+    that is let pass, the gap that cannot be told from zero, and the time left to the
+    next time that was asked for (an impact beyond it waits for a later step).
     """
     polynomial = bernstein(left, right, h)
-    behind = (right.gap < -slack) | ((right.gap < 0) & (right.velocity < 0))
-    # on the surface and moving in at the very start: no time passes
-    now = (left.gap <= 0) & (left.velocity < 0) & (h == 0)
-    offset = jnp.where(now, 0.0, time_to_root(right))
-    near = (jnp.abs(offset) <= _CLOSE * h) & (
-        jnp.abs(offset * right.acceleration) <= _STRAIGHT * jnp.abs(right.velocity)
+    # a parabola that turns before it is below rounding only touches
+    touches = (right.acceleration > 0) & (
+        2 * right.acceleration * (right.gap + rounding) > right.velocity**2
     )
-    near = near | (jnp.abs(right.gap) <= rounding)
-    lands = ((right.velocity < 0) & near & ~(at_stop & (offset > 0))) | now
+    inward = (right.velocity < 0) & ~touches
+    behind = (right.gap < -slack) | ((right.gap < 0) & inward)
+    # on the surface at the very start and moving, or pulled, in: no time passes
+    now = (left.gap <= 0) & moves_in(left) & (h == 0)
+    # judged by the straight line, since the series can vanish far from the root
+    distance = jnp.abs(right.gap)
+    speed = jnp.abs(right.velocity)
+    straight = distance * jnp.abs(right.acceleration) <= _STRAIGHT * speed * speed
+    close = (distance <= _CLOSE * h * speed) & straight
+    offset = jnp.where(close, time_to_root(right), 0.0)
+    offset = jnp.where(now, 0.0, offset)
+    near = (close | (distance <= rounding)) & (offset <= room)
+    lands = (inward & near) | now
     dips = (lowest(polynomial) < -slack) & ~behind & ~now
     lands = lands & ~dips
     retake = (behind & ~lands) | dips
@@ -56,6 +64,11 @@ def judge(left: Jet, right: Jet, h, slack, rounding, at_stop) -> Verdict:
     fraction = jnp.where(behind, crossing(c), lowest_point(polynomial, c))
     length = jnp.where(retake, fraction * h, jnp.inf)
     return Verdict(retake, length, lands, offset, jnp.zeros_like(h))
+
+
+def moves_in(jet: Jet):
+    """Whether the motion at this instant goes, or is pulled, into the constraint."""
+    return (jet.velocity < 0) | ((jet.velocity == 0) & (jet.acceleration < 0))
 
 
 def earliest(verdicts: list[Verdict]) -> Verdict:

@@ -51,11 +51,26 @@ def bernstein(left: Jet, right: Jet, h) -> Bernstein:
         right.gap - v1,
         right.gap,
     )
-    middle7 = (b[0] + b[7] + 7 * (b[1] + b[6]) + 21 * (b[2] + b[5])) / 128
-    middle7 = middle7 + 35 * (b[3] + b[4]) / 128
-    middle5 = (left.gap + right.gap) / 2 + 5 * h * (left.velocity - right.velocity) / 32
-    middle5 = middle5 + h2 * (left.acceleration + right.acceleration) / 64
-    return Bernstein(b, jnp.abs(middle7 - middle5))
+    return Bernstein(b, _mistrust(left, right, h))
+
+
+def _mistrust(left: Jet, right: Jet, h):
+    """Bound of the difference to the polynomial of degree five, which ignores j.
+
+    The difference is s^3 (1-s)^3 (p + q (2s - 1)); its third coefficients at the ends
+    are what the jerks differ by there.
+    """
+    c1, c2 = h * left.velocity, h * h * left.acceleration / 2
+    r0 = right.gap - (left.gap + c1 + c2)
+    r1 = h * right.velocity - (c1 + 2 * c2)
+    r2 = h * h * right.acceleration / 2 - c2
+    d3 = 10 * r0 - 4 * r1 + r2
+    d4 = -15 * r0 + 7 * r1 - 2 * r2
+    d5 = 6 * r0 - 3 * r1 + r2
+    sixth = h * h * h / 6
+    at_left = sixth * left.jerk - d3
+    at_right = sixth * right.jerk - (d3 + 4 * d4 + 10 * d5)
+    return jnp.maximum(jnp.abs(at_left), jnp.abs(at_right)) / 64
 
 
 def lowest(polynomial: Bernstein):

@@ -14,7 +14,7 @@ import jax.numpy as jnp
 from ._advance import advance_lane, Attempt, Plan
 from ._chatter import completion_time
 from ._codes import Row
-from ._flight import earliest, judge
+from ._flight import earliest, judge, moves_in
 from ._functions import Functions
 from ._gap_polynomial import Jet
 from ._lane import Lane, RUNNING
@@ -51,7 +51,7 @@ def _iterate(functions: Functions, plan: Plan, lane: Lane) -> tuple[Lane, Record
     # already in contact and moving in, or in contact and pulled away: no time passes
     now = any_of(
         [
-            jnp.where(c, j.acceleration > 0, (j.gap <= 0) & (j.velocity < 0))
+            jnp.where(c, j.acceleration > 0, (j.gap <= 0) & moves_in(j))
             for j, c in zip(lane.jets, lane.contact, strict=True)
         ]
     )
@@ -60,6 +60,7 @@ def _iterate(functions: Functions, plan: Plan, lane: Lane) -> tuple[Lane, Record
     h = jnp.where(at_stop, stop - lane.t, jnp.where(lane.completing, lane.step, wanted))
     h = jnp.where(active, h, 0.0)
     t1 = jnp.where(at_stop, stop, lane.t + h)
+    room = jnp.where(at_stop, 0.0, stop - t1)
 
     # the step itself
     x1, error, _ = step(
@@ -80,12 +81,13 @@ def _iterate(functions: Functions, plan: Plan, lane: Lane) -> tuple[Lane, Record
 
     # what happened in it
     size = largest([jnp.abs(e) for e in lane.x])
-    rounding = 4e-16 * size
+    rounding = [1e-15 * s + 2e-15 * size for s in lane.scale]
     slack = [2e-12 * s + 1e-15 * size for s in lane.scale]
     flown = earliest(
         [
             _where_free(
-                free[k], judge(lane.jets[k], jets1[k], h, slack[k], rounding, at_stop)
+                free[k],
+                judge(lane.jets[k], jets1[k], h, slack[k], rounding[k], room),
             )
             for k in range(m)
         ]
@@ -128,7 +130,11 @@ def _iterate(functions: Functions, plan: Plan, lane: Lane) -> tuple[Lane, Record
         flown,
         stop,
     )
-    begins = lands & chatter.possible & (rebound <= plan.depth * fastest)
+    # deep enough into the sequence, or so low that rounding hides the next hop
+    pulled = jnp.abs(pick([j.acceleration for j in jets3], flown.constraint))
+    deep = rebound <= plan.depth * fastest
+    hidden = rebound * rebound <= 500 * pick(rounding, flown.constraint) * pulled
+    begins = lands & chatter.possible & (deep | hidden)
 
     # contact: the state is put on the surface a second time, then judged
     settled = functions.onto(frame, jets3, x3, contact)
@@ -139,9 +145,7 @@ def _iterate(functions: Functions, plan: Plan, lane: Lane) -> tuple[Lane, Record
         [
             _where_free(
                 lane.contact[k],
-                judge_contact(
-                    lane.jets[k], jets3[k], h, scale, at_stop, lane.completing
-                ),
+                judge_contact(lane.jets[k], jets3[k], h, scale, room, lane.completing),
             )
             for k in range(m)
         ]

@@ -43,15 +43,19 @@ def lie_series(function: Callable, field: Callable, order: int) -> Callable:
     after the other.
     """
 
-    def series(t, x):
+    def first(t, x):
         return (function(t, x),)
 
-    for _ in range(order):
-
-        def series(t, x, below=series):
+    def one_more(below):
+        def series(t, x):
             values, rates = jax.jvp(below, (t, x), (jnp.ones_like(t), field(t, x)))
             return (*values, rates[-1])
 
+        return series
+
+    series = first
+    for _ in range(order):
+        series = one_more(series)
     return series
 
 

@@ -11,7 +11,7 @@ from ._gap_polynomial import Jet
 _CLOSE = 1e-9
 
 
-def judge_contact(left: Jet, right: Jet, h, scale, at_stop, completing) -> Verdict:
+def judge_contact(left: Jet, right: Jet, h, scale, room, completing) -> Verdict:
     """Judge the step of one constraint in contact.
 
     The multiplier (the acceleration a that contact suppresses) is negative while the
@@ -28,7 +28,7 @@ def judge_contact(left: Jet, right: Jet, h, scale, at_stop, completing) -> Verdi
     offset = -a1 / jnp.where(rises, right.jerk, 1.0)
     now = passed & (h == 0)
     near = rises & (jnp.abs(offset) <= _CLOSE * scale)
-    lets_go = ((near & ~(at_stop & (offset > 0))) | now) & ~completing
+    lets_go = ((near & (offset <= room)) | now) & ~completing
     # short of its end a step that only might have let go is halved
     suspect = inside & ~passed & (left.acceleration < 0)
     retake = (passed | suspect) & ~lets_go & ~completing

@@ -49,7 +49,7 @@ def run_raw(functions: Functions, plan: Plan, lane: Lane, rows: int, row):
         lane, record = iterate(functions, plan, lane)
         return lane, jnp.stack(row(record))
 
-    body, kept = with_kept(body, lane)
+    keeping, kept = with_kept(body, lane)
     width = len(row(_empty_record(functions)))
     blocks = -(-rows // _BLOCK)
     log = jnp.zeros((blocks * _BLOCK, width))
@@ -60,12 +60,13 @@ def run_raw(functions: Functions, plan: Plan, lane: Lane, rows: int, row):
 
     def several(carry):
         count, state, log = carry
-        state, some = jax.lax.scan(lambda s, _: body(s), state, None, length=_BLOCK)
+        state, some = jax.lax.scan(lambda s, _: keeping(s), state, None, length=_BLOCK)
         start = (count * _BLOCK, jnp.zeros_like(count))
         return count + 1, state, jax.lax.dynamic_update_slice(log, some, start)
 
     start = (jnp.asarray(0, jnp.int32), (lane, kept), log)
-    _, (lane, kept), log = jax.lax.while_loop(unfinished, several, start)
+    _, last, log = jax.lax.while_loop(unfinished, several, start)
+    lane, kept = last
     return lane._replace(steps=depend_on(lane.steps, kept)), log
 
 

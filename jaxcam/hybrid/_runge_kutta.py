@@ -42,7 +42,7 @@ def tableau_of(solver) -> Tableau:
         nodes=(0.0, *map(float, table.c[: last - 1])),
         weights=tuple(map(float, weights[:last])),
         error=tuple(map(float, error[:last])),
-        order=int(solver.order(diffrax.ODETerm(lambda t, y, args: y))),
+        order=solver.order(diffrax.ODETerm(lambda t, y, args: y)) or 1,
     )
 
 

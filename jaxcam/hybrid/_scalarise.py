@@ -14,6 +14,7 @@ from collections.abc import Callable
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jax.core import Tracer
 from jax.extend.core import Literal
 
 from ._sincos import sincos
@@ -109,7 +110,7 @@ def scalarise(function: Callable, *example) -> Callable:
 def _constants(values) -> list[np.ndarray]:
     """Constants of a jaxpr; those with known values become numbers."""
     return [
-        split(v if isinstance(v, jax.core.Tracer) else np.asarray(v)) for v in values
+        split(v if isinstance(v, Tracer) else np.asarray(v)) for v in values
     ]
 
 

@@ -8,7 +8,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import ArrayLike, Float
 
 from ._advance import Plan
 from ._check import check_start, is_traced
@@ -30,11 +30,11 @@ _CHUNK = 2048
 
 def simulate(
     system: HybridSystem,
-    state: Float[Array, " n"] | None,
+    state: Float[ArrayLike, " n"] | None,
     t0: RealScalar,
     t1: RealScalar,
     *,
-    tolerance: RealScalar = 1e-10,
+    tolerance: float = 1e-10,
     solver: diffrax.AbstractSolver | None = None,
     settings: Settings | None = None,
     max_steps: int | None = None,
@@ -79,6 +79,7 @@ def simulate(
         )
     t0, t1 = jnp.asarray(t0, dtype=jnp.float64), jnp.asarray(t1, dtype=jnp.float64)
     system = with_array_parameters(system)
+    settings = with_array_parameters(settings)
     traced = is_traced((system, state, t0, t1, settings))
     if state is None:
         state, t_start = _released(system, t0, traced)

@@ -70,6 +70,7 @@ def stroboscope(
     )
     settings.check()
     system = with_array_parameters(system)
+    settings = with_array_parameters(settings)
     states = np.asarray(states, dtype=float)
     values = None if values is None else np.asarray(values, dtype=float)
     lanes = (

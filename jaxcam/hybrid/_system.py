@@ -1,7 +1,7 @@
 """What a hybrid system is: three functions of time and state, and parameters."""
 
 import abc
-from typing import ClassVar
+from typing import Any, ClassVar, TypeVar
 
 import equinox as eqx
 import jax
@@ -33,15 +33,21 @@ class HybridSystem(eqx.Module):
     state_units: ClassVar[tuple[str, ...]] = ()
 
     @abc.abstractmethod
-    def vector_field(self, t: RealScalar, state: Float[Array, " n"]):
+    def vector_field(
+        self, t: RealScalar, state: Float[Array, " n"]
+    ) -> Float[Array, " n"]:
         """Rate of change of the state in free flight, shape `(n,)`. (2.24)"""
 
     @abc.abstractmethod
-    def gap(self, t: RealScalar, state: Float[Array, " n"]):
+    def gap(
+        self, t: RealScalar, state: Float[Array, " n"]
+    ) -> Float[Array, "*constraints"]:
         """Distance to the constraint: positive outside, zero in contact. (2.23)"""
 
     @abc.abstractmethod
-    def impact(self, t: RealScalar, state: Float[Array, " n"]):
+    def impact(
+        self, t: RealScalar, state: Float[Array, " n"]
+    ) -> Float[Array, "*constraints n"]:
         """State just after an impact that found the system in `state`.
 
         It must have the form `state + W(t, state) * normal_velocity` (2.27): a grazing
@@ -50,7 +56,7 @@ class HybridSystem(eqx.Module):
         """
 
     @property
-    def period(self):
+    def period(self) -> Any:
         """Period of the forcing (s), or `None` for a system without one."""
         return None
 
@@ -70,8 +76,11 @@ class HybridSystem(eqx.Module):
         return None
 
 
-def with_array_parameters(system: HybridSystem) -> HybridSystem:
-    """The system with Python floats among its parameters turned into arrays.
+_Module = TypeVar("_Module", bound=eqx.Module)
+
+
+def with_array_parameters(system: _Module) -> _Module:
+    """The system (or settings) with Python floats turned into arrays.
 
     A field declared as `stiffness: float = 3.0` is a parameter like any other.
     """

@@ -139,7 +139,7 @@ class Trajectory(eqx.Module):
             )
         span = float(self.t1 - self.t0 - phase)
         number = int(span / float(period) * (1 + 1e-12)) + 1
-        times = self.t0 + phase + jnp.arange(number) * period
+        times = self.t0 + phase + jnp.arange(number, dtype=float) * period
         return self.at(jnp.minimum(times, self.t1))
 
     def section(self, function, direction: int = 0):

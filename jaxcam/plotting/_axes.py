@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 
 
 # of the legend's font
-_LETTERS_PER_INCH = 11.0
+_LETTERS_PER_INCH = 12.5
 
 
 def one_axes(ax: Axes | None) -> Axes:

@@ -10,6 +10,7 @@ from ..hybrid import Trajectory
 
 # points in a flight that is too short for the even sampling to see
 _SHORT_FLIGHT = 8
+_POINTS_IN_STEP = 4
 
 
 class Curve(NamedTuple):
@@ -101,10 +102,8 @@ def curve(
     found = hits(trajectory, start, stop)
     spans = contact_spans(trajectory, start, stop)
     knots = np.unique(np.concatenate([[start, stop], found.time, spans.ravel()]))
-    pieces = [
-        np.linspace(a, b, _points((b - a) / (stop - start), samples))
-        for a, b in zip(knots[:-1], knots[1:], strict=True)
-    ]
+    numbers = _points(trajectory, knots, samples)
+    pieces = [np.linspace(a, b, n) for a, b, n in zip(knots, knots[1:], numbers)]
     ends = np.cumsum([len(piece) for piece in pieces])
     time = np.concatenate(pieces)
     padded = _padded(time)
@@ -134,8 +133,13 @@ def curve(
     )
 
 
-def _points(part: float, samples: int) -> int:
-    return max(int(np.ceil(part * samples)) + 1, _SHORT_FLIGHT)
+def _points(trajectory: Trajectory, knots, samples: int) -> list[int]:
+    """Points of the piece between each two knots."""
+    even = np.ceil(samples * np.diff(knots) / (knots[-1] - knots[0])) + 1
+    # a long run turns often between two even samples; its steps follow every turn
+    steps = np.asarray(trajectory.steps.time)[: int(trajectory.steps.count)]
+    follows = _POINTS_IN_STEP * np.diff(np.searchsorted(steps, knots))
+    return np.maximum(np.maximum(even, follows), _SHORT_FLIGHT).astype(int).tolist()
 
 
 def _padded(times):

@@ -70,17 +70,24 @@ def _draw_motion(ax: Axes, drawn: Curve, right: int, up: int) -> None:
         if np.any(drawn.contact == held):
             shown = np.where((drawn.contact == held)[:, None], drawn.state, np.nan)
             ax.plot(shown[:, right], shown[:, up], color=colour, lw=width, label=label)
-    # on a surface at rest a contact is a point, and its line cannot be seen
-    begins = np.flatnonzero(drawn.contact & ~np.roll(drawn.contact, 1))
-    ax.plot(
-        drawn.state[begins, right],
-        drawn.state[begins, up],
-        "s",
-        color=CONTACT,
-        markersize=6,
-        markeredgecolor="white",
-        zorder=3,
-    )
+    resting = _resting(drawn)[:, [right, up]]
+    ax.plot(*resting.T, "s", color=CONTACT, ms=6, markeredgecolor="white", zorder=3)
+
+
+def _resting(drawn: Curve) -> np.ndarray:
+    """States of the contacts that are points, as on a floor at rest.
+
+    A line through equal points cannot be seen.
+    """
+    size = np.nanmax(drawn.state, axis=0) - np.nanmin(drawn.state, axis=0)
+    ends = np.flatnonzero(np.isnan(drawn.time))
+    pieces = [
+        drawn.state[start:end]
+        for start, end in zip(np.append(0, ends[:-1] + 1), ends, strict=True)
+        if drawn.contact[start]
+    ]
+    still = [piece[0] for piece in pieces if np.all(np.ptp(piece, 0) <= 1e-6 * size)]
+    return np.array(still).reshape(-1, drawn.state.shape[1])
 
 
 def _draw_jumps(ax: Axes, drawn: Curve, right: int, up: int) -> None:
