@@ -3,16 +3,17 @@
 import diffrax
 import jax
 import jax.numpy as jnp
-import jaxcam
 import numpy as np
 import pytest
+from textbook_systems import BallBetweenWalls, parameters, TwoMasses
+
+import jaxcam
 from jaxcam.models import (
     BouncingBall,
     CamFollower,
     ImpactOscillator,
     TripleIntegrator,
 )
-from textbook_systems import BallBetweenWalls, parameters, TwoMasses
 
 
 # of positions, velocities and times; accuracy of the runs is a thousand times better
@@ -30,9 +31,7 @@ def _both(system, state, t0, t1):
 def _assert_same(a, b):
     assert a.successful and b.successful, (a.result, b.result)
     # a contact that ends where it starts is a matter of rounding
-    kept = [
-        np.asarray(c.end - c.start) > _AGREEMENT for c in (a.contacts, b.contacts)
-    ]
+    kept = [np.asarray(c.end - c.start) > _AGREEMENT for c in (a.contacts, b.contacts)]
     number = [int(np.sum(k)) for k in kept]
     assert number[0] == number[1]
     for name in ("start", "end", "constraint", "released"):
@@ -41,22 +40,28 @@ def _assert_same(a, b):
             for c, k in zip((a.contacts, b.contacts), kept, strict=True)
         )
         np.testing.assert_allclose(left, right, rtol=0, atol=_AGREEMENT, err_msg=name)
-    # the impacts just before the end of a chatter are below what is compared
-    assert a.impacts.count == b.impacts.count
-    np.testing.assert_array_equal(a.impacts.constraint, b.impacts.constraint)
-    for name in ("time", "before", "after"):
-        left, right = getattr(a.impacts, name), getattr(b.impacts, name)
+    # how many of the last, lowest hops of a chatter are listed is a matter of rounding
+    hits = [_fast_impacts(trajectory) for trajectory in (a, b)]
+    for name, left, right in zip(("constraint", "time", "before", "after"), *hits):
         scale = 1.0 if name == "time" else 1.0 + np.max(np.abs(left), initial=0.0)
         np.testing.assert_allclose(
             left, right, rtol=0, atol=scale * _AGREEMENT, err_msg=name
         )
     # inside a chatter a sample may fall between two slightly different impact times
     times = np.linspace(float(a.steps.time[0]), float(a.t1), 20)
-    hits = np.concatenate([np.asarray(a.impacts.time), [np.inf]])
-    clear = np.min(np.abs(times[:, None] - hits), axis=1) > 1e3 * _AGREEMENT
+    hit = np.concatenate([np.asarray(a.impacts.time), [np.inf]])
+    clear = np.min(np.abs(times[:, None] - hit), axis=1) > 1e3 * _AGREEMENT
     left, right = np.asarray(a.at(times))[clear], np.asarray(b.at(times))[clear]
     scale = 1.0 + np.max(np.abs(left))
     np.testing.assert_allclose(left, right, rtol=0, atol=scale * _AGREEMENT)
+
+
+def _fast_impacts(trajectory):
+    impacts = trajectory.impacts
+    speeds = np.asarray(impacts.speed_after)
+    fast = speeds > 1e-3 * np.max(speeds, initial=0.0)
+    names = ("constraint", "time", "before", "after")
+    return [np.asarray(getattr(impacts, name), float)[fast] for name in names]
 
 
 @pytest.mark.parametrize("seed", range(10))

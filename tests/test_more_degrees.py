@@ -1,10 +1,11 @@
 """Several walls and several masses, by both engines, against what is known of them."""
 
 import jax.numpy as jnp
-import jaxcam
 import numpy as np
 import pytest
 from textbook_systems import BallBetweenWalls, parameters, TwoMasses, TwoStops
+
+import jaxcam
 
 
 _ENGINES = ("loop", "diffeqsolve")

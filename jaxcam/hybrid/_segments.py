@@ -11,37 +11,17 @@ at points inside it, made by steps of their own, for anything earlier; and what 
 is located by Newton's method on the length of such a step.
 """
 
-import functools
 from typing import NamedTuple
 
-import diffrax
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-import optimistix as optx
 
-from ._chatter import completion_time
 from ._codes import Row
-from ._normal import (
-    contact_multipliers,
-    field_in_force,
-    gaps,
-    impacts,
-    lie_derivative,
-    lie_series,
-    normal_directions,
-    normal_velocity,
-    restitution_coefficients,
-)
-from ._one_step import one_step
 from ._run import Log
+from ._segment_motion import FRACTIONS, Motion, prepared
 
 
-# attempted steps in one call of diffrax
-_BATCH = 64
-# points at which each of its steps is looked through
-_FRACTIONS = np.arange(1, 9) / 8
 # a hop whose lambda = v |j| / a^2 is smaller is one step, not a call of diffrax
 _SHORT = 1e-3
 _SUCCESSFUL, _BUDGET, _STEP_FAILED, _NOT_FINITE = 0, 1, 2, 3
@@ -82,12 +62,16 @@ class _Event(NamedTuple):
     length: float
 
 
+# the step after an event was longer than the flight: try again with a shorter one
+_TOO_LONG = _Event(-1, 0, 0.0)
+
+
 class _Engine:
     """The state of a run. `contact` says for each constraint whether it is held."""
 
     def __init__(self, system, settings, t0, state, t1):
         self.settings = settings
-        self.motion = _Motion(_prepared(system), settings)
+        self.motion = Motion(prepared(system), settings)
         self.t, self.x, self.t1 = t0, state, t1
         jets = np.asarray(self.motion.jets(t0, state))
         self.tiny = 1e-12 * (1.0 + np.max(np.abs(state)))
@@ -190,50 +174,46 @@ class _Engine:
         level, rate = np.asarray(scan.level), np.asarray(scan.rate)
         found: list[_Event] = []
         for k in range(len(self.contact)):
-            before, slope = first[k], first_rate[k]
-            if before <= self.tiny:
-                # leaves the surface: its rate may be zero up to rounding
-                slope = max(slope, 0.0)
-            for i in range(count - 1):
+            curve = level[: count - 1, :, k], rate[: count - 1, :, k]
+            event = self._crossing(k, times, states, curve, first[k], first_rate[k])
+            if event is _TOO_LONG:
+                return event
+            if event is None and fired:
+                # the piece ends at the event, behind which nothing was looked at
+                end, slope, i = curve[0][-1, -1], curve[1][-1, -1], count - 2
                 h = float(times[i + 1] - times[i])
-                low = 0.0
-                for p, fraction in enumerate(_FRACTIONS):
-                    high = fraction * h
-                    after, next_slope = level[i, p, k], rate[i, p, k]
-                    bottom = high
-                    if slope < 0 < next_slope and min(before, after) < (high - low) * (
-                        max(-slope, next_slope)
-                    ):
-                        bottom = self._bottom(k, i, times, states, low, high)
-                        after_low = self._probe(i, times, states, bottom).level[k]
-                    else:
-                        after_low = after
-                    if after_low < -self.tiny / 10:
-                        if i == 0 and p == 0 and before <= self.tiny:
-                            return _TOO_LONG
-                        found.append(self._locate(k, i, times, states, low, bottom))
-                        break
-                    before, slope, low = after, next_slope, high
-                else:
-                    continue
-                break
-            else:
-                # the piece ends at the event: nothing was behind the surface by then
-                if fired and abs(before) <= self._reach(slope, times, count):
-                    i = count - 2
-                    h = float(times[i + 1] - times[i])
+                # how far from zero the interpolant may put an event
+                if abs(end) <= abs(slope) * 1e-2 * h + 10 * self.tiny:
                     event = self._locate(k, i, times, states, 0.0, None, h)
-                    found.append(event)
-        found = [e for e in found if times[e.row] + e.length <= self.t1]
-        if not found:
-            return None
-        return min(found, key=lambda e: times[e.row] + e.length)
+            if event is not None:
+                # no step ends behind t1, so only rounding can put an event there
+                length = min(event.length, self.t1 - times[event.row])
+                found.append(event._replace(length=float(length)))
+        return min(found, key=lambda e: times[e.row] + e.length, default=None)
 
-    def _reach(self, slope, times, count):
-        """How far from zero the level may be where diffrax put an event."""
-        return (
-            abs(slope) * 1e-2 * (times[count - 1] - times[count - 2]) + 10 * self.tiny
-        )
+    def _crossing(self, k, times, states, curve, before, slope):
+        """Where a level first goes below zero, seen from points in the steps."""
+        if before <= self.tiny:
+            # leaves the surface: its rate may be zero up to rounding
+            slope = max(slope, 0.0)
+        started_on_surface = before <= self.tiny
+        for i, (levels, rates) in enumerate(zip(*curve, strict=True)):
+            lengths = FRACTIONS * float(times[i + 1] - times[i])
+            low = 0.0
+            for p, high in enumerate(lengths):
+                bottom, lowest = high, levels[p]
+                steepest = max(-slope, rates[p])
+                if slope < 0 < rates[p] and (
+                    min(before, levels[p]) < (high - low) * steepest
+                ):
+                    bottom = self._bottom(k, i, times, states, low, high)
+                    lowest = float(self._probe(i, times, states, bottom).level[k])
+                if lowest < -self.tiny / 10:
+                    if i == 0 and p == 0 and started_on_surface:
+                        return _TOO_LONG
+                    return self._locate(k, i, times, states, low, bottom)
+                before, slope, low = levels[p], rates[p], high
+        return None
 
     def _locate(self, k, i, times, states, low, high, start=None) -> _Event:
         """Newton on the length from point `i`, kept between `low` and `high`."""
@@ -333,9 +313,6 @@ class _Engine:
         return self.motion.probe(times[i], states[i], self.contact, h)
 
 
-_TOO_LONG = object()
-
-
 def _time_to_contact(jet) -> float:
     """Smallest positive time at which the cubic through the jet is zero, else inf."""
     gap, velocity, acceleration, jerk = map(float, jet)
@@ -346,251 +323,3 @@ def _time_to_contact(jet) -> float:
     roots = np.roots(cubic)
     times = roots.real[(np.abs(roots.imag) <= 1e-9 * np.abs(roots)) & (roots.real > 0)]
     return float(times.min()) if times.size else np.inf
-
-
-class _Point(NamedTuple):
-    """A state on the way, and for each constraint how far it is from its event.
-
-    The level is the gap of a free constraint and the pressure (minus the multiplier)
-    of one in contact; the event is where it falls through zero.
-    """
-
-    state: jax.Array
-    level: jax.Array
-    rate: jax.Array
-
-
-class _Hop(NamedTuple):
-    """The end of a short hop: as `_Point`, normal velocity and height climbed `(m,)`."""
-
-    state: jax.Array
-    level: jax.Array
-    rate: jax.Array
-    velocity: jax.Array
-    climbed: jax.Array
-    effort: jax.Array
-
-
-class _End(NamedTuple):
-    """The end of a chatter, and whether the series for it may be used."""
-
-    possible: jax.Array
-    duration: jax.Array
-    state: jax.Array
-
-
-@eqx.filter_jit
-def _prepared(system):
-    return system.prepared()
-
-
-def _compiled(method):
-    """Compile once: numbers become arrays, which are not part of the program."""
-    compiled = eqx.filter_jit(method)
-
-    @functools.wraps(method)
-    def call(self, *arguments):
-        return compiled(self, *map(np.asarray, arguments))
-
-    return call
-
-
-class _Motion(eqx.Module):
-    """The compiled functions: of time, state and the constraints in contact."""
-
-    system: eqx.Module
-    tolerance: float
-    smallness: float
-    solver: diffrax.AbstractSolver = eqx.field(static=True)
-
-    def __init__(self, system, settings):
-        self.system = system
-        # arrays, so that another value does not compile again
-        self.tolerance = jnp.asarray(settings.tolerance, dtype=jnp.float64)
-        self.smallness = jnp.asarray(settings.chatter_smallness, dtype=jnp.float64)
-        self.solver = settings.solver
-
-    @_compiled
-    def fly(self, t0, x, contact, t1, first, longest):
-        """Steps up to an event, `t1` or the end of the batch, and how many are real."""
-
-        def lowest(t, y, args, **kwargs):
-            del kwargs
-            values = gaps(self.system, t, y)
-            pressure = jax.lax.cond(
-                jnp.any(args),
-                lambda: -contact_multipliers(self.system, t, y, args),
-                lambda: values,
-            )
-            return jnp.min(jnp.where(args, pressure, values))
-
-        solution = diffrax.diffeqsolve(
-            diffrax.ODETerm(self._field),
-            self.solver,
-            t0,
-            t1,
-            jnp.minimum(first, t1 - t0),
-            x,
-            contact,
-            saveat=diffrax.SaveAt(t0=True, steps=True),
-            stepsize_controller=diffrax.PIDController(
-                rtol=self.tolerance, atol=self.tolerance, dtmax=longest
-            ),
-            event=diffrax.Event(
-                lowest, optx.Bisection(1e-12, 1e-12, flip=True), direction=False
-            ),
-            adjoint=diffrax.ForwardMode(),
-            max_steps=_BATCH,
-            throw=False,
-        )
-        assert solution.ts is not None
-        count = jnp.sum(jnp.isfinite(solution.ts))
-        fired = solution.event_mask
-        return solution.ts, solution.ys, count, solution.stats["num_steps"], fired
-
-    @_compiled
-    def probe(self, t, x, contact, h) -> _Point:
-        """The point a step of length `h` after `(t, x)`."""
-        return self._point(t, x, contact, h)
-
-    @_compiled
-    def scan(self, times, states, contact, count) -> _Point:
-        """Points inside the first `count` steps: `(steps, fractions, m)`."""
-        real = jnp.arange(times.shape[0] - 1) < count
-        lengths = jnp.where(real, jnp.diff(times), 0.0)
-        starts = jnp.where(real, times[:-1], times[0])
-        origins = jnp.where(real[:, None], states[:-1], states[0])
-
-        def inside(step):
-            t, x, length = step
-            return jax.lax.map(
-                lambda f: self._point(t, x, contact, f * length),
-                jnp.asarray(_FRACTIONS),
-            )
-
-        # one after the other: a batch of them takes much longer to compile
-        return jax.lax.map(inside, (starts, origins, lengths))
-
-    @_compiled
-    def hop(self, t, x, contact, h) -> _Hop:
-        """The end of a hop, its height by Gauss's quadrature of the velocity."""
-        nodes, weights = np.polynomial.legendre.leggauss(5)
-
-        def velocity_at(s):
-            after, _ = self._step(t, x, contact, s)
-            return normal_velocity(self.system, t + s, after)
-
-        lengths = h * jnp.asarray((nodes + 1) / 2)
-        speeds = jax.vmap(velocity_at)(lengths)
-        after, error = self._step(t, x, contact, h)
-        level, rate = self._levels(t + h, after, contact)
-        size = self.tolerance * (1.0 + jnp.max(jnp.abs(x)))
-        return _Hop(
-            after,
-            level,
-            rate,
-            normal_velocity(self.system, t + h, after),
-            h * jnp.sum(jnp.asarray(weights / 2)[:, None] * speeds, axis=0),
-            jnp.max(jnp.abs(error)) / size,
-        )
-
-    @_compiled
-    def jets(self, t, x):
-        """Gap and its first three derivatives in free flight, `(m, 4)`."""
-        return jnp.stack(self._free_series(3)(t, x), axis=1)
-
-    @_compiled
-    def velocity(self, t, x):
-        return normal_velocity(self.system, t, x)
-
-    @_compiled
-    def impact(self, t, x):
-        return impacts(self.system, t, x)
-
-    @_compiled
-    def completion(self, t, x, contact, k, speed, incoming) -> _End:
-        """The rest of the chatter on constraint `k` after a rebound at `speed`.
-
-        As [`jaxcam.hybrid.chatter_completion`][], for one of several constraints.
-        """
-        held = contact.at[k].set(True)
-
-        def pressing(s, y):
-            # acceleration along the motion that the other contacts allow
-            return lie_derivative(
-                lambda r, z: normal_velocity(self.system, r, z)[k],
-                lambda r, z: self._field(r, z, contact),
-            )(s, y)
-
-        direction = normal_directions(self.system, t, x)[k]
-        rest = x - speed * direction
-        r0 = restitution_coefficients(self.system, t, rest)[k]
-        softening = (speed / incoming - r0) / incoming
-        a = pressing(t, rest)
-        rate = lie_derivative(pressing, lambda s, y: self._field(s, y, held))(t, rest)
-        damping = jax.jvp(lambda y: pressing(t, y), (rest,), (direction,))[1]
-        jerk = lie_derivative(pressing, lambda s, y: self._field(s, y, contact))(t, x)
-        acceleration = pressing(t, x)
-        small = speed * jnp.abs(jerk) <= self.smallness * (1 - r0) * acceleration**2
-        duration = completion_time(speed, a, rate, damping, r0, softening)
-        possible = small & (r0 < 1) & (a < 0) & (a + rate * duration < 0)
-        return _End(possible, duration, self._point(t, rest, held, duration).state)
-
-    def _field(self, t, x, contact):
-        # free flight does not pay for the multipliers of contact
-        return jax.lax.cond(
-            jnp.any(contact),
-            lambda: field_in_force(self.system, t, x, contact),
-            lambda: self.system.vector_field(t, x),
-        )
-
-    def _step(self, t, x, contact, h):
-        return one_step(
-            self.solver,
-            self.tolerance,
-            lambda s, y: self._field(s, y, contact),
-            t,
-            x,
-            h,
-        )
-
-    def _point(self, t, x, contact, h) -> _Point:
-        after, _ = self._step(t, x, contact, h)
-        after = jax.lax.cond(
-            jnp.any(contact),
-            lambda: self._onto(t + h, self._onto(t + h, after, contact), contact),
-            lambda: after,
-        )
-        return _Point(after, *self._levels(t + h, after, contact))
-
-    def _levels(self, t, x, contact):
-        gap = self._free_series(1)(t, x)
-
-        def pressed():
-            pressure = lie_series(
-                lambda s, y: -contact_multipliers(self.system, s, y, contact),
-                lambda s, y: field_in_force(self.system, s, y, contact),
-                1,
-            )(t, x)
-            return tuple(
-                jnp.where(contact, p, g) for p, g in zip(pressure, gap, strict=True)
-            )
-
-        return jax.lax.cond(jnp.any(contact), pressed, lambda: gap)
-
-    def _free_series(self, order):
-        return lie_series(
-            lambda s, y: gaps(self.system, s, y),
-            lambda s, y: self.system.vector_field(s, y),
-            order,
-        )
-
-    def _onto(self, t, x, contact):
-        """One Newton step onto gap = normal velocity = 0 where in contact."""
-
-        def conditions(y):
-            jet = jnp.stack(self._free_series(1)(t, y), axis=1)
-            return jnp.where(contact[:, None], jet, 0.0).ravel()
-
-        slope = jax.jacfwd(conditions)(x)
-        return x - jnp.linalg.pinv(slope, rtol=1e-10) @ conditions(x)

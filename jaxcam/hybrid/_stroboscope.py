@@ -168,7 +168,8 @@ def _first(batched, shared, period, states, t0, turns, settings):
     return eqx.filter_vmap(one, in_axes=(eqx.if_array(0), 0))(batched, states)
 
 
-@eqx.filter_jit
+# the widest vectors that the machine has; XLA is shy of them by default
+@eqx.filter_jit(compiler_options={"xla_cpu_prefer_vector_width": 512})
 def _some(batched, shared, period, t0, turns, settings, lane, rows):
     t0 = jnp.asarray(t0, dtype=jnp.float64)
 

@@ -58,7 +58,8 @@ def _sum(angle, mean, cosines, sines):
 
 # The derivative of a series is again a series. Saying so halves the work of gap,
 # velocity, acceleration and jerk together, against differentiating the recurrence.
-_series = jax.custom_jvp(_sum)
+# Traced once for each number of harmonics, since a simulation asks for it many times.
+_series = jax.custom_jvp(jax.jit(_sum))
 
 
 def _series_jvp(primals, tangents):
