@@ -6,6 +6,7 @@ from ._chatter import (
     completion_time as completion_time,
 )
 from ._codes import RESULTS as RESULTS
+from ._events import Contacts as Contacts, Impacts as Impacts, Steps as Steps
 from ._normal import (
     field_in_force as field_in_force,
     normal_acceleration as normal_acceleration,
@@ -24,10 +25,5 @@ from ._settings import Settings as Settings
 from ._simulate import simulate as simulate
 from ._stroboscope import Stroboscope as Stroboscope, stroboscope as stroboscope
 from ._system import HybridSystem as HybridSystem
-from ._trajectory import (
-    Contacts as Contacts,
-    Impacts as Impacts,
-    Steps as Steps,
-    Trajectory as Trajectory,
-)
+from ._trajectory import Trajectory as Trajectory
 from ._tuning import tune_compiler as tune_compiler

@@ -29,5 +29,9 @@ def _with_root_finder(solver, tolerance):
     if not isinstance(solver, diffrax.AbstractImplicitSolver):
         return solver
     tolerance = jnp.maximum(tolerance, 1e-14)
-    finder = diffrax.VeryChord(rtol=tolerance, atol=tolerance, norm=optx.max_norm)
+    finder = diffrax.VeryChord(
+        rtol=tolerance,  # pyright: ignore[reportArgumentType]
+        atol=tolerance,  # pyright: ignore[reportArgumentType]
+        norm=optx.max_norm,
+    )
     return eqx.tree_at(lambda s: s.root_finder, solver, finder)

@@ -109,9 +109,7 @@ def scalarise(function: Callable, *example) -> Callable:
 
 def _constants(values) -> list[np.ndarray]:
     """Constants of a jaxpr; those with known values become numbers."""
-    return [
-        split(v if isinstance(v, Tracer) else np.asarray(v)) for v in values
-    ]
+    return [split(v if isinstance(v, Tracer) else np.asarray(v)) for v in values]
 
 
 def _boxed(leaf) -> np.ndarray:

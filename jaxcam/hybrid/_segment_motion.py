@@ -127,7 +127,7 @@ class Motion(eqx.Module):
             max_steps=_BATCH,
             throw=False,
         )
-        assert solution.ts is not None
+        assert solution.ts is not None and solution.ys is not None
         count = jnp.sum(jnp.isfinite(solution.ts))
         fired = solution.event_mask
         return solution.ts, solution.ys, count, solution.stats["num_steps"], fired

@@ -11,7 +11,9 @@ import numpy as np
 from jaxtyping import ArrayLike, Float
 
 from ._advance import Plan
+from ._assemble import assemble, Parts
 from ._check import check_start, is_traced
+from ._events import Contacts, Impacts, Steps
 from ._functions import Functions
 from ._lane import first_lane, Lane, RUNNING
 from ._release_point import release_point
@@ -20,7 +22,7 @@ from ._runge_kutta import tableau_of
 from ._segments import simulate_segments
 from ._settings import Settings
 from ._system import HybridSystem, with_array_parameters
-from ._trajectory import assemble, Contacts, Impacts, Parts, Steps, Trajectory
+from ._trajectory import Trajectory
 from ._types import RealScalar
 
 
@@ -48,7 +50,8 @@ def simulate(
 
     - `system`: a [`jaxcam.hybrid.HybridSystem`][].
     - `state`: shape `(n,)`, with every gap >= 0; or `None` for the orbit released last
-      from contact (systems with a period, two states and one constraint).
+      from contact (systems with a period, two states and one constraint): in contact at
+      `t0` where contact holds then, else from the last release before `t0` on.
     - `t0`, `t1`: s, t1 >= t0.
     - `tolerance`: error allowed in a step, relative and absolute.
     - `solver`: any explicit Runge-Kutta solver of diffrax, `Dopri8` by default.
@@ -98,7 +101,7 @@ def simulate(
             system, settings, t_start, state, t1, budget, progress
         )
         rows = log.kind.shape[0]
-        parts = _assemble(system, t_start, t1, state, contact, log, (rows, rows))
+        parts = _assemble(system, t_start, state, contact, log, (rows, rows))
         return Trajectory(system, settings, t0, t1, *_trim(parts), code)
     tableau_of(settings.solver)
     if traced or derivatives == "reverse":
@@ -106,7 +109,7 @@ def simulate(
         log, contact, code = _whole(
             system, settings, t_start, state, t1, rows, derivatives
         )
-        parts = assemble(system, t_start, t1, state, contact, log, (rows, rows))
+        parts = assemble(system, t_start, state, contact, log, (rows, rows))
         if traced:
             return Trajectory(system, settings, t0, t1, *parts, code)
     else:
@@ -115,7 +118,7 @@ def simulate(
             system, settings, t_start, state, t1, budget, progress
         )
         rows = log.kind.shape[0]
-        parts = _assemble(system, t_start, t1, state, contact, log, (rows, rows))
+        parts = _assemble(system, t_start, state, contact, log, (rows, rows))
     return Trajectory(system, settings, t0, t1, *_trim(parts), code)
 
 

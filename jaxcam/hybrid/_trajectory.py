@@ -1,67 +1,19 @@
 """What a simulation returns: impacts, contacts, and the state at any time."""
 
-from typing import NamedTuple
-
-import diffrax
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float, Int
+from jaxtyping import Array, Float, Int
 
 from ._check import is_traced
-from ._codes import RESULTS, Row
-from ._functions import Functions
-from ._normal import field_in_force, gaps, normal_velocity
-from ._one_step import one_step
-from ._run import kinds, Log
-from ._runge_kutta import step, tableau_of
+from ._codes import RESULTS
+from ._events import Contacts, Impacts, Steps
+from ._normal import gaps
+from ._sample import pad, padded, sample
+from ._section import crossings
 from ._settings import Settings
 from ._system import HybridSystem
-
-
-class Impacts(eqx.Module):
-    """The impacts of a trajectory, in order.
-
-    Under a transformation (`jit`, `vmap`, `grad`) the arrays keep a fixed length k; the
-    first `count` entries are real, later times are inf and later states NaN.
-    """
-
-    #: (k,) s
-    time: Float[Array, " k"]
-    #: (k, n) state just before and just after
-    before: Float[Array, "k n"]
-    after: Float[Array, "k n"]
-    #: (k,) which constraint was hit
-    constraint: Int[Array, " k"]
-    #: (k,) normal velocity before (negative) and after (positive)
-    speed_before: Float[Array, " k"]
-    speed_after: Float[Array, " k"]
-    count: Int[Array, ""]
-
-
-class Contacts(eqx.Module):
-    """The intervals of sticking, in order of their start; padded as `Impacts` is.
-
-    `start` is the accumulation time of the chatter (or t0), `end` the release; a
-    contact that lasts beyond the trajectory has `released` False and ends at t1.
-    """
-
-    start: Float[Array, " m"]
-    end: Float[Array, " m"]
-    released: Bool[Array, " m"]
-    constraint: Int[Array, " m"]
-    count: Int[Array, ""]
-
-
-class Steps(eqx.Module):
-    """The points between which the motion was integrated, with their modes."""
-
-    time: Float[Array, " s"]
-    state: Float[Array, "s n"]
-    #: (s, constraints) whether the constraint is in contact from here on
-    contact: Bool[Array, "s constraints"]
-    count: Int[Array, ""]
 
 
 class Trajectory(eqx.Module):
@@ -117,9 +69,10 @@ class Trajectory(eqx.Module):
                     f"{float(self.t0):g} to {end:g} s"
                 )
         if not known:
-            return _sample(self.system, self.settings, self.steps, times)
-        steps, padded = _padded(self.steps), _pad(times, np.nan)
-        found = _sample(self.system, self.settings, steps, padded)
+            return sample(self.system, self.settings, self.steps, times)
+        # a few lengths only, so that few programs are compiled
+        steps, longer = padded(self.steps), pad(times, np.nan)
+        found = sample(self.system, self.settings, steps, longer)
         return jnp.asarray(np.asarray(found)[: times.shape[0]])
 
     def gap(self, times):
@@ -146,12 +99,12 @@ class Trajectory(eqx.Module):
         """Crossings of a Poincare section `function(t, state) = 0`.
 
         **Arguments:** a smooth scalar function, and the direction of the crossings that
-        count: +1 rising, -1 falling, 0 both. Crossings are looked for between the
-        points of the integration, refined by Newton; two within one step are missed.
+        count: +1 rising, -1 falling, 0 both. Each step of the integration is searched
+        in eight pieces; two crossings within one piece are missed.
 
         **Returns:** times (s) and states, shapes `(k,)` and `(k, n)`.
         """
-        return _section(self, function, direction)
+        return crossings(self, function, direction)
 
 
 def message(code: int) -> str:
@@ -165,171 +118,7 @@ def message(code: int) -> str:
     return RESULTS[items[code]]
 
 
-class Parts(NamedTuple):
-    """The padded pieces of a trajectory."""
-
-    impacts: Impacts
-    contacts: Contacts
-    steps: Steps
-
-
-def assemble(system, t0, t1, state, contact, log: Log, sizes: tuple[int, int]) -> Parts:
-    """Sort the rows of a log into impacts, contacts and steps of fixed lengths."""
-    rows = log.kind.shape[0]
-    max_impacts, max_contacts = sizes
-    valid = log.kind > 0
-    order = jnp.nonzero(valid, size=rows, fill_value=rows)[0]
-    count = jnp.sum(valid)
-
-    def first(start, rest, fill):
-        padded = jnp.concatenate([rest, jnp.full_like(rest[:1], fill)])
-        return jnp.concatenate([start[None], padded[order]])
-
-    time = first(t0, log.t, jnp.inf)
-    kept = first(contact, log.contact > 0.5, False)
-    steps = Steps(time, first(state, log.after, jnp.nan), kept, count + 1)
-
-    hits = kinds(log, Row.IMPACT, Row.LAST_IMPACT)
-    number = jnp.sum(hits)
-    index = jnp.nonzero(hits, size=max_impacts, fill_value=0)[0]
-    real = jnp.arange(max_impacts) < number
-    t_hit = jnp.where(real, log.t[index], jnp.inf)
-    before = jnp.where(real[:, None], log.before[index], jnp.nan)
-    after = jnp.where(real[:, None], log.after[index], jnp.nan)
-    which = jnp.where(real, log.constraint[index], 0.0).astype(jnp.int32)
-    impacts = Impacts(
-        t_hit,
-        before,
-        after,
-        which,
-        _speeds(system, log.t[index], log.before[index], which, real),
-        _speeds(system, log.t[index], log.after[index], which, real),
-        number,
-    )
-
-    # a contact begins at the row after its last impact, and ends where its flag falls
-    began = jnp.concatenate([kept[:1], kept[1:] & ~kept[:-1]])
-    fell = jnp.concatenate([jnp.zeros_like(kept[:1]), kept[:-1] & ~kept[1:]])
-    fell = fell & (jnp.arange(rows + 1) <= count)[:, None]
-    ends = jnp.where(fell, time[:, None], jnp.inf)
-    ends = jax.lax.cummin(ends, axis=0, reverse=True)
-    later = jnp.concatenate([time[1:], jnp.full_like(time[:1], jnp.inf)])
-    starts = jnp.where(jnp.arange(rows + 1) == 0, time, later)
-    width = kept.shape[1]
-    flat = jnp.nonzero(began.ravel(), size=max_contacts, fill_value=0)[0]
-    row, column = flat // width, flat % width
-    total = jnp.sum(began & (starts[:, None] < jnp.inf))
-    real = jnp.arange(max_contacts) < total
-    end = ends[row, column]
-    contacts = Contacts(
-        jnp.where(real, starts[row], jnp.inf),
-        jnp.where(real, jnp.minimum(end, t1), jnp.inf),
-        real & (end < jnp.inf),
-        jnp.where(real, column, 0).astype(jnp.int32),
-        total,
-    )
-    return Parts(impacts, contacts, steps)
-
-
-def _speeds(system, times, states, which, real):
-    speeds = jax.vmap(lambda t, x: normal_velocity(system, t, x))(times, states)
-    picked = jnp.take_along_axis(speeds, which[:, None], axis=1)[:, 0]
-    return jnp.where(real, picked, jnp.nan)
-
-
 @eqx.filter_jit
 def _gaps(system, times, states):
     values = jax.vmap(lambda t, x: gaps(system, t, x))(times, states)
     return values[:, 0] if values.shape[1] == 1 else values
-
-
-def _pad(array, fill):
-    """`array` continued to a power of two, so that few lengths are compiled."""
-    array = np.asarray(array)
-    length = 64
-    while length < array.shape[0]:
-        length *= 2
-    rest = [(0, length - array.shape[0])] + [(0, 0)] * (array.ndim - 1)
-    return jnp.asarray(np.pad(array, rest, constant_values=fill))
-
-
-def _padded(steps: Steps) -> Steps:
-    return Steps(
-        _pad(steps.time, np.inf),
-        _pad(steps.state, np.nan),
-        _pad(steps.contact, False),
-        steps.count,
-    )
-
-
-@eqx.filter_jit
-def _sample(system, settings: Settings, steps: Steps, times):
-    system = system.prepared()
-    n = steps.state.shape[1]
-    functions = Functions(system, n)
-
-    def one(t):
-        found = jnp.searchsorted(steps.time, t, side="right").astype(jnp.int64) - 1
-        k = jnp.clip(found, 0, steps.count.astype(jnp.int64) - 1)
-        x = tuple(steps.state[k, i] for i in range(n))
-        contact = tuple(steps.contact[k, i] for i in range(functions.m))
-        start = steps.time[k]
-        moved = advance(system, functions, settings, start, x, contact, t - start)
-        return jnp.stack(moved)
-
-    return jax.vmap(one)(times)
-
-
-def advance(system, functions: Functions, settings: Settings, t, x, contact, h):
-    """The state a time `h` after `(t, x)` in one mode, by one step."""
-    moved = _move(system, functions, settings, t, x, contact, h)
-    held = contact[0]
-    for c in contact[1:]:
-        held = held | c
-    if functions.planar:
-        moved = tuple(jnp.where(held, a, b) for a, b in zip(x, moved, strict=True))
-    for _ in range(3):
-        jets = functions.jets(t + h, moved, contact)
-        frame = functions.frame(t + h, moved)
-        moved = functions.onto(frame, jets, moved, contact)
-    return moved
-
-
-def _move(system, functions, settings, t, x, contact, h):
-    if isinstance(settings.solver, diffrax.AbstractImplicitSolver):
-        held = jnp.stack(contact)
-
-        def field(s, y):
-            return field_in_force(system, s, y, held)
-
-        after, _ = one_step(
-            settings.solver, settings.tolerance, field, t, jnp.stack(x), h
-        )
-        return tuple(after[i] for i in range(functions.n))
-    tableau = tableau_of(settings.solver)
-    moved, _, _ = step(tableau, lambda s, y: functions.field(s, y, contact), t, x, h)
-    return moved
-
-
-def _section(trajectory, function, direction):
-    steps = trajectory.steps
-    count = int(steps.count)
-    times, states = steps.time[:count], steps.state[:count]
-    # a point just before an impact is not in the steps: end every step from its start
-    lengths = jnp.diff(times)
-    tiny = 1e-12 * jnp.maximum(jnp.abs(times[1:]), 1e-300)
-    ends = trajectory.at(jnp.maximum(times[1:] - tiny, times[:-1]))
-    left = jax.vmap(function)(times[:-1], states[:-1])
-    right = jax.vmap(function)(times[1:], ends)
-    crossed = (left * right < 0) | ((right == 0) & (left != 0))
-    crossed = crossed & ((right - left) * direction >= 0) & (lengths > 0)
-    (index,) = jnp.nonzero(crossed)
-    low, high = times[index], times[index + 1]
-    f_low = left[index]
-    t = (low + high) / 2
-    for _ in range(60):
-        value = jax.vmap(function)(t, trajectory.at(t))
-        same = value * f_low > 0
-        low, high = jnp.where(same, t, low), jnp.where(same, high, t)
-        t = (low + high) / 2
-    return t, trajectory.at(t)
