@@ -20,6 +20,7 @@ def one_step(solver: diffrax.AbstractSolver, tolerance, field, t, x, h):
     zero = jnp.zeros_like(h)
     state = solver.init(terms, zero, h, x, None)
     after, error, _, _, _ = solver.step(terms, zero, h, x, None, state, made_jump=True)
+    assert error is not None
     still = h == 0
     return jnp.where(still, x, after), jnp.where(still, jnp.zeros_like(x), error)
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from typing import Any
 
 import equinox as eqx
 import jax
@@ -169,7 +170,10 @@ def _first(batched, shared, period, states, t0, turns, settings):
 
 
 # the widest vectors that the machine has; XLA is shy of them by default
-@eqx.filter_jit(compiler_options={"xla_cpu_prefer_vector_width": 512})
+_WIDE: dict[str, Any] = {"compiler_options": {"xla_cpu_prefer_vector_width": 512}}
+
+
+@eqx.filter_jit(**_WIDE)
 def _some(batched, shared, period, t0, turns, settings, lane, rows):
     t0 = jnp.asarray(t0, dtype=jnp.float64)
 
