@@ -191,6 +191,18 @@ def test_traced_input_is_refused():
         jax.jvp(final, (jnp.asarray(1.0),), (jnp.asarray(1.0),))
 
 
+def test_solver_without_error_estimate_is_refused():
+    with pytest.raises(ValueError, match="Euler has no error estimate"):
+        jaxcam.simulate(
+            BouncingBall(),
+            [1.0, 0.0],
+            0.0,
+            1.0,
+            solver=diffrax.Euler(),
+            engine="diffeqsolve",
+        )
+
+
 def test_budget_is_reported():
     trajectory = jaxcam.simulate(
         BouncingBall(), [1.0, 0.0], 0.0, 5.0, engine="diffeqsolve", max_steps=5

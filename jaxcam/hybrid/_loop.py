@@ -165,7 +165,8 @@ def _iterate(functions: Functions, plan: Plan, lane: Lane) -> tuple[Lane, Record
     )
     jets4 = tuple(
         Jet(
-            jnp.where(went[k], 0.0, jets3[k].gap),
+            # on the surface the gap is zero, whatever rounding makes of it
+            jnp.where(went[k] | hit[k], 0.0, jets3[k].gap),
             jnp.where(went[k], 0.0, jets3[k].velocity),
             jnp.where(
                 went[k],

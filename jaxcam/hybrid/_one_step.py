@@ -13,6 +13,8 @@ def one_step(solver: diffrax.AbstractSolver, tolerance, field, t, x, h):
     take that of their equations; time (s), state `(n,)` and length (s, zero allowed).
 
     **Returns:** the state after the step and the estimate of its error, both `(n,)`.
+
+    **Raises:** `ValueError` for a solver without an error estimate.
     """
     # time counts from t: t + h - t would lose the digits of a short step
     terms = diffrax.ODETerm(lambda s, y, args: field(t + s, y))
@@ -20,7 +22,11 @@ def one_step(solver: diffrax.AbstractSolver, tolerance, field, t, x, h):
     zero = jnp.zeros_like(h)
     state = solver.init(terms, zero, h, x, None)
     after, error, _, _, _ = solver.step(terms, zero, h, x, None, state, made_jump=True)
-    assert error is not None
+    if error is None:
+        raise ValueError(
+            f"{type(solver).__name__} has no error estimate; pass an adaptive solver "
+            "such as diffrax.Dopri8() or diffrax.Kvaerno5()"
+        )
     still = h == 0
     return jnp.where(still, x, after), jnp.where(still, jnp.zeros_like(x), error)
 

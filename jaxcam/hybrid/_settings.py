@@ -14,7 +14,8 @@ class Settings(eqx.Module):
       lambda/(1 - r) is below this, lambda = v |j| / a^2; the completed time is then
       wrong by about its square, relatively.
     - `chatter_depth`: and only after the speed has fallen to this fraction of the
-      fastest rebound since the last release. 1 completes as soon as theory allows
+      fastest rebound since the last release (or hops have become lower than rounding
+      can tell). 1 completes as soon as theory allows
       (fast, for sweeps); small values list more impacts of each sequence.
     - `solver`: any explicit Runge-Kutta solver of diffrax with an error estimate.
     """
