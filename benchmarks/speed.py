@@ -158,7 +158,8 @@ def first_call() -> None:
 
 def two_cores(repeats: int) -> None:
     """The same batch with one and two threads, wall time."""
-    os.sched_setaffinity(0, range(os.cpu_count() or 1))
+    for thread in os.listdir("/proc/self/task"):
+        os.sched_setaffinity(int(thread), range(os.cpu_count() or 1))
     workload = _workloads.grid(side=64)
     system = CamFollower(speed=workload.speed[0])
     spent = {1: float("inf"), 2: float("inf")}

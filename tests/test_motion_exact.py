@@ -80,14 +80,16 @@ def test_sixty_impacts_before_completion():
 def test_depth_of_chatter_lists_more_impacts_and_moves_nothing():
     r, counts = 0.8, []
     rest = 2 * LAUNCH / GRAVITY / (1 - r)
-    for depth in (1e-2, 1e-6, 1e-7):
+    # the last one is deeper than rounding lets a hop be seen
+    for depth in (1e-2, 1e-4, 1e-6, 1e-9):
         settings = Settings(chatter_depth=depth)
         trajectory = run(ball(r), [0.0, LAUNCH], 0.0, 5.0, settings=settings)
         counts.append(int(trajectory.impacts.count))
         assert abs(float(trajectory.contacts.start[0]) - rest) < 1e-10
-    wanted = [int(np.ceil(np.log(d) / np.log(r))) for d in (1e-2, 1e-6, 1e-7)]
+    wanted = [int(np.ceil(np.log(d) / np.log(r))) for d in (1e-2, 1e-4, 1e-6)]
     # depth is relative to the fastest rebound, which is the first: r v0
-    assert counts == [n + 1 for n in wanted]
+    assert counts[:3] == [n + 1 for n in wanted]
+    assert counts[3] >= counts[2]
 
 
 def test_energy_over_a_thousand_elastic_impacts():
@@ -247,7 +249,7 @@ def test_steady_orbit_just_short_of_the_wall_never_hits():
         assert int(trajectory.impacts.count) == 0
         states = np.asarray(trajectory.stroboscopic())
         assert states.shape == (11, 2)
-        assert np.max(np.abs(states - [-amplitude, 0.0])) < 1e-9
+        assert np.max(np.abs(np.asarray(states) - [-amplitude, 0.0])) < 1e-9
         times, crossed = trajectory.section(lambda t, x: x[0], direction=1)
         exact = t0 + (2 * np.arange(1, 11) - 0.5) * np.pi / omega
         assert np.max(np.abs(times - exact)) < 1e-9

@@ -1,11 +1,13 @@
 """The commands of `jaxcam`, and the options that come before them."""
 
+import os
+import sys
 from typing import Annotated
 
 import typer
 
 from ._demo import demo
-from ._errors import one_sentence
+from ._errors import INTERRUPTED, one_sentence
 from ._simulate import simulate
 
 
@@ -51,4 +53,12 @@ def _options(
 
 def main() -> None:
     """Run the command that the arguments of the process name."""
-    app()
+    try:
+        app()
+    except SystemExit as end:
+        if end.code == INTERRUPTED:
+            # what XLA is still computing would crash the interpreter as it shuts down
+            sys.stdout.flush()
+            sys.stderr.flush()
+            os._exit(INTERRUPTED)
+        raise

@@ -1,5 +1,6 @@
 """What can be chosen by name at the command line: systems and solvers."""
 
+import math
 from collections.abc import Iterable
 from typing import NamedTuple
 
@@ -21,7 +22,7 @@ SYSTEMS = {
     "cam-follower": Ready("CamFollower", None, 10.0, 0.0),
     "impact-oscillator": Ready("ImpactOscillator", None, 10.0, 0.0),
     "bouncing-ball": Ready("BouncingBall", (1.0, 0.0), None, 3.0),
-    "triple-integrator": Ready("TripleIntegrator", (0.0, 1.0, -3.0), None, 6.0),
+    "triple-integrator": Ready("TripleIntegrator", (0.0, 0.1, -2.0), None, 3.0),
 }
 SOLVERS = {
     "dopri8": "Dopri8",
@@ -61,6 +62,8 @@ def make_system(name: str, preset: str | None, rpm: float | None) -> HybridSyste
         return getattr(models, SYSTEMS[name].model)()
     system = models.CamFollower() if preset is None else models.preset(preset)
     if rpm is not None:
+        if not 0 < rpm < math.inf:
+            raise ValueError(f"--speed is {rpm:g} rpm; give a positive number.")
         speed = jnp.asarray(models.rpm_to_rad_s(rpm), dtype=float)
         system = eqx.tree_at(lambda s: s.speed, system, speed)
     return system

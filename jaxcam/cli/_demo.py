@@ -44,25 +44,22 @@ def demo(
 
     choose("--gaps", gaps, ("refuse", "split"))
 
-    from ._cache import keep_compiled_programs
-    from ._output import Output, to_text
-    from ._progress import progress
-
-    output = Output(json_file, out)
-    keep_compiled_programs()
-
     from ..data import DEMO_RIG
     from ..recordings import compare_case, merge, read_case, read_rig, segment_case
+    from ._cache import keep_compiled_programs
     from ._demo_figures import draw
+    from ._output import Output, to_text
     from ._page import page, Report
+    from ._progress import progress
     from ._rests import rest_table, rests, simulate_run
 
+    keep_compiled_programs()
     folder = DEMO_RIG if case is None else case
-    with progress("reading") as report:
-        runs = read_case(folder, gaps=gaps)  # pyright: ignore
-        nominal = read_rig(_rig_file(folder, rig))
-        report("finding impacts and contacts", None)
-        segments = segment_case(runs, nominal)
+    runs = read_case(folder, gaps=gaps)  # pyright: ignore
+    nominal = read_rig(_rig_file(folder, rig))
+    output = Output(json_file, out)
+    with progress("finding impacts and contacts") as report:
+        segments = segment_case(tuple(runs), nominal)
         parts = []
         for k, run in enumerate(segments):
             report(f"comparing {run.recording.name}", k / len(segments))

@@ -17,6 +17,7 @@ INTERRUPTED = 130
 # messages written for Python name arguments; here they are options
 _OPTIONS = (
     ("or pass state=None to start", "or give --state release to start"),
+    ("state=None needs", "--state release needs"),
     ("pass the state to start from", "give the state to start from with --state"),
     ('engine="diffeqsolve"', "--engine diffeqsolve"),
     ("pass one (diffrax.Dopri8(), diffrax.Tsit5())", "choose --solver dopri8"),

@@ -41,6 +41,8 @@ th, td { padding: .4rem .6rem; text-align: right; white-space: nowrap;
   border-bottom: 1px solid var(--line); }
 th { color: var(--quiet); font-weight: 600; }
 .text { text-align: left; }
+td.text:nth-child(n+4) { white-space: normal; min-width: 18rem; }
+@media (max-width: 34rem) { table { font-size: .85rem; } th, td { padding: .35rem; } }
 figure { margin: 1.4rem 0; }
 img { display: block; width: 100%; max-width: 46rem; height: auto; background: #fff;
   border-radius: 6px; border: 1px solid var(--line); }
@@ -57,7 +59,7 @@ def page(report: Report) -> str:
         # one idea a line is easier to take in than a paragraph of numbers
         *(f'<p class="sentence">{escape(s)}</p>' for s in _split(report.sentence)),
         "<h2>Residuals by mode</h2>",
-        _table(_MODES, [_cells(row) for row in report.comparison], text=(0, 7)),
+        _table(_MODES, [_cells(row) for row in report.comparison], text=(0, 6)),
         '<p class="note">Each flight is started where the recording says it started, '
         "so that what is left over is what the model lacks in that mode. The ratio is "
         "what is left in units of the noise of the sensors: 1 where nothing is "
@@ -68,7 +70,9 @@ def page(report: Report) -> str:
         ),
         '<p class="note">Simulated: the rig as its file states it, at the mean speed '
         "of the run, in its own motion after twenty turns. Angles are those of the "
-        "cam in its turn; ± is the spread from rest to rest.</p>",
+        "cam in its turn; ± is the spread from rest to rest. Where the two have "
+        "nothing in common, the rig may follow another motion that exists at the same "
+        "speed.</p>",
         "<h2>Figures</h2>",
         *(_figure(file, caption) for file, caption in report.figures),
         "<h2>The runs</h2>",
@@ -87,15 +91,15 @@ def page(report: Report) -> str:
     )
 
 
-_MODES = ("mode", "unit", "pieces", "samples", "rms", "noise", "ratio", "clearest in")
+_MODES = ("mode", "ratio", "rms", "noise", "unit", "pieces", "most clearly in")
 
 
 def _cells(row: Row) -> tuple[str, ...]:
-    numbers = (f"{row.rms:.1e}", f"{row.noise:.1e}", f"{row.ratio:.2f}")
+    numbers = (f"{row.ratio:.2f}", f"{row.rms:.1e}", f"{row.noise:.1e}")
     place = f"{row.worst_record}, {row.worst_time:.3f} s"
     if row.worst_phase == row.worst_phase:
         place += f", cam at {row.worst_phase:.2f} rad"
-    return (row.mode, row.unit, str(row.count), str(row.samples), *numbers, place)
+    return (row.mode, *numbers, row.unit, str(row.count), place)
 
 
 def _table(

@@ -143,5 +143,6 @@ def _typical(angle: Float[np.ndarray, " k"]) -> str:
     mean = np.mean(np.exp(1j * angle))
     turned = np.mod(angle - np.angle(mean) + math.pi, 2 * math.pi) - math.pi
     middle = (np.angle(mean) + np.mean(turned)) % (2 * math.pi)
-    spread = f" ± {np.std(turned):.2f}" if len(angle) > 1 else ""
-    return f"{middle:.2f}{spread}"
+    spread = f"{np.std(turned):.2f}"
+    # a periodic motion has none
+    return f"{middle:.2f}" if float(spread) == 0 else f"{middle:.2f} ± {spread}"

@@ -1,5 +1,6 @@
 """`jaxcam simulate`: one trajectory of a ready system."""
 
+import math
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -32,7 +33,7 @@ def simulate(
         typer.Option(
             metavar="A,B",
             help="Start, such as 0.3,0, or the word release for the release point of "
-            "a sticking orbit. Without: release; 1,0 for the ball; 0,1,-3 for the "
+            "a sticking orbit. Without: release; 1,0 for the ball; 0,0.1,-2 for the "
             "triple integrator.",
         ),
     ] = None,
@@ -85,23 +86,23 @@ def simulate(
     engine = engine or ("diffeqsolve" if implicit else "loop")
     choose("--engine", engine, ENGINES)
 
+    import jaxcam
+
     from ._cache import keep_compiled_programs
     from ._output import Output
     from ._parameters import set_parameters
     from ._progress import progress
     from ._trajectory import about, contact_table, draw, impact_table, summary
 
-    output = Output(json_file, out)
     keep_compiled_programs()
-
-    import jaxcam
-
+    start = _state(system, state)
     model = set_parameters(make_system(system, preset, speed), set_ or ())
     end = _end(system, model, t0, t1, turns)
+    output = Output(json_file, out)
     with progress("compiling (the first run of a system takes longest)") as report:
         trajectory = jaxcam.simulate(
             model,
-            _state(system, state),
+            start,
             t0,
             end,
             tolerance=tolerance,
@@ -150,6 +151,9 @@ def _state(name: str, text: str | None):
 
 def _end(name: str, model, t0: float, t1: float | None, turns: float | None) -> float:
     """When to stop (s)."""
+    for option, value in (("--t0", t0), ("--t1", t1), ("--turns", turns)):
+        if value is not None and not math.isfinite(value):
+            raise ValueError(f"{option} is {value:g}; give a finite number.")
     if t1 is not None and turns is not None:
         raise ValueError("Give --t1 or --turns, not both.")
     if t1 is not None:

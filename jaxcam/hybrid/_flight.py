@@ -20,6 +20,8 @@ from ._gap_polynomial import (
 _CLOSE = 1e-3
 # and the gap is nearly a straight line there, so that its root is a short series
 _STRAIGHT = 4e-3
+# error of the gap's polynomial over the largest gap, up to which it is believed
+_TRUST = 0.02
 
 
 class Verdict(NamedTuple):
@@ -32,22 +34,22 @@ class Verdict(NamedTuple):
     constraint: Any
 
 
-def judge(left: Jet, right: Jet, h, slack, rounding, room) -> Verdict:
+def judge(left: Jet, right: Jet, h, slack, rounding, scale, room) -> Verdict:
     """Judge the step of one free constraint.
 
     **Arguments:** the jets at both ends, the length of the step, the gap below zero
-    that is let pass, the gap that cannot be told from zero, and the time left to the
-    next time that was asked for (an impact beyond it waits for a later step).
+    that is let pass, the gap that cannot be told from zero, the largest gap so far, and
+    the time left to the next time that was asked for (an impact beyond it waits for a
+    later step).
     """
     polynomial = bernstein(left, right, h)
-    # a parabola that turns before it is below rounding only touches
-    touches = (right.acceleration > 0) & (
-        2 * right.acceleration * (right.gap + rounding) > right.velocity**2
-    )
-    inward = (right.velocity < 0) & ~touches
+    # a polynomial that errs by a part of the gap's own size says nothing
+    size = jnp.maximum(scale, jnp.maximum(jnp.abs(left.gap), jnp.abs(right.gap)))
+    vague = polynomial.error > _TRUST * size
+    inward = moves_in(right, rounding)
     behind = (right.gap < -slack) | ((right.gap < 0) & inward)
     # on the surface at the very start and moving, or pulled, in: no time passes
-    now = (left.gap <= 0) & moves_in(left) & (h == 0)
+    now = (left.gap <= 0) & moves_in(left, rounding) & (h == 0)
     # judged by the straight line, since the series can vanish far from the root
     distance = jnp.abs(right.gap)
     speed = jnp.abs(right.velocity)
@@ -56,19 +58,26 @@ def judge(left: Jet, right: Jet, h, slack, rounding, room) -> Verdict:
     offset = jnp.where(close, time_to_root(right), 0.0)
     offset = jnp.where(now, 0.0, offset)
     near = (close | (distance <= rounding)) & (offset <= room)
-    lands = (inward & near) | now
     dips = (lowest(polynomial) < -slack) & ~behind & ~now
-    lands = lands & ~dips
-    retake = (behind & ~lands) | dips
+    lands = ((inward & near) | now) & ~dips & ~vague
+    retake = (behind & ~lands) | dips | vague
     c = power_coefficients(left, right, h)
     fraction = jnp.where(behind, crossing(c), lowest_point(polynomial, c))
+    fraction = jnp.where(vague, 0.5, fraction)
     length = jnp.where(retake, fraction * h, jnp.inf)
     return Verdict(retake, length, lands, offset, jnp.zeros_like(h))
 
 
-def moves_in(jet: Jet):
-    """Whether the motion at this instant goes, or is pulled, into the constraint."""
-    return (jet.velocity < 0) | ((jet.velocity == 0) & (jet.acceleration < 0))
+def moves_in(jet: Jet, rounding):
+    """Whether the motion at this instant goes, or is pulled, into the constraint.
+
+    A parabola that turns before it is below rounding only touches.
+    """
+    touches = (jet.acceleration > 0) & (
+        2 * jet.acceleration * (jet.gap + rounding) > jet.velocity**2
+    )
+    falls = (jet.velocity < 0) & ~touches
+    return falls | ((jet.velocity == 0) & (jet.acceleration < 0))
 
 
 def earliest(verdicts: list[Verdict]) -> Verdict:

@@ -48,11 +48,13 @@ def _iterate(functions: Functions, plan: Plan, lane: Lane) -> tuple[Lane, Record
 
     # where the step ends
     stop = jnp.minimum(plan.t0 + (lane.stops + 1) * plan.stop_period, plan.t1)
+    size = largest([jnp.abs(e) for e in lane.x])
+    rounding = [1e-15 * s + 2e-15 * size for s in lane.scale]
     # already in contact and moving in, or in contact and pulled away: no time passes
     now = any_of(
         [
-            jnp.where(c, j.acceleration > 0, (j.gap <= 0) & moves_in(j))
-            for j, c in zip(lane.jets, lane.contact, strict=True)
+            jnp.where(c, j.acceleration > 0, (j.gap <= 0) & moves_in(j, near))
+            for j, c, near in zip(lane.jets, lane.contact, rounding, strict=True)
         ]
     )
     wanted = jnp.where(now, 0.0, jax.lax.stop_gradient(lane.step))
@@ -80,14 +82,20 @@ def _iterate(functions: Functions, plan: Plan, lane: Lane) -> tuple[Lane, Record
     projected = functions.onto(frame, jets1, x1, lane.contact)
 
     # what happened in it
-    size = largest([jnp.abs(e) for e in lane.x])
-    rounding = [1e-15 * s + 2e-15 * size for s in lane.scale]
     slack = [2e-12 * s + 1e-15 * size for s in lane.scale]
     flown = earliest(
         [
             _where_free(
                 free[k],
-                judge(lane.jets[k], jets1[k], h, slack[k], rounding[k], room),
+                judge(
+                    lane.jets[k],
+                    jets1[k],
+                    h,
+                    slack[k],
+                    rounding[k],
+                    lane.scale[k],
+                    room,
+                ),
             )
             for k in range(m)
         ]
@@ -133,7 +141,7 @@ def _iterate(functions: Functions, plan: Plan, lane: Lane) -> tuple[Lane, Record
     # deep enough into the sequence, or so low that rounding hides the next hop
     pulled = jnp.abs(pick([j.acceleration for j in jets3], flown.constraint))
     deep = rebound <= plan.depth * fastest
-    hidden = rebound * rebound <= 500 * pick(rounding, flown.constraint) * pulled
+    hidden = rebound * rebound <= 1e-12 * size * pulled
     begins = lands & chatter.possible & (deep | hidden)
 
     # contact: the state is put on the surface a second time, then judged

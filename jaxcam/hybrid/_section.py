@@ -13,7 +13,7 @@ def crossings(trajectory, function, direction: int):
     count = int(trajectory.steps.count)
     points = trajectory.steps.time[:count]
     share = jnp.linspace(0.0, 1.0, _PLACES + 1)
-    grid = points[:-1, None] + share * jnp.diff(points)[:, None]
+    grid = points[:-1, None] + share[None, :] * jnp.diff(points)[:, None]
     # an impact belongs to the step after it: every step ends just before its end
     tiny = 1e-12 * jnp.maximum(jnp.abs(points[1:]), 1e-3)
     ends = jnp.maximum(points[1:] - tiny, points[:-1])
