@@ -250,7 +250,9 @@ def test_steady_orbit_just_short_of_the_wall_never_hits():
         states = np.asarray(trajectory.stroboscopic())
         assert states.shape == (11, 2)
         assert np.max(np.abs(np.asarray(states) - [-amplitude, 0.0])) < 1e-9
-        times, crossed = trajectory.section(lambda t, x: x[0], direction=1)
+        times, crossed = map(
+            np.asarray, trajectory.section(lambda t, x: x[0], direction=1)
+        )
         exact = t0 + (2 * np.arange(1, 11) - 0.5) * np.pi / omega
         assert np.max(np.abs(times - exact)) < 1e-9
         assert np.max(np.abs(crossed - np.array([0.0, omega * amplitude]))) < 1e-9
