@@ -8,7 +8,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from hypothesis import given, settings, strategies as st
+from hypothesis import example, given, settings, strategies as st
 
 from jaxcam import HybridSystem, simulate
 from jaxcam.models import (
@@ -137,6 +137,7 @@ def describe(system, state, tolerance, k):
 
 @pytest.mark.parametrize("kind", [oscillators, balls, cams, springs])
 @SLOW
+@example(seed=874)  # two crossings in one step, of which the later was taken
 @given(seed=st.integers(0, 10**6))
 def test_gap_stays_positive_in_every_lane(kind, seed):
     system, state, t1, tolerance = random_batch(kind, seed)

@@ -11,7 +11,7 @@ from ._runge_kutta import Tableau
 from ._select import any_of, select
 
 
-# consecutive failures after which a lane gives up
+# consecutive attempts without progress in time after which a lane gives up
 _PATIENCE = 80
 
 
@@ -63,7 +63,9 @@ def advance_lane(plan: Plan, lane: Lane, attempt: Attempt) -> Lane:
     longest = _longest(plan, lane, attempt)
     trial = _next_length(plan, lane, attempt, longest)
     fixed = (good & attempt.begins) | (lane.completing & ~good)
-    failures = jnp.where(good | ~active, 0.0, lane.failures + 1.0)
+    # steps too short to move the clock lead nowhere either
+    moved = good & (attempt.t > lane.t)
+    failures = jnp.where(moved | ~active, 0.0, lane.failures + 1.0)
     stop_gradient = jax.lax.stop_gradient
     waiting = active & any_of(lane.contact) & attempt.finite
     fastest = jnp.where(attempt.released, 0.0, attempt.fastest)

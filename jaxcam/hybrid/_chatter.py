@@ -134,7 +134,20 @@ def chatter_completion(
             point + duration * sticking_field(system, t, point),
             smallness,
         )
-    duration = completion_time(speed, acceleration, rate, damping, restitution)
+    softening = _softening(system, t, point, direction, speed, restitution)
+    duration = completion_time(
+        speed, acceleration, rate, damping, restitution, softening
+    )
     half = point + duration / 2 * sticking_field(system, t, point)
     moved = point + duration * sticking_field(system, t + duration / 2, half)
     return Completion(t + duration, moved, smallness)
+
+
+def _softening(system, t, point, direction, speed, restitution):
+    """r1 of r0 + r1 v, from the impact that led to this rebound."""
+    bounces = restitution > 0
+    approach = speed / jnp.where(bounces, restitution, 1.0)
+    after = impacts(system, t, point - approach * direction)[0]
+    rebound = normal_velocity(system, t, after)[0]
+    inverse = 1 / jnp.where(approach > 0, approach, 1.0)
+    return jnp.where(bounces, (rebound * inverse - restitution) * inverse, 0.0)
