@@ -1,11 +1,14 @@
 """Runs that once went wrong, each with what was wrong."""
 
+import jax
 import jax.numpy as jnp
 import numpy as np
+import pytest
 
 import jaxcam
 from jaxcam.hybrid import stroboscope
-from jaxcam.models import BouncingBall, CamFollower, rpm_to_rad_s
+from jaxcam.hybrid._scalarise import scalarise, split
+from jaxcam.models import BouncingBall, CamFollower, ImpactOscillator, rpm_to_rad_s
 
 
 def test_release_point_start_reaches_the_end():
@@ -50,3 +53,54 @@ def test_landing_is_not_mistaken_far_from_the_surface():
     trajectory = jaxcam.simulate(system, start, 0.3, 3.0, tolerance=1e-6)
     assert trajectory.successful, trajectory.result
     assert float(trajectory.gap(np.linspace(0.3, 3.0, 2000)).min()) > -1e-9
+
+
+def test_stroboscope_starts_at_any_time():
+    # 0.1 + turns 0.7 is rounded differently with and without a fused product
+    starts = np.stack([np.linspace(-0.9, -0.1, 8), np.zeros(8)], axis=1)
+    made = stroboscope(ImpactOscillator(), starts, 5, t0=0.1, period=0.7)
+    assert np.all(made.code == 0)
+    one = jaxcam.simulate(ImpactOscillator(), jnp.asarray(starts[3]), 0.1, 3.7)
+    wanted = np.asarray(one.at(0.1 + 0.7 * np.arange(1.0, 6.0)))
+    # the tolerance of the batch is 1e-9
+    assert np.max(np.abs(made.states[3] - wanted)) < 1e-7
+
+
+@pytest.mark.parametrize(
+    "start, options, word",
+    [
+        ([np.nan, 0.0], {}, "finite"),
+        ([2.0, 0.0], {}, "gap is negative"),
+        ([0.0, 0.0, 0.0], {}, "components"),
+        ([-0.5, 0.0], {"period": -1.0}, "period"),
+    ],
+)
+def test_stroboscope_says_what_is_wrong(start, options, word):
+    with pytest.raises(ValueError, match=word):
+        stroboscope(ImpactOscillator(), np.array([start]), 2, **options)
+
+
+def test_derivative_rules_of_the_reader_are_kept():
+    # the derivative of an implicit function is not that of the iteration inside
+    @jax.custom_jvp
+    def root(x):
+        return jax.lax.stop_gradient(jnp.sqrt(x))
+
+    @root.defjvp
+    def _(primals, tangents):
+        (x,), (dx,) = primals, tangents
+        return root(x), dx / (2 * root(x))
+
+    example = jax.ShapeDtypeStruct((), jnp.float64)
+    scalar = scalarise(lambda x: 3.0 * root(x), example)
+    slope = jax.grad(lambda x: scalar(split(x)).item())(4.0)
+    assert abs(float(slope) - 0.75) < 1e-15
+
+
+def test_integers_known_while_tracing_are_combined_bit_by_bit():
+    scalar = scalarise(
+        lambda x: x * (jnp.arange(4) & 1).astype(x.dtype),
+        jax.ShapeDtypeStruct((4,), jnp.float64),
+    )
+    made = scalar(split(jnp.ones(4)))
+    assert [float(e) for e in made] == [0.0, 1.0, 0.0, 1.0]

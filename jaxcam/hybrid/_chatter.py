@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Array, ArrayLike, Float
 
 from ._normal import (
     impacts,
@@ -33,7 +33,9 @@ from ._system import HybridSystem
 from ._types import RealScalar, State
 
 
-def completion_time(speed, acceleration, rate, damping, restitution, softening=0.0):
+def completion_time(
+    speed, acceleration, rate, damping, restitution, softening: ArrayLike = 0.0
+):
     """Duration of the remaining hops, of second order in `speed`.
 
     **Arguments:** rebound speed u > 0; A < 0, B and C as above; r0 and r1.

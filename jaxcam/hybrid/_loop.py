@@ -188,6 +188,9 @@ def _iterate(functions: Functions, plan: Plan, lane: Lane) -> tuple[Lane, Record
     finite = jnp.isfinite(sum(x4) + t4 + sum(j.gap + j.velocity for j in jets4))
     good = good & finite
     stopped = at_stop & good & ~lands & ~released
+    shorter = jnp.minimum(flown.length, held.length)
+    if not functions.planar:
+        shorter = jnp.where(converged, shorter, 0.5 * h)
     attempt = Attempt(
         t=t4,
         x=x4,
@@ -198,10 +201,10 @@ def _iterate(functions: Functions, plan: Plan, lane: Lane) -> tuple[Lane, Record
         good=good,
         fits=fits,
         finite=finite,
-        shorter=jnp.minimum(flown.length, held.length),
+        shorter=shorter,
         # algebraic contact may start its next attempt from here
         guess=settled if functions.planar else lane.x,
-        settling=~converged,
+        settling=~converged & functions.planar,
         stopped=stopped,
         lands=lands,
         begins=begins,

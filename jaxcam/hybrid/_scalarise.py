@@ -47,7 +47,7 @@ _ELEMENTWISE = frozenset(
 _NUMPY = {
     "add": np.add,
     "add_any": np.add,
-    "and": np.logical_and,
+    "and": np.bitwise_and,
     "div": np.divide,
     "eq": np.equal,
     "ge": np.greater_equal,
@@ -146,7 +146,7 @@ def _apply(equation, inputs, memory):
             else (inner, [])
         )
         return _evaluate(body, consts, inputs, memory)
-    if name in _CUSTOM:
+    if name in _CUSTOM and _is_plain(equation):
         inner = params["call_jaxpr"]
         consts = _constants(inner.consts)
         return _evaluate(inner.jaxpr, consts, inputs, memory)
@@ -168,6 +168,8 @@ def _apply(equation, inputs, memory):
         return list(np.split(inputs[0], cuts, axis=params["axis"]))
     if name in _ELEMENTWISE:
         return [_elementwise(equation, inputs, outputs[0].shape, memory)]
+    # a rule of the reader's, as custom derivatives are, comes among these parameters
+    params = equation.primitive.get_bind_params(params)
     made = equation.primitive.bind(*[join(i) for i in inputs], **params)
     made = made if equation.primitive.multiple_results else [made]
     return [split(m) for m in made]
@@ -177,7 +179,8 @@ def _compute(equation, arrays) -> list[np.ndarray]:
     """An operation on known numbers, done while tracing."""
     name, outputs = equation.primitive.name, equation.outvars
     if name in _NUMPY:
-        made = [_NUMPY[name](*arrays)]
+        with np.errstate(all="ignore"):
+            made = [_NUMPY[name](*arrays)]
     elif name == "convert_element_type":
         made = arrays
     else:
@@ -187,6 +190,18 @@ def _compute(equation, arrays) -> list[np.ndarray]:
     return [
         np.asarray(m, dtype=o.aval.dtype) for m, o in zip(made, outputs, strict=True)
     ]
+
+
+def _is_plain(equation) -> bool:
+    """Whether differentiating the body of a custom rule gives what the rule gives.
+
+    So it is for our own Fourier series. A reader's rule (of an implicit function, say)
+    must be kept; for a rule of reverse mode alone there is only the body.
+    """
+    if equation.primitive.name == "custom_vjp_call":
+        return True
+    equations = equation.params["call_jaxpr"].jaxpr.eqns
+    return [e.params.get("name") for e in equations] == ["fourier_sum"]
 
 
 def _known(element) -> bool:

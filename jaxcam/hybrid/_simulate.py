@@ -131,13 +131,25 @@ def _released(system, t0, traced):
             "state=None needs a system with a forcing period; pass the state to start "
             "from"
         )
+    names = type(system).state_names
+    if (names and len(names) != 2) or _constraints(system, t0) != 1:
+        raise ValueError(
+            "state=None needs a system with two states and one constraint; pass the "
+            "state to start from"
+        )
     point = _release_point(system, t0)
     if not traced and float(point.holds) == 2:
         raise ValueError(
             "there is no contact anywhere in the period, so no release point; pass the "
             "state to start from"
         )
-    return point.state, point.time
+    nowhere = point.holds == 2
+    return jnp.where(nowhere, jnp.nan, point.state), point.time
+
+
+def _constraints(system, t0) -> int:
+    gap = jax.eval_shape(system.gap, t0, jnp.zeros(2))
+    return gap.shape[0] if gap.shape else 1
 
 
 @eqx.filter_jit

@@ -10,9 +10,11 @@ import jax.numpy as jnp
 import numpy as np
 
 from ._advance import Plan
+from ._check import check_start
 from ._codes import Row
 from ._functions import Functions
 from ._lane import first_lane, RUNNING
+from ._normal import gaps
 from ._run import run_raw
 from ._runge_kutta import tableau_of
 from ._settings import Settings
@@ -86,15 +88,20 @@ def stroboscope(
             "give where and values together, with one value for each lane: "
             f"{lanes} lanes here"
         )
+    length = None if period is None else jnp.asarray(period, dtype=jnp.float64)
     if period is None and system.period is None:
         raise ValueError(
             "this system has no forcing period; pass period=... in seconds"
         )
+    if turns < 1:
+        raise ValueError(f"turns is {turns}; give the number of periods, 1 or more")
+    start = jnp.asarray(t0, dtype=jnp.float64)
+    _check(*_batch(system, where, values), settings, start, length, states)
 
     def work(first):
         some = slice(first, first + block)
         part = None if values is None else values[some]
-        shape = (t0, period, turns, settings, rows, max_steps)
+        shape = (start, length, turns, settings, rows, max_steps)
         return _block(system, where, part, states[some], *shape)
 
     pieces = []
@@ -106,19 +113,51 @@ def stroboscope(
     return Stroboscope(*map(np.concatenate, zip(*pieces, strict=True)))
 
 
+def _check(batched, shared, settings, t0, period, states) -> None:
+    """Raise `ValueError` for lanes that cannot start; the first is checked closely."""
+    first = eqx.combine(jax.tree.map(lambda leaf: leaf[0], batched), shared)
+    one = jnp.asarray(states[0])
+    check_start(first, settings, t0, one, t0)
+    if not np.all(np.isfinite(states)):
+        raise ValueError("a state is not finite; every component of each must be")
+
+    def look(batched, state):
+        system = eqx.combine(batched, shared)
+        length = system.period if period is None else period
+        return jnp.min(gaps(system, t0, state)), jnp.asarray(length, dtype=float)
+
+    nearest, lengths = eqx.filter_jit(
+        eqx.filter_vmap(look, in_axes=(eqx.if_array(0), 0))
+    )(batched, jnp.asarray(states))
+    if not bool(jnp.all(lengths > 0)):
+        raise ValueError(
+            "the period of a lane is not positive; check values and period"
+        )
+    low = float(jnp.min(nearest))
+    if not low >= -1e-12 * (1.0 + float(np.max(np.abs(states)))):
+        raise ValueError(
+            f"gap is negative ({low:.1e}) at t0 in lane {int(jnp.argmin(nearest))}; "
+            "start outside the constraint"
+        )
+
+
 def _block(system, where, values, states, t0, period, turns, settings, rows, max_steps):
     lanes, n = states.shape
     batched, shared = _batch(system, where, values)
-    lane = _first(batched, shared, period, jnp.asarray(states), t0, turns, settings)
+    end = jnp.asarray(float(turns))
+    lane = _first(batched, shared, period, jnp.asarray(states), t0, end, settings)
     samples = np.full((lanes, turns, n), np.nan)
     filled = np.zeros(lanes, dtype=int)
     used = 0
     while used < max_steps and bool(np.any(np.asarray(lane.status) == RUNNING)):
-        lane, log = _some(batched, shared, period, t0, turns, settings, lane, rows)
+        lane, log = _some(batched, shared, period, t0, end, settings, lane, rows)
         kind, after = np.asarray(log[..., 0]), np.asarray(log[..., 1:])
         hit = kind == float(Row.STOP)
         rank = filled[:, None] + np.cumsum(hit, axis=1) - 1
         who, row = np.nonzero(hit)
+        # rounding may set the end of the run apart from its last stop
+        real = rank[who, row] < turns
+        who, row = who[real], row[real]
         samples[who, rank[who, row]] = after[who, row]
         filled += hit.sum(axis=1)
         used += rows

@@ -41,8 +41,9 @@ class Trajectory(eqx.Module):
 
     @property
     def final(self) -> Float[Array, " n"]:
-        """State at the end of the run."""
-        return self.steps.state[self.steps.count - 1]
+        """State at the end of the run; NaN under a transformation if it failed."""
+        last = self.steps.state[self.steps.count - 1]
+        return jnp.where(self.code == 0, last, jnp.nan) if is_traced(self) else last
 
     def at(self, times) -> Float[Array, "times n"]:
         """State at each of `times` (s, shape `(times,)`), after any impact there.

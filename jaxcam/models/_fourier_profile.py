@@ -42,7 +42,7 @@ class FourierProfile(CamProfile):
         require_finite(mean=self.mean, cosines=self.cosines, sines=self.sines)
 
 
-def _sum(angle, mean, cosines, sines):
+def fourier_sum(angle, mean, cosines, sines):
     # Clenshaw's recurrence, for the cosine and the sine sum side by side. The loop is
     # unrolled in Python: inside a simulation's loop it must fuse into plain arithmetic.
     # It starts at the last coefficients, since the compiler would keep products with 0.
@@ -59,7 +59,7 @@ def _sum(angle, mean, cosines, sines):
 # The derivative of a series is again a series. Saying so halves the work of gap,
 # velocity, acceleration and jerk together, against differentiating the recurrence.
 # Traced once for each number of harmonics, since a simulation asks for it many times.
-_series = jax.custom_jvp(jax.jit(_sum))
+_series = jax.custom_jvp(jax.jit(fourier_sum))
 
 
 def _series_jvp(primals, tangents):
