@@ -121,14 +121,7 @@ def _check(batched, shared, settings, t0, period, states) -> None:
     if not np.all(np.isfinite(states)):
         raise ValueError("a state is not finite; every component of each must be")
 
-    def look(batched, state):
-        system = eqx.combine(batched, shared)
-        length = system.period if period is None else period
-        return jnp.min(gaps(system, t0, state)), jnp.asarray(length, dtype=float)
-
-    nearest, lengths = eqx.filter_jit(
-        eqx.filter_vmap(look, in_axes=(eqx.if_array(0), 0))
-    )(batched, jnp.asarray(states))
+    nearest, lengths = _look(batched, shared, period, t0, jnp.asarray(states))
     if not bool(jnp.all(lengths > 0)):
         raise ValueError(
             "the period of a lane is not positive; check values and period"
@@ -139,6 +132,18 @@ def _check(batched, shared, settings, t0, period, states) -> None:
             f"gap is negative ({low:.1e}) at t0 in lane {int(jnp.argmin(nearest))}; "
             "start outside the constraint"
         )
+
+
+@eqx.filter_jit
+def _look(batched, shared, period, t0, states):
+    """Smallest gap and period of each lane."""
+
+    def one(batched, state):
+        system = eqx.combine(batched, shared)
+        length = system.period if period is None else period
+        return jnp.min(gaps(system, t0, state)), jnp.asarray(length, dtype=jnp.float64)
+
+    return eqx.filter_vmap(one, in_axes=(eqx.if_array(0), 0))(batched, states)
 
 
 def _block(system, where, values, states, t0, period, turns, settings, rows, max_steps):
