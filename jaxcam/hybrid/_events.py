@@ -28,7 +28,7 @@ class Contacts(eqx.Module):
     """The intervals of sticking, in order of their start; padded as `Impacts` is.
 
     `start` is the accumulation time of the chatter (or t0), `end` the release; a
-    contact that lasts beyond the trajectory has `released` False and ends at t1.
+    contact that lasts beyond the run has `released` False and ends where the run does.
     """
 
     start: Float[Array, " m"]

@@ -2,7 +2,7 @@
 
 H, v, a and j at the two ends of a step fix a polynomial of degree seven. Its Bernstein
 coefficients bound it from below, so a step whose coefficients are positive cannot have
-crossed the constraint; the difference to the polynomial of degree five that ignores the
+crossed the constraint as far as the polynomial is right; the difference to the polynomial of degree five that ignores the
 jerks tells how far the polynomial itself can be trusted. All functions take scalars and
 are free of branches.
 """

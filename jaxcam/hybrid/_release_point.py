@@ -15,7 +15,10 @@ _ON = (True,)
 
 
 class ReleasePoint(eqx.Module):
-    """`time` (s) and `state` `(n,)` at which contact ends; `holds` if it never does."""
+    """`time` (s) and `state` `(n,)` at which contact ends.
+
+    `holds`: 0 for a release, 1 where contact still holds, 2 where there is none.
+    """
 
     time: Float[Array, ""]
     state: Float[Array, " n"]
