@@ -1,9 +1,9 @@
 """The gap inside one step, as the polynomial through its jets at both ends.
 
 H, v, a and j at the two ends of a step fix a polynomial of degree seven. Its Bernstein
-coefficients bound it from below, so a step whose coefficients are positive cannot have
-crossed the constraint as far as the polynomial is right; the difference to the polynomial of degree five that ignores the
-jerks tells how far the polynomial itself can be trusted. All functions take scalars and
+coefficients bound it from below: where they are positive the step has not crossed the
+constraint, as far as the polynomial is right. The difference to the polynomial of
+degree five that ignores the jerks tells how far that is. All functions take scalars and
 are free of branches.
 """
 
