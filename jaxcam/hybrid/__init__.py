@@ -7,6 +7,7 @@ from ._chatter import (
 )
 from ._codes import RESULTS as RESULTS
 from ._events import Contacts as Contacts, Impacts as Impacts, Steps as Steps
+from ._flow import Arrival as Arrival, flow as flow
 from ._normal import (
     field_in_force as field_in_force,
     normal_acceleration as normal_acceleration,
