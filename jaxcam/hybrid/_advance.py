@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
-from ._gap_polynomial import Jet, time_to_contact
+from ._gap_polynomial import end_curvature, Jet, time_to_contact, time_to_release
 from ._lane import FINISHED, Lane, NOT_FINITE, RUNNING, STEP_FAILED
 from ._runge_kutta import Tableau
 from ._select import any_of, select
@@ -36,6 +36,8 @@ class Attempt(NamedTuple):
     x: tuple
     contact: tuple
     jets: tuple
+    # the jets before what happened at the end of the step
+    arrived: tuple
     length: Any
     # error of the step over the error allowed
     effort: Any
@@ -102,9 +104,9 @@ def _longest(plan, lane, attempt):
     rough = jnp.exp2(jnp.log2(rough) * jnp.float32(-1.0 / plan.tableau.order))
     factor = jnp.clip(0.9 * jnp.asarray(rough, dtype=jnp.float64), 0.2, 6.0)
     factor = jnp.where(jnp.isfinite(effort), factor, 0.1)
-    grown = jnp.where(
-        h < 0.999 * lane.longest, jnp.maximum(lane.longest, h * factor), h * factor
-    )
+    # a much shorter step says nothing about the longest
+    grown = jnp.where(h < 0.5 * lane.longest, lane.longest, h * factor)
+    grown = jnp.where(h < 0.999 * lane.longest, jnp.maximum(lane.longest, grown), grown)
     grown = jnp.where(any_of(lane.contact) & (effort == 0.0), lane.longest, grown)
     failed = jnp.where(attempt.fits, lane.longest, h * factor)
     longest = jnp.where(attempt.good, grown, failed)
@@ -114,16 +116,16 @@ def _longest(plan, lane, attempt):
 def _next_length(plan, lane, attempt, longest):
     """To the next contact or release, if it is nearer than the error allows."""
     ahead = longest
-    for jet, contact in zip(attempt.jets, attempt.contact, strict=True):
-        flight = time_to_contact(jet)
-        rise = -jet.acceleration / jnp.where(jet.jerk > 0, jet.jerk, 1.0)
-        rising = (jet.jerk > 0) & (jet.acceleration < 0)
-        held = jnp.where(
-            rising, jnp.minimum(rise, plan.longest_contact), plan.longest_contact
-        )
+    good, h = attempt.good, attempt.length
+    # the step that completes a chatter did not follow the motion
+    whole = (h > 0) & ~lane.completing
+    inverse = jnp.where(whole, 1.0, 0.0) / jnp.where(whole, h, 1.0)
+    for k, (jet, contact) in enumerate(zip(attempt.jets, attempt.contact, strict=True)):
+        ends = lane.jets[k], attempt.arrived[k]
+        flight = time_to_contact(jet, end_curvature(*ends, inverse))
+        held = jnp.minimum(time_to_release(*ends, inverse), plan.longest_contact)
         limit = jnp.where(contact, held, jnp.where(flight > 0, flight, jnp.inf))
         ahead = jnp.minimum(ahead, limit)
-    good, h = attempt.good, attempt.length
     again = jnp.where(attempt.fits, jnp.minimum(attempt.shorter, h), longest)
     again = jnp.where(attempt.settling, h, again)
     again = jnp.where(attempt.finite, again, 0.25 * h)

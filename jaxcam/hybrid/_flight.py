@@ -17,7 +17,7 @@ from ._gap_polynomial import (
 
 # a landing is taken over by the Taylor series from this fraction of the step on: the
 # series then errs by its fourth power
-_CLOSE = 1e-3
+_CLOSE = 2e-3
 # and the gap is nearly a straight line there, so that its root is a short series
 _STRAIGHT = 4e-3
 # error of the gap's polynomial over the largest gap, up to which it is believed

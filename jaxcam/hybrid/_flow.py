@@ -12,6 +12,7 @@ from ._functions import Functions
 from ._lane import first_lane, RUNNING
 from ._loop import iterate
 from ._materialise import depend_on, with_kept
+from ._one_kernel import one_kernel
 from ._runge_kutta import tableau_of
 from ._settings import Settings
 from ._system import HybridSystem, with_array_parameters
@@ -71,7 +72,7 @@ def flow(
         t0=t0,
         t1=t1,
         stop_period=jnp.inf,
-        longest_contact=jnp.inf if period is None else period / 8,
+        longest_contact=jnp.inf if period is None else period / 4,
         tolerance=settings.tolerance,
         smallness=settings.chatter_smallness,
         depth=settings.chatter_depth,
@@ -93,7 +94,8 @@ def flow(
         return count + _BLOCK, lane
 
     start = (jnp.asarray(0, jnp.int32), (lane, kept))
-    _, (lane, kept) = jax.lax.while_loop(unfinished, several, start)
+    loop = one_kernel(lambda start: jax.lax.while_loop(unfinished, several, start))
+    _, (lane, kept) = loop(start)
     order = jnp.array([1, 0, 2, 3], dtype=jnp.int32)
     return Arrival(
         state=jnp.stack(lane.x),

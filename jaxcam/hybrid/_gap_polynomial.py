@@ -148,11 +148,12 @@ def lowest_point(polynomial: Bernstein, c):
     return jnp.where(bend > 0, jnp.clip(step, 0.02, 0.98), s)
 
 
-def time_to_contact(jet: Jet):
-    """Time until the cubic through the jet falls to zero; inf where it does not.
+def time_to_contact(jet: Jet, snap):
+    """Time until the quartic through the jet falls to zero; inf where it does not.
 
     Leaving the surface (v > 0, little height) the cubic has an exact smallest root;
-    else the root of the parabola is refined once.
+    else the root of the parabola is taken. One Newton step follows, with `snap`, the
+    rate of the jerk; it need not be accurate, and is left out where it matters much.
     """
     g, v, a, j = jet
     leaving = (v > 0) & (jnp.abs(g * a) < 1e-3 * v * v)
@@ -164,9 +165,44 @@ def time_to_contact(jet: Jet):
     time = 2 * jnp.where(leaving, v, g) / jnp.where(possible, below, 1.0)
     value = g + time * (v + time * (a / 2 + time * j / 6))
     slope = v + time * (a + time * j / 2)
+    bend = snap * time * time * time
+    more = jnp.where(jnp.abs(bend) <= 2 * jnp.abs(slope), bend, 0.0)
+    value, slope = value + time * more / 24, slope + more / 6
     refined = time - value / jnp.where(slope < 0, slope, -1.0)
     refined = jnp.where((slope < 0) & (refined > 0), refined, time)
-    return jnp.where(possible, jnp.where(leaving, time, refined), jnp.inf)
+    return jnp.where(possible, refined, jnp.inf)
+
+
+def time_to_release(left: Jet, right: Jet, inverse):
+    """Time until the acceleration rises through zero; inf where it does not.
+
+    The cubic through a and j at both ends of a step is followed beyond its end: the
+    root of its parabola there, refined. `inverse` is one over the length of the step.
+    """
+    a, j = right.acceleration, right.jerk
+    bend = end_curvature(left, right, inverse)
+    square = j * j - 2 * a * bend
+    below = j + jnp.sqrt(jnp.where(square > 0, square, 0.0))
+    rises = (a < 0) & (square > 0) & (below > 0)
+    time = -2 * a / jnp.where(rises, below, 1.0)
+    third = 6 * inverse * inverse * (
+        left.jerk + j + 2 * inverse * (left.acceleration - a)
+    )
+    for _ in range(2):
+        value = a + time * (j + time * (bend / 2 + time * third / 6))
+        slope = j + time * (bend + time * third / 2)
+        step = time - value / jnp.where(slope > 0, slope, 1.0)
+        time = jnp.where((slope > 0) & (step > 0), step, time)
+    return jnp.where(rises, time, jnp.inf)
+
+
+def end_curvature(left: Jet, right: Jet, inverse):
+    """Second derivative, at the end of a step, of the cubic through a and j at its ends.
+
+    `inverse` is one over the length of the step.
+    """
+    bend = 6 * inverse * (left.acceleration - right.acceleration)
+    return inverse * (bend + 2 * left.jerk + 4 * right.jerk)
 
 
 def time_to_root(jet: Jet):

@@ -196,6 +196,7 @@ def _iterate(functions: Functions, plan: Plan, lane: Lane) -> tuple[Lane, Record
         x=x4,
         contact=contact4,
         jets=jets4,
+        arrived=tuple(jets1),
         length=h,
         effort=effort,
         good=good,

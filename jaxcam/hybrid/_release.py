@@ -3,12 +3,12 @@
 import jax.numpy as jnp
 
 from ._flight import Verdict
-from ._gap_polynomial import Jet
+from ._gap_polynomial import end_curvature, Jet
 
 
 # a release is located by retaking the step until this fraction of a natural step
-# remains, over which the multiplier is a straight line
-_CLOSE = 1e-9
+# remains, over which the multiplier is a parabola
+_CLOSE = 1e-7
 
 
 def judge_contact(left: Jet, right: Jet, h, scale, room, completing) -> Verdict:
@@ -25,7 +25,12 @@ def judge_contact(left: Jet, right: Jet, h, scale, room, completing) -> Verdict:
     inside = jnp.maximum(a0 + s0 / 3, a1 - s1 / 3) + trust > 0
     passed = a1 > 0
     rises = right.jerk > 0
-    offset = -a1 / jnp.where(rises, right.jerk, 1.0)
+    slope = jnp.where(rises, right.jerk, 1.0)
+    straight = -a1 / slope
+    inverse = jnp.where(h > 0, 1.0, 0.0) / jnp.where(h > 0, h, 1.0)
+    bend = straight * end_curvature(left, right, inverse) / (2 * slope)
+    # so small over the short time left that the first correction is enough
+    offset = straight * (1 - jnp.where(jnp.abs(bend) < 0.01, bend, 0.0))
     now = passed & (h == 0)
     near = rises & (jnp.abs(offset) <= _CLOSE * scale)
     lets_go = ((near & (offset <= room)) | now) & ~completing

@@ -13,6 +13,7 @@ from ._functions import Functions
 from ._lane import Lane, RUNNING
 from ._loop import iterate, Record
 from ._materialise import depend_on, with_kept
+from ._one_kernel import one_kernel
 
 
 # iterations between two looks at whether any lane still runs, and between two writes to
@@ -41,8 +42,13 @@ def run(functions: Functions, plan: Plan, lane: Lane, rows: int) -> tuple[Lane, 
     return lane, _unpack(log, functions)
 
 
-def run_raw(functions: Functions, plan: Plan, lane: Lane, rows: int, row):
-    """`run` with a log of what `row` makes of each record: a list of scalars."""
+def run_raw(
+    functions: Functions, plan: Plan, lane: Lane, rows: int, row, batch: bool = False
+):
+    """`run` with a log of what `row` makes of each record: a list of scalars.
+
+    `batch` says that many lanes will be run by `vmap`.
+    """
     lane = jax.tree.map(jnp.asarray, lane)
 
     def body(lane):
@@ -65,7 +71,10 @@ def run_raw(functions: Functions, plan: Plan, lane: Lane, rows: int, row):
         return count + 1, state, jax.lax.dynamic_update_slice(log, some, start)
 
     start = (jnp.asarray(0, jnp.int32), (lane, kept), log)
-    _, last, log = jax.lax.while_loop(unfinished, several, start)
+    loop = one_kernel(
+        lambda start: jax.lax.while_loop(unfinished, several, start), batch
+    )
+    _, last, log = loop(start)
     lane, kept = last
     return lane._replace(steps=depend_on(lane.steps, kept)), log
 

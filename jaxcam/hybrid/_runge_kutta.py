@@ -1,5 +1,6 @@
 """One explicit Runge-Kutta step, unrolled from the tableau of a diffrax solver."""
 
+import functools
 from typing import NamedTuple
 
 import diffrax
@@ -46,16 +47,40 @@ def tableau_of(solver) -> Tableau:
     )
 
 
-def _combine(weights, stages, n):
-    """Sum of the stages with constant weights, component by component."""
-    used = [(w, s) for w, s in zip(weights, stages) if w != 0.0]
-    out = []
-    for i in range(n):
-        total = used[0][0] * used[0][1][i]
-        for w, s in used[1:]:
-            total = total + w * s[i]
-        out.append(total)
-    return out
+class Squared(NamedTuple):
+    """Coefficients of a component whose rate is another component, y'' = f.
+
+    Its stages are y + c h y' + h^2 sum of `lower` times f, so that the rates of the
+    component itself are not summed, and those of y' only where f depends on it.
+    """
+
+    lower: tuple[tuple[float, ...], ...]
+    weights: tuple[float, ...]
+    error: tuple[float, ...]
+
+
+@functools.cache
+def squared(tableau: Tableau) -> Squared:
+    """The tableau applied twice. (Nystroem's form of a Runge-Kutta step)"""
+    number = len(tableau.weights)
+    a = np.zeros((number, number))
+    for i, row in enumerate(tableau.lower, start=1):
+        a[i, : len(row)] = row
+    lower = a @ a
+    rows = np.vstack([lower, np.asarray(tableau.weights) @ a, tableau.error @ a])
+    # sums that vanish by the order conditions leave rounding behind
+    rows[np.abs(rows) < 1e-14] = 0.0
+    *stages, weights, error = (tuple(map(float, row)) for row in rows)
+    return Squared(tuple(stages[1:]), weights, error)
+
+
+def _combine(weights, stages, i):
+    """Sum of component `i` of the stages with constant weights; None where empty."""
+    total = None
+    for w, s in zip(weights, stages):
+        if w != 0.0:
+            total = w * s[i] if total is None else total + w * s[i]
+    return total
 
 
 def step(tableau: Tableau, field, t, x: tuple, h):
@@ -66,12 +91,37 @@ def step(tableau: Tableau, field, t, x: tuple, h):
     **Returns:** the state after the step, the error estimate, and the stages.
     """
     n = len(x)
-    stages = [field(t, x)]
-    for row, c in zip(tableau.lower, tableau.nodes[1:], strict=True):
-        increment = _combine(row, stages, n)
-        point = tuple(x[i] + h * increment[i] for i in range(n))
-        stages.append(field(t + c * h, point))
-    change = _combine(tableau.weights, stages, n)
-    error = _combine(tableau.error, stages, n)
-    after = tuple(x[i] + h * change[i] for i in range(n))
-    return after, tuple(h * e for e in error), stages
+    first = field(t, x)
+    rate_of = _rates_among(x, first)
+    twice = squared(tableau)
+    h2 = h * h
+
+    def moved(i, node, once, double):
+        """Change of component i over the step, or over a part of it."""
+        if i not in rate_of:
+            return h * _combine(once, stages, i)
+        change = node * (h * x[rate_of[i]]) if node != 0.0 else None
+        bend = _combine(double, stages, rate_of[i])
+        if bend is None:
+            return change
+        return h2 * bend if change is None else change + h2 * bend
+
+    stages = [first]
+    for k, node in enumerate(tableau.nodes[1:]):
+        parts = node, tableau.lower[k], twice.lower[k]
+        point = tuple(x[i] + moved(i, *parts) for i in range(n))
+        stages.append(field(t + node * h, point))
+    change = [moved(i, 1.0, tableau.weights, twice.weights) for i in range(n)]
+    error = [moved(i, 0.0, tableau.error, twice.error) for i in range(n)]
+    return tuple(a + b for a, b in zip(x, change, strict=True)), tuple(error), stages
+
+
+def _rates_among(x, rates) -> dict[int, int]:
+    """Which components are rates of others, as they stand: position and velocity."""
+    found = {}
+    for i, rate in enumerate(rates):
+        for j, component in enumerate(x):
+            if rate is component and i != j:
+                found[i] = j
+    # the rate itself must be integrated as it is, or there would be a third level
+    return {i: j for i, j in found.items() if j not in found}

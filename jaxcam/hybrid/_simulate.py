@@ -161,7 +161,7 @@ def _prepare(system, settings, t0, state, t1):
     system = system.prepared()
     functions = Functions(system, state.shape[0])
     period = system.period
-    longest = jnp.inf if period is None else period / 8
+    longest = jnp.inf if period is None else period / 4
     plan = Plan(
         t0=t0,
         t1=t1,

@@ -188,7 +188,7 @@ def _plan(system, period, t0, turns, settings):
         t0=t0,
         t1=t0 + turns * period,
         stop_period=period,
-        longest_contact=period / 8,
+        longest_contact=period / 4,
         tolerance=settings.tolerance,
         smallness=settings.chatter_smallness,
         depth=settings.chatter_depth,
@@ -224,6 +224,7 @@ def _some(batched, shared, period, t0, turns, settings, lane, rows):
     def one(batched, lane):
         system = eqx.combine(batched, shared).prepared()
         plan = _plan(system, period, t0, turns, settings)
-        return run_raw(Functions(system, len(lane.x)), plan, lane, rows, _sample_row)
+        functions = Functions(system, len(lane.x))
+        return run_raw(functions, plan, lane, rows, _sample_row, batch=True)
 
     return eqx.filter_vmap(one, in_axes=(eqx.if_array(0), 0))(batched, lane)
