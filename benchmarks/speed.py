@@ -1,7 +1,6 @@
 """Speed of the event loop beside scalar numba loops and scipy, in one run.
 
     python -m benchmarks.speed            # all parts, a table each
-    python -m benchmarks.speed --tuned    # the same with the opt-in compiler options
 
 One pinned core, minimum CPU time of interleaved runs, tolerance 1e-9 on every side,
 float64. Needs `pip install -e ".[bench]"`.
@@ -178,15 +177,12 @@ def two_cores(repeats: int) -> None:
     print(f"\ntwo threads: {spent[1] / spent[2]:.2f} times one")
 
 
-def main(tuned: bool = False, repeats: int = 3, side: int = 128) -> None:
+def main(repeats: int = 3, side: int = 128) -> None:
     """Print all tables; `--side 32` makes W2 smaller."""
-    if tuned:
-        jaxcam.hybrid.tune_compiler()
-    print(f"core {CORE}, jax {jax.__version__}, tuned={tuned}")
+    print(f"core {CORE}, jax {jax.__version__}")
     batches(repeats, side)
     single(repeats)
-    if not tuned:
-        first_call()
+    first_call()
     two_cores(repeats)
 
 

@@ -27,4 +27,3 @@ from ._simulate import simulate as simulate
 from ._stroboscope import Stroboscope as Stroboscope, stroboscope as stroboscope
 from ._system import HybridSystem as HybridSystem
 from ._trajectory import Trajectory as Trajectory
-from ._tuning import tune_compiler as tune_compiler

@@ -185,8 +185,8 @@ def time_to_release(left: Jet, right: Jet, inverse):
     below = j + jnp.sqrt(jnp.where(square > 0, square, 0.0))
     rises = (a < 0) & (square > 0) & (below > 0)
     time = -2 * a / jnp.where(rises, below, 1.0)
-    third = 6 * inverse * inverse * (
-        left.jerk + j + 2 * inverse * (left.acceleration - a)
+    third = (
+        6 * inverse * inverse * (left.jerk + j + 2 * inverse * (left.acceleration - a))
     )
     for _ in range(2):
         value = a + time * (j + time * (bend / 2 + time * third / 6))
@@ -197,7 +197,7 @@ def time_to_release(left: Jet, right: Jet, inverse):
 
 
 def end_curvature(left: Jet, right: Jet, inverse):
-    """Second derivative, at the end of a step, of the cubic through a and j at its ends.
+    """Second derivative at its end of the cubic through a and j at both ends of a step.
 
     `inverse` is one over the length of the step.
     """

@@ -15,11 +15,9 @@ from jax.core import eval_jaxpr
 from jax.extend.core import jaxpr_as_fun, Literal
 from jax.interpreters import partial_eval
 
-from ._tuning import one_kernel
-
 
 # a value is kept when computing it again in its users would cost more operations
-_THRESHOLD = 60
+_THRESHOLD = 100
 # operations that cost more than an addition
 _COST = {"div": 4, "sqrt": 6, "custom_jvp_call": 40, "sin": 30, "cos": 30, "pow": 40}
 _COST |= {"exp": 20, "log": 20, "atan2": 30, "atan": 20, "asin": 30, "acos": 30}
@@ -27,8 +25,6 @@ _COST |= {"exp": 20, "log": 20, "atan2": 30, "atan": 20, "asin": 30, "acos": 30}
 
 def _chosen(jaxpr) -> list:
     """The variables of a jaxpr that are worth keeping."""
-    if one_kernel():
-        return []
     uses: dict = {}
     for equation in jaxpr.eqns:
         for v in equation.invars:
