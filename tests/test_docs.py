@@ -24,8 +24,11 @@ def _exported(package: str) -> set[str]:
         "jaxcam.hybrid",
         "jaxcam.models",
         "jaxcam.recordings",
+        "jaxcam.fitting",
         "jaxcam.plotting",
+        "jaxcam.thesis",
         "variational",
+        "continuation",
     ],
 )
 def test_every_public_name_has_its_place(package):

@@ -1,0 +1,337 @@
+"""Many branches at once."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import ArrayLike, PyTree
+
+from ._follow import checked_bounds
+from ._locate import locate, Walk
+from ._parameter import as_arrays, leaf_of, pick, with_leaf
+from ._point import Branch, Point, set_parameters, with_field
+from ._problem import AbstractProblem
+from ._program import correct_, Corrected, scale_at
+from ._settings import Settings
+from ._test_functions import eigenvalues_of, is_stable, test_values
+
+
+_RUNNING, _BOUND, _SHORT, _FULL, _NO_START = range(5)
+REASONS = (
+    "running",
+    "the parameter is at its bound",
+    "the step was halved down to the smallest and the corrector still failed, or the "
+    "branch turned too sharply",
+    "as many points as were asked for",
+    "the start is no solution, and Newton's method finds none near it",
+)
+
+
+class _Lane(NamedTuple):
+    """One branch of the batch on its way."""
+
+    at: Corrected
+    step: jax.Array
+    count: jax.Array
+    status: jax.Array
+    passed: Corrected
+
+
+@dataclass(frozen=True, eq=False)
+class Batch:
+    """Branches side by side. Rows of a lane beyond its `count` are not points."""
+
+    #: (lanes, points, n)
+    states: np.ndarray
+    #: (lanes, points)
+    parameters: np.ndarray
+    #: (lanes, points, k)
+    multipliers: np.ndarray
+    #: (lanes,) number of points
+    count: np.ndarray
+    #: (lanes,) why each branch ends
+    reasons: tuple[str, ...]
+    name: str
+    _passed: Corrected
+    _problems: Callable[[int], AbstractProblem]
+    _walk: Walk
+
+    def lane(self, index: int) -> Branch:
+        """One branch, with its special points located."""
+        if not 0 <= index < self.count.size:
+            raise ValueError(
+                f"there is no lane {index}; lanes run from 0 to {self.count.size - 1}"
+            )
+        problem, walk = self._problems(index), self._walk
+        rows = [
+            jax.tree.map(lambda x: x[index, i], self._passed)
+            for i in range(int(self.count[index]))
+        ]
+        points, before = [], None
+        arclength = 0.0
+        for i, at in enumerate(rows):
+            tests = test_values(problem, at)
+            if before is not None:
+                old, old_tests = before
+                arclength += float(np.linalg.norm((at.z - old.z) / old.scale))
+                for name in tests:
+                    if tests[name] * old_tests[name] < 0:
+                        values = (old_tests[name], tests[name])
+                        found = locate(problem, name, walk, old, at, values)
+                        monitors = problem.monitors()
+                        kind = monitors[name].kind if name in monitors else name
+                        special = with_field(at, "z", found.z)
+                        points.append(
+                            _point(
+                                problem, special, kind, arclength, {},
+                                found.converged, found.reason, walk.leaf,
+                            )
+                        )  # fmt: skip
+            last = i == len(rows) - 1
+            kind = "start" if i == 0 else "end" if last else "regular"
+            reason = self.reasons[index] if last else ""
+            points.append(
+                _point(problem, at, kind, arclength, tests, True, reason, walk.leaf)
+            )
+            before = at, tests
+        numbered = tuple(with_field(p, "label", i + 1) for i, p in enumerate(points))
+        return Branch(numbered, self.name, walk.bounds, walk.leaf, (self.name,))
+
+
+def _point(problem, at, kind, arclength, tests, converged, reason, leaf) -> Point:
+    multipliers = eigenvalues_of(at.linearisation)
+    parameters = with_leaf(problem.parameters, leaf, np.asarray(at.z[-1]))
+    return Point(
+        label=0,
+        kind=kind,
+        parameter=float(at.z[-1]),
+        state=at.z[:-1],
+        multipliers=multipliers,
+        stable=is_stable(problem, multipliers),
+        tangent=at.tangent,
+        scale=at.scale,
+        step=0.0,
+        arclength=arclength,
+        iterations=int(at.iterations),
+        converged=converged,
+        reason=reason,
+        observed={k: np.asarray(v) for k, v in at.observed.items()},
+        tests=tests,
+        signature=problem.signature,
+        parameters=(*problem.free(at.z[:-1]), float(at.z[-1])),
+        problem=set_parameters(problem, parameters),
+    )
+
+
+def follow_batch(
+    problem: AbstractProblem,
+    states: ArrayLike,
+    where: Callable[[Any], Any],
+    bounds: tuple[float, float],
+    *,
+    parameters: PyTree | None = None,
+    settings: Settings | None = None,
+    direction: ArrayLike = 1,
+    points: int = 100,
+) -> Batch:
+    """Follow many branches in one compiled program, each with its own steps.
+
+    Pseudo-arclength with tangent predictor. Branches differ in their starts, in the
+    values of other parameters, or both; what needs decisions in Python (transitions,
+    admissibility, fresh references) is left out.
+
+    **Arguments:**
+
+    - `states`: (lanes, n) states to begin with.
+    - `where`, `bounds`, `settings`: as of [`continuation.follow`][].
+    - `parameters`: the problem's parameters, each float leaf (lanes,) or a scalar for
+      all; None: those of the problem.
+    - `direction`: 1 or -1, or (lanes,) of them.
+    - `points`: at most this many on each branch.
+
+    **Returns:** a [`continuation.Batch`][]; a lane that fails says so in its reason.
+    """
+    settings = Settings() if settings is None else settings
+    leaf, name = pick(where, problem.parameters)
+    low, high = checked_bounds(bounds, name)
+    starts = np.asarray(states, float)
+    if starts.ndim != 2 or not len(starts):
+        raise ValueError("states must have shape (lanes, n), one start for each branch")
+    if points < 2:
+        raise ValueError(f"points is {points}; a branch needs at least 2")
+    lanes = len(starts)
+    given = problem.parameters if parameters is None else parameters
+    given = as_arrays(given, leaf)
+    problem = set_parameters(problem, as_arrays(problem.parameters, leaf))
+    axes = jax.tree.map(
+        lambda one, many: 0 if np.ndim(many) == np.ndim(one) + 1 else None,
+        problem.parameters,
+        given,
+    )
+    for axis, many in zip(_leaves(axes), jax.tree.leaves(given), strict=True):
+        if axis == 0 and len(many) != lanes:
+            raise ValueError(
+                f"a parameter has {len(many)} values for {lanes} branches; give one "
+                "for each or one for all"
+            )
+    p = np.broadcast_to(np.asarray(leaf_of(given, leaf), float), (lanes,))
+    if not np.all((low <= p) & (p <= high)):
+        raise ValueError(
+            f"a branch starts outside the bounds ({low:g}, {high:g}) of {name}; widen "
+            "them or start elsewhere"
+        )
+    z = np.concatenate([starts, p[:, None]], axis=1)
+    signs = np.broadcast_to(np.asarray(direction, float), (lanes,))
+    lane = _run(
+        problem, given, _Axes(axes), leaf, z, signs, np.asarray(low), np.asarray(high),
+        jax.tree.map(np.asarray, _numbers(settings)), settings.max_iterations, points,
+    )  # fmt: skip
+    lane = jax.tree.map(np.asarray, lane)
+    passed = lane.passed
+    matrices = passed.linearisation
+    finite = np.all(np.isfinite(matrices), axis=(-1, -2), keepdims=True)
+    multipliers = np.linalg.eigvals(np.where(finite, matrices, 0.0))
+    multipliers = np.where(finite[..., 0], multipliers, np.nan)
+
+    def at_lane(index: int) -> AbstractProblem:
+        flat, structure = jax.tree.flatten(given)
+        chosen = [
+            x[index] if axis == 0 else x
+            for x, axis in zip(flat, _leaves(axes), strict=True)
+        ]
+        return set_parameters(problem, jax.tree.unflatten(structure, chosen))
+
+    return Batch(
+        states=passed.z[..., :-1],
+        parameters=passed.z[..., -1],
+        multipliers=multipliers,
+        count=lane.count,
+        reasons=tuple(REASONS[s] for s in lane.status),
+        name=name,
+        _passed=passed,
+        _problems=at_lane,
+        _walk=Walk(leaf, high - low, (low, high), settings),
+    )
+
+
+def _leaves(axes: PyTree) -> list:
+    return jax.tree.leaves(axes, is_leaf=lambda x: x is None)
+
+
+class _Axes(eqx.Module):
+    """Which parameters differ from lane to lane; static."""
+
+    tree: PyTree = eqx.field(static=True)
+
+
+class _Numbers(NamedTuple):
+    tolerance: Any
+    iterations: Any
+    step: Any
+    min_step: Any
+    max_step: Any
+    angle: Any
+    max_angle: Any
+
+
+def _numbers(s: Settings) -> _Numbers:
+    return _Numbers(
+        s.tolerance, float(s.iterations), s.step, s.min_step, s.max_step, s.angle,
+        s.max_angle,
+    )  # fmt: skip
+
+
+@eqx.filter_jit
+def _run(problem, given, axes, leaf, z, signs, low, high, s, max_iterations, points):
+    width = high - low
+
+    def begin(parameters, z, sign):
+        here = set_parameters(problem, parameters)
+        across = jnp.zeros_like(z).at[-1].set(1.0)
+        at = correct_(here, leaf, z, across, across, width, s.tolerance, 30, False)
+        turn = jnp.where(at.tangent[-1] * sign < 0, -1.0, 1.0)
+        tangent = turn * at.tangent
+        at = with_field(at, "tangent", tangent)
+        # the determinant of jacobian and tangent turns with the tangent
+        at = with_field(at, "determinant", turn * at.determinant)
+        buffer = jax.tree.map(
+            lambda x: jnp.zeros((points, *x.shape), x.dtype).at[0].set(x), at
+        )
+        good = at.success & jnp.all(jnp.isfinite(tangent))
+        return _Lane(
+            at=at,
+            step=s.step,
+            count=jnp.where(good, 1, 0),
+            status=jnp.where(good, _RUNNING, _NO_START),
+            passed=buffer,
+        )
+
+    def advance(parameters, lane: _Lane) -> _Lane:
+        here = set_parameters(problem, parameters)
+        a = lane.at
+        scale = scale_at(here, leaf, a.z, width)
+        change = lane.step * a.tangent
+        target = a.z[-1] + change[-1]
+        bound = jnp.where(change[-1] > 0, high, low)
+        lands = (target > high) | (target < low)
+        share = jnp.where(lands, (bound - a.z[-1]) / change[-1], 1.0)
+        guess = a.z + share * change
+        guess = guess.at[-1].set(jnp.where(lands, bound, guess[-1]))
+        across = jnp.zeros_like(scale).at[-1].set(1.0 / width)
+        normal = jnp.where(lands, across, a.tangent / scale**2)
+        b = correct_(
+            here, leaf, guess, normal, a.tangent, width, s.tolerance, max_iterations,
+            False,
+        )  # fmt: skip
+        z = b.z.at[-1].set(jnp.where(lands, bound, b.z[-1]))
+        b = with_field(b, "z", z)
+        old, new = a.tangent / b.scale, b.tangent / b.scale
+        cosine = jnp.dot(old, new) / (jnp.linalg.norm(old) * jnp.linalg.norm(new))
+        angle = jnp.arccos(jnp.clip(cosine, -1.0, 1.0))
+        moved = jnp.linalg.norm((z - guess) / scale)
+        inside = (low <= z[-1]) & (z[-1] <= high)
+        good = b.success & (angle <= s.max_angle) & (moved <= lane.step) & inside
+        effort = 2.0 ** ((s.iterations - b.iterations.astype(float)) / 2)
+        straight = s.angle / jnp.maximum(angle, 1e-3 * s.angle)
+        factor = jnp.clip(jnp.minimum(effort, straight), 0.5, 2.0)
+        step = jnp.where(
+            good, jnp.clip(lane.step * factor, s.min_step, s.max_step), lane.step / 2
+        )
+        count = lane.count + jnp.where(good, 1, 0)
+        status = jnp.where(
+            good & lands,
+            _BOUND,
+            jnp.where(
+                ~good & (step < s.min_step),
+                _SHORT,
+                jnp.where(count == points, _FULL, _RUNNING),
+            ),
+        )
+        running = lane.status == _RUNNING
+        taken = running & good
+        at = jax.tree.map(lambda new, old: jnp.where(taken, new, old), b, a)
+        passed = jax.tree.map(
+            lambda buffer, new: buffer.at[lane.count].set(
+                jnp.where(taken, new, buffer[lane.count])
+            ),
+            lane.passed,
+            b,
+        )
+        return _Lane(
+            at=at,
+            step=jnp.where(running, step, lane.step),
+            count=jnp.where(running, count, lane.count),
+            status=jnp.where(running, status, lane.status),
+            passed=passed,
+        )
+
+    lanes = jax.vmap(begin, in_axes=(axes.tree, 0, 0))(given, z, signs)
+    return jax.lax.while_loop(
+        lambda lanes: jnp.any(lanes.status == _RUNNING),
+        lambda lanes: jax.vmap(advance, in_axes=(axes.tree, 0))(given, lanes),
+        lanes,
+    )

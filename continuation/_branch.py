@@ -1,0 +1,115 @@
+"""Whole branches."""
+
+import dataclasses
+import os
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any
+
+from ._algorithms import AbstractAlgorithm, PseudoArclength
+from ._follow import checked_bounds, follow
+from ._parameter import pick
+from ._point import Branch, Point, relabelled, replace
+from ._problem import AbstractProblem, Start
+from ._record import header_of, read, Recorder
+from ._settings import Settings
+from ._stated import stated
+
+
+def branch(
+    problem: AbstractProblem,
+    start: Any,
+    where: Callable[[Any], Any],
+    bounds: tuple[float, float],
+    algorithm: AbstractAlgorithm | None = None,
+    *,
+    settings: Settings | None = None,
+    direction: int | str = 1,
+    callbacks: Iterable[Callable[[Point], Any]] = (),
+    out: str | os.PathLike | None = None,
+    resume: bool = False,
+) -> Branch:
+    """Collect a branch. Arguments as of [`continuation.follow`][], and
+
+    - `direction`: 1, -1, or `"both"`: from the start towards smaller and towards larger
+      parameters, put together in order, with labels counted anew.
+    - `callbacks`: called with each point as it comes: progress, saving. One that
+      returns True ends the branch.
+    - `out`: a file to which each point is appended as it comes; its format is that of
+      [`continuation.load`][]. With both directions the first goes to a file of its own,
+      with `.back` before the suffix.
+    - `resume`: go on where the run that wrote `out` was interrupted. The result is the
+      branch that it would have become.
+
+    **Returns:** a [`continuation.Branch`][].
+    """
+    if direction not in (1, -1, "both"):
+        raise ValueError(f"direction is {direction!r}; give 1, -1 or 'both'")
+    stop = tuple(callbacks)
+    problem, start = stated(problem, start)
+    begun = start.problem if isinstance(start, Start) else problem
+    leaf, name = pick(where, begun.parameters)
+    empty = Branch((), name, checked_bounds(bounds, name), leaf, (name,))
+
+    def walk(direction: int, path: Path | None) -> list[Point]:
+        points, save, begin = [], None, start
+        if path is not None:
+            header = header_of(
+                empty,
+                direction=direction,
+                algorithm=str(algorithm or PseudoArclength()),
+                settings=str(settings or Settings()),
+            )
+            if resume and path.exists():
+                points = _written(path, header, begun)
+                if points and points[-1].kind == "end":
+                    return points
+                begin = points[-1] if points else start
+            save = Recorder(path, header, tuple(points))
+        for point in follow(
+            problem, begin, where, bounds, algorithm,
+            settings=settings, direction=direction, history=tuple(points),
+        ):  # fmt: skip
+            points.append(point)
+            if save is not None:
+                save(point)
+            # every callback sees the point
+            if any([callback(point) is True for callback in stop]):
+                break
+        return points
+
+    path = None if out is None else Path(out)
+    if direction == "both":
+        back_path = None if path is None else path.with_suffix(".back" + path.suffix)
+        back, forth = walk(-1, back_path), walk(1, path)
+        if back[-1].reason.startswith("the branch is closed"):
+            points = tuple(back)
+        else:
+            turned = [
+                replace(
+                    p, tangent=-p.tangent, arclength=-p.arclength,
+                    kind="regular" if p.kind == "start" else p.kind,
+                )
+                for p in reversed(back)
+            ]  # fmt: skip
+            points = relabelled([*turned, *forth[1:]])
+    else:
+        assert isinstance(direction, int)
+        points = tuple(walk(direction, path))
+    return dataclasses.replace(empty, points=points)
+
+
+def _written(path: Path, header: dict, problem: AbstractProblem) -> list[Point]:
+    """Points of an interrupted run, up to the last ordinary one."""
+    branch, before = read(path, problem)
+    different = [key for key, value in header.items() if before.get(key) != value]
+    if different:
+        raise ValueError(
+            f"{path} was written with other {', '.join(different)}; resume with the "
+            "same, or write to another file"
+        )
+    points = list(branch.points)
+    # special points that follow it are found again
+    while points and points[-1].special:
+        points.pop()
+    return points

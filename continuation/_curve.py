@@ -1,0 +1,108 @@
+"""Curves of special points in two parameters."""
+
+import os
+from collections.abc import Callable, Iterable
+from typing import Any
+
+import jax.numpy as jnp
+import numpy as np
+
+from ._algorithms import AbstractAlgorithm
+from ._branch import branch
+from ._extended import MonitorPoints, SingularPoints
+from ._follow import checked_bounds
+from ._locate import monitor_points, singular_points, Walk
+from ._parameter import as_arrays, leaf_of, pick
+from ._point import Branch, Point, set_parameters
+from ._problem import Start
+from ._settings import Settings
+from ._test_functions import FLIP, FOLD, HOPF, NEIMARK_SACKER
+
+
+def extended(
+    point: Point,
+    where: Callable[[Any], Any],
+    bounds: tuple[float, float],
+    settings: Settings | None = None,
+) -> SingularPoints | MonitorPoints:
+    """The problem whose solutions are special points like this one, the parameter that
+    `where` picks among the unknowns (at the end of the state).
+
+    **Raises:** `ValueError` for points that form no curve.
+    """
+    problem = point.problem
+    if problem is None:
+        raise ValueError(
+            "this point carries no problem; read its file with load(path, problem)"
+        )
+    leaf, name = pick(where, problem.parameters)
+    low, high = checked_bounds(bounds, name)
+    problem = set_parameters(problem, as_arrays(problem.parameters, leaf))
+    walk = Walk(leaf, high - low, (low, high), settings or Settings())
+    z = np.append(point.state, leaf_of(problem.parameters, leaf))
+    if point.kind in (FOLD, FLIP, HOPF, NEIMARK_SACKER):
+        return singular_points(problem, point.kind, walk, z)
+    values = problem.monitor(jnp.asarray(point.state), problem.parameters)
+    same = {
+        abs(float(values[key])): key
+        for key, monitor in problem.monitors().items()
+        if monitor.kind == point.kind
+    }
+    if same:
+        # several monitors may share a kind: the one that is zero here
+        return monitor_points(problem, same[min(same)], walk)
+    raise ValueError(
+        f"points of kind {point.kind!r} form no curve in two parameters; folds, flips, "
+        "Neimark-Sacker and Hopf points and the zeros of a problem's monitors do"
+    )
+
+
+def curve(
+    point: Point,
+    where: tuple[Callable[[Any], Any], Callable[[Any], Any]],
+    bounds: tuple[tuple[float, float], tuple[float, float]],
+    algorithm: AbstractAlgorithm | None = None,
+    *,
+    settings: Settings | None = None,
+    direction: int | str = "both",
+    callbacks: Iterable[Callable[[Point], Any]] = (),
+    out: str | os.PathLike | None = None,
+    resume: bool = False,
+) -> Branch:
+    """Follow a special point in two parameters.
+
+    **Arguments:**
+
+    - `point`: a fold, flip, Neimark-Sacker or Hopf point of a branch, or a zero of a
+      monitor of its problem.
+    - `where`: picks the two parameters. The first becomes an unknown; steps, bounds and
+      `point.parameter` are those of the second.
+    - `bounds`: (lowest, highest) of both; the curve ends exactly on them.
+    - the rest as of [`continuation.branch`][].
+
+    **Returns:** a [`continuation.Branch`][]; `point.parameters` has both parameters in
+    the order of `where`. Its special points are those of codimension two: cusp,
+    Bogdanov-Takens, zero-Hopf; generalized flip, fold-flip, 1:1, 1:2, 1:3, 1:4
+    resonances; and crossings with monitors.
+
+    **Raises:** `ValueError` for points that form no curve, and as `follow` does.
+    """
+    try:
+        (first, second), (bounds_1, bounds_2) = where, bounds
+    except (TypeError, ValueError) as error:
+        raise ValueError(
+            "give two parameters, where=(lambda p: p.a, lambda p: p.b), and bounds "
+            "of both, ((low, high), (low, high))"
+        ) from error
+    problem = extended(point, first, bounds_1, settings)
+    leaf, name = pick(second, problem.parameters)
+    if leaf == problem.leaf:
+        raise ValueError(f"both parameters are {name}; pick two different ones")
+    u = np.append(point.state, leaf_of(problem.parameters, problem.leaf))
+    found = branch(
+        problem, Start(problem, u), second, bounds_2, algorithm,
+        settings=settings, direction=direction, callbacks=callbacks,
+        out=out, resume=resume,
+    )  # fmt: skip
+    names = (pick(first, problem.parameters)[1], name)
+    return Branch(found.points, name, found.bounds, found.leaf, names)

@@ -1,0 +1,103 @@
+"""Further solutions at one parameter value, by deflation."""
+
+from collections.abc import Sequence
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import ArrayLike
+
+from ._parameter import as_arrays
+from ._point import set_parameters
+from ._problem import AbstractProblem
+from ._program import newton, solve
+from ._settings import Settings
+
+
+@eqx.filter_jit
+def _deflated(problem, guesses, known, count, scale, tolerance, iterations: int):
+    """Newton on G(u) prod_i (1/|u - u_i|^2 + 1), from all guesses at once."""
+
+    def one(guess):
+        def equations(y):
+            g = problem.residual(y * scale, problem.parameters) / scale
+            distance = jnp.mean((y[None, :] - known) ** 2, axis=1)
+            there = jnp.arange(known.shape[0]) < count
+            factor = jnp.prod(jnp.where(there, 1 / distance + 1, 1.0))
+            return g * factor
+
+        return newton(equations, guess / scale, tolerance, iterations)
+
+    y, success, _ = jax.vmap(one)(guesses)
+    return y * scale[None, :], success
+
+
+def deflate(
+    problem: AbstractProblem,
+    guesses: ArrayLike,
+    known: Sequence[ArrayLike] = (),
+    *,
+    settings: Settings | None = None,
+    most: int = 16,
+    max_iterations: int = 100,
+) -> tuple[np.ndarray, ...]:
+    """Find solutions besides the known ones, at the parameters that the problem has.
+
+    Each solution found is divided out (Farrell, Birkisson and Funke, SIAM J. Sci.
+    Comput. 37, 2015), so that Newton's method from the same guesses must end elsewhere
+    or nowhere.
+
+    **Arguments:**
+
+    - `guesses`: (guesses, n) or (n,), from which Newton's method begins.
+    - `known`: states (n,) of solutions that are known already.
+    - `most`: number of solutions, known ones included, at which the search ends.
+    - `max_iterations`: of Newton's method for each guess.
+
+    **Returns:** the further solutions, each (n,), in the order found.
+    """
+    settings = Settings() if settings is None else settings
+    problem = set_parameters(problem, as_arrays(problem.parameters))
+    starts = np.atleast_2d(np.asarray(guesses, float))
+    if starts.ndim != 2 or not np.all(np.isfinite(starts)):
+        raise ValueError("guesses must be finite numbers of shape (guesses, n)")
+    n = starts.shape[1]
+    solutions = [np.asarray(u, float).reshape(n) for u in known]
+    if len(solutions) >= most:
+        raise ValueError(f"{len(solutions)} solutions are known; give a larger `most`")
+    size = np.maximum(1.0, np.sqrt(np.mean(starts**2)))
+    scale = np.full(n, size)
+    given = len(solutions)
+    while len(solutions) < most:
+        table = np.full((most, n), 1e3)
+        for i, u in enumerate(solutions):
+            table[i] = u / scale
+        values, success = jax.device_get(
+            _deflated(
+                problem,
+                # off the guess itself: it may be a solution that is divided out
+                jnp.asarray(starts + 1e-6 * scale),
+                jnp.asarray(table),
+                jnp.asarray(len(solutions)),
+                jnp.asarray(scale),
+                jnp.asarray(settings.tolerance),
+                max_iterations,
+            )
+        )
+        fresh = [
+            polished
+            for value in values[success]
+            for polished, converged, _ in [solve(problem, value, settings)]
+            if converged
+        ]
+        before = len(solutions)
+        for u in fresh:
+            near = [np.max(np.abs(u - other) / scale) for other in solutions]
+            if not near or min(near) > 1e-6:
+                solutions.append(u)
+            if len(solutions) == most:
+                break
+        if len(solutions) == before:
+            break
+    return tuple(solutions[given:])

@@ -1,0 +1,183 @@
+"""Limit cycles of smooth vector fields, by shooting."""
+
+from collections.abc import Callable
+from typing import Any, ClassVar
+
+import diffrax
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float, PyTree
+
+from ._point import with_field
+from ._problem import AbstractProblem, Stability, Start
+
+
+_TABLEAU = diffrax.Dopri8.tableau
+_STAGES = _TABLEAU.num_stages
+_A = np.zeros((_STAGES, _STAGES))
+for _i, _row in enumerate(_TABLEAU.a_lower):
+    _A[_i + 1, : len(_row)] = _row
+_B, _B_ERROR = np.asarray(_TABLEAU.b_sol), np.asarray(_TABLEAU.b_error)
+
+
+class LimitCycle(AbstractProblem):
+    """Periodic orbits of u' = vector_field(u, parameters), with unknown period.
+
+    The unknowns are (u(0), period), the equations u(period) = u(0) and a phase
+    condition: u(0) lies in a plane that is renewed at each point of a branch. The
+    multipliers are those of the map on that plane, (2.14), without the trivial one.
+
+    **Arguments:**
+
+    - `vector_field`: maps a state (n,), n >= 2, and the parameters to (n,).
+    - `parameters`: any pytree with scalar floats among its leaves.
+    - `reference`: a state (n,) on the cycle or near it, to begin with.
+    - `steps`: of equal length in a period, by Dormand and Prince's method of order 8.
+      `point.observed["error"]` is its estimated error, relative to the state.
+    """
+
+    vector_field: Callable[[Array, Any], Array]
+    parameters: PyTree
+    reference: Any
+    #: (n,) unit normal of the plane, and (n, n-1) unit vectors in it
+    normal: Any
+    basis: Any
+    steps: int = eqx.field(static=True)
+    stability: ClassVar[Stability] = "map"
+
+    def __init__(
+        self,
+        vector_field: Callable[[Any, Any], Array],
+        parameters: PyTree,
+        reference: Any,
+        steps: int = 64,
+        normal: Any = None,
+    ):
+        self.vector_field = vector_field
+        self.parameters = parameters
+        self.reference = np.asarray(reference, float)
+        if self.reference.ndim != 1 or self.reference.size < 2:
+            raise ValueError("reference must be a state of shape (n,), n >= 2")
+        if steps < 1:
+            raise ValueError(f"steps is {steps}; give a whole number >= 1")
+        self.steps = steps
+        if normal is None:
+            normal = vector_field(jnp.asarray(self.reference), parameters)
+        self.normal, self.basis = _plane(np.asarray(normal))
+
+    def _turn(self, u, parameters):
+        """State after the period, and the largest error of a step."""
+        x, period = u[:-1], u[-1]
+        h = period / self.steps
+
+        def step(carry, _):
+            x, worst = carry
+
+            # a loop over the stages compiles in a fraction of the time
+            def stage(slopes, row):
+                weights, i = row
+                k = self.vector_field(x + h * (weights @ slopes), parameters)
+                return slopes.at[i].set(k), None
+
+            empty = jnp.zeros((_STAGES, x.shape[0]), x.dtype)
+            slopes, _ = jax.lax.scan(stage, empty, (_A, jnp.arange(_STAGES)))
+            error = h * jnp.max(jnp.abs(_B_ERROR @ slopes))
+            return (x + h * (_B @ slopes), jnp.maximum(worst, error)), None
+
+        (x, worst), _ = jax.lax.scan(
+            step, (x, jnp.zeros_like(period)), None, length=self.steps
+        )
+        return x, worst
+
+    def residual(self, u: Float[Array, " n"], parameters: PyTree) -> Float[Array, " n"]:
+        x = u[:-1]
+        phase = jnp.dot(self.normal, x - self.reference)
+        closing = self._turn(u, parameters)[0] - x
+        return jnp.concatenate([closing, phase[None]])
+
+    def linearisation(self, u: Float[Array, " n"], parameters: PyTree, jacobian):
+        n = u.shape[0] - 1
+        monodromy = jacobian[:n, :n] + jnp.eye(n, dtype=u.dtype)
+        f = self.vector_field(u[:-1], parameters)
+        along = jnp.outer(f, self.normal) / jnp.dot(self.normal, f)
+        on_plane = monodromy @ self.basis
+        return self.basis.T @ (on_plane - along @ on_plane)
+
+    @property
+    def normal_forms(self) -> bool:
+        return False
+
+    def observe(self, u: Float[Array, " n"], parameters: PyTree) -> dict[str, Array]:
+        size = jnp.maximum(1.0, jnp.max(jnp.abs(u[:-1])))
+        error = self._turn(u, parameters)[1] / size
+        return {"period": u[-1], "error": error}
+
+    def refreshed(self, u: np.ndarray, parameters: PyTree) -> "LimitCycle":
+        x = np.asarray(u[:-1], float)
+        f = np.asarray(self.vector_field(jnp.asarray(x), parameters))
+        # next to a Hopf point the field vanishes, and the plane from there serves
+        if np.linalg.norm(f) < 1e-6 * max(1.0, float(np.linalg.norm(x))):
+            return self
+        normal, basis = _plane(f)
+        # the sign continues, for the sake of test functions
+        normal = normal * (-1.0 if normal @ np.asarray(self.normal) < 0 else 1.0)
+        moved = with_field(with_field(self, "normal", normal), "basis", basis)
+        return with_field(moved, "reference", x)
+
+    def check(self, point: Any) -> str | None:
+        if point.state[-1] <= 0:
+            return "the period is not positive"
+        return None
+
+    def doubled(self, point: Any, direction: np.ndarray) -> Start:
+        twice = with_field(self, "steps", 2 * self.steps)
+        state = np.append(point.state[:-1], 2 * point.state[-1])
+        tangent = np.concatenate([np.asarray(self.basis) @ direction, [0.0, 0.0]])
+        return Start(twice, state, point.parameter, tangent)
+
+    @property
+    def signature(self) -> str:
+        return f"limit cycle of {self.steps} steps"
+
+    def with_signature(self, signature: str) -> "LimitCycle":
+        words = signature.split()
+        if words[:3] != ["limit", "cycle", "of"] or not words[3].isdecimal():
+            raise ValueError(
+                f"the saved branch has signature {signature!r}, which is no limit "
+                "cycle; take it up with the problem it was made with"
+            )
+        return with_field(self, "steps", int(words[3]))
+
+
+def _plane(normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Unit normal, and unit vectors (n, n-1) in the plane across it."""
+    if not np.all(np.isfinite(normal)) or not np.any(normal):
+        raise ValueError(
+            "the vector field vanishes at the reference: an equilibrium is no cycle; "
+            "give a state on the cycle"
+        )
+    normal = normal / np.linalg.norm(normal)
+    rows = np.linalg.svd(normal[None, :])[2]
+    return normal, rows[1:].T
+
+
+def cycle_at_hopf(
+    vector_field: Callable, parameters: PyTree, point: Any, matrix: np.ndarray
+) -> Start | None:
+    """The cycle born at a Hopf point: radius 0, period 2 pi / omega."""
+    found = np.linalg.eig(matrix)
+    values: Any = found.eigenvalues
+    vectors: Any = found.eigenvectors
+    upper = values.imag > 0
+    if not np.any(upper):
+        return None
+    k = int(np.argmin(np.where(upper, np.abs(values.real), np.inf)))
+    q = vectors[:, k]
+    # the phase that makes real and imaginary part orthogonal
+    q = q * np.exp(-0.5j * np.angle(np.sum(q * q)))
+    problem = LimitCycle(vector_field, parameters, point.state, normal=q.imag)
+    state = np.append(point.state, 2 * np.pi / values[k].imag)
+    tangent = np.concatenate([q.real / np.linalg.norm(q.real), [0.0, 0.0]])
+    return Start(problem, state, point.parameter, tangent)

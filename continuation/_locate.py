@@ -1,0 +1,224 @@
+"""Locating special points between two points of a branch."""
+
+from typing import Any, NamedTuple
+
+import jax.numpy as jnp
+import numpy as np
+
+from ._bialternate import determinant_on_plane, trace_on_plane
+from ._extended import BranchPoints, matrix_at, MonitorPoints, SingularPoints
+from ._normal_forms import null_vectors
+from ._problem import AbstractProblem
+from ._program import correct, Corrected, evaluate, solve
+from ._settings import Settings
+from ._test_functions import (
+    BRANCH_POINT,
+    HOPF,
+    NEIMARK_SACKER,
+    test_values,
+)
+
+
+# their `parameters` is a property, which type checkers take for an argument
+_singular: Any = SingularPoints
+_monitored: Any = MonitorPoints
+_crossing: Any = BranchPoints
+
+
+class Walk(NamedTuple):
+    """What stays the same along a branch."""
+
+    leaf: int
+    width: float
+    bounds: tuple[float, float]
+    settings: Settings
+
+
+class Located(NamedTuple):
+    """A special point."""
+
+    z: np.ndarray
+    converged: bool
+    reason: str
+
+
+def singular_points(
+    problem: AbstractProblem, kind: str, walk: Walk, z: np.ndarray
+) -> SingularPoints:
+    """The extended problem of a kind of special point, with borders from near it."""
+    m = matrix_at(problem, kind, walk.leaf, z)
+    border = np.zeros(m.shape[0])
+    empty = _singular(
+        problem,
+        kind,
+        walk.leaf,
+        np.asarray(walk.width),
+        np.asarray(walk.bounds),
+        border,
+        border,
+    )
+    return empty.refreshed(np.asarray(z), problem.parameters)
+
+
+def monitor_points(
+    problem: AbstractProblem, name: str, walk: Walk, level: float = 0.0
+) -> MonitorPoints:
+    """The extended problem of a zero of a monitor."""
+    return _monitored(
+        problem,
+        name,
+        walk.leaf,
+        np.asarray(walk.width),
+        np.asarray(walk.bounds),
+        np.asarray(level),
+    )
+
+
+def _newton(problem, name: str, walk: Walk, guess: np.ndarray):
+    """Newton on the extended system: (z, success)."""
+    if name == BRANCH_POINT:
+        at = evaluate(problem, walk.leaf, guess, np.ones_like(guess), walk.width)
+        if not np.all(np.isfinite(at.jacobian)):
+            return guess, False
+        # the left vector that the whole derivative nearly annihilates
+        left, _, _ = np.linalg.svd(at.jacobian * at.scale[None, :])
+        extended = _crossing(problem, walk.leaf, np.asarray(walk.width))
+        u = np.concatenate([guess, [0.0], left[:, -1]])
+        value, success, _ = solve(extended, u, walk.settings)
+        return value[: guess.size], success
+    if name in problem.monitors():
+        extended = monitor_points(problem, name, walk)
+    else:
+        extended = singular_points(problem, name, walk, guess)
+    value, success, _ = solve(extended, guess, walk.settings)
+    return value, success
+
+
+def locate(
+    problem: AbstractProblem,
+    name: str,
+    walk: Walk,
+    a: Corrected,
+    b: Corrected,
+    values: tuple[float, float],
+) -> Located:
+    """The zero of a test function between points a and b of a branch.
+
+    Newton on the extended system, from the secant's estimate; where that fails or
+    leaves the bracket, the bracket is shrunk with points of the branch first.
+    """
+    low, high = (a.z, values[0]), (b.z, values[1])
+    guess = _between(a, b, values[0] / (values[0] - values[1]))
+    direct = walk.settings.localise == "newton" or name in problem.monitors()
+    for attempt in range(60):
+        if direct:
+            z, success = _newton(problem, name, walk, guess)
+            if success and _inside(z, low[0], high[0], a.scale):
+                return Located(z, True, "")
+        direct = walk.settings.localise == "newton" and attempt < 12
+        chord = (high[0] - low[0]) / a.scale
+        length = float(np.linalg.norm(chord))
+        if length < walk.settings.tolerance:
+            break
+        guess = _next_guess(low, high, attempt)
+        middle = correct(
+            problem, walk.leaf, guess, chord / a.scale, a.tangent, walk.width,
+            walk.settings,
+        )  # fmt: skip
+        if not middle.success or not _inside(middle.z, low[0], high[0], a.scale):
+            reason = "the branch could not be computed between two of its points"
+            return Located(guess, False, reason)
+        value = test_values(problem, middle)[name]
+        if value == 0:
+            return Located(middle.z, True, "")
+        if np.sign(value) == np.sign(low[1]):
+            low = (middle.z, value)
+        else:
+            high = (middle.z, value)
+        guess = middle.z
+    if length < walk.settings.tolerance:
+        return Located(guess, True, "")
+    return Located(guess, False, "Newton on the extended system did not converge")
+
+
+def _next_guess(low, high, attempt: int) -> np.ndarray:
+    """Secant and bisection in turns."""
+    share = 0.5
+    if attempt % 3 != 2:
+        share = abs(low[1]) / (abs(low[1]) + abs(high[1]))
+        share = min(max(share, 0.01), 0.99)
+    return low[0] + share * (high[0] - low[0])
+
+
+def _between(a: Corrected, b: Corrected, share: float) -> np.ndarray:
+    """Cubic through two points and their tangents."""
+    if not np.isfinite(share):
+        share = 0.5
+    chord = b.z - a.z
+    length = np.linalg.norm(chord / a.scale)
+    s = share
+    return (
+        a.z * (1 + 2 * s) * (1 - s) ** 2
+        + b.z * s * s * (3 - 2 * s)
+        + length * a.tangent * s * (1 - s) ** 2
+        + length * b.tangent * s * s * (s - 1)
+    )
+
+
+def _inside(z, low, high, scale, slack: float = 1e-6) -> bool:
+    """Whether z lies between the ends, and near the chord."""
+    chord, way = (high - low) / scale, (z - low) / scale
+    length = np.linalg.norm(chord)
+    along = float(way @ chord) / length
+    aside = float(np.linalg.norm(way - along / length * chord))
+    edge = slack * length + 1e-9
+    return bool(-edge <= along <= length + edge and aside <= length)
+
+
+def ahead(
+    problem: AbstractProblem, name: str, walk: Walk, a: Corrected, value: float,
+    reach: float,
+) -> Located | None:  # fmt: skip
+    """The zero of a monitor within `reach` ahead of a point of the branch, if any.
+
+    For monitors that do not change sign or end the branch: where nothing exists behind
+    the zero, or not even at it, it is approached from this side, level by level.
+    """
+    z, level, failures = a.z, value, 0
+
+    def reached(target: float):
+        extended = monitor_points(problem, name, walk, target)
+        found, success, _ = solve(extended, z, walk.settings)
+        way = (found - a.z) / a.scale
+        forward = float(way @ (a.tangent / a.scale)) > 0
+        near = success and forward and float(np.linalg.norm(way)) <= reach
+        return found, success, near
+
+    while failures < 4:
+        found, _, near = reached(0.0)
+        if near:
+            return Located(found, True, "")
+        target = level * (0.1 if failures == 0 else 0.5)
+        found, success, near = reached(target)
+        if near:
+            # the rest of the way, which is as short as it can be told
+            rest = target / (level - target) * (found - z)
+            z, level = found, target
+            if float(np.linalg.norm(rest / a.scale)) <= walk.settings.tolerance:
+                return Located(z + rest, True, "")
+        elif success:
+            return None
+        else:
+            failures += 1
+    return None
+
+
+def pair_is_complex(problem, kind: str, walk: Walk, z: np.ndarray, at) -> bool:
+    """Whether a critical pair is complex; otherwise the point is a neutral saddle."""
+    if kind not in (HOPF, NEIMARK_SACKER):
+        return True
+    right, _ = null_vectors(matrix_at(problem, kind, walk.leaf, z))
+    a, w = jnp.asarray(at.linearisation), jnp.asarray(right)
+    if kind == HOPF:
+        return float(determinant_on_plane(a, w)) > 0
+    return abs(float(trace_on_plane(a, w))) < 2

@@ -1,0 +1,174 @@
+"""What a branch consists of."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, fields
+from typing import Any
+
+import numpy as np
+
+from ._parameter import leaf_of, with_leaf
+from ._problem import AbstractProblem
+
+
+#: kinds of points that are not special
+ORDINARY = ("start", "regular", "end")
+
+
+@dataclass(frozen=True, eq=False)
+class Point:
+    """A point of a branch. All arrays are NumPy's."""
+
+    #: number along the branch, from 1
+    label: int
+    #: `"start"`, `"regular"`, `"end"`, or the kind of special point
+    kind: str
+    #: value of the parameter that is followed
+    parameter: float
+    #: (n,) the solution
+    state: np.ndarray
+    #: (k,) eigenvalues of an equilibrium, multipliers of a map or an orbit
+    multipliers: np.ndarray
+    #: None where the problem has no stability
+    stable: bool | None
+    #: (n+1,) direction of the branch in (state, parameter)
+    tangent: np.ndarray
+    #: (n+1,) sizes by which lengths are measured here
+    scale: np.ndarray
+    #: the step that follows; arclength from the start
+    step: float
+    arclength: float
+    #: of the corrector
+    iterations: int
+    #: False for a special point that could only be bracketed
+    converged: bool
+    #: why the branch ends here, or what is to be known about a special point
+    reason: str = ""
+    #: normal-form coefficient where there is one, and what its sign says
+    coefficient: float | None = None
+    criticality: str = ""
+    #: quantities that the problem watches
+    observed: dict[str, Any] = field(default_factory=dict)
+    #: values of the test functions
+    tests: dict[str, float] = field(default_factory=dict)
+    #: `problem.signature` here
+    signature: str = ""
+    #: the parameters that vary, in order: one, or two on a curve of special points
+    parameters: tuple[float, ...] = ()
+    #: the problem with its parameters here; None for a point read from a file
+    problem: AbstractProblem | None = None
+    #: index of the parameter among the leaves of the problem's parameters
+    leaf: int = -1
+
+    @property
+    def special(self) -> bool:
+        """Whether this is a special point."""
+        return self.kind not in ORDINARY
+
+    def inner(self, base: AbstractProblem, leaf: int) -> "Point":
+        """This point of an extended problem as a point of the problem it extends."""
+        value = float(self.state[-1])
+        assert self.problem is not None
+        parameters = with_leaf(self.problem.parameters, leaf, np.asarray(value))
+        return replace(
+            self,
+            state=self.state[:-1],
+            parameter=value,
+            problem=set_parameters(base, parameters),
+        )
+
+
+def replace(point: Point, **changes: Any) -> Point:
+    """The same point with other fields."""
+    return Point(**{**point.__dict__, **changes})
+
+
+@dataclass(frozen=True, eq=False)
+class Branch:
+    """Points in the order of the branch."""
+
+    points: tuple[Point, ...]
+    #: name of the parameter
+    name: str
+    bounds: tuple[float, float]
+    #: index of the parameter among the leaves
+    leaf: int = 0
+    #: names of all parameters that vary
+    names: tuple[str, ...] = ()
+
+    @property
+    def special(self) -> tuple[Point, ...]:
+        """The special points."""
+        return tuple(point for point in self.points if point.special)
+
+    @property
+    def regular(self) -> tuple[Point, ...]:
+        """All other points."""
+        return tuple(point for point in self.points if not point.special)
+
+    def of_kind(self, kind: str) -> tuple[Point, ...]:
+        """The special points of one kind."""
+        return tuple(point for point in self.points if point.kind == kind)
+
+    @property
+    def reason(self) -> str:
+        """Why the branch ends."""
+        return self.points[-1].reason if self.points else ""
+
+    @property
+    def parameters(self) -> np.ndarray:
+        """Values of the parameter at all points."""
+        return np.array([point.parameter for point in self.points])
+
+    @property
+    def states(self) -> np.ndarray:
+        """(points, n) states; problems that change on the way must keep n."""
+        return np.stack([point.state for point in self.points])
+
+    def at(self, label: int) -> Point:
+        """The point with a label.
+
+        **Raises:** `ValueError` where there is none.
+        """
+        for point in self.points:
+            if point.label == label:
+                return point
+        raise ValueError(
+            f"there is no point with label {label}; labels run from "
+            f"{self.points[0].label} to {self.points[-1].label}"
+        )
+
+
+def relabelled(points: Sequence[Point]) -> tuple[Point, ...]:
+    """The same points, counted from 1."""
+    return tuple(replace(point, label=i + 1) for i, point in enumerate(points))
+
+
+def with_parameter(problem: Any, leaf: int, value: Any) -> Any:
+    """The problem at another value of the parameter."""
+    parameters = with_leaf(problem.parameters, leaf, np.asarray(value, float))
+    return set_parameters(problem, parameters)
+
+
+def set_parameters(problem: Any, parameters: Any) -> Any:
+    """The problem with other parameters, wherever inside it they are kept."""
+    names = {f.name for f in fields(problem)}
+    if "parameters" in names:
+        return with_field(problem, "parameters", parameters)
+    base = getattr(problem, "base")
+    return with_field(problem, "base", set_parameters(base, parameters))
+
+
+def with_field(module: Any, name: str, value: Any) -> Any:
+    """A module with one field replaced; what `tree_at` does, in a tenth of the time."""
+    new = object.__new__(type(module))
+    for f in fields(module):
+        if f.name == name:
+            object.__setattr__(new, name, value)
+        elif hasattr(module, f.name):
+            object.__setattr__(new, f.name, getattr(module, f.name))
+    return new
+
+
+def value_of(problem: AbstractProblem, leaf: int) -> float:
+    """The value that the problem has for the parameter."""
+    return float(leaf_of(problem.parameters, leaf))

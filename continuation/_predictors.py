@@ -1,0 +1,99 @@
+"""Predictors: where the next point of a branch is expected."""
+
+import abc
+from collections.abc import Sequence
+from typing import ClassVar, NamedTuple
+
+import equinox as eqx
+import numpy as np
+
+
+class Station(NamedTuple):
+    """A point passed, as predictors see it: lengths are scaled."""
+
+    #: (n+1,) scaled state and parameter
+    y: np.ndarray
+    #: (n+1,) scaled unit tangent
+    tangent: np.ndarray
+
+
+class AbstractPredictor(eqx.Module):
+    """Extrapolates a branch. The last of the stations is where it stands."""
+
+    #: number of stations that are used where there are so many
+    stations: eqx.AbstractClassVar[int]
+
+    @abc.abstractmethod
+    def __call__(self, stations: Sequence[Station], step: float) -> np.ndarray:
+        """(n+1,) predicted scaled state and parameter, at about `step` ahead."""
+
+
+class Tangent(AbstractPredictor):
+    """Along the tangent, (3.30) and (3.33)."""
+
+    stations: ClassVar[int] = 1
+
+    def __call__(self, stations: Sequence[Station], step: float) -> np.ndarray:
+        return stations[-1].y + step * stations[-1].tangent
+
+
+class Secant(AbstractPredictor):
+    """Along the line through the last two points."""
+
+    stations: ClassVar[int] = 2
+
+    def __call__(self, stations: Sequence[Station], step: float) -> np.ndarray:
+        here = stations[-1]
+        if len(stations) < 2:
+            return here.y + step * here.tangent
+        chord = here.y - stations[-2].y
+        return here.y + step * chord / np.linalg.norm(chord)
+
+
+class Extrapolation(AbstractPredictor):
+    """The step is one of the parameter, the state linear in it, (3.40)."""
+
+    stations: ClassVar[int] = 2
+
+    def __call__(self, stations: Sequence[Station], step: float) -> np.ndarray:
+        here = stations[-1]
+        chord = here.tangent if len(stations) < 2 else here.y - stations[-2].y
+        # next to a fold the state is no function of the parameter
+        if abs(chord[-1]) < 0.1 * np.linalg.norm(chord):
+            chord = here.tangent
+            return here.y + step * chord
+        along = np.sign(here.tangent[-1]) or 1.0
+        change = along * step * abs(chord[-1]) / np.linalg.norm(chord)
+        return here.y + change / chord[-1] * chord
+
+
+class Polynomial(AbstractPredictor):
+    """Polynomial in arclength through the last points, and the last tangent.
+
+    **Arguments:** `order`: degree, from 2 up; lower as long as points are missing.
+    """
+
+    order: int = eqx.field(static=True, default=3)
+    stations: ClassVar[int] = 8
+
+    def __check_init__(self):
+        if not 2 <= self.order <= self.stations:
+            raise ValueError(
+                f"order is {self.order}; give a degree from 2 to {self.stations}"
+            )
+
+    def __call__(self, stations: Sequence[Station], step: float) -> np.ndarray:
+        used = stations[-self.order :]
+        here = used[-1]
+        y = np.stack([station.y for station in used])
+        lengths = np.linalg.norm(np.diff(y, axis=0), axis=1)
+        s = -np.concatenate([np.cumsum(lengths[::-1])[::-1], [0.0]])
+        # y(s) = y0 + s t0 + s^2 q(s), q through the earlier points
+        past = s[:-1]
+        if past.size == 0:
+            return here.y + step * here.tangent
+        q = (y[:-1] - here.y - past[:, None] * here.tangent) / past[:, None] ** 2
+        weights = np.array(
+            [np.prod([(step - b) / (a - b) for b in past if b != a]) for a in past]
+        )
+        return here.y + step * here.tangent + step**2 * (weights @ q)

@@ -1,0 +1,216 @@
+"""What is followed: a residual, its kind of stability, and what to watch on the way."""
+
+import abc
+from collections.abc import Mapping
+from typing import Any, Literal
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float, PyTree
+
+
+#: what the eigenvalues of `linearisation` mean
+Stability = Literal["equilibrium", "map", "none"]
+
+
+class Monitor(eqx.Module):
+    """A test function that a problem adds, and what its zero means.
+
+    **Arguments:**
+
+    - `kind`: name of the special point at its zero, such as `"grazing"`.
+    - `ends`: the branch of this problem ends there. `AbstractProblem.transition` is
+      then asked for another problem to go on with. The zero of such a monitor is also
+      looked for ahead of the last point, when a step fails or its result is refused; so
+      the monitor may cease to exist, or not change sign, behind its zero. It must have
+      a nonzero slope on the near side.
+    """
+
+    kind: str = eqx.field(static=True)
+    ends: bool = eqx.field(static=True, default=False)
+
+
+class Start(eqx.Module):
+    """Where to begin a branch, and with which problem.
+
+    **Arguments:**
+
+    - `problem`: what is to be followed.
+    - `state`: (n,) state, on the branch or near it.
+    - `parameter`: value of the parameter; None: the one that `problem.parameters` has.
+    - `tangent`: (n+1,) direction (state, parameter) in which the branch leaves; its
+      length is immaterial. The first point is sought in the plane across it, so a
+      branch that leaves a branch point is found and not the one that was known. None:
+      along the branch through `state`, in the direction asked for.
+    - `step`: first step; None: as the settings say.
+    """
+
+    problem: "AbstractProblem"
+    state: np.ndarray
+    parameter: float | None = None
+    tangent: np.ndarray | None = None
+    step: float | None = None
+
+
+class AbstractProblem(eqx.Module):
+    """G(u, parameters) = 0 with u of shape (n,) and G of shape (n,).
+
+    **To state a problem of your own**, subclass and give
+
+    - `parameters`, a field: any pytree (a dict, a module, a system). Its scalar float
+      leaves can be continued in, picked with `where(parameters)`. The methods get a
+      tree of the same structure as an argument and must use that one, never the field.
+    - `stability`, a class attribute or static field: `"equilibrium"` where eigenvalues
+      of the linearisation on the imaginary axis are bifurcations, `"map"` where those
+      on the unit circle are (fixed points, periodic orbits), `"none"` otherwise.
+    - `residual(u, parameters)`.
+
+    **Traced** (called inside compiled programs; jax functions, differentiable forward):
+    `residual`, `jacobian`, `linearisation`, `motion`, `monitor`, `observe`, `scale`.
+    Everything about them that is not an array must be static: one program is compiled
+    for each structure of a problem, and reused for all values of arrays in it.
+    `residual` and monitors of `ends=False` are to be smooth; where an orbit does not
+    exist return NaN, and the step is halved.
+
+    **Python** (called between compiled programs with concrete arrays): `monitors`,
+    `check`, `transition`, `refreshed`, `doubled`, `signature`, `with_signature`. They
+    may compile things of their own.
+
+    The order of calls for a step from point a to point b: corrector; `monitor` and
+    `linearisation` and `observe` at b in the same program; if a monitor with `ends`
+    changed sign, its zero is located, yielded as a special point, and
+    `transition(point)` is asked for a `Start` (None: the branch ends); otherwise
+    `check(point b)`, and if it gives a reason, the zero of an ending monitor is sought
+    between a and b, then the step is halved, and at the smallest step the branch ends
+    with that reason. Then `refreshed` at b.
+
+    Curves in two parameters need nothing more: the core extends the problem with
+    the condition `linearisation is singular` or `monitor = 0`.
+    """
+
+    parameters: eqx.AbstractVar[PyTree]
+    stability: eqx.AbstractClassVar[Stability]
+
+    @abc.abstractmethod
+    def residual(self, u: Float[Array, " n"], parameters: PyTree) -> Float[Array, " n"]:
+        """G(u, parameters), zero on the branch."""
+
+    def jacobian(self, u: Float[Array, " n"], parameters: PyTree):
+        """dG/du, shape (n, n)."""
+        return jax.jacfwd(self.residual)(u, parameters)
+
+    def linearisation(
+        self, u: Float[Array, " n"], parameters: PyTree, jacobian: Float[Array, "n n"]
+    ) -> Float[Array, "k k"]:
+        """Matrix whose eigenvalues decide stability; `jacobian` is dG/du at the point.
+
+        By default dG/du for equilibria, and dG/du + I for maps, right for G = f(u) - u.
+        Multiple shooting overrides this with the monodromy matrix, autonomous orbits
+        with that of the map on a section (no trivial multiplier).
+        """
+        del u, parameters
+        if self.stability == "map":
+            return jacobian + jnp.eye(jacobian.shape[0], dtype=jacobian.dtype)
+        return jacobian
+
+    def motion(self, u: Float[Array, " n"], parameters: PyTree) -> Float[Array, " n"]:
+        """The vector field, or the map, whose derivative is `linearisation`.
+
+        Normal-form coefficients come from its second and third derivatives. Override it
+        together with `linearisation`, or set `normal_forms` to False.
+        """
+        moved = self.residual(u, parameters)
+        return moved + u if self.stability == "map" else moved
+
+    @property
+    def normal_forms(self) -> bool:
+        """Whether `motion` can be differentiated three times."""
+        return True
+
+    def monitor(
+        self, u: Float[Array, " n"], parameters: PyTree
+    ) -> dict[str, Float[Array, ""]]:
+        """Values of the test functions that `monitors` names."""
+        del u, parameters
+        return {}
+
+    def monitors(self) -> Mapping[str, Monitor]:
+        """Test functions of this problem by name; may depend on its structure only."""
+        return {}
+
+    def observe(self, u: Float[Array, " n"], parameters: PyTree) -> dict[str, Array]:
+        """Further quantities to keep with each point (`point.observed`)."""
+        del u, parameters
+        return {}
+
+    def scale(self, u: Float[Array, " n"], parameters: PyTree) -> Float[Array, " n"]:
+        """(n,) sizes of the components of u, by which lengths along a branch are
+        measured. By default 1, or the root mean square of u where that is more."""
+        del parameters
+        size = jnp.maximum(1.0, jnp.sqrt(jnp.mean(u * u)))
+        return jnp.broadcast_to(size, u.shape)
+
+    @property
+    def detects(self) -> bool:
+        """Whether folds, branch points and those of `stability` are sought."""
+        return True
+
+    def free(self, u: np.ndarray) -> tuple[float, ...]:
+        """Parameters that are unknowns of this problem (curves in two parameters)."""
+        del u
+        return ()
+
+    def limits(self) -> Mapping[int, tuple[float, float]]:
+        """Bounds on components of u, by index; a branch ends exactly on them."""
+        return {}
+
+    def check(self, point: Any) -> str | None:
+        """None where the point is admissible, else the reason why not, in words."""
+        del point
+        return None
+
+    def transition(self, point: Any) -> Start | None:
+        """How to go on behind the zero `point` of a monitor that ends this problem.
+
+        A `Start` with another problem (same `parameters`), or None to end the branch.
+        """
+        del point
+        return None
+
+    def refreshed(self, u: np.ndarray, parameters: PyTree) -> "AbstractProblem":
+        """The same problem with its internal references (borders, phase conditions)
+        taken from this point. Must depend on the point only, not on the way there, so
+        that a branch taken up again is the identical branch; only signs may be chosen
+        by those before, and must be, where test functions depend on them. Structure and
+        shapes stay.
+        """
+        del u, parameters
+        return self
+
+    def doubled(self, point: Any, direction: np.ndarray) -> Start | None:
+        """The doubled orbit at a flip: a problem whose solutions include this orbit run
+        through twice, its state there, and the tangent (direction of the eigenvector of
+        -1, parameter component 0). None where there is none."""
+        del point, direction
+        return None
+
+    def cycle(self, point: Any, matrix: np.ndarray) -> Start | None:
+        """The limit cycle born at a Hopf point, whose linearisation is `matrix`."""
+        del point, matrix
+        return None
+
+    @property
+    def signature(self) -> str:
+        """What is not array about this problem, as text; saved with every point."""
+        return ""
+
+    def with_signature(self, signature: str) -> "AbstractProblem":
+        """The problem that has this signature, to take up a saved branch."""
+        if signature != self.signature:
+            raise ValueError(
+                f"the saved branch has signature {signature!r}, this problem "
+                f"{self.signature!r}; take it up with the problem it was made with"
+            )
+        return self

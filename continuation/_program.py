@@ -1,0 +1,204 @@
+"""The compiled programs: one for each structure of a problem."""
+
+import dataclasses
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import optimistix as optx
+from jaxtyping import Float
+
+from ._parameter import with_leaf
+from ._problem import AbstractProblem
+
+
+class Corrected(eqx.Module):
+    """A point on the branch and what is known about it.
+
+    Traced arrays inside programs, NumPy's outside.
+    """
+
+    z: Float[Any, " n+1"]
+    success: Any
+    iterations: Any
+    #: (n, n+1) derivative of the residual with respect to (state, parameter)
+    jacobian: Float[Any, "n n+1"]
+    linearisation: Float[Any, "k k"]
+    tangent: Float[Any, " n+1"]
+    #: sign and (n+1)-th root of the determinant of jacobian and tangent, scaled
+    determinant: Any
+    scale: Float[Any, " n+1"]
+    monitors: dict[str, Any]
+    observed: dict[str, Any]
+
+
+def residual_at(problem: AbstractProblem, leaf: int, z):
+    """G at z = (u, parameter)."""
+    parameters = with_leaf(problem.parameters, leaf, z[-1])
+    return problem.residual(z[:-1], parameters)
+
+
+def scale_at(problem: AbstractProblem, leaf: int, z, width):
+    """(n+1,) sizes that make z / size a vector whose norm is the length of a step."""
+    parameters = with_leaf(problem.parameters, leaf, z[-1])
+    u = z[:-1]
+    size = problem.scale(u, parameters) * jnp.sqrt(jnp.asarray(u.size, u.dtype))
+    return jnp.concatenate([size, jnp.reshape(width, (1,))])
+
+
+def newton(function, y, tolerance, max_iterations: int):
+    """Root of a function, or with fewer equations the nearest one (Moore-Penrose)."""
+    solution = optx.root_find(
+        lambda y, _: function(y),
+        optx.Newton(rtol=tolerance, atol=tolerance),
+        y,
+        max_steps=max_iterations,
+        throw=False,
+    )
+    value = solution.value
+    success = (solution.result == optx.RESULTS.successful) & jnp.all(
+        jnp.isfinite(value)
+    )
+    return value, success, solution.stats["num_steps"]
+
+
+def tangent_and_determinant(jacobian, scale, old):
+    """Unit tangent along `old` (all in z), and the determinant of (3.33)."""
+    scaled = jacobian * scale[None, :]
+    old = old / scale
+    last = jnp.zeros_like(old).at[-1].set(1.0)
+    raw = jnp.linalg.solve(jnp.concatenate([scaled, old[None, :]]), last)
+    tangent = raw / jnp.linalg.norm(raw)
+    sign, log = jnp.linalg.slogdet(jnp.concatenate([scaled, tangent[None, :]]))
+    return tangent * scale, sign * jnp.exp(log / scale.size)
+
+
+def correct_(
+    problem: AbstractProblem,
+    leaf: int,
+    guess,
+    normal,
+    old,
+    width,
+    tolerance,
+    max_iterations: int,
+    least_norm: bool,
+) -> Corrected:
+    """Correct `guess` and evaluate everything at the point found.
+
+    `normal` (n+1,) is the covector of the plane through the guess in which the solution
+    is sought; it is ignored with `least_norm` (Moore-Penrose). `old` gives the
+    direction of the tangent. Not compiled by itself, so that it can be batched.
+    """
+    scale = scale_at(problem, leaf, guess, width)
+
+    def equations(y):
+        g = residual_at(problem, leaf, y * scale) / scale[:-1]
+        if least_norm:
+            return g
+        plane = jnp.dot(normal * scale, y - guess / scale)
+        return jnp.concatenate([g, plane[None]])
+
+    y, success, iterations = newton(equations, guess / scale, tolerance, max_iterations)
+    return evaluate_(problem, leaf, y * scale, old, width, success, iterations)
+
+
+def evaluate_(problem, leaf, z, old, width, success, iterations) -> Corrected:
+    """Everything about a point that is taken as it is."""
+    u, p = z[:-1], z[-1]
+    parameters = with_leaf(problem.parameters, leaf, p)
+    if type(problem).jacobian is AbstractProblem.jacobian:
+        jacobian = jax.jacfwd(lambda z: residual_at(problem, leaf, z))(z)
+        j_u = jacobian[:, :-1]
+    else:
+        j_u = problem.jacobian(u, parameters)
+        _, j_p = jax.jvp(
+            lambda p: residual_at(problem, leaf, jnp.append(u, p)),
+            (p,),
+            (jnp.ones_like(p),),
+        )
+        jacobian = jnp.concatenate([j_u, j_p[:, None]], axis=1)
+    scale = scale_at(problem, leaf, z, width)
+    tangent, determinant = tangent_and_determinant(jacobian, scale, old)
+    return Corrected(
+        z=z,
+        success=jnp.asarray(success) & jnp.all(jnp.isfinite(jacobian)),
+        iterations=jnp.asarray(iterations),
+        jacobian=jacobian,
+        linearisation=problem.linearisation(u, parameters, j_u),
+        tangent=tangent,
+        determinant=determinant,
+        scale=scale,
+        monitors=problem.monitor(u, parameters),
+        observed=problem.observe(u, parameters),
+    )
+
+
+_correct = eqx.filter_jit(correct_)
+_evaluate = eqx.filter_jit(evaluate_)
+
+
+def _plain(at: Corrected) -> Corrected:
+    """The same with NumPy arrays, of which the host makes quicker use."""
+    return Corrected(
+        **{
+            f.name: jax.tree.map(np.asarray, getattr(at, f.name))
+            for f in dataclasses.fields(at)
+        }
+    )
+
+
+def correct(problem, leaf, guess, normal, old, width, settings, least_norm=False):
+    """`correct_`, compiled, with numbers as arguments and NumPy arrays as result."""
+    return _plain(
+        _correct(
+            problem,
+            leaf,
+            np.asarray(guess),
+            np.asarray(normal),
+            np.asarray(old),
+            np.asarray(width),
+            np.asarray(settings.tolerance),
+            settings.max_iterations,
+            least_norm,
+        )
+    )
+
+
+def evaluate(problem, leaf, z, old, width) -> Any:
+    """`evaluate_`, compiled."""
+    return _plain(
+        _evaluate(
+            problem,
+            leaf,
+            np.asarray(z),
+            np.asarray(old),
+            np.asarray(width),
+            np.asarray(True),
+            np.asarray(0),
+        )
+    )
+
+
+@eqx.filter_jit
+def _solve(problem, u, tolerance, max_iterations: int):
+    scale = problem.scale(u, problem.parameters)
+
+    def equations(y):
+        g = problem.residual(y * scale, problem.parameters)
+        # what is small depends on the units of the unknowns, for square problems
+        return g / scale
+
+    y, success, iterations = newton(equations, u / scale, tolerance, max_iterations)
+    g = problem.residual(y * scale, problem.parameters)
+    return y * scale, success & jnp.all(jnp.isfinite(g)), iterations, g
+
+
+def solve(problem, u, settings, iterations: int = 30):
+    """Solve a problem from a guess at its own parameters: value, success, residual."""
+    value, success, _, g = _solve(
+        problem, np.asarray(u), np.asarray(settings.tolerance), iterations
+    )
+    return np.asarray(value), bool(success), np.asarray(g)

@@ -1,0 +1,187 @@
+"""Branches on disk: one line of JSON for each point, written as it comes.
+
+The format, version 1: UTF-8 text, one JSON object a line. The first is the header, with
+`format` = "continuation branch", `version`, `parameter`, `parameters`, `leaf`,
+`bounds`, and whatever the writer adds. Each further line is a point: the fields of
+`continuation.Point` without its problem. Numbers are written so that they read back as
+the same 64-bit floats; a number that is not finite is a string; complex numbers are
+pairs; `observed` arrays carry their `shape` and `dtype`. A last line without its end is
+the point that was in work when the run was interrupted, and is ignored.
+"""
+
+import json
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ._parameter import as_arrays
+from ._point import Branch, Point, set_parameters, with_parameter
+from ._problem import AbstractProblem
+
+
+FORMAT = "continuation branch"
+VERSION = 1
+
+
+class Recorder:
+    """A callback that appends points to a file as they come.
+
+    **Arguments:** `path`: the file; `header`: what goes into its first line besides the
+    format. With `after`, points that are there already, the file is written anew up to
+    them.
+    """
+
+    def __init__(
+        self, path: str | os.PathLike, header: dict, after: tuple[Point, ...] = ()
+    ):
+        self.path = Path(path)
+        self.path.parent.mkdir(parents=True, exist_ok=True)
+        lines = [{"format": FORMAT, "version": VERSION, **header}]
+        lines += [_point_to_json(point) for point in after]
+        # the old file stays whole until the new one is
+        fresh = self.path.with_name(self.path.name + ".new")
+        fresh.write_text("".join(_line(x) for x in lines), "utf-8")
+        os.replace(fresh, self.path)
+
+    def __call__(self, point: Point) -> None:
+        with self.path.open("a", encoding="utf-8") as file:
+            file.write(_line(_point_to_json(point)))
+
+
+def save(branch: Branch, path: str | os.PathLike) -> None:
+    """Write a branch to a file; [`continuation.load`][] reads it."""
+    Recorder(path, header_of(branch), branch.points)
+
+
+def header_of(branch: Branch, **more: Any) -> dict:
+    """The first line of a file, without its format."""
+    return {
+        "parameter": branch.name,
+        "parameters": list(branch.names),
+        "leaf": branch.leaf,
+        "bounds": list(branch.bounds),
+        **more,
+    }
+
+
+def load(path: str | os.PathLike, problem: AbstractProblem | None = None) -> Branch:
+    """Read a branch that was saved, or as much as an interrupted run has written.
+
+    **Arguments:** `problem`: what was followed; then the points carry it, at their
+    parameters, and can be switched from or followed in two parameters.
+
+    **Raises:** `ValueError` where the file is no branch or of a later version.
+    """
+    return read(path, problem)[0]
+
+
+def read(
+    path: str | os.PathLike, problem: AbstractProblem | None = None
+) -> tuple[Branch, dict]:
+    """A branch and the header of its file."""
+    text = Path(path).read_text("utf-8")
+    lines = text.split("\n")[:-1]
+    try:
+        header, *rest = [json.loads(line) for line in lines]
+    except ValueError as error:
+        raise ValueError(f"{path} is not a saved branch; it is not JSON") from error
+    if not isinstance(header, dict) or header.get("format") != FORMAT:
+        raise ValueError(f"{path} is not a saved branch")
+    if header.get("version") != VERSION:
+        raise ValueError(
+            f"{path} has version {header.get('version')} of the format, this program "
+            f"reads version {VERSION}; read it with the program that wrote it"
+        )
+    leaf = int(header["leaf"])
+    attach = _attacher(problem, leaf)
+    points = tuple(_point_from_json(line, attach) for line in rest)
+    low, high = header["bounds"]
+    names = tuple(header["parameters"])
+    return Branch(points, header["parameter"], (low, high), leaf, names), header
+
+
+def _attacher(problem: AbstractProblem | None, leaf: int) -> Callable:
+    """A function that gives the problem at a signature and a parameter value."""
+    if problem is None:
+        return lambda signature, value: None
+    stated: AbstractProblem = set_parameters(
+        problem, as_arrays(problem.parameters, leaf)
+    )
+    known = {stated.signature: stated}
+
+    def attach(signature: str, value: float) -> AbstractProblem:
+        if signature not in known:
+            known[signature] = stated.with_signature(signature)
+        return with_parameter(known[signature], leaf, value)
+
+    return attach
+
+
+def _line(value: Any) -> str:
+    return json.dumps(value, allow_nan=False, separators=(",", ":")) + "\n"
+
+
+def _number(x: Any) -> Any:
+    """A float that JSON can hold."""
+    x = float(x)
+    return x if np.isfinite(x) else str(x)
+
+
+def _array(x: Any) -> dict:
+    x = np.asarray(x)
+    if x.dtype == bool or np.issubdtype(x.dtype, np.integer):
+        values = x.ravel().tolist()
+    else:
+        values = [_number(v) for v in x.ravel()]
+    return {"shape": list(x.shape), "dtype": str(x.dtype), "values": values}
+
+
+def _point_to_json(point: Point) -> dict:
+    return {
+        "label": point.label,
+        "kind": point.kind,
+        "parameter": _number(point.parameter),
+        "parameters": [_number(x) for x in point.parameters],
+        "state": [_number(x) for x in point.state],
+        "multipliers": [[_number(x.real), _number(x.imag)] for x in point.multipliers],
+        "stable": point.stable,
+        "tangent": [_number(x) for x in point.tangent],
+        "scale": [_number(x) for x in point.scale],
+        "step": _number(point.step),
+        "arclength": _number(point.arclength),
+        "iterations": point.iterations,
+        "converged": point.converged,
+        "reason": point.reason,
+        "coefficient": None if point.coefficient is None else float(point.coefficient),
+        "criticality": point.criticality,
+        "observed": {k: _array(v) for k, v in point.observed.items()},
+        "tests": {k: _number(v) for k, v in point.tests.items()},
+        "signature": point.signature,
+    }
+
+
+def _point_from_json(line: dict, attach: Callable) -> Point:
+    def vector(x):
+        return np.array([float(v) for v in x])
+
+    value = dict(line)
+    value["parameter"] = float(line["parameter"])
+    value["parameters"] = tuple(float(x) for x in line["parameters"])
+    for name in ("state", "tangent", "scale"):
+        value[name] = vector(line[name])
+    value["multipliers"] = np.array(
+        [complex(float(re), float(im)) for re, im in line["multipliers"]], complex
+    )
+    value["step"], value["arclength"] = float(line["step"]), float(line["arclength"])
+    value["observed"] = {
+        k: np.array([float(x) if isinstance(x, str) else x for x in v["values"]])
+        .astype(v["dtype"])
+        .reshape(v["shape"])
+        for k, v in line["observed"].items()
+    }
+    value["tests"] = {k: float(v) for k, v in line["tests"].items()}
+    value["problem"] = attach(line["signature"], value["parameter"])
+    return Point(**value)

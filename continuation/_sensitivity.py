@@ -1,0 +1,94 @@
+"""Special points as differentiable functions of all other parameters."""
+
+from collections.abc import Callable
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import optimistix as optx
+from jaxtyping import Array, Float, PyTree
+
+from ._curve import extended
+from ._parameter import as_arrays, leaf_of, with_leaf
+from ._point import Point
+
+
+def special_point(
+    point: Point, where: Callable[[Any], Any], parameters: PyTree
+) -> tuple[Float[Array, " n"], Float[Array, ""]]:
+    """Where a special point is at other parameters; for use inside `jit` and `jvp`.
+
+    Newton's method on the extended system from `point`; the derivative comes from the
+    implicit function theorem. The parameters must be so near to those of `point` that
+    Newton gets there; the result is NaN where it does not.
+
+    **Arguments:**
+
+    - `point`: a fold, flip, Neimark-Sacker or Hopf point, or a zero of a monitor.
+    - `where`: picks the parameter in which it is located.
+    - `parameters`: of the same structure as the problem's; the picked one is ignored.
+
+    **Returns:** the state (n,) and the value of the picked parameter.
+    """
+    value = point.parameter
+    problem = extended(point, where, (value - 0.5, value + 0.5))
+    u = jnp.append(jnp.asarray(point.state), leaf_of(problem.parameters, problem.leaf))
+    parameters = as_arrays(parameters, problem.leaf)
+    scale = problem.scale(u, problem.parameters)
+
+    def equations(y, parameters):
+        return problem.residual(y * scale, parameters) / scale
+
+    solution = optx.root_find(
+        equations,
+        optx.Newton(rtol=1e-10, atol=1e-10),
+        u / scale,
+        args=parameters,
+        max_steps=30,
+        throw=False,
+    )
+    found = jnp.where(
+        solution.result == optx.RESULTS.successful, solution.value * scale, jnp.nan
+    )
+    return found[:-1], found[-1]
+
+
+@eqx.filter_jit
+def _derivatives(problem, u, moving, fixed):
+    """(n+1, leaf...) derivative of the solution with respect to each moving leaf."""
+
+    def residual(u, moving):
+        return problem.residual(u, eqx.combine(moving, fixed))
+
+    inverse = jnp.linalg.inv(jax.jacfwd(residual)(u, moving))
+    by_leaf = jax.jacfwd(residual, argnums=1)(u, moving)
+    return jax.tree.map(lambda d: -jnp.tensordot(inverse[-1], d, 1), by_leaf)
+
+
+def sensitivity(point: Point, where: Callable[[Any], Any]) -> PyTree:
+    """Derivative of the parameter value of a special point by all other parameters.
+
+    By the implicit function theorem on the extended system: d(speed at the flip) /
+    d(restitution), for example.
+
+    **Arguments:** `point`, `where`: as of [`continuation.special_point`][].
+
+    **Returns:** a tree like the problem's parameters, with the derivative by each float
+    leaf in its place; 0 for the picked one, None for leaves that are not floats.
+    """
+    value = point.parameter
+    problem = extended(point, where, (value - 0.5, value + 0.5))
+    parameters = as_arrays(problem.parameters, problem.leaf)
+    u = np.append(point.state, leaf_of(parameters, problem.leaf))
+    moving, fixed = eqx.partition(parameters, eqx.is_inexact_array)
+    found = jax.device_get(_derivatives(problem, jnp.asarray(u), moving, fixed))
+    return with_leaf(found, _position(moving, parameters, problem.leaf), 0.0)
+
+
+def _position(moving: PyTree, parameters: PyTree, leaf: int) -> int:
+    """Where a leaf of all parameters stands among those that are floats."""
+    del moving
+    leaves = jax.tree.leaves(parameters)[:leaf]
+    return sum(eqx.is_inexact_array(x) for x in leaves)

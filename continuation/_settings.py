@@ -1,0 +1,63 @@
+"""Numbers that decide how a branch is walked, not what it is."""
+
+import equinox as eqx
+
+
+class Settings(eqx.Module):
+    """Accuracy and step control.
+
+    Lengths along a branch are measured with the parameter in units of the width of its
+    bounds, and the state in units of `problem.scale`, root mean square over its
+    components: a step of 0.01 is a hundredth of the bounds.
+
+    **Arguments:**
+
+    - `tolerance`: corrections smaller than this, relative to the scales, end Newton's
+      iteration; its error is then about the square of that.
+    - `max_iterations`: of the corrector; more means a smaller step.
+    - `iterations`: the number aimed at by the step control.
+    - `step`, `min_step`, `max_step`: first, smallest and largest step.
+    - `angle`, `max_angle`: rad, change of direction per step aimed at, and refused.
+    - `max_points`: ordinary points on a branch.
+    - `special`: locate and report special points.
+    - `localise`: `"newton"` on the extended system, which takes second derivatives of
+      the residual; or `"bracket"`, which takes none, for residuals whose second
+      derivatives are too dear to compile.
+    """
+
+    tolerance: float = 1e-10
+    max_iterations: int = 8
+    iterations: int = 4
+    step: float = 0.01
+    min_step: float = 1e-8
+    max_step: float = 0.05
+    angle: float = 0.1
+    max_angle: float = 0.35
+    max_points: int = 1000
+    special: bool = True
+    localise: str = "newton"
+
+    def __check_init__(self):
+        if not 0 < self.tolerance < 1e-2:
+            raise ValueError(
+                f"tolerance is {self.tolerance:g}; give a number between 1e-14 and "
+                "1e-2, such as 1e-10"
+            )
+        if not 0 < self.min_step <= self.step <= self.max_step:
+            raise ValueError(
+                f"steps {self.min_step:g}, {self.step:g}, {self.max_step:g} must obey "
+                "0 < min_step <= step <= max_step"
+            )
+        if not 0 < self.angle <= self.max_angle < 1.5:
+            raise ValueError(
+                f"angles {self.angle:g} and {self.max_angle:g} must obey "
+                "0 < angle <= max_angle < 1.5 rad"
+            )
+        if not 1 <= self.iterations <= self.max_iterations:
+            raise ValueError("give 1 <= iterations <= max_iterations")
+        if self.max_points < 1:
+            raise ValueError("max_points must be at least 1")
+        if self.localise not in ("newton", "bracket"):
+            raise ValueError(
+                f"localise is {self.localise!r}; give 'newton' or 'bracket'"
+            )

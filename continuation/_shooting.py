@@ -1,0 +1,319 @@
+"""Multiple shooting: one segment a flight, the impact times among the unknowns.
+
+An orbit with m impacts is the list of its impacts: time t_k and state x_k just after
+each. With phi the free flight and H, R gap and law of the constraint that is hit,
+
+    H(t_{k+1}, phi(t_{k+1}; t_k, x_k)) = 0,
+    x_{k+1} = R(t_{k+1}, phi(t_{k+1}; t_k, x_k)),
+
+closed by t_{m+1} = t_1 + n T, x_{m+1} = x_1. Nothing in these equations divides by an
+impact speed, so they are as regular at grazing as elsewhere; they go on behind it, to
+motions through the constraint, which the monitors mark and the checks refuse.
+"""
+
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from jaxcam.hybrid import HybridSystem
+from jaxcam.hybrid._normal import gaps, impacts, normal_velocity
+from variational import saltation_matrix
+
+from ._admissible import DIP, dips, IMPACT, inadmissible, orbit_grazing
+from ._problem import AbstractProblem, Monitor, Stability, Start
+from ._shooting_flight import flight_end, flight_nodes
+
+
+class ImpactingOrbits(AbstractProblem):
+    """Periodic orbits of a hybrid system with a known sequence of impacts.
+
+    The unknowns are, for each impact, its phase (time in forcing periods) and the state
+    after it: shape `(m (1 + n),)`. Without impacts they are the state at time zero,
+    shape `(n,)`. For a system without forcing the first phase is zero, its place taken
+    by the period (s), and phases count periods of the orbit.
+
+    **Arguments:**
+
+    - `parameters`: the [`jaxcam.hybrid.HybridSystem`][].
+    - `constraints`: which constraint each impact hits, in order.
+    - `periods`: forcing periods until the orbit repeats; 0 for a system without
+      forcing.
+    - `dimension`: number of states n.
+    - `steps`: Runge-Kutta steps of order eight in each flight.
+    """
+
+    stability: ClassVar[Stability] = "map"
+
+    parameters: HybridSystem
+    constraints: tuple[int, ...] = eqx.field(static=True)
+    periods: int = eqx.field(static=True)
+    dimension: int = eqx.field(static=True)
+    steps: int = eqx.field(static=True, default=32)
+
+    def __check_init__(self):
+        if self.periods == 0 and not self.constraints:
+            raise ValueError(
+                "an orbit without forcing and without impacts has no section to be "
+                "found on; follow it as a smooth boundary value problem"
+            )
+
+    # -- the equations
+
+    def residual(self, u, parameters) -> Float[Array, " n"]:
+        if not self.constraints:
+            end = self.period(u, parameters)
+            start = jnp.zeros_like(end)
+            return flight_end(parameters, start, u, end, steps=self.steps) - u
+        return self._defects(parameters, *self.segments(u, parameters))
+
+    def linearisation(self, u, parameters, jacobian) -> Float[Array, "k k"]:
+        """The monodromy matrix, of the state just after the first impact.
+
+        Without forcing, that of the return map to the constraint.
+        """
+        if not self.constraints:
+            return jacobian + jnp.eye(self.dimension)
+        matrix = self.monodromy(u, parameters)
+        if self.periods:
+            return matrix
+        starts, _ = self.segments(u, parameters)
+        t, x = starts[0, 0], starts[0, 1:]
+        which = self.constraints[0]
+        normal = jax.grad(lambda y: gaps(parameters, t, y)[which])(x)
+        along = parameters.vector_field(t, x)
+        along = along / jnp.dot(normal, along)
+        basis = jnp.linalg.qr(normal[:, None], mode="complete")[0][:, 1:]
+        moved = matrix @ basis
+        return basis.T @ (moved - along[:, None] * (normal @ moved)[None, :])
+
+    @property
+    def normal_forms(self) -> bool:
+        return False
+
+    def period(self, u, parameters) -> Float[Array, ""]:
+        """Period of the orbit (s)."""
+        if self.periods == 0:
+            return u[0]
+        return jnp.asarray(self.periods * parameters.period, dtype=jnp.float64)
+
+    def segments(self, u, parameters):
+        """Starts and ends of the flights: times (s) and states, two `(m, 1 + n)`."""
+        starts = u.reshape(len(self.constraints), 1 + self.dimension)
+        if self.periods == 0:
+            starts = starts.at[0, 0].set(0.0)
+        ends = self._next(starts).at[-1, 0].add(max(self.periods, 1))
+        unit = self.period(u, parameters) / max(self.periods, 1)
+        scale = jnp.ones(1 + self.dimension).at[0].set(unit)
+        return starts * scale[None, :], ends * scale[None, :]
+
+    def _next(self, rows, last=1.0):
+        """Each row replaced by the next; `last` multiplies the one that wraps."""
+        return jnp.concatenate([rows[1:], last * rows[:1]])
+
+    def _arrivals(self, parameters, starts, ends):
+        """States before the impacts, shape `(m, n)`."""
+        return jax.vmap(
+            lambda a, b: flight_end(parameters, a[0], a[1:], b[0], steps=self.steps)
+        )(starts, ends)
+
+    def _hit(self):
+        """Index of the constraint that ends each flight."""
+        return jnp.asarray(self.constraints[1:] + self.constraints[:1])
+
+    def _defects(self, parameters, starts, ends):
+        before = self._arrivals(parameters, starts, ends)
+
+        def one(end, x, which):
+            gap = gaps(parameters, end[0], x)[which]
+            after = impacts(parameters, end[0], x)[which]
+            return jnp.concatenate([gap[None], end[1:] - after])
+
+        return jax.vmap(one)(ends, before, self._hit()).reshape(-1)
+
+    def monodromy(self, u, parameters, first: int = 0) -> Float[Array, "n n"]:
+        """Derivative of the state one period after impact `first` by that there."""
+        matrix = jnp.eye(self.dimension)
+        factors = self._factors(u, parameters)
+        for k in range(len(self.constraints)):
+            matrix = factors[(first + k) % len(self.constraints)] @ matrix
+        return matrix
+
+    def _factors(self, u, parameters) -> Float[Array, "m n n"]:
+        """Saltation after flight, for each segment."""
+        starts, ends = self.segments(u, parameters)
+
+        def one(start, end, which):
+            def fly(x):
+                y = flight_end(parameters, start[0], x, end[0], steps=self.steps)
+                return y, y
+
+            flown, before = jax.jacfwd(fly, has_aux=True)(start[1:])
+            return saltation_matrix(parameters, end[0], before, which) @ flown
+
+        return jax.vmap(one)(starts, ends, self._hit())
+
+    def antiperiodic(self, u, parameters) -> Float[Array, "u u"]:
+        """Derivative of the equations for a deviation that changes sign each period.
+
+        It is singular at a flip, where its null vector is the deviation of the doubled
+        orbit. The first column belongs to the first phase, also without forcing.
+        """
+        if not self.constraints:
+            return self.linearisation(u, parameters, self.jacobian(u, parameters)) + (
+                jnp.eye(self.dimension)
+            )
+        starts, ends = self.segments(u, parameters)
+        unit = self.period(u, parameters) / max(self.periods, 1)
+        scale = jnp.ones(1 + self.dimension).at[0].set(unit)[None, :]
+
+        def along(flat):
+            rows = flat.reshape(starts.shape) * scale
+            return jax.jvp(
+                lambda a, b: self._defects(parameters, a, b),
+                (starts, ends),
+                (rows, self._next(rows, last=-1.0)),
+            )[1]
+
+        return jax.jacfwd(along)(jnp.zeros_like(u))
+
+    # -- what to watch
+
+    def speeds(self, u, parameters) -> Float[Array, " m"]:
+        """Approach speed of each impact, positive where it is physical."""
+        starts, ends = self.segments(u, parameters)
+        before = self._arrivals(parameters, starts, ends)
+        found = jax.vmap(
+            lambda end, x, which: -normal_velocity(parameters, end[0], x)[which]
+        )(ends, before, self._hit())
+        # the flight of row k ends in impact k + 1
+        return jnp.roll(found, 1)
+
+    def flights(self, u, parameters):
+        """Starts `(m, 1 + n)` and end times `(m,)` of all flights."""
+        if self.constraints:
+            starts, ends = self.segments(u, parameters)
+            return starts, ends[:, 0]
+        start = jnp.concatenate([jnp.zeros(1), u])
+        return start[None], self.period(u, parameters)[None]
+
+    def monitor(self, u, parameters) -> dict[str, Float[Array, ""]]:
+        starts, ends = self.flights(u, parameters)
+        lowest = dips(
+            parameters, starts, ends, self.steps, whole_turn=not self.constraints
+        )
+        found = {f"{DIP} {k}": lowest[k] for k in range(lowest.shape[0])}
+        if self.constraints:
+            speeds = self.speeds(u, parameters)
+            found |= {f"{IMPACT} {k}": speeds[k] for k in range(len(self.constraints))}
+        return found
+
+    def monitors(self) -> Mapping[str, Monitor]:
+        m = len(self.constraints)
+        names = [f"{DIP} {k}" for k in range(max(m, 1))]
+        names += [f"{IMPACT} {k}" for k in range(m)]
+        return {name: Monitor(kind="grazing", ends=True) for name in names}
+
+    def observe(self, u, parameters) -> dict[str, Array]:
+        """Period (s); time (s) and state after the first impact; integration error;
+        with forcing, the states at whole forcing periods, `(periods, n)`."""
+        starts, ends = self.flights(u, parameters)
+        wrong = jax.vmap(
+            lambda a, b: flight_nodes(parameters, a[0], a[1:], b, self.steps)[2]
+        )(starts, ends)
+        found = {
+            "period": self.period(u, parameters),
+            "time": starts[0, 0],
+            "state": starts[0, 1:],
+            "integration error": jnp.max(wrong),
+        }
+        if self.periods:
+            found["stroboscopic"] = self.stroboscopic(u, parameters)
+        return found
+
+    def stroboscopic(self, u, parameters) -> Float[Array, "periods n"]:
+        """States at time zero and each forcing period after it."""
+        starts, _ = self.flights(u, parameters)
+        length = self.period(u, parameters)
+
+        def at(time):
+            ago = jnp.mod(time - starts[:, 0], length)
+            last = jnp.argmin(ago)
+            begin = starts[last, 0]
+            return flight_end(
+                parameters, begin, starts[last, 1:], begin + ago[last], steps=self.steps
+            )
+
+        times = jnp.arange(self.periods, dtype=jnp.float64) * length / self.periods
+        return jax.vmap(at)(times)
+
+    # -- between compiled programs
+
+    def check(self, point: Any) -> str | None:
+        return inadmissible(self, point)
+
+    def transition(self, point: Any) -> Start | None:
+        return orbit_grazing(self, point)
+
+    def doubled(self, point: Any, direction) -> Start | None:
+        del direction
+        u = jnp.asarray(point.state)
+        parameters = point.problem.parameters
+        matrix = np.asarray(_antiperiodic(self, u, parameters))
+        deviation = np.linalg.svd(matrix)[2][-1]
+        state, tangent = _twice(self, np.asarray(point.state), deviation)
+        twice = ImpactingOrbits(
+            parameters,
+            2 * self.constraints,
+            2 * self.periods,
+            self.dimension,
+            self.steps if self.constraints else 2 * self.steps,
+        )
+        return Start(twice, state, float(point.parameter), np.append(tangent, 0.0))
+
+    @property
+    def signature(self) -> str:
+        hits = ".".join(map(str, self.constraints)) or "-"
+        return f"impacts {hits} periods {self.periods} steps {self.steps}"
+
+    def with_signature(self, signature: str) -> "ImpactingOrbits":
+        words = signature.split()
+        if words[0::2] != ["impacts", "periods", "steps"]:
+            raise ValueError(
+                f"the saved branch has signature {signature!r}, which is no sequence "
+                "of impacts; take it up with the problem it was made with"
+            )
+        hits = () if words[1] == "-" else tuple(map(int, words[1].split(".")))
+        periods, steps = int(words[3]), int(words[5])
+        return ImpactingOrbits(self.parameters, hits, periods, self.dimension, steps)
+
+
+@eqx.filter_jit
+def _antiperiodic(problem: ImpactingOrbits, u, parameters):
+    return problem.antiperiodic(u, parameters)
+
+
+def _twice(problem: ImpactingOrbits, u, deviation):
+    """State and tangent of the orbit run through twice, deviating with each sign."""
+    if not problem.constraints:
+        # the state at time zero only
+        return u, deviation
+    shape = (len(problem.constraints), 1 + problem.dimension)
+    first, moved = u.reshape(shape).copy(), deviation.reshape(shape).copy()
+    change = np.concatenate([moved, -moved])
+    if problem.periods:
+        second = first + np.eye(1, shape[1]) * problem.periods
+        return np.concatenate([first, second]).ravel(), change.ravel()
+    period, first[0, 0] = first[0, 0], 0.0
+    second = first + np.eye(1, shape[1])
+    rows = np.concatenate([first, second])
+    # time counts from the first impact, which must not move
+    change[:, 0] -= change[0, 0]
+    rows[:, 0] /= 2
+    change[:, 0] /= 2
+    rows[0, 0] = 2 * period
+    return rows.ravel(), change.ravel()

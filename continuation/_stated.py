@@ -1,0 +1,16 @@
+"""What may be handed to `follow` instead of a problem."""
+
+from typing import Any
+
+from ._problem import AbstractProblem
+
+
+def stated(problem: Any, start: Any) -> tuple[AbstractProblem, Any]:
+    """The problem and its start, where a system and an orbit of it may be given."""
+    if isinstance(problem, AbstractProblem):
+        return problem, start
+    # the core knows nothing of impacts unless it is given a system that has them
+    from ._periodic import start_of
+
+    begun = start_of(problem, start)
+    return begun.problem, begun

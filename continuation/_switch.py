@@ -1,0 +1,131 @@
+"""Branches that leave a special point."""
+
+from collections.abc import Callable
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from ._algorithms import AbstractAlgorithm
+from ._branch import branch
+from ._multilinear import second
+from ._normal_forms import null_vectors
+from ._parameter import pick, with_leaf
+from ._point import Branch, Point
+from ._problem import AbstractProblem, Start
+from ._program import evaluate
+from ._settings import Settings
+from ._test_functions import BRANCH_POINT, FLIP, HOPF
+
+
+def emanating(
+    point: Point, where: Callable[[Any], Any], width: float = 1.0
+) -> tuple[Start, ...]:
+    """Where to begin the branches that leave a special point, besides its own.
+
+    From a branch point: both halves of the other branch, whose direction solves the
+    algebraic branching equation (3.37). From a flip: the doubled orbit. From a Hopf
+    point of an [`continuation.Equilibrium`][]: the limit cycle.
+
+    **Arguments:** `width`: of the bounds of the parameter, the unit of its directions.
+
+    **Raises:** `ValueError` for a point from which no branch is known to leave.
+    """
+    problem = point.problem
+    if problem is None:
+        raise ValueError(
+            "this point carries no problem; read its file with load(path, problem)"
+        )
+    leaf, _ = pick(where, problem.parameters)
+    if point.kind == BRANCH_POINT:
+        direction = other_direction(problem, leaf, point, width)
+        return tuple(
+            Start(problem, point.state, point.parameter, sign * direction)
+            for sign in (1.0, -1.0)
+        )
+    start = None
+    if point.kind in (FLIP, HOPF):
+        z = np.append(point.state, point.parameter)
+        at = evaluate(problem, leaf, z, point.tangent, width)
+        if point.kind == FLIP:
+            one = np.eye(at.linearisation.shape[0])
+            right, _ = null_vectors(at.linearisation + one)
+            start = problem.doubled(point, right)
+        else:
+            start = problem.cycle(point, at.linearisation)
+    if start is None:
+        raise ValueError(
+            f"no branch is known to leave a {point.kind or 'regular'} point of this "
+            "problem; branches leave branch points, flips and Hopf points"
+        )
+    return (start,)
+
+
+def switch(
+    point: Point,
+    where: Callable[[Any], Any],
+    bounds: tuple[float, float],
+    algorithm: AbstractAlgorithm | None = None,
+    *,
+    settings: Settings | None = None,
+) -> tuple[Branch, ...]:
+    """Follow all branches that leave a special point, besides its own.
+
+    **Arguments:** `point`: a branch point, a flip or a Hopf point of a branch; the rest
+    as of [`continuation.follow`][].
+
+    **Returns:** two branches from a branch point, one from a flip or a Hopf point.
+
+    **Raises:** `ValueError` for a point from which no branch is known to leave.
+    """
+    starts = emanating(point, where, float(bounds[1] - bounds[0]))
+    return tuple(
+        branch(start.problem, start, where, bounds, algorithm, settings=settings)
+        for start in starts
+    )
+
+
+@eqx.filter_jit
+def _quadratic(problem: AbstractProblem, leaf: int, z, basis, left):
+    """left . B(basis_i, basis_j) of G(u, parameter)."""
+
+    def g(z, _):
+        return problem.residual(z[:-1], with_leaf(problem.parameters, leaf, z[-1]))
+
+    def entry(a, b):
+        return jnp.dot(left, second(g, z, None, a, b))
+
+    return jax.vmap(lambda a: jax.vmap(lambda b: entry(a, b))(basis))(basis)
+
+
+def other_direction(
+    problem: AbstractProblem, leaf: int, point: Point, width: float
+) -> np.ndarray:
+    """(n+1,) direction of the branch that crosses at a simple branch point, (3.37)."""
+    z = np.append(point.state, point.parameter)
+    at = evaluate(problem, leaf, z, point.tangent, width)
+    left, _, rows = np.linalg.svd(at.jacobian * at.scale[None, :])
+    basis = rows[-2:]
+    form = np.asarray(
+        _quadratic(
+            problem, leaf, jnp.asarray(z), jnp.asarray(basis * at.scale),
+            jnp.asarray(left[:, -1]),
+        )
+    )  # fmt: skip
+    # a quadratic form in two variables is zero on two lines where it is indefinite
+    sizes, axes = np.linalg.eigh((form + form.T) / 2)
+    if not sizes[0] < 0 < sizes[1]:
+        raise ValueError(
+            f"the algebraic branching equation at {point.parameter:g} has no second "
+            "real root: the point is isolated, or of higher order"
+        )
+    one, two = np.sqrt(sizes[1]), np.sqrt(-sizes[0])
+    lines = [
+        (one * axes[:, 0] + sign * two * axes[:, 1]) @ basis for sign in (1.0, -1.0)
+    ]
+    known = point.tangent / at.scale
+    known = known / np.linalg.norm(known)
+    other = min(lines, key=lambda v: abs(v @ known) / np.linalg.norm(v))
+    return other / np.linalg.norm(other) * at.scale

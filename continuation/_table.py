@@ -1,0 +1,84 @@
+"""A table of points on the screen."""
+
+import numpy as np
+import rich.console
+import rich.table
+
+from ._point import Branch, Point
+
+
+# what AUTO calls them
+_SHORT = {
+    "start": "EP",
+    "end": "EP",
+    "regular": "",
+    "fold": "LP",
+    "branch point": "BP",
+    "flip": "PD",
+    "Neimark-Sacker": "TR",
+    "Hopf": "HB",
+}
+
+
+def table(branch: Branch, *, every: int = 0, components: int = 3) -> rich.table.Table:
+    """Special points, ends and every so manieth ordinary point of a branch.
+
+    **Arguments:**
+
+    - `every`: show each ordinary point whose label it divides; 0 shows none.
+    - `components`: how many of the state.
+
+    **Returns:** a table that `rich.print` shows.
+    """
+    found = rich.table.Table()
+    names = branch.names or (branch.name,)
+    n = min(components, max((p.state.size for p in branch.points), default=0))
+    heads = _heads(names, n)
+    for head in heads:
+        found.add_column(head, justify="right" if head != "type" else "left")
+    for point in branch.points:
+        if point.kind != "regular" or (every and point.label % every == 0):
+            found.add_row(*_row(point, len(names), n))
+    return found
+
+
+def _heads(names: tuple[str, ...], n: int) -> list[str]:
+    return ["label", "type", *names, "|u|", *[f"u{i + 1}" for i in range(n)], "stable"]
+
+
+def _row(point: Point, parameters: int, n: int) -> list[str]:
+    kind = _SHORT.get(point.kind, point.kind)
+    if not point.converged:
+        kind += " (not converged)"
+    stable = {True: "yes", False: "no", None: ""}[point.stable]
+    values = point.parameters[-parameters:] or (point.parameter,)
+    state = [f"{x:.6g}" for x in point.state[:n]]
+    return [
+        str(point.label),
+        kind,
+        *[f"{x:.9g}" for x in values],
+        f"{np.linalg.norm(point.state):.6g}",
+        *state,
+        *[""] * (n - len(state)),
+        stable,
+    ]
+
+
+class Progress:
+    """A callback that prints a line for each point that is worth one.
+
+    **Arguments:** `every`: also each ordinary point whose label it divides.
+    """
+
+    def __init__(self, every: int = 0, console: rich.console.Console | None = None):
+        self.every = every
+        self.console = rich.console.Console() if console is None else console
+
+    def __call__(self, point: Point) -> None:
+        ordinary = point.kind == "regular"
+        if ordinary and not (self.every and point.label % self.every == 0):
+            return
+        kind = _SHORT.get(point.kind, point.kind)
+        values = "  ".join(f"{x:.9g}" for x in point.parameters)
+        words = point.reason or point.criticality
+        self.console.print(f"{point.label:6d}  {kind:4s}  {values}  {words}".rstrip())
