@@ -6,8 +6,11 @@ from typing import Annotated
 
 import typer
 
+from ._continue import continue_
 from ._demo import demo
 from ._errors import INTERRUPTED, one_sentence
+from ._fit import fit
+from ._reproduce import reproduce
 from ._simulate import simulate
 
 
@@ -20,7 +23,10 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 app.command()(one_sentence(simulate))
+app.command("continue")(one_sentence(continue_))
 app.command()(one_sentence(demo))
+app.command()(one_sentence(fit))
+app.command()(one_sentence(reproduce))
 
 
 def _version(wanted: bool) -> None:

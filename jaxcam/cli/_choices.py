@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterable
+from pathlib import Path
 from typing import NamedTuple
 
 from ..hybrid import HybridSystem
@@ -42,8 +43,23 @@ def choose(option: str, name: str, known: Iterable[str]) -> str:
     return name
 
 
-def make_system(name: str, preset: str | None, rpm: float | None) -> HybridSystem:
+def saved_name(file: Path) -> str:
+    """The name of the system in a file. **Raises:** `ValueError` for another one."""
+    from ..models import load_system
+
+    model = type(load_system(file)).__name__
+    for name, ready in SYSTEMS.items():
+        if ready.model == model:
+            return name
+    raise ValueError(f"{file}: it holds a {model}, which no command line knows.")
+
+
+def make_system(
+    name: str, preset: str | None, rpm: float | None, saved: Path | None = None
+) -> HybridSystem:
     """A ready system; `preset` and a speed in rpm are for the cam-follower alone.
+
+    **Arguments:** `saved` is a file with the system, as `jaxcam fit --json` writes it.
 
     **Raises:** `ValueError` that names the fix.
     """
@@ -59,8 +75,15 @@ def make_system(name: str, preset: str | None, rpm: float | None) -> HybridSyste
                     f"{option} belongs to {CAM}; leave it out, and use --set for the "
                     f"parameters of {name}."
                 )
+        if saved is not None:
+            return models.load_system(saved)
         return getattr(models, SYSTEMS[name].model)()
-    system = models.CamFollower() if preset is None else models.preset(preset)
+    if saved is not None and preset is not None:
+        raise ValueError("Give --system or --preset, not both.")
+    if saved is not None:
+        system = models.load_system(saved)
+    else:
+        system = models.CamFollower() if preset is None else models.preset(preset)
     if rpm is not None:
         if not 0 < rpm < math.inf:
             raise ValueError(f"--speed is {rpm:g} rpm; give a positive number.")

@@ -6,16 +6,31 @@ from typing import Annotated, Any
 
 import typer
 
-from ._choices import CAM, choose, ENGINES, make_solver, make_system, SOLVERS, SYSTEMS
+from ._choices import (
+    CAM,
+    choose,
+    ENGINES,
+    make_solver,
+    make_system,
+    saved_name,
+    SOLVERS,
+    SYSTEMS,
+)
 
 
 def simulate(
     system: Annotated[
         str, typer.Argument(metavar="SYSTEM", help=f"One of {', '.join(SYSTEMS)}.")
     ] = CAM,
+    saved: Annotated[
+        Path | None,
+        typer.Option(
+            "--system", metavar="FILE", help="A system that `jaxcam fit` has written."
+        ),
+    ] = None,
     preset: Annotated[
         str | None,
-        typer.Option(metavar="NAME", help="Parameters of the cam-follower: table-4.4."),
+        typer.Option(metavar="NAME", help="The cam-follower: table-4.4 or calibrated."),
     ] = None,
     speed: Annotated[
         float | None, typer.Option(metavar="RPM", help="Speed of the cam in rpm.")
@@ -80,6 +95,8 @@ def simulate(
       jaxcam simulate bouncing-ball --set restitution=0.5 --state 2,0 --t1 3
       jaxcam simulate impact-oscillator --set omega=2.6 --out ./jaxcam-oscillator
     """
+    if saved is not None:
+        system = saved_name(saved)
     choose("SYSTEM", system, SYSTEMS)
     choose("--solver", solver, SOLVERS)
     implicit = solver.startswith("kvaerno")
@@ -96,7 +113,7 @@ def simulate(
 
     keep_compiled_programs()
     start = _state(system, state)
-    model = set_parameters(make_system(system, preset, speed), set_ or ())
+    model = set_parameters(make_system(system, preset, speed, saved), set_ or ())
     end = _end(system, model, t0, t1, turns)
     output = Output(json_file, out)
     with progress("compiling (the first run of a system takes longest)") as report:

@@ -12,6 +12,12 @@ from ._restitution import (
     LinearInSpeed as LinearInSpeed,
     PowerLawRestitution as PowerLawRestitution,
 )
+from ._saved import (
+    load_system as load_system,
+    save_system as save_system,
+    system_from_json as system_from_json,
+    system_to_json as system_to_json,
+)
 from ._spline_profile import (
     PiecewiseProfile as PiecewiseProfile,
     SplineProfile as SplineProfile,

@@ -1,0 +1,102 @@
+"""Tables and figures of `jaxcam fit`."""
+
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+from rich.table import Table
+
+
+matplotlib.use("Agg")
+
+from ..fitting import Bootstrap, Fit, Problem, residuals
+from ..plotting._style import CONTACT, FLIGHT
+
+
+def parameter_table(problem: Problem, found: Fit, again: Bootstrap | None) -> Table:
+    """Nominal and fitted values with their errors."""
+    table = Table(title="Parameters")
+    table.add_column("parameter", no_wrap=True)
+    headings = ["nominal", "tolerance", "fitted", "stderr"]
+    if again is not None:
+        headings.append("redrawn")
+    for heading in headings:
+        table.add_column(heading, justify="right", no_wrap=True)
+    for k, one in enumerate(found.estimates):
+        parameter = problem.parameter(one.name)
+        nominal = float(problem.start.values[0, problem.names.index(one.name)])
+        cells = [
+            f"{nominal:.4g}",
+            f"{parameter.tolerance:.2g}",
+            f"{one.value:.6g}",
+            f"{one.stderr:.1e}",
+        ]
+        if again is not None:
+            cells.append(f"{again.stderr[k]:.1e}")
+        label = ", ".join(part for part in (one.unit, one.record) if part)
+        table.add_row(f"{one.name} ({label})" if label else one.name, *cells)
+    return table
+
+
+def correlation_table(found: Fit) -> Table:
+    """The strongest correlations, which say what cannot be told apart."""
+    table = Table(title="Strongest correlations")
+    for heading in ("one", "other"):
+        table.add_column(heading, no_wrap=True)
+    table.add_column("correlation", justify="right")
+    names = [one.name for one in found.estimates]
+    pairs = [
+        (abs(found.correlation[i, k]), found.correlation[i, k], names[i], names[k])
+        for i in range(len(names))
+        for k in range(i)
+    ]
+    for _, value, one, other in sorted(pairs, reverse=True)[:6]:
+        table.add_row(one, other, f"{value:+.4f}")
+    return table
+
+
+def draw(folder: Path, before: Fit, after: Fit) -> list[Path]:
+    """Residuals of each record before and after the fit, and against the cam."""
+    import matplotlib.pyplot as plt
+
+    from ..plotting import save_figure, style
+
+    with style():
+        return _draw(plt, save_figure, folder, before, after)
+
+
+def _draw(plt, save_figure, folder, before, after) -> list[Path]:
+    pairs = list(zip(residuals(before), residuals(after)))
+    files = []
+    for name, sideways in (("time", False), ("phase", True)):
+        figure, axes = plt.subplots(
+            len(pairs), 2, figsize=(9, 1.6 * len(pairs) + 0.8), squeeze=False
+        )
+        for row, both in zip(axes, pairs):
+            for axis, part, when in zip(row, both, ("nominal", "fitted")):
+                x = part.turned % (2 * np.pi) if sideways else part.time
+                for resting, color, label in (
+                    (False, FLIGHT, "flight"),
+                    (True, CONTACT, "contact"),
+                ):
+                    keep = part.resting == resting
+                    axis.plot(
+                        x[keep],
+                        part.value[keep] * 1e3,
+                        ".",
+                        ms=1,
+                        color=color,
+                        label=label,
+                        rasterized=True,
+                    )
+                axis.axhspan(
+                    -2e3 * part.noise, 2e3 * part.noise, color="0.5", alpha=0.25, lw=0
+                )
+                axis.set_title(f"{part.record}: {when}", fontsize=8)
+            row[0].set_ylabel("residual (mrad)", fontsize=8)
+        unit = "cam angle in its turn (rad)" if sideways else "time (s)"
+        for axis in axes[-1]:
+            axis.set_xlabel(unit)
+        axes[0, 0].legend(markerscale=6, fontsize=7)
+        files.append(save_figure(figure, folder / f"residuals_{name}.png"))
+    return files

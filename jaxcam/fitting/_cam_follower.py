@@ -1,0 +1,98 @@
+"""The cam-follower rig as a problem: its parameters, tolerances and sensors."""
+
+import math
+from collections.abc import Sequence
+
+from ..recordings import Rig
+from ._model import cam_follower_drive, Model, Sensor
+from ._parameter import Parameter
+
+
+def cam_follower_model(
+    rig: Rig, channels: Sequence[str] = ("follower_angle_rad",)
+) -> Model:
+    """The nominal rig with its sensors; the drive follows the cam's encoder.
+
+    **Arguments:** channels to fit: `follower_angle_rad`, `gyro_rad_s`.
+
+    **Raises:** `ValueError` for another channel, or a gyro that the rig does not have.
+    """
+    known = rig_sensors(rig)
+    for channel in channels:
+        if channel not in known:
+            raise ValueError(
+                f"The rig has no sensor for `{channel}`; it has {', '.join(known)}."
+            )
+    system = rig.system(1.0)
+    return Model(system, {c: known[c] for c in channels}, cam_follower_drive())
+
+
+def rig_sensors(rig: Rig) -> dict[str, Sensor]:
+    """Sensors of the follower, by channel, as the rig file states them."""
+    sensors = rig.sensors
+    found = {
+        "follower_angle_rad": Sensor(
+            0,
+            noise=sensors.follower_noise,
+            resolution=2 * math.pi / sensors.follower_counts_per_turn,
+        )
+    }
+    if sensors.gyro is not None:
+        gyro = sensors.gyro
+        found["gyro_rad_s"] = Sensor(
+            1,
+            noise=gyro.noise_rad_s,
+            limit=gyro.range_rad_s,
+            bandwidth_hz=gyro.bandwidth_hz,
+        )
+    return found
+
+
+def cam_follower_parameters(rig: Rig, base=lambda system: system) -> list[Parameter]:
+    """What recordings of the rig can tell: K (as K/J), the spring, the cam, r.
+
+    The inertia is held, since only K/J acts; so is the follower's half height in the
+    profile, since only its sum with the cam's radius does.
+
+    **Arguments:** `base` picks the `CamFollower` out of a system that wraps it.
+    """
+    half = rig.follower_half_height.tolerance
+    table = (
+        ("stiffness", lambda s: s.stiffness, rig.spring_stiffness.tolerance, "N/m"),
+        ("spring_hook_x", lambda s: s.spring_hook_x, rig.spring_hook_x.tolerance, "m"),
+        (
+            "spring_elongation",
+            lambda s: s.spring_elongation,
+            rig.spring_elongation.tolerance,
+            "m",
+        ),
+        ("spring_half_height", lambda s: s.spring_half_height, half, "m"),
+        (
+            "cam_radius",
+            lambda s: s.profile.radius,
+            math.hypot(rig.cam_radius.tolerance, half),
+            "m",
+        ),
+        (
+            "cam_eccentricity",
+            lambda s: s.profile.eccentricity,
+            rig.cam_eccentricity.tolerance,
+            "m",
+        ),
+        ("cam_center_x", lambda s: s.profile.center_x, rig.cam_center_x.tolerance, "m"),
+        ("cam_center_y", lambda s: s.profile.center_y, rig.cam_center_y.tolerance, "m"),
+        ("restitution", lambda s: s.restitution.r, rig.restitution.tolerance, ""),
+    )
+    return [
+        Parameter(
+            name,
+            lambda m, where=where: where(base(m.system)),
+            tolerance=tolerance,
+            lower=0.0 if name == "restitution" else -math.inf,
+            upper=1.0 if name == "restitution" else math.inf,
+            unit=unit,
+        )
+        for name, where, tolerance, unit in table
+        # a quantity without tolerance is known
+        if tolerance > 0
+    ]

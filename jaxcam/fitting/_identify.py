@@ -1,0 +1,146 @@
+"""What the data can and cannot tell of the parameters, before any fit, in words."""
+
+import dataclasses
+from collections.abc import Iterable
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from ._fit import Fit, fit, free_columns, reduced
+from ._linearise import assemble
+from ._problem import Problem
+
+
+# a combination is seen if the data narrow it to this part of the tolerance
+_SEEN = 0.5
+# members of a combination that are named: at least this part of the largest
+_MEMBER = 0.15
+
+
+@dataclasses.dataclass(frozen=True)
+class Identifiability:
+    """Which combinations of parameters the data see, best first.
+
+    - `names`: parameters, as in the columns of `directions` `(g, g)`: one combination a
+        row, each parameter in units of its scale (its tolerance).
+    - `stderr`: error of each combination from the data alone, in the same units.
+    - `alone`: error of each parameter from the data alone if all others were known, and
+        `together` if none is, in units of the scale.
+    """
+
+    names: tuple[str, ...]
+    directions: Float[np.ndarray, "g g"]
+    stderr: Float[np.ndarray, " g"]
+    alone: Float[np.ndarray, " g"]
+    together: Float[np.ndarray, " g"]
+
+    @property
+    def seen(self) -> int:
+        """Number of combinations that the data narrow below half their tolerance."""
+        return int(np.sum(self.stderr < _SEEN))
+
+    def sentences(self) -> list[str]:
+        """The report, one fact a sentence."""
+        total = len(self.names)
+        if not total:
+            return ["Nothing is to be fitted."]
+        found = [
+            f"The data see {self.seen} of {total} combinations of parameters better "
+            f"than the tolerances do."
+        ]
+        dead = [n for n, a in zip(self.names, self.alone) if not np.isfinite(a)]
+        if dead:
+            found.append(
+                f"They do not depend on {_listed(dead)} at all: hold "
+                f"{'it' if len(dead) == 1 else 'them'}."
+            )
+        alone = [
+            n
+            for n, a, t in zip(self.names, self.alone, self.together)
+            if t < _SEEN and np.isfinite(a)
+        ]
+        if alone:
+            found.append(f"Each by itself can be told: {_listed(alone)}.")
+        for stderr, direction in zip(self.stderr[::-1], self.directions[::-1]):
+            members = self._members(direction)
+            if stderr < _SEEN or not members or set(members) <= set(dead):
+                continue
+            found.append(self._unseen(stderr, direction, members))
+        return found
+
+    def _members(self, direction) -> list[str]:
+        large = np.max(np.abs(direction))
+        order = np.argsort(-np.abs(direction))
+        return [self.names[k] for k in order if abs(direction[k]) >= _MEMBER * large]
+
+    def _unseen(self, stderr, direction, members) -> str:
+        if len(members) == 1:
+            return (
+                f"The data say less of {members[0]} than its tolerance does, so the "
+                f"tolerance decides."
+            )
+        shares = {self.names[k]: direction[k] for k in range(len(self.names))}
+        sign = np.sign(shares[members[0]])
+        up = [n for n in members if shares[n] * sign > 0]
+        down = [n for n in members if shares[n] * sign < 0]
+        what = f"raising {_listed(up)} together"
+        if len(up) == 1:
+            what = f"raising {up[0]}"
+        if down:
+            what += f" while lowering {_listed(down)}"
+        ratio = " (only their ratio acts)" if len(up) == 1 == len(down) else ""
+        if len(members) == 2 and not down:
+            ratio = " (only their difference acts)"
+        return (
+            f"The data hardly notice {what}{ratio}: this combination is left to the "
+            f"tolerances."
+        )
+
+
+def identify(
+    problem: Problem, names: Iterable[str] | None = None, at: Fit | None = None
+) -> Identifiability:
+    """What the recordings can tell of some parameters, without fitting them.
+
+    The Fisher information at the nominal parameters, the states of all pieces
+    eliminated: its large eigenvalues belong to what the data see, its small ones to
+    what only the tolerances say.
+
+    **Arguments:** `at` is where to look, by default the nominal parameters with the
+    states fitted.
+    """
+    columns = free_columns(problem, names)
+    at = at or fit(problem, free=())
+    blocks, _ = assemble(
+        problem.layout,
+        problem.pieces,
+        problem.extras,
+        at.point,
+        jnp.asarray(columns.local),
+        jnp.asarray(columns.scales),
+    )
+    information, _ = reduced(columns, blocks)
+    values, vectors = np.linalg.eigh(information)
+    # what rounding makes of zero is zero
+    floor = np.finfo(float).eps * len(values) * max(np.max(values, initial=0.0), 0.0)
+    values = np.where(values > floor, values, 0.0)[::-1]
+    directions = vectors.T[::-1]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        stderr = 1 / np.sqrt(values)
+        alone = 1 / np.sqrt(np.maximum(np.diag(information), 0.0))
+        spread = np.where(directions**2 > 1e-20, directions**2, 0.0)
+        weighted = np.where(spread > 0, spread * stderr[:, None] ** 2, 0.0)
+        together = np.sqrt(np.sum(weighted, axis=0))
+    labels = tuple(
+        problem.names[p] if r < 0 else f"{problem.names[p]}@{problem.records[r]}"
+        for p, r in zip(columns.parameter, columns.record)
+    )
+    return Identifiability(labels, directions, stderr, alone, together)
+
+
+def _listed(names) -> str:
+    names = list(names)
+    if len(names) == 1:
+        return names[0]
+    return f"{', '.join(names[:-1])} and {names[-1]}"

@@ -1,0 +1,103 @@
+"""How likely a sample is, with the derivatives that Fisher scoring needs."""
+
+import math
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jax.scipy.special import log_ndtr
+from jaxtyping import Array, Float
+
+from ._model import Sensor
+
+
+class Scored(NamedTuple):
+    """Of each sample, elementwise.
+
+    - `cost`: minus twice the logarithm of the likelihood, less a constant, so that a
+        sample of Gaussian noise costs one on average.
+    - `score`: derivative of the logarithm of the likelihood to the prediction.
+    - `information`: the expected square of the score.
+    """
+
+    cost: Float[Array, "..."]
+    score: Float[Array, "..."]
+    information: Float[Array, "..."]
+
+
+def score(sensor: Sensor, value, predicted) -> Scored:
+    """Likelihood of `value` where `predicted` is what a perfect sensor would show."""
+    found = _within(sensor, value, predicted)
+    if math.isinf(sensor.limit):
+        return found
+    # a saturated sample only says that the truth was beyond the limit
+    over = jnp.abs(value) >= sensor.limit - sensor.resolution / 2
+    censored = _beyond(sensor, value, predicted)
+    return Scored(*(jnp.where(over, c, w) for c, w in zip(censored, found)))
+
+
+def _within(sensor: Sensor, value, predicted) -> Scored:
+    off = value - predicted
+    if not math.isinf(sensor.tails):
+        # Student's distribution, of the width that noise and rounding have together
+        nu, variance = sensor.tails, sensor.floor**2
+        square = off * off / variance
+        return Scored(
+            (nu + 1) * jnp.log1p(square / nu),
+            (nu + 1) / (nu + square) * off / variance,
+            jnp.ones_like(off) * ((nu + 1) / (nu + 3) / variance),
+        )
+    if sensor.resolution == 0:
+        variance = sensor.noise**2
+        one = jnp.ones_like(off)
+        return Scored(off * off / variance, off / variance, one / variance)
+    return _rounded(sensor, off)
+
+
+def _rounded(sensor: Sensor, off) -> Scored:
+    """Noise first, then rounding: the probability of an interval.
+
+    With z = (off +- resolution / 2) / noise it is Phi(z_high) - Phi(z_low).
+    """
+    half = sensor.resolution / 2 / sensor.noise
+    # by symmetry in the lower tail, where differences keep their accuracy
+    z = -jnp.abs(off) / sensor.noise
+    high, low = log_ndtr(z + half), log_ndtr(z - half)
+    chance = high + jnp.log1p(-jnp.exp(low - high))
+    density = _log_density(z + half), _log_density(z - half)
+    pull = jnp.exp(density[1] - chance) - jnp.exp(density[0] - chance)
+    # the constant: half a sample of noise of the same variance costs nothing
+    variance = sensor.floor**2
+    constant = jnp.log(sensor.resolution**2 / (2 * jnp.pi * variance))
+    return Scored(
+        constant - 2 * chance,
+        -jnp.sign(off) * pull / sensor.noise,
+        jnp.ones_like(off) / variance,
+    )
+
+
+def _beyond(sensor: Sensor, value, predicted) -> Scored:
+    """The chance of a truth beyond the limit: Phi(z)."""
+    z = (jnp.sign(value) * predicted - sensor.limit) / sensor.noise
+    chance = log_ndtr(z)
+    ratio = jnp.exp(_log_density(z) - chance)
+    # curvature of the logarithm of Phi; its mean is the information
+    bend = ratio * (z + ratio)
+    return Scored(
+        -2 * chance,
+        jnp.sign(value) * ratio / sensor.noise,
+        jnp.clip(bend, 0.0, 1.0) / sensor.noise**2,
+    )
+
+
+def _log_density(z):
+    return -0.5 * z * z - 0.5 * jnp.log(2 * jnp.pi)
+
+
+def score_all(sensors, values, predicted) -> Scored:
+    """All channels, along the last axis."""
+    columns = [
+        score(sensor, values[..., k], predicted[..., k])
+        for k, sensor in enumerate(sensors)
+    ]
+    return jax.tree.map(lambda *parts: jnp.stack(parts, axis=-1), *columns)

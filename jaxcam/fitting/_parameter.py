@@ -1,0 +1,64 @@
+"""What is fitted, and what is known of it beforehand."""
+
+import dataclasses
+import math
+from collections.abc import Callable
+
+from jaxtyping import Array
+
+from ._model import Model
+
+
+@dataclasses.dataclass(frozen=True)
+class Parameter:
+    """One number of a model that may be fitted.
+
+    **Arguments:**
+
+    - `name`: for tables, and to free it.
+    - `where`: picks it out of a `Model`: `lambda m: m.system.stiffness`.
+    - `tolerance`: how far it may be from `nominal`, as a maker states it: plus or minus
+        so much, anything in between equally likely. The fit uses a Gaussian of the same
+        standard deviation, `tolerance / sqrt(3)`. Infinite: nothing is known.
+    - `nominal`: by default, the value that the model has.
+    - `scale`: size of a change that matters; by default the tolerance, or else a
+        hundredth of the value. It does not influence the result.
+    - `lower`, `upper`: bounds that hold whatever the data say.
+    - `per_record`: whether every record has a value of its own.
+    - `unit`: for tables.
+    """
+
+    name: str
+    where: Callable[[Model], Array]
+    tolerance: float = math.inf
+    nominal: float | None = None
+    scale: float | None = None
+    lower: float = -math.inf
+    upper: float = math.inf
+    per_record: bool = False
+    unit: str = ""
+
+    def __post_init__(self):
+        if not self.tolerance > 0:
+            raise ValueError(
+                f"The parameter {self.name!r} has the tolerance {self.tolerance:g}; "
+                f"give a positive one, or leave the parameter out to hold it."
+            )
+        if not self.lower < self.upper:
+            raise ValueError(
+                f"The bounds of {self.name!r} are {self.lower:g} and {self.upper:g}; "
+                f"the lower one must be below the upper one."
+            )
+
+    @property
+    def prior_stderr(self) -> float:
+        """Standard deviation of what is known beforehand."""
+        return self.tolerance / math.sqrt(3.0)
+
+    def size(self, value: float) -> float:
+        """A change that matters, positive."""
+        if self.scale is not None:
+            return self.scale
+        if math.isfinite(self.tolerance):
+            return self.tolerance
+        return 0.01 * abs(value) if value else 1.0

@@ -1,0 +1,226 @@
+"""Recordings cut into short pieces, as arrays for a compiled program."""
+
+import dataclasses
+from collections.abc import Sequence
+
+import equinox as eqx
+import numpy as np
+from jaxtyping import Array, Bool, Float, Int
+from scipy.signal import savgol_coeffs
+
+from ..recordings import RecordingError, Segments
+
+
+# A piece has at most so many samples: long enough for its own initial state, short
+# beside the time over which impacts magnify an error
+_PIECE = 100
+# A flight with fewer samples than this tells nothing
+_LEAST = 8
+# what precedes a piece
+FREE, FLIGHT, IMPACT = 0, 1, 2
+# Half-width (samples) of the search for the time of an impact about the recorded one
+_REACH = 20.0
+
+
+class Samples(eqx.Module):
+    """Samples of `k` pieces of each of `r` records, sorted into steps.
+
+    Every piece is `n` steps of equal length; a step holds up to `m` samples of `c`
+    channels. `place` is where in its step (0 to 1) a sample is.
+    """
+
+    start: Float[Array, "r k"]
+    step: Float[Array, "r k"]
+    place: Float[Array, "r k n m"]
+    value: Float[Array, "r k n m c"]
+    known: Bool[Array, "r k n m c"]
+
+
+class Pieces(eqx.Module):
+    """Everything of some records that a fit needs.
+
+    - `flown`, `rested`: samples in flight and in contact.
+    - `joint`: what comes before each piece of flight: nothing, flight, or an impact.
+    - `exists`: false where padded. `angle`, `rate` `(r, k, n)`: the drive in the middle
+        of each step; `angle_at`, `rate_at` `(r, k)`: at the beginning of each piece.
+    - `rest_angle`, `rest_rate` `(r, kc, n + 1)`: the drive at each node of contact.
+    - `reach`: how far (s) an impact may be from its recorded time.
+    - `drive_error`: standard errors of angle and rate of the drive, per record.
+    """
+
+    flown: Samples
+    rested: Samples
+    joint: Int[Array, "r k"]
+    exists: Bool[Array, "r k"]
+    rest_exists: Bool[Array, "r kc"]
+    angle: Float[Array, "r k n"]
+    rate: Float[Array, "r k n"]
+    angle_at: Float[Array, "r k"]
+    rate_at: Float[Array, "r k"]
+    rest_angle: Float[Array, "r kc n1"]
+    rest_rate: Float[Array, "r kc n1"]
+    reach: Float[Array, " r"]
+    drive_error: Float[Array, "r 2"]
+
+
+@dataclasses.dataclass(frozen=True)
+class Span:
+    """One piece: from when to when, which samples, and what came before it."""
+
+    start: float
+    stop: float
+    rows: Int[np.ndarray, " k"]
+    joint: int
+    flight: int
+
+
+def spans(segments: Segments) -> tuple[list[Span], list[Span]]:
+    """The pieces of flight and of contact of one record."""
+    record = segments.recording
+    time, interval = record.time, record.interval
+    valid = ~np.asarray(record.meta.get("filled", np.zeros(len(time), bool)))
+    flown: list[Span] = []
+    before = None
+    for number, flight in enumerate(segments.flights):
+        begin, end = flight.start.time, flight.stop.time
+        if flight.start.kind == "end of record":
+            begin = float(time[flight.first])
+        first, last = (_margin(edge, interval) for edge in (flight.start, flight.stop))
+        rows = np.arange(max(0, flight.first - 1), min(len(time), flight.last + 1))
+        rows = rows[(time[rows] >= begin + first) & (time[rows] <= end - last)]
+        if np.sum(valid[rows]) < _LEAST:
+            before = None
+            continue
+        sharp = flight.start.stderr < 2 * interval
+        joined = flight.start.kind == "impact" and before is flight.start and sharp
+        count = -(-round((end - begin) / interval) // _PIECE)
+        edges = np.linspace(begin, end, max(1, count) + 1)
+        where = np.clip(np.searchsorted(edges, time[rows], "right") - 1, 0, count - 1)
+        for k, (a, b) in enumerate(zip(edges, edges[1:])):
+            joint = FLIGHT if k else IMPACT if joined else FREE
+            inside = rows[where == k]
+            flown.append(Span(a, b, inside[valid[inside]], joint, number))
+        before = flight.stop
+    rested = []
+    for number, contact in enumerate(segments.contacts):
+        rows = np.flatnonzero(
+            (time >= contact.settled) & (time < contact.stop.time) & valid
+        )
+        for block in np.array_split(rows, max(1, -(-len(rows) // _PIECE))):
+            if len(block):
+                a, b = float(time[block[0]]), float(time[block[-1]])
+                rested.append(Span(a, max(b, a + interval), block, FREE, number))
+    return flown, rested
+
+
+def _margin(edge, interval: float) -> float:
+    """Samples closer to a boundary than this may be on its other side."""
+    if edge.kind == "end of record":
+        return 0.0
+    error = edge.stderr if np.isfinite(edge.stderr) else interval
+    return interval / 2 + 2 * min(error, 2 * interval)
+
+
+def gather(
+    segments: Sequence[Segments], channels: Sequence[str], steps: int
+) -> tuple[Pieces, list[tuple[list[Span], list[Span]]]]:
+    """Pieces of some records, padded so that similar records share a program.
+
+    **Raises:** `RecordingError` where there is nothing to fit.
+    """
+    cuts = [spans(part) for part in segments]
+    if not any(flown for flown, _ in cuts):
+        names = ", ".join(part.recording.name for part in segments)
+        raise RecordingError(
+            f"{names}: there is no flight of {_LEAST} samples to be fitted; give a "
+            f"record in which the motion leaves the surface."
+        )
+    width = 64 * -(-max(len(flown) for flown, _ in cuts) // 64)
+    resting = 32 * -(-max(1, *(len(rested) for _, rested in cuts)) // 32)
+    most = max(_most_in_a_step(part, cut, steps) for part, cut in zip(segments, cuts))
+    both = [
+        [
+            _samples(part, cut[side], channels, size, steps, most)
+            for part, cut in zip(segments, cuts)
+        ]
+        for side, size in ((0, width), (1, resting))
+    ]
+    flown, rested = (
+        Samples(*(np.stack(column) for column in zip(*rows))) for rows in both
+    )
+    records = len(segments)
+    joint = np.zeros((records, width), dtype=int)
+    exists = np.zeros((records, width), dtype=bool)
+    rest_exists = np.zeros((records, resting), dtype=bool)
+    for row, (flights, contacts) in enumerate(cuts):
+        joint[row, : len(flights)] = [span.joint for span in flights]
+        exists[row, : len(flights)] = True
+        rest_exists[row, : len(contacts)] = True
+    middle = flown.start[..., None] + flown.step[..., None] * (np.arange(steps) + 0.5)
+    nodes = rested.start[..., None] + rested.step[..., None] * np.arange(steps + 1)
+    angle, rate = _drive(segments, middle)
+    angle_at, rate_at = _drive(segments, flown.start)
+    rest_angle, rest_rate = _drive(segments, nodes)
+    pieces = Pieces(
+        flown,
+        rested,
+        joint,
+        exists,
+        rest_exists,
+        angle,
+        rate,
+        angle_at,
+        rate_at,
+        rest_angle,
+        rest_rate,
+        np.array([_REACH * part.recording.interval for part in segments]),
+        np.array([_drive_error(part) for part in segments]),
+    )
+    return pieces, cuts
+
+
+def _most_in_a_step(part: Segments, cut, steps: int) -> int:
+    length = max((s.stop - s.start for side in cut for s in side), default=0.0)
+    return int(np.ceil(length / steps / part.recording.interval - 1e-9)) + 1
+
+
+def _samples(part: Segments, cut: list[Span], channels, size, steps, most):
+    time = part.recording.time
+    start, step = np.zeros(size), np.full(size, part.recording.interval)
+    shape = (size, steps, most)
+    place, value = np.zeros(shape), np.zeros((*shape, len(channels)))
+    known = np.zeros((*shape, len(channels)), dtype=bool)
+    columns = np.stack([part.recording[channel] for channel in channels], axis=-1)
+    for k, span in enumerate(cut):
+        start[k], step[k] = span.start, (span.stop - span.start) / steps
+        along = (time[span.rows] - span.start) / step[k]
+        bins = np.clip(along.astype(int), 0, steps - 1)
+        for b in np.unique(bins):
+            inside = np.flatnonzero(bins == b)
+            place[k, b, : len(inside)] = along[inside] - b
+            value[k, b, : len(inside)] = columns[span.rows[inside]]
+            known[k, b, : len(inside)] = np.isfinite(columns[span.rows[inside]])
+    return start, step, place, np.where(known, value, 0.0), known
+
+
+def _drive(segments, times):
+    """Angle and rate of each record's drive at some times, shape of `times`."""
+    angle, rate = np.zeros(times.shape), np.ones(times.shape)
+    for row, part in enumerate(segments):
+        if part.drive is not None:
+            time, at = part.recording.time, times[row]
+            angle[row] = np.interp(at, time, part.drive.angle)
+            rate[row] = np.interp(at, time, part.drive.rate)
+    return angle, rate
+
+
+def _drive_error(part: Segments) -> tuple[float, float]:
+    """Standard errors of the smoothed angle and rate of a drive."""
+    if part.drive is None:
+        return 0.0, 0.0
+    interval = part.recording.interval
+    count = part.drive.window
+    smooth = savgol_coeffs(count, 2)
+    slope = savgol_coeffs(count, 2, deriv=1, delta=interval)
+    noise = part.drive.noise
+    return noise * float(np.linalg.norm(smooth)), noise * float(np.linalg.norm(slope))

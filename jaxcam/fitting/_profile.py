@@ -1,0 +1,101 @@
+"""Profile likelihood: how much worse the best fit is with one parameter held."""
+
+import dataclasses
+
+import numpy as np
+from jaxtyping import Float
+
+from ._fit import Fit, fit
+from ._problem import Weights
+
+
+@dataclasses.dataclass(frozen=True)
+class Profile:
+    """Of one parameter: `values`, and `cost` above the optimum at each of them.
+
+    The cost is minus twice the log-likelihood, so the 95 % interval is where it is
+    below 3.84; `interval` is interpolated, infinite on a side where no value was tried
+    that is bad enough.
+    """
+
+    name: str
+    values: Float[np.ndarray, " k"]
+    cost: Float[np.ndarray, " k"]
+    fits: tuple[Fit, ...]
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        best = int(np.argmin(self.cost))
+        return (
+            self._crossing(range(best, -1, -1), -np.inf),
+            self._crossing(range(best, len(self.cost)), np.inf),
+        )
+
+    def _crossing(self, order, none: float) -> float:
+        order = list(order)
+        for a, b in zip(order, order[1:]):
+            # the root of the cost is closer to a straight line than the cost
+            low, high = (np.sqrt(max(self.cost[k], 0.0)) for k in (a, b))
+            level = np.sqrt(3.84)
+            if low <= level < high:
+                share = (level - low) / (high - low)
+                return float(self.values[a] + share * (self.values[b] - self.values[a]))
+        return none
+
+
+def profile(
+    found: Fit,
+    name: str,
+    *,
+    reach: float = 3.0,
+    points: int = 9,
+    weights: Weights | None = None,
+    prior: bool = True,
+) -> Profile:
+    """Fit all other parameters again with one of them held at several values.
+
+    **Arguments:**
+
+    - `found`: the fit, in which `name` was free.
+    - `reach`: how far to go, in standard errors on both sides.
+    - `points`: number of values, the optimum included.
+    - `weights`, `prior`: as they were for `found`.
+
+    **Raises:** `KeyError` for a parameter that was not fitted; `ValueError` for one
+    that differs from record to record.
+    """
+    estimate = found[name]
+    if estimate.record is not None:
+        raise ValueError(
+            f"{name!r} has a value for each record; profile a parameter that all "
+            f"records share."
+        )
+    problem, others = found.problem, [n for n in found.free if n != name]
+    parameter = problem.parameter(name)
+    offsets = np.linspace(-reach, reach, points | 1)
+    values = estimate.value + offsets * estimate.stderr
+    values = np.clip(values, parameter.lower, parameter.upper)
+    place = problem.names.index(name)
+    fits: dict[int, Fit] = {}
+    middle = len(values) // 2
+    # outwards from the optimum, each from its neighbour
+    for side in (range(middle, len(values)), range(middle - 1, -1, -1)):
+        near = found if not fits else fits[middle]
+        for k in side:
+            start = near.point._replace(
+                values=near.point.values.at[:, place].set(values[k])
+            )
+            near = fit(problem, free=others, start=start, weights=weights, prior=prior)
+            fits[k] = near
+    # what was known of the parameter itself counts although it is held
+    cost = np.array([fits[k].cost for k in range(len(values))])
+    if prior:
+        nominal = parameter.nominal
+        nominal = float(problem.start.values[0, place]) if nominal is None else nominal
+        cost = cost + ((values - nominal) / parameter.prior_stderr) ** 2
+    return Profile(
+        name,
+        values,
+        cost - min(np.min(cost), found.cost),
+        tuple(fits[k] for k in range(len(values))),
+    )

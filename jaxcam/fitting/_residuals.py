@@ -1,0 +1,100 @@
+"""What a fit leaves over: data minus model by record, mode, time and phase."""
+
+import dataclasses
+
+import numpy as np
+from jaxtyping import Float
+
+from ._fit import Fit
+from ._linearise import predict
+
+
+@dataclasses.dataclass(frozen=True)
+class Residuals:
+    """Data minus model of one channel of one record, in units of the channel.
+
+    - `time` (s), `turned` (angle of the drive, rad, or nothing), `value`, each `(k,)`.
+    - `flight`: number of the flight or contact each sample belongs to; `resting` is
+        true in contact.
+    - `noise`: standard deviation of noise and rounding.
+    """
+
+    record: str
+    channel: str
+    time: Float[np.ndarray, " k"]
+    turned: Float[np.ndarray, " k"]
+    value: Float[np.ndarray, " k"]
+    flight: Float[np.ndarray, " k"]
+    resting: Float[np.ndarray, " k"]
+    noise: float
+
+    @property
+    def rms(self) -> float:
+        return float(np.sqrt(np.mean(self.value**2)))
+
+    def autocorrelation(self, lags: int = 20) -> Float[np.ndarray, " lags"]:
+        """Correlation of samples that are 1, 2, ... apart within a flight or contact.
+
+        White residuals are within about `2 / sqrt(k)` of zero.
+        """
+        scale = np.mean(self.value**2)
+        found = []
+        for lag in range(1, lags + 1):
+            same = (self.flight[lag:] == self.flight[:-lag]) & (
+                self.resting[lag:] == self.resting[:-lag]
+            )
+            found.append(np.mean((self.value[lag:] * self.value[:-lag])[same]) / scale)
+        return np.array(found)
+
+
+def residuals(found: Fit) -> list[Residuals]:
+    """What is left over, for each record and channel, sorted by time.
+
+    Saturated samples are left out: they say too little.
+    """
+    problem = found.problem
+    pieces = problem.pieces
+    flown, rested, _ = predict(problem.layout, pieces, problem.extras, found.point)
+    parts = []
+    for record, segments in enumerate(problem.segments):
+        for c, (channel, sensor) in enumerate(problem.model.sensors.items()):
+            columns = []
+            for side, (part, seen) in enumerate(
+                ((pieces.flown, flown), (pieces.rested, rested))
+            ):
+                known = np.asarray(part.known[record, ..., c])
+                value = np.asarray(part.value[record, ..., c])
+                known = known & (np.abs(value) < sensor.limit)
+                k, n, _ = np.nonzero(known)
+                along = n + np.asarray(part.place[record])[known]
+                start, step = (
+                    np.asarray(x[record])[k] for x in (part.start, part.step)
+                )
+                time = start + step * along
+                flights = np.array([s.flight for s in problem.spans[record][side]])
+                columns.append(
+                    (
+                        time,
+                        (value - np.asarray(seen[record, ..., c]))[known],
+                        flights[k] if len(flights) else k,
+                        np.full(len(k), bool(side)),
+                    )
+                )
+            time, value, flight, resting = (np.concatenate(x) for x in zip(*columns))
+            order = np.argsort(time)
+            turned = np.full(len(time), np.nan)
+            if segments.drive is not None:
+                turned = np.interp(time, segments.recording.time, segments.drive.angle)
+            parts.append(
+                Residuals(
+                    segments.recording.name,
+                    channel,
+                    time[order],
+                    turned[order],
+                    value[order],
+                    flight[order],
+                    resting[order],
+                    float(sensor.floor),
+                )
+            )
+    return parts

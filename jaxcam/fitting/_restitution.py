@@ -1,0 +1,262 @@
+"""The law of restitution from every impact that was recorded, and the thesis' way."""
+
+import dataclasses
+from collections.abc import Sequence
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import optimistix as optx
+from jaxtyping import Array, Float
+
+from ..hybrid import HybridSystem
+from ..models import ConstantRestitution, LinearInSpeed, PowerLawRestitution
+from ..recordings import RecordingError, Segments
+from ._model import Turning
+
+
+# Errors beyond this many standard errors count by their size, not its square (Huber)
+_HUBER = 3.0
+# Runge-Kutta steps of one bounce
+_STEPS = 200
+
+
+@dataclasses.dataclass(frozen=True)
+class RestitutionFit:
+    """A law of restitution fitted to measured impacts.
+
+    - `law`: the fitted law, a Module for `CamFollower(restitution=...)`.
+    - `names`, `values`, `stderr`: its parameters.
+    - `cost`, `freedom`: sum of squares (of Huber's kind) in standard errors, and
+        impacts less parameters; their ratio is one where the law says all there is.
+    """
+
+    law: eqx.Module
+    names: tuple[str, ...]
+    values: Float[np.ndarray, " p"]
+    stderr: Float[np.ndarray, " p"]
+    cost: float
+    freedom: int
+
+    def sentence(self) -> str:
+        """The law in words."""
+        parts = ", ".join(
+            f"{n} = {v:.5g} +- {e:.1g}"
+            for n, v, e in zip(self.names, self.values, self.stderr)
+        )
+        ratio = self.cost / max(1, self.freedom)
+        return (
+            f"{type(self.law).__name__}: {parts}; {ratio:.2f} times the noise over "
+            f"{self.freedom + len(self.names)} impacts."
+        )
+
+
+def restitution_laws(segments: Sequence[Segments]) -> dict[str, RestitutionFit]:
+    """Three laws fitted to the impacts of some recordings.
+
+    **Returns:** `"constant"`, `"speed"` (linear in the speed of the drive, Figure 4.15
+    of the thesis) and `"approach"` (a power of the approach speed).
+
+    **Raises:** `RecordingError` where there are too few impacts.
+    """
+    approach = np.concatenate([part.impacts.approach for part in segments])
+    usual = float(np.median(approach[approach > 0])) if np.any(approach > 0) else 1.0
+    start = {
+        "constant": (ConstantRestitution(0.5), ("r",)),  # pyright: ignore
+        "speed": (LinearInSpeed(0.0, 0.5), ("slope", "intercept")),  # pyright: ignore
+        "approach": (
+            PowerLawRestitution(0.5, usual, 0.0),  # pyright: ignore
+            ("r0", "exponent"),
+        ),
+    }
+    speeds = {part.drive.speed for part in segments if part.drive is not None}
+    if len(speeds) < 2:
+        del start["speed"]
+    return {
+        name: fit_restitution(segments, law, names)
+        for name, (law, names) in start.items()
+    }
+
+
+def fit_restitution(
+    segments: Sequence[Segments], law: eqx.Module, names: Sequence[str]
+) -> RestitutionFit:
+    """Fit parameters of a law to the speeds before and after every impact.
+
+    The misfit of an impact is its separation speed less r times its approach speed,
+    over the error that both speeds and that of the surface give it. Levenberg-Marquardt
+    (optimistix); an outlier counts by its size.
+
+    **Arguments:**
+
+    - `segments`: from `segment_case` or `segment`.
+    - `law`: called as `law(speed, approach_speed)`; where to start.
+    - `names`: its fields to fit; the others stay.
+
+    **Raises:** `RecordingError` where there are fewer impacts than parameters.
+    """
+    impacts = [part.impacts for part in segments]
+    speed = np.concatenate(
+        [
+            np.full(i.count, part.drive.speed if part.drive is not None else 0.0)
+            for i, part in zip(impacts, segments)
+        ]
+    )
+    columns = [
+        np.concatenate([getattr(i, name) for i in impacts])
+        for name in (
+            "approach",
+            "separation",
+            "before_stderr",
+            "after_stderr",
+            "surface_stderr",
+        )
+    ]
+    data = np.stack([speed, *columns])
+    fine = np.all(np.isfinite(data), axis=0) & (columns[0] > 3 * columns[2])
+    data = data[:, fine]
+    names = tuple(names)
+    if data.shape[1] <= len(names):
+        raise RecordingError(
+            f"There are {data.shape[1]} clear impacts for {len(names)} parameters of "
+            f"restitution; give more recordings, or a simpler law."
+        )
+    start = np.array([float(getattr(law, name)) for name in names])
+    found, _ = _solve(law, names, jnp.asarray(start), jnp.asarray(data))
+    rows, off = _normal(law, names, found, jnp.asarray(data))
+    covariance = np.linalg.inv(np.asarray(rows).T @ np.asarray(rows))
+    values = np.asarray(found)
+    return RestitutionFit(
+        _with(law, names, jnp.asarray(values)),
+        names,
+        values,
+        np.sqrt(np.diag(covariance)),
+        float(np.sum(np.asarray(off) ** 2)),
+        int(data.shape[1] - len(names)),
+    )
+
+
+def _with(law, names, values):
+    return eqx.tree_at(
+        lambda l: tuple(getattr(l, name) for name in names),
+        law,
+        tuple(values[k] for k in range(len(names))),
+    )
+
+
+def _misfit(values, data, law, names):
+    """In standard errors, `(k,)`."""
+    speed, approach, separation, before, after, surface = data
+    changed = _with(law, names, values)
+    r = jax.vmap(changed)(speed, approach)
+    error = jnp.sqrt(after**2 + (r * before) ** 2 + ((1 + r) * surface) ** 2)
+    # the error is a weight, not a way to make the misfit smaller
+    return (separation - r * approach) / jax.lax.stop_gradient(error)
+
+
+def _huber(off):
+    """The square root of Huber's loss, with the sign of the misfit."""
+    size = jnp.abs(off)
+    safe = jnp.where(size > _HUBER, size, _HUBER)
+    return jnp.where(
+        size > _HUBER, jnp.sign(off) * jnp.sqrt(2 * _HUBER * safe - _HUBER**2), off
+    )
+
+
+@eqx.filter_jit
+def _solve(law, names, start, data):
+    def loss(values, data):
+        return _huber(_misfit(values, data, law, names))
+
+    solver = optx.LevenbergMarquardt(rtol=1e-10, atol=1e-12)
+    found = optx.least_squares(loss, solver, start, data, max_steps=200, throw=False)
+    return found.value, found.result
+
+
+@eqx.filter_jit
+def _normal(law, names, values, data):
+    def loss(values):
+        off = _huber(_misfit(values, data, law, names))
+        return off, off
+
+    return jax.jacfwd(loss, has_aux=True)(values)
+
+
+def first_bounce(
+    system: HybridSystem, segments: Segments, drive: Turning
+) -> Float[np.ndarray, " turns"]:
+    """Restitution from the height of the first bounce, the thesis' procedure (4.6.1).
+
+    After each release the first impact ends the high flight of that turn. The system
+    is started on the surface at that impact with a separation speed such that the next
+    flight rises as high above the cam as the recorded one; the coefficient is this
+    speed over the recorded approach speed. For comparison: unlike a fit of whole
+    trajectories it uses one number a turn, and that one is the largest of noisy ones.
+
+    **Returns:** one coefficient for each turn that has such a pair of flights.
+    """
+    impacts, flights = segments.impacts, segments.flights
+    if segments.drive is None:
+        raise RecordingError(
+            f"{segments.recording.name}: it was cut without its drive; use "
+            f"`segment_case`."
+        )
+    time = segments.recording.time
+    found = []
+    for k in range(impacts.count):
+        before = flights[impacts.flight[k]]
+        after = flights[impacts.flight[k] + 1]
+        if before.start.kind != "release" or impacts.approach[k] <= 0:
+            continue
+        at = impacts.time[k]
+        angle = float(np.interp(at, time, segments.drive.angle))
+        rate = float(np.interp(at, time, segments.drive.rate))
+        speed = _speed_for_height(
+            drive.at(system, 0.0, jnp.asarray(angle), jnp.asarray(rate)),
+            float(impacts.angle[k]),
+            float(after.duration),
+            float(after.height),
+        )
+        found.append(float(speed) / impacts.approach[k])
+    return np.array(found)
+
+
+@eqx.filter_jit
+def _speed_for_height(system, angle, duration, height) -> Array:
+    """Separation speed whose flight rises by `height`, by bisection."""
+    # the gap is an angle less the cam's; on the cam both agree
+    contact = angle - system.gap(jnp.asarray(0.0), jnp.stack([angle, 0.0 * angle]))
+    start = jnp.stack([contact, jnp.zeros_like(contact)])
+    zero = jnp.zeros_like(contact)
+    _, slope = jax.jvp(lambda t: system.gap(t, start), (zero,), (jnp.ones_like(zero),))
+    h = 1.5 * duration / _STEPS
+
+    def top(speed):
+        def step(carry, _):
+            t, x, highest = carry
+            k1 = system.vector_field(t, x)
+            k2 = system.vector_field(t + h / 2, x + h / 2 * k1)
+            k3 = system.vector_field(t + h / 2, x + h / 2 * k2)
+            k4 = system.vector_field(t + h, x + h * k3)
+            x = x + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+            gap = system.gap(t + h, x)
+            # a flight is over once it is back on the cam
+            open_ = (highest >= 0) & (gap > 0)
+            return (t + h, x, jnp.where(open_, jnp.maximum(highest, gap), highest)), gap
+
+        x = jnp.stack([contact, -slope + speed])
+        carry = (zero, x, zero)
+        (_, _, highest), _ = jax.lax.scan(step, carry, None, length=_STEPS)
+        return highest
+
+    def halve(_, bounds):
+        low, high = bounds
+        middle = (low + high) / 2
+        short = top(middle) < height
+        return jnp.where(short, middle, low), jnp.where(short, high, middle)
+
+    # no bounce is faster than one that falls back at the rate of its own height
+    high = 8 * height / duration + 1e-9
+    low, high = jax.lax.fori_loop(0, 40, halve, (zero, high + zero))
+    return (low + high) / 2

@@ -1,0 +1,121 @@
+"""Gradients in reverse mode, for systems with very many parameters."""
+
+import dataclasses
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import scipy.optimize
+from jax.flatten_util import ravel_pytree
+
+from ._fit import fit
+from ._linearise import cost_of, Point
+from ._model import Model
+from ._problem import Problem
+
+
+def cost_and_gradient(
+    problem: Problem, point: Point, where: Callable[[Model], Any], values: Any
+) -> tuple[jax.Array, Any]:
+    """Cost of a problem and its gradient to any part of the model, by reverse mode.
+
+    It takes about as long for a neural network with thousands of weights in the vector
+    field as for one parameter. The states of the pieces stay as they are in `point`; at
+    states that are fitted (`fit(problem, free=())`) they do not add to the gradient, so
+    that this is the gradient of the best cost.
+
+    **Arguments:**
+
+    - `where`: picks a field, or a tuple of fields, out of the model: `lambda m:
+        m.system.network`.
+    - `values`: what to put there; its inexact arrays are differentiated.
+
+    **Returns:** the cost, and the gradient as a tree like `values`.
+    """
+    return _gradient(
+        problem.layout, problem.pieces, problem.extras, point, where, values
+    )
+
+
+@eqx.filter_jit
+def _gradient(layout, pieces, extras, point, where, values):
+    # the values of the parameters are part of the model from here on
+    model = layout.at(point.values[0])
+    bare = Point(point.values[:, :0], point.states)
+
+    @eqx.filter_value_and_grad
+    def cost(values):
+        changed = eqx.tree_at(where, model, values)
+        moved = eqx.tree_at(
+            lambda found: (found.model, found.places), layout, (changed, ())
+        )
+        costs = cost_of(moved, pieces, extras, bare)
+        parts = (
+            jnp.sum(jnp.where(pieces.exists, costs.flown + costs.joints, 0.0)),
+            jnp.sum(jnp.where(pieces.rest_exists, costs.rested, 0.0)),
+        )
+        return sum(parts)
+
+    return cost(values)
+
+
+class Trained(NamedTuple):
+    """What `train` found: the part of the model, and the cost before and after."""
+
+    values: Any
+    before: float
+    after: float
+
+
+def train(
+    problem: Problem,
+    where: Callable[[Model], Any],
+    *,
+    steps: int = 100,
+    progress: Callable[[int, float], None] | None = None,
+) -> Trained:
+    """Fit a part of a model that has very many parameters, such as a network.
+
+    L-BFGS (scipy) with gradients in reverse mode. At each step the states of the pieces
+    are fitted first, so that the gradient is that of the best cost.
+
+    **Arguments:** as for `cost_and_gradient`; `steps` at most.
+    """
+    values = where(problem.model)
+    arrays, rest = eqx.partition(values, eqx.is_inexact_array)
+    start, unravel = ravel_pytree(arrays)
+    point = problem.start
+    costs: list[float] = []
+
+    def evaluate(vector):
+        nonlocal point
+        part = eqx.combine(unravel(jnp.asarray(vector)), rest)
+        changed = _with_part(problem, where, part)
+        point = fit(changed, free=(), start=point).point
+        cost, gradient = cost_and_gradient(problem, point, where, part)
+        flat, _ = ravel_pytree(eqx.filter(gradient, eqx.is_inexact_array))
+        costs.append(float(cost))
+        if progress is not None:
+            progress(len(costs), costs[-1])
+        # in units of a sample, so that the first step is not a leap
+        return costs[-1] / problem.samples, np.asarray(flat) / problem.samples
+
+    found = scipy.optimize.minimize(
+        evaluate,
+        np.asarray(start),
+        jac=True,
+        method="L-BFGS-B",
+        options={"maxiter": steps, "ftol": 1e-9, "gtol": 1e-7},
+    )
+    trained = eqx.combine(unravel(jnp.asarray(found.x)), rest)
+    return Trained(trained, costs[0], float(found.fun) * problem.samples)
+
+
+def _with_part(problem: Problem, where: Callable[[Model], Any], values: Any) -> Problem:
+    """The problem with another part in its model."""
+    model = eqx.tree_at(where, problem.model, values)
+    layout = eqx.tree_at(lambda found: found.model, problem.layout, model)
+    return dataclasses.replace(problem, model=model, layout=layout)

@@ -1,0 +1,103 @@
+"""Score and information of all parameters at a fit, whether they were free or not."""
+
+import dataclasses
+from collections.abc import Iterable
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from ._fit import (
+    Columns,
+    Fit,
+    free_columns,
+    invert,
+    off_nominal,
+    prior_information,
+    reduced,
+)
+from ._linearise import assemble
+from ._problem import Problem, Weights
+
+
+@dataclasses.dataclass(frozen=True)
+class Linearised:
+    """The likelihood about a fit as a quadratic function of all parameters.
+
+    In units of each parameter's scale, states eliminated; `information` of the data
+    alone, `prior` that of what was known beforehand (a diagonal), `score` of both.
+    """
+
+    problem: Problem
+    names: tuple[str, ...]
+    columns: Columns
+    information: Float[np.ndarray, "g g"]
+    score: Float[np.ndarray, " g"]
+    prior: Float[np.ndarray, " g"]
+
+    def gain(self, names: Iterable[str], beside: Iterable[str] = ()) -> float:
+        """By how much twice the log-likelihood would grow if `names` were freed.
+
+        **Arguments:** `beside` are parameters that are free in any case, and take up
+        what they can.
+        """
+        names, beside = tuple(names), tuple(beside)
+        with_, without = self._best((*names, *beside)), self._best(beside)
+        return with_ - without
+
+    def step(self, names: Iterable[str]) -> dict[str, tuple[float, float]]:
+        """Change of each of the freed parameters, and its standard error.
+
+        Exact where the likelihood is quadratic. Parameters that differ from record to
+        record are named `name@record`.
+        """
+        rows = self._rows(names)
+        inverse = invert(self._block(rows))
+        change = inverse @ self.score[rows] * self.columns.scale[rows]
+        stderr = np.sqrt(np.abs(np.diag(inverse))) * self.columns.scale[rows]
+        return {
+            self.names[row]: (float(c), float(e))
+            for row, c, e in zip(rows, change, stderr)
+        }
+
+    def _best(self, names) -> float:
+        rows = self._rows(names)
+        if not len(rows):
+            return 0.0
+        return float(self.score[rows] @ invert(self._block(rows)) @ self.score[rows])
+
+    def _block(self, rows):
+        return self.information[np.ix_(rows, rows)] + np.diag(self.prior[rows])
+
+    def _rows(self, names):
+        wanted = set(names)
+        for name in wanted:
+            self.problem.parameter(name)
+        plain = [self.problem.names[p] for p in self.columns.parameter]
+        return np.array([k for k, n in enumerate(plain) if n in wanted], dtype=int)
+
+
+def linearise(
+    problem: Problem, found: Fit, *, weights: Weights | None = None, prior: bool = True
+) -> Linearised:
+    """Score and information of all parameters about a fit.
+
+    **Arguments:** as for `fit`.
+    """
+    columns = free_columns(problem, None)
+    blocks, _ = assemble(
+        problem.layout,
+        problem.pieces,
+        problem.weighted(weights),
+        found.point,
+        jnp.asarray(columns.local),
+        jnp.asarray(columns.scales),
+    )
+    information, score = reduced(columns, blocks)
+    names = tuple(
+        problem.names[p] if r < 0 else f"{problem.names[p]}@{problem.records[r]}"
+        for p, r in zip(columns.parameter, columns.record)
+    )
+    strength = prior_information(problem, columns, prior)
+    score = score - strength * off_nominal(problem, columns, found.point)
+    return Linearised(problem, names, columns, information, score, strength)

@@ -1,0 +1,169 @@
+"""Systems as JSON: the name of the class and its parameters, nothing that is run.
+
+```json
+{"format": "jaxcam.system", "version": 1,
+ "system": {"class": "BouncingBall",
+            "fields": {"gravity": 9.81, "restitution": 0.8, ...}}}
+```
+
+A field is a number, a list of numbers, a word, or another object of this kind.
+"""
+
+import dataclasses
+import json
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from ..hybrid import HybridSystem
+from ._bouncing_ball import BouncingBall
+from ._cam_follower import CamFollower
+from ._eccentric_circle import EccentricCircle
+from ._fourier_profile import FourierProfile
+from ._impact_oscillator import ImpactOscillator
+from ._restitution import ConstantRestitution, LinearInSpeed, PowerLawRestitution
+from ._spline_profile import PiecewiseProfile, SplineProfile
+from ._triple_integrator import TripleIntegrator
+
+
+_FORMAT, _VERSION = "jaxcam.system", 1
+_KNOWN: tuple[type, ...] = (
+    BouncingBall,
+    CamFollower,
+    ConstantRestitution,
+    EccentricCircle,
+    FourierProfile,
+    ImpactOscillator,
+    LinearInSpeed,
+    PiecewiseProfile,
+    PowerLawRestitution,
+    SplineProfile,
+    TripleIntegrator,
+)
+
+
+def save_system(
+    system: HybridSystem, file: str | Path, *, about: dict[str, Any] | None = None
+) -> None:
+    """Write a system as JSON.
+
+    **Arguments:** `about` is anything else to be kept with it, in plain JSON: the
+    errors of the parameters, where they come from.
+
+    **Raises:** `ValueError` for a system with a field that is not a number, an array, a
+    word or another Module.
+    """
+    Path(file).write_text(
+        json.dumps(system_to_json(system, about=about), indent=1) + "\n", "utf-8"
+    )
+
+
+def load_system(file: str | Path, *, classes: Iterable[type] = ()) -> HybridSystem:
+    """Read a system that `save_system` wrote.
+
+    **Arguments:** `classes` beside those of `jaxcam.models` that may occur in it, such
+    as a system of your own.
+
+    **Raises:** `ValueError` for a file that is not one, or names another class.
+    """
+    file = Path(file)
+    try:
+        found = json.loads(file.read_text("utf-8"))
+    except (json.JSONDecodeError, UnicodeDecodeError):
+        raise ValueError(
+            f"{file}: this is no JSON; give a file that `jaxcam fit` or `save_system` "
+            f"wrote."
+        ) from None
+    try:
+        return system_from_json(found, classes=classes)
+    except ValueError as error:
+        raise ValueError(f"{file}: {error}") from None
+
+
+def system_to_json(
+    system: HybridSystem, *, about: dict[str, Any] | None = None
+) -> dict[str, Any]:
+    """A system as plain numbers, lists and words; see `save_system`."""
+    found = {"format": _FORMAT, "version": _VERSION, "system": _encode(system, "")}
+    return found if about is None else {**found, "about": about}
+
+
+def system_from_json(found: Any, *, classes: Iterable[type] = ()) -> HybridSystem:
+    """The system in plain JSON; see `load_system`. Keys beside its own are ignored.
+
+    **Raises:** `ValueError` that says what is wrong.
+    """
+    if not isinstance(found, dict) or found.get("format") != _FORMAT:
+        raise ValueError(
+            f'this is no saved system: it lacks "format": "{_FORMAT}"; give a file '
+            f"that `jaxcam fit` or `save_system` wrote."
+        )
+    if found.get("version") != _VERSION:
+        raise ValueError(
+            f"the file has the version {found.get('version')!r} and this program reads "
+            f"{_VERSION}; update the program, or save the system again."
+        )
+    known = {cls.__name__: cls for cls in (*_KNOWN, *classes)}
+    system = _decode(found.get("system"), known, "system")
+    if not isinstance(system, HybridSystem):
+        raise ValueError(f"{type(system).__name__} is no system; save a system.")
+    system.check()
+    return system
+
+
+def _encode(value: Any, place: str) -> Any:
+    if isinstance(value, eqx.Module):
+        fields = {
+            field.name: _encode(getattr(value, field.name), f"{place}.{field.name}")
+            for field in dataclasses.fields(value)
+        }
+        return {"class": type(value).__name__, "fields": fields}
+    if isinstance(value, jax.Array | np.ndarray | np.generic):
+        return np.asarray(value).tolist()
+    if value is None or isinstance(value, bool | int | float | str):
+        return value
+    raise ValueError(
+        f"`{place.lstrip('.')}` is a {type(value).__name__}, which cannot be saved; "
+        f"use a Module with numbers for it."
+    )
+
+
+def _decode(found: Any, known: dict[str, type], place: str) -> Any:
+    if isinstance(found, list):
+        return jnp.asarray(found, dtype=float)
+    if isinstance(found, bool) or found is None or isinstance(found, str):
+        return found
+    if isinstance(found, int | float):
+        return found
+    if not isinstance(found, dict) or set(found) != {"class", "fields"}:
+        raise ValueError(f"`{place}` needs a `class` and its `fields`.")
+    name = found["class"]
+    if name not in known:
+        raise ValueError(
+            f"`{place}` is a {name!r}, which is not known; if it is a class of your "
+            f"own, pass it as classes=[...]."
+        )
+    cls = known[name]
+    fields = {field.name: field for field in dataclasses.fields(cls)}
+    given = found["fields"]
+    for wrong in set(given) ^ set(fields):
+        raise ValueError(
+            f"`{place}` has the fields {', '.join(sorted(given))}, and {name} has "
+            f"{', '.join(fields)}: correct `{wrong}`."
+        )
+    made = object.__new__(cls)
+    for key, field in fields.items():
+        value = _decode(given[key], known, f"{place}.{key}")
+        dynamic = not field.metadata.get("static", False)
+        if dynamic and isinstance(value, int | float) and not isinstance(value, bool):
+            value = jnp.asarray(value, dtype=float)
+        object.__setattr__(made, key, value)
+    check = getattr(made, "__check_init__", None)
+    if check is not None:
+        check()
+    return made

@@ -1,0 +1,111 @@
+"""The P(1,1) branch of a rig: one impact in one turn, from fold to flip and beyond."""
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+
+from ..fitting import (
+    impact_orbit,
+    ImpactOrbit,
+    one_impact_orbits,
+    orbit_monodromy,
+    orbit_where,
+    SpecialPoint,
+)
+from ..models import CamFollower, rpm_to_rad_s
+
+
+#: a state near the cam, from which Newton finds contact
+NEAR_CAM = (0.3, 0.0)
+#: where the search for the branch begins (rpm), and the longest stride along it
+_SEARCH, _STRIDE = 148.0, 0.5
+
+
+def speed_of(system):
+    return system.speed
+
+
+def at_speed(system: CamFollower, rpm) -> CamFollower:
+    """The rig at another speed, given in rpm."""
+    speed = jnp.asarray(rpm_to_rad_s(rpm), dtype=float)
+    return eqx.tree_at(speed_of, system, speed)
+
+
+def first_orbit(system: CamFollower) -> ImpactOrbit | None:
+    """P(1,1) at 148 rpm that is no saddle, or None."""
+    orbits = one_impact_orbits(at_speed(system, _SEARCH), jnp.array(NEAR_CAM))
+    return orbits[0] if orbits else None
+
+
+def orbit_at(system: CamFollower, start: ImpactOrbit, rpm: float) -> ImpactOrbit:
+    """The orbit that `start`, at 148 rpm, becomes at another speed."""
+    strides = max(1, int(np.ceil(abs(rpm - _SEARCH) / _STRIDE)))
+    orbit = start
+    for speed in np.linspace(_SEARCH, rpm, strides + 1)[1:]:
+        orbit = _orbit(at_speed(system, speed), orbit)
+    return orbit
+
+
+def multipliers_at(system: CamFollower, start: ImpactOrbit, rpm: float) -> np.ndarray:
+    """The two multipliers of P(1,1); NaN where it is lost."""
+    orbit = orbit_at(system, start, rpm)
+    return multipliers_of(_monodromy(at_speed(system, rpm), orbit))
+
+
+def multipliers_of(matrix) -> np.ndarray:
+    """Eigenvalues, the larger in magnitude last; complex pairs as -, +."""
+    matrix = np.asarray(matrix)
+    if not np.all(np.isfinite(matrix)):
+        return np.full(2, np.nan, dtype=complex)
+    values = np.linalg.eigvals(matrix).astype(complex)
+    if np.any(np.imag(values) != 0):
+        return values[np.argsort(np.imag(values))]
+    return values[np.argsort(np.abs(values))]
+
+
+# A line in the plane of trace and product of the multipliers: trace = a + b product.
+# a = b = 1 is a fold, a = b = -1 a flip, and b = 0 asks for a trace.
+FOLD, FLIP = (1.0, 1.0), (-1.0, -1.0)
+
+
+def point_on_line(
+    system: CamFollower, guess: SpecialPoint, line: tuple[float, float]
+) -> SpecialPoint:
+    """Where the branch meets a line; `guess.parameter` in rad/s."""
+    system = eqx.tree_at(speed_of, system, guess.parameter)
+    return _point(system, guess.orbit, jnp.asarray(line[0]), jnp.asarray(line[1]))
+
+
+def along_traces(
+    system: CamFollower, start: ImpactOrbit, trace: float, stride: float = 0.1
+) -> SpecialPoint:
+    """Where the sum of the multipliers is `trace`, reached from 148 rpm.
+
+    The trace is monotonic along the branch, also around the fold, where the speed is
+    not.
+    """
+    point = SpecialPoint(jnp.asarray(rpm_to_rad_s(_SEARCH)), start)
+    moved = at_speed(system, _SEARCH)
+    first = float(np.trace(np.asarray(_monodromy(moved, start))))
+    strides = max(1, int(np.ceil(abs(trace - first) / stride)))
+    for value in np.linspace(first, trace, strides + 1)[1:]:
+        point = point_on_line(system, point, (float(value), 0.0))
+    return point
+
+
+@eqx.filter_jit
+def _orbit(system, guess):
+    return impact_orbit(system, guess)
+
+
+@eqx.filter_jit
+def _monodromy(system, orbit):
+    return orbit_monodromy(system, orbit)
+
+
+@eqx.filter_jit
+def _point(system, orbit, offset, slope):
+    def test(matrix):
+        return jnp.trace(matrix) - offset - slope * jnp.linalg.det(matrix)
+
+    return orbit_where(system, speed_of, orbit, test)
