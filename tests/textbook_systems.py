@@ -81,3 +81,34 @@ class TwoStops(TwoMasses):
 def parameters(**values):
     """Plain numbers as arrays, so that one compiled program serves them all."""
     return {name: jnp.asarray(value, jnp.float64) for name, value in values.items()}
+
+
+class DampedImpactOscillator(HybridSystem):
+    """x'' + damping x' + stiffness x = amplitude cos(omega t), x <= wall; v+ = -e v-.
+
+    State (x, x').
+    """
+
+    state_names: ClassVar[tuple[str, ...]] = ("position", "velocity")
+
+    omega: jax.Array
+    damping: jax.Array
+    stiffness: jax.Array
+    amplitude: jax.Array
+    wall: jax.Array
+    restitution: jax.Array
+
+    def vector_field(self, t, state):
+        drive = self.amplitude * jnp.cos(self.omega * t)
+        pull = self.stiffness * state[0] + self.damping * state[1]
+        return jnp.stack([state[1], drive - pull])
+
+    def gap(self, t, state):
+        return self.wall - state[0]
+
+    def impact(self, t, state):
+        return jnp.stack([state[0], -self.restitution * state[1]])
+
+    @property
+    def period(self):
+        return 2 * jnp.pi / self.omega

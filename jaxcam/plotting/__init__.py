@@ -1,7 +1,21 @@
 """Figures, in one style. Imported by the command line and notebooks only."""
 
+from ._branch import branch_diagram as branch_diagram
+from ._chatter_maps import (
+    beta_lobes as beta_lobes,
+    lambda_cobweb as lambda_cobweb,
+    lobe_scaling as lobe_scaling,
+)
+from ._chatter_region import chattering_region as chattering_region
 from ._compare_recording import compare_recording as compare_recording
+from ._grazing_map import cobweb as cobweb
 from ._impact_map import impact_map as impact_map
+from ._local_map import (
+    local_map as local_map,
+    local_map_diagram as local_map_diagram,
+)
+from ._lyapunov import lyapunov_convergence as lyapunov_convergence
+from ._multipliers import multipliers as multipliers
 from ._phase_portrait import phase_portrait as phase_portrait
 from ._residual_by_mode import residual_by_mode as residual_by_mode
 from ._style import save_figure as save_figure, style as style

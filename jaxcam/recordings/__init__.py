@@ -9,6 +9,7 @@ from ._comparison import (
 )
 from ._drive import Drive as Drive, read_drive as read_drive
 from ._errors import RecordingError as RecordingError, RigError as RigError
+from ._mend import mend as mend, Mended as Mended
 from ._read import (
     CAM_FOLLOWER as CAM_FOLLOWER,
     read_case as read_case,
@@ -37,3 +38,4 @@ from ._surface import (
     refine_surface as refine_surface,
     Surface as Surface,
 )
+from ._synthetic import record as record, Wandering as Wandering

@@ -1,7 +1,5 @@
 """What is wrong with the numbers of a recording, in one sentence."""
 
-from typing import Literal
-
 import numpy as np
 from jaxtyping import Float, Int
 
@@ -18,7 +16,7 @@ _DEGREES = "multiply it by pi/180 or name the column `{}_deg`"
 
 
 def find_gaps(
-    name: str, time: Float[np.ndarray, " k"], gaps: Literal["refuse", "split"]
+    name: str, time: Float[np.ndarray, " k"], gaps: str
 ) -> Int[np.ndarray, " pieces"]:
     """Index of the first sample after each gap in time.
 
@@ -26,7 +24,7 @@ def find_gaps(
     `gaps` is `"split"`.
     """
     if gaps not in ("refuse", "split"):
-        raise RecordingError(f'gaps is "refuse" or "split", not {gaps!r}.')
+        raise RecordingError(f'gaps is "refuse", "split" or "mend", not {gaps!r}.')
     if len(time) < 2:
         raise RecordingError(f"{name}: one sample is no recording; remove this run.")
     steps = np.diff(time)
@@ -46,7 +44,8 @@ def find_gaps(
         raise RecordingError(
             f"{name}: there is {many} in time at {time[first]:.6g} s, "
             f"{steps[first]:.4g} s long where samples are {usual:.4g} s apart; read it "
-            f'with gaps="split" to use the pieces as recordings of their own.'
+            f'with gaps="split" to use the pieces as recordings of their own, or '
+            f'gaps="mend" to bridge short ones.'
         )
     return found + 1
 

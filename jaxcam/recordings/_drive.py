@@ -23,6 +23,7 @@ class Drive:
     - `rate`: its rate of change (rad/s).
     - `speed`, `phase`: the straight line `speed * time + phase` through the angle.
     - `noise`: standard deviation of the raw samples about the smoothed angle (rad).
+    - `window`: number of samples in each of the parabolas that smooth it.
     """
 
     angle: Float[np.ndarray, " k"]
@@ -30,6 +31,7 @@ class Drive:
     speed: float
     phase: float
     noise: float
+    window: int
 
     @property
     def clock(self) -> Float[np.ndarray, " k"]:
@@ -67,4 +69,5 @@ def read_drive(recording: Recording, channel: str = "cam_angle_rad") -> Drive:
             f"{recording.name}: the cam turns by {abs(angle[-1] - angle[0]):.2g} rad "
             f"only; give a record of at least half a turn."
         )
-    return Drive(angle, rate, float(speed), float(phase), float(np.std(raw - angle)))
+    noise = float(np.std(raw - angle))
+    return Drive(angle, rate, float(speed), float(phase), noise, count)

@@ -1,5 +1,6 @@
 """Recordings and cases from files."""
 
+import dataclasses
 import math
 import re
 from collections.abc import Sequence
@@ -8,15 +9,18 @@ from typing import Literal
 
 import numpy as np
 
+from ._binary_table import read_mat, read_parquet
 from ._check import check_channels, check_drive, find_gaps
 from ._errors import RecordingError
+from ._mend import mend
 from ._recording import Case, Recording
-from ._table import read_table, SUFFIXES
+from ._table import read_table, SUFFIXES as TEXT
 from ._units import si
 
 
 #: what a recording of a cam-follower rig must contain
 CAM_FOLLOWER = ("cam_angle_rad", "follower_angle_rad")
+SUFFIXES = (*TEXT, ".mat", ".parquet")
 
 
 def read_recordings(
@@ -24,9 +28,9 @@ def read_recordings(
     *,
     channels: Sequence[str] = (),
     split: str | None = None,
-    gaps: Literal["refuse", "split"] = "refuse",
+    gaps: Literal["refuse", "split", "mend"] = "refuse",
 ) -> tuple[Recording, ...]:
-    """Every recording in one file: CSV with a header, plain or gz.
+    """Every recording in one file: CSV (plain or gz), MATLAB .mat or Parquet.
 
     The end of a column's name is its unit; `_deg`, `_rpm`, `_ms`, `_mm` and the like
     are converted and the column is renamed (`cam_angle_deg` -> `cam_angle_rad`). One
@@ -37,7 +41,9 @@ def read_recordings(
     - `file`: the file. `..._150.7rpm.csv` in its name is the nominal speed.
     - `channels`: columns that must be there (SI names).
     - `split`: a column that numbers the runs in a file that holds several.
-    - `gaps`: `"refuse"` a record with samples missing, or `"split"` it in pieces.
+    - `gaps`: `"refuse"` a record with samples missing, `"split"` it in pieces, or
+        `"mend"` it: bridge short gaps, split at long ones and undo slips of an encoder
+        (see `mend`); what was done is in `meta["notes"]`.
 
     **Returns:** a tuple of `Recording`, one for each run and piece.
 
@@ -45,7 +51,7 @@ def read_recordings(
     """
     file = Path(file)
     columns = {}
-    for name, numbers in read_table(file).items():
+    for name, numbers in _columns(file).items():
         renamed, factor = (name, 1.0) if name == split else si(name)
         if renamed in columns:
             raise RecordingError(
@@ -68,20 +74,23 @@ def read_recordings(
     for name, rows in runs.items():
         time = columns["time_s"][rows]
         values = {c: v[rows] for c, v in columns.items() if c != "time_s"}
-        breaks = find_gaps(f"{file}: {name}" if split else str(file), time, gaps)
-        pieces = np.split(np.arange(len(time)), breaks)
-        pieces = [piece for piece in pieces if len(piece) > 1]
-        for number, piece in enumerate(pieces, start=1):
-            recording = Recording(
-                name=name if len(pieces) == 1 else f"{name}_piece{number}",
-                time=time[piece],
-                channels={c: v[piece] for c, v in values.items()},
-                nominal_speed=speed,
-                meta={"file": str(file), "piece": number, "pieces": len(pieces)},
+        label = f"{file}: {name}" if split else str(file)
+        if gaps == "mend":
+            find_gaps(label, time, "split")
+            whole = Recording(name, time, values, speed, {"file": str(file)})
+            mended = mend(whole)
+            pieces = [
+                dataclasses.replace(r, meta={**r.meta, "notes": mended.notes})
+                for r in mended.recordings
+            ]
+        else:
+            pieces = _split(
+                name, time, values, speed, file, find_gaps(label, time, gaps)
             )
+        for recording in pieces:
             check_channels(recording)
             check_drive(recording)
-            recordings.append(recording)
+        recordings += pieces
     return tuple(recordings)
 
 
@@ -101,7 +110,7 @@ def read_case(
     *,
     channels: Sequence[str] = CAM_FOLLOWER,
     split: str | None = None,
-    gaps: Literal["refuse", "split"] = "refuse",
+    gaps: Literal["refuse", "split", "mend"] = "refuse",
 ) -> Case:
     """All recordings in a folder, in the order of their names.
 
@@ -125,12 +134,37 @@ def read_case(
         cases = sorted(sub.name for sub in folder.iterdir() if sub.is_dir())
         hint = f"; name one of its folders ({', '.join(cases[:4])})" if cases else ""
         raise RecordingError(
-            f"{folder}: there is no recording (*.csv, *.csv.gz) in this folder{hint}."
+            f"{folder}: there is no recording (*.csv, *.csv.gz, *.mat, *.parquet) in "
+            f"this folder{hint}."
         )
     recordings = []
     for file in files:
         recordings += read_recordings(file, channels=channels, split=split, gaps=gaps)
     return Case(folder.resolve().name, tuple(recordings), folder)
+
+
+def _split(name, time, values, speed, file, breaks) -> list[Recording]:
+    pieces = np.split(np.arange(len(time)), breaks)
+    pieces = [piece for piece in pieces if len(piece) > 1]
+    return [
+        Recording(
+            name=name if len(pieces) == 1 else f"{name}_piece{number}",
+            time=time[piece],
+            channels={c: v[piece] for c, v in values.items()},
+            nominal_speed=speed,
+            meta={"file": str(file), "piece": number, "pieces": len(pieces)},
+        )
+        for number, piece in enumerate(pieces, start=1)
+    ]
+
+
+def _columns(file: Path):
+    """Columns of a file by their names, read according to its ending."""
+    if file.name.lower().endswith(".mat"):
+        return read_mat(file)
+    if file.name.lower().endswith(".parquet"):
+        return read_parquet(file)
+    return read_table(file)
 
 
 def _require(file, columns, needed) -> None:
@@ -147,7 +181,8 @@ def _is_table(file: Path) -> bool:
 
 
 def _stem(file: Path) -> str:
-    return re.sub(r"\.(csv|tsv)(\.gz)?$", "", file.name, flags=re.IGNORECASE)
+    ending = r"\.((csv|tsv)(\.gz)?|mat|parquet)$"
+    return re.sub(ending, "", file.name, flags=re.IGNORECASE)
 
 
 def _nominal_speed(file: Path) -> float | None:

@@ -1,0 +1,146 @@
+"""Problems of `jaxcam.fitting` with terms, and what their scores say of blocks."""
+
+import dataclasses
+from collections.abc import Sequence
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from ..fitting import Fit, Model, Parameter, Problem
+from ..fitting._eliminate import eliminate
+from ..fitting._fit import (
+    free_columns,
+    invert,
+    off_nominal,
+    prior_information,
+)
+from ..fitting._linearise import assemble, Layout, Point
+from ..fitting._problem import _places
+from ._term import Term
+from ._with_terms import WithTerms
+
+
+def term_parameters(terms: Sequence[Term]) -> dict[str, list[Parameter]]:
+    """Parameters of each term, by the term's name."""
+    return {term.name: term.parameters(k) for k, term in enumerate(terms)}
+
+
+def extended(problem: Problem, terms: Sequence[Term], at: Point) -> Problem:
+    """The same data with more terms in the system, all without effect so far.
+
+    **Arguments:** a problem whose system is a `WithTerms`, the terms to add, and the
+    point to start from.
+    """
+    system = problem.model.system
+    assert isinstance(system, WithTerms)
+    before = len(system.terms)
+    model: Model = eqx.tree_at(
+        lambda m: m.system, problem.model, WithTerms(system.base, (*system.terms, *terms))
+    )
+    more = [p for k, t in enumerate(terms) for p in t.parameters(before + k)]
+    parameters = (*problem.parameters, *more)
+    layout = Layout(model, _places(model, parameters))
+    fresh = np.array([float(p.where(model)) for p in more])
+    fresh = np.tile(fresh, (len(problem.segments), 1))
+
+    def wider(values):
+        return jnp.asarray(np.concatenate([np.asarray(values), fresh], axis=1))
+
+    return dataclasses.replace(
+        problem,
+        model=model,
+        parameters=parameters,
+        layout=layout,
+        start=at._replace(values=wider(at.values)),
+    )
+
+
+@dataclasses.dataclass(frozen=True)
+class Blocks:
+    """The likelihood about a point as a quadratic function, block by block.
+
+    A block is a stretch of one record. In units of the parameters' scales, the states
+    eliminated: `information` `(b, g, g)`, `score` `(b, g)`; `prior` `(g,)` and
+    `pull` `(g,)` are what the tolerances add to both.
+    """
+
+    names: tuple[str, ...]
+    scale: Float[np.ndarray, " g"]
+    record: tuple[str, ...]
+    start: Float[np.ndarray, " b"]
+    information: Float[np.ndarray, "b g g"]
+    score: Float[np.ndarray, "b g"]
+    prior: Float[np.ndarray, " g"]
+    pull: Float[np.ndarray, " g"]
+
+    def rows(self, names) -> np.ndarray:
+        wanted = set(names)
+        return np.array([k for k, n in enumerate(self.names) if n in wanted], dtype=int)
+
+    def total(self, weight=None):
+        """Information and score of all blocks, weighted, with the tolerances."""
+        weight = np.ones(len(self.record)) if weight is None else weight
+        information = np.einsum("b,bij->ij", weight, self.information)
+        score = np.einsum("b,bi->i", weight, self.score)
+        return information + np.diag(self.prior), score + self.pull
+
+
+def blocks_of(
+    problem: Problem, point: Point, slices: int = 1, names: Sequence[str] | None = None
+) -> Blocks:
+    """Score and information of parameters about a point, in slices of each record."""
+    columns = free_columns(problem, names)
+    local, scales = jnp.asarray(columns.local), jnp.asarray(columns.scales)
+    longest = max(part.recording.time[-1] for part in problem.segments)
+    edges = np.linspace(0.0, longest, slices + 1)
+    edges[0], edges[-1] = -np.inf, np.inf
+    size = len(columns.scale)
+    record, start, information, score = [], [], [], []
+    for a, b in zip(edges, edges[1:]):
+        weights = problem.between(a, b)
+        found, _ = assemble(
+            problem.layout,
+            problem.pieces,
+            problem.weighted(weights),
+            point,
+            local,
+            scales,
+        )
+        found = eliminate(found)
+        for r, name in enumerate(problem.records):
+            record.append(name)
+            start.append(max(a, 0.0))
+            information.append(np.asarray(found.information[r])[:size, :size])
+            score.append(np.asarray(found.score[r])[:size])
+    prior = prior_information(problem, columns, True)
+    pull = -prior * off_nominal(problem, columns, point)
+    return Blocks(
+        tuple(problem.names[p] for p in columns.parameter),
+        columns.scale,
+        tuple(record),
+        np.array(start),
+        np.array(information),
+        np.array(score),
+        prior,
+        pull,
+    )
+
+
+def gain(information, score, rows) -> float:
+    """Growth of twice the log-likelihood when some parameters are freed."""
+    if not len(rows):
+        return 0.0
+    inverse = invert(information[np.ix_(rows, rows)])
+    return float(score[rows] @ inverse @ score[rows])
+
+
+def off(information, score, rows):
+    """Steps of some parameters to their optimum, and their standard errors."""
+    inverse = invert(information[np.ix_(rows, rows)])
+    return inverse @ score[rows], np.sqrt(np.abs(np.diag(inverse)))
+
+
+def value_of(found: Fit, name: str) -> float:
+    return float(found.point.values[0, found.problem.names.index(name)])

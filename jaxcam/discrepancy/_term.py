@@ -1,0 +1,150 @@
+"""A piece of physics that a model may lack, as a term with a strength."""
+
+import dataclasses
+import math
+from typing import Any, ClassVar, NamedTuple
+
+import equinox as eqx
+import jax.numpy as jnp
+
+from ..fitting import Model, Parameter
+
+
+class Motion(NamedTuple):
+    """What a term sees: time (s), position, velocity, and phase of the drive (rad).
+
+    The phase is the angle that the drive has turned, or time itself without a drive.
+    """
+
+    t: Any
+    position: Any
+    velocity: Any
+    phase: Any
+
+
+def strength(
+    unit: str,
+    size: float,
+    *,
+    lower: float = -math.inf,
+    upper: float = math.inf,
+    default: float = 0.0,
+    inner: bool = False,
+):
+    """A field of a term that is fitted.
+
+    **Arguments:**
+
+    - `unit`: for tables.
+    - `size`: a change that matters; it does not influence the result.
+    - `lower`, `upper`: signs that physics demands.
+    - `inner`: a parameter such as a frequency, without effect while the strengths are
+        zero; it is fitted from a value that a scan has found.
+    """
+    metadata = {
+        "strength": Strength("", unit, size, lower, upper, inner),
+    }
+    return eqx.field(
+        default=default,
+        converter=lambda value: jnp.asarray(value, dtype=float),
+        metadata=metadata,
+    )
+
+
+@dataclasses.dataclass(frozen=True)
+class Strength:
+    """One number of a term that is fitted, as `strength` declares it."""
+
+    name: str
+    unit: str
+    size: float
+    lower: float = -math.inf
+    upper: float = math.inf
+    inner: bool = False
+
+
+class Term(eqx.Module):
+    """Something a model may lack. Subclass it, and declare its numbers by `strength`.
+
+    With all strengths zero a term changes nothing. It may act in flight
+    (`acceleration`), on the surface (`contact`) or in impacts (`restitution`); what a
+    subclass does not state is left alone.
+
+    Class variables: `name`, `sentence` (what it is, in words that go on after "the
+    model lacks"), `where` (`"flight"`, `"impact"`, `"contact"`, `"drive"` or
+    `"sensor"`), `region` (of the motion, in words), `source` (literature), `listed`
+    (false for one that describes a shape but is not a verdict by itself).
+    """
+
+    name: ClassVar[str] = ""
+    sentence: ClassVar[str] = ""
+    where: ClassVar[str] = "flight"
+    region: ClassVar[str] = "everywhere"
+    source: ClassVar[str] = ""
+    listed: ClassVar[bool] = True
+    acts: ClassVar[tuple[str, ...]] = ("flight",)
+
+    def acceleration(self, motion: Motion):
+        """What is added to the acceleration in flight."""
+        del motion
+        return 0.0
+
+    def contact(self, motion: Motion):
+        """How much higher the surface is, in units of the gap; of time and phase."""
+        del motion
+        return 0.0
+
+    def restitution(self, approach, motion: Motion):
+        """Factor on the restitution coefficient at an approach speed."""
+        del approach, motion
+        return 1.0
+
+    def strengths(self) -> tuple[Strength, ...]:
+        """The numbers that are fitted, in the order of the fields."""
+        found = []
+        for field in dataclasses.fields(self):
+            one = field.metadata.get("strength")
+            if one is not None:
+                found.append(dataclasses.replace(one, name=field.name))
+        return tuple(found)
+
+    def parameters(self, place: int) -> list[Parameter]:
+        """Parameters of a fit, of the term at some place of a `WithTerms`."""
+        return [
+            Parameter(
+                one.name,
+                lambda m, name=one.name: getattr(m.system.terms[place], name),
+                scale=one.size,
+                lower=one.lower,
+                upper=one.upper,
+                unit=one.unit,
+            )
+            for one in self.strengths()
+        ]
+
+
+class SensorTerm(Term):
+    """A fault of the sensor of the motion: it acts on a field of that sensor."""
+
+    where: ClassVar[str] = "sensor"
+    acts: ClassVar[tuple[str, ...]] = ()
+    #: fields of `jaxcam.fitting.Sensor`, one for each strength
+    fields: ClassVar[tuple[str, ...]] = ()
+
+    def parameters(self, place: int) -> list[Parameter]:
+        del place
+        return [
+            Parameter(
+                one.name,
+                lambda m, field=field: getattr(_first(m), field),
+                scale=one.size,
+                lower=one.lower,
+                upper=one.upper,
+                unit=one.unit,
+            )
+            for one, field in zip(self.strengths(), self.fields, strict=True)
+        ]
+
+
+def _first(model: Model):
+    return next(iter(model.sensors.values()))

@@ -1,0 +1,145 @@
+"""The library: what the dynamics of machines most often leaves out."""
+
+from typing import ClassVar
+
+import jax.numpy as jnp
+
+from ._term import Motion, SensorTerm, strength, Term
+
+
+# Speed (rad/s) within which dry friction changes sign, so that it can be integrated;
+# far below the speeds that it is told from
+_SLIP = 0.01
+
+
+class ViscousDamping(Term):
+    """Damping proportional to the velocity, `-c1 v`."""
+
+    name: ClassVar[str] = "viscous_damping"
+    sentence: ClassVar[str] = "viscous damping, a force against the velocity"
+    region: ClassVar[str] = "in flight, in proportion to the speed"
+    source: ClassVar[str] = "Rayleigh, The Theory of Sound, 1877, section 45"
+    c1: float = strength("1/s", 0.1, lower=0.0)
+
+    def acceleration(self, motion: Motion):
+        return -self.c1 * motion.velocity
+
+
+class CoulombFriction(Term):
+    """Dry friction, `-fc sign(v)`."""
+
+    name: ClassVar[str] = "coulomb_friction"
+    sentence: ClassVar[str] = "Coulomb friction, a constant force against the motion"
+    region: ClassVar[str] = "in flight, changing sign with the velocity"
+    source: ClassVar[str] = "Armstrong-Helouvry, Dupont, Canudas de Wit 1994, Automatica"
+    fc: float = strength("rad/s^2", 0.1, lower=0.0)
+
+    def acceleration(self, motion: Motion):
+        return -self.fc * jnp.tanh(motion.velocity / _SLIP)
+
+
+class QuadraticDrag(Term):
+    """Drag of a turbulent fluid, `-c2 |v| v`."""
+
+    name: ClassVar[str] = "quadratic_drag"
+    sentence: ClassVar[str] = "quadratic drag, as of moving air or oil"
+    region: ClassVar[str] = "in flight, at large speeds"
+    source: ClassVar[str] = "Batchelor, An Introduction to Fluid Dynamics, 5.11"
+    c2: float = strength("1/rad", 0.1, lower=0.0)
+
+    def acceleration(self, motion: Motion):
+        return -self.c2 * jnp.abs(motion.velocity) * motion.velocity
+
+
+class NonlinearSpring(Term):
+    """A spring that hardens (or softens) away from its middle, `-k3 (q - q0)^3`."""
+
+    name: ClassVar[str] = "nonlinear_spring"
+    sentence: ClassVar[str] = "a cubic part of the spring force"
+    region: ClassVar[str] = "in flight, at large deflections"
+    source: ClassVar[str] = "Duffing 1918; Kovacic and Brennan 2011, chapter 2"
+    center: ClassVar[float] = 0.27
+    k3: float = strength("1/(s^2 rad^2)", 100.0)
+
+    def acceleration(self, motion: Motion):
+        return -self.k3 * (motion.position - self.center) ** 3
+
+
+class RestitutionVelocity(Term):
+    """Restitution that falls with the approach speed, `r0 (1 + v / 0.3)^-rb`."""
+
+    name: ClassVar[str] = "restitution_velocity"
+    sentence: ClassVar[str] = "a restitution that depends on the approach speed"
+    where: ClassVar[str] = "impact"
+    region: ClassVar[str] = "at impacts, by their approach speed"
+    source: ClassVar[str] = "Goldsmith, Impact, 1960, chapter 8; Johnson 1985, 11.5"
+    acts: ClassVar[tuple[str, ...]] = ("impact",)
+    reference: ClassVar[float] = 0.3
+    rb: float = strength("-", 0.02, lower=0.0)
+
+    def restitution(self, approach, motion: Motion):
+        del motion
+        return jnp.exp(-self.rb * jnp.log1p(approach / self.reference))
+
+
+class CamProfileError(Term):
+    """A cam that is out of round, by `run cos(2 phi + 0.7)`."""
+
+    name: ClassVar[str] = "cam_profile_error"
+    sentence: ClassVar[str] = "an error of the cam's profile, twice a turn"
+    where: ClassVar[str] = "contact"
+    region: ClassVar[str] = "at impacts and rests, by the angle of the cam"
+    source: ClassVar[str] = "Norton, Cam Design and Manufacturing Handbook, chapter 12"
+    acts: ClassVar[tuple[str, ...]] = ("contact",)
+    lead: ClassVar[float] = 0.7
+    run: float = strength("rad", 1e-4)
+
+    def contact(self, motion: Motion):
+        return self.run * jnp.cos(2 * motion.phase + self.lead)
+
+
+class SensorLag(SensorTerm):
+    """A channel of the motion that is late."""
+
+    name: ClassVar[str] = "sensor_lag"
+    sentence: ClassVar[str] = "a lag of the follower's sensor"
+    region: ClassVar[str] = "in the measured angle, in proportion to the velocity"
+    source: ClassVar[str] = "Ljung, System Identification, 1999, section 4.2"
+    fields: ClassVar[tuple[str, ...]] = ("lag",)
+    lag: float = strength("s", 1e-4, lower=0.0)
+
+
+class ExternalVibration(Term):
+    """A foundation that shakes, `ext sin(2 pi fe t + phase)`.
+
+    Fitted as the amplitudes of sine and cosine, in which it is linear.
+    """
+
+    name: ClassVar[str] = "external_vibration"
+    sentence: ClassVar[str] = "an external vibration at a frequency of its own"
+    region: ClassVar[str] = "in flight, periodic in time and not with the cam"
+    source: ClassVar[str] = "Den Hartog, Mechanical Vibrations, 1956, section 2.9"
+    ext_sin: float = strength("rad/s^2", 0.1)
+    ext_cos: float = strength("rad/s^2", 0.1)
+    fe: float = strength("Hz", 0.05, lower=0.0, default=10.0, inner=True)
+
+    def acceleration(self, motion: Motion):
+        angle = 2 * jnp.pi * self.fe * motion.t
+        return self.ext_sin * jnp.sin(angle) + self.ext_cos * jnp.cos(angle)
+
+
+class DriveRipple(Term):
+    """A drive whose speed varies with its own angle, `w (1 + eps cos(phi - psi))`.
+
+    Found in the channel of the drive itself; the motion is computed from that channel
+    in any case.
+    """
+
+    name: ClassVar[str] = "drive_ripple"
+    sentence: ClassVar[str] = "a ripple of the cam's speed, once a turn"
+    where: ClassVar[str] = "drive"
+    region: ClassVar[str] = "in the cam's own angle, by that angle"
+    source: ClassVar[str] = "Norton, Cam Design and Manufacturing Handbook, chapter 10"
+    acts: ClassVar[tuple[str, ...]] = ()
+    eps: float = 0.0
+    psi: float = 0.0

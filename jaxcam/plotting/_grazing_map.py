@@ -1,0 +1,74 @@
+"""A one-dimensional map with its cobweb."""
+
+from collections.abc import Callable
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from ._axes import legend_above, one_axes
+from ._style import BAND, FLIGHT, IMPACT, styled
+
+
+@styled
+def cobweb(
+    function: Callable,
+    start: float,
+    turns: int = 50,
+    ax: Axes | None = None,
+    *,
+    skip: int = 0,
+    edge: float | None = None,
+    name: str = "x",
+) -> Figure:
+    """Draw a map, the line on which nothing changes, and the cobweb of one motion.
+
+    **Arguments:**
+
+    - `function`: the map of a vector of points, such as
+        `lambda x: variational.nordmark_map(x, mu, lam)`.
+    - `start`: where the motion starts; `turns` steps are drawn after `skip` others.
+    - `ax`: where to draw; a new figure without.
+    - `edge`: where impacts begin, marked by a dashed line.
+    - `name`: of the variable, in TeX.
+
+    **Returns:** the figure.
+
+    **Raises:** `ValueError` for a motion that does not stay finite.
+    """
+    x, points = float(start), []
+    with np.errstate(over="ignore", invalid="ignore"):
+        for _ in range(skip + turns):
+            points.append(x)
+            x = float(np.asarray(function(np.array([x])))[0])
+    points = np.array([*points[skip:], x])
+    if not np.all(np.isfinite(points)):
+        raise ValueError("the motion leaves every bound; give another start")
+    low, high = points.min(), points.max()
+    if edge is not None:
+        low, high = min(low, edge), max(high, edge)
+    room = 0.08 * (high - low) or 1.0
+    low, high = low - room, high + room
+    grid = np.linspace(low, high, 1601)
+    if edge is not None:
+        # the slope is infinite at the edge
+        grid = np.sort(np.append(grid, edge - (high - low) * np.logspace(-9, -3, 60)))
+    ax = one_axes(ax)
+    ax.plot([low, high], [low, high], color=BAND, label="_identity")
+    ax.plot(grid, np.asarray(function(grid)), color=FLIGHT, label="map")
+    steps = np.repeat(points, 2)
+    ax.plot(
+        steps[:-2], np.append(low, steps[2:-1]), color=IMPACT, linewidth=0.8,
+        label="motion",
+    )  # fmt: skip
+    if edge is not None:
+        ax.axvline(edge, color=BAND, linestyle="--", linewidth=1.0, label="graze")
+    ax.set_xlim(low, high)
+    ax.set_ylim(low, high)
+    ax.set_aspect("equal")
+    ax.set_xlabel(f"${name}_k$")
+    ax.set_ylabel(f"${name}_{{k+1}}$")
+    legend_above(ax)
+    figure = ax.figure
+    assert isinstance(figure, Figure)
+    return figure

@@ -1,0 +1,93 @@
+"""The local map of section 5.4 with its cobwebs, and the diagram it iterates to."""
+
+import jax.numpy as jnp
+import numpy as np
+from matplotlib.axes import Axes
+
+from variational import Lobes, LocalMap
+
+from ._axes import legend_above, one_axes
+from ._style import FLIGHT, IMPACT, RECORDED, SECTION, styled
+
+
+@styled
+def local_map(
+    local: LocalMap,
+    lobes: Lobes | None = None,
+    ax: Axes | None = None,
+    *,
+    shift: float = 0.0,
+    turns: int = 60,
+) -> Axes:
+    """Draw the fitted map over the measured one, with a cobweb. (Figures 5.25, 5.26)
+
+    **Arguments:**
+
+    - `local`: what [`variational.fit_local_map`][] returned.
+    - `lobes`: the measurement, drawn as dots and only without a shift.
+    - `ax`: where to draw; a new figure without.
+    - `shift`: how far the map is moved to the left, as a parameter moves it.
+    - `turns`: steps of the cobweb, the first half of which is not drawn.
+
+    **Returns:** the axes.
+    """
+    ax = one_axes(ax)
+    x_0, x_inf = float(local.x_0), float(local.x_inf)
+    span = x_0 - x_inf
+    # dense at every corner: equal steps of the depth, then of the root
+    x = np.unique(
+        np.concatenate(
+            [
+                np.linspace(x_inf - 0.4 * span, x_0, 2000),
+                x_0 - span * np.linspace(0, 1, 4000) ** 3,
+            ]
+        )
+    )
+    if lobes is not None and shift == 0:
+        ax.plot(
+            lobes.scan,
+            lobes.scanned,
+            ".",
+            color=IMPACT,
+            ms=3,
+            label="measured",
+            zorder=3,
+        )
+    # the fit stands for the first lobe and those inside it
+    shown = np.asarray(local(jnp.asarray(x)))
+    ax.plot(x - shift, shown, color=FLIGHT, lw=1.2, label="fitted")
+    ends = np.array([x[0] - shift, x[-1] - shift])
+    ax.plot(ends, ends, color=RECORDED, ls="--", lw=1, label="identity")
+    points, value = [], float(local.alpha_inf)
+    for k in range(turns):
+        after = float(local(value + shift))
+        if k >= turns // 2:
+            points += [(value, after), (after, after)]
+        value = after
+    web = np.array(points).T
+    ax.plot(*web, color=SECTION, lw=0.7, label="cobweb")
+    ax.set_xlabel("state at the section")
+    ax.set_ylabel("one turn later")
+    ax.set_ylim(np.min(shown) - 0.1 * span, np.max(shown) + 0.3 * span)
+    legend_above(ax)
+    return ax
+
+
+@styled
+def local_map_diagram(shifts, attractor, ax: Axes | None = None, *, flow=None) -> Axes:
+    """Draw the attractor of the fitted map over its shift. (Figure 5.28)
+
+    **Arguments:** `shifts`, shape `(k,)`; `attractor`, shape `(k, keep)`; `ax`, a new
+    figure without; `flow`, shifts and states of the motion itself, drawn beneath.
+
+    **Returns:** the axes.
+    """
+    ax = one_axes(ax)
+    if flow is not None:
+        ax.plot(*flow, ",", color=IMPACT, label="motion")
+    shifts = np.repeat(np.asarray(shifts), attractor.shape[1])
+    ax.plot(shifts, np.ravel(attractor), ",", color=FLIGHT, label="fitted map")
+    ax.set_xlabel("shift of the map")
+    ax.set_ylabel("state at the section")
+    legend_above(ax)
+    return ax

@@ -1,0 +1,68 @@
+"""Floquet multipliers in the complex plane, beside the unit circle."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from ._axes import legend_above, one_axes
+from ._style import BAND, FLIGHT, IMPACT, styled
+
+
+@styled
+def multipliers(
+    values: Sequence | np.ndarray, ax: Axes | None = None, *, reach: float | None = None
+) -> Figure:
+    """Draw multipliers of one orbit, or of many, and the unit circle.
+
+    **Arguments:**
+
+    - `values`: complex, shape `(n,)`, or `(orbits, n)` for the orbits of a branch.
+    - `ax`: where to draw; a new figure without.
+    - `reach`: half the width of the picture; without, so that all fit in. Multipliers
+        beyond it are marked at the edge.
+
+    **Returns:** the figure.
+    """
+    values = np.atleast_2d(np.asarray(values, dtype=complex)).ravel()
+    values = values[np.isfinite(values)]
+    ax = one_axes(ax)
+    if reach is None:
+        reach = 1.15 * max(1.0, float(np.abs(values).max(initial=0.0)))
+    turn = np.linspace(0, 2 * np.pi, 361)
+    ax.plot(np.cos(turn), np.sin(turn), color=BAND, zorder=1, label="unit circle")
+    size = np.maximum(np.abs(np.real(values)), np.abs(np.imag(values)))
+    outside = size > reach
+    shown = np.where(
+        outside, values * (0.98 * reach / np.maximum(size, 1e-300)), values
+    )
+    kinds = (
+        ("stable", (np.abs(values) < 1) & ~outside, "o", FLIGHT),
+        ("unstable", (np.abs(values) >= 1) & ~outside, "s", IMPACT),
+        ("outside the picture", outside, "X", IMPACT),
+    )
+    for name, chosen, marker, colour in kinds:
+        if np.any(chosen):
+            ax.plot(
+                np.real(shown[chosen]),
+                np.imag(shown[chosen]),
+                marker,
+                color=colour,
+                markersize=5,
+                markeredgecolor="white",
+                markeredgewidth=0.5,
+                clip_on=False,
+                label=name,
+            )
+    ax.axhline(0, color=BAND, linewidth=0.6, zorder=0)
+    ax.axvline(0, color=BAND, linewidth=0.6, zorder=0)
+    ax.set_xlim(-reach, reach)
+    ax.set_ylim(-reach, reach)
+    ax.set_aspect("equal")
+    ax.set_xlabel(r"real part of $\mu$")
+    ax.set_ylabel(r"imaginary part of $\mu$")
+    legend_above(ax)
+    figure = ax.figure
+    assert isinstance(figure, Figure)
+    return figure

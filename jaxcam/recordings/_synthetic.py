@@ -1,0 +1,162 @@
+"""Recordings of a system that is known: to try an experiment before it is run."""
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from ..hybrid import HybridSystem, simulate
+from ._errors import RecordingError
+from ._recording import Recording
+
+
+# Finer steps than the samples, in which a sensor's filter is integrated
+_FINER = 4
+
+
+class Wandering(HybridSystem):
+    """A driven system whose drive wanders slowly, as real drives do.
+
+    The drive turns at `speed (1 + depth w)` with w = 0.7 cos(2 pi 0.31 t) + 0.3 cos(2
+    pi 0.87 t): two slow tones that have no simple ratio.
+
+    **Arguments:**
+
+    - `base`: the system.
+    - `depth`: relative size of the wandering.
+    - `speed`, `phase`: pick both out of `base`.
+    """
+
+    base: HybridSystem
+    depth: float = 2e-4
+    speed: Callable[[Any], Array] = eqx.field(
+        default=lambda system: system.speed, static=True
+    )
+    phase: Callable[[Any], Array] = eqx.field(
+        default=lambda system: system.phase, static=True
+    )
+
+    @property
+    def state_names(self) -> tuple[str, ...]:  # pyright: ignore
+        return self.base.state_names
+
+    @property
+    def state_units(self) -> tuple[str, ...]:  # pyright: ignore
+        return self.base.state_units
+
+    @property
+    def period(self):
+        return self.base.period
+
+    def prepared(self) -> "Wandering":
+        return eqx.tree_at(lambda s: s.base, self, self.base.prepared())
+
+    def check(self) -> None:
+        self.base.check()
+
+    def angle(self, t) -> Array:
+        """Angle that the drive has turned (rad) at `t` (s), elementwise."""
+        wander = 0.0
+        for share, frequency in _TONES:
+            w = 2 * jnp.pi * frequency
+            wander = wander + share * jnp.sin(w * t) / w
+        return self.phase(self.base) + self.speed(self.base) * (t + self.depth * wander)
+
+    def at(self, t) -> HybridSystem:
+        """The base as it is near time `t`: turning at the drive's speed of then."""
+        angle, rate = jax.jvp(self.angle, (t,), (jnp.ones_like(t),))
+        here = rate, angle - rate * t
+        return eqx.tree_at(lambda s: (self.speed(s), self.phase(s)), self.base, here)
+
+    def vector_field(self, t, state):
+        return self.at(t).vector_field(t, state)
+
+    def gap(self, t, state):
+        # only the angle matters here, and its own rate of change comes with it
+        phase = self.angle(t) - self.speed(self.base) * t
+        base = eqx.tree_at(lambda s: self.phase(s), self.base, phase)
+        return base.gap(t, state)
+
+    def impact(self, t, state):
+        return self.at(t).impact(t, state)
+
+
+_TONES = ((0.7, 0.31), (0.3, 0.87))
+
+
+def record(
+    system: HybridSystem,
+    sensors: Mapping[str, Any],
+    duration: float,
+    *,
+    rng: np.random.Generator,
+    state=None,
+    settle: float = 0.0,
+    interval: float = 5e-4,
+    drive: tuple[float, float] | None = None,
+    name: str = "synthetic",
+) -> Recording:
+    """Simulate a system and read it through sensors.
+
+    **Arguments:**
+
+    - `system`: a driven one may be a `Wandering`.
+    - `sensors`: a `jaxcam.fitting.Sensor` for each channel.
+    - `duration`, `settle`: how long (s) to record, and to wait before.
+    - `rng`: the source of the noise.
+    - `state`: to start from `(n,)`; `None` for the release point.
+    - `interval`: between samples (s).
+    - `drive`: noise and resolution (rad) of an encoder on the drive of a `Wandering`,
+        recorded as `cam_angle_rad`.
+
+    **Raises:** `RecordingError` where the simulation did not come to its end.
+    """
+    trajectory = simulate(system, state, 0.0, settle + duration, max_steps=1 << 17)
+    if not bool(trajectory.successful):
+        raise RecordingError(f"{name}: the simulation failed: {trajectory.result}")
+    count = round(duration / interval)
+    time = interval * np.arange(count)
+    channels = {
+        channel: _sense(sensor, trajectory, settle, count, interval, rng)
+        for channel, sensor in sensors.items()
+    }
+    speed = None
+    if isinstance(system, Wandering):
+        speed = float(system.speed(system.base))
+        if drive is not None:
+            angle = np.asarray(system.angle(jnp.asarray(settle + time)))
+            angle = angle - 2 * np.pi * np.floor(angle[0] / (2 * np.pi))
+            noisy = angle + drive[0] * rng.standard_normal(count)
+            channels = {"cam_angle_rad": _round(noisy, drive[1]), **channels}
+    return Recording(name, time, channels, speed)
+
+
+def _sense(sensor, trajectory, settle, count, interval, rng) -> Float[np.ndarray, " k"]:
+    fine = interval / _FINER
+    times = settle + fine * np.arange(count * _FINER) - float(sensor.lag)
+    states = np.asarray(trajectory.at(np.maximum(times, trajectory.t0)))
+    seen = np.asarray(jax.vmap(sensor.seen)(jnp.asarray(states)))
+    if sensor.bandwidth_hz != float("inf"):
+        seen = _filtered(seen, 2 * np.pi * sensor.bandwidth_hz * fine)
+    seen = float(sensor.offset) + float(sensor.gain) * seen[::_FINER]
+    noisy = seen + float(sensor.noise) * rng.standard_normal(count)
+    return np.clip(_round(noisy, sensor.resolution), -sensor.limit, sensor.limit)
+
+
+def _filtered(samples, step: float) -> np.ndarray:
+    """First-order filter of a signal that is linear between its samples."""
+    from scipy.signal import lfilter
+
+    keep = np.exp(-step)
+    late = (1 - keep) / step
+    b = [1 - late, late - keep]
+    first = samples[0] * (1 - b[0])
+    return lfilter(b, [1, -keep], samples, zi=[first])[0]
+
+
+def _round(samples, step: float) -> np.ndarray:
+    return np.round(samples / step) * step if step else samples

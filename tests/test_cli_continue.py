@@ -1,0 +1,81 @@
+"""`jaxcam continue`, as a reader types it."""
+
+import json
+import re
+import shlex
+
+import numpy as np
+import pytest
+from typer.main import get_command
+from typer.testing import CliRunner
+
+from jaxcam.cli import app
+
+
+@pytest.fixture(autouse=True)
+def keep_the_cache_of_the_tests(monkeypatch):
+    """A command sets the folder of compiled programs; here it is the tests' own."""
+    monkeypatch.setenv("JAX_COMPILATION_CACHE_DIR", "as the tests have it")
+
+
+def jaxcam(*arguments):
+    return CliRunner().invoke(app, ["continue", *[str(a) for a in arguments]])
+
+
+def test_examples_in_the_help_name_options_that_exist():
+    found = re.findall(r"^\s+(jaxcam continue.*?)\s*$", jaxcam("--help").stdout, re.M)
+    command = get_command(app).commands["continue"]  # pyright: ignore
+    assert len(found) >= 3
+    for line in found:
+        arguments = shlex.split(line)[2:]
+        assert command.make_context("continue", arguments).params
+
+
+def test_branch_of_the_oscillator(tmp_path):
+    """From the orbit without impacts up to its grazing at |gamma|, and behind it."""
+    line = "impact-oscillator --parameter wall --at 0.2 --from 0.12 --to 0.3 --state"
+    state = "-0.1462,0"
+    arguments = [*line.split(), state, "--set", "damping=0.05", "--direction", "down"]
+    file, folder = tmp_path / "branch.json", tmp_path / "out"
+    found = jaxcam(*arguments, "--json", file, "--out", folder)
+    assert found.exit_code == 0, found.output
+    data = json.loads(file.read_text())
+    w, zeta = 2.8, 0.05
+    amplitude = 1 / np.hypot(1 - w * w, 2 * zeta * w)
+    first = data["special"][0]
+    assert first["kind"] == "grazing" and first["converged"]
+    assert first["parameter"] == pytest.approx(amplitude, abs=1e-9)
+    assert data["points"][0]["stable"] and data["points"][0]["parameter"] == 0.2
+    assert "grazing" in found.stdout
+    assert {f.name for f in folder.iterdir()} >= {"branch.png", "branch.jsonl"}
+    # nothing is left to do, and nothing is done again
+    again = jaxcam(*arguments, "--json", file, "--out", folder, "--resume")
+    assert again.exit_code == 0, again.output
+    assert json.loads(file.read_text())["points"] == data["points"]
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ("pendulum --from 1 --to 2", "cam-follower, impact-oscillator"),
+        ("impact-oscillator --parameter wall", "--from A --to B"),
+        ("impact-oscillator --parameter wall --from 1 --to 0", "wrong way round"),
+        ("impact-oscillator --parameter wall --from nan --to 0", "finite"),
+        ("impact-oscillator --parameter size --from 0 --to 1", "omega"),
+        ("impact-oscillator --parameter wall --from 1 --to 2", "--at"),
+        ("impact-oscillator --parameter wall --from 0 --to 1 --state low", "commas"),
+        ("impact-oscillator --parameter wall --from 0 --to 1 --periods 0", "1 or more"),
+        ("impact-oscillator --parameter wall --from 0 --to 1 --max-points 1", "2 or"),
+        ("impact-oscillator --parameter wall --from 0 --to 1 --direction on", "up, "),
+        ("impact-oscillator --parameter wall --from 0 --to 1 --algorithm x", "natural"),
+        ("impact-oscillator --parameter wall --from 0 --to 1 --resume", "--out DIR"),
+        ("--from 130 --to 150 --preset table-9", "table-4.4"),
+        ("--from 150 --to 160 --at 145", "outside"),
+    ],
+)
+def test_bad_input_is_one_sentence(line, words):
+    found = jaxcam(*line.split())
+    assert found.exit_code == 2, found.output
+    assert found.stdout == "" and words in found.stderr
+    (sentence,) = found.stderr.splitlines()
+    assert sentence.endswith(".")

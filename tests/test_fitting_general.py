@@ -1,0 +1,258 @@
+"""Fits of systems other than a cam-follower, sensors, and what is refused."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from jaxcam import fitting
+from jaxcam.fitting._likelihood import score
+from jaxcam.hybrid import HybridSystem
+from jaxcam.models import BouncingBall, PowerLawRestitution
+from jaxcam.recordings import mend, record, Recording, RecordingError, segment
+
+
+class DraggedBall(HybridSystem):
+    """A ball on a fixed floor with viscous drag, as a reader would write it."""
+
+    state_names = ("height", "velocity")
+
+    gravity: float = 9.81
+    drag: float = 0.0
+    restitution: float = 0.8
+
+    def vector_field(self, t, state):
+        return jnp.stack([state[1], -self.gravity - self.drag * state[1]])
+
+    def gap(self, t, state):
+        return state[0]
+
+    def impact(self, t, state):
+        return jnp.stack([state[0], -self.restitution * state[1]])
+
+
+NOISE = 1e-3
+SENSORS = {"height_m": fitting.Sensor(0, noise=NOISE)}
+
+
+def ball_record(system, seed, sensors=SENSORS, duration=2.0, name="drop"):
+    rng = np.random.default_rng(seed)
+    run = record(
+        system,
+        sensors,
+        duration,
+        rng=rng,
+        state=jnp.array([1.0, 0.0]),
+        interval=2e-3,
+        name=name,
+    )
+    return segment(run, "height_m", np.zeros(len(run)), noise=NOISE, restitution=0.8)
+
+
+PARAMETERS = [
+    fitting.Parameter("gravity", lambda m: m.system.gravity, tolerance=0.5),
+    fitting.Parameter("drag", lambda m: m.system.drag, lower=0.0, scale=0.1),
+    fitting.Parameter(
+        "restitution", lambda m: m.system.restitution, per_record=True, upper=1.0
+    ),
+]
+TRUE = DraggedBall(gravity=9.7, drag=0.12, restitution=0.75)
+
+
+@pytest.fixture(scope="module")
+def balls():
+    other = eqx.tree_at(lambda s: s.restitution, TRUE, 0.7)
+    runs = [ball_record(TRUE, 0, name="a"), ball_record(other, 1, name="b")]
+    model = fitting.Model(DraggedBall(), SENSORS)
+    return fitting.Problem.build(model, runs, PARAMETERS)
+
+
+def test_a_readers_system_with_values_of_each_record(balls):
+    found = fitting.fit(balls)
+    assert found.converged
+    truth = {"gravity": 9.7, "drag": 0.12, "restitution@a": 0.75, "restitution@b": 0.7}
+    for name, value in truth.items():
+        one = found[name]
+        assert abs(one.value - value) < 3.3 * one.stderr, name
+    assert float(found.model("b").system.restitution) == found["restitution@b"].value
+    rms = [part.rms / part.noise for part in fitting.residuals(found)]
+    assert np.max(np.abs(np.array(rms) - 1)) < 0.1
+
+
+def test_freeing_another_parameter_compiles_nothing(balls):
+    fitting.fit(balls, free=["gravity"])
+    from jaxcam.fitting._linearise import assemble
+
+    before = assemble._cached._cache_size()
+    fitting.fit(balls, free=["drag", "restitution"])
+    assert assemble._cached._cache_size() == before
+
+
+def test_the_optimum_is_that_of_optimistix(balls):
+    """Against a dense Levenberg-Marquardt on one flight, all unknowns together."""
+    import optimistix as optx
+
+    run = ball_record(TRUE, 4)
+    one = segment(run.recording.between(0.0, 0.4), "height_m", noise=NOISE)
+    model = fitting.Model(DraggedBall(drag=0.12), SENSORS)
+    problem = fitting.Problem.build(
+        model, [one], [fitting.Parameter("gravity", lambda m: m.system.gravity)]
+    )
+    found = fitting.fit(problem)
+    time, height = one.recording.time, one.recording["height_m"]
+
+    def misfit(unknowns, _):
+        g, h, v = unknowns
+        c = 0.12
+        # the solution of x'' = -g - c x'
+        fall = (v + g / c) * (1 - jnp.exp(-c * time)) / c - g * time / c
+        return (height - h - fall) / NOISE
+
+    dense = optx.least_squares(
+        misfit,
+        optx.LevenbergMarquardt(rtol=1e-10, atol=1e-10),
+        jnp.array([9.81, 1.0, 0.0]),
+    )
+    jacobian = jax.jacfwd(lambda u: misfit(u, None))(dense.value)
+    stderr = np.sqrt(np.linalg.inv(jacobian.T @ jacobian)[0, 0])
+    value = float(dense.value[0])
+    assert found["gravity"].value == pytest.approx(value, abs=1e-3 * stderr)
+    assert found["gravity"].stderr == pytest.approx(stderr, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    "sensor",
+    [
+        fitting.Sensor(0, noise=1.0),
+        fitting.Sensor(0, noise=1.0, resolution=2.5),
+        fitting.Sensor(0, noise=1.0, limit=2.0),
+        fitting.Sensor(0, noise=1.0, tails=4.0),
+    ],
+)
+def test_likelihoods(sensor):
+    """Scores are derivatives, zero on average; their square is the information."""
+    rng = np.random.default_rng(0)
+    truth = 1.3
+    values = truth + rng.standard_normal(200_000)
+    if sensor.tails < np.inf:
+        values = truth + rng.standard_t(4.0, 200_000)
+    if sensor.resolution:
+        values = np.round(values / sensor.resolution) * sensor.resolution
+    values = jnp.clip(jnp.asarray(values), -sensor.limit, sensor.limit)
+    at = jnp.full_like(values, truth)
+    h = 1e-5
+    found = score(sensor, values, at)
+    ends = [score(sensor, values, at + s * h).cost for s in (1, -1)]
+    np.testing.assert_allclose(
+        -(ends[0] - ends[1]) / (4 * h), found.score, rtol=1e-6, atol=1e-8
+    )
+    spread = float(jnp.std(found.score))
+    assert abs(float(jnp.mean(found.score))) < 4 * spread / np.sqrt(len(values))
+    if sensor.tails == np.inf:
+        mean = float(jnp.mean(found.information))
+        # rounding to 2.5 standard deviations loses more than its variance tells
+        assert mean == pytest.approx(spread**2, rel=0.2)
+
+
+def test_saturated_and_filtered_rate():
+    """A gyro with a bandwidth and a range that the motion exceeds."""
+    sensors = {
+        "height_m": fitting.Sensor(0, noise=NOISE),
+        "speed_m_s": fitting.Sensor(1, noise=0.02, bandwidth_hz=20.0, limit=2.5),
+    }
+    part = ball_record(TRUE, 7, sensors)
+    assert np.mean(np.abs(part.recording["speed_m_s"]) == 2.5) > 0.02
+    named = Recording(
+        "drop", part.recording.time, {"speed_rad_s": part.recording["speed_m_s"]}
+    )
+    assert any("saturated" in note for note in mend(named).notes)
+    problem = fitting.Problem.build(
+        fitting.Model(DraggedBall(), sensors), [part], PARAMETERS
+    )
+    found = fitting.fit(problem)
+    for name, value in {"gravity": 9.7, "drag": 0.12, "restitution": 0.75}.items():
+        one = found[name]
+        assert abs(one.value - value) < 3.3 * one.stderr, name
+
+
+def test_lag_gain_and_offset_of_a_sensor():
+    true = fitting.Sensor(0, noise=NOISE, gain=1.02, offset=0.01, lag=1e-3)
+    part = ball_record(TRUE, 8, {"height_m": true})
+    # a floor that the sensor shows elsewhere is no floor to cut at
+    time = part.recording.time
+    flight = segment(part.recording.between(0.46, 1.1), "height_m", noise=NOISE)
+    assert time[0] == 0
+    model = fitting.Model(TRUE, SENSORS)
+    gain = fitting.Parameter("gain", lambda m: m.sensors["height_m"].gain)
+    problem = fitting.Problem.build(model, [flight], [gain])
+    found = fitting.fit(problem)["gain"]
+    # gravity is known, so the curvature shows the gain
+    assert abs(found.value - 1.02) < 3.3 * found.stderr
+
+
+def test_network_in_the_vector_field():
+    """A force that nobody stated, learnt by gradients in reverse mode."""
+
+    class Learnt(HybridSystem):
+        state_names = ("height", "velocity")
+
+        network: eqx.nn.MLP
+        restitution: float = 0.75
+
+        def vector_field(self, t, state):
+            push = self.network(state[1:] / 4)[0]
+            return jnp.stack([state[1], -9.7 + push])
+
+        def gap(self, t, state):
+            return state[0]
+
+        def impact(self, t, state):
+            return jnp.stack([state[0], -self.restitution * state[1]])
+
+    net = eqx.nn.MLP(1, 1, 8, 1, jnp.tanh, key=jax.random.key(0))
+    # at first no force at all
+    net = eqx.tree_at(lambda n: n.layers[-1].weight, net, 0 * net.layers[-1].weight)
+    net = eqx.tree_at(lambda n: n.layers[-1].bias, net, 0 * net.layers[-1].bias)
+    strong = eqx.tree_at(lambda s: s.drag, TRUE, 0.5)
+    part = ball_record(strong, 9, duration=1.5)
+    problem = fitting.Problem.build(fitting.Model(Learnt(net), SENSORS), [part], [])
+    trained, before, after = fitting.train(
+        problem, lambda m: m.system.network, steps=60
+    )
+    # -0.5 v over the speeds of the flights
+    assert after < 0.2 * before
+    for speed in (-3.0, 2.0):
+        force = float(trained(jnp.array([speed / 4]))[0])
+        assert force == pytest.approx(-0.5 * speed, abs=0.3)
+
+
+def test_restitution_from_every_impact():
+    part = ball_record(BouncingBall(restitution=0.7), 2)
+    laws = fitting.restitution_laws([part])
+    constant = laws["constant"]
+    assert abs(constant.values[0] - 0.7) < 3.3 * constant.stderr[0]
+    assert abs(laws["approach"].values[1]) < 3.3 * laws["approach"].stderr[1]
+    assert "speed" not in laws
+    start = PowerLawRestitution(0.5, 1.0, 0.0)
+    again = fitting.fit_restitution([part], start, ("r0",))
+    assert again.values[0] == pytest.approx(constant.values[0], rel=1e-6)
+
+
+def test_refusals(balls):
+    with pytest.raises(ValueError, match="no parameter 'mass'"):
+        fitting.fit(balls, free=["mass"])
+    model = fitting.Model(DraggedBall(), SENSORS)
+    same = fitting.Parameter("g", lambda m: m.system.gravity)
+    with pytest.raises(ValueError, match="same number"):
+        fitting.Problem.build(model, balls.segments, [*PARAMETERS, same])
+    whole = fitting.Parameter("all", lambda m: m.system)
+    with pytest.raises(ValueError, match="not one number"):
+        fitting.Problem.build(model, balls.segments, [whole])
+    with pytest.raises(ValueError, match="positive"):
+        fitting.Parameter("g", lambda m: m.system.gravity, tolerance=0.0)
+    with pytest.raises(RecordingError, match="no recording"):
+        fitting.Problem.build(model, [], [])
+    with pytest.raises(RecordingError, match="no channel `width_m`"):
+        sensors = {"width_m": fitting.Sensor(0, noise=1.0)}
+        fitting.Problem.build(fitting.Model(DraggedBall(), sensors), balls.segments, [])

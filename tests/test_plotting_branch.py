@@ -1,0 +1,66 @@
+"""The bifurcation figure says what the branch says."""
+
+import matplotlib
+
+
+matplotlib.use("Agg")
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+
+from continuation import Branch, Point
+from jaxcam import plotting
+
+
+pytestmark = pytest.mark.filterwarnings("error")
+
+
+def parabola(number=41, converged=True):
+    """x^2 = p, stable above, with its fold."""
+    states = np.linspace(1.0, -1.0, number)
+    points = [
+        Point(
+            label=k + 1,
+            kind="fold" if x == 0 else "regular",
+            parameter=x * x,
+            state=np.array([x]),
+            multipliers=np.array([1 - x / 2 + 0j]),
+            stable=bool(x > 0),
+            tangent=np.array([1.0, 0.0]),
+            step=0.05,
+            arclength=1 - x,
+            iterations=2,
+            converged=converged or x != 0,
+        )
+        for k, x in enumerate(states)
+    ]
+    return Branch(tuple(points), "p", (0.0, 1.0))
+
+
+def test_stable_solid_unstable_dashed_special_marked():
+    figure = plotting.branch_diagram(
+        parabola(), x_label=("speed", "rpm"), y_label=("angle", "rad"), x_scale=10.0
+    )
+    (ax,) = figure.axes
+    assert ax.get_xlabel() == "speed (rpm)" and ax.get_ylabel() == "angle (rad)"
+    lines = {line.get_label(): line for line in ax.lines}
+    assert set(lines) == {"stable", "unstable", "fold"}
+    assert lines["stable"].get_linestyle() == "-"
+    assert lines["unstable"].get_linestyle() == "--"
+    for label, sign in (("stable", 1), ("unstable", -1)):
+        x, y = lines[label].get_data()
+        np.testing.assert_allclose(x, 10 * y**2, atol=1e-12)
+        assert np.all(sign * y[1:] <= 1e-12)
+    np.testing.assert_allclose(lines["fold"].get_data(), [[0.0], [0.0]], atol=1e-12)
+    assert [text.get_text() for text in ax.texts] == ["F"]
+    legend = ax.get_legend()
+    assert {t.get_text() for t in legend.get_texts()} == {"stable", "unstable", "fold"}
+    plt.close(figure)
+
+
+def test_point_that_was_only_bracketed_is_named_so():
+    figure = plotting.branch_diagram(parabola(converged=False), letters=False)
+    labels = {line.get_label() for line in figure.axes[0].lines}
+    assert "fold (bracketed)" in labels and not figure.axes[0].texts
+    plt.close(figure)

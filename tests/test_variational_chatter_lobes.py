@@ -1,0 +1,124 @@
+"""The local theory of the interruption against the exact motion of the cam-follower.
+
+The rig is the one behind the thesis' chapter 6; Figures 6.14 and 6.15.
+"""
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from jaxcam.models import preset, rad_s_to_rpm, rpm_to_rad_s
+from variational import (
+    chatter_frame,
+    chatter_interruption,
+    composed_map,
+    lambda_inverse,
+    parameter_incidence,
+    scaling_law,
+    simulated_at_section,
+    simulated_by_parameter,
+)
+
+
+# compiling takes most of the time
+pytestmark = pytest.mark.slow
+
+
+def speed(system):
+    return system.speed
+
+
+# so late that the lambda-map is exact to 1e-5, which the corners need: near them an
+# error of x in lambda is one of sqrt(x) in height
+RANK = 36
+
+
+@pytest.fixture(scope="module")
+def rig():
+    rig = preset("calibrated")
+    bracket = (rpm_to_rad_s(150.0), rpm_to_rad_s(154.0))
+    found = chatter_interruption(rig, speed, bracket)
+    return eqx.tree_at(speed, rig, found)
+
+
+@pytest.fixture(scope="module")
+def composed(rig):
+    return composed_map(rig, speed, RANK)
+
+
+def lobes(composed, count):
+    """lambda - lambda_bar along each of the first lobes, inside its corners."""
+    r = composed.frame.restitution
+    corners = [3 / 8]
+    for _ in range(count):
+        corners.append(float(lambda_inverse(corners[-1], r)))
+    share = np.linspace(0.01, 0.99, 40) ** 2
+    pieces = [a + share * (b - a) for a, b in zip(corners, corners[1:], strict=False)]
+    return np.array(pieces) - float(composed.lambda_bar)
+
+
+def compare(found, predicted, rest, level):
+    """Largest difference over the height of each lobe; `level` is subtracted."""
+    found, predicted = found - rest - level, predicted - rest - level
+    height = np.ptp(predicted, axis=1)
+    return np.max(np.abs(found - predicted), axis=1) / height
+
+
+def test_lobes_by_perturbed_velocity(rig, composed):
+    deviation = lobes(composed, 3)
+    change = deviation / float(composed.covector[0])
+    got = simulated_at_section(rig, composed, change.ravel())
+    want = np.asarray(composed.at_section(speed=change))
+    for k, value in enumerate((got.gap, got.velocity)):
+        found = np.asarray(value).reshape(change.shape)
+        error = compare(found, want[..., k], float(composed.relative[k]), 0.0)
+        assert np.max(error) < 0.02
+
+
+def test_lobes_by_perturbed_speed_of_the_cam(rig, composed):
+    deviation = lobes(composed, 3)
+    change = deviation / float(composed.incidence)
+    got = simulated_by_parameter(rig, speed, change.ravel())
+    want = np.asarray(composed.at_section(parameter=change))
+    for k, value in enumerate((got.gap, got.velocity)):
+        found = np.asarray(value).reshape(change.shape)
+        tilt = float(composed.drift[k]) * change
+        error = compare(found, want[..., k], float(composed.relative[k]), tilt)
+        assert np.max(error) < 0.02
+
+
+def test_scaling_exponent_of_the_motion(rig, composed):
+    # depth of the lobes against their distance from the interruption
+    deviation = lobes(composed, 7)[1:]
+    change = deviation / float(composed.covector[0])
+    got = simulated_at_section(rig, composed, change.ravel())
+    left = np.asarray(got.velocity).reshape(change.shape) - float(composed.relative[1])
+    depth = -np.min(left, axis=1)
+    exponent = np.polyfit(np.log(deviation[:, 0]), np.log(depth), 1)[0]
+    law = scaling_law(composed.frame.restitution)
+    assert abs(exponent / float(law.kappa) - 1) < 0.01
+
+
+def test_printed_coefficients_of_chapter_six(rig, composed):
+    # Table 6.1: coordinates at the section; Table 6.3: their change with rpm
+    assert abs(float(composed.relative[0]) - 0.00494) < 1e-5
+    assert abs(float(composed.relative[1]) - 0.22315) < 1e-4
+    per_rpm = np.asarray(composed.drift) * float(rpm_to_rad_s(1.0))
+    assert abs(per_rpm[1] / 0.009647 - 1) < 2e-3
+    assert abs(per_rpm[0] / 0.0002305 - 1) < 2e-3
+    # the printed critical speed, from parameters that reproduce Tables 5.2 and 6.1
+    assert abs(float(rad_s_to_rpm(rig.speed)) - 152.67658) < 0.002
+
+
+def test_release_by_the_speed_of_the_cam(rig, composed):
+    # (6.114) by differentiation, against differences of the release itself
+    rate = parameter_incidence(rig, speed)
+    h = 1e-4
+    ends = [
+        chatter_frame(eqx.tree_at(speed, rig, rig.speed + k * h)) for k in (-1.0, 1.0)
+    ]
+    for pick in (lambda f: f.release, lambda f: f.jerk, lambda f: f.restitution):
+        difference = (pick(ends[1]) - pick(ends[0])) / (2 * h)
+        assert abs(float(pick(rate) / difference) - 1) < 1e-6
+    assert bool(jnp.isfinite(composed.by_parameter))

@@ -1,0 +1,76 @@
+"""Lyapunov exponents: sum rule, multipliers, and motions that stick."""
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from textbook_systems import parameters
+
+import variational
+from jaxcam.models import ImpactOscillator
+
+
+# omega, wall: one impact a turn, and chaos
+LANES = np.array([2.8, 3.2, 3.5, 3.8])
+
+
+def _system(damping):
+    return ImpactOscillator(
+        **parameters(omega=2.8, restitution=0.8, wall=-0.2, damping=damping)
+    )
+
+
+@pytest.mark.parametrize("damping", [0.0, 0.02])
+def test_sum_rule_on_chaotic_and_periodic_motions(damping):
+    """l1 + l2 = -2 zeta + 2 ln r x (impacts per unit time), to 1e-10."""
+    made = variational.lyapunov_spectrum(
+        _system(damping),
+        [-0.9, 0.0],
+        200,
+        transient=50,
+        where=lambda s: s.omega,
+        values=LANES,
+    )
+    assert np.all(np.asarray(made.code) == 0)
+    exact = -2 * damping + 2 * np.log(0.8) * np.asarray(made.impact_rate)
+    np.testing.assert_allclose(made.exponents.sum(axis=1), exact, atol=1e-10)
+    if damping:
+        largest = np.asarray(made.exponents)[:, 0]
+        error = np.asarray(made.standard_error)[:, 0]
+        # a motion of either kind, by many standard errors
+        assert largest[0] < -0.05 and np.any(largest > 5 * error)
+        np.testing.assert_allclose(
+            made.running[:, -1], made.exponents, atol=1e-12, rtol=0
+        )
+
+
+def test_exponents_of_a_periodic_orbit_are_those_of_its_multipliers():
+    system = _system(0.02)
+    settled = variational.lyapunov_spectrum(system, [-0.9, 0.0], 400, transient=400)
+    orbit = variational.orbit_of(system, settled.state)
+    sizes = np.abs(np.asarray(orbit.multipliers))
+    exact = np.log(sizes) / float(orbit.period)
+    # the frame turns with a complex pair: what it adds is bounded by the number of
+    # turns
+    np.testing.assert_allclose(settled.exponents, exact, atol=3 / 400)
+    np.testing.assert_allclose(settled.exponents.sum(), exact.sum(), atol=1e-10)
+
+
+def test_sticking_makes_minus_infinity():
+    system = ImpactOscillator(
+        **parameters(omega=1.0, restitution=0.1, wall=-1.0, damping=0.1)
+    )
+    found = variational.lyapunov_spectrum(system, [-1.5, 0.0], 200, transient=50)
+    assert int(found.code) == 0
+    assert np.all(np.isneginf(np.asarray(found.exponents)))
+
+
+def test_what_does_not_fit_is_refused():
+    system = _system(0.0)
+    with pytest.raises(ValueError, match="blocks"):
+        variational.lyapunov_spectrum(system, [-0.9, 0.0], 10)
+    with pytest.raises(ValueError, match="together"):
+        variational.lyapunov_spectrum(system, [-0.9, 0.0], values=LANES)
+    with pytest.raises(ValueError, match="every lane"):
+        variational.lyapunov_spectrum(
+            system, jnp.zeros((3, 2)), where=lambda s: s.omega, values=LANES
+        )

@@ -1,0 +1,95 @@
+"""What happens to a deviation at an event: impact, entering contact, release."""
+
+from collections.abc import Callable
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Bool, Float
+
+from jaxcam.hybrid import (
+    field_in_force,
+    HybridSystem,
+    normal_directions,
+    normal_velocity,
+)
+
+
+def gap_of(system: HybridSystem, constraint) -> Callable:
+    """The gap of one constraint as a function of (t, x)."""
+    return lambda t, x: jnp.atleast_1d(system.gap(t, x))[constraint]
+
+
+def impact_of(system: HybridSystem, constraint) -> Callable:
+    """The impact law of one constraint as a function of (t, x)."""
+    return lambda t, x: jnp.atleast_2d(system.impact(t, x))[constraint]
+
+
+def completed_law(system: HybridSystem, constraint) -> Callable:
+    """The law of an impact together with all later ones of its chatter.
+
+    The state between before and after that has no normal velocity: the rest of the
+    sequence takes no time compared with the motion along the constraint, to second
+    order in the speed.
+    """
+    impact = impact_of(system, constraint)
+
+    def law(t, x):
+        after = impact(t, x)
+        v_before = normal_velocity(system, t, x)[constraint]
+        v_after = normal_velocity(system, t, after)[constraint]
+        return x - v_before / (v_after - v_before) * (after - x)
+
+    return law
+
+
+def field_of(system: HybridSystem, contact: Bool[Array, " m"] | None) -> Callable:
+    """Free flight, or the field of contact with the constraints marked."""
+    if contact is None:
+        return system.vector_field
+    return lambda t, x: field_in_force(system, t, x, contact)
+
+
+def crossing(
+    law: Callable, gap: Callable, field_before: Callable, field_after: Callable, t, x
+) -> tuple[Float[Array, "n n"], Float[Array, " n"], Float[Array, " n"], Array]:
+    """R_x, w = F+ - R_t - R_x F-, the normal H_x, and the speed v of the gap.
+
+    The derivative of the flow across the event is R_x + w H_x / v.
+    """
+    flow_before = field_before(t, x)
+    after, law_rate = jax.jvp(lambda s: law(s, x), (t,), (jnp.ones_like(t),))
+    law_x = jax.jacfwd(law, argnums=1)(t, x)
+    rate, normal = jax.grad(gap, argnums=(0, 1))(t, x)
+    speed = rate + normal @ flow_before
+    return law_x, field_after(t, after) - law_rate - law_x @ flow_before, normal, speed
+
+
+def onto_contact(
+    system: HybridSystem, t, x, contact: Bool[Array, " m"]
+) -> Float[Array, " n"]:
+    """One Newton step onto gap = normal velocity = 0 for constraints in contact.
+
+    At a state in contact it changes nothing, but its derivative takes from a deviation
+    what contact takes: the rank falls by two for each constraint, and what remains is
+    how the state of contact follows the parameters.
+    """
+    values = jnp.atleast_1d(system.gap(t, x))
+    normals = jax.jacfwd(lambda y: jnp.atleast_1d(system.gap(t, y)))(x)
+    for k in range(values.shape[0]):
+        lift = normals[k] / jnp.sum(normals[k] * normals[k])
+        lifted = x - jnp.atleast_1d(system.gap(t, x))[k] * lift
+        slip = normal_velocity(system, t, lifted)[k]
+        settled = lifted - slip * normal_directions(system, t, x)[k]
+        x = jnp.where(contact[k], settled, x)
+    return x
+
+
+def contact_projector(
+    system: HybridSystem, t, x, contact: Bool[Array, " m"]
+) -> Float[Array, "n n"]:
+    """The derivative of `onto_contact`: exactly zero for two states in contact."""
+    out = jax.jacfwd(lambda y: onto_contact(system, t, y, contact))(x)
+    if x.shape[0] == 2:
+        # nothing is left; rounding divided by a small impact speed would be something
+        out = jnp.where(jnp.any(contact), jnp.zeros_like(out), out)
+    return out

@@ -1,0 +1,36 @@
+"""Eigenvalues of a monodromy matrix whose entries may be huge."""
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Complex, Float
+
+
+def eigenvalues(
+    matrix: Float[Array, "n n"], determinant: Float[Array, ""] | None = None
+) -> Complex[Array, " n"]:
+    """Eigenvalues of a real matrix, the largest modulus first.
+
+    Near grazing the entries grow like one over the impact speed while the determinant
+    stays as it is. For n = 2 the larger root of mu^2 - trace mu + det is computed
+    without cancellation and the smaller one as det over it, so that both are right
+    where `determinant` is known better than the entries give it.
+    """
+    if matrix.shape[0] == 2:
+        return _two(matrix, determinant)
+    found = jnp.linalg.eigvals(matrix)
+    return found[jnp.argsort(-jnp.abs(found))]
+
+
+def _two(matrix, determinant):
+    (a, b), (c, d) = matrix
+    det = a * d - b * c if determinant is None else determinant
+    half = (a + d) / 2
+    square = half * half - det
+    real = square >= 0
+    root = jnp.sqrt(jnp.where(real, square, 0.0))
+    large = half + jnp.where(half < 0, -root, root)
+    small = jnp.where(large == 0, 0.0, det / jnp.where(large == 0, 1.0, large))
+    width = jnp.sqrt(jnp.where(real, 0.0, -square))
+    first = jax.lax.complex(jnp.where(real, large, half), width)
+    second = jax.lax.complex(jnp.where(real, small, half), -width)
+    return jnp.stack([first, second])

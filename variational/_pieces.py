@@ -1,0 +1,89 @@
+"""A turn of an orbit cut at its events, in arrays of a few fixed lengths."""
+
+import equinox as eqx
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from jaxcam.hybrid import Contacts, Impacts
+
+
+#: what ends a piece: nothing (its mode may change), an impact, or the impact after
+#: which all later ones of a chatter are summed
+NOTHING, IMPACT, LAST_IMPACT = 0, 1, 2
+
+
+class Pieces(eqx.Module):
+    """Pieces of flight or contact, each with the event at its end.
+
+    Those beyond the last event take no time and do nothing. Kept as numpy arrays.
+    """
+
+    start: Float[np.ndarray, " k"]
+    end: Float[np.ndarray, " k"]
+    kind: Int[np.ndarray, " k"]
+    constraint: Int[np.ndarray, " k"]
+    #: (k, n) state before the event
+    before: Float[np.ndarray, "k n"]
+    #: (k, m) constraints in contact in the piece, and in the one after; for those
+    #: that are hit or touched, further ones are not
+    contact: Bool[np.ndarray, "k m"]
+    contact_after: Bool[np.ndarray, "k m"]
+
+
+def cut(
+    impacts: Impacts, contacts: Contacts, state, t0: float, t1: float
+) -> tuple[Pieces, bool]:
+    """The pieces of the turn from t0 to t1, and whether there is any contact.
+
+    **Arguments:** the events of the turn, and the state at t0.
+    """
+    state = np.asarray(state)
+    time, which = np.asarray(impacts.time), np.asarray(impacts.constraint)
+    before = np.asarray(impacts.before)
+    number = int(impacts.count)
+    sides = np.asarray(contacts.constraint)[: int(contacts.count)]
+    m = 1 + int(max(which[:number].max(initial=0), sides.max(initial=0)))
+    kind = np.full(number, IMPACT)
+    spans = []
+    for k in range(int(contacts.count)):
+        begin, side = float(contacts.start[k]), int(contacts.constraint[k])
+        end = float(contacts.end[k]) if bool(contacts.released[k]) else np.inf
+        earlier = np.flatnonzero((time[:number] <= begin) & (which[:number] == side))
+        if begin > t0 and len(earlier):
+            # contact counts from the last impact on: the others take no time
+            kind[earlier[-1]] = LAST_IMPACT
+            begin = time[earlier[-1]]
+        spans.append((begin, end, side))
+    releases = [end for _, end, _ in spans if end < t1]
+    own = [(time[i], kind[i], which[i], before[i]) for i in range(number)]
+    # an impact may be what ends a contact: then it comes alone
+    let_go = [(end, NOTHING, 0, state) for end in releases if end not in time]
+    events = sorted(own + let_go, key=lambda event: event[0])
+    events.append((t1, NOTHING, 0, state))
+    times = np.array([t0, *(event[0] for event in events)])
+    modes = np.zeros((len(events), m), dtype=bool)
+    for begin, end, side in spans:
+        middle = (times[:-1] + times[1:]) / 2
+        modes[:, side] |= (middle >= begin) & (middle <= end)
+    length = 1
+    while length < len(events):
+        length *= 2
+    spare = length - len(events)
+
+    def filled(values, last):
+        values = np.asarray(values)
+        shape = (spare, *values.shape[1:])
+        more = np.broadcast_to(last, shape).astype(values.dtype)
+        return np.concatenate([values, more])
+
+    after = np.concatenate([modes[1:], modes[-1:]])
+    pieces = Pieces(
+        start=filled(times[:-1], t1),
+        end=filled(times[1:], t1),
+        kind=filled([event[1] for event in events], NOTHING),
+        constraint=filled([event[2] for event in events], 0),
+        before=filled([event[3] for event in events], state),
+        contact=filled(modes, modes[-1]),
+        contact_after=filled(after, modes[-1]),
+    )
+    return pieces, bool(spans)

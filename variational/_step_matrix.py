@@ -1,0 +1,110 @@
+"""The derivative of each step of a recorded run, all steps at once."""
+
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from jaxcam.hybrid import HybridSystem
+from jaxcam.hybrid._codes import Row
+from jaxcam.hybrid._functions import Functions
+from jaxcam.hybrid._runge_kutta import step, Tableau
+
+from ._event_law import (
+    completed_law,
+    contact_projector,
+    crossing,
+    field_of,
+    gap_of,
+    impact_of,
+)
+
+
+class LogRow(NamedTuple):
+    """What the log says of one attempt at a step."""
+
+    kind: Array
+    constraint: Array
+    t: Array
+    before: tuple
+    after: tuple
+    contact: tuple
+
+
+class Point(NamedTuple):
+    """Where a step begins."""
+
+    t: Array
+    x: tuple
+    contact: tuple
+
+
+def step_matrix(
+    system: HybridSystem,
+    functions: Functions,
+    tableau: Tableau,
+    point: Point,
+    row: LogRow,
+) -> Float[Array, "n n"]:
+    """The derivative of one step and of the event at its end; the identity for none.
+
+    The step is the one the run took, so its derivative needs no control of its own.
+    """
+    n = functions.n
+    taken = row.kind != float(Row.NOTHING)
+    h = jnp.where(taken, row.t - point.t, 0.0)
+
+    def end(*x):
+        return step(
+            tableau,
+            lambda t, y: functions.field(t, y, point.contact),
+            point.t,
+            x,
+            h,
+        )[0]
+
+    columns = []
+    for k in range(n):
+        unit = tuple(jnp.where(i == k, 1.0, 0.0) for i in range(n))
+        columns.append(jnp.stack(jax.jvp(end, point.x, unit)[1]))
+    matrix = jnp.stack(columns, axis=1)
+    before, now = jnp.stack(row.before), jnp.stack(row.contact)
+    held = jnp.stack(point.contact)
+    if functions.planar:
+        # contact leaves nothing of a deviation
+        matrix = jnp.where(held[0], 0.0, matrix)
+    else:
+        matrix = contact_projector(system, row.t, before, held) @ matrix
+    hit = taken & (row.kind == float(Row.IMPACT))
+    last = taken & (row.kind == float(Row.LAST_IMPACT))
+    event = _across(system, row, before, held, now, impact_of, functions.planar)
+    out = jnp.where(hit, _times(event, matrix), matrix)
+    if functions.planar:
+        entry = jnp.zeros((n, n))
+    else:
+        entry = _across(system, row, before, held, now, completed_law, False)
+        rest = completed_law(system, row.constraint)(row.t, before)
+        entry = contact_projector(system, row.t, rest, now) @ entry @ matrix
+    out = jnp.where(last, entry, out)
+    return jnp.where(taken, out, jnp.eye(n))
+
+
+def _across(system, row: LogRow, before, held, now, law_of, planar):
+    side = row.constraint
+    field_before = field_of(system, None if planar else held)
+    field_after = field_of(system, None if planar else now)
+    law_x, moved, normal, speed = crossing(
+        law_of(system, side),
+        gap_of(system, side),
+        field_before,
+        field_after,
+        row.t,
+        before,
+    )
+    return law_x + moved[:, None] * (normal / speed)[None, :]
+
+
+def _times(a, b):
+    """A matrix product that stays elementwise in a batch."""
+    return jnp.sum(a[:, :, None] * b[None, :, :], axis=1)
