@@ -1,0 +1,91 @@
+"""The first point of a branch: solved for, or reached along a tangent."""
+
+import jax.numpy as jnp
+import numpy as np
+
+from ._locate import Walk
+from ._point import with_field, with_parameter
+from ._problem import AbstractProblem, Start
+from ._program import correct, Corrected, evaluate
+
+
+def settle(
+    problem: AbstractProblem, walk: Walk, z: np.ndarray, name: str, direction: int
+) -> Corrected:
+    """Solve at the parameter of the start, and find the direction there."""
+    across = np.zeros_like(z)
+    across[-1] = 1.0
+    at = correct(problem, walk.leaf, z, across, across, walk.width, walk.settings)
+    if not at.success:
+        # more iterations are another program: compiled only where they are needed
+        patient = with_field(walk.settings, "max_iterations", 30)
+        at = correct(problem, walk.leaf, z, across, across, walk.width, patient)
+    if not at.success:
+        # Newton has no answer where the derivative is singular; the start may
+        # still be one
+        given = evaluate(problem, walk.leaf, z, across, walk.width)
+        size = np.abs(_residual(problem, z, walk.leaf)) / given.scale[:-1]
+        if not np.all(size <= walk.settings.tolerance):
+            raise ValueError(
+                f"the start is no solution at {name} = {z[-1]:g}, and "
+                "Newton's method finds none near it; start from a better guess "
+                f"(largest residual {_largest(size)})"
+            )
+        at = given
+    return _oriented(problem, walk, at, direction)
+
+
+def leave(
+    problem: AbstractProblem, walk: Walk, z: np.ndarray, start: Start
+) -> tuple[Corrected, float]:
+    """The first point of a branch that leaves z along a tangent."""
+    settings = walk.settings
+    zero = np.zeros_like(z)
+    scale = evaluate(problem, walk.leaf, z, zero + 1.0, walk.width).scale
+    tangent = np.asarray(start.tangent, float)
+    tangent = tangent / np.linalg.norm(tangent / scale)
+    step = settings.step if start.step is None else start.step
+    low, high = walk.bounds
+    while step >= settings.min_step:
+        guess = z + step * tangent
+        at = correct(
+            problem, walk.leaf, guess, tangent / scale**2, tangent, walk.width,
+            settings,
+        )  # fmt: skip
+        moved = np.linalg.norm((at.z - guess) / scale)
+        if at.success and moved <= step and low <= at.z[-1] <= high:
+            # the tangent has turned since the start: continue outwards
+            outwards = evaluate(problem, walk.leaf, at.z, at.z - z, walk.width)
+            if np.all(np.isfinite(outwards.tangent)):
+                return outwards, step
+        step /= 2
+    raise ValueError(
+        "no branch leaves the start along the given tangent; is it a special point?"
+    )
+
+
+def _oriented(
+    problem: AbstractProblem, walk: Walk, at: Corrected, direction: int
+) -> Corrected:
+    """The same point with its tangent in the direction asked for."""
+    _, sizes, rows = np.linalg.svd(at.jacobian * at.scale[None, :])
+    n = sizes.size
+    null = rows[n:] if n == 0 else rows[np.append(sizes, 0) <= 1e-9 * sizes[0]]
+    null = rows[-1:] if len(null) == 0 else null
+    tangent = null.T @ null[:, -1]
+    if np.linalg.norm(tangent) < 1e-9:
+        tangent = null[-1] * (np.sign(null[-1].sum()) or 1.0)
+    tangent = direction * tangent / np.linalg.norm(tangent)
+    if len(null) == 1:
+        return evaluate(problem, walk.leaf, at.z, tangent * at.scale, walk.width)
+    at = with_field(at, "determinant", np.zeros(()))
+    return with_field(at, "tangent", tangent * at.scale)
+
+
+def _residual(problem: AbstractProblem, z: np.ndarray, leaf: int) -> np.ndarray:
+    here = with_parameter(problem, leaf, z[-1])
+    return np.asarray(here.residual(jnp.asarray(z[:-1]), here.parameters))
+
+
+def _largest(size: np.ndarray) -> str:
+    return f"{np.max(size):.1e}" if np.all(np.isfinite(size)) else "not finite"
