@@ -91,10 +91,11 @@ def main() -> None:
     parser.add_argument("--rigs", type=int, default=20)
     parser.add_argument("--draws", type=int, default=5)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--levels", type=float, nargs="*", default=LEVELS)
     options = parser.parse_args()
     rng = np.random.default_rng(options.seed)
     nominal = read_rig(DEMO_RIG / "rig.toml")
-    found: dict[float, list] = {level: [] for level in LEVELS}
+    found: dict[float, list] = {level: [] for level in options.levels}
     begun, cpu = time.time(), time.process_time()
     for number in range(options.rigs):
         real = random_rig(nominal, rng)
@@ -105,7 +106,7 @@ def main() -> None:
             for span in ((130, 148), (150, 175))
         ]
         truth = true_values(real, nominal)
-        for level in LEVELS:
+        for level in options.levels:
             rig = at_level(nominal, level)
             for _ in range(options.draws):
                 runs = [

@@ -179,6 +179,11 @@ def orbit_grazing(problem: "ImpactingOrbits", point: Any) -> Start | None:
     values, _ = _look(problem, u, parameters)
     values = {name: abs(float(v)) for name, v in values.items()}
     name = min(values, key=values.__getitem__)
+    speeds = {key: v for key, v in values.items() if key.startswith(IMPACT)}
+    slowest = min(speeds, key=speeds.__getitem__, default=name)
+    # next to an impact without speed the gap has its minimum too: the impact goes
+    if values[slowest] <= 1e-7 * (1.0 + float(jnp.max(jnp.abs(u)))):
+        name = slowest
     number = int(name.rsplit(" ", 1)[1])
     if name.startswith(IMPACT):
         m = len(problem.constraints)

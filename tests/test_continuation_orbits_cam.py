@@ -82,9 +82,14 @@ def test_second_corrector_finds_the_same_branch():
 
 @pytest.mark.slow
 def test_cascade_with_the_ratio_of_feigenbaum():
-    start = one_impact(151.0)
+    start = one_impact()
     found = continuation.cascade(
-        start.problem, start, speed, bounds(140.0, 160.0), flips=5
+        start.problem,
+        start,
+        speed,
+        bounds(140.0, 160.0),
+        flips=5,
+        settings=continuation.Settings(localise="bracket"),
     )
     assert len(found.flips) == 5 and all(p.converged for p in found.flips)
     assert [len(p.state) for p in found.flips] == [3, 6, 12, 24, 48]

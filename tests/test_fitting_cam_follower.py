@@ -54,7 +54,7 @@ def test_scores_are_derivatives(problem, found):
     )
     scales = np.tile(np.append(scale, np.zeros(width - len(names))), (records, 1))
     # off the optimum, where scores are large
-    values = found.point.values + 1e-4 * scale
+    values = found.point.values + 1e-4 * scale[None]
     point = found.point._replace(values=values)
     blocks, _ = assemble(
         problem.layout,
@@ -152,14 +152,17 @@ def test_profile_agrees_with_fisher(problem, found):
     assert high == pytest.approx(one.value + 1.96 * one.stderr, abs=0.3 * one.stderr)
 
 
-def test_bootstrap_scatters_as_the_errors_say(found):
+def test_bootstrap_scatters_around_the_optimum(found):
     again = fitting.bootstrap(found, 30, seed=1)
     names = [one.name for one in found.estimates]
-    k = names.index("restitution")
-    # few blocks and few repetitions: the order of magnitude
-    assert 0.4 < again.stderr[k] / found["restitution"].stderr < 2.5
+    column = again.estimates[:, names.index("restitution")]
+    one = found["restitution"]
+    # the middle half of a Gaussian is 1.35 standard errors wide; a few repetitions
+    # that lose most of the impacts are far off
+    middle = np.subtract(*np.quantile(column, [0.75, 0.25])) / 1.35
+    assert 0.3 < middle / one.stderr < 3.0
     low, high = again.interval("restitution")
-    assert low < found["restitution"].value < high
+    assert low < one.value < high
 
 
 def test_what_cannot_be_seen_is_said(problem):
@@ -173,8 +176,10 @@ def test_missing_samples_a_gap_and_a_slip():
     """Dropped samples, a gap at an impact and a slip: said, and still inside."""
     rng = np.random.default_rng(5)
     runs, notes = [], []
-    for run, hit in zip(recorded(), (0, 3)):
+    for run in recorded():
         cut = segment_case([run], NOMINAL)[0]
+        # the one nearest to the middle, so that both pieces see the cam turn
+        hit = np.argmin(np.abs(cut.impacts.time - run.time[-1] / 2))
         impact = cut.impacts.time[hit]
         keep = rng.uniform(size=len(run)) > 0.05
         keep &= np.abs(run.time - impact) > 0.025

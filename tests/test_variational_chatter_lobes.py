@@ -80,7 +80,7 @@ def test_lobes_by_perturbed_speed_of_the_cam(rig, composed):
     deviation = lobes(composed, 3)
     change = deviation / float(composed.incidence)
     got = simulated_by_parameter(rig, speed, change.ravel())
-    want = np.asarray(composed.at_section(parameter=change))
+    want = np.asarray(composed.along_parameter(change))
     for k, value in enumerate((got.gap, got.velocity)):
         found = np.asarray(value).reshape(change.shape)
         tilt = float(composed.drift[k]) * change

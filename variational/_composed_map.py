@@ -6,8 +6,10 @@ direction B, so one number says where they are: epsilon = tau*^2 beta, which at 
 is a relative velocity c epsilon. With A the derivative of Theta, C that of lambda and
 mu the distance of the parameter from the interruption,
 
-    epsilon' = tau*^2 beta(lambda_bar + C A B epsilon + lambda_mu mu).
+    epsilon' = tau*^2 beta(lambda_bar + C A B epsilon + lambda_mu mu),
 
+where the deviation is first carried to where it is small, since it grows linearly in
+the coordinate K of [`variational.koenigs`][] only.
 (6.104) and (6.116) leave out tau*^2; the thesis' K_beta stands for it.
 """
 
@@ -35,6 +37,11 @@ from ._section_turn import (
 )
 
 
+# deviation of lambda up to which K and lambda - lambda_bar agree to as many digits as
+# rounding leaves of it
+_LINEAR = 1e-8
+
+
 class ComposedMap(eqx.Module):
     """Local theory of one turn around the interruption of complete chattering."""
 
@@ -59,7 +66,7 @@ class ComposedMap(eqx.Module):
     #: C: lambda by rebound speed and time of D*, (6.100), and by the parameter (6.114)
     covector: Float[Array, "2"]
     by_parameter: Float[Array, ""]
-    #: change of lambda - lambda_bar with the parameter, D* moving along with the orbit
+    #: change of lambda - lambda_bar with the parameter, D* moving with the orbit
     incidence: Float[Array, ""]
     #: change of gap and velocity at the section with the parameter, epsilon = 0 (6.115)
     drift: Float[Array, "2"]
@@ -80,21 +87,44 @@ class ComposedMap(eqx.Module):
         **Arguments:** `epsilon`, in the unit of time squared; `parameter`, its distance
         from the interruption; broadcast.
         """
-        lam = self.lambda_bar + self.feedback * epsilon + self.incidence * parameter
-        return self.tau**2 * beta_parts(lam, self.frame.restitution).beta
+        return self._left(self.feedback * epsilon + self.incidence * parameter)
 
-    def at_section(self, speed=0.0, time=0.0, parameter=0.0) -> Float[Array, "... 2"]:
-        """Gap and velocity at the section after D* is moved. (6.104), (6.115)
+    def at_section(self, speed=0.0, time=0.0) -> Float[Array, "... 2"]:
+        """Gap and velocity at the section after D* itself is moved. (6.104)
 
-        **Arguments:** changes of the rebound speed and time of D*, and of the parameter
-        with D* moving along; broadcast.
+        **Arguments:** changes of the rebound speed and time of D*, broadcast.
 
         **Returns:** shape `(..., 2)`.
         """
         moved = self.covector[0] * speed + self.covector[1] * time
-        lam = self.lambda_bar + moved + self.incidence * parameter
-        parts = beta_parts(lam, self.frame.restitution)
-        epsilon = self.tau**2 * parts.beta
+        parts = beta_parts(self.lambda_bar + moved, self.frame.restitution)
+        return self._section(self.tau**2 * parts.beta, 0.0)
+
+    def along_parameter(self, parameter) -> Float[Array, "... 2"]:
+        """Gap and velocity at the section of the orbit from release. (6.114)-(6.115)
+
+        **Arguments:** distance of the parameter from the interruption, any shape.
+
+        **Returns:** shape `(..., 2)`.
+        """
+        return self._section(self._left(self.incidence * parameter), parameter)
+
+    def _left(self, deviation):
+        """epsilon by a deviation that grew over all the impacts before D*.
+
+        It is linear in the coordinate K only, so beta is taken so many impacts earlier,
+        where the deviation is small and K is lambda - lambda_bar; there tau is larger
+        by p^-n.
+        """
+        law = scaling_law(self.frame.restitution)
+        deviation = jnp.asarray(deviation, jnp.float64)
+        size = jnp.where(deviation > 0, deviation, _LINEAR)
+        n = jnp.maximum(jnp.ceil(jnp.log(_LINEAR / size) / jnp.log(law.q)), 0.0)
+        earlier = law.lambda_bar + law.q**n * deviation
+        beta = beta_parts(earlier, self.frame.restitution).beta
+        return self.tau**2 * law.p ** (-2 * n) * beta
+
+    def _section(self, epsilon, parameter):
         columns = [
             self.relative[k] + epsilon * self.relative_vector[k] + parameter * drift
             for k, drift in enumerate(self.drift)
@@ -206,7 +236,7 @@ def simulated_by_parameter(
 ) -> Section:
     """The orbit from release, followed over a turn at other values of the parameter.
 
-    What [`variational.ComposedMap.at_section`][] predicts from `parameter`.
+    What [`variational.ComposedMap.along_parameter`][] predicts.
 
     **Arguments:** `system` at the interruption; `where` picks the parameter; `changes`
     of it, shape `(k,)`; `phase` of the section, in periods.

@@ -11,7 +11,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, ArrayLike, Bool, Float
 
 from jaxcam import HybridSystem
 from jaxcam.hybrid import (
@@ -72,7 +72,7 @@ def _step(rates, s, y, h):
 
 
 def next_impact(
-    system: HybridSystem, time, state, speed, horizon, height=0.0
+    system: HybridSystem, time, state, speed, horizon, height: ArrayLike = 0.0
 ) -> ImpactPoint:
     """The next impact of a motion that leaves the surface, and the state after it.
 
@@ -206,7 +206,7 @@ def _rates(system, time, speed, n):
     return rates
 
 
-def fly(system: HybridSystem, time, state, speed, duration, height=0.0):
+def fly(system: HybridSystem, time, state, speed, duration, height: ArrayLike = 0.0):
     """Free flight for a given time, without a look at the constraint.
 
     **Arguments:** as in [`variational.next_impact`][]; `duration` >= 0.

@@ -13,6 +13,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jax.core import Tracer
 from jaxtyping import Array, Bool, Float, Int
 
 from jaxcam import HybridSystem
@@ -190,7 +191,7 @@ def chatter_interruption(
     check_chatter_system(system)
     low, high = bracket
     found = interruption_in(system, where, low, high)
-    if not isinstance(found.converged, jax.core.Tracer):
+    if not isinstance(found.converged, Tracer):
         _require(found, low, high)
     return found.value
 

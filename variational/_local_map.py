@@ -73,7 +73,10 @@ class LocalMap(eqx.Module):
         return smooth + self.root * jnp.sqrt(jnp.abs(self.delta_x) * inside)
 
     def __call__(self, x) -> Float[Array, "..."]:
-        """The map: constant beyond the accumulation, else lobe j of (5.4)."""
+        """The map: constant beyond the accumulation, else lobe j of (5.4).
+
+        NaN outside the first lobe, of which the fit knows nothing.
+        """
         width = 1 - jnp.exp(self.M)
         # sum of beta_k up to j - 1, solved for j
         share = (self.x_0 - x) / self.delta_x * width
@@ -85,7 +88,8 @@ class LocalMap(eqx.Module):
         alpha = self.delta_pi * (1 - gamma) / (1 - jnp.exp(self.Q))
         alpha = alpha + self.p_0 * (1 - gamma)
         inside = gamma * self.lobe(self.x_0 + (x - x_j) / beta) + alpha
-        return jnp.where(lobes, inside, self.alpha_inf)
+        known = jnp.where(share >= 0, inside, jnp.nan)
+        return jnp.where(lobes, known, self.alpha_inf)
 
 
 def find_lobes(
@@ -141,7 +145,7 @@ def find_lobes(
     # outwards from the last turn that sticks
     edge = np.flatnonzero(np.diff(stuck.astype(int)))[0]
     inner, outer = (edge, edge + 1) if stuck[edge] else (edge + 1, edge)
-    bottom, top = _bisect(turn, scan[inner], scan[outer], lambda n, s: s)
+    bottom, top = _bisect(turn, float(scan[inner]), float(scan[outer]), lambda n, s: s)
     accumulation = 0.5 * (bottom + top)
     limit = turn(np.array([bottom]))[0][0]
 

@@ -23,22 +23,23 @@ class Reversed(HybridSystem):
 
     def vector_field(self, t, state) -> jax.Array:
         """Minus the field of `forward`."""
-        return -self.forward.vector_field(-t, state)
+        return -self.forward.vector_field(-jnp.asarray(t), state)
 
     def gap(self, t, state) -> jax.Array:
         """The gap of `forward`."""
-        return self.forward.gap(-t, state)
+        return self.forward.gap(-jnp.asarray(t), state)
 
     def impact(self, t, state) -> jax.Array:
         """The state from which an impact of `forward` leads to `state`."""
-        direction = normal_directions(self.forward, -t, state)[0]
+        time = -jnp.asarray(t)
+        direction = normal_directions(self.forward, time, state)[0]
 
         def rebound(v):
             before = rest + v * direction
-            after = one_constraint(self.forward.impact(-t, before), 1)
-            return normal_velocity(self.forward, -t, after)[0]
+            after = one_constraint(self.forward.impact(time, before), 1)
+            return normal_velocity(self.forward, time, after)[0]
 
-        wanted = normal_velocity(self.forward, -t, state)[0]
+        wanted = normal_velocity(self.forward, time, state)[0]
         rest = state - wanted * direction
 
         def newton(_, v):

@@ -4,6 +4,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jax.core import Tracer
 from jaxtyping import Array, Float
 
 
@@ -34,7 +35,7 @@ def scaling_law(r) -> ScalingLaw:
 
     **Raises:** `ValueError` for r outside (0, 1), where it can be seen.
     """
-    if not isinstance(r, jax.core.Tracer):
+    if not isinstance(r, Tracer):
         values = np.asarray(r)
         if not np.all((values > 0) & (values < 1)):
             raise ValueError(

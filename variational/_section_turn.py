@@ -5,7 +5,7 @@ from typing import NamedTuple
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Bool, Float, Int
+from jaxtyping import Array, ArrayLike, Bool, Float, Int
 
 from jaxcam import HybridSystem
 from jaxcam.hybrid import normal_velocity
@@ -44,7 +44,11 @@ class _Run(NamedTuple):
 
 
 def to_section(
-    system: HybridSystem, frame: ChatterFrame, start: ImpactPoint, section, height=0.0
+    system: HybridSystem,
+    frame: ChatterFrame,
+    start: ImpactPoint,
+    section,
+    height: ArrayLike = 0.0,
 ) -> Section:
     """Follow a motion, impact by impact, to the time `section`.
 

@@ -23,7 +23,9 @@ def fit(
     ] = "mend",
     bootstrap: Annotated[
         int,
-        typer.Option(metavar="N", help="Redraw the flights N times for another error."),
+        typer.Option(
+            metavar="N", help="Weight the flights at random N times for another error."
+        ),
     ] = 0,
     json_file: Annotated[
         Path | None,
@@ -84,7 +86,7 @@ def fit(
             again = fitting.bootstrap(
                 found,
                 bootstrap,
-                progress=lambda k, n: report("redrawing flights", k / n),
+                progress=lambda k, n: report("weighting flights", k / n),
             )
         figures = []
         if out is not None:

@@ -19,7 +19,7 @@ def parameter_table(problem: Problem, found: Fit, again: Bootstrap | None) -> Ta
     table.add_column("parameter", no_wrap=True)
     headings = ["nominal", "tolerance", "fitted", "stderr"]
     if again is not None:
-        headings.append("redrawn")
+        headings.append("bootstrap")
     for heading in headings:
         table.add_column(heading, justify="right", no_wrap=True)
     for k, one in enumerate(found.estimates):

@@ -1,4 +1,4 @@
-"""Block bootstrap: how the estimates scatter when stretches of the data are redrawn."""
+"""Block bootstrap: how the estimates scatter when flights count more or less."""
 
 import dataclasses
 from collections.abc import Callable
@@ -12,7 +12,7 @@ from ._problem import Weights
 
 @dataclasses.dataclass(frozen=True)
 class Bootstrap:
-    """Estimates from redrawn data, shape `(repetitions, g)`, in the order of the fit.
+    """Estimates from reweighted data, shape `(repetitions, g)`, in the fit's order.
 
     Unlike the Fisher information they count what is left over in the data as it is: a
     model that lacks something scatters more than the noise explains.
@@ -43,11 +43,13 @@ def bootstrap(
     iterations: int = 8,
     progress: Callable[[int, int], None] | None = None,
 ) -> Bootstrap:
-    """Fit again with flights and contacts drawn with replacement.
+    """Fit again with random weights on flights and contacts (Rubin, 1981).
 
     A block is one flight, all its pieces together, or one contact: what is left over in
-    one part of a motion tends to be alike throughout. Each repetition starts at the
-    optimum and needs few iterations.
+    one part of a motion tends to be alike throughout. Weights are exponential with mean
+    one; drawing blocks with replacement has the same mean and variance, but leaves
+    out blocks altogether, and with them the impacts at both their ends. Each repetition
+    starts at the optimum and needs few iterations.
 
     **Arguments:** number of repetitions, and of iterations at most in each; `prior` as
     it was for `found`.
@@ -59,9 +61,9 @@ def bootstrap(
         blocks += sorted({(record, 1, span.flight) for span in rested})
     estimates = []
     for number in range(repetitions):
-        drawn = rng.integers(0, len(blocks), len(blocks))
-        count = dict(zip(blocks, np.bincount(drawn, minlength=len(blocks))))
-        weights = _weights(problem, count)
+        weights = _weights(
+            problem, dict(zip(blocks, rng.exponential(size=len(blocks))))
+        )
         again = fit(
             problem,
             free=found.free,
@@ -76,11 +78,11 @@ def bootstrap(
     return Bootstrap(found, np.array(estimates))
 
 
-def _weights(problem, count) -> Weights:
+def _weights(problem, drawn) -> Weights:
     every = problem.everything()
     flown, rested = np.array(every.flown), np.array(every.rested)
     for record, sides in enumerate(problem.spans):
         for side, (spans, array) in enumerate(zip(sides, (flown, rested))):
             for k, span in enumerate(spans):
-                array[record, k] = count[record, side, span.flight]
+                array[record, k] = drawn[record, side, span.flight]
     return Weights(flown, rested)

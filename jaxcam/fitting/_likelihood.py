@@ -11,6 +11,10 @@ from jaxtyping import Array, Float
 from ._model import Sensor
 
 
+# Standard deviations of the noise that no sample strays from its interval
+_FAR = 5.0
+
+
 class Scored(NamedTuple):
     """Of each sample, elementwise.
 
@@ -69,11 +73,13 @@ def _rounded(sensor: Sensor, off) -> Scored:
     # the constant: half a sample of noise of the same variance costs nothing
     variance = sensor.floor**2
     constant = jnp.log(sensor.resolution**2 / (2 * jnp.pi * variance))
-    return Scored(
-        constant - 2 * chance,
-        -jnp.sign(off) * pull / sensor.noise,
-        jnp.ones_like(off) / variance,
-    )
+    slope = -jnp.sign(off) * pull / sensor.noise
+    # far out, where no noise leads but a bad start may, the cost is steeper than the
+    # mean information tells, and a step by it alone would go too far
+    far = jnp.abs(off) > sensor.resolution / 2 + _FAR * sensor.noise
+    safe = jnp.where(far, off, 1.0)
+    information = jnp.where(far, slope / safe, 1 / variance)
+    return Scored(constant - 2 * chance, slope, information)
 
 
 def _beyond(sensor: Sensor, value, predicted) -> Scored:

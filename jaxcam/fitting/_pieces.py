@@ -2,6 +2,7 @@
 
 import dataclasses
 from collections.abc import Sequence
+from typing import TypeAlias
 
 import equinox as eqx
 import numpy as np
@@ -22,6 +23,10 @@ FREE, FLIGHT, IMPACT = 0, 1, 2
 _REACH = 20.0
 
 
+# numpy while it is put together, JAX in the programs
+Numbers: TypeAlias = Array | np.ndarray
+
+
 class Samples(eqx.Module):
     """Samples of `k` pieces of each of `r` records, sorted into steps.
 
@@ -29,11 +34,11 @@ class Samples(eqx.Module):
     channels. `place` is where in its step (0 to 1) a sample is.
     """
 
-    start: Float[Array, "r k"]
-    step: Float[Array, "r k"]
-    place: Float[Array, "r k n m"]
-    value: Float[Array, "r k n m c"]
-    known: Bool[Array, "r k n m c"]
+    start: Float[Numbers, "r k"]
+    step: Float[Numbers, "r k"]
+    place: Float[Numbers, "r k n m"]
+    value: Float[Numbers, "r k n m c"]
+    known: Bool[Numbers, "r k n m c"]
 
 
 class Pieces(eqx.Module):
@@ -50,17 +55,17 @@ class Pieces(eqx.Module):
 
     flown: Samples
     rested: Samples
-    joint: Int[Array, "r k"]
-    exists: Bool[Array, "r k"]
-    rest_exists: Bool[Array, "r kc"]
-    angle: Float[Array, "r k n"]
-    rate: Float[Array, "r k n"]
-    angle_at: Float[Array, "r k"]
-    rate_at: Float[Array, "r k"]
-    rest_angle: Float[Array, "r kc n1"]
-    rest_rate: Float[Array, "r kc n1"]
-    reach: Float[Array, " r"]
-    drive_error: Float[Array, "r 2"]
+    joint: Int[Numbers, "r k"]
+    exists: Bool[Numbers, "r k"]
+    rest_exists: Bool[Numbers, "r kc"]
+    angle: Float[Numbers, "r k n"]
+    rate: Float[Numbers, "r k n"]
+    angle_at: Float[Numbers, "r k"]
+    rate_at: Float[Numbers, "r k"]
+    rest_angle: Float[Numbers, "r kc n1"]
+    rest_rate: Float[Numbers, "r kc n1"]
+    reach: Float[Numbers, " r"]
+    drive_error: Float[Numbers, "r 2"]
 
 
 @dataclasses.dataclass(frozen=True)

@@ -68,6 +68,8 @@ from ._predict import fly
 _STEPS, _MOST_STEPS = 10, 160
 # Change (in units of the noise) that halving the steps may make
 _STEP_ERROR = 0.01
+# Step over time constant of a filter: Hermite's error is then 1e-4 of a jump
+_FILTER_STEP = 0.4
 _WIDTH = 4
 # A joint within a flight is this much sharper than what its samples say of the state
 _JOINT = 1e-3
@@ -141,7 +143,8 @@ class Problem:
             states, guess = _starts(model, segments, cuts, pieces)
             point = Point(jnp.asarray(values), jnp.asarray(states))
             extras = _extras(layout, pieces, point, guess)
-            if steps >= _MOST_STEPS or _fine(layout, pieces, extras, point):
+            settled = _follows(model, pieces) and _fine(layout, pieces, extras, point)
+            if steps >= _MOST_STEPS or settled:
                 break
             steps *= 2
         pieces = jax.tree.map(jnp.asarray, pieces)
@@ -405,6 +408,16 @@ def _drive_slopes(layout: Layout, pieces: Pieces, point: Point):
         jnp.asarray(pieces.rate_at),
         jnp.asarray(pieces.drive_error),
     )
+
+
+def _follows(model: Model, pieces: Pieces) -> bool:
+    """Whether the steps are short beside the filters of the sensors.
+
+    A filter is not at rest after an impact, which the states to begin with do not show.
+    """
+    longest = float(np.max(np.where(pieces.exists, pieces.flown.step, 0.0)))
+    corners = [2 * np.pi * s.bandwidth_hz for s in model.sensors.values() if s.filtered]
+    return all(longest * corner <= _FILTER_STEP for corner in corners)
 
 
 def _fine(layout: Layout, pieces: Pieces, extras: Extras, point: Point) -> bool:

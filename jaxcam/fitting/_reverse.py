@@ -5,21 +5,20 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 import scipy.optimize
 from jax.flatten_util import ravel_pytree
 
 from ._fit import fit
-from ._linearise import cost_of, Point
+from ._linearise import cost_of, Layout, Point
 from ._model import Model
 from ._problem import Problem
 
 
 def cost_and_gradient(
     problem: Problem, point: Point, where: Callable[[Model], Any], values: Any
-) -> tuple[jax.Array, Any]:
+) -> tuple[Any, Any]:
     """Cost of a problem and its gradient to any part of the model, by reverse mode.
 
     It takes about as long for a neural network with thousands of weights in the vector
@@ -49,9 +48,7 @@ def _gradient(layout, pieces, extras, point, where, values):
     @eqx.filter_value_and_grad
     def cost(values):
         changed = eqx.tree_at(where, model, values)
-        moved = eqx.tree_at(
-            lambda found: (found.model, found.places), layout, (changed, ())
-        )
+        moved = Layout(changed, ())
         costs = cost_of(moved, pieces, extras, bare)
         parts = (
             jnp.sum(jnp.where(pieces.exists, costs.flown + costs.joints, 0.0)),

@@ -12,7 +12,7 @@ import numpy as np
 from ._binary_table import read_mat, read_parquet
 from ._check import check_channels, check_drive, find_gaps
 from ._errors import RecordingError
-from ._mend import mend
+from ._mend import mend, Mended
 from ._recording import Case, Recording
 from ._table import read_table, SUFFIXES as TEXT
 from ._units import si
@@ -79,10 +79,7 @@ def read_recordings(
             find_gaps(label, time, "split")
             whole = Recording(name, time, values, speed, {"file": str(file)})
             mended = mend(whole)
-            pieces = [
-                dataclasses.replace(r, meta={**r.meta, "notes": mended.notes})
-                for r in mended.recordings
-            ]
+            pieces = _turning(mended)
         else:
             pieces = _split(
                 name, time, values, speed, file, find_gaps(label, time, gaps)
@@ -155,6 +152,20 @@ def _split(name, time, values, speed, file, breaks) -> list[Recording]:
             meta={"file": str(file), "piece": number, "pieces": len(pieces)},
         )
         for number, piece in enumerate(pieces, start=1)
+    ]
+
+
+def _turning(mended: Mended) -> list[Recording]:
+    """The pieces, less those in which a cam turns too little to be followed."""
+    pieces, notes = [], list(mended.notes)
+    for piece in mended.recordings:
+        cam = piece.channels.get("cam_angle_rad")
+        if cam is not None and np.ptp(cam) < np.pi:
+            notes.append(f"{piece.name}: it has less than half a turn; it is left out.")
+        else:
+            pieces.append(piece)
+    return [
+        dataclasses.replace(p, meta={**p.meta, "notes": tuple(notes)}) for p in pieces
     ]
 
 

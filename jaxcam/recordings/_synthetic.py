@@ -14,8 +14,8 @@ from ._errors import RecordingError
 from ._recording import Recording
 
 
-# Finer steps than the samples, in which a sensor's filter is integrated
-_FINER = 4
+# Steps in a sample in which a sensor's filter is integrated: impacts fall between them
+_FINER = 256
 
 
 class Wandering(HybridSystem):
@@ -136,13 +136,15 @@ def record(
 
 
 def _sense(sensor, trajectory, settle, count, interval, rng) -> Float[np.ndarray, " k"]:
-    fine = interval / _FINER
-    times = settle + fine * np.arange(count * _FINER) - float(sensor.lag)
+    filtered = sensor.bandwidth_hz != float("inf")
+    finer = _FINER if filtered else 1
+    fine = interval / finer
+    times = settle + fine * np.arange(count * finer) - float(sensor.lag)
     states = np.asarray(trajectory.at(np.maximum(times, trajectory.t0)))
     seen = np.asarray(jax.vmap(sensor.seen)(jnp.asarray(states)))
-    if sensor.bandwidth_hz != float("inf"):
+    if filtered:
         seen = _filtered(seen, 2 * np.pi * sensor.bandwidth_hz * fine)
-    seen = float(sensor.offset) + float(sensor.gain) * seen[::_FINER]
+    seen = float(sensor.offset) + float(sensor.gain) * seen[::finer]
     noisy = seen + float(sensor.noise) * rng.standard_normal(count)
     return np.clip(_round(noisy, sensor.resolution), -sensor.limit, sensor.limit)
 

@@ -1,0 +1,129 @@
+"""Whether the drive ripples with its own angle, from its encoder alone.
+
+`w (1 + eps cos(phi - psi))` shifts the angle by `eps sin(phi - psi)` to first order. A
+real drive also wanders slowly: everything slower than three quarters of its rate is
+fitted freely (cosines of the record's length) and no ripple. What the wandering leaks
+to the harmonic is judged by what is seen beside it, at rates that no drive has a reason
+to prefer.
+"""
+
+import dataclasses
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Float
+from scipy.stats import chi2
+
+from ..recordings import Recording
+
+
+# Up to this multiple of the rate of turning a drive wanders
+_WANDER = 0.75
+# Degree of the polynomial that takes up slopes at the ends of a record
+_ENDS = 5
+# Multiples of the rate that are no harmonics, where the leakage is measured
+_BESIDE = (1.25, 1.4, 1.6, 1.75, 2.25, 2.4, 2.6, 2.75)
+
+
+@dataclasses.dataclass(frozen=True)
+class Ripple:
+    """Ripple of the speed once a turn: `eps` and `psi` (rad) with their errors.
+
+    - `gain`: growth of twice the log-likelihood, over what leakage explains.
+    - `p_value`: of no ripple. `count`: samples. `per_record`: eps of each record.
+    """
+
+    eps: float
+    eps_stderr: float
+    psi: float
+    psi_stderr: float
+    gain: float
+    p_value: float
+    count: int
+    dispersion: float
+    per_record: dict[str, tuple[float, float]]
+
+    @property
+    def delta_bic(self) -> float:
+        return 2 * math.log(max(self.count, 2)) - self.gain
+
+
+def ripple_of(
+    recordings: Sequence[Recording], noise: float, channel: str = "cam_angle_rad"
+) -> Ripple:
+    """Fit one ripple to the drives of all records."""
+    orders = (1.0, *_BESIDE)
+    amplitudes, errors, samples = [], [], 0
+    for recording in recordings:
+        found, error = _amplitudes(recording, channel, orders, noise)
+        amplitudes.append(found)
+        errors.append(error)
+        samples += len(recording)
+    wave, error = np.array(amplitudes), np.array(errors)
+    beside = np.abs(wave[:, 1:] / error[:, 1:]) ** 2 / 2
+    dispersion = max(1.0, float(np.mean(beside)))
+    variance = error[:, 0] ** 2 * dispersion
+    weight = 1 / variance
+    mean = np.sum(weight * wave[:, 0]) / np.sum(weight)
+    stderr = 1 / math.sqrt(np.sum(weight))
+    gain = float(abs(mean) ** 2 / stderr**2)
+    # sin(phi - psi) = -(e^{i phi} conj(a) ...): amplitude a of e^{i phi} is -i e^{-i psi}
+    eps = abs(mean)
+    psi = float(np.angle(mean)) % (2 * math.pi)
+    return Ripple(
+        float(eps),
+        stderr,
+        psi,
+        stderr / max(eps, 1e-300),
+        gain,
+        float(chi2.sf(gain, 2)),
+        samples,
+        dispersion,
+        {
+            r.name: (float(abs(w)), float(math.sqrt(v)))
+            for r, w, v in zip(recordings, wave[:, 0], variance)
+        },
+    )
+
+
+def _amplitudes(recording: Recording, channel: str, orders, noise: float):
+    """Complex amplitude eps e^{i psi} of each multiple of the rate, and its error."""
+    angle = recording[channel]
+    if np.any(np.abs(np.diff(angle)) > np.pi):
+        angle = np.unwrap(angle)
+    if angle[-1] < angle[0]:
+        angle = -angle
+    time = recording.time - recording.time[0]
+    line = np.polyfit(time, angle, 1)
+    turned = np.polyval(line, time)
+    rate = line[0] / (2 * np.pi)
+    length = time[-1] * (1 + 1 / len(time))
+    slow = np.arange(1, int(2 * length * _WANDER * rate) + 1)
+    wander = np.cos(np.pi * np.outer(time / length, slow))
+    # cosines are flat at both ends, where a drive need not be
+    ends = np.polynomial.legendre.legvander(2 * time / length - 1, _ENDS)
+    columns = [*ends.T, *wander.T]
+    found, errors = np.zeros(len(orders), dtype=complex), np.zeros(len(orders))
+    fixed, _ = np.linalg.qr(np.stack(columns, axis=1))
+    rest = angle - turned
+    rest = rest - fixed @ (fixed.T @ rest)
+    # the first harmonic is fitted beside the others, which it may leak into
+    for k, order in enumerate(orders):
+        pick = (order,) if order == 1 else (order, 1.0)
+        waves = [f(o * turned) for o in pick for f in (np.sin, np.cos)]
+        matrix = np.stack(waves, axis=1)
+        matrix = matrix - fixed @ (fixed.T @ matrix)
+        inverse = np.linalg.inv(matrix.T @ matrix)
+        s, c = (inverse @ (matrix.T @ rest))[:2] * order
+        # s sin + c cos = eps sin(phi - psi): s = eps cos psi, c = -eps sin psi
+        found[k] = s - 1j * c
+        errors[k] = noise * order * math.sqrt((inverse[0, 0] + inverse[1, 1]) / 2)
+    return found, errors
+
+
+def without_ripple(
+    angle: Float[np.ndarray, " k"], ripple: Ripple
+) -> Float[np.ndarray, " k"]:
+    """The drive's angle as it would be if it did not ripple."""
+    return angle - ripple.eps * np.sin(angle - ripple.psi)
