@@ -135,7 +135,7 @@ def inadmissible(problem: "ImpactingOrbits", point: Any) -> str | None:
 
 @eqx.filter_jit
 def _look(problem, u, parameters):
-    return problem.monitor(u, parameters), problem.observe(u, parameters)
+    return problem.seen(u, parameters)
 
 
 def refuse(problem: "ImpactingOrbits", u, parameters) -> str | None:
@@ -213,7 +213,9 @@ def _direction(problem, u, parameters, leaf: int, watched: str):
     )(jnp.append(u, p))
     tangent = jnp.linalg.svd(whole)[2][-1]
     _, slope = jax.jvp(
-        lambda z: problem.monitor(z[:-1], with_leaf(parameters, leaf, z[-1]))[watched],
+        lambda z: problem.watched(
+            watched, z[:-1], with_leaf(parameters, leaf, z[-1])
+        ),
         (jnp.append(u, p),),
         (tangent,),
     )

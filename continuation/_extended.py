@@ -272,7 +272,7 @@ class MonitorPoints(AbstractProblem):
 
     def residual(self, u: Float[Array, " n"], parameters: PyTree):
         inner, inside = self._split(u, parameters)
-        value = self.base.monitor(inner, inside)[self.name] - self.level
+        value = self.base.watched(self.name, inner, inside) - self.level
         return jnp.concatenate(
             [self.base.residual(inner, inside), jnp.reshape(value, (1,))]
         )
@@ -290,8 +290,11 @@ class MonitorPoints(AbstractProblem):
         return self.base.observe(*self._split(u, parameters))
 
     def monitor(self, u: Float[Array, " n"], parameters: PyTree) -> dict[str, Array]:
-        values = self.base.monitor(*self._split(u, parameters))
-        return {name: values[name] for name in self.monitors()}
+        return self.seen(u, parameters)[0]
+
+    def seen(self, u: Float[Array, " n"], parameters: PyTree):
+        values, observed = self.base.seen(*self._split(u, parameters))
+        return {name: values[name] for name in self.monitors()}, observed
 
     def monitors(self) -> dict[str, Monitor]:
         own = self.base.monitors()[self.name]

@@ -4,38 +4,44 @@ from collections.abc import Mapping
 from typing import Any, ClassVar
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from jaxcam.hybrid import contact_acceleration, HybridSystem
-from variational._chatter_frame import chatter_frame
-from variational._chatter_orbit import chatter_accumulation
+from jaxcam.hybrid import (
+    contact_state,
+    HybridSystem,
+    normal_acceleration,
+    normal_velocity,
+)
+from jaxcam.hybrid._normal import gaps
+from variational._chatter_frame import chatter_frame, ChatterFrame, frame_at
+from variational._chatter_orbit import ChatterOrbit, orbit_from
 
 from ._problem import AbstractProblem, Monitor, Stability
 
 
 #: names of the monitors
 CHATTER = "chatter margin"
-DETACHMENT = "contact acceleration"
-_GRID = 128
+DETACHMENT = "jerk at release"
 
 
 class StickingOrbits(AbstractProblem):
     """P(inf, 1): the orbit that leaves contact, chatters and sticks in each period.
 
-    While it sticks it follows the constraint, so it starts each turn at the release
-    point without relative velocity and needs no equation to be solved: the unknowns are
-    the state at release, shape `(2,)`, and all multipliers are zero. Where it exists
-    depends on two monitors:
+    While it sticks it follows the constraint, so each turn starts at the release point:
+    the time t and the state x at which gap, normal velocity and normal acceleration are
+    zero. Those are the equations; the unknowns, shape `(3,)`, are the phase of release
+    (time in forcing periods) and the state there. All multipliers are zero. Where the
+    orbit exists depends on two monitors:
 
     - the margin of [`variational.chatter_accumulation`][], zero where the impacts
       accumulate at the very moment of release. The sticking time itself falls to zero
       there like a power and does not change sign (the thesis, 3.5.1); the margin is
       smooth.
-    - the largest acceleration that contact suppresses, zero where contact would never
-      end: impacts begin there.
+    - the rate of change of the contact acceleration at release, relative to the forcing
+      period. It is zero where release and the next return to contact fall together:
+      beyond, contact never ends, so impacts begin there.
 
     **Arguments:** a system with a period, two states and one constraint.
     """
@@ -44,17 +50,21 @@ class StickingOrbits(AbstractProblem):
 
     parameters: HybridSystem
 
-    def residual(self, u, parameters) -> Float[Array, " n"]:
-        return u - chatter_frame(parameters).state
+    def residual(self, u, parameters) -> Float[Array, "3"]:
+        system = parameters.prepared()
+        period = system.period
+        time, state = u[0] * period, u[1:]
+        rows = [
+            gaps(system, time, state),
+            period * normal_velocity(system, time, state),
+            period**2 * normal_acceleration(system, time, state),
+        ]
+        return jnp.concatenate(rows)
 
-    def jacobian(self, u, parameters):
-        del parameters
-        return jnp.eye(u.shape[0])
-
-    def linearisation(self, u, parameters, jacobian) -> Float[Array, "n n"]:
+    def linearisation(self, u, parameters, jacobian) -> Float[Array, "2 2"]:
         """Zero: nothing of a deviation survives sticking."""
-        del u, parameters
-        return jnp.zeros_like(jacobian)
+        del parameters, jacobian
+        return jnp.zeros((u.shape[0] - 1, u.shape[0] - 1))
 
     @property
     def normal_forms(self) -> bool:
@@ -64,12 +74,18 @@ class StickingOrbits(AbstractProblem):
     def detects(self) -> bool:
         return False
 
+    def _frame(self, u, system) -> ChatterFrame:
+        return frame_at(system, u[0] * system.period, u[1:])
+
+    def watched(self, name: str, u, parameters) -> Float[Array, ""]:
+        system = parameters.prepared()
+        frame = self._frame(u, system)
+        if name == DETACHMENT:
+            return frame.jerk * system.period**3
+        return -orbit_from(system, frame).margin
+
     def monitor(self, u, parameters) -> dict[str, Float[Array, ""]]:
-        turn = chatter_accumulation(parameters)
-        return {
-            CHATTER: -turn.margin,
-            DETACHMENT: largest_contact_acceleration(parameters, u),
-        }
+        return self.seen(u, parameters)[0]
 
     def monitors(self) -> Mapping[str, Monitor]:
         return {
@@ -78,24 +94,35 @@ class StickingOrbits(AbstractProblem):
         }
 
     def observe(self, u, parameters) -> dict[str, Array]:
-        """Period, release, accumulation and sticking time (s), impacts listed."""
-        turn = chatter_accumulation(parameters)
-        period = jnp.asarray(parameters.period, dtype=jnp.float64)
-        return {
+        """Period, release, accumulation and sticking time (s), impacts listed; the
+        state at whole forcing periods, `(1, 2)`, NaN if they fall into the flights."""
+        return self.seen(u, parameters)[1]
+
+    def seen(self, u, parameters):
+        system = parameters.prepared()
+        period = jnp.asarray(system.period, dtype=jnp.float64)
+        turn = orbit_from(system, self._frame(u, system))
+        monitors = {
+            CHATTER: -turn.margin,
+            DETACHMENT: turn.frame.jerk * period**3,
+        }
+        observed = {
             "period": period,
             "time": turn.frame.release,
             "state": turn.frame.state,
             "accumulation": turn.accumulation,
             "sticking time": turn.frame.release + period - turn.accumulation,
             "impacts": turn.impacts,
+            "stroboscopic": _stroboscopic(system, turn)[None],
         }
+        return monitors, observed
 
     def check(self, point: Any) -> str | None:
         value = point.tests.get(CHATTER, np.nan)
         if np.isfinite(value) and value < 0:
             return "chattering does not come to its end before contact is released"
         if point.tests.get(DETACHMENT, 1.0) < 0:
-            return "contact never ends, so there are no impacts"
+            return "contact is made, not released, at this zero of its acceleration"
         return None
 
     @property
@@ -103,37 +130,16 @@ class StickingOrbits(AbstractProblem):
         return "sticks once a period"
 
 
-def largest_contact_acceleration(system: HybridSystem, guess) -> Float[Array, ""]:
-    """Largest acceleration that contact suppresses in a period; contact lasts below 0.
-
-    Differentiable: at the maximum its time does not matter to first order.
-    """
+def _stroboscopic(system, turn: ChatterOrbit) -> Float[Array, " n"]:
+    """State at the first whole period after release, if contact lasts there."""
     period = system.period
-    grid = period * jnp.arange(_GRID) / _GRID
-
-    def at(system, t):
-        return contact_acceleration(system, t[None], guess)[0]
-
-    still = jax.lax.stop_gradient(system)
-    values = contact_acceleration(still, jax.lax.stop_gradient(grid), guess)
-    time = jax.lax.stop_gradient(grid[jnp.argmax(values)])
-
-    def slope(t):
-        return jax.jvp(lambda s: at(still, s), (t,), (jnp.ones_like(t),))[1]
-
-    h = jax.lax.stop_gradient(period) / _GRID
-
-    def newton(_, t):
-        value, rate = jax.jvp(slope, (t,), (jnp.ones_like(t),))
-        move = -value / jnp.where(rate < 0, rate, -jnp.inf)
-        return t + jnp.clip(move, -h, h)
-
-    time = jax.lax.stop_gradient(jax.lax.fori_loop(0, 4, newton, time))
-    return at(system, time)
+    time = jnp.ceil(turn.frame.release / period) * period
+    state = contact_state(system, time[None], turn.frame.state)[0]
+    return jnp.where(time >= turn.accumulation, state, jnp.nan)
 
 
 def on_release(system: HybridSystem) -> tuple[StickingOrbits, np.ndarray]:
-    """The problem of the orbit that sticks once a period, and its state.
+    """The problem of the orbit that sticks once a period, and its unknowns.
 
     **Raises:** `ValueError` where contact never ends, or is never made.
     """
@@ -143,7 +149,8 @@ def on_release(system: HybridSystem) -> tuple[StickingOrbits, np.ndarray]:
             "this system has no release from contact in its period, so no orbit sticks "
             "for a part of it; check the parameters"
         )
-    return StickingOrbits(system), np.asarray(frame.state)
+    phase = float(frame.release) / float(system.period)  # pyright: ignore
+    return StickingOrbits(system), np.append(phase, np.asarray(frame.state))
 
 
 @eqx.filter_jit

@@ -68,7 +68,8 @@ class AbstractProblem(eqx.Module):
     - `residual(u, parameters)`.
 
     **Traced** (called inside compiled programs; jax functions, differentiable forward):
-    `residual`, `jacobian`, `linearisation`, `motion`, `monitor`, `observe`, `scale`.
+    `residual`, `jacobian`, `linearisation`, `motion`, `monitor`, `observe`, `watched`,
+    `seen`, `scale`.
     Everything about them that is not an array must be static: one program is compiled
     for each structure of a problem, and reused for all values of arrays in it.
     `residual` and monitors of `ends=False` are to be smooth; where an orbit does not
@@ -144,6 +145,18 @@ class AbstractProblem(eqx.Module):
         """Further quantities to keep with each point (`point.observed`)."""
         del u, parameters
         return {}
+
+    def watched(
+        self, name: str, u: Float[Array, " n"], parameters: PyTree
+    ) -> Float[Array, ""]:
+        """One of the monitors alone, where that is less work."""
+        return self.monitor(u, parameters)[name]
+
+    def seen(
+        self, u: Float[Array, " n"], parameters: PyTree
+    ) -> tuple[dict[str, Array], dict[str, Array]]:
+        """`monitor` and `observe` together, where they share work."""
+        return self.monitor(u, parameters), self.observe(u, parameters)
 
     def scale(self, u: Float[Array, " n"], parameters: PyTree) -> Float[Array, " n"]:
         """(n,) sizes of the components of u, by which lengths along a branch are

@@ -122,6 +122,7 @@ def evaluate_(problem, leaf, z, old, width, success, iterations) -> Corrected:
         jacobian = jnp.concatenate([j_u, j_p[:, None]], axis=1)
     scale = scale_at(problem, leaf, z, width)
     tangent, determinant = tangent_and_determinant(jacobian, scale, old)
+    monitors, observed = problem.seen(u, parameters)
     return Corrected(
         z=z,
         success=jnp.asarray(success) & jnp.all(jnp.isfinite(jacobian)),
@@ -131,8 +132,8 @@ def evaluate_(problem, leaf, z, old, width, success, iterations) -> Corrected:
         tangent=tangent,
         determinant=determinant,
         scale=scale,
-        monitors=problem.monitor(u, parameters),
-        observed=problem.observe(u, parameters),
+        monitors=monitors,
+        observed=observed,
     )
 
 

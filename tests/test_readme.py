@@ -32,7 +32,9 @@ def test_continuous_integration_runs_the_test_command_of_the_readme():
     assert script.stat().st_mode & stat.S_IXUSR
 
 
-@pytest.mark.parametrize("name", ["simulate", "demo"])
+@pytest.mark.parametrize(
+    "name", ["simulate", "demo", "continue", "fit", "diagnose", "reproduce"]
+)
 def test_commands_of_the_readme_exist(name, monkeypatch, capsys):
     from jaxcam.cli import main
 

@@ -5,7 +5,15 @@ import numpy as np
 import pytest
 
 from jaxcam.models import ImpactOscillator
-from variational import find_lobes, fit_local_map, iterate_local_map, Lobes
+from variational import (
+    chatter_interruption,
+    find_lobes,
+    fit_local_map,
+    iterate_local_map,
+    Lobes,
+    scaling_law,
+    section_turn,
+)
 
 
 Q, M, X, HEIGHT, WIDTH = -0.62, -0.535, 0.34, 2.2e-4, 1.0e-3
@@ -62,6 +70,7 @@ def test_fit_recovers_scales_lobe_and_accumulation():
         assert np.max(np.abs(np.asarray(local(scaled)) - value)) < 0.01 * HEIGHT
     assert float(local(lobes.accumulation - 1e-4)) == float(local.alpha_inf)
     assert np.isnan(float(local(X + 1e-6)))
+    assert np.isnan(float(local(np.nan)))
 
 
 def test_iteration_moves_from_the_fixed_point_into_the_lobes():
@@ -77,8 +86,6 @@ def test_iteration_moves_from_the_fixed_point_into_the_lobes():
 @pytest.mark.slow
 def test_lobes_of_the_motion_are_found():
     # x'' + x = cos wt at its interruption for r = 0.5, lobes in the position
-    from variational import chatter_interruption, scaling_law, section_turn
-
     system = ImpactOscillator(omega=jnp.asarray(1.0), restitution=jnp.asarray(0.5))
     value = chatter_interruption(system, lambda s: s.omega, (0.4, 0.8))
     system = ImpactOscillator(omega=value, restitution=jnp.asarray(0.5))

@@ -101,21 +101,28 @@ def prepared_frame(system, time) -> ChatterFrame:
     found = release_point(system, grid[jnp.argmax(push)])
     release = found.time + jnp.where(found.time < time, period, jnp.zeros_like(period))
 
+    frame = frame_at(system, release, found.state)
+    lacking = (found.holds != 0) | (frame.jerk <= 0)
+    return eqx.tree_at(lambda f: f.release, frame, jnp.where(lacking, jnp.nan, release))
+
+
+def frame_at(system, release, state) -> ChatterFrame:
+    """The frame of a known release of a system that is already `prepared`."""
+
     def suppressed(t, x):
         return normal_acceleration(system, t, x)[0]
 
     # by jvp, not grad: the same program is differentiated again
     _, jerk = jax.jvp(
         suppressed,
-        (release, found.state),
-        (jnp.ones_like(release), sticking_field(system, release, found.state)),
+        (release, state),
+        (jnp.ones_like(release), sticking_field(system, release, state)),
     )
-    lacking = (found.holds != 0) | (jerk <= 0)
     return ChatterFrame(
-        release=jnp.where(lacking, jnp.nan, release),
-        state=found.state,
+        release=release,
+        state=state,
         jerk=jerk,
-        restitution=restitution_coefficients(system, release, found.state)[0],
+        restitution=restitution_coefficients(system, release, state)[0],
     )
 
 

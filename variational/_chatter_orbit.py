@@ -88,7 +88,11 @@ def _orbit(system, time) -> ChatterOrbit:
 
 def prepared_orbit(system, time) -> ChatterOrbit:
     """The orbit of a system that is already `prepared`."""
-    frame = prepared_frame(system, time)
+    return orbit_from(system, prepared_frame(system, time))
+
+
+def orbit_from(system, frame: ChatterFrame) -> ChatterOrbit:
+    """The orbit of a system that is already `prepared`, from a known release."""
     period = system.period
     restitution = frame.restitution
     end = frame.release + period

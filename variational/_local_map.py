@@ -89,7 +89,7 @@ class LocalMap(eqx.Module):
         alpha = alpha + self.p_0 * (1 - gamma)
         inside = gamma * self.lobe(self.x_0 + (x - x_j) / beta) + alpha
         known = jnp.where(share >= 0, inside, jnp.nan)
-        return jnp.where(lobes, known, self.alpha_inf)
+        return jnp.where(share >= 1, self.alpha_inf, known)
 
 
 def find_lobes(

@@ -1,0 +1,15 @@
+"""What physics a model leaves out: where it acts, its name, its strength."""
+
+from ._diagnose import diagnose as diagnose
+from ._diagnosis import Diagnosis as Diagnosis, Effect as Effect, Value as Value
+from ._drive import Ripple as Ripple, ripple_of as ripple_of
+from ._structure import Structure as Structure
+from ._term import (
+    Motion as Motion,
+    SensorTerm as SensorTerm,
+    Strength as Strength,
+    strength as strength,
+    Term as Term,
+)
+from ._terms import library as library
+from ._with_terms import WithTerms as WithTerms

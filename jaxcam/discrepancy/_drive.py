@@ -43,6 +43,8 @@ class Ripple:
     count: int
     dispersion: float
     per_record: dict[str, tuple[float, float]]
+    heldout_gain: float
+    inclusion: float
 
     @property
     def delta_bic(self) -> float:
@@ -68,7 +70,6 @@ def ripple_of(
     mean = np.sum(weight * wave[:, 0]) / np.sum(weight)
     stderr = 1 / math.sqrt(np.sum(weight))
     gain = float(abs(mean) ** 2 / stderr**2)
-    # sin(phi - psi) = -(e^{i phi} conj(a) ...): amplitude a of e^{i phi} is -i e^{-i psi}
     eps = abs(mean)
     psi = float(np.angle(mean)) % (2 * math.pi)
     return Ripple(
@@ -84,7 +85,31 @@ def ripple_of(
             r.name: (float(abs(w)), float(math.sqrt(v)))
             for r, w, v in zip(recordings, wave[:, 0], variance)
         },
+        _held_out(wave[:, 0], variance),
+        _inclusion(wave[:, 0], variance, 2 * math.log(max(samples, 2))),
     )
+
+
+def _held_out(wave, variance) -> float:
+    """Log-likelihood gained on each record with the ripple of all the others."""
+    total = 0.0
+    for k in range(len(wave)):
+        rest = np.arange(len(wave)) != k
+        if not rest.any():
+            return 0.0
+        mean = np.average(wave[rest], weights=1 / variance[rest])
+        missed = abs(wave[k]) ** 2 - abs(wave[k] - mean) ** 2
+        total += float(missed / variance[k]) / 2
+    return total
+
+
+def _inclusion(wave, variance, asked: float, repetitions: int = 200) -> float:
+    """Part of the redrawn sets of records in which the ripple is worth it."""
+    rng = np.random.default_rng(0)
+    drawn = rng.integers(0, len(wave), (repetitions, len(wave)))
+    weight = 1 / variance[drawn]
+    mean = np.sum(weight * wave[drawn], axis=1) / np.sum(weight, axis=1)
+    return float(np.mean(np.abs(mean) ** 2 * np.sum(weight, axis=1) > asked))
 
 
 def _amplitudes(recording: Recording, channel: str, orders, noise: float):

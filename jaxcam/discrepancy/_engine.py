@@ -8,9 +8,11 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from ..fitting import Fit, Model, Parameter, Problem
-from ..fitting._eliminate import eliminate
+from ..fitting import Fit, Model, Parameter, Problem, Weights
+from ..fitting._eliminate import eliminate, step_of
 from ..fitting._fit import (
+    _PROMISE,
+    _total,
     free_columns,
     invert,
     off_nominal,
@@ -55,6 +57,10 @@ def extended(problem: Problem, terms: Sequence[Term], at: Point) -> Problem:
         layout=layout,
         start=at._replace(values=wider(at.values)),
     )
+
+
+# Steps of Newton's method on the states alone
+_STATE_STEPS = 12
 
 
 @dataclasses.dataclass(frozen=True)
@@ -144,3 +150,29 @@ def off(information, score, rows):
 
 def value_of(found: Fit, name: str) -> float:
     return float(found.point.values[0, found.problem.names.index(name)])
+
+
+def with_states(problem: Problem, found: Fit, weights: Weights) -> Fit:
+    """The parameters of a fit and states fitted to other data, as in a test of them.
+
+    The same programs as those of the fit itself are used: all parameters are free with
+    a scale of zero.
+    """
+    columns = free_columns(problem, found.free)
+    local = jnp.asarray(columns.local)
+    scales = jnp.zeros(local.shape)
+    extras, point = problem.weighted(weights), found.point
+    none = jnp.zeros(local.shape)
+    costs = found.costs
+    best = np.inf
+    for _ in range(_STATE_STEPS):
+        blocks, costs_here = assemble(
+            problem.layout, problem.pieces, extras, point, local, scales
+        )
+        total = _total(costs_here, extras)
+        if total > best - _PROMISE:
+            break
+        best, costs, kept = total, costs_here, point
+        reduced = eliminate(blocks)
+        point = point._replace(states=point.states + step_of(reduced, none))
+    return dataclasses.replace(found, point=kept, cost=best, costs=costs)

@@ -11,15 +11,17 @@ from ..fitting import Model, Parameter
 
 
 class Motion(NamedTuple):
-    """What a term sees: time (s), position, velocity, and phase of the drive (rad).
+    """What a term sees: time (s), position, velocity, and the drive.
 
-    The phase is the angle that the drive has turned, or time itself without a drive.
+    `phase` is the angle that the drive has turned (rad), or time itself without a
+    drive; `rate` the drive's speed (rad/s), or one.
     """
 
     t: Any
     position: Any
     velocity: Any
     phase: Any
+    rate: Any = 1.0
 
 
 def strength(

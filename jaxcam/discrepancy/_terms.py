@@ -2,6 +2,7 @@
 
 from typing import ClassVar
 
+import equinox as eqx
 import jax.numpy as jnp
 
 from ._term import Motion, SensorTerm, strength, Term
@@ -9,7 +10,7 @@ from ._term import Motion, SensorTerm, strength, Term
 
 # Speed (rad/s) within which dry friction changes sign, so that it can be integrated;
 # far below the speeds that it is told from
-_SLIP = 0.01
+_SLIP = 0.015
 
 
 class ViscousDamping(Term):
@@ -58,8 +59,8 @@ class NonlinearSpring(Term):
     sentence: ClassVar[str] = "a cubic part of the spring force"
     region: ClassVar[str] = "in flight, at large deflections"
     source: ClassVar[str] = "Duffing 1918; Kovacic and Brennan 2011, chapter 2"
-    center: ClassVar[float] = 0.27
     k3: float = strength("1/(s^2 rad^2)", 100.0)
+    center: float = eqx.field(default=0.27, static=True)
 
     def acceleration(self, motion: Motion):
         return -self.k3 * (motion.position - self.center) ** 3
@@ -74,8 +75,8 @@ class RestitutionVelocity(Term):
     region: ClassVar[str] = "at impacts, by their approach speed"
     source: ClassVar[str] = "Goldsmith, Impact, 1960, chapter 8; Johnson 1985, 11.5"
     acts: ClassVar[tuple[str, ...]] = ("impact",)
-    reference: ClassVar[float] = 0.3
     rb: float = strength("-", 0.02, lower=0.0)
+    reference: float = eqx.field(default=0.3, static=True)
 
     def restitution(self, approach, motion: Motion):
         del motion
@@ -91,8 +92,8 @@ class CamProfileError(Term):
     region: ClassVar[str] = "at impacts and rests, by the angle of the cam"
     source: ClassVar[str] = "Norton, Cam Design and Manufacturing Handbook, chapter 12"
     acts: ClassVar[tuple[str, ...]] = ("contact",)
-    lead: ClassVar[float] = 0.7
     run: float = strength("rad", 1e-4)
+    lead: float = eqx.field(default=0.7, static=True)
 
     def contact(self, motion: Motion):
         return self.run * jnp.cos(2 * motion.phase + self.lead)
@@ -141,5 +142,113 @@ class DriveRipple(Term):
     region: ClassVar[str] = "in the cam's own angle, by that angle"
     source: ClassVar[str] = "Norton, Cam Design and Manufacturing Handbook, chapter 10"
     acts: ClassVar[tuple[str, ...]] = ()
-    eps: float = 0.0
-    psi: float = 0.0
+
+
+class StribeckFriction(Term):
+    """Dry friction that is larger near standstill, `-fs exp(-(v / vs)^2) sign(v)`."""
+
+    name: ClassVar[str] = "stribeck_friction"
+    sentence: ClassVar[str] = "friction that is larger at low speed"
+    region: ClassVar[str] = "in flight, near standstill"
+    source: ClassVar[str] = "Armstrong-Helouvry, Dupont, Canudas de Wit 1994, Automatica"
+    listed: ClassVar[bool] = False
+    fs: float = strength("rad/s^2", 0.1, lower=0.0)
+    speed: float = eqx.field(default=0.1, static=True)
+
+    def acceleration(self, motion: Motion):
+        slow = jnp.exp(-((motion.velocity / self.speed) ** 2))
+        return -self.fs * slow * jnp.tanh(motion.velocity / _SLIP)
+
+
+class AsymmetricFriction(Term):
+    """Dry friction that differs with the direction: a force against one of them."""
+
+    name: ClassVar[str] = "asymmetric_friction"
+    sentence: ClassVar[str] = "friction that acts in one direction only"
+    region: ClassVar[str] = "in flight, on the way up"
+    source: ClassVar[str] = "Armstrong-Helouvry 1991, Control of Machines with Friction"
+    listed: ClassVar[bool] = False
+    fa: float = strength("rad/s^2", 0.1, lower=0.0)
+
+    def acceleration(self, motion: Motion):
+        return -self.fa * (1 + jnp.tanh(motion.velocity / _SLIP)) / 2
+
+
+class GravityImbalance(Term):
+    """The weight of an arm whose centre of mass is off its hinge, `-g cos(q)`."""
+
+    name: ClassVar[str] = "gravity_imbalance"
+    sentence: ClassVar[str] = "the weight of an arm that is not balanced"
+    region: ClassVar[str] = "in flight, by position"
+    source: ClassVar[str] = "Meriam and Kraige, Dynamics, chapter 6"
+    listed: ClassVar[bool] = False
+    imbalance: float = strength("rad/s^2", 0.1)
+
+    def acceleration(self, motion: Motion):
+        return -self.imbalance * jnp.cos(motion.position)
+
+
+class SpeedDependentBounce(Term):
+    """Restitution that varies with the speed of the drive, by `br` per rad/s."""
+
+    name: ClassVar[str] = "restitution_drive_speed"
+    sentence: ClassVar[str] = "a restitution that depends on the speed of the drive"
+    where: ClassVar[str] = "impact"
+    region: ClassVar[str] = "at impacts, by the speed of the drive"
+    source: ClassVar[str] = "Chong 2016, section 4.6.1 (Figure 4.15)"
+    listed: ClassVar[bool] = False
+    acts: ClassVar[tuple[str, ...]] = ("impact",)
+    br: float = strength("s/rad", 1e-3)
+
+    def restitution(self, approach, motion: Motion):
+        del approach
+        return 1 + self.br * motion.rate
+
+
+class SensorGain(SensorTerm):
+    """A sensor that shows too much or too little, in proportion."""
+
+    name: ClassVar[str] = "sensor_gain"
+    sentence: ClassVar[str] = "a wrong gain of the follower's sensor"
+    region: ClassVar[str] = "in the measured angle, in proportion to it"
+    source: ClassVar[str] = "Doebelin, Measurement Systems, chapter 3"
+    listed: ClassVar[bool] = False
+    fields: ClassVar[tuple[str, ...]] = ("gain",)
+    gain: float = strength("-", 1e-3)
+
+
+class SensorOffset(SensorTerm):
+    """A sensor whose zero is off."""
+
+    name: ClassVar[str] = "sensor_offset"
+    sentence: ClassVar[str] = "a wrong zero of the follower's sensor"
+    region: ClassVar[str] = "in the measured angle, everywhere"
+    source: ClassVar[str] = "Doebelin, Measurement Systems, chapter 3"
+    listed: ClassVar[bool] = False
+    fields: ClassVar[tuple[str, ...]] = ("offset",)
+    offset: float = strength("rad", 1e-3)
+
+
+def library(turned: bool = True) -> tuple[Term, ...]:
+    """All terms that `diagnose` tries by default.
+
+    **Arguments:** whether the system has a drive, without which no cam can be out of
+    round.
+    """
+    found: list[Term] = [
+        ViscousDamping(),
+        CoulombFriction(),
+        QuadraticDrag(),
+        NonlinearSpring(),
+        RestitutionVelocity(),
+        ExternalVibration(),
+        SensorLag(),
+        StribeckFriction(),
+        AsymmetricFriction(),
+        GravityImbalance(),
+        SensorGain(),
+        SensorOffset(),
+    ]
+    if turned:
+        found += [CamProfileError(), SpeedDependentBounce()]
+    return tuple(found)

@@ -25,16 +25,32 @@ _FINE = 6
 
 @dataclasses.dataclass(frozen=True)
 class Periodogram:
-    """`gain` `(k,)`: growth of twice the log-likelihood at each `frequency` (Hz)."""
+    """Growth of twice the log-likelihood at each `frequency` (Hz), shape `(k,)`.
+
+    `gain` with one phase for all records, `separate` with a phase for each record.
+    `records` is their number, `cells` that of frequencies that can be told apart.
+    """
 
     frequency: Float[np.ndarray, " k"]
     gain: Float[np.ndarray, " k"]
+    separate: Float[np.ndarray, " k"]
+    records: int
 
     @property
     def best(self) -> tuple[float, float]:
-        """Frequency (Hz) and gain of the highest peak."""
+        """Frequency (Hz) and gain of the highest peak with one phase."""
         k = int(np.argmax(self.gain))
         return float(self.frequency[k]), float(self.gain[k])
+
+    @property
+    def best_separate(self) -> tuple[float, float]:
+        """Frequency (Hz) and gain of the highest peak with separate phases."""
+        k = int(np.argmax(self.separate))
+        return float(self.frequency[k]), float(self.separate[k])
+
+    @property
+    def cells(self) -> int:
+        return max(1, len(self.frequency) // _FINE)
 
 
 def periodogram(parts: Sequence[Residuals]) -> Periodogram:
@@ -42,14 +58,17 @@ def periodogram(parts: Sequence[Residuals]) -> Periodogram:
 
     **Arguments:** residuals of the channels that see the position.
     """
-    values, times, edges, bases = [], [], [], []
+    values, times, edges, bases, firsts = [], [], [], [], []
     count = 0
     for part in parts:
-        fly = ~part.resting
+        fly, first = ~part.resting, True
         for flight in np.unique(part.flight[fly]):
             rows = np.flatnonzero(fly & (part.flight == flight))
             if len(rows) < 4 * (_DEGREE + 1):
                 continue
+            if first:
+                firsts.append(len(edges))
+            first = False
             t = part.time[rows]
             x = (t - t.mean()) / np.ptp(t)
             basis, _ = np.linalg.qr(np.vander(x, _DEGREE + 1))
@@ -60,9 +79,11 @@ def periodogram(parts: Sequence[Residuals]) -> Periodogram:
             edges.append(count)
             count += len(rows)
     if not values:
-        return Periodogram(np.zeros(1), np.zeros(1))
+        none = np.zeros(1)
+        return Periodogram(none, none, none, 1)
     value, time = np.concatenate(values), np.concatenate(times)
-    basis, edges = np.concatenate(bases), np.array(edges)
+    basis, cuts = np.concatenate(bases), np.array(edges)
+    records = np.array(firsts)
     interval = float(np.median(np.diff(times[0])))
     length = max(float(np.max(p.time) - np.min(p.time)) for p in parts)
     flight = float(np.median([np.ptp(t) for t in times]))
@@ -70,23 +91,30 @@ def periodogram(parts: Sequence[Residuals]) -> Periodogram:
     frequency = np.arange(1 / flight, 1 / (_PER_PERIOD * interval), step)
     turn = np.exp(2j * np.pi * frequency[0] * time)
     advance = np.exp(2j * np.pi * step * time)
-    gain = np.zeros(len(frequency))
+    gain, separate = np.zeros(len(frequency)), np.zeros(len(frequency))
+    starts = cuts[records]
     for k in range(len(frequency)):
-        gain[k] = _regressed(value, turn, basis, edges)
+        taken = np.add.reduceat(basis * turn[:, None], cuts, axis=0)
+
+        def summed(a, b, projected):
+            whole = np.add.reduceat(a * b, starts)
+            return whole - np.add.reduceat(projected.sum(axis=1), records)
+
+        re, im = turn.real, turn.imag
+        tr, ti = taken.real, taken.imag
+        cc, ss = summed(re, re, tr * tr), summed(im, im, ti * ti)
+        cs = summed(re, im, tr * ti)
+        c, s = np.add.reduceat(value * re, starts), np.add.reduceat(value * im, starts)
+        gain[k] = _solved(*(np.sum(x, keepdims=True) for x in (cc, ss, cs, c, s)))[0]
+        separate[k] = np.sum(_solved(cc, ss, cs, c, s))
         turn = turn * advance
-    return Periodogram(frequency, gain)
+    return Periodogram(frequency, gain, separate, len(records))
 
 
-def _regressed(value, turn, basis, edges) -> float:
-    """Gain of cosine and sine together, each without what the flights explain."""
-    taken = np.add.reduceat(basis * turn[:, None], edges, axis=0)
-    real, imag = taken.real.ravel(), taken.imag.ravel()
-    cc = np.dot(turn.real, turn.real) - np.dot(real, real)
-    ss = np.dot(turn.imag, turn.imag) - np.dot(imag, imag)
-    cs = np.dot(turn.real, turn.imag) - np.dot(real, imag)
-    c, s = np.dot(value, turn.real), np.dot(value, turn.imag)
+def _solved(cc, ss, cs, c, s):
+    """Gains of cosine and sine together."""
     det = cc * ss - cs * cs
     # what the cubics take up entirely cannot be seen
-    if not det > 1e-9 * max(cc, ss) ** 2:
-        return 0.0
-    return float((ss * c * c - 2 * cs * c * s + cc * s * s) / det)
+    seen = det > 1e-9 * np.maximum(cc, ss) ** 2
+    top = ss * c * c - 2 * cs * c * s + cc * s * s
+    return np.where(seen, top / np.where(seen, det, 1.0), 0.0)

@@ -44,7 +44,7 @@ class WithTerms(HybridSystem):
 
     def motion(self, t, state) -> Motion:
         """What the terms see of a state."""
-        return Motion(t, state[0], state[1], _turned(self.base, t))
+        return Motion(t, state[0], state[1], *_turned(self.base, t))
 
     def vector_field(self, t, state) -> jax.Array:
         rate = self.base.vector_field(t, state)
@@ -91,7 +91,7 @@ class WithTerms(HybridSystem):
 
     def _raised(self, t):
         none = jnp.zeros_like(t)
-        motion = Motion(t, none, none, _turned(self.base, t))
+        motion = Motion(t, none, none, *_turned(self.base, t))
         total = none
         for term in self._acting("contact"):
             total = total + term.contact(motion)
@@ -102,12 +102,12 @@ class WithTerms(HybridSystem):
 
 
 def _turned(base, t):
-    """Angle that the drive has turned (rad); time where there is no drive."""
+    """Angle (rad) and rate (rad/s) of the drive; time where there is no drive."""
     if hasattr(base, "speed") and hasattr(base, "phase"):
-        return base.speed * t + base.phase
+        return base.speed * t + base.phase, base.speed
     if base.period is not None:
-        return 2 * jnp.pi * t / base.period
-    return t
+        return 2 * jnp.pi * t / base.period, 2 * jnp.pi / base.period
+    return t, jnp.ones_like(t)
 
 
 def _speed(system):

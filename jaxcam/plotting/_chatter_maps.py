@@ -2,6 +2,7 @@
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.ticker import NullFormatter
 
 from variational import beta_map, lambda_inverse, lambda_map, scaling_law
 
@@ -119,6 +120,8 @@ def lobe_scaling(distance, height, kappa: float, ax: Axes | None = None) -> Axes
     ax.loglog(
         distance, law, color=SECTION, ls="--", lw=1, label=rf"$\kappa$ = {kappa:.4f}"
     )
+    # the labels of minor ticks run into each other over less than two decades
+    ax.xaxis.set_minor_formatter(NullFormatter())
     ax.set(xlabel="distance from the interruption", ylabel="height of the lobe")
     legend_above(ax)
     return ax

@@ -1,0 +1,127 @@
+"""What was found: the verdict, its evidence, and how it is written down."""
+
+import dataclasses
+from typing import Any
+
+from ..fitting import Fit, Model
+from ._drive import Ripple
+from ._structure import Structure
+
+
+@dataclasses.dataclass(frozen=True)
+class Value:
+    """A number with its standard error and unit."""
+
+    value: float
+    stderr: float
+    unit: str = ""
+
+
+@dataclasses.dataclass(frozen=True)
+class Effect:
+    """One thing that the model lacks.
+
+    - `parameters`: its numbers. `where`: `"flight"`, `"impact"`, `"contact"`, `"drive"`
+        or `"sensor"`; `region` in words; `records` in which it can be seen.
+    - `delta_bic`: of the model with it, less that of the model without it.
+    - `heldout_gain_nats`: log-likelihood gained on data that no parameter has seen.
+    - `inclusion`: part of the redrawn data sets in which it would be named.
+    """
+
+    name: str
+    sentence: str
+    parameters: dict[str, Value]
+    where: str
+    region: str
+    records: tuple[str, ...]
+    delta_bic: float
+    heldout_gain_nats: float
+    inclusion: float
+
+    def to_json(self) -> dict[str, Any]:
+        return {
+            "name": self.name,
+            "parameters": {
+                name: dataclasses.asdict(one) for name, one in self.parameters.items()
+            },
+            "located": {
+                "where": self.where,
+                "region": self.region,
+                "records": list(self.records),
+            },
+            "evidence": {
+                "delta_bic": self.delta_bic,
+                "heldout_gain_nats": self.heldout_gain_nats,
+                "inclusion": self.inclusion,
+            },
+        }
+
+
+@dataclasses.dataclass(frozen=True)
+class Diagnosis:
+    """The answer to: what physics did the model leave out?
+
+    - `verdict`: `"effect"`, `"none"` or `"unknown"`; `effects`: what it is.
+    - `alternatives`: other subsets and how much worse their BIC is.
+    - `heldout_before`, `heldout_after`, `noise_floor`: rms of the residuals (`unit`) on
+        records that no parameter has seen, one flight ahead.
+    - `rig`: fitted parameters with what is missing in the model.
+    - `before`, `after`: the fits of the textbook model and of the one chosen.
+    - `left_before`, `left_after`: shapes that the residuals were asked for.
+    - `ripple`: of the drive. `pulls`: how far each parameter went without and with the
+        effects, in tolerances. `limits`: least strength of each term that would have
+        been named. `hides`: the parameter that would take up most of each term.
+    - `caveats`: sentences.
+    """
+
+    case: str
+    verdict: str
+    effects: tuple[Effect, ...]
+    alternatives: tuple[tuple[str, float], ...]
+    heldout_before: float
+    heldout_after: float
+    noise_floor: float
+    unit: str
+    rig: dict[str, Value]
+    summary: str
+    before: Fit
+    after: Fit
+    left_before: tuple[Structure, ...]
+    left_after: tuple[Structure, ...]
+    ripple: Ripple | None
+    pulls: dict[str, tuple[float, float]]
+    limits: dict[str, Value]
+    hides: dict[str, str]
+    caveats: tuple[str, ...]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the effects."""
+        return tuple(effect.name for effect in self.effects)
+
+    def model(self, record: int | str = 0) -> Model:
+        """The model with what was missing, for use in every other command."""
+        return self.after.model(record)
+
+    def to_json(self) -> dict[str, Any]:
+        """The verdict as plain numbers and strings."""
+        return {
+            "case": self.case,
+            "verdict": self.verdict,
+            "effects": [effect.to_json() for effect in self.effects],
+            "alternatives": [
+                {"name": name, "delta_bic_to_best": delta}
+                for name, delta in self.alternatives
+            ],
+            "fit": {
+                "heldout_rmse_before": self.heldout_before,
+                "heldout_rmse_after": self.heldout_after,
+                "noise_floor": self.noise_floor,
+                "unit": self.unit,
+            },
+            "rig": {
+                name: {"value": one.value, "stderr": one.stderr}
+                for name, one in self.rig.items()
+            },
+            "summary": self.summary,
+        }

@@ -1,0 +1,165 @@
+"""How sure a named effect is: unseen records, redrawn blocks, and its limits."""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from ..fitting import Fit, fit, Problem, residuals
+from ._engine import Blocks, blocks_of, gain, off, with_states
+from ._search import Search, Trial, values_of
+
+
+_SLICES = 4
+_REDRAWN = 200
+
+
+def held_out(
+    search: Search, before: Trial, after: Trial, progress: Callable
+) -> tuple[float, float, dict[str, float]]:
+    """Two models on records that their parameters have not seen.
+
+    Records are dealt out to two halves; each is predicted with what the other one says.
+    One record alone is cut in two.
+
+    **Returns:** rms of the residuals in units of the noise, without and with the terms,
+    and what was gained in the logarithm of the likelihood, by record.
+    """
+    problem = search.problem
+    halves = _halves(problem)
+    squares, counts = np.zeros(2), np.zeros(2)
+    gained: dict[str, float] = {}
+    for fold, (seen, unseen) in enumerate((halves, halves[::-1])):
+        costs = []
+        for which, trial in enumerate((before, after)):
+            progress("predicting records not seen", (2 * fold + which) / 4)
+            known = fit(
+                problem, free=trial.fit.free, start=trial.fit.point, weights=seen
+            )
+            test = with_states(problem, known, unseen)
+            square, count = _squares(test, unseen)
+            squares[which] += square
+            counts[which] += count
+            flown = np.sum(
+                np.asarray(unseen.flown)
+                * (np.asarray(test.costs.flown) + np.asarray(test.costs.joints)),
+                axis=1,
+            )
+            rested = np.sum(
+                np.asarray(unseen.rested) * np.nan_to_num(np.asarray(test.costs.rested)),
+                axis=1,
+            )
+            costs.append(flown + rested)
+            if before.names == after.names:
+                squares[1], counts[1] = squares[0], counts[0]
+                costs.append(costs[0])
+                break
+        for name, a, b in zip(problem.records, *costs):
+            gained[name] = gained.get(name, 0.0) + float(a - b) / 2
+    rms = np.sqrt(squares / np.maximum(counts, 1))
+    return float(rms[0]), float(rms[1]), gained
+
+
+def _halves(problem: Problem):
+    if len(problem.records) > 1:
+        return problem.only(problem.records[::2]), problem.only(problem.records[1::2])
+    middle = problem.segments[0].recording.time.mean()
+    return problem.between(-np.inf, middle), problem.between(middle, np.inf)
+
+
+def _squares(test: Fit, unseen) -> tuple[float, int]:
+    """Sum of squares of the residuals of the pieces that count, in units of noise."""
+    total, count = 0.0, 0
+    problem = test.problem
+    for part in residuals(test):
+        row = problem.records.index(part.record)
+        begin = np.asarray(problem.pieces.flown.start[row])
+        used = np.asarray(unseen.flown[row]) > 0
+        if not used.any():
+            continue
+        inside = (part.time >= begin[used].min() - 1e-9) & (
+            part.time <= begin[used].max() + 1.0
+        )
+        if used.sum() < np.asarray(problem.pieces.exists[row]).sum():
+            last = begin[np.asarray(problem.pieces.exists[row]) & ~used]
+            inside &= ~((part.time >= last.min()) & (part.time <= last.max()))
+        value = part.value[inside] / part.noise
+        total += float(np.sum(value**2))
+        count += len(value)
+    return total, count
+
+
+def redrawn(
+    search: Search, best: Trial, seed: int = 0
+) -> tuple[dict[str, float], dict[str, float]]:
+    """Draw stretches of the records again, a second or so each.
+
+    **Returns:** of each term, in which part of the redrawn sets it would be kept: no
+    other term in its place, and not the gain of leaving it out, is as good by BIC. And
+    the standard deviation of each parameter.
+    """
+    problem = search.problem
+    blocks = blocks_of(problem, best.fit.point, _SLICES)
+    free = blocks.rows(search.parameters(best.names))
+    value = values_of(best.fit, blocks)
+    rng = np.random.default_rng(seed)
+    kept = dict.fromkeys(sorted(best.names), 0)
+    estimates = []
+    number = len(blocks.record)
+    for _ in range(_REDRAWN):
+        weight = np.bincount(rng.integers(0, number, number), minlength=number)
+        information, score = blocks.total(weight.astype(float))
+        step, _ = off(information, score, free)
+        estimates.append((value[free] + step) * blocks.scale[free])
+        top = gain(information, score, free)
+        for name in kept:
+            kept[name] += _needed(search, blocks, information, score, best, name, top)
+    spread = np.std(np.array(estimates), axis=0)
+    deviation = {blocks.names[k]: float(s) for k, s in zip(free, spread)}
+    return {name: k / _REDRAWN for name, k in kept.items()}, deviation
+
+
+def _needed(search, blocks: Blocks, information, score, best, name, top) -> bool:
+    """Whether nothing else in the place of a term is as good."""
+    gone = blocks.rows([one.name for one in search.term(name).strengths()])
+    free = blocks.rows(search.parameters(best.names))
+    rest = np.setdiff1d(free, gone)
+    value = values_of(best.fit, blocks)
+    step = np.zeros(len(blocks.names))
+    step[gone] = -value[gone]
+    lost = step @ information @ step - 2 * step @ score
+    moved = score - information @ step
+    own = search.count([name]) * math.log(search.problem.samples)
+    without = top + lost - gain(information, moved, rest) - own
+    return bool(without > 0)
+
+
+def limits(search: Search, trial: Trial) -> dict[str, tuple[float, float, str]]:
+    """Least strength of each term, beside those of a trial, that would be named.
+
+    **Returns:** by the name of the parameter, that strength, its standard error, and
+    the parameter of the rig that would take up most of it.
+    """
+    blocks = search.blocks(trial)
+    information, score = blocks.total()
+    free = blocks.rows(search.parameters(trial.names))
+    rig = blocks.rows(search.rig)
+    found = {}
+    for term in search.terms:
+        if term.name in trial.names:
+            continue
+        for one in term.strengths():
+            if one.inner:
+                continue
+            row = blocks.rows([one.name])
+            rows = np.union1d(free, row)
+            _, error = off(information, score, rows)
+            stderr = float(error[np.searchsorted(rows, row[0])])
+            # without the term, the rig moves by what its columns have in common with it
+            inside = information[np.ix_(rig, rig)]
+            taken = np.linalg.solve(inside, information[rig, row[0]])
+            own = np.sqrt(np.diag(np.linalg.inv(inside)))
+            hidden = blocks.names[rig[int(np.argmax(np.abs(taken) / own))]]
+            size = stderr * float(blocks.scale[row[0]])
+            found[one.name] = (size * math.sqrt(search.asked(term.name)), size, hidden)
+    return found

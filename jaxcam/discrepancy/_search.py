@@ -1,0 +1,233 @@
+"""The best subset of up to three terms, each judged by a fit of whole trajectories."""
+
+import dataclasses
+import itertools
+import math
+from collections.abc import Callable, Iterable, Sequence
+
+import numpy as np
+from scipy.stats import chi2
+
+from ..fitting import Fit, fit, Problem, residuals
+from ._engine import Blocks, blocks_of, gain
+from ._term import Term
+from ._vibration_scan import Periodogram, periodogram
+
+
+#: chance that any term at all is named where nothing is missing
+FALSE_ALARMS = 0.01
+MOST_TERMS = 3
+# How many of the best subsets of each size are built upon, and how many are tried
+_KEPT, _TRIED = 3, 6
+
+
+@dataclasses.dataclass(frozen=True)
+class Trial:
+    """A subset of terms, fitted."""
+
+    names: frozenset[str]
+    fit: Fit
+    bic: float
+    count: int
+
+
+class Search:
+    """All that was tried on one problem.
+
+    **Arguments:** the problem, the names of the parameters of the rig (free in every
+    fit), the terms that may be named, and `progress(sentence, fraction)`.
+    """
+
+    def __init__(
+        self,
+        problem: Problem,
+        rig: Sequence[str],
+        terms: Sequence[Term],
+        progress: Callable[[str, float | None], None],
+    ):
+        self.problem, self.rig, self.terms = problem, tuple(rig), tuple(terms)
+        self.progress = progress
+        self.trials: dict[frozenset[str], Trial] = {}
+        self.failed: set[frozenset[str]] = set()
+        self.scans: dict[frozenset[str], Periodogram] = {}
+        self.linear: dict[frozenset[str], Blocks] = {}
+
+    def term(self, name: str) -> Term:
+        return next(term for term in self.terms if term.name == name)
+
+    def parameters(self, names: Iterable[str]) -> list[str]:
+        """Parameters of the rig and of some terms."""
+        found = list(self.rig)
+        for term in self.terms:
+            if term.name in names:
+                found += [one.name for one in term.strengths()]
+        return found
+
+    def count(self, names: Iterable[str]) -> int:
+        return len(self.parameters(names)) - len(self.rig)
+
+    def asked(self, name: str) -> float:
+        """Gain that a term must have: the more demanding of BIC and error rate."""
+        term = self.term(name)
+        number, chance = self.count([name]), FALSE_ALARMS / len(self.terms)
+        if any(one.inner for one in term.strengths()):
+            # as many chances as there are frequencies
+            chance /= self.scan(frozenset()).cells
+        return max(number * math.log(self.problem.samples), chi2.isf(chance, number))
+
+    def run(self) -> Trial:
+        """The best subset; empty where no term is worth its parameters."""
+        best = self._attempt(frozenset(), None)
+        assert best is not None
+        kept = [best]
+        for size in range(1, MOST_TERMS + 1):
+            promised: dict[frozenset[str], tuple[float, Trial]] = {}
+            for trial in kept:
+                for names, bic in self._promises(trial).items():
+                    if names not in promised or bic < promised[names][0]:
+                        promised[names] = bic, trial
+            most = len(self.terms) if size == 1 else _TRIED
+            order = sorted(promised, key=lambda n: promised[n][0])[:most]
+            for k, names in enumerate(order):
+                said = " and ".join(sorted(names)).replace("_", " ")
+                self.progress(f"fitting {said}", k / len(order))
+                self._attempt(names, promised[names][1])
+            found = [t for n, t in self.trials.items() if len(n) == size]
+            kept = sorted(found, key=lambda t: t.bic)[:_KEPT]
+            kept = [t for t in kept if t.bic < best.bic]
+            if not kept:
+                break
+            best = self._better(best, kept[0])
+        return self._swapped(self._smallest(best))
+
+    def _smallest(self, best: Trial) -> Trial:
+        """Terms that the others can do without, by the error rate too, are dropped."""
+        for size in range(len(best.names)):
+            enough = []
+            for names in itertools.combinations(sorted(best.names), size):
+                less = self.trials.get(frozenset(names))
+                if less is None:
+                    continue
+                asked = sum(self.asked(name) for name in best.names - less.names)
+                if less.fit.cost - best.fit.cost < asked:
+                    enough.append(less)
+            if enough:
+                return min(enough, key=lambda trial: trial.bic)
+        return best
+
+    def _better(self, best: Trial, other: Trial) -> Trial:
+        return other if other.bic < best.bic else best
+
+    def _swapped(self, best: Trial) -> Trial:
+        """Subsets with one term exchanged, as far as the quadratic model favours it."""
+        for _ in range(MOST_TERMS):
+            if not best.names:
+                return best
+            found = best
+            for names in self._exchanges(best):
+                if names in self.trials:
+                    continue
+                trial = self._attempt(names, best)
+                if trial is not None:
+                    found = self._better(found, trial)
+            if found is best:
+                return best
+            best = self._smallest(found)
+        return best
+
+    def _exchanges(self, best: Trial) -> list[frozenset[str]]:
+        """Subsets that the quadratic model about the best fit finds as good."""
+        blocks = self.blocks(best)
+        information, score = blocks.total()
+        free = blocks.rows(self.parameters(best.names))
+        value = values_of(best.fit, blocks)
+        top = gain(information, score, free)
+        found = []
+        for out in best.names:
+            gone = blocks.rows([one.name for one in self.term(out).strengths()])
+            rest = np.setdiff1d(free, gone)
+            step = np.zeros(len(blocks.names))
+            step[gone] = -value[gone]
+            cost = step @ information @ step - 2 * step @ score
+            moved = score - information @ step
+            for term in self.terms:
+                if term.name in best.names:
+                    continue
+                new = [one.name for one in term.strengths() if not one.inner]
+                rows = np.union1d(rest, blocks.rows(new))
+                change = top + cost - gain(information, moved, rows)
+                extra = self.count([term.name]) - self.count([out])
+                if change + extra * math.log(self.problem.samples) < 0:
+                    found.append((best.names - {out}) | {term.name})
+        return found[:_TRIED]
+
+    def _promises(self, trial: Trial) -> dict[frozenset[str], float]:
+        """What the scores say of each further term: the BIC it would lead to."""
+        blocks = self.blocks(trial)
+        information, score = blocks.total()
+        free = blocks.rows(self.parameters(trial.names))
+        now = gain(information, score, free)
+        found = {}
+        for term in self.terms:
+            if term.name in trial.names:
+                continue
+            names = [one.name for one in term.strengths() if not one.inner]
+            rows = np.union1d(free, blocks.rows(names))
+            grown = gain(information, score, rows) - now
+            if any(one.inner for one in term.strengths()):
+                grown = max(grown, self.scan(trial.names).best[1])
+            if grown < self.asked(term.name):
+                continue
+            cost = trial.fit.cost - grown
+            count = trial.count + self.count([term.name])
+            bic = cost + count * math.log(self.problem.samples)
+            found[trial.names | {term.name}] = bic
+        return found
+
+    def blocks(self, trial: Trial) -> Blocks:
+        if trial.names not in self.linear:
+            self.linear[trial.names] = blocks_of(self.problem, trial.fit.point)
+        return self.linear[trial.names]
+
+    def scan(self, names: frozenset[str]) -> Periodogram:
+        """Periodogram of what a fit leaves over."""
+        if names not in self.scans:
+            self.progress("looking for vibrations", None)
+            parts = residuals(self.trials[names].fit)
+            self.scans[names] = periodogram(parts)
+        return self.scans[names]
+
+    def _attempt(self, names: frozenset[str], start: Trial | None) -> Trial | None:
+        point = None
+        if start is not None:
+            point = self._seeded(names, start)
+        found = fit(self.problem, free=self.parameters(names), start=point)
+        if not math.isfinite(found.cost):
+            self.failed.add(names)
+            return None
+        count = self.count(names)
+        bic = found.cost + count * math.log(self.problem.samples)
+        trial = Trial(names, found, bic, count)
+        if names not in self.trials or bic < self.trials[names].bic:
+            self.trials[names] = trial
+        return self.trials[names]
+
+    def _seeded(self, names: frozenset[str], start: Trial):
+        """The point of another fit; terms it does not share are without effect."""
+        values = np.array(start.fit.point.values)
+        everything = self.problem.names
+        for term in self.terms:
+            for one in term.strengths():
+                column = everything.index(one.name)
+                if one.inner and term.name in names - start.names:
+                    values[:, column] = self.scan(start.names).best[0]
+                elif term.name not in names and not one.inner:
+                    values[:, column] = 0.0
+        return start.fit.point._replace(values=values)
+
+
+def values_of(found: Fit, blocks: Blocks) -> np.ndarray:
+    """Values of the parameters of some blocks at a fit, in their scales."""
+    all_names = found.problem.names
+    columns = [all_names.index(name) for name in blocks.names]
+    return np.asarray(found.point.values)[0, columns] / blocks.scale

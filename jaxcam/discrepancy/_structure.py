@@ -1,0 +1,207 @@
+"""What a fit leaves over: shapes that would still gain, and where they live."""
+
+import dataclasses
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Float
+from scipy.stats import chi2, norm
+
+from ..fitting import Fit, Problem, residuals
+from ._engine import blocks_of, extended, gain, off
+from ._search import FALSE_ALARMS
+from ._shapes import Harmonics, Polynomial, Shape, shapes
+from ._term import Term
+from ._vibration_scan import Periodogram
+
+
+_LAGS = 20
+_POINTS = 48
+
+
+@dataclasses.dataclass(frozen=True)
+class Structure:
+    """One way in which what is left over might not be noise.
+
+    - `gain`: growth of twice the log-likelihood; `asked`: what chance and the number of
+        parameters would demand.
+    - `variable`, `grid`, `value`, `stderr` `(k,)`: the shape, where there is one.
+    """
+
+    name: str
+    sentence: str
+    where: str
+    region: str
+    gain: float
+    asked: float
+    count: int
+    unit: str = ""
+    variable: str = ""
+    grid: Float[np.ndarray, " k"] = dataclasses.field(
+        default_factory=lambda: np.zeros(0)
+    )
+    value: Float[np.ndarray, " k"] = dataclasses.field(
+        default_factory=lambda: np.zeros(0)
+    )
+    stderr: Float[np.ndarray, " k"] = dataclasses.field(
+        default_factory=lambda: np.zeros(0)
+    )
+
+    @property
+    def significant(self) -> bool:
+        return self.gain > self.asked
+
+    @property
+    def place(self) -> str:
+        """Where the shape is largest in units of its error."""
+        if not len(self.grid):
+            return self.region
+        score = np.abs(self.value) / np.maximum(self.stderr, 1e-300)
+        k = int(np.argmax(score))
+        return (
+            f"{self.region}; clearest at {self.variable} {self.grid[k]:.3g}, where it "
+            f"is {self.value[k]:.2g} +- {self.stderr[k]:.1g} {self.unit}"
+        )
+
+
+def structures(
+    found: Fit,
+    free: Sequence[str],
+    unlisted: Sequence[Term],
+    scan: Periodogram,
+    turned: bool,
+) -> list[Structure]:
+    """Everything that the residuals of a fit are asked for, largest excess first.
+
+    **Arguments:** the fit, its free parameters, terms that describe but are no
+    verdicts, the periodogram of what is left, and whether there is a drive.
+    """
+    problem = found.problem
+    ranges = _ranges(problem)
+    more: tuple[Term, ...] = (*unlisted, *shapes(*ranges, turned=turned))
+    wide = extended(problem, more, found.point)
+    blocks = blocks_of(wide, wide.start)
+    information, score = blocks.total()
+    rows = blocks.rows(free)
+    now = gain(information, score, rows)
+    tests = len(more) + 2
+    before = len(problem.model.system.terms)
+    made = []
+    for k, term in enumerate(more):
+        names = [p.name for p in term.parameters(before + k)]
+        own = blocks.rows(names)
+        both = np.union1d(rows, own)
+        grown = gain(information, score, both) - now
+        asked = _asked(len(own), problem.samples, tests)
+        shape = {}
+        if isinstance(term, Shape):
+            step, _ = off(information, score, both)
+            inverse = _inverse(information, both)
+            pick = np.searchsorted(both, own)
+            scale = blocks.scale[own]
+            shape = _function(
+                term, step[pick] * scale, inverse[np.ix_(pick, pick)], scale
+            )
+        made.append(
+            Structure(
+                term.name,
+                term.sentence,
+                term.where,
+                term.region,
+                grown,
+                asked,
+                len(own),
+                **shape,
+            )
+        )
+    made += [_vibration(scan, problem, tests), _coloured(found, tests)]
+    return sorted(made, key=lambda one: one.gain - one.asked, reverse=True)
+
+
+def _asked(count: int, samples: int, tests: int, looks: int = 1) -> float:
+    chance = FALSE_ALARMS / tests / looks
+    return float(max(count * math.log(samples), chi2.isf(chance, count)))
+
+
+def _inverse(information, rows):
+    from ..fitting._fit import invert
+
+    return invert(information[np.ix_(rows, rows)])
+
+
+def _function(term: Shape, coefficients, covariance, scale):
+    import jax
+
+    if isinstance(term, Polynomial):
+        grid = np.linspace(term.low, term.high, _POINTS)
+    else:
+        assert isinstance(term, Harmonics)
+        grid = np.linspace(0.0, 2 * np.pi, _POINTS)
+    basis = np.asarray(jax.vmap(term.basis)(grid))
+    spread = basis * scale
+    error = np.sqrt(np.maximum(np.einsum("kp,pq,kq->k", spread, covariance, spread), 0))
+    return {
+        "unit": term.unit,
+        "variable": term.variable,
+        "grid": grid,
+        "value": basis @ coefficients,
+        "stderr": error,
+    }
+
+
+def _vibration(scan: Periodogram, problem: Problem, tests: int) -> Structure:
+    frequency, grown = scan.best_separate
+    count = 2 * scan.records + 1
+    return Structure(
+        "resonance",
+        f"a force at {frequency:.4g} Hz with a phase of its own in each record",
+        "flight",
+        f"in flight, at {frequency:.4g} Hz",
+        grown,
+        _asked(count, problem.samples, tests, scan.cells),
+        count,
+    )
+
+
+def _coloured(found: Fit, tests: int) -> Structure:
+    """Whether residuals that are close in time are alike."""
+    total, count = 0.0, 0
+    for part in residuals(found):
+        value = part.value / part.noise
+        for lag in range(1, _LAGS + 1):
+            same = (part.flight[lag:] == part.flight[:-lag]) & (
+                part.resting[lag:] == part.resting[:-lag]
+            )
+            products = (value[lag:] * value[:-lag])[same]
+            total += float(np.sum(products))
+            count += len(products)
+    score = total / math.sqrt(max(count, 1))
+    # as the gain of one parameter, with the smoothness that states take out ignored
+    return Structure(
+        "coloured_residuals",
+        "a smooth motion of a form that no shape has",
+        "flight",
+        "in flight and at rest",
+        max(score, 0.0) ** 2,
+        max(norm.isf(FALSE_ALARMS / tests) ** 2, math.log(found.problem.samples)),
+        1,
+    )
+
+
+def _ranges(problem: Problem):
+    """Least and largest position, velocity and approach speed, and the duration."""
+    states = np.asarray(problem.start.states)[np.asarray(problem.pieces.exists)]
+    position, velocity = states[:, 0], states[:, 1]
+    position = np.concatenate(
+        [part.recording[part.channel] for part in problem.segments]
+    )
+    speeds = np.concatenate([part.impacts.approach for part in problem.segments])
+    speeds = speeds[np.isfinite(speeds) & (speeds > 0)]
+    top = float(np.max(speeds, initial=1e-3))
+    return (
+        (float(position.min()), float(position.max())),
+        (float(np.quantile(velocity, 0.005)), float(np.quantile(velocity, 0.995))),
+        (0.0, top),
+        max(part.recording.duration for part in problem.segments),
+    )
