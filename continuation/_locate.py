@@ -109,13 +109,17 @@ def locate(
     """
     low, high = (a.z, values[0]), (b.z, values[1])
     guess = _between(a, b, values[0] / (values[0] - values[1]))
-    direct = walk.settings.localise == "newton" or name in problem.monitors()
+    newton = walk.settings.localise == "newton"
+    monitor = problem.monitors().get(name)
+    if monitor is not None:
+        newton = newton and not monitor.bracket
+    direct = newton or (monitor is not None and not monitor.bracket)
     for attempt in range(60):
         if direct:
             z, success = _newton(problem, name, walk, guess)
             if success and _inside(z, low[0], high[0], a.scale):
                 return Located(z, True, "")
-        direct = walk.settings.localise == "newton" and attempt < 12
+        direct = newton and attempt < 12
         chord = (high[0] - low[0]) / a.scale
         length = float(np.linalg.norm(chord))
         if length < walk.settings.tolerance:

@@ -185,12 +185,26 @@ def _by_shooting(system, guess, length, number, t0, settings):
             turn = simulate(system, state, t0, float(t0) + length, settings=settings)
             state = turn.final
         return None, f"the motion from the guess sticks, and {why}"
-    start = float(t0)
-    if _touches(system, guess, start) and int(turn.impacts.count):
-        # an impact at both ends would be counted twice, or not at all
-        start += (float(turn.impacts.time[0]) - start) / 2
-        between = turn.at([start])[0]
-        turn = simulate(system, between, start, start + length, settings=settings)
+    start, count, why = float(t0), int(turn.impacts.count), None
+    if not count or not _touches(system, guess, start):
+        orbit, why = _with_impacts_of(system, turn, number, start, settings)
+        if orbit is not None:
+            return orbit, None
+    # an impact at the ends is counted twice, or not at all: begin within a flight
+    if not count:
+        turn = simulate(system, guess, t0, start + 2 * length, settings=settings)
+        if not bool(turn.successful) or not int(turn.impacts.count):
+            return None, why
+    start += (float(turn.impacts.time[0]) - start) / 2
+    between = turn.at([start])[0]
+    turn = simulate(system, between, start, start + length, settings=settings)
+    if not bool(turn.successful):
+        return None, turn.result
+    return _with_impacts_of(system, turn, number, float(t0), settings)
+
+
+def _with_impacts_of(system, turn, number, t0, settings):
+    """The orbit with the impacts of one turn, at `t0`, and why there is none."""
     try:
         problem, u = from_motion(system, turn, number)
     except ValueError as error:
@@ -204,7 +218,7 @@ def _by_shooting(system, guess, length, number, t0, settings):
     why = refuse(problem, u, system)
     if why is not None:
         return None, f"what it converged to is no orbit: {why}"
-    state, time, length = _at(problem, u, float(t0))
+    state, time, length = _at(problem, u, t0)
     return _confirmed(system, state, time, length, settings)
 
 

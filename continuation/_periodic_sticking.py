@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from typing import Any, ClassVar
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
@@ -17,13 +18,17 @@ from jaxcam.hybrid import (
 from jaxcam.hybrid._normal import gaps
 from variational._chatter_frame import chatter_frame, ChatterFrame, frame_at
 from variational._chatter_orbit import ChatterOrbit, orbit_from
+from variational._impact_map import next_impact
 
 from ._problem import AbstractProblem, Monitor, Stability
+from ._shooting_flight import flight_end
 
 
 #: names of the monitors
 CHATTER = "chatter margin"
 DETACHMENT = "jerk at release"
+# Runge-Kutta steps of order eight in a part of one forcing period
+_STEPS = 64
 
 
 class StickingOrbits(AbstractProblem):
@@ -89,13 +94,13 @@ class StickingOrbits(AbstractProblem):
 
     def monitors(self) -> Mapping[str, Monitor]:
         return {
-            CHATTER: Monitor(kind="interruption of chattering", ends=True),
-            DETACHMENT: Monitor(kind="beginning of impacts", ends=True),
+            CHATTER: Monitor("interruption of chattering", ends=True, bracket=True),
+            DETACHMENT: Monitor("beginning of impacts", ends=True),
         }
 
     def observe(self, u, parameters) -> dict[str, Array]:
         """Period, release, accumulation and sticking time (s), impacts listed; the
-        state at whole forcing periods, `(1, 2)`, NaN if they fall into the flights."""
+        state at whole forcing periods, `(1, 2)`."""
         return self.seen(u, parameters)[1]
 
     def seen(self, u, parameters):
@@ -131,11 +136,27 @@ class StickingOrbits(AbstractProblem):
 
 
 def _stroboscopic(system, turn: ChatterOrbit) -> Float[Array, " n"]:
-    """State at the first whole period after release, if contact lasts there."""
+    """State at the first whole period after release."""
     period = system.period
-    time = jnp.ceil(turn.frame.release / period) * period
-    state = contact_state(system, time[None], turn.frame.state)[0]
-    return jnp.where(time >= turn.accumulation, state, jnp.nan)
+    end = jnp.ceil(turn.frame.release / period) * period
+    sticks = end >= turn.accumulation
+
+    def goes_on(carry):
+        _, (time, _, _), found = carry
+        return ~sticks & found & (time < end)
+
+    def hop(carry):
+        _, (time, state, speed), _ = carry
+        point = next_impact(system, time, state, speed, 2 * period)
+        return (time, state), (point.time, point.state, point.speed), point.found
+
+    # a complete sequence has no end, but then `end` comes before it accumulates
+    begin = (turn.frame.release, turn.frame.state)
+    start = (begin, (*begin, jnp.zeros(())), jnp.asarray(True))
+    (time, state), _, _ = jax.lax.while_loop(goes_on, hop, start)
+    flown = flight_end(system, time, state, end, steps=_STEPS)
+    in_contact = contact_state(system, end[None], turn.frame.state)[0]
+    return jnp.where(sticks, in_contact, flown)
 
 
 def on_release(system: HybridSystem) -> tuple[StickingOrbits, np.ndarray]:

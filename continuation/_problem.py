@@ -26,10 +26,13 @@ class Monitor(eqx.Module):
       looked for ahead of the last point, when a step fails or its result is refused; so
       the monitor may cease to exist, or not change sign, behind its zero. It must have
       a nonzero slope on the near side.
+    - `bracket`: its zero is enclosed by points of the branch instead of solved for by
+      Newton's method; for values whose derivative is dear to compile.
     """
 
     kind: str = eqx.field(static=True)
     ends: bool = eqx.field(static=True, default=False)
+    bracket: bool = eqx.field(static=True, default=False)
 
 
 class Start(eqx.Module):

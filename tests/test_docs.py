@@ -25,6 +25,7 @@ def _exported(package: str) -> set[str]:
         "jaxcam.models",
         "jaxcam.recordings",
         "jaxcam.fitting",
+        "jaxcam.discrepancy",
         "jaxcam.plotting",
         "jaxcam.thesis",
         "variational",

@@ -248,11 +248,11 @@ def cam_completes(rpm, rotation):
             if lam > 3 / 8:
                 return False
             s = 1.5 * tau * (np.sqrt(1 - 8 * lam / 3) - 1)
-        for _ in range(30):
+        for _ in range(8):
             gap, velocity = cam_flight(w, sense, t, u, s)
             change = gap / velocity
             s -= change
-            if abs(change) < 1e-15 * s:
+            if abs(change) < 1e-13 * s:
                 break
         t, u = t + s, -r * velocity
         if t >= end:

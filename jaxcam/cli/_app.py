@@ -8,6 +8,7 @@ import typer
 
 from ._continue import continue_
 from ._demo import demo
+from ._diagnose import diagnose
 from ._errors import INTERRUPTED, one_sentence
 from ._fit import fit
 from ._reproduce import reproduce
@@ -25,6 +26,7 @@ app = typer.Typer(
 app.command()(one_sentence(simulate))
 app.command("continue")(one_sentence(continue_))
 app.command()(one_sentence(demo))
+app.command()(one_sentence(diagnose))
 app.command()(one_sentence(fit))
 app.command()(one_sentence(reproduce))
 

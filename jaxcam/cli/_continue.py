@@ -100,7 +100,7 @@ def continue_(
     Examples:
       jaxcam continue cam-follower --from 130 --to 160 --at 145 --state 0.37,1.8
       jaxcam continue impact-oscillator --parameter wall --from -1 --to 0.2
-      jaxcam continue impact-oscillator --parameter omega --from 2 --to 3 --out DIR
+      jaxcam continue cam-follower --from 130 --to 150 --out DIR --resume
     """
     choose("SYSTEM", system, SYSTEMS)
     choose("--direction", direction, DIRECTIONS)

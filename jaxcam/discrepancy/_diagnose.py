@@ -96,7 +96,7 @@ def diagnose(
             search.scan(best.names),
             turned,
         )
-    rms_before, rms_after, gained = held_out(search, before, best, report)
+    rms_before, rms_after, gained, unseen = held_out(search, before, best, report)
     report("redrawing stretches of the records", None)
     inclusion, deviation = redrawn(search, best, seed)
     effects = [
@@ -136,6 +136,7 @@ def diagnose(
         best.fit,
         tuple(left_before),
         tuple(left_after),
+        unseen,
         ripple,
         _pulls(search, before, best),
         {
@@ -191,7 +192,7 @@ def _of_system(system, recordings, candidates, sensors, parameters, report):
             )
     turned = system.period is not None
     if candidates is None:
-        candidates = library(turned)
+        candidates = library(turned, center=0.0)
     terms, unlisted = _sorted(tuple(candidates))
     model = Model(WithTerms(system, terms), dict(sensors))
     inside = [_within(parameter) for parameter in parameters]

@@ -3,7 +3,7 @@
 import dataclasses
 from typing import Any
 
-from ..fitting import Fit, Model
+from ..fitting import Fit, Model, Residuals
 from ._drive import Ripple
 from ._structure import Structure
 
@@ -68,6 +68,7 @@ class Diagnosis:
     - `rig`: fitted parameters with what is missing in the model.
     - `before`, `after`: the fits of the textbook model and of the one chosen.
     - `left_before`, `left_after`: shapes that the residuals were asked for.
+    - `unseen`: residuals of both on records not seen.
     - `ripple`: of the drive. `pulls`: how far each parameter went without and with the
         effects, in tolerances. `limits`: least strength of each term that would have
         been named. `hides`: the parameter that would take up most of each term.
@@ -88,6 +89,7 @@ class Diagnosis:
     after: Fit
     left_before: tuple[Structure, ...]
     left_after: tuple[Structure, ...]
+    unseen: tuple[list[Residuals], list[Residuals]]
     ripple: Ripple | None
     pulls: dict[str, tuple[float, float]]
     limits: dict[str, Value]

@@ -59,6 +59,8 @@ def extended(problem: Problem, terms: Sequence[Term], at: Point) -> Problem:
     )
 
 
+# Part of its information that a parameter must keep beside the others to be seen
+_ALIKE = 1e-8
 # Steps of Newton's method on the states alone
 _STATE_STEPS = 12
 
@@ -140,6 +142,27 @@ def gain(information, score, rows) -> float:
         return 0.0
     inverse = invert(information[np.ix_(rows, rows)])
     return float(score[rows] @ inverse @ score[rows])
+
+
+def added(information, score, free, new) -> float:
+    """Growth of twice the log-likelihood when `new` are freed beside `free`.
+
+    Combinations that the free ones imitate to within `_ALIKE` of their information gain
+    nothing, as rounding would decide what.
+    """
+    new = np.setdiff1d(new, free)
+    if not len(new):
+        return 0.0
+    inside = invert(information[np.ix_(free, free)])
+    across = information[np.ix_(new, free)]
+    rest = information[np.ix_(new, new)] - across @ inside @ across.T
+    left = score[new] - across @ (inside @ score[free])
+    own = np.diag(information)[new]
+    scale = 1 / np.sqrt(np.where(own > 0, own, np.inf))
+    values, vectors = np.linalg.eigh(rest * np.outer(scale, scale))
+    along = vectors.T @ (left * scale)
+    seen = values > _ALIKE
+    return float(np.sum(along[seen] ** 2 / values[seen]))
 
 
 def off(information, score, rows):

@@ -1,11 +1,12 @@
 """How sure a named effect is: unseen records, redrawn blocks, and its limits."""
 
+import dataclasses
 import math
 from collections.abc import Callable
 
 import numpy as np
 
-from ..fitting import Fit, fit, Problem, residuals
+from ..fitting import Fit, fit, Problem, Residuals, residuals
 from ._engine import Blocks, blocks_of, gain, off, with_states
 from ._search import Search, Trial, values_of
 
@@ -16,16 +17,18 @@ _REDRAWN = 200
 
 def held_out(
     search: Search, before: Trial, after: Trial, progress: Callable
-) -> tuple[float, float, dict[str, float]]:
+) -> tuple[float, float, dict[str, float], tuple[list[Residuals], list[Residuals]]]:
     """Two models on records that their parameters have not seen.
 
     Records are dealt out to two halves; each is predicted with what the other one says.
     One record alone is cut in two.
 
     **Returns:** rms of the residuals in units of the noise, without and with the terms,
-    and what was gained in the logarithm of the likelihood, by record.
+    what was gained in the logarithm of the likelihood, by record, and the residuals
+    of both models.
     """
     problem = search.problem
+    unseen_parts: tuple[list[Residuals], list[Residuals]] = ([], [])
     halves = _halves(problem)
     squares, counts = np.zeros(2), np.zeros(2)
     gained: dict[str, float] = {}
@@ -37,7 +40,10 @@ def held_out(
                 problem, free=trial.fit.free, start=trial.fit.point, weights=seen
             )
             test = with_states(problem, known, unseen)
-            square, count = _squares(test, unseen)
+            parts = _parts(test, unseen)
+            unseen_parts[which].extend(parts)
+            square = sum(float(np.sum((p.value / p.noise) ** 2)) for p in parts)
+            count = sum(len(p.value) for p in parts)
             squares[which] += square
             counts[which] += count
             flown = np.sum(
@@ -52,12 +58,13 @@ def held_out(
             costs.append(flown + rested)
             if before.names == after.names:
                 squares[1], counts[1] = squares[0], counts[0]
+                unseen_parts[1].extend(parts)
                 costs.append(costs[0])
                 break
         for name, a, b in zip(problem.records, *costs):
             gained[name] = gained.get(name, 0.0) + float(a - b) / 2
     rms = np.sqrt(squares / np.maximum(counts, 1))
-    return float(rms[0]), float(rms[1]), gained
+    return float(rms[0]), float(rms[1]), gained, unseen_parts
 
 
 def _halves(problem: Problem):
@@ -67,26 +74,25 @@ def _halves(problem: Problem):
     return problem.between(-np.inf, middle), problem.between(middle, np.inf)
 
 
-def _squares(test: Fit, unseen) -> tuple[float, int]:
-    """Sum of squares of the residuals of the pieces that count, in units of noise."""
-    total, count = 0.0, 0
+def _parts(test: Fit, unseen) -> list[Residuals]:
+    """Residuals of the pieces that count."""
+    found = []
     problem = test.problem
     for part in residuals(test):
         row = problem.records.index(part.record)
-        begin = np.asarray(problem.pieces.flown.start[row])
-        used = np.asarray(unseen.flown[row]) > 0
-        if not used.any():
-            continue
-        inside = (part.time >= begin[used].min() - 1e-9) & (
-            part.time <= begin[used].max() + 1.0
-        )
-        if used.sum() < np.asarray(problem.pieces.exists[row]).sum():
-            last = begin[np.asarray(problem.pieces.exists[row]) & ~used]
-            inside &= ~((part.time >= last.min()) & (part.time <= last.max()))
-        value = part.value[inside] / part.noise
-        total += float(np.sum(value**2))
-        count += len(value)
-    return total, count
+        inside = np.zeros(len(part.time), dtype=bool)
+        for side, used in enumerate((unseen.flown[row], unseen.rested[row])):
+            for span, weight in zip(problem.spans[row][side], used):
+                if weight > 0:
+                    within = (part.time >= span.start) & (part.time <= span.stop)
+                    inside |= within & (part.resting == bool(side))
+        if inside.any():
+            pick = {
+                name: getattr(part, name)[inside]
+                for name in ("time", "turned", "value", "flight", "resting")
+            }
+            found.append(dataclasses.replace(part, **pick))
+    return found
 
 
 def redrawn(

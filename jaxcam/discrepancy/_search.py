@@ -9,7 +9,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from ..fitting import Fit, fit, Problem, residuals
-from ._engine import Blocks, blocks_of, gain
+from ._engine import added, Blocks, blocks_of, gain
 from ._term import Term
 from ._vibration_scan import Periodogram, periodogram
 
@@ -82,8 +82,10 @@ class Search:
         kept = [best]
         for size in range(1, MOST_TERMS + 1):
             promised: dict[frozenset[str], tuple[float, Trial]] = {}
-            for trial in kept:
-                for names, bic in self._promises(trial).items():
+            for place, trial in enumerate(kept):
+                # a scan takes longer than a fit, and one more tells little else
+                scan = self.scan(trial.names if place == 0 else kept[0].names)
+                for names, bic in self._promises(trial, scan).items():
                     if names not in promised or bic < promised[names][0]:
                         promised[names] = bic, trial
             most = len(self.terms) if size == 1 else _TRIED
@@ -161,21 +163,19 @@ class Search:
                     found.append((best.names - {out}) | {term.name})
         return found[:_TRIED]
 
-    def _promises(self, trial: Trial) -> dict[frozenset[str], float]:
+    def _promises(self, trial: Trial, scan: Periodogram) -> dict[frozenset[str], float]:
         """What the scores say of each further term: the BIC it would lead to."""
         blocks = self.blocks(trial)
         information, score = blocks.total()
         free = blocks.rows(self.parameters(trial.names))
-        now = gain(information, score, free)
         found = {}
         for term in self.terms:
             if term.name in trial.names:
                 continue
             names = [one.name for one in term.strengths() if not one.inner]
-            rows = np.union1d(free, blocks.rows(names))
-            grown = gain(information, score, rows) - now
+            grown = added(information, score, free, blocks.rows(names))
             if any(one.inner for one in term.strengths()):
-                grown = max(grown, self.scan(trial.names).best[1])
+                grown = max(grown, scan.best[1])
             if grown < self.asked(term.name):
                 continue
             cost = trial.fit.cost - grown
@@ -196,6 +196,13 @@ class Search:
             parts = residuals(self.trials[names].fit)
             self.scans[names] = periodogram(parts)
         return self.scans[names]
+
+    def _frequency(self, start: Trial) -> float:
+        """The best known frequency to start from."""
+        scan = self.scans.get(start.names)
+        if scan is None:
+            scan = list(self.scans.values())[-1]
+        return scan.best[0]
 
     def _attempt(self, names: frozenset[str], start: Trial | None) -> Trial | None:
         point = None
@@ -220,7 +227,7 @@ class Search:
             for one in term.strengths():
                 column = everything.index(one.name)
                 if one.inner and term.name in names - start.names:
-                    values[:, column] = self.scan(start.names).best[0]
+                    values[:, column] = self._frequency(start)
                 elif term.name not in names and not one.inner:
                     values[:, column] = 0.0
         return start.fit.point._replace(values=values)

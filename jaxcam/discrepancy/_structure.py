@@ -9,7 +9,7 @@ from jaxtyping import Float
 from scipy.stats import chi2, norm
 
 from ..fitting import Fit, Problem, residuals
-from ._engine import blocks_of, extended, gain, off
+from ._engine import added, blocks_of, extended, off
 from ._search import FALSE_ALARMS
 from ._shapes import Harmonics, Polynomial, Shape, shapes
 from ._term import Term
@@ -84,7 +84,6 @@ def structures(
     blocks = blocks_of(wide, wide.start)
     information, score = blocks.total()
     rows = blocks.rows(free)
-    now = gain(information, score, rows)
     tests = len(more) + 2
     before = len(problem.model.system.terms)
     made = []
@@ -92,7 +91,7 @@ def structures(
         names = [p.name for p in term.parameters(before + k)]
         own = blocks.rows(names)
         both = np.union1d(rows, own)
-        grown = gain(information, score, both) - now
+        grown = added(information, score, rows, own)
         asked = _asked(len(own), problem.samples, tests)
         shape = {}
         if isinstance(term, Shape):

@@ -229,17 +229,17 @@ class SensorOffset(SensorTerm):
     offset: float = strength("rad", 1e-3)
 
 
-def library(turned: bool = True) -> tuple[Term, ...]:
+def library(turned: bool = True, center: float = 0.27) -> tuple[Term, ...]:
     """All terms that `diagnose` tries by default.
 
     **Arguments:** whether the system has a drive, without which no cam can be out of
-    round.
+    round; and the position about which a nonlinear spring is symmetric.
     """
     found: list[Term] = [
         ViscousDamping(),
         CoulombFriction(),
         QuadraticDrag(),
-        NonlinearSpring(),
+        NonlinearSpring(center=center),
         RestitutionVelocity(),
         ExternalVibration(),
         SensorLag(),

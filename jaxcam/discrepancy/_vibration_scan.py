@@ -7,6 +7,7 @@ flight; what is left is regressed with one phase for all records.
 """
 
 import dataclasses
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -17,8 +18,9 @@ from ..fitting import Residuals
 
 # Degree of the motion that a flight's initial state and its forces explain
 _DEGREE = 3
-# Samples a period at the highest frequency
+# Samples a period at the highest frequency, before and after neighbours are averaged
 _PER_PERIOD = 20
+_JOINED = 4
 # Frequencies a resolution cell (one over the length of a record)
 _FINE = 6
 
@@ -64,27 +66,29 @@ def periodogram(parts: Sequence[Residuals]) -> Periodogram:
         fly, first = ~part.resting, True
         for flight in np.unique(part.flight[fly]):
             rows = np.flatnonzero(fly & (part.flight == flight))
-            if len(rows) < 4 * (_DEGREE + 1):
+            if len(rows) < 4 * _JOINED * (_DEGREE + 1):
                 continue
             if first:
                 firsts.append(len(edges))
             first = False
-            t = part.time[rows]
+            number = len(rows) // _JOINED
+            rows = rows[: number * _JOINED].reshape(number, _JOINED)
+            t = part.time[rows].mean(axis=1)
             x = (t - t.mean()) / np.ptp(t)
             basis, _ = np.linalg.qr(np.vander(x, _DEGREE + 1))
-            value = part.value[rows] / part.noise
+            value = part.value[rows].mean(axis=1) / part.noise * math.sqrt(_JOINED)
             values.append(value - basis @ (basis.T @ value))
             times.append(t)
             bases.append(basis)
             edges.append(count)
-            count += len(rows)
+            count += number
     if not values:
         none = np.zeros(1)
         return Periodogram(none, none, none, 1)
     value, time = np.concatenate(values), np.concatenate(times)
     basis, cuts = np.concatenate(bases), np.array(edges)
     records = np.array(firsts)
-    interval = float(np.median(np.diff(times[0])))
+    interval = float(np.median(np.diff(times[0]))) / _JOINED
     length = max(float(np.max(p.time) - np.min(p.time)) for p in parts)
     flight = float(np.median([np.ptp(t) for t in times]))
     step = 1 / (_FINE * length)

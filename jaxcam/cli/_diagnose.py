@@ -1,0 +1,84 @@
+"""`jaxcam diagnose`: what physics a rig's model leaves out, from its recordings."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def diagnose(
+    case: Annotated[
+        Path, typer.Argument(metavar="CASE", help="A folder of recordings of one rig.")
+    ],
+    rig: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="The rig; CASE/rig.toml without."),
+    ] = None,
+    gaps: Annotated[
+        str,
+        typer.Option(
+            metavar="NAME",
+            help="Faulty runs: mend them (dropped samples, slips), refuse, or split.",
+        ),
+    ] = "mend",
+    seed: Annotated[int, typer.Option(help="Of the redrawn stretches.")] = 0,
+    json_file: Annotated[
+        Path | None,
+        typer.Option("--json", metavar="FILE", help="The verdict; - prints it."),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="DIR",
+            help="Write verdict.json, index.html and the model found (model.json).",
+        ),
+    ] = None,
+) -> None:
+    """
+    Say what physics the model of a cam-follower rig leaves out.
+
+    \b
+    Examples:
+      jaxcam diagnose ./case --rig rig.toml --out ./jaxcam-diagnosis
+      jaxcam diagnose ./case --json -
+    """
+    from ._choices import choose
+
+    choose("--gaps", gaps, ("mend", "refuse", "split"))
+
+    from .. import discrepancy
+    from ..recordings import read_case, read_rig
+    from ._cache import keep_compiled_programs
+    from ._demo import _rig_file
+    from ._diagnose_page import diagnosis_page, draw
+    from ._output import Output, to_text
+    from ._progress import progress
+
+    keep_compiled_programs()
+    runs = read_case(case, gaps=gaps)  # pyright: ignore
+    nominal = read_rig(_rig_file(case, rig))
+    output = Output(json_file, out)
+    notes = dict.fromkeys(n for run in runs for n in run.meta.get("notes", ()))
+    with progress("finding impacts and contacts") as report:
+        found = discrepancy.diagnose(
+            nominal, tuple(runs), case=runs.name, seed=seed, progress=report
+        )
+        verdict = found.to_json()
+        if out is not None:
+            report("drawing", None)
+            figures = draw(out, found)
+            page = diagnosis_page(found, figures, tuple(notes))
+            (out / "index.html").write_text(page, encoding="utf-8")
+            (out / "verdict.json").write_text(to_text(verdict) + "\n", "utf-8")
+    for note in notes:
+        output.print(note)
+    output.print(found.summary)
+    for caveat in found.caveats:
+        output.print(caveat)
+    output.print(
+        f"On records not seen: {found.heldout_before:.3e} {found.unit} before, "
+        f"{found.heldout_after:.3e} after, noise {found.noise_floor:.3e}."
+    )
+    if out is not None:
+        output.print(f"Report: {out / 'index.html'}")
+    output.write_json(verdict)

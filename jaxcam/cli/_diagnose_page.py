@@ -1,0 +1,238 @@
+"""The report of `jaxcam diagnose`: figures and one HTML file with everything in it."""
+
+from collections.abc import Sequence
+from html import escape
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+
+from ..discrepancy import Diagnosis, Structure
+from ..discrepancy._words import listed, number
+from ..fitting import Residuals
+from ._page import _figure, _split, _STYLE, _table
+
+
+matplotlib.use("Agg")
+
+from ..plotting import save_figure, style
+from ..plotting._style import CONTACT, FLIGHT, IMPACT, RECORDED
+
+
+_BINS = 36
+
+
+def draw(folder: Path, found: Diagnosis) -> list[tuple[Path, str]]:
+    """Write all figures; each comes with its caption."""
+    import matplotlib.pyplot as plt
+
+    with style():
+        return [
+            (save_figure(_unseen(plt, found), folder / "unseen.png"), _UNSEEN),
+            (save_figure(_maps(plt, found), folder / "maps.png"), _MAPS),
+            (save_figure(_shapes(plt, found), folder / "shapes.png"), _SHAPES),
+            (save_figure(_ranking(plt, found), folder / "ranking.png"), _RANKING),
+        ]
+
+
+_UNSEEN = (
+    "Residuals on records that no parameter has seen, one flight ahead: the textbook "
+    "model refitted to the other records (above), and with what was found (below). The "
+    "band is twice the noise on either side."
+)
+_MAPS = (
+    "Mean residual of each record by the angle of the cam, in standard errors, before "
+    "(left) and after (right); flights above, contacts below. Beyond the colours' ends "
+    "is what chance would show in one of a hundred such maps."
+)
+_SHAPES = (
+    "What the data would have the model changed by, as free functions: of the textbook "
+    "model (grey) and of the model found (colour), with twice the standard error. A "
+    "function that stays within its band of zero is not needed."
+)
+_RANKING = "How much worse other explanations are, by their BIC (a logarithmic scale)."
+
+
+def _unseen(plt, found: Diagnosis):
+    before, after = found.unseen
+    figure, axes = plt.subplots(2, 1, figsize=(8.5, 4.6), sharex=True, sharey=True)
+    name = before[0].record
+    for axis, parts, label in zip(
+        axes, (before, after), ("textbook model, refitted", "with what was found")
+    ):
+        part = next(part for part in parts if part.record == name)
+        for resting, color in ((False, FLIGHT), (True, CONTACT)):
+            keep = part.resting == resting
+            axis.plot(
+                part.time[keep],
+                1e3 * part.value[keep],
+                ".",
+                ms=1.5,
+                color=color,
+                label="contact" if resting else "flight",
+                rasterized=True,
+            )
+        axis.axhspan(-2e3 * part.noise, 2e3 * part.noise, color="0.5", alpha=0.25, lw=0)
+        axis.set_title(f"{name}: {label}")
+        axis.set_ylabel("residual (mrad)")
+    axes[-1].set_xlabel("time (s)")
+    axes[0].legend(markerscale=6, loc="upper right")
+    return figure
+
+
+def _maps(plt, found: Diagnosis):
+    from scipy.stats import norm
+
+    figure, axes = plt.subplots(
+        2, 2, figsize=(8.5, 5.0), sharex=True, sharey=True, layout="constrained"
+    )
+    records = [part.record for part in found.unseen[0]]
+    end = float(norm.isf(0.005 / (_BINS * len(records) * 2)))
+    image = None
+    for column, parts in zip(axes.T, found.unseen):
+        for axis, resting in zip(column, (False, True)):
+            rows = [_binned(part, resting) for part in parts]
+            image = axis.imshow(
+                np.array(rows),
+                aspect="auto",
+                extent=(0, 2 * np.pi, len(rows) - 0.5, -0.5),
+                vmin=-end,
+                vmax=end,
+                cmap="RdBu_r",
+                interpolation="nearest",
+            )
+            axis.set_yticks(range(len(rows)), [part.record for part in parts])
+            axis.set_title("contact" if resting else "flight")
+            axis.grid(False)
+    for axis in axes[-1]:
+        axis.set_xlabel("cam angle in its turn (rad)")
+    figure.colorbar(image, ax=axes, label="mean residual (standard errors)")
+    return figure
+
+
+def _binned(part: Residuals, resting: bool):
+    keep = part.resting == resting
+    phase = np.nan_to_num(part.turned[keep]) % (2 * np.pi)
+    where = np.minimum((phase / (2 * np.pi) * _BINS).astype(int), _BINS - 1)
+    count = np.bincount(where, minlength=_BINS)
+    total = np.bincount(where, part.value[keep] / part.noise, minlength=_BINS)
+    return np.where(count > 0, total / np.sqrt(np.maximum(count, 1)), np.nan)
+
+
+def _shapes(plt, found: Diagnosis):
+    before = {one.name: one for one in found.left_before if len(one.grid)}
+    after = {one.name: one for one in found.left_after if len(one.grid)}
+    rows = -(-len(before) // 3)
+    figure, axes = plt.subplots(rows, 3, figsize=(9, 2.3 * rows), layout="constrained")
+    for axis in axes.flat[len(before) :]:
+        axis.axis("off")
+    for axis, name in zip(axes.flat, before):
+        _band(axis, before[name], RECORDED, "textbook")
+        _band(axis, after[name], IMPACT, "found")
+        axis.axhline(0.0, color="k", lw=0.6)
+        axis.set_title(name.replace("_", " "), fontsize=9)
+        axis.set_xlabel(before[name].variable, fontsize=8)
+        axis.set_ylabel(before[name].unit, fontsize=8)
+    axes.flat[0].legend(fontsize=7)
+    return figure
+
+
+def _band(axis, one: Structure, color, label) -> None:
+    axis.fill_between(
+        one.grid,
+        one.value - 2 * one.stderr,
+        one.value + 2 * one.stderr,
+        color=color,
+        alpha=0.3,
+        lw=0,
+    )
+    axis.plot(one.grid, one.value, color=color, label=label)
+
+
+def _ranking(plt, found: Diagnosis):
+    pairs = found.alternatives or (("none", 0.0),)
+    figure, axis = plt.subplots(figsize=(8, 0.35 * len(pairs) + 1.0))
+    names = [name.replace("_", " ").replace("+", " + ") for name, _ in pairs]
+    axis.barh(names, [max(delta, 0.1) for _, delta in pairs], color=FLIGHT)
+    axis.set_xscale("log")
+    axis.invert_yaxis()
+    axis.set_xlabel("BIC above that of the verdict")
+    return figure
+
+
+def diagnosis_page(
+    found: Diagnosis, figures: Sequence[tuple[Path, str]], notes: Sequence[str]
+) -> str:
+    """The page as text; nothing in it is loaded from elsewhere."""
+    title = f"{found.case or 'Recordings'}: {_title(found)}"
+    effects = [
+        (
+            effect.name.replace("_", " "),
+            ", ".join(
+                f"{name} = {number(v.value, v.stderr, v.unit)}"
+                for name, v in effect.parameters.items()
+            ),
+            effect.where,
+            f"{effect.delta_bic:.0f}",
+            f"{effect.heldout_gain_nats:.0f}",
+            f"{effect.inclusion:.0%}",
+        )
+        for effect in found.effects
+    ]
+    rows = [
+        (name, f"{a:+.2f}", f"{b:+.2f}") for name, (a, b) in found.pulls.items()
+    ]
+    limits = [
+        (name, f"{one.value:.2g} {'' if one.unit == '-' else one.unit}",
+         found.hides.get(name, "").replace("_", " "))
+        for name, one in found.limits.items()
+    ]
+    left = [
+        (one.name.replace("_", " "), one.where, f"{one.gain:.1f}", f"{one.asked:.1f}",
+         "yes" if one.significant else "no")
+        for one in found.left_after
+    ]
+    parts = [
+        f"<h1>{escape(title)}</h1>",
+        *(f'<p class="sentence">{escape(s)}</p>' for s in _split(found.summary)),
+        *(f'<p class="note">{escape(note)}</p>' for note in notes),
+    ]
+    if effects:
+        headings = ("effect", "parameters", "where", "BIC", "unseen (nats)", "redrawn")
+        parts += ["<h2>What is missing</h2>", _table(headings, effects, text=(0, 1, 2))]
+    parts += [
+        "<h2>Before and after, on records not seen</h2>",
+        f"<p>{found.heldout_before:.3e} {found.unit} before, "
+        f"{found.heldout_after:.3e} after; noise and rounding of the sensor are "
+        f"{found.noise_floor:.3e}.</p>",
+        *(_figure(file, caption) for file, caption in figures),
+    ]
+    if found.caveats:
+        items = "".join(f"<li>{escape(caveat)}</li>" for caveat in found.caveats)
+        parts += ["<h2>Caveats</h2>", f"<ul>{items}</ul>"]
+    parts += [
+        "<h2>Is anything left over?</h2>",
+        _table(("form", "where", "gain", "asked", "left"), left, text=(0, 1)),
+        '<p class="note">Growth of twice the log-likelihood if the model were allowed '
+        "each of these free functions, and what chance and the number of their "
+        "coefficients ask for.</p>",
+        "<h2>Parameters of the rig</h2>",
+        _table(("parameter", "textbook", "with what was found"), rows, text=(0,)),
+        '<p class="note">Distance from the rig file in units of the tolerance stated '
+        "there. A parameter that moves far in the first column and not in the second "
+        "was hiding what is missing.</p>",
+        "<h2>What would have been seen</h2>",
+        _table(("parameter", "least strength", "would hide in"), limits, text=(0, 2)),
+    ]
+    return (
+        '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        f"<title>{escape(title)}</title>\n<style>{_STYLE}</style>\n</head>\n"
+        "<body>\n" + "\n".join(parts) + "\n</body>\n</html>\n"
+    )
+
+
+def _title(found: Diagnosis) -> str:
+    if found.verdict == "effect":
+        return listed(found.names)
+    return {"none": "nothing is missing", "unknown": "something unknown"}[found.verdict]

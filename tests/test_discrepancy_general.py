@@ -1,0 +1,146 @@
+"""What a simple system lacks: truth from closed forms and from scipy."""
+
+from typing import ClassVar
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from jaxcam import HybridSystem
+from jaxcam.discrepancy import diagnose, library, strength, Term
+from jaxcam.fitting import Parameter, Sensor
+from jaxcam.recordings import Recording, segment
+
+
+_NOISE = 1e-4
+_STIFFNESS = 150.0
+_TIME = 1e-3 * np.arange(2500)
+
+
+class Swing(HybridSystem):
+    """A mass on a spring, far from any stop."""
+
+    stiffness: float = 149.0
+
+    def vector_field(self, t, state):
+        return jnp.stack([state[1], -self.stiffness * state[0]])
+
+    def gap(self, t, state):
+        return state[0] + 100.0
+
+    def impact(self, t, state):
+        return state * jnp.array([1.0, -0.5])
+
+
+class Magnet(Term):
+    """A pull towards 0.1 rad that is felt near it only."""
+
+    name: ClassVar[str] = "magnet"
+    sentence: ClassVar[str] = "a magnet"
+    pull: float = strength("rad/s^2", 0.1)
+
+    def acceleration(self, motion):
+        x = (motion.position - 0.1) / 0.05
+        return -self.pull * x * jnp.exp(-(x**2))
+
+
+def _free(x0, c=0.0):
+    """A damped oscillation that starts at rest, in closed form."""
+    w = np.sqrt(_STIFFNESS - c * c / 4)
+    decay = np.exp(-c * _TIME / 2)
+    return x0 * decay * (np.cos(w * _TIME) + c / (2 * w) * np.sin(w * _TIME))
+
+
+def _pulled(x0, force):
+    def field(t, y):
+        return [y[1], -_STIFFNESS * y[0] + force(t, y[0], y[1])]
+
+    found = solve_ivp(
+        field, (0, _TIME[-1]), [x0, 0.0], "DOP853", _TIME, rtol=1e-10, atol=1e-12
+    )
+    return found.y[0]
+
+
+def _diagnosed(motions, seed=1, **options):
+    rng = np.random.default_rng(seed)
+    runs = []
+    for number, motion in enumerate(motions):
+        noisy = motion + _NOISE * rng.standard_normal(len(motion))
+        runs.append(Recording(f"run{number}", _TIME, {"angle_rad": noisy}))
+    return diagnose(
+        Swing(),
+        [segment(run, "angle_rad", noise=_NOISE) for run in runs],
+        sensors={"angle_rad": Sensor(0, noise=_NOISE)},
+        parameters=[Parameter("stiffness", lambda m: m.system.stiffness, 3.0)],
+        **options,
+    )
+
+
+def test_nothing_is_missing():
+    found = _diagnosed([_free(0.3), _free(0.2)])
+    assert found.verdict == "none"
+    assert found.effects == ()
+    assert found.rig["stiffness"].value == pytest.approx(
+        _STIFFNESS, abs=4 * found.rig["stiffness"].stderr
+    )
+    assert found.heldout_after == pytest.approx(_NOISE, rel=0.05)
+    # what was not found could have been, were it there
+    assert found.limits["c1"].value < 0.01
+
+
+def test_damping_is_named_with_its_strength():
+    c = 0.1
+    found = _diagnosed([_free(0.3, c), _free(0.2, c)])
+    assert (found.verdict, found.names) == ("effect", ("viscous_damping",))
+    (effect,) = found.effects
+    one = effect.parameters["c1"]
+    assert one.value == pytest.approx(c, abs=4 * one.stderr)
+    assert one.stderr < 0.05 * c
+    assert effect.delta_bic < -100
+    assert effect.heldout_gain_nats > 50
+    assert effect.inclusion == 1.0
+    assert found.heldout_after < 1.05 * _NOISE < 1.2 * _NOISE < found.heldout_before
+    written = found.to_json()
+    assert written["effects"][0]["located"]["where"] == "flight"
+    assert {"case", "verdict", "effects", "alternatives", "fit", "rig", "summary"} == (
+        set(written)
+    )
+    # the model that comes back is the one with damping
+    field = found.model().system.vector_field(0.0, jnp.array([0.0, 1.0]))
+    assert float(field[1]) == pytest.approx(-one.value)
+
+
+def _magnet(t, x, v):
+    s = (x - 0.1) / 0.05
+    return -0.8 * s * np.exp(-s * s)
+
+
+def test_a_force_that_no_term_has_is_unknown():
+    motions = [_pulled(x0, _magnet) for x0 in (0.3, 0.2)]
+    found = _diagnosed(motions)
+    assert found.verdict == "unknown"
+    assert found.effects[0].name == "unknown"
+    assert found.effects[0].where == "flight"
+    shapes = {one.name: one for one in found.left_before}
+    assert shapes["force_of_angle"].significant
+
+
+def test_a_term_of_ones_own_is_named():
+    motions = [_pulled(x0, _magnet) for x0 in (0.3, 0.2)]
+    found = _diagnosed(motions, candidates=(*library(False), Magnet()))
+    assert found.names == ("magnet",)
+    one = found.effects[0].parameters["pull"]
+    assert one.value == pytest.approx(0.8, abs=4 * one.stderr)
+
+
+def test_vibration_is_found_at_its_frequency():
+    def force(t, x, v):
+        return 0.3 * np.sin(2 * np.pi * 11.3 * t + 0.6)
+
+    found = _diagnosed([_pulled(x0, force) for x0 in (0.3, 0.2)])
+    assert found.names == ("external_vibration",)
+    values = found.effects[0].parameters
+    for name, truth in (("ext", 0.3), ("fe", 11.3), ("phase", 0.6)):
+        assert values[name].value == pytest.approx(truth, abs=4 * values[name].stderr)
+    assert values["fe"].stderr < 0.05
