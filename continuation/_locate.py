@@ -109,7 +109,8 @@ def locate(
     """
     low, high = (a.z, values[0]), (b.z, values[1])
     guess = _between(a, b, values[0] / (values[0] - values[1]))
-    newton = walk.settings.localise == "newton"
+    choice = walk.settings.localise
+    newton = choice == "newton" or (choice == "auto" and not problem.dear)
     monitor = problem.monitors().get(name)
     if monitor is not None:
         newton = newton and not monitor.bracket

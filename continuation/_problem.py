@@ -169,6 +169,12 @@ class AbstractProblem(eqx.Module):
         return jnp.broadcast_to(size, u.shape)
 
     @property
+    def dear(self) -> bool:
+        """Whether second derivatives of `residual` take long to compile, so that its
+        special points are better enclosed than solved for."""
+        return False
+
+    @property
     def detects(self) -> bool:
         """Whether folds, branch points and those of `stability` are sought."""
         return True

@@ -18,6 +18,10 @@ from ._program import Corrected, evaluate
 from ._step import Attempt, StepControl
 
 
+# failures in one place before an end is looked for just ahead
+_HALVINGS = 2
+
+
 class Run:
     """One walk along a branch."""
 
@@ -121,7 +125,7 @@ class Run:
 
     def _advance(self, here: Here) -> tuple[Here | None, str]:
         """The next point, and why the branch ends with it; None: it ends before."""
-        step, control = here.step, self.control
+        step, control, failures = here.step, self.control, 0
         while True:
             attempt = control.attempt(
                 here.problem, self.walk, self.algorithm, here.at, self._stations(here),
@@ -141,10 +145,14 @@ class Run:
                     if back is not None:
                         return back, "the branch is closed: back at its start"
                     return there, attempt.bound
-            over = self._end_ahead(here, step)
-            if over is not None:
-                return over
-            if step / 2 < self.walk.settings.min_step:
+            # a bend says nothing of an end, and long steps fail for other reasons
+            last = step / 2 < self.walk.settings.min_step
+            failures += attempt.angle == 0 or not attempt.refusal
+            if failures > _HALVINGS or last:
+                over = self._end_ahead(here, step)
+                if over is not None:
+                    return over
+            if last:
                 return None, (
                     f"the step was halved down to {step:.1e}, and still {refusal}"
                 )

@@ -21,8 +21,8 @@ class Settings(eqx.Module):
     - `max_points`: ordinary points on a branch.
     - `special`: locate and report special points.
     - `localise`: `"newton"` on the extended system, which takes second derivatives of
-      the residual; or `"bracket"`, which takes none, for residuals whose second
-      derivatives are too dear to compile.
+      the residual; or `"bracket"`, which takes none and encloses the point between
+      points of the branch; or `"auto"`, the second where `problem.dear` says so.
     """
 
     tolerance: float = 1e-10
@@ -35,7 +35,7 @@ class Settings(eqx.Module):
     max_angle: float = 0.35
     max_points: int = 1000
     special: bool = True
-    localise: str = "newton"
+    localise: str = "auto"
 
     def __check_init__(self):
         if not 0 < self.tolerance < 1e-2:
@@ -57,7 +57,7 @@ class Settings(eqx.Module):
             raise ValueError("give 1 <= iterations <= max_iterations")
         if self.max_points < 1:
             raise ValueError("max_points must be at least 1")
-        if self.localise not in ("newton", "bracket"):
+        if self.localise not in ("auto", "newton", "bracket"):
             raise ValueError(
-                f"localise is {self.localise!r}; give 'newton' or 'bracket'"
+                f"localise is {self.localise!r}; give 'auto', 'newton' or 'bracket'"
             )

@@ -95,6 +95,10 @@ class ImpactingOrbits(AbstractProblem):
     def normal_forms(self) -> bool:
         return False
 
+    @property
+    def dear(self) -> bool:
+        return True
+
     def period(self, u, parameters) -> Float[Array, ""]:
         """Period of the orbit (s)."""
         if self.periods == 0:

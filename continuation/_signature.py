@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from ._shooting import ImpactingOrbits
 
 
-#: longest flight that starts with 32 steps, and the error allowed in one
-_STEPS = (32, 64, 128, 256)
+#: numbers of steps to choose from, and the error allowed in a flight
+_STEPS = (16, 32, 64, 128, 256)
 _ALLOWED = 1e-12
 
 

@@ -200,14 +200,15 @@ def cam_flight(omega, sense, t, u, duration):
         angle = contact_angle(sense * omega * (t + s)) + y[0]
         return [y[1], relative_acceleration(omega, sense, t + s, angle)]
 
-    size = max(u, 1e-3 * duration)
+    # the scale of the flight itself: rounding leaves no more
+    size = u if u > 0 else duration
     end = solve_ivp(
         field,
         (0, duration),
         [0.0, u],
         method="DOP853",
-        rtol=3e-14,
-        atol=[1e-15 * size * duration, 1e-15 * size],
+        rtol=1e-12,
+        atol=[1e-13 * size * duration, 1e-13 * size],
     )
     return end.y[:, -1]
 
