@@ -10,7 +10,7 @@ mu the distance of the parameter from the interruption,
 
 where the deviation is first carried to where it is small, since it grows linearly in
 the coordinate K of [`variational.koenigs`][] only.
-(6.104) and (6.116) leave out tau*^2; the thesis' K_beta stands for it.
+(6.104) and (6.116) leave out tau*^2; the thesis' K_beta appears to stand for it.
 """
 
 from collections.abc import Callable

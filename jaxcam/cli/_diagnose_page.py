@@ -179,17 +179,23 @@ def diagnosis_page(
         )
         for effect in found.effects
     ]
-    rows = [
-        (name, f"{a:+.2f}", f"{b:+.2f}") for name, (a, b) in found.pulls.items()
-    ]
+    rows = [(name, f"{a:+.2f}", f"{b:+.2f}") for name, (a, b) in found.pulls.items()]
     limits = [
-        (name, f"{one.value:.2g} {'' if one.unit == '-' else one.unit}",
-         found.hides.get(name, "").replace("_", " "))
+        (
+            name,
+            f"{one.value:.2g} {'' if one.unit == '-' else one.unit}",
+            found.hides.get(name, "").replace("_", " "),
+        )
         for name, one in found.limits.items()
     ]
     left = [
-        (one.name.replace("_", " "), one.where, f"{one.gain:.1f}", f"{one.asked:.1f}",
-         "yes" if one.significant else "no")
+        (
+            one.name.replace("_", " "),
+            one.where,
+            f"{one.gain:.1f}",
+            f"{one.asked:.1f}",
+            "yes" if one.significant else "no",
+        )
         for one in found.left_after
     ]
     parts = [

@@ -1,5 +1,6 @@
 """From recordings to a verdict: effect, none or unknown."""
 
+import dataclasses
 import math
 from collections.abc import Callable, Mapping, Sequence
 
@@ -16,6 +17,7 @@ from ..fitting import (
 )
 from ..hybrid import HybridSystem
 from ..recordings import Recording, RecordingError, Rig, segment_case, Segments
+from ..recordings._check import check_channels, check_drive
 from ._diagnosis import Diagnosis, Effect, Value
 from ._drive import Ripple, ripple_of
 from ._engine import value_of
@@ -33,6 +35,7 @@ from ._words import listed, summary_of
 _SHARE = 0.15**2
 # Subsets within this BIC of the best one are as good
 _TIE = 10.0
+_FOLLOWER = "follower_angle_rad"
 
 
 def diagnose(
@@ -114,8 +117,8 @@ def diagnose(
         if delta < _TIE:
             caveats.append(
                 f"These records cannot tell {listed(sorted(best.names))} from "
-                f"{name.replace('_', ' ')}: the BIC differs by {delta:.1f} only. Record "
-                f"larger and smaller bounces, and speeds further apart."
+                f"{name.replace('_', ' ')}: the BIC differs by {delta:.1f} only. "
+                f"Record larger and smaller bounces, and speeds further apart."
             )
     floor = float(next(iter(problem.model.sensors.values())).floor)
     least = limits(search, best)
@@ -161,10 +164,10 @@ def _of_rig(rig: Rig, recordings, candidates, report):
             f"There is {len(runs)} recording; give at least two of the same rig at "
             f"different speeds, so that one can test what the other says."
         )
+    _check(rig, [r.recording if isinstance(r, Segments) else r for r in runs])
     report("finding impacts and contacts", None)
     if not all(isinstance(run, Segments) for run in runs):
         runs = segment_case(runs, rig)  # pyright: ignore
-    _check(rig, runs)
     terms = tuple(library() if candidates is None else candidates)
     terms, unlisted = _sorted(terms)
     base = cam_follower_model(rig)
@@ -203,7 +206,6 @@ def _of_system(system, recordings, candidates, sensors, parameters, report):
 
 def _within(parameter: Parameter) -> Parameter:
     """The same parameter of the system that a `WithTerms` holds."""
-    import dataclasses
 
     def where(model):
         return parameter.where(Model(model.system.base, model.sensors, model.drive))
@@ -222,36 +224,34 @@ def _own(terms) -> list[Parameter]:
     return [p for k, term in enumerate(terms) for p in term.parameters(k)]
 
 
-def _check(rig: Rig, runs) -> None:
+def _check(rig: Rig, runs: Sequence[Recording]) -> None:
     """Records that cannot be those of the rig.
 
     **Raises:** `RecordingError` that says what is wrong with which.
     """
+    surface = rig.system(1.0)
+    angles = np.asarray(surface.contact_angle(np.linspace(0, 2 * np.pi, 64)))
+    low, high = float(angles.min()), float(angles.max())
     for run in runs:
-        samples = run.recording[run.channel]
-        top = float(np.max(np.abs(samples)))
-        surface = rig.system(1.0)
-        angles = np.asarray(surface.contact_angle(np.linspace(0, 2 * np.pi, 64)))
-        low, high = float(angles.min()), float(angles.max())
-        span = high - low
-        name = run.recording.name
-        if np.median(samples) < 0 < low and np.median(-samples) > low - span:
+        check_channels(run)
+        check_drive(run)
+        samples = run[_FOLLOWER]
+        least = float(np.min(samples))
+        # the follower cannot be below the cam, by more than tolerances explain
+        room = (high - low) / 2
+        if least >= low - room and least <= high:
+            continue
+        if low - room <= float(np.min(-samples)) <= high:
             raise RecordingError(
-                f"{name}: `{run.channel}` is negative where the follower of this rig "
-                f"is between {low:.3g} and {high:.3g} rad or above; its sign is "
-                f"swapped, so multiply the column by -1."
+                f"{run.name}: `{_FOLLOWER}` has the wrong sign for this rig, whose "
+                f"follower is between {low:.3g} and {high:.3g} rad on the cam; "
+                f"multiply the column by -1."
             )
-        if top > math.pi / 2:
-            raise RecordingError(
-                f"{name}: `{run.channel}` reaches {top:.3g}, which looks like degrees; "
-                f"multiply it by pi/180 or name the column in degrees."
-            )
-        if np.min(samples) < low - span / 2 or np.min(samples) > high:
-            raise RecordingError(
-                f"{name}: `{run.channel}` goes down to {np.min(samples):.3g} rad, and "
-                f"the cam of this rig is between {low:.3g} and {high:.3g} rad; check "
-                f"that the channel and the rig file belong to these records."
-            )
+        raise RecordingError(
+            f"{run.name}: `{_FOLLOWER}` goes down to {least:.3g} rad where the cam of "
+            f"this rig is between {low:.3g} and {high:.3g} rad; check that the column "
+            f"and the rig file belong to this record, and that it is in radians."
+        )
 
 
 def _ripples(ripple: Ripple, tests: int) -> bool:

@@ -39,7 +39,9 @@ def extended(problem: Problem, terms: Sequence[Term], at: Point) -> Problem:
     assert isinstance(system, WithTerms)
     before = len(system.terms)
     model: Model = eqx.tree_at(
-        lambda m: m.system, problem.model, WithTerms(system.base, (*system.terms, *terms))
+        lambda m: m.system,
+        problem.model,
+        WithTerms(system.base, (*system.terms, *terms)),
     )
     more = [p for k, t in enumerate(terms) for p in t.parameters(before + k)]
     parameters = (*problem.parameters, *more)
@@ -140,8 +142,8 @@ def gain(information, score, rows) -> float:
     """Growth of twice the log-likelihood when some parameters are freed."""
     if not len(rows):
         return 0.0
-    inverse = invert(information[np.ix_(rows, rows)])
-    return float(score[rows] @ inverse @ score[rows])
+    step, _ = off(information, score, rows)
+    return float(score[rows] @ step)
 
 
 def added(information, score, free, new) -> float:
@@ -153,6 +155,7 @@ def added(information, score, free, new) -> float:
     new = np.setdiff1d(new, free)
     if not len(new):
         return 0.0
+    free = free[np.diag(information)[free] > 0]
     inside = invert(information[np.ix_(free, free)])
     across = information[np.ix_(new, free)]
     rest = information[np.ix_(new, new)] - across @ inside @ across.T
@@ -166,9 +169,18 @@ def added(information, score, free, new) -> float:
 
 
 def off(information, score, rows):
-    """Steps of some parameters to their optimum, and their standard errors."""
-    inverse = invert(information[np.ix_(rows, rows)])
-    return inverse @ score[rows], np.sqrt(np.abs(np.diag(inverse)))
+    """Steps of some parameters to their optimum, and their covariance.
+
+    What the data do not see at all stays where it is, with an infinite variance.
+    """
+    step = np.zeros(len(rows))
+    covariance = np.diag(np.full(len(rows), np.inf))
+    alive = np.flatnonzero(np.diag(information)[rows] > 0)
+    inside = rows[alive]
+    inverse = invert(information[np.ix_(inside, inside)])
+    step[alive] = inverse @ score[inside]
+    covariance[np.ix_(alive, alive)] = inverse
+    return step, covariance
 
 
 def value_of(found: Fit, name: str) -> float:

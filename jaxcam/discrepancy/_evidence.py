@@ -52,7 +52,8 @@ def held_out(
                 axis=1,
             )
             rested = np.sum(
-                np.asarray(unseen.rested) * np.nan_to_num(np.asarray(test.costs.rested)),
+                np.asarray(unseen.rested)
+                * np.nan_to_num(np.asarray(test.costs.rested)),
                 axis=1,
             )
             costs.append(flown + rested)
@@ -159,13 +160,17 @@ def limits(search: Search, trial: Trial) -> dict[str, tuple[float, float, str]]:
                 continue
             row = blocks.rows([one.name])
             rows = np.union1d(free, row)
-            _, error = off(information, score, rows)
-            stderr = float(error[np.searchsorted(rows, row[0])])
+            _, covariance = off(information, score, rows)
+            place = np.searchsorted(rows, row[0])
+            stderr = math.sqrt(abs(covariance[place, place]))
             # without the term, the rig moves by what its columns have in common with it
-            inside = information[np.ix_(rig, rig)]
-            taken = np.linalg.solve(inside, information[rig, row[0]])
-            own = np.sqrt(np.diag(np.linalg.inv(inside)))
-            hidden = blocks.names[rig[int(np.argmax(np.abs(taken) / own))]]
+            across = np.zeros(len(blocks.names))
+            across[rig] = information[rig, row[0]]
+            taken, spread = off(information, across, rig)
+            own = np.sqrt(np.diag(spread))
+            hidden = ""
+            if len(rig):
+                hidden = blocks.names[rig[int(np.argmax(np.abs(taken) / own))]]
             size = stderr * float(blocks.scale[row[0]])
             found[one.name] = (size * math.sqrt(search.asked(term.name)), size, hidden)
     return found

@@ -15,6 +15,14 @@ from ..fitting import Parameter
 from ._term import Motion, Term
 
 
+# Just inside the ends, where the angle of a Chebyshev polynomial can be differentiated
+_END = 1 - 1e-12
+
+
+def _number(value):
+    return jnp.asarray(value, dtype=float)
+
+
 def _numbers(values):
     return tuple(jnp.asarray(value, dtype=float) for value in values)
 
@@ -55,28 +63,29 @@ class Shape(Term):
 class Polynomial(Shape):
     """Chebyshev polynomials between two ends, `first` is the lowest degree."""
 
-    low: float = eqx.field(static=True)
-    high: float = eqx.field(static=True)
+    low: Array = eqx.field(converter=_number)
+    high: Array = eqx.field(converter=_number)
     first: int = eqx.field(default=1, static=True)
 
     def basis(self, quantity) -> Array:
         middle, half = (self.high + self.low) / 2, (self.high - self.low) / 2
-        x = jnp.clip((quantity - middle) / half, -1.0, 1.0)
-        found = [jnp.ones_like(x), x]
-        while len(found) < self.first + len(self.coefficients):
-            found.append(2 * x * found[-1] - found[-2])
-        return jnp.stack(found[self.first : self.first + len(self.coefficients)])
+        x = jnp.clip((quantity - middle) / half, -_END, _END)
+        # all at once: a recurrence would be compiled degree by degree
+        last = self.first + len(self.coefficients)
+        degrees = jnp.arange(self.first, last, dtype=float)
+        return jnp.cos(degrees * jnp.arccos(x))
 
 
 class Harmonics(Shape):
-    """Cosine and sine of multiples of the phase, `first` is the lowest order."""
+    """Cosines, then sines, of multiples of the phase, `first` is the lowest order."""
 
     first: int = eqx.field(default=1, static=True)
 
     def basis(self, quantity) -> Array:
-        orders = range(self.first, self.first + len(self.coefficients) // 2)
-        pairs = [(jnp.cos(k * quantity), jnp.sin(k * quantity)) for k in orders]
-        return jnp.stack([part for pair in pairs for part in pair])
+        half = len(self.coefficients) // 2
+        orders = jnp.arange(self.first, self.first + half, dtype=float)
+        angles = orders * quantity
+        return jnp.concatenate([jnp.cos(angles), jnp.sin(angles)])
 
 
 class ForceOfAngle(Polynomial):

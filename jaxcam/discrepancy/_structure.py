@@ -4,6 +4,7 @@ import dataclasses
 import math
 from collections.abc import Sequence
 
+import jax
 import numpy as np
 from jaxtyping import Float
 from scipy.stats import chi2, norm
@@ -95,13 +96,12 @@ def structures(
         asked = _asked(len(own), problem.samples, tests)
         shape = {}
         if isinstance(term, Shape):
-            step, _ = off(information, score, both)
-            inverse = _inverse(information, both)
+            step, covariance = off(information, score, both)
             pick = np.searchsorted(both, own)
             scale = blocks.scale[own]
-            shape = _function(
-                term, step[pick] * scale, inverse[np.ix_(pick, pick)], scale
-            )
+            covariance = covariance[np.ix_(pick, pick)]
+            if np.isfinite(covariance).all():
+                shape = _function(term, step[pick] * scale, covariance, scale)
         made.append(
             Structure(
                 term.name,
@@ -123,17 +123,9 @@ def _asked(count: int, samples: int, tests: int, looks: int = 1) -> float:
     return float(max(count * math.log(samples), chi2.isf(chance, count)))
 
 
-def _inverse(information, rows):
-    from ..fitting._fit import invert
-
-    return invert(information[np.ix_(rows, rows)])
-
-
 def _function(term: Shape, coefficients, covariance, scale):
-    import jax
-
     if isinstance(term, Polynomial):
-        grid = np.linspace(term.low, term.high, _POINTS)
+        grid = np.linspace(float(term.low), float(term.high), _POINTS)
     else:
         assert isinstance(term, Harmonics)
         grid = np.linspace(0.0, 2 * np.pi, _POINTS)

@@ -32,7 +32,9 @@ class CoulombFriction(Term):
     name: ClassVar[str] = "coulomb_friction"
     sentence: ClassVar[str] = "Coulomb friction, a constant force against the motion"
     region: ClassVar[str] = "in flight, changing sign with the velocity"
-    source: ClassVar[str] = "Armstrong-Helouvry, Dupont, Canudas de Wit 1994, Automatica"
+    source: ClassVar[str] = (
+        "Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica 1994"
+    )
     fc: float = strength("rad/s^2", 0.1, lower=0.0)
 
     def acceleration(self, motion: Motion):
@@ -150,7 +152,9 @@ class StribeckFriction(Term):
     name: ClassVar[str] = "stribeck_friction"
     sentence: ClassVar[str] = "friction that is larger at low speed"
     region: ClassVar[str] = "in flight, near standstill"
-    source: ClassVar[str] = "Armstrong-Helouvry, Dupont, Canudas de Wit 1994, Automatica"
+    source: ClassVar[str] = (
+        "Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica 1994"
+    )
     listed: ClassVar[bool] = False
     fs: float = strength("rad/s^2", 0.1, lower=0.0)
     speed: float = eqx.field(default=0.1, static=True)

@@ -29,8 +29,8 @@ def summary_of(
             unit = "" if units[name] == "-" else f" {units[name]}"
             tail = f" A {name} of {size:.2g}{unit} would have been seen."
         return (
-            "Nothing is missing: with its parameters fitted within their tolerances the "
-            f"model explains all records down to the noise of the sensors.{tail}"
+            "Nothing is missing: with its parameters fitted within their tolerances "
+            f"the model explains all records down to the noise of the sensors.{tail}"
         )
     named = [effect for effect in effects if effect.name != "unknown"]
     parts = []
