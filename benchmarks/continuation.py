@@ -22,6 +22,7 @@ import jax.numpy as jnp
 import numpy as np
 
 import continuation
+from jaxcam.models import ImpactOscillator
 
 
 # the cusp, its two folds on the way: as simple as a branch can be
@@ -105,6 +106,39 @@ def singles() -> None:
         print(f"  {row.name}: {1e3 / row.rate:.2f} ms a point ({points_run} points)")
 
 
+def wall(system):
+    return system.wall
+
+
+def orbits() -> None:
+    """Orbits with one impact of the forced oscillator, multipliers included.
+
+    Started at half the phase of the closed form: with V the speed of impact,
+    (1 - r) V / (2 w) = |gamma| sin(phi), wall = |gamma| cos(phi) - k V.
+    """
+    w, r, phi = 2.8, 0.8, 0.5
+    gamma = 1 / (1 - w * w)
+    speed = abs(gamma) * np.sin(phi) * 2 * w / (1 - r)
+    place = abs(gamma) * np.cos(phi) - (1 + r) / np.tan(np.pi / w) / 2 * speed
+    system = ImpactOscillator(omega=w, restitution=r, wall=place)
+    phase = np.mod((np.pi - phi) / (2 * np.pi), 1.0)
+    problem = continuation.ImpactingOrbits(system, (0,), 1, 2, steps=16)
+    start = continuation.Start(problem, np.array([phase, place, -r * speed]))
+    bounds = (place - 0.2, place + 0.2)
+    plain = continuation.Settings(special=False, max_step=0.02)
+
+    def walk():
+        return continuation.branch(
+            problem, start, wall, bounds, settings=plain, direction="both"
+        )
+
+    begun = time.process_time()
+    count = len(walk().points)
+    print(f"  one impact: first run {time.process_time() - begun:.1f} s of CPU time")
+    for row in _timing.compare({"one impact": walk}, {"one impact": count}):
+        print(f"  {row.name}: {1e3 / row.rate:.2f} ms a point ({count} points)")
+
+
 def batches(lanes: int = 100) -> None:
     """A hundred branches in one program, and one after the other."""
     values = np.linspace(-2.0, -0.5, lanes)
@@ -168,6 +202,8 @@ def auto() -> None:
 def main() -> None:
     print(f"core {CORE}; one point after the other:")
     singles()
+    print("periodic orbits with impacts:")
+    orbits()
     print("a hundred branches:")
     batches()
     print("AUTO-07p:")

@@ -8,6 +8,9 @@ standard errors; and what the residuals are left with. What the data do not see 
 to the tolerances, so that only another rig is another case there: many rigs tell more
 than many draws of the noise.
 
+The bias has two parts: which rigs were drawn, which a linear model without noise has
+too, and the rest, which is the fit's own and printed with its error.
+
 `--truth normal` draws the rigs from the Gaussian by which the fit knows a tolerance;
 the difference to `box` is what the shape of the box does. `--profile` asks of some
 parameters whether the interval of the profile likelihood holds the truth. The last line
@@ -89,13 +92,18 @@ def recording(truth: Truth, sensors, name: str, rng) -> Recording:
 
 @dataclasses.dataclass(frozen=True)
 class Case:
-    """One fit; `off` has error and standard error, `held` the cost of the truth."""
+    """One fit; `off` has error and standard error, `held` the cost of the truth.
+
+    `drawn` is the error that the tolerances alone make of this truth: where the data do
+    not see, an estimate stays at its nominal value however the rig was drawn.
+    """
 
     converged: bool
     off: dict[str, tuple[float, float]]
     rms: float
     white: float
     distance: float
+    drawn: dict[str, float]
     held: dict[str, float]
 
 
@@ -155,7 +163,15 @@ def main() -> None:
                     for name in options.profile
                 }
                 found[level].append(
-                    Case(fit.converged, off, rms, white, distance(fit, truth), held)
+                    Case(
+                        fit.converged,
+                        off,
+                        rms,
+                        white,
+                        distance(fit, truth),
+                        drawn_error(fit, truth),
+                        held,
+                    )
                 )
         print(
             f"{number + 1} rigs, {time.time() - begun:.0f} s "
@@ -172,6 +188,17 @@ def distance(fit, truth) -> float:
     return float(off @ np.linalg.solve(fit.covariance, off))
 
 
+def drawn_error(fit, truth) -> dict[str, float]:
+    """Of a linear model without noise: C P (nominal - truth), with the covariance C and
+    the information P of the tolerances."""
+    names = [e.name for e in fit.estimates]
+    problem = fit.problem
+    start = dict(zip(problem.names, np.asarray(problem.start.values[0])))
+    off = np.array([start[name] - truth[name] for name in names])
+    known = np.array([problem.parameter(name).prior_stderr for name in names]) ** -2
+    return dict(zip(names, (fit.covariance @ (known * off)).tolist()))
+
+
 def report(found) -> None:
     for level, cases in found.items():
         if not cases:
@@ -183,18 +210,22 @@ def report(found) -> None:
             f"\nnoise x {level:g}: {len(cases)} fits, {converged} converged; residuals "
             f"{rms:.3f} times the noise, lag-one correlation {white:.3f}"
         )
-        print("| parameter | coverage | bias (stderr) | spread (stderr) | profile |")
-        print("| --- | --- | --- | --- | --- |")
+        print("| parameter | coverage | bias | spread | bias of the fit | profile |")
+        print("| --- | --- | --- | --- | --- | --- |")
         for name in cases[0].off:
             z = np.array([case.off[name][0] / case.off[name][1] for case in cases])
             inside = np.mean(np.abs(z) < 1.96)
+            drawn = np.array([case.drawn[name] / case.off[name][1] for case in cases])
+            # what is left has the noise in it, and what is bent in the model
+            rest = z - drawn
+            error = np.std(rest) / math.sqrt(len(rest))
             held = ""
             if name in cases[0].held:
                 level_95 = scipy.stats.chi2.ppf(0.95, 1)
                 held = f"{np.mean([case.held[name] < level_95 for case in cases]):.0%}"
             print(
                 f"| {name} | {inside:.0%} | {np.mean(z):+.2f} | {np.std(z):.2f} | "
-                f"{held} |"
+                f"{np.mean(rest):+.3f} +- {error:.3f} | {held} |"
             )
         limit = scipy.stats.chi2.ppf(0.95, len(cases[0].off))
         together = np.mean([case.distance < limit for case in cases])

@@ -28,8 +28,15 @@ IMPACT = "speed of impact"
 ROUNDING = 1e-9
 
 
+def nodes_of(system: HybridSystem, start, end, steps: int):
+    """Times and states at both ends of all steps of a flight, and its error."""
+    later, states, wrong = flight_nodes(system, start[0], start[1:], end, steps)
+    times = jnp.concatenate([start[:1], later])
+    return times, jnp.concatenate([start[None, 1:], states]), wrong
+
+
 def lowest_times(
-    system: HybridSystem, start, end, steps: int, whole_turn: bool = False
+    system: HybridSystem, start, end, steps: int, whole_turn: bool = False, nodes=None
 ) -> tuple[Float[Array, " m"], Float[Array, " m"]]:
     """When each gap has its lowest minimum within a flight, and the gap there.
 
@@ -37,15 +44,15 @@ def lowest_times(
     where it starts and ends in contact, do not count. With `whole_turn` the flight is a
     closed orbit and its lowest point counts wherever it is.
 
-    **Arguments:** time and state `(1 + n,)` at the start, time at the end (s).
+    **Arguments:** time and state `(1 + n,)` at the start, time at the end (s); `nodes`
+    of the flight where they are known.
 
     **Returns:** times (s) and gaps, one for each constraint; where a gap has no
     minimum, the end of the flight and the largest gap on it.
     """
-    t0, x0 = start[0], start[1:]
-    later, states, _ = flight_nodes(system, t0, x0, end, steps)
-    times = jnp.concatenate([t0[None], later])
-    states = jnp.concatenate([x0[None], states])
+    t0 = start[0]
+    nodes = nodes_of(system, start, end, steps) if nodes is None else nodes
+    times, states, _ = nodes
     heights = jax.vmap(lambda t, x: gaps(system, t, x))(times, states)
     speeds = jax.vmap(lambda t, x: normal_velocity(system, t, x))(times, states)
     turns = (speeds[:-1] < 0) & (speeds[1:] >= 0)
@@ -213,9 +220,7 @@ def _direction(problem, u, parameters, leaf: int, watched: str):
     )(jnp.append(u, p))
     tangent = jnp.linalg.svd(whole)[2][-1]
     _, slope = jax.jvp(
-        lambda z: problem.watched(
-            watched, z[:-1], with_leaf(parameters, leaf, z[-1])
-        ),
+        lambda z: problem.watched(watched, z[:-1], with_leaf(parameters, leaf, z[-1])),
         (jnp.append(u, p),),
         (tangent,),
     )

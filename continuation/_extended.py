@@ -194,6 +194,9 @@ class SingularPoints(AbstractProblem):
         return found
 
     def monitor(self, u: Float[Array, " n"], parameters: PyTree) -> dict[str, Array]:
+        return self.seen(u, parameters)[0]
+
+    def seen(self, u: Float[Array, " n"], parameters: PyTree):
         wanted = self.monitors()
         inner, inside = self._split(u, parameters)
         base = self.base
@@ -227,9 +230,10 @@ class SingularPoints(AbstractProblem):
                 values["pair"] = jnp.linalg.det(
                     product - jnp.eye(product.shape[0], dtype=a.dtype)
                 )
-        for name, value in base.monitor(inner, inside).items():
+        others, observed = base.seen(inner, inside)
+        for name, value in others.items():
             values[f"base {name}"] = value
-        return {name: values[name] for name in wanted}
+        return {name: values[name] for name in wanted}, observed
 
 
 def flip_coefficient(motion, u, parameters, a, right, left):

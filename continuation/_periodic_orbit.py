@@ -140,7 +140,7 @@ def _somewhere(system, t0):
     n = len(names) or _dimension(system)
     try:
         run = simulate(system, None, t0, float(t0) + 1e-9 * float(system.period))
-        return np.asarray(run.steps.state[0])
+        return np.asarray(run.at([float(t0)])[0])
     except ValueError:
         pass
     state = jnp.zeros(n)

@@ -24,7 +24,15 @@ from jaxcam.hybrid import HybridSystem
 from jaxcam.hybrid._normal import gaps, impacts, normal_velocity
 from variational import saltation_matrix
 
-from ._admissible import DIP, dips, IMPACT, inadmissible, orbit_grazing
+from ._admissible import (
+    DIP,
+    dips,
+    IMPACT,
+    inadmissible,
+    lowest_times,
+    nodes_of,
+    orbit_grazing,
+)
 from ._problem import AbstractProblem, Monitor, Stability, Start
 from ._shooting_flight import flight_end, flight_nodes
 
@@ -191,8 +199,11 @@ class ImpactingOrbits(AbstractProblem):
         """Approach speed of each impact, positive where it is physical."""
         starts, ends = self.segments(u, parameters)
         before = self._arrivals(parameters, starts, ends)
+        return self._speeds(parameters, ends[:, 0], before)
+
+    def _speeds(self, parameters, ends, before):
         found = jax.vmap(
-            lambda end, x, which: -normal_velocity(parameters, end[0], x)[which]
+            lambda end, x, which: -normal_velocity(parameters, end, x)[which]
         )(ends, before, self._hit())
         # the flight of row k ends in impact k + 1
         return jnp.roll(found, 1)
@@ -222,13 +233,33 @@ class ImpactingOrbits(AbstractProblem):
         names += [f"{IMPACT} {k}" for k in range(m)]
         return {name: Monitor(kind="grazing", ends=True) for name in names}
 
+    def watched(self, name: str, u, parameters) -> Float[Array, ""]:
+        number = int(name.rsplit(" ", 1)[1])
+        if name.startswith(IMPACT):
+            return self.speeds(u, parameters)[number]
+        starts, ends = self.flights(u, parameters)
+        whole = not self.constraints
+        return dips(parameters, starts, ends, self.steps, whole_turn=whole)[number]
+
     def observe(self, u, parameters) -> dict[str, Array]:
         """Period (s); time (s) and state after the first impact; integration error;
         with forcing, the states at whole forcing periods, `(periods, n)`."""
+        return self.seen(u, parameters)[1]
+
+    def seen(self, u, parameters):
         starts, ends = self.flights(u, parameters)
-        wrong = jax.vmap(
-            lambda a, b: flight_nodes(parameters, a[0], a[1:], b, self.steps)[2]
-        )(starts, ends)
+        whole = not self.constraints
+
+        def one(start, end):
+            nodes = nodes_of(parameters, start, end, self.steps)
+            gap = lowest_times(parameters, start, end, self.steps, whole, nodes)[1]
+            return *nodes, jnp.min(gap)
+
+        times, states, wrong, lowest = jax.vmap(one)(starts, ends)
+        monitors = {f"{DIP} {k}": lowest[k] for k in range(lowest.shape[0])}
+        if self.constraints:
+            speeds = self._speeds(parameters, ends, states[:, -1])
+            monitors |= {f"{IMPACT} {k}": speeds[k] for k in range(len(speeds))}
         found = {
             "period": self.period(u, parameters),
             "time": starts[0, 0],
@@ -236,24 +267,26 @@ class ImpactingOrbits(AbstractProblem):
             "integration error": jnp.max(wrong),
         }
         if self.periods:
-            found["stroboscopic"] = self.stroboscopic(u, parameters)
-        return found
+            found["stroboscopic"] = self._stroboscopic(parameters, times, states)
+        return monitors, found
 
-    def stroboscopic(self, u, parameters) -> Float[Array, "periods n"]:
-        """States at time zero and each forcing period after it."""
-        starts, _ = self.flights(u, parameters)
-        length = self.period(u, parameters)
+    def _stroboscopic(self, parameters, times, states) -> Float[Array, "periods n"]:
+        """States at time zero and each forcing period after it, from those at the ends
+        of all Runge-Kutta steps."""
+        base = parameters.period
+        length = self.periods * base
 
         def at(time):
-            ago = jnp.mod(time - starts[:, 0], length)
+            ago = jnp.mod(time - times[:, 0], length)
             last = jnp.argmin(ago)
-            begin = starts[last, 0]
-            return flight_end(
-                parameters, begin, starts[last, 1:], begin + ago[last], steps=self.steps
-            )
+            when = times[last, 0] + ago[last]
+            k = jnp.searchsorted(times[last], when, side="right") - 1
+            k = jnp.clip(k, 0, self.steps - 1)
+            return flight_nodes(parameters, times[last, k], states[last, k], when, 1)[
+                1
+            ][-1]
 
-        times = jnp.arange(self.periods, dtype=jnp.float64) * length / self.periods
-        return jax.vmap(at)(times)
+        return jax.vmap(at)(base * jnp.arange(self.periods, dtype=jnp.float64))
 
     # -- between compiled programs
 

@@ -31,8 +31,8 @@ system = ImpactOscillator(omega=2.8, restitution=0.8, wall=-0.5)
 orbit = continuation.periodic_orbit(system, guess=[-0.8, 1.0], period=1)
 print(f"impact at {orbit.impacts.time[0]:.6f} s, multipliers {orbit.multipliers}")
 
-# Free flight keeps areas and the impact shrinks them by r squared, so the product of the
-# two multipliers is r squared, here 0.64.
+# Free flight keeps areas and the impact shrinks them by r squared, so the product of
+# the two multipliers is r squared, here 0.64.
 
 assert np.isclose(np.prod(orbit.multipliers).real, 0.8**2, rtol=1e-9)
 stability = variational.stability(system, orbit)

@@ -1,5 +1,9 @@
 """The fold beside a grazing, the saddle between them, and what comes behind."""
 
+from typing import Any
+
+import equinox as eqx
+import jax.numpy as jnp
 import numpy as np
 import pytest
 from scipy.linalg import expm
@@ -56,7 +60,7 @@ class Exact:
 
 def test_fold_saddle_and_grazing_are_told_apart():
     exact = Exact()
-    fold = minimize_scalar(
+    fold: Any = minimize_scalar(
         exact.amplitude, bounds=(1e-6, 0.1), method="bounded", options={"xatol": 1e-13}
     )
     assert fold.fun == pytest.approx(0.0999707536, abs=1e-10)
@@ -102,9 +106,6 @@ def test_motion_through_the_wall_is_refused():
     _, start = exact.start(-1e-3)
     amplitude = exact.amplitude(-1e-3)
     assert amplitude > 0.1
-    import equinox as eqx
-    import jax.numpy as jnp
-
     problem = eqx.tree_at(
         lambda p: p.parameters.amplitude, problem, jnp.asarray(amplitude)
     )
@@ -123,7 +124,9 @@ def test_ball_on_a_table(k):
     gamma_flip = np.hypot(gamma_fold, 2 * (1 + r * r) / (1 + r) ** 2)
     gamma = (gamma_fold + gamma_flip) / 2
     amplitude, phase = gamma * g / w**2, np.arccos(gamma_fold / gamma)
-    ball = BouncingBall(gravity=g, restitution=r, amplitude=amplitude, frequency=w)
+    ball = BouncingBall(
+        **parameters(gravity=g, restitution=r, amplitude=amplitude, frequency=w)
+    )
     period = 2 * np.pi / w
     start = np.array(
         [phase / (2 * np.pi), amplitude * np.sin(phase), g * k * period / 2]

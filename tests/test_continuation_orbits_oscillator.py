@@ -127,7 +127,7 @@ def test_flip_behind_a_grazing_is_not_reported(case):
 def test_resonance_has_the_same_multipliers_for_every_wall():
     exact = Exact(2.0, 0.8, 1)
     problem, start = exact.problem(1.2)
-    sigma = float(problem.parameters.wall)
+    sigma = exact.at(1.2)[0]
     points = first(
         problem, start, ("grazing",), (sigma - 0.02, sigma + 0.02), 1, special=False
     )
@@ -140,7 +140,9 @@ def test_orbit_from_a_guess_with_its_multipliers():
     exact = Exact(2.8, 0.8, 1)
     phi = 0.9 * exact.flip + 0.1 * exact.fold
     system, time, state = exact.start(phi)
-    orbit = continuation.periodic_orbit(system, state - 0.01, system.period, t0=time)
+    orbit = continuation.periodic_orbit(
+        system, state - 0.01, float(system.period), t0=time
+    )
     sigma, speed = exact.at(phi)
     assert int(orbit.impacts.count) == 1
     assert float(-orbit.impacts.speed_before[0]) == pytest.approx(speed, abs=1e-9)

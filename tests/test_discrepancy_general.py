@@ -13,6 +13,9 @@ from jaxcam.fitting import Parameter, Sensor
 from jaxcam.recordings import Recording, segment
 
 
+# the first one compiles the engine for this system, which takes minutes
+pytestmark = pytest.mark.slow
+
 _NOISE = 1e-4
 _STIFFNESS = 150.0
 _TIME = 1e-3 * np.arange(2500)

@@ -155,6 +155,7 @@ def test_likelihoods(sensor):
         assert mean == pytest.approx(spread**2, rel=0.2)
 
 
+@pytest.mark.slow
 def test_saturated_and_filtered_rate():
     """A gyro with a bandwidth and a range that the motion exceeds."""
     sensors = {
@@ -191,6 +192,7 @@ def test_lag_gain_and_offset_of_a_sensor():
     assert abs(found.value - 1.02) < 3.3 * found.stderr
 
 
+@pytest.mark.slow
 def test_network_in_the_vector_field():
     """A force that nobody stated, learnt by gradients in reverse mode."""
 
@@ -237,6 +239,31 @@ def test_restitution_from_every_impact():
     start = PowerLawRestitution(0.5, 1.0, 0.0)
     again = fitting.fit_restitution([part], start, ("r0",))
     assert again.values[0] == pytest.approx(constant.values[0], rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("direction", "words"),
+    [
+        ([0.6, 0.8], "only their ratio acts"),
+        ([0.6, -0.8], "only their product acts"),
+        ([0.8, 0.6], "raising K and J together: this"),
+    ],
+)
+def test_a_pair_that_is_seen_only_together(direction, words):
+    """K = 100 in units of 3, J = 2 in units of 0.045: 0.6 and 0.8 are equal parts."""
+    d = np.array(direction)
+    report = fitting.Identifiability(
+        ("K", "J"),
+        np.stack([[d[1], -d[0]], d]),
+        np.array([0.01, 50.0]),
+        values=np.array([100.0, 2.0]),
+        scales=np.array([3.0, 0.045]),
+        alone=np.array([0.01, 0.01]),
+        together=np.array([30.0, 40.0]),
+    )
+    sentences = report.sentences()
+    assert sentences[0].startswith("The data see 1 of 2")
+    assert words in sentences[1]
 
 
 def test_refusals(balls):

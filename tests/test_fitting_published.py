@@ -102,6 +102,7 @@ def test_derivative_of_a_trace_is_that_of_the_closed_form():
     assert_allclose(slope, (trace(a + step) - trace(a - step)) / (2 * step), rtol=1e-7)
 
 
+@pytest.mark.slow
 def test_fold_and_flip_of_the_ball():
     """The orbit is born where A w is the speed at a bounce, and doubles later."""
     born = SPEED / W
@@ -162,6 +163,7 @@ def _start(a, r, gravity=G):
     return start
 
 
+@pytest.mark.slow
 def test_fit_to_printed_numbers_finds_the_truth():
     fit = fit_published(
         _start(0.031, 0.48),

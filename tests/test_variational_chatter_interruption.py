@@ -9,6 +9,7 @@ import jax.numpy as jnp
 import mpmath
 import numpy as np
 import pytest
+from oscillator_hops import oscillator_hop
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
@@ -39,39 +40,6 @@ BRACKETS = {0.3: (0.7, 1.2), 0.4: (0.6, 1.0), 0.5: (0.4, 0.8), 0.7: (0.3, 0.5)}
 def found(r):
     oscillator = ImpactOscillator(omega=jnp.asarray(1.0), restitution=jnp.asarray(r))
     return chatter_interruption(oscillator, omega, BRACKETS[r])
-
-
-def oscillator_hop(w, t, u):
-    """Next impact of x'' + x = cos wt, x <= 0, after one at t with rebound speed u."""
-    g = 1 / (1 - w * w)
-    a, b = -g * mpmath.cos(w * t), -u + g * w * mpmath.sin(w * t)
-
-    def position(s):
-        return g * mpmath.cos(w * s) + a * mpmath.cos(s - t) + b * mpmath.sin(s - t)
-
-    def velocity(s):
-        free = -a * mpmath.sin(s - t) + b * mpmath.cos(s - t)
-        return -g * w * mpmath.sin(w * s) + free
-
-    # the wall pulls with cos wt, which falls at the rate w sin wt
-    pull, fall = mpmath.cos(w * t), w * mpmath.sin(w * t)
-    inside = pull * pull / 4 - 2 * u * fall / 3
-    if u == 0:
-        grid = np.linspace(0.05, 12.0, 4000)
-        values = np.array([float(position(t + s)) for s in grid])
-        first = int(np.argmax(values > 0))
-        s = mpmath.findroot(position, t + (grid[first - 1] + grid[first]) / 2)
-    elif inside < 0:
-        return None
-    else:
-        first = 3 * (pull / 2 - mpmath.sqrt(inside)) / fall
-        s = t + first
-        for _ in range(50):
-            step = position(s) / velocity(s)
-            s -= step
-            if abs(step) < mpmath.mpf(10) ** -38:
-                break
-    return s, velocity(s)
 
 
 def completes(w, r):

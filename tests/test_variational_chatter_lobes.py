@@ -10,9 +10,11 @@ import pytest
 
 from jaxcam.models import preset, rad_s_to_rpm, rpm_to_rad_s
 from variational import (
+    adding_thresholds,
     chatter_frame,
     chatter_interruption,
     composed_map,
+    find_lobes,
     lambda_inverse,
     parameter_incidence,
     scaling_law,
@@ -122,3 +124,24 @@ def test_release_by_the_speed_of_the_cam(rig, composed):
         difference = (pick(ends[1]) - pick(ends[0])) / (2 * h)
         assert abs(float(pick(rate) / difference) - 1) < 1e-6
     assert bool(jnp.isfinite(composed.by_parameter))
+
+
+def test_windows_of_the_local_map_open_where_the_motion_loses_impacts(rig, composed):
+    # a change of speed moves the map sideways by this much (6.114)-(6.115)
+    shift = float(composed.incidence * composed.vector[0] / composed.feedback)
+    span = 0.012 * float(composed.state[0])
+    deviations = np.linspace(-span / 4, span, 320)
+    found = find_lobes(
+        rig, composed.state, deviations, direction=composed.vector, most=6
+    )
+    want = (found.corners - found.limit) / shift
+    critical = float(rig.speed)
+    beyond = critical + 1.1 * float(want[0])
+    values = np.asarray(adding_thresholds(rig, speed, critical, beyond, 8)) - critical
+    # corners of the map and thresholds of the motion, from the innermost outwards
+    nearest = np.array([values[np.argmin(np.abs(values - w))] for w in want])
+    error = np.abs(nearest / want - 1)
+    # the shift is exact at the interruption, and grows worse with the distance
+    assert len(set(nearest)) == len(want)
+    assert np.all(error[-3:] < 0.02)
+    assert error[-1] < error[0]

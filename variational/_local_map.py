@@ -99,6 +99,7 @@ def find_lobes(
     *,
     phase: float = 0.0,
     component: int = 0,
+    direction=None,
     samples: int = 64,
     most: int = 8,
 ) -> Lobes:
@@ -113,6 +114,9 @@ def find_lobes(
     - `state`: shape `(2,)`, at time `phase` x period, on the sticking orbit.
     - `deviations`: shape `(n,)`, of `component` of the state, in order and across the
       accumulation point.
+    - `direction`: shape `(2,)`, along which the state deviates; only `component` does
+      by default, as in the thesis. Motions leave the lobes along
+      [`variational.ComposedMap`][]`.vector`, so the map that is iterated needs that.
     - `samples`: points measured in each lobe; `most`: how many lobes.
 
     **Raises:** `ValueError` where fewer than two lobes are found.
@@ -121,13 +125,21 @@ def find_lobes(
     system = as_arrays(system)
     state = jnp.asarray(state, jnp.float64)
     base = float(state[component])
+    axis = jnp.zeros(2).at[component].set(1.0)
+    along = axis if direction is None else jnp.asarray(direction, jnp.float64)
+    if float(along[component]) == 0:
+        raise ValueError(
+            f"direction is {np.asarray(along)}: it does not change component "
+            f"{component}. Give another component or direction."
+        )
+    along = along / along[component]
 
     def turn(x):
         # in rows of one length, so that one compiled program serves all
         rows = -(-len(x) // _ROW)
         padded = np.concatenate([x, np.full(rows * _ROW - len(x), x[-1])])
         parts = [
-            _turns(system, state, jnp.asarray(row), phase, component)
+            _turns(system, state, along, jnp.asarray(row), phase, component)
             for row in padded.reshape(rows, _ROW)
         ]
         return tuple(
@@ -184,9 +196,10 @@ def find_lobes(
 
 
 @eqx.filter_jit
-def _turns(system, state, values, phase, component):
+def _turns(system, state, along, values, phase, component):
     def image(x):
-        section = section_turn(system, state.at[component].set(x), phase)
+        moved = state + (x - state[component]) * along
+        section = section_turn(system, moved.at[component].set(x), phase)
         return section.state[component], (section.impacts, section.stuck)
 
     def one(x):

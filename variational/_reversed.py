@@ -21,6 +21,14 @@ class Reversed(HybridSystem):
 
     forward: HybridSystem
 
+    def prepared(self) -> "Reversed":
+        """The same motion, cheaper to evaluate."""
+        return Reversed(self.forward.prepared())
+
+    def check(self) -> None:
+        """Raise `ValueError` where a parameter of `forward` has no meaning."""
+        self.forward.check()
+
     def vector_field(self, t, state) -> jax.Array:
         """Minus the field of `forward`."""
         return -self.forward.vector_field(-jnp.asarray(t), state)

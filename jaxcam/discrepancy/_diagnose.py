@@ -24,7 +24,7 @@ from ._engine import value_of
 from ._evidence import held_out, limits, redrawn
 from ._search import FALSE_ALARMS, Search, Trial
 from ._structure import Structure, structures
-from ._term import Term
+from ._term import Term, terms_of
 from ._terms import DriveRipple, library
 from ._with_terms import base_drive, WithTerms
 from ._words import listed, summary_of
@@ -256,7 +256,7 @@ def _check(rig: Rig, runs: Sequence[Recording]) -> None:
 
 def _ripples(ripple: Ripple, tests: int) -> bool:
     asked = max(2 * math.log(ripple.count), chi2.isf(FALSE_ALARMS / tests, 2))
-    return ripple.gain > asked
+    return bool(ripple.gain > asked)
 
 
 def _effect(
@@ -396,7 +396,7 @@ def _rig_values(system, best: Trial, deviation) -> dict[str, Value]:
 def search_names(best: Trial) -> set[str]:
     """Parameters of the rig among those of a fit."""
     problem = best.fit.problem
-    terms = problem.model.system.terms
+    terms = terms_of(problem.model)
     own = {one.name for term in terms for one in term.strengths()}
     return set(best.fit.free) - own
 

@@ -73,7 +73,8 @@ class Search:
         if any(one.inner for one in term.strengths()):
             # as many chances as there are frequencies
             chance /= self.scan(frozenset()).cells
-        return max(number * math.log(self.problem.samples), chi2.isf(chance, number))
+        level = float(chi2.isf(chance, number))
+        return max(number * math.log(self.problem.samples), level)
 
     def run(self) -> Trial:
         """The best subset; empty where no term is worth its parameters."""
@@ -89,6 +90,14 @@ class Search:
                     if names not in promised or bic < promised[names][0]:
                         promised[names] = bic, trial
             most = len(self.terms) if size == 1 else _TRIED
+            if size > 1:
+                # what the best subset lacks, its own scores know best
+                own = self._promises(best, self.scan(best.names))
+                promised = {
+                    names: said
+                    for names, said in promised.items()
+                    if not names > best.names or names in own
+                }
             order = sorted(promised, key=lambda n: promised[n][0])[:most]
             for k, names in enumerate(order):
                 said = " and ".join(sorted(names)).replace("_", " ")

@@ -12,7 +12,7 @@ import jax.numpy as jnp
 from jaxtyping import Array
 
 from ..fitting import Parameter
-from ._term import Motion, Term
+from ._term import Motion, Term, terms_of
 
 
 # Just inside the ends, where the angle of a Chebyshev polynomial can be differentiated
@@ -52,7 +52,7 @@ class Shape(Term):
         return [
             Parameter(
                 f"{self.name}_{k}",
-                lambda m, k=k: m.system.terms[place].coefficients[k],
+                lambda m, k=k: terms_of(m)[place].coefficients[k],
                 scale=self.size,
                 unit=self.unit,
             )

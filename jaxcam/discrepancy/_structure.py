@@ -13,7 +13,7 @@ from ..fitting import Fit, Problem, residuals
 from ._engine import added, blocks_of, extended, off
 from ._search import FALSE_ALARMS
 from ._shapes import Harmonics, Polynomial, Shape, shapes
-from ._term import Term
+from ._term import Term, terms_of
 from ._vibration_scan import Periodogram
 
 
@@ -86,7 +86,7 @@ def structures(
     information, score = blocks.total()
     rows = blocks.rows(free)
     tests = len(more) + 2
-    before = len(problem.model.system.terms)
+    before = len(terms_of(problem.model))
     made = []
     for k, term in enumerate(more):
         names = [p.name for p in term.parameters(before + k)]
@@ -168,6 +168,7 @@ def _coloured(found: Fit, tests: int) -> Structure:
             total += float(np.sum(products))
             count += len(products)
     score = total / math.sqrt(max(count, 1))
+    bic = math.log(found.problem.samples)
     # as the gain of one parameter, with the smoothness that states take out ignored
     return Structure(
         "coloured_residuals",
@@ -175,7 +176,7 @@ def _coloured(found: Fit, tests: int) -> Structure:
         "flight",
         "in flight and at rest",
         max(score, 0.0) ** 2,
-        max(norm.isf(FALSE_ALARMS / tests) ** 2, math.log(found.problem.samples)),
+        max(float(norm.isf(FALSE_ALARMS / tests)) ** 2, bic),
         1,
     )
 

@@ -115,7 +115,7 @@ class Term(eqx.Module):
         return [
             Parameter(
                 one.name,
-                lambda m, name=one.name: getattr(m.system.terms[place], name),
+                lambda m, name=one.name: getattr(terms_of(m)[place], name),
                 scale=one.size,
                 lower=one.lower,
                 upper=one.upper,
@@ -146,6 +146,11 @@ class SensorTerm(Term):
             )
             for one, field in zip(self.strengths(), self.fields, strict=True)
         ]
+
+
+def terms_of(model: Model) -> tuple[Term, ...]:
+    """The terms of a model whose system is a `WithTerms`."""
+    return model.system.terms  # pyright: ignore
 
 
 def _first(model: Model):

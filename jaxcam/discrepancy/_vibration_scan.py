@@ -93,19 +93,19 @@ def periodogram(parts: Sequence[Residuals]) -> Periodogram:
     flight = float(np.median([np.ptp(t) for t in times]))
     step = 1 / (_FINE * length)
     frequency = np.arange(1 / flight, 1 / (_PER_PERIOD * interval), step)
-    turn = np.exp(2j * np.pi * frequency[0] * time)
+    turn: np.ndarray = np.exp(2j * np.pi * frequency[0] * time)
     advance = np.exp(2j * np.pi * step * time)
     gain, separate = np.zeros(len(frequency)), np.zeros(len(frequency))
     starts = cuts[records]
     for k in range(len(frequency)):
-        taken = np.add.reduceat(basis * turn[:, None], cuts, axis=0)
+        taken: np.ndarray = np.add.reduceat(basis * turn[:, None], cuts, axis=0)
 
         def summed(a, b, projected):
             whole = np.add.reduceat(a * b, starts)
             return whole - np.add.reduceat(projected.sum(axis=1), records)
 
         re, im = turn.real, turn.imag
-        tr, ti = taken.real, taken.imag
+        tr, ti = np.real(taken), np.imag(taken)
         cc, ss = summed(re, re, tr * tr), summed(im, im, ti * ti)
         cs = summed(re, im, tr * ti)
         c, s = np.add.reduceat(value * re, starts), np.add.reduceat(value * im, starts)

@@ -14,6 +14,8 @@ from ._problem import Problem
 
 # a combination is seen if the data narrow it to this part of the tolerance
 _SEEN = 0.5
+# two relative changes are the same to this part
+_SAME = 0.05
 # members of a combination that are named: at least this part of the largest
 _MEMBER = 0.15
 
@@ -25,6 +27,7 @@ class Identifiability:
     - `names`: parameters, as in the columns of `directions` `(g, g)`: one combination a
         row, each parameter in units of its scale (its tolerance).
     - `stderr`: error of each combination from the data alone, in the same units.
+    - `values`, `scales`: of each parameter, where it was looked and what its unit is.
     - `alone`: error of each parameter from the data alone if all others were known, and
         `together` if none is, in units of the scale.
     """
@@ -32,6 +35,8 @@ class Identifiability:
     names: tuple[str, ...]
     directions: Float[np.ndarray, "g g"]
     stderr: Float[np.ndarray, " g"]
+    values: Float[np.ndarray, " g"]
+    scales: Float[np.ndarray, " g"]
     alone: Float[np.ndarray, " g"]
     together: Float[np.ndarray, " g"]
 
@@ -89,13 +94,23 @@ class Identifiability:
             what = f"raising {up[0]}"
         if down:
             what += f" while lowering {_listed(down)}"
-        ratio = " (only their ratio acts)" if len(up) == 1 == len(down) else ""
-        if len(members) == 2 and not down:
-            ratio = " (only their difference acts)"
+        what += self._relation(direction, members)
         return (
-            f"The data hardly notice {what}{ratio}: this combination is left to the "
+            f"The data hardly notice {what}: this combination is left to the "
             f"tolerances."
         )
+
+    def _relation(self, direction, members) -> str:
+        """What is left of two parameters that are seen only together."""
+        pair = [self.names.index(name) for name in members]
+        if len(pair) != 2 or np.any(self.values[pair] == 0):
+            return ""
+        one, other = direction[pair] * self.scales[pair] / self.values[pair]
+        if abs(one - other) < _SAME * abs(one):
+            return " (only their ratio acts)"
+        if abs(one + other) < _SAME * abs(one):
+            return " (only their product acts)"
+        return ""
 
 
 def identify(
@@ -136,7 +151,10 @@ def identify(
         problem.names[p] if r < 0 else f"{problem.names[p]}@{problem.records[r]}"
         for p, r in zip(columns.parameter, columns.record)
     )
-    return Identifiability(labels, directions, stderr, alone, together)
+    held = np.asarray(at.point.values)[np.maximum(columns.record, 0), columns.parameter]
+    return Identifiability(
+        labels, directions, stderr, held, columns.scale, alone, together
+    )
 
 
 def _listed(names) -> str:

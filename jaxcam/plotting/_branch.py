@@ -7,6 +7,7 @@ from typing import Any, TYPE_CHECKING
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.patheffects import withStroke
 
 from ._axes import legend_above, one_axes
 from ._labels import labelled
@@ -131,7 +132,7 @@ def _mark(ax: Axes, branch, value, x_scale, letters: bool) -> None:
             ys,
             mark,
             color=colour,
-            markersize=6,
+            markersize=10 if mark == "*" else 6,
             markeredgecolor="white",
             markeredgewidth=0.6,
             zorder=4,
@@ -145,5 +146,6 @@ def _mark(ax: Axes, branch, value, x_scale, letters: bool) -> None:
                 textcoords="offset points",
                 fontsize="x-small",
                 color=colour,
+                path_effects=[withStroke(linewidth=2.5, foreground="white")],
                 zorder=5,
             )

@@ -84,9 +84,12 @@ def local_map_diagram(shifts, attractor, ax: Axes | None = None, *, flow=None) -
     """
     ax = one_axes(ax)
     if flow is not None:
-        ax.plot(*flow, ",", color=IMPACT, label="motion")
+        ax.plot(*flow, ",", color=IMPACT)
+        # pixels do not show in a legend
+        ax.plot([], [], ".", color=IMPACT, label="motion")
     shifts = np.repeat(np.asarray(shifts), attractor.shape[1])
-    ax.plot(shifts, np.ravel(attractor), ",", color=FLIGHT, label="fitted map")
+    ax.plot(shifts, np.ravel(attractor), ",", color=FLIGHT)
+    ax.plot([], [], ".", color=FLIGHT, label="fitted map")
     ax.set_xlabel("shift of the map")
     ax.set_ylabel("state at the section")
     legend_above(ax)

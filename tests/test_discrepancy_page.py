@@ -1,0 +1,87 @@
+"""The report of a diagnosis: complete in itself, the sentence first."""
+
+import numpy as np
+import pytest
+
+from jaxcam.cli._diagnose_page import diagnosis_page, draw
+from jaxcam.cli._output import to_text
+from jaxcam.discrepancy import Diagnosis, Effect, Structure, Value
+from jaxcam.fitting import Residuals
+
+
+def _residuals(name):
+    rng = np.random.default_rng(1)
+    time = 5e-4 * np.arange(400)
+    value = 1e-4 * rng.standard_normal(400)
+    rest = time > 0.15
+    return Residuals(name, "q", time, 15 * time, value, 0 * time, rest, 1e-4)
+
+
+def _diagnosis(verdict, effects):
+    grid = np.linspace(0.1, 0.4, 8)
+    shape = Structure(
+        "force_of_angle",
+        "a force that depends on the position",
+        "flight",
+        "in flight",
+        3.0,
+        60.0,
+        6,
+        "rad/s^2",
+        "position",
+        grid,
+        0.1 * grid,
+        0.1 + 0 * grid,
+    )
+    parts = [_residuals("run1"), _residuals("run2")]
+    return Diagnosis(
+        "case",
+        verdict,
+        effects,
+        (("coulomb_friction", 55.0), ("none", 2000.0)),
+        2e-4,
+        1e-4,
+        1e-4,
+        "rad",
+        {"K/J": Value(2400.0, 20.0, "1/(m^2 s^2)")},
+        "The model lacks damping. Without it <nothing> fits.",
+        None,  # pyright: ignore
+        None,  # pyright: ignore
+        (shape,),
+        (shape,),
+        (parts, parts),
+        None,
+        {"stiffness": (1.3, 0.2)},
+        {"fc": Value(0.01, 0.003, "rad/s^2")},
+        {"fc": "restitution"},
+        ("One caveat.",),
+    )
+
+
+EFFECT = Effect(
+    "viscous_damping",
+    "damping",
+    {"c1": Value(0.1, 0.01, "1/s")},
+    "flight",
+    "in flight",
+    ("run1",),
+    -100.0,
+    40.0,
+    1.0,
+)
+
+
+@pytest.mark.parametrize(
+    ("verdict", "effects"), [("effect", (EFFECT,)), ("none", ()), ("unknown", ())]
+)
+def test_the_page_is_complete(tmp_path, verdict, effects):
+    found = _diagnosis(verdict, effects)
+    page = diagnosis_page(found, draw(tmp_path, found), ("A note.",))
+    assert page.index("The model lacks damping.") < page.index("<figure>")
+    assert "&lt;nothing&gt;" in page
+    assert page.count("data:image/png;base64,") == 4
+    # nothing is loaded from elsewhere
+    assert "http" not in page.replace("http-equiv", "")
+    assert "One caveat." in page
+    assert ("viscous damping" in page) == bool(effects)
+    assert '"verdict"' in to_text(found.to_json())

@@ -1,0 +1,144 @@
+"""Terms change what they say, and nothing while their strengths are zero."""
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from jaxcam.discrepancy import library, WithTerms
+from jaxcam.discrepancy._engine import added
+from jaxcam.discrepancy._terms import (
+    CamProfileError,
+    CoulombFriction,
+    ExternalVibration,
+    NonlinearSpring,
+    QuadraticDrag,
+    RestitutionVelocity,
+    ViscousDamping,
+)
+from jaxcam.discrepancy._vibration_scan import periodogram
+from jaxcam.fitting import Residuals
+from jaxcam.models import CamFollower, ConstantRestitution
+
+
+BASE = CamFollower(speed=15.0, phase=0.3, restitution=ConstantRestitution(0.6))
+TIME = jnp.asarray(0.123)
+
+
+def _state(velocity):
+    """On the cam, with a velocity of its own."""
+    angle = BASE.contact_angle(BASE.cam_angle(TIME))
+    return jnp.stack([angle, jnp.asarray(velocity)])
+
+
+def test_terms_of_no_strength_change_nothing():
+    system, state = WithTerms(BASE, library()), _state(-0.7)
+    for name in ("vector_field", "gap", "impact"):
+        mine, plain = (getattr(s, name)(TIME, state) for s in (system, BASE))
+        assert np.asarray(mine) == pytest.approx(np.asarray(plain), abs=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("term", "expected"),
+    [
+        (ViscousDamping(0.2), lambda q, v: -0.2 * v),
+        (CoulombFriction(0.2), lambda q, v: -0.2 * np.sign(v)),
+        (QuadraticDrag(0.2), lambda q, v: -0.2 * abs(v) * v),
+        (NonlinearSpring(50.0), lambda q, v: -50.0 * (q - 0.27) ** 3),
+        (
+            ExternalVibration(0.3, 0.1, 30.0),
+            lambda q, v: (
+                0.3 * np.sin(60 * np.pi * 0.123) + 0.1 * np.cos(60 * np.pi * 0.123)
+            ),
+        ),
+    ],
+    ids=lambda value: getattr(value, "name", ""),
+)
+@pytest.mark.parametrize("velocity", [-0.8, 0.5])
+def test_forces_are_those_of_the_table(term, expected, velocity):
+    state = _state(velocity)
+    change = WithTerms(BASE, (term,)).vector_field(TIME, state) - BASE.vector_field(
+        TIME, state
+    )
+    force = expected(float(state[0]), velocity)
+    assert np.asarray(change) == pytest.approx([0.0, force], rel=1e-9)
+
+
+def test_restitution_falls_with_the_approach_speed():
+    state = _state(-0.9)
+    system = WithTerms(BASE, (RestitutionVelocity(0.1),))
+    # the surface moves; speeds count relative to it
+    rest = float(BASE.impact(TIME, state)[1] + 0.6 * state[1]) / 1.6
+    approach = abs(-0.9 - rest)
+    r = 0.6 * (1 + approach / 0.3) ** -0.1
+    after = float(system.impact(TIME, state)[1])
+    assert after - rest == pytest.approx(-r * (-0.9 - rest), rel=1e-10)
+
+
+def test_a_profile_error_moves_the_surface_and_its_rate():
+    run, turned = 2e-3, 15.0 * 0.123 + 0.3
+    state = _state(-0.9)
+    system = WithTerms(BASE, (CamProfileError(run),))
+    raised = run * np.cos(2 * turned + 0.7)
+    change = float(system.gap(TIME, state) - BASE.gap(TIME, state))
+    assert change == pytest.approx(-raised, rel=1e-10)
+    rate = -2 * 15.0 * run * np.sin(2 * turned + 0.7)
+    plain, moved = BASE.impact(TIME, state)[1], system.impact(TIME, state)[1]
+    assert float(moved - plain) == pytest.approx(1.6 * rate, rel=1e-9)
+
+
+def test_a_system_with_terms_flies_as_before():
+    """The wrapped system keeps what else the base knows."""
+    system = WithTerms(BASE, (ViscousDamping(0.1),))
+    assert float(system.period) == pytest.approx(2 * np.pi / 15.0)
+    assert system.state_names == BASE.state_names
+    moved = eqx.tree_at(lambda s: s.terms[0].c1, system, jnp.asarray(0.3))
+    assert float(moved.terms[0].c1) == 0.3
+
+
+def _shaken(amplitude, frequency, rng, records=3):
+    """Residuals of flights of 0.2 s that a force shakes, less a line in each."""
+    time = 5e-4 * np.arange(6000)
+    flight = (time // 0.2).astype(int)
+    found = []
+    for number in range(records):
+        w = 2 * np.pi * frequency
+        motion = -amplitude / w**2 * np.sin(w * time + 0.4)
+        value = motion + 9e-5 * rng.standard_normal(len(time))
+        for one in np.unique(flight):
+            rows = flight == one
+            line = np.polyfit(time[rows], value[rows], 1)
+            value[rows] -= np.polyval(line, time[rows])
+        rest = np.zeros(len(time), dtype=bool)
+        found.append(
+            Residuals(f"run{number}", "q", time, time, value, flight, rest, 9e-5)
+        )
+    return found
+
+
+def test_the_periodogram_finds_a_frequency():
+    scan = periodogram(_shaken(1.0, 31.9, np.random.default_rng(1)))
+    frequency, grown = scan.best
+    assert frequency == pytest.approx(31.9, abs=0.05)
+    # 3 x 6000 samples of a sine over white noise, of which cubics take up a part
+    expected = 18000 * (1.0 / (2 * np.pi * 31.9) ** 2 / 9e-5) ** 2 / 2
+    assert 0.8 * expected < grown < 1.1 * expected
+
+
+def test_the_periodogram_of_noise_has_no_peak():
+    """Gains are chi-square of two: the largest of many is as chance would have it."""
+    tops = []
+    for seed in range(5):
+        scan = periodogram(_shaken(0.0, 31.9, np.random.default_rng(seed)))
+        tops.append(scan.best[1])
+        # one in a hundred, over all frequencies and the five draws
+        assert tops[-1] < 2 * np.log(5 * scan.cells * 6 / 0.01)
+    assert min(tops) > 2
+
+
+def test_what_the_free_ones_imitate_gains_nothing():
+    information = np.array([[4.0, 4.0, 0.0], [4.0, 4.0, 0.0], [0.0, 0.0, 1.0]])
+    score = np.array([2.0, 2.0, 3.0])
+    assert added(information, score, np.array([0]), np.array([1])) == 0.0
+    both = added(information, score, np.array([0]), np.array([1, 2]))
+    assert both == pytest.approx(9.0)
