@@ -45,8 +45,8 @@ def ours(workload, block: int):
 def batches(repeats: int, side: int) -> None:
     """W1 and W2 on every side, and how far the samples agree."""
     for workload, block in (
-        (_workloads.sweep(), 256),
-        (_workloads.grid(side=side), 256),
+        (_workloads.sweep(), 64),
+        (_workloads.grid(side=side), 128),
     ):
         run = ours(workload, block)
         calls = {
@@ -170,7 +170,6 @@ def two_cores(repeats: int) -> None:
                 workload.start,
                 workload.turns,
                 settings=FAST,
-                block=256,
                 workers=workers,
             )
             spent[workers] = min(spent[workers], time.perf_counter() - started)

@@ -13,12 +13,16 @@ from ._advance import Plan
 from ._check import check_start
 from ._codes import Row
 from ._functions import Functions
-from ._lane import first_lane, RUNNING
+from ._lane import FINISHED, first_lane, RUNNING
 from ._normal import gaps
 from ._run import run_raw
 from ._runge_kutta import tableau_of
 from ._settings import Settings
 from ._system import HybridSystem, with_array_parameters
+
+
+# lanes of a group over lanes of a block
+_GROUP = 16
 
 
 class Stroboscope(eqx.Module):
@@ -43,8 +47,8 @@ def stroboscope(
     values=None,
     period: float | None = None,
     settings: Settings | None = None,
-    block: int = 256,
-    rows: int = 256,
+    block: int = 128,
+    rows: int = 96,
     max_steps: int = 1_000_000,
     workers: int = 1,
     progress: Callable[[float], None] | None = None,
@@ -59,7 +63,8 @@ def stroboscope(
     - `states`: shape `(lanes, n)`, or `(n,)` for all lanes alike.
     - `period`: s; the system's own forcing period by default.
     - `settings`: accuracy; the default completes chatter as soon as theory allows.
-    - `block`: lanes that advance together; `rows`: attempts between looks at them.
+    - `block`: lanes that advance together, of which each that ends makes room for the
+      next; `rows`: attempts between looks at them.
     - `max_steps`: budget of attempted steps of a lane.
     - `workers`: threads that work on blocks; results do not depend on their number.
     - `progress`: called with the fraction of lanes done.
@@ -98,18 +103,23 @@ def stroboscope(
     start = jnp.asarray(t0, dtype=jnp.float64)
     _check(*_batch(system, where, values), settings, start, length, states)
 
+    # a group keeps its block busy until its last lanes, and bounds the memory
+    width = min(block, lanes)
+    shares = -(-lanes // (workers * width))
+    group = width * min(_GROUP, shares)
+
     def work(first):
-        some = slice(first, first + block)
+        some = slice(first, first + group)
         part = None if values is None else values[some]
-        shape = (start, length, turns, settings, rows, max_steps)
-        return _block(system, where, part, states[some], *shape)
+        shape = (start, length, turns, settings, width, rows, max_steps)
+        return _group(system, where, part, states[some], *shape)
 
     pieces = []
     with ThreadPoolExecutor(workers) as pool:
-        for piece in pool.map(work, range(0, lanes, block)):
+        for piece in pool.map(work, range(0, lanes, group)):
             pieces.append(piece)
             if progress is not None:
-                progress(min(1.0, len(pieces) * block / lanes))
+                progress(min(1.0, len(pieces) * group / lanes))
     return Stroboscope(*map(np.concatenate, zip(*pieces, strict=True)))
 
 
@@ -146,30 +156,85 @@ def _look(batched, shared, period, t0, states):
     return eqx.filter_vmap(one, in_axes=(eqx.if_array(0), 0))(batched, states)
 
 
-def _block(system, where, values, states, t0, period, turns, settings, rows, max_steps):
+def _group(
+    system, where, values, states, t0, period, turns, settings, width, rows, max_steps
+):
+    """Run some lanes, `width` at a time; a lane that ends makes room for the next.
+
+    Lanes do not know of each other, so their order and company change no result.
+    """
     lanes, n = states.shape
-    batched, shared = _batch(system, where, values)
+    # one more than there are lanes, for slots that have none
+    samples = np.full((lanes + 1, turns, n), np.nan)
+    filled = np.zeros(lanes + 1, dtype=int)
+    ends = np.zeros((lanes + 1, 3), dtype=int)
     end = jnp.asarray(float(turns))
-    lane = _first(batched, shared, period, jnp.asarray(states), t0, end, settings)
-    samples = np.full((lanes, turns, n), np.nan)
-    filled = np.zeros(lanes, dtype=int)
-    used = 0
-    while used < max_steps and bool(np.any(np.asarray(lane.status) == RUNNING)):
+    started = _start(system, where, values, states, t0, period, end, settings, width)
+    values = None if values is None else np.append(values, values[-1])
+    work, used = np.minimum(np.arange(width), lanes), np.zeros(width)
+    lane = jax.tree.map(lambda leaf: leaf[work], started)
+    running, waiting = work < lanes, min(width, lanes)
+    lane = lane._replace(status=np.where(running, lane.status, FINISHED))
+    while np.any(running):
+        part = None if values is None else values[work]
+        batched, shared = _batch(system, where, part)
         lane, log = _some(batched, shared, period, t0, end, settings, lane, rows)
-        kind, after = np.asarray(log[..., 0]), np.asarray(log[..., 1:])
-        hit = kind == float(Row.STOP)
-        rank = filled[:, None] + np.cumsum(hit, axis=1) - 1
-        who, row = np.nonzero(hit)
-        # rounding may set the end of the run apart from its last stop
-        real = rank[who, row] < turns
-        who, row = who[real], row[real]
-        samples[who, rank[who, row]] = after[who, row]
-        filled += hit.sum(axis=1)
+        _harvest(samples, filled, work, np.asarray(log))
         used += rows
-    status = np.asarray(lane.status).astype(int)
-    code = np.array([1, 0, 2, 3])[status]
-    counts = [np.asarray(c).astype(int) for c in (lane.impacts, lane.steps)]
-    return samples, *counts, code
+        status = np.array(lane.status)
+        over = running & ((status != RUNNING) | (used >= max_steps))
+        if not np.any(over):
+            continue
+        counts = status, np.asarray(lane.impacts), np.asarray(lane.steps)
+        ends[work[over]] = np.stack(counts, axis=1)[over]
+        # who has used up the budget stays where it is
+        status[over], running[over] = FINISHED, False
+        slots = np.flatnonzero(over)[: lanes - waiting]
+        fresh = np.arange(waiting, waiting + len(slots))
+        work[slots], used[slots], running[slots] = fresh, 0, True
+        waiting += len(slots)
+        lane = _exchanged(lane._replace(status=status), started, slots, fresh)
+    codes = np.array([1, 0, 2, 3])[ends[:lanes, 0]]
+    return samples[:lanes], ends[:lanes, 1], ends[:lanes, 2], codes
+
+
+def _harvest(samples, filled, work, log) -> None:
+    """Put the samples of one stretch into their places."""
+    turns = samples.shape[1]
+    hit = log[..., 0] == float(Row.STOP)
+    rank = filled[work][:, None] + np.cumsum(hit, axis=1) - 1
+    who, row = np.nonzero(hit)
+    # rounding may set the end of the run apart from its last stop
+    real = rank[who, row] < turns
+    who, row = who[real], row[real]
+    samples[work[who], rank[who, row]] = log[who, row, 1:]
+    filled[work] += hit.sum(axis=1)
+
+
+def _start(system, where, values, states, t0, period, end, settings, width):
+    """All lanes as they start, as numpy arrays; computed `width` at a time.
+
+    There is one more than there are states, to fill slots with.
+    """
+    pieces = []
+    for first in range(0, len(states) + 1, width):
+        # filled up, so that one compiled program serves all
+        some = np.minimum(np.arange(first, first + width), len(states) - 1)
+        part = None if values is None else values[some]
+        batched, shared = _batch(system, where, part)
+        start = jnp.asarray(states[some])
+        lane = _first(batched, shared, period, start, t0, end, settings)
+        pieces.append(jax.tree.map(np.asarray, lane))
+    return jax.tree.map(lambda *parts: np.concatenate(parts), *pieces)
+
+
+def _exchanged(lane, started, slots, which):
+    def put(now, fresh):
+        now = np.array(now)
+        now[slots] = fresh[which]
+        return now
+
+    return jax.tree.map(put, lane, started)
 
 
 def _batch(system, where, values):
