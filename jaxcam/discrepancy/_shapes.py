@@ -52,7 +52,7 @@ class Shape(Term):
         return [
             Parameter(
                 f"{self.name}_{k}",
-                lambda m, k=k: terms_of(m)[place].coefficients[k],
+                lambda m, k=k: terms_of(m)[place].coefficients[k],  # pyright: ignore
                 scale=self.size,
                 unit=self.unit,
             )

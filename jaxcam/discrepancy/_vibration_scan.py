@@ -104,7 +104,7 @@ def periodogram(parts: Sequence[Residuals]) -> Periodogram:
             whole = np.add.reduceat(a * b, starts)
             return whole - np.add.reduceat(projected.sum(axis=1), records)
 
-        re, im = turn.real, turn.imag
+        re, im = np.real(turn), np.imag(turn)
         tr, ti = np.real(taken), np.imag(taken)
         cc, ss = summed(re, re, tr * tr), summed(im, im, ti * ti)
         cs = summed(re, im, tr * ti)
