@@ -184,8 +184,9 @@ def main() -> None:
 
 def distance(fit, truth) -> float:
     """Of all parameters together, a chi-square of as many degrees."""
-    off = np.array([e.value - truth[e.name] for e in fit.estimates])
-    return float(off @ np.linalg.solve(fit.covariance, off))
+    # in standard errors: parameters of very different size would lose the small ones
+    z = np.array([(e.value - truth[e.name]) / e.stderr for e in fit.estimates])
+    return float(z @ np.linalg.solve(fit.correlation, z))
 
 
 def drawn_error(fit, truth) -> dict[str, float]:
@@ -229,7 +230,11 @@ def report(found) -> None:
             )
         limit = scipy.stats.chi2.ppf(0.95, len(cases[0].off))
         together = np.mean([case.distance < limit for case in cases])
-        print(f"all together: {together:.0%} inside")
+        middle = np.median([case.distance for case in cases])
+        print(
+            f"all together: {together:.0%} inside; median chi-square {middle:.1f} of "
+            f"{len(cases[0].off)} degrees"
+        )
     sys.stdout.flush()
 
 

@@ -26,7 +26,7 @@ def test_continuous_integration_runs_the_test_command_of_the_readme():
     setup = re.findall(r"^python3 -m venv .*$", README, re.MULTILINE)
     assert len(setup) == 2
     command = setup[1].rpartition(" && ")[2]
-    assert command == "python -m pytest -n 2"
+    assert command == 'python -m pytest -n 2 -m "not slow"'
     script = ROOT / ".ci" / "run"
     assert command in script.read_text(encoding="utf-8").splitlines()
     assert script.stat().st_mode & stat.S_IXUSR

@@ -134,14 +134,12 @@ def test_windows_of_the_local_map_open_where_the_motion_loses_impacts(rig, compo
     found = find_lobes(
         rig, composed.state, deviations, direction=composed.vector, most=6
     )
-    want = (found.corners - found.limit) / shift
+    want = (found.corners[1:] - found.limit) / shift
     critical = float(rig.speed)
-    beyond = critical + 1.1 * float(want[0])
-    values = np.asarray(adding_thresholds(rig, speed, critical, beyond, 8)) - critical
-    # corners of the map and thresholds of the motion, from the innermost outwards
-    nearest = np.array([values[np.argmin(np.abs(values - w))] for w in want])
-    error = np.abs(nearest / want - 1)
-    # the shift is exact at the interruption, and grows worse with the distance
-    assert len(set(nearest)) == len(want)
-    assert np.all(error[-3:] < 0.02)
-    assert error[-1] < error[0]
+    beyond = critical + 1.25 * float(want[0])
+    values = np.asarray(adding_thresholds(rig, speed, critical, beyond, 6)) - critical
+    error = np.abs(values / want - 1)
+    # the shift is exact at the interruption: the error falls like tau, by p a window
+    assert np.all(np.diff(error) < 0)
+    assert error[0] < 0.05
+    assert error[-1] < 0.01

@@ -4,6 +4,7 @@ import dataclasses
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float, Int
@@ -236,7 +237,7 @@ def finish(
             Estimate(parameter.name, value, float(stderr[g]), parameter.unit, record)
         )
     names = tuple(dict.fromkeys(problem.names[p] for p in columns.parameter))
-    costs = Costs(*(np.asarray(part) for part in costs))
+    costs = jax.device_get(costs)
     return Fit(
         problem,
         point,
