@@ -127,16 +127,3 @@ def test_orbit_that_sticks_from_its_beginning_to_its_interruption():
     assert abs(float(direct) - last.parameter) < 1e-9
     times = [float(p.observed["sticking time"]) for p in branch.regular]
     assert min(times) > 0
-    # the motion itself settles on it
-    chosen = branch.regular[1::5]
-    run = stroboscope(
-        system,
-        np.array([SEED] * len(chosen)),
-        40,
-        where=speed,
-        values=[p.parameter for p in chosen],
-    )
-    for k, point in enumerate(chosen):
-        np.testing.assert_allclose(
-            run.states[k, -1], point.observed["stroboscopic"][0], atol=1e-8
-        )
