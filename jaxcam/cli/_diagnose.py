@@ -30,7 +30,7 @@ def diagnose(
         Path | None,
         typer.Option(
             metavar="DIR",
-            help="Write verdict.json, index.html and the model found (model.json).",
+            help="Write verdict.json and index.html here.",
         ),
     ] = None,
 ) -> None:
