@@ -16,8 +16,6 @@ from jaxcam.discrepancy._terms import (
     RestitutionVelocity,
     ViscousDamping,
 )
-from jaxcam.discrepancy._vibration_scan import periodogram
-from jaxcam.fitting import Residuals
 from jaxcam.models import CamFollower, ConstantRestitution
 
 
@@ -94,46 +92,6 @@ def test_a_system_with_terms_flies_as_before():
     assert system.state_names == BASE.state_names
     moved = eqx.tree_at(lambda s: s.terms[0].c1, system, jnp.asarray(0.3))
     assert float(moved.terms[0].c1) == 0.3
-
-
-def _shaken(amplitude, frequency, rng, records=3):
-    """Residuals of flights of 0.2 s that a force shakes, less a line in each."""
-    time = 5e-4 * np.arange(6000)
-    flight = (time // 0.2).astype(int)
-    found = []
-    for number in range(records):
-        w = 2 * np.pi * frequency
-        motion = -amplitude / w**2 * np.sin(w * time + 0.4)
-        value = motion + 9e-5 * rng.standard_normal(len(time))
-        for one in np.unique(flight):
-            rows = flight == one
-            line = np.polyfit(time[rows], value[rows], 1)
-            value[rows] -= np.polyval(line, time[rows])
-        rest = np.zeros(len(time), dtype=bool)
-        found.append(
-            Residuals(f"run{number}", "q", time, time, value, flight, rest, 9e-5)
-        )
-    return found
-
-
-def test_the_periodogram_finds_a_frequency():
-    scan = periodogram(_shaken(1.0, 31.9, np.random.default_rng(1)))
-    frequency, grown = scan.best
-    assert frequency == pytest.approx(31.9, abs=0.05)
-    # 3 x 6000 samples of a sine over white noise, of which cubics take up a part
-    expected = 18000 * (1.0 / (2 * np.pi * 31.9) ** 2 / 9e-5) ** 2 / 2
-    assert 0.8 * expected < grown < 1.1 * expected
-
-
-def test_the_periodogram_of_noise_has_no_peak():
-    """Gains are chi-square of two: the largest of many is as chance would have it."""
-    tops = []
-    for seed in range(5):
-        scan = periodogram(_shaken(0.0, 31.9, np.random.default_rng(seed)))
-        tops.append(scan.best[1])
-        # one in a hundred, over all frequencies and the five draws
-        assert tops[-1] < 2 * np.log(5 * scan.cells * 6 / 0.01)
-    assert min(tops) > 2
 
 
 def test_what_the_free_ones_imitate_gains_nothing():

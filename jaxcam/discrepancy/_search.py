@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Sequence
 import numpy as np
 from scipy.stats import chi2
 
-from ..fitting import Fit, fit, Problem, residuals
+from ..fitting import Fit, fit, Problem
 from ._engine import added, Blocks, blocks_of, gain
 from ._term import Term
 from ._vibration_scan import Periodogram, periodogram
@@ -202,8 +202,9 @@ class Search:
         """Periodogram of what a fit leaves over."""
         if names not in self.scans:
             self.progress("looking for vibrations", None)
-            parts = residuals(self.trials[names].fit)
-            self.scans[names] = periodogram(parts)
+            point = self.trials[names].fit.point
+            free = tuple(self.parameters(names))
+            self.scans[names] = periodogram(self.problem, point, free)
         return self.scans[names]
 
     def _frequency(self, start: Trial) -> float:

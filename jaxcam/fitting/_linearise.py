@@ -1,6 +1,6 @@
 """Scores and information of every piece and joint about a point."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import equinox as eqx
 import jax
@@ -8,9 +8,20 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
 from ._likelihood import score_all
+from ._linear import (
+    Extras,
+    flight_inputs,
+    flown,
+    joint,
+    joint_inputs,
+    Linear,
+    linear,
+    rest_inputs,
+    rested,
+    tied,
+)
 from ._model import Model
-from ._pieces import FLIGHT, IMPACT, Pieces
-from ._predict import flight_joint, fly, impact_joint, rest, samples
+from ._pieces import Pieces
 
 
 class Point(NamedTuple):
@@ -58,26 +69,6 @@ class Costs(NamedTuple):
     rested: Float[Array, "r kc"]
 
 
-class Sharpness(NamedTuple):
-    """Standard errors of the joints of one record."""
-
-    flight: Float[Array, "k n"]
-    impact: Float[Array, "k n"]
-    gap: Float[Array, " k"]
-
-
-class Extras(NamedTuple):
-    """What else a program needs: reference states of contact and the joints' errors.
-
-    `weight` `(r, k)` and `rest_weight` `(r, kc)` of the data of each piece.
-    """
-
-    guess: Float[Array, "r kc n"]
-    sharpness: Sharpness
-    weight: Float[Array, "r k"]
-    rest_weight: Float[Array, "r kc"]
-
-
 @eqx.filter_jit
 def assemble(
     layout: Layout,
@@ -105,15 +96,15 @@ def predict(layout: Layout, pieces: Pieces, extras: Extras, point: Point):
 
     def record(pieces, extras, values, states):
         model = layout.at(values)
-        end, flown = jax.vmap(lambda *a: _flown(model, *a))(
-            states, *_flight_inputs(pieces)
+        end, seen = jax.vmap(lambda *a: flown(model, *a))(
+            states, *flight_inputs(pieces)
         )
-        rested = jax.vmap(lambda *a: _rested(model, *a))(*_rest_inputs(pieces, extras))
+        resting = jax.vmap(lambda *a: rested(model, *a))(*rest_inputs(pieces, extras))
         before = jnp.concatenate([states[:1], end[:-1]])
-        joints = jax.vmap(lambda *a: _joint(model, pieces.reach, *a))(
-            before, states, *_joint_inputs(pieces)
+        joints = jax.vmap(lambda *a: joint(model, pieces.reach, *a))(
+            before, states, *joint_inputs(pieces)
         )
-        return flown, rested, joints
+        return seen, resting, joints
 
     return jax.vmap(record)(pieces, extras, *point)
 
@@ -121,96 +112,38 @@ def predict(layout: Layout, pieces: Pieces, extras: Extras, point: Point):
 @eqx.filter_jit
 def cost_of(layout: Layout, pieces: Pieces, extras: Extras, point: Point) -> Costs:
     """Costs without derivatives; can be differentiated in reverse mode."""
-    flown, rested, joints = predict(layout, pieces, extras, point)
+    seen, resting, off = predict(layout, pieces, extras, point)
     sensors = tuple(layout.model.sensors.values())
 
     def total(part, predicted):
         found = score_all(sensors, part.value, predicted)
         return jnp.sum(jnp.where(part.known, found.cost, 0.0), axis=(-3, -2, -1))
 
-    off, error = joints, extras.sharpness
-    tied = _tied(off, error, pieces.joint)
+    missed = tied(off, extras.sharpness, pieces.joint)
     return Costs(
-        total(pieces.flown, flown),
-        jnp.sum(tied**2, axis=-1),
-        total(pieces.rested, rested),
+        total(pieces.flown, seen),
+        jnp.sum(missed**2, axis=-1),
+        total(pieces.rested, resting),
     )
 
 
 def _record(layout, pieces: Pieces, extras, values, states, columns, scales):
-    size, width = states.shape[-1], columns.shape[0]
-
-    def model_at(change):
+    def model_at(change, start, step):
+        del start, step
         return layout.at(values.at[columns].add(change * scales))
 
-    origin = jnp.zeros(width)
-    sensors = tuple(layout.model.sensors.values())
+    found = linear(model_at, pieces, extras, states, columns.shape[0])
+    costs = Costs(found.flown_cost, found.joint_cost, found.rested_cost)
+    return _chained(found), costs
 
-    def piece(state, *inputs):
-        def predicted(both):
-            end, seen = _flown(model_at(both[size:]), both[:size], *inputs)
-            return (end, seen), (end, seen)
 
-        both = jnp.concatenate([state, origin])
-        (end_rows, rows), (end, seen) = jax.jacfwd(predicted, has_aux=True)(both)
-        return end_rows, rows, end, seen
-
-    end_rows, rows, end, seen = jax.vmap(piece)(states, *_flight_inputs(pieces))
-    part = pieces.flown
-    found = score_all(sensors, part.value, seen)
-    weight = jnp.where(part.known, extras.weight[:, None, None, None], 0.0)
-    information = jnp.einsum(
-        "knmca,knmc,knmcb->kab", rows, weight * found.information, rows
-    )
-    slope = jnp.einsum("knmca,knmc->ka", rows, weight * found.score)
-    flown_cost = jnp.sum(jnp.where(part.known, found.cost, 0.0), axis=(1, 2, 3))
-
-    # contact depends on the parameters alone
-    def contact(*inputs):
-        def predicted(change):
-            seen = _rested(model_at(change), *inputs)
-            return seen, seen
-
-        return jax.jacfwd(predicted, has_aux=True)(origin)
-
-    rest_rows, rest_seen = jax.vmap(contact)(*_rest_inputs(pieces, extras))
-    part = pieces.rested
-    found = score_all(sensors, part.value, rest_seen)
-    weight = jnp.where(part.known, extras.rest_weight[:, None, None, None], 0.0)
-    # where the surface cannot be found, nothing can be learnt from it
-    rest_rows = jnp.where(part.known[..., None], rest_rows, 0.0)
-    pp = jnp.einsum(
-        "knmca,knmc,knmcb->ab", rest_rows, weight * found.information, rest_rows
-    )
-    p = jnp.einsum(
-        "knmca,knmc->a", rest_rows, weight * jnp.where(part.known, found.score, 0.0)
-    )
-    rested_cost = jnp.sum(jnp.where(part.known, found.cost, 0.0), axis=(1, 2, 3))
-
-    # joints: rows for the earlier state, the later state and the parameters
-    def joint(before, state, *inputs):
-        def off(all_):
-            model = model_at(all_[2 * size :])
-            found = _joint(
-                model, pieces.reach, all_[:size], all_[size : 2 * size], *inputs
-            )
-            return found, found
-
-        return jax.jacfwd(off, has_aux=True)(jnp.concatenate([before, state, origin]))
-
-    before = jnp.concatenate([states[:1], end[:-1]])
-    turned = jnp.concatenate([jnp.zeros_like(end_rows[:1]), end_rows[:-1]])
-    joint_rows, off = jax.vmap(joint)(before, states, *_joint_inputs(pieces))
-    tied = _tied(off, extras.sharpness, pieces.joint)
-    strength = _strength(extras.sharpness, pieces.joint)
-    joint_rows = joint_rows * strength[..., None]
-    earlier = jnp.einsum("kei,kia->kea", joint_rows[..., :size], turned)
-    later, direct = joint_rows[..., size : 2 * size], joint_rows[..., 2 * size :]
-    earlier_s, params = earlier[..., :size], direct + earlier[..., size:]
-    shared = jnp.sqrt(jnp.minimum(extras.weight, _previous(extras.weight)))[:, None]
-    tied_now = tied * shared
-    later, earlier_s, params = (
-        x * shared[..., None] for x in (later, earlier_s, params)
+def _chained(found: Linear) -> Blocks:
+    """Pieces and their joints added up, as a chain."""
+    size = found.later.shape[-1]
+    information, later = found.information, found.later
+    earlier, params = (
+        found.earlier[..., :size],
+        found.direct + found.earlier[..., size:],
     )
 
     def into_previous(array):
@@ -220,79 +153,14 @@ def _record(layout, pieces: Pieces, extras, values, states, columns, scales):
         return jnp.einsum("kea,keb->kab", a, b)
 
     def times(a):
-        return -jnp.einsum("kea,ke->ka", a, tied_now)
+        return -jnp.einsum("kea,ke->ka", a, found.tied)
 
     ss = information[:, :size, :size] + product(later, later)
-    ss = ss + into_previous(product(earlier_s, earlier_s))
+    ss = ss + into_previous(product(earlier, earlier))
     sp = information[:, :size, size:] + product(later, params)
-    sp = sp + into_previous(product(earlier_s, params))
-    s = slope[:, :size] + times(later) + into_previous(times(earlier_s))
-    pp = pp + jnp.sum(information[:, size:, size:] + product(params, params), axis=0)
-    p = p + jnp.sum(slope[:, size:] + times(params), axis=0)
-    blocks = Blocks(ss, sp, s, product(later, earlier_s), pp, p)
-    return blocks, Costs(flown_cost, jnp.sum(tied**2, axis=-1), rested_cost)
-
-
-def _flown(model: Model, state, start, step, angle, rate, place):
-    end, nodes = fly(model, state, start, step, angle, rate)
-    return end, samples(model, nodes, step, place)
-
-
-def _rested(model: Model, guess, start, step, angle, rate, place):
-    return samples(model, rest(model, guess, start, step, angle, rate), step, place)
-
-
-def _flight_inputs(pieces: Pieces):
-    part = pieces.flown
-    return part.start, part.step, pieces.angle, pieces.rate, part.place
-
-
-def _rest_inputs(pieces: Pieces, extras: Extras):
-    part = pieces.rested
-    return (
-        extras.guess,
-        part.start,
-        part.step,
-        pieces.rest_angle,
-        pieces.rest_rate,
-        part.place,
-    )
-
-
-def _joint_inputs(pieces: Pieces):
-    return pieces.flown.start, pieces.angle_at, pieces.rate_at, pieces.joint
-
-
-def _joint(model: Model, reach, before, state, t, angle, rate, kind):
-    """State and gap in one vector `(n + 1,)`, whichever kind of joint it is."""
-    inner = jnp.concatenate([*_flat(flight_joint(before, state))])
-    # where there is no impact the search for one must not spoil the derivatives
-    hit = kind == IMPACT
-    found = impact_joint(model, before, state, t, angle, rate, reach)
-    outer = jnp.concatenate([*_flat(found)])
-    return jnp.where(hit, outer, jnp.where(kind == FLIGHT, inner, 0.0))
-
-
-def _flat(joint):
-    return joint.state, joint.gap[None]
-
-
-def _strength(sharpness: Sharpness, kind):
-    """One over the error of each part of a joint, zero where there is none."""
-    error = jnp.concatenate([sharpness.impact, sharpness.gap[..., None]], axis=-1)
-    flight = jnp.concatenate(
-        [sharpness.flight, jnp.full_like(sharpness.gap[..., None], jnp.inf)], axis=-1
-    )
-    kind = kind[..., None]
-    strength = jnp.where(
-        kind == IMPACT, 1 / error, jnp.where(kind == FLIGHT, 1 / flight, 0.0)
-    )
-    return strength
-
-
-def _tied(off, sharpness, kind) -> Any:
-    return off * _strength(sharpness, kind)
-
-
-def _previous(array):
-    return jnp.concatenate([array[:1], array[:-1]])
+    sp = sp + into_previous(product(earlier, params))
+    s = found.slope[:, :size] + times(later) + into_previous(times(earlier))
+    inner = information[:, size:, size:] + product(params, params)
+    pp = found.pp + jnp.sum(inner, axis=0)
+    p = found.p + jnp.sum(found.slope[:, size:] + times(params), axis=0)
+    return Blocks(ss, sp, s, product(later, earlier), pp, p)

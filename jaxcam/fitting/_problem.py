@@ -57,7 +57,8 @@ from jaxtyping import Float
 from ..recordings import RecordingError, Segments
 from ..recordings._flight_fit import state_at
 from ..recordings._polynomial import fit_local
-from ._linearise import assemble, Extras, Layout, Point, Sharpness
+from ._linear import Extras, Sharpness
+from ._linearise import assemble, Layout, Point
 from ._model import filtered_channels, Model
 from ._parameter import Parameter
 from ._pieces import gather, IMPACT, Pieces, Span
