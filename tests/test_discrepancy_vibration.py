@@ -7,6 +7,9 @@ from scipy.integrate import solve_ivp
 
 from jaxcam import HybridSystem
 from jaxcam.discrepancy import WithTerms
+from jaxcam.discrepancy._engine import blocks_of, extended
+from jaxcam.discrepancy._local_force import force_blocks, force_response
+from jaxcam.discrepancy._shapes import ForceOfTime, ForceOfVelocity
 from jaxcam.discrepancy._terms import ExternalVibration
 from jaxcam.discrepancy._vibration_scan import periodogram
 from jaxcam.fitting import fit, Model, Parameter, Problem, Sensor
@@ -87,11 +90,15 @@ def build():
     return problem
 
 
+def _scan(problem, found):
+    return periodogram(problem, force_response(problem, found.point, found.free))
+
+
 def test_the_scan_promises_what_a_fit_gains(build):
     """The frequency to a quarter of a cell; the gain to 3 %, far above its rivals."""
     problem = build(0.15, 23.3, 1)
     textbook = fit(problem, free=["stiffness"])
-    scan = periodogram(problem, textbook.point, ("stiffness",))
+    scan = _scan(problem, textbook)
     frequency, grown = scan.best
     assert frequency == pytest.approx(23.3, abs=0.25 / _TIME[-1])
     values = np.array(textbook.point.values)
@@ -115,7 +122,29 @@ def test_gains_without_vibration_are_within_chance(build):
     """
     problem = build(0.0, 23.3, 2)
     textbook = fit(problem, free=["stiffness"])
-    scan = periodogram(problem, textbook.point, ("stiffness",))
+    scan = _scan(problem, textbook)
     assert 0.4 < np.mean(scan.gain) < 2.2
     assert 0.8 < np.mean(scan.separate) < 4.4
     assert scan.best[1] < 2 * np.log(len(scan.frequency) / 1e-3)
+
+
+def test_forces_at_nodes_say_what_terms_in_the_system_say(build):
+    """Score and information of two shapes of force, to 1e-3 of their size."""
+    problem = build(0.15, 23.3, 1)
+    found = fit(problem, free=["stiffness"])
+    shapes = (
+        ForceOfVelocity([0.0, 0.0], -3.0, 3.0),
+        ForceOfTime([0.0, 0.0], 0.0, 3.0),
+    )
+    response = force_response(problem, found.point, found.free)
+    quick = force_blocks(problem, response, shapes)
+    wide = extended(problem, shapes, found.point)
+    names = (*found.free, *quick.names[1:])
+    exact = blocks_of(wide, found.point._replace(values=wide.start.values), 1, names)
+    assert quick.names == exact.names
+    for mine, theirs in zip(quick.total(), exact.total()):
+        size = np.sqrt(np.diag(exact.total()[0]))
+        size = size if theirs.ndim == 1 else np.outer(size, size)
+        assert np.max(np.abs(mine - theirs) / size) < 1e-3 * (
+            np.max(np.abs(theirs) / size)
+        )

@@ -85,7 +85,7 @@ def diagnose(
     report("looking at what is left over", None)
     left_before = structures(
         before.fit,
-        search.parameters(()),
+        search.response(frozenset()),
         unlisted,
         search.scan(frozenset()),
         turned,
@@ -94,7 +94,7 @@ def diagnose(
     if best.names:
         left_after = structures(
             best.fit,
-            search.parameters(best.names),
+            search.response(best.names),
             unlisted,
             search.scan(best.names),
             turned,

@@ -10,6 +10,7 @@ from scipy.stats import chi2
 
 from ..fitting import Fit, fit, Problem
 from ._engine import added, Blocks, blocks_of, gain
+from ._local_force import force_response, Response
 from ._term import Term
 from ._vibration_scan import Periodogram, periodogram
 
@@ -50,6 +51,7 @@ class Search:
         self.trials: dict[frozenset[str], Trial] = {}
         self.failed: set[frozenset[str]] = set()
         self.scans: dict[frozenset[str], Periodogram] = {}
+        self.responses: dict[frozenset[str], Response] = {}
         self.linear: dict[frozenset[str], Blocks] = {}
 
     def term(self, name: str) -> Term:
@@ -198,13 +200,19 @@ class Search:
             self.linear[trial.names] = blocks_of(self.problem, trial.fit.point)
         return self.linear[trial.names]
 
+    def response(self, names: frozenset[str]) -> Response:
+        """What a force at any time would gain beside a fit."""
+        if names not in self.responses:
+            point = self.trials[names].fit.point
+            free = self.parameters(names)
+            self.responses[names] = force_response(self.problem, point, free)
+        return self.responses[names]
+
     def scan(self, names: frozenset[str]) -> Periodogram:
         """Periodogram of what a fit leaves over."""
         if names not in self.scans:
             self.progress("looking for vibrations", None)
-            point = self.trials[names].fit.point
-            free = tuple(self.parameters(names))
-            self.scans[names] = periodogram(self.problem, point, free)
+            self.scans[names] = periodogram(self.problem, self.response(names))
         return self.scans[names]
 
     def _frequency(self, start: Trial) -> float:

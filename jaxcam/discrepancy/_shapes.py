@@ -48,6 +48,9 @@ class Shape(Term):
         """The sum of the functions."""
         return jnp.stack(self.coefficients) @ self.basis(quantity)
 
+    def numbers(self) -> tuple[Array, ...]:
+        return self.coefficients
+
     def parameters(self, place: int) -> list[Parameter]:
         return [
             Parameter(

@@ -10,7 +10,8 @@ from jaxtyping import Float
 from scipy.stats import chi2, norm
 
 from ..fitting import Fit, Problem, residuals
-from ._engine import added, blocks_of, extended, off
+from ._engine import added, Blocks, blocks_of, extended, off
+from ._local_force import force_blocks, Response
 from ._search import FALSE_ALARMS
 from ._shapes import Harmonics, Polynomial, Shape, shapes
 from ._term import Term, terms_of
@@ -68,54 +69,63 @@ class Structure:
 
 def structures(
     found: Fit,
-    free: Sequence[str],
+    response: Response,
     unlisted: Sequence[Term],
     scan: Periodogram,
     turned: bool,
 ) -> list[Structure]:
     """Everything that the residuals of a fit are asked for, largest excess first.
 
-    **Arguments:** the fit, its free parameters, terms that describe but are no
-    verdicts, the periodogram of what is left, and whether there is a drive.
+    **Arguments:** the fit, what a force would gain beside it, terms that describe but
+    are no verdicts, the periodogram of what is left, and whether there is a drive.
     """
     problem = found.problem
-    ranges = _ranges(problem)
-    more: tuple[Term, ...] = (*unlisted, *shapes(*ranges, turned=turned))
-    wide = extended(problem, more, found.point)
-    blocks = blocks_of(wide, wide.start)
-    information, score = blocks.total()
-    rows = blocks.rows(free)
+    more: tuple[Term, ...] = (*unlisted, *shapes(*_ranges(problem), turned=turned))
+    # a force needs no program of its own
+    forces = [t for t in more if t.acts == ("flight",)]
+    others = [t for t in more if t.acts != ("flight",)]
+    wide = extended(problem, others, found.point)
     tests = len(more) + 2
-    before = len(terms_of(problem.model))
     made = []
-    for k, term in enumerate(more):
-        names = [p.name for p in term.parameters(before + k)]
-        own = blocks.rows(names)
-        both = np.union1d(rows, own)
-        grown = added(information, score, rows, own)
-        asked = _asked(len(own), problem.samples, tests)
-        shape = {}
-        if isinstance(term, Shape):
-            step, covariance = off(information, score, both)
-            pick = np.searchsorted(both, own)
-            scale = blocks.scale[own]
-            covariance = covariance[np.ix_(pick, pick)]
-            if np.isfinite(covariance).all():
-                shape = _function(term, step[pick] * scale, covariance, scale)
-        made.append(
-            Structure(
-                term.name,
-                term.sentence,
-                term.where,
-                term.region,
-                grown,
-                asked,
-                len(own),
-                **shape,
+    for terms, blocks, place in (
+        (forces, force_blocks(problem, response, forces), 0),
+        (others, blocks_of(wide, wide.start), len(terms_of(problem.model))),
+    ):
+        information, score = blocks.total()
+        free = blocks.rows(response.free)
+        for k, term in enumerate(terms):
+            own = blocks.rows([p.name for p in term.parameters(place + k)])
+            grown = added(information, score, free, own)
+            asked = _asked(len(own), problem.samples, tests)
+            shape = _shape(term, blocks, information, score, free, own)
+            made.append(
+                Structure(
+                    term.name,
+                    term.sentence,
+                    term.where,
+                    term.region,
+                    grown,
+                    asked,
+                    len(own),
+                    **shape,
+                )
             )
-        )
     made += [_vibration(scan, problem, tests), _coloured(found, tests)]
     return sorted(made, key=lambda one: one.gain - one.asked, reverse=True)
+
+
+def _shape(term: Term, blocks: Blocks, information, score, free, own) -> dict:
+    """What a shape looks like, once it is fitted."""
+    if not isinstance(term, Shape):
+        return {}
+    both = np.union1d(free, own)
+    step, covariance = off(information, score, both)
+    pick = np.searchsorted(both, own)
+    scale = blocks.scale[own]
+    covariance = covariance[np.ix_(pick, pick)]
+    if not np.isfinite(covariance).all():
+        return {}
+    return _function(term, step[pick] * scale, covariance, scale)
 
 
 def _asked(count: int, samples: int, tests: int, looks: int = 1) -> float:

@@ -110,6 +110,10 @@ class Term(eqx.Module):
                 found.append(dataclasses.replace(one, name=field.name))
         return tuple(found)
 
+    def numbers(self) -> tuple[Any, ...]:
+        """Values of the strengths, in the same order."""
+        return tuple(getattr(self, one.name) for one in self.strengths())
+
     def parameters(self, place: int) -> list[Parameter]:
         """Parameters of a fit, of the term at some place of a `WithTerms`."""
         return [

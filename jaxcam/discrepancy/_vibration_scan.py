@@ -7,15 +7,15 @@ that a fit with that frequency promises.
 """
 
 import dataclasses
-from typing import NamedTuple
+from typing import Any
 
+import jax
 import numpy as np
 from jaxtyping import Complex, Float
 
 from ..fitting import Problem
 from ..fitting._fit import invert
-from ..fitting._linearise import Point
-from ._local_force import force_response, Response
+from ._local_force import Response
 
 
 # Frequencies a resolution cell (one over the length of a record)
@@ -56,13 +56,11 @@ class Periodogram:
         return max(1, len(self.frequency) // _FINE)
 
 
-def periodogram(problem: Problem, point: Point, free: tuple[str, ...]) -> Periodogram:
-    """Scan all frequencies that the flights can show, about a point.
+def periodogram(problem: Problem, response: Response) -> Periodogram:
+    """Scan all frequencies that the flights can show.
 
-    **Arguments:** a problem whose system is a `WithTerms`, and the names of the
-    parameters that are free beside the vibration.
+    **Arguments:** the problem, and its `Response` about a fit.
     """
-    response = force_response(problem, point, free)
     frequency = _frequencies(problem)
     if not len(frequency):
         none = np.zeros(1)
@@ -70,22 +68,22 @@ def periodogram(problem: Problem, point: Point, free: tuple[str, ...]) -> Period
     rate = 2 * np.pi * frequency
     size = len(response.prior)
     information, score = np.diag(response.prior), response.pull.copy()
-    records = []
-    for r in range(len(response.exists)):
-        found = _reduced(response, r, rate)
-        used = np.flatnonzero(response.place[r] >= 0)
-        rows = response.place[r][used]
-        information[np.ix_(rows, rows)] += found.pp[np.ix_(used, used)]
-        score[rows] += found.p[used]
+    parts = []
+    for r, place in enumerate(response.place):
+        sums = _summed(response, r, rate)
+        used = np.flatnonzero(place >= 0)
+        rows = place[used]
+        information[np.ix_(rows, rows)] += sums.pp[np.ix_(used, used)]
+        score[rows] += sums.p[used]
         across = np.zeros((size, len(rate)), dtype=complex)
-        across[rows] = found.pf[used]
-        records.append(found._replace(pf=across))
+        across[rows] = sums.pf[used]
+        parts.append((across, sums.f, sums.ff, sums.fc))
     inside = invert(information)
     inside = np.where(np.isfinite(inside), inside, 0.0)
-    whole = [sum(part) for part in zip(*(r[2:] for r in records))]
+    whole = tuple(sum(part) for part in zip(*parts))
     gain = _gain(inside, score, [whole])
-    separate = _gain(inside, score, [r[2:] for r in records])
-    return Periodogram(frequency, gain, separate, len(records))
+    separate = _gain(inside, score, parts)
+    return Periodogram(frequency, gain, separate, len(parts))
 
 
 def _frequencies(problem: Problem) -> Float[np.ndarray, " k"]:
@@ -97,68 +95,71 @@ def _frequencies(problem: Problem) -> Float[np.ndarray, " k"]:
     return np.arange(_LEAST / length, top, 1 / (_FINE * length))
 
 
-class _Reduced(NamedTuple):
-    """Of one record, its states eliminated, for a force `exp(i w t)` at each rate.
+class _Sums:
+    """Of one record, what its pieces add up to for a force `exp(i w t)` at each rate.
 
     `pp`, `p` of the parameters; `pf` couples them to the force; `f` is its score,
     `ff` the sum of squares of its rows and `fc` that of their absolute squares.
     """
 
-    pp: Float[np.ndarray, "m m"]
-    p: Float[np.ndarray, " m"]
-    pf: Complex[np.ndarray, "m w"]
-    f: Complex[np.ndarray, " w"]
-    ff: Complex[np.ndarray, " w"]
-    fc: Float[np.ndarray, " w"]
+    def __init__(self, pp, p, rates: int):
+        self.pp, self.p = np.array(pp), np.array(p)
+        self.pf = np.zeros((len(p), rates), dtype=complex)
+        self.f, self.ff = np.zeros((2, rates), dtype=complex)
+        self.fc = np.zeros(rates)
+
+    def add_piece(self, inner, slope, waves, shaken):
+        """Information `inner` and score of parameters, then nodes of one piece."""
+        m = len(self.p)
+        self.pp += inner[:m, :m]
+        self.p += slope[:m]
+        self.pf += shaken[:m]
+        self.f += slope[m:] @ waves
+        self.ff += np.sum(waves * shaken[m:], axis=0)
+        self.fc += np.sum(np.real(np.conj(waves) * shaken[m:]), axis=0)
+
+    def add_rows(self, direct, pushed, off, sign=1.0):
+        """Rows for the parameters and the force, and what they are to explain."""
+        self.pp += sign * direct.T @ direct
+        self.p += sign * direct.T @ off
+        self.pf += sign * direct.T @ pushed
+        self.f += sign * off @ pushed
+        self.ff += sign * np.sum(pushed * pushed, axis=0)
+        self.fc += sign * np.sum(pushed.real**2 + pushed.imag**2, axis=0)
 
 
-def _reduced(response: Response, r: int, rate) -> _Reduced:
-    """The chain of pieces of one record from its first to its last."""
-    found = response.pieces
-    n = found.later.shape[-1]
-    m = response.place.shape[1]
+def _summed(response: Response, r: int, rate) -> _Sums:
+    """The states of one record eliminated, from its first piece to its last."""
+    found: Any = jax.tree.map(lambda part: part[r], response.pieces)
+    n, m = found.later.shape[-1], response.place.shape[1]
     p, l = slice(n, n + m), slice(n + m, None)
-    pp, ps = found.pp[r, :m, :m].copy(), found.p[r, :m].copy()
-    pf = np.zeros((m, len(rate)), dtype=complex)
-    f, ff = np.zeros((2, len(rate)), dtype=complex)
-    fc = np.zeros(len(rate))
-
-    def add(rows_p, rows_f, sign=1.0):
-        """Products of columns for the parameters, one, and the force."""
-        nonlocal pp, ps, pf, f, ff, fc
-        (a, one), (b, other) = rows_p, rows_f
-        pp, ps = pp + sign * a.T @ a, ps + sign * a.T @ one
-        pf, f = pf + sign * a.T @ b, f + sign * other @ b
-        ff, fc = ff + sign * np.sum(b * b, axis=0), fc + sign * np.sum(_square(b), 0)
-
-    before, waves_before = None, None
+    sums = _Sums(found.pp[:m, :m], found.p[:m], len(rate))
+    before, waves_before = [], np.zeros((0, 0))
     for k in np.flatnonzero(response.exists[r]):
-        inner, slope = found.information[r, k], found.slope[r, k]
+        inner, slope = found.information[k], found.slope[k]
         waves = _waves(response.time[r, k], rate)
         shaken = inner[:, l] @ waves
-        pp, ps = pp + inner[p, p], ps + slope[p]
-        pf, f = pf + shaken[p], f + slope[l] @ waves
-        ff = ff + np.sum(waves * shaken[l], axis=0)
-        fc = fc + np.sum(np.real(np.conj(waves) * shaken[l]), axis=0)
+        sums.add_piece(inner[n:, n:], slope[n:], waves, shaken[n:])
+        # information of the state: with itself, parameters, what is off, and the force
         here = [inner[:n, :n], inner[:n, p], slope[:n], shaken[:n]]
-        if before is not None:
-            later, off = found.later[r, k], -found.tied[r, k]
-            earlier = found.earlier[r, k]
-            direct = earlier[:, p] + found.direct[r, k, :, :m]
+        if before:
+            later, earlier, off = found.later[k], found.earlier[k], -found.tied[k]
+            direct = earlier[:, p] + found.direct[k, :, :m]
             pushed = earlier[:, l] @ waves_before
-            add((direct, off), (pushed, off))
-            sides = [later, direct, off, pushed]
-            here = [x + later.T @ y for x, y in zip(here, sides)]
-            sides[0] = earlier[:, :n]
-            before = [x + sides[0].T @ y for x, y in zip(before, sides)]
-            half, coupled = _halved(before, sides[0].T @ later)
-            add((half[1], half[2]), (half[3], half[2]), -1.0)
-            here = [x - coupled.T @ y for x, y in zip(here, (coupled, *half[1:]))]
+            sums.add_rows(direct, pushed, off)
+            rows = [direct, off, pushed]
+            here = [x + later.T @ y for x, y in zip(here, (later, *rows))]
+            earlier = earlier[:, :n]
+            before = [x + earlier.T @ y for x, y in zip(before, (earlier, *rows))]
+            (_, direct, off, pushed), coupled = _halved(before, earlier.T @ later)
+            sums.add_rows(direct, pushed, off, -1.0)
+            taken = (coupled, direct, off, pushed)
+            here = [x - coupled.T @ y for x, y in zip(here, taken)]
         before, waves_before = here, waves
-    if before is not None:
-        half, _ = _halved(before, np.zeros((n, 0)))
-        add((half[1], half[2]), (half[3], half[2]), -1.0)
-    return _Reduced(pp, ps, pf, f, ff, fc)
+    if before:
+        (_, direct, off, pushed), _ = _halved(before, np.zeros((n, 0)))
+        sums.add_rows(direct, pushed, off, -1.0)
+    return sums
 
 
 def _halved(blocks, coupling):
@@ -178,10 +179,6 @@ def _waves(time, rate) -> Complex[np.ndarray, "l w"]:
     for k in range(1, len(time)):
         np.multiply(found[k - 1], turn, out=found[k])
     return found
-
-
-def _square(values):
-    return values.real**2 + values.imag**2
 
 
 def _gain(inside, score, parts) -> Float[np.ndarray, " w"]:

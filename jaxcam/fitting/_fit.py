@@ -270,7 +270,8 @@ def free_columns(problem: Problem, free: Iterable[str] | None) -> Columns:
     records = len(problem.segments)
     picked = [k for k, p in enumerate(problem.parameters) if p.name in wanted]
     parameter, record, scale = [], [], []
-    place = -np.ones((records, width_of(len(picked))), dtype=int)
+    # as wide for any choice of them, which is one program then
+    place = -np.ones((records, width_of(len(problem.names))), dtype=int)
     local = np.zeros_like(place)
     for column, k in enumerate(picked):
         one = problem.parameters[k]

@@ -134,10 +134,10 @@ def _record(layout, pieces: Pieces, extras, values, states, columns, scales):
 
     found = linear(model_at, pieces, extras, states, columns.shape[0])
     costs = Costs(found.flown_cost, found.joint_cost, found.rested_cost)
-    return _chained(found), costs
+    return chained(found), costs
 
 
-def _chained(found: Linear) -> Blocks:
+def chained(found: Linear) -> Blocks:
     """Pieces and their joints added up, as a chain."""
     size = found.later.shape[-1]
     information, later = found.information, found.later
