@@ -9,6 +9,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from ..fitting import Fit, fit, Problem
+from ..fitting._linearise import Point
 from ._engine import added, Blocks, blocks_of, gain
 from ._local_force import force_response, Response
 from ._term import Term
@@ -20,6 +21,12 @@ FALSE_ALARMS = 0.01
 MOST_TERMS = 3
 # How many of the best subsets of each size are built upon, and how many are tried
 _KEPT, _TRIED = 3, 6
+# Iterations of a first look at a subset, and at most of one that may win
+_QUICK, _ITERATIONS = 15, 60
+# Subsets within this BIC of the best one may lead to a better one than it does
+_RIVAL = 50.0
+# Standard deviations of what is known of a rig beyond which its fit went astray
+_FAR = 3.0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -80,41 +87,50 @@ class Search:
 
     def run(self) -> Trial:
         """The best subset; empty where no term is worth its parameters."""
-        best = self._attempt(frozenset(), None)
+        best = self._attempt(frozenset(), None, _ITERATIONS)
         assert best is not None
         kept = [best]
         for size in range(1, MOST_TERMS + 1):
-            promised: dict[frozenset[str], tuple[float, Trial]] = {}
-            for place, trial in enumerate(kept):
-                # a scan takes longer than a fit, and one more tells little else
-                scan = self.scan(trial.names if place == 0 else kept[0].names)
-                for names, bic in self._promises(trial, scan).items():
-                    if names not in promised or bic < promised[names][0]:
-                        promised[names] = bic, trial
+            promised = self._promised(kept, best)
             most = len(self.terms) if size == 1 else _TRIED
-            if size > 1:
-                # what the best subset lacks, its own scores know best
-                own = self._promises(best, self.scan(best.names))
-                promised = {
-                    names: said
-                    for names, said in promised.items()
-                    if not names > best.names or names in own
-                }
             order = sorted(promised, key=lambda n: promised[n][0])[:most]
             for k, names in enumerate(order):
                 said = " and ".join(sorted(names)).replace("_", " ")
                 self.progress(f"fitting {said}", k / len(order))
                 self._attempt(names, promised[names][1])
             found = [t for n, t in self.trials.items() if len(n) == size]
-            kept = sorted(found, key=lambda t: t.bic)[:_KEPT]
-            kept = [t for t in kept if t.bic < best.bic]
+            lowest = min((t.fit.cost for t in self.trials.values()), default=math.inf)
+            kept = sorted(found, key=_bic)[:_KEPT]
+            kept = [self._finished(t) if t.fit.cost < 2 * lowest else t for t in kept]
+            kept = sorted((t for t in kept if t.bic < best.bic), key=_bic)
             if not kept:
                 break
             best = self._better(best, kept[0])
         return self._swapped(self._smallest(best))
 
+    def _promised(
+        self, kept: Sequence[Trial], best: Trial
+    ) -> dict[frozenset[str], tuple[float, Trial]]:
+        """Subsets with one term more than those kept: the BIC promised, and by whom."""
+        promised: dict[frozenset[str], tuple[float, Trial]] = {}
+        # what the best subset lacks, its own scores know best
+        own = self._promises(best, self.scan(best.names))
+        for trial in kept:
+            # where the best one lacks nothing, only its equals can lead further
+            if not own and trial.bic > best.bic + _RIVAL:
+                continue
+            for names, bic in self._promises(trial, self.scan(best.names)).items():
+                if names > best.names and names not in own:
+                    continue
+                if names not in promised or bic < promised[names][0]:
+                    promised[names] = bic, trial
+        return promised
+
     def _smallest(self, best: Trial) -> Trial:
         """Terms that the others can do without, by the error rate too, are dropped."""
+        for name in sorted(best.names):
+            # the same place with one term less: a fit of its own may have gone astray
+            self._attempt(best.names - {name}, best, _ITERATIONS)
         for size in range(len(best.names)):
             enough = []
             for names in itertools.combinations(sorted(best.names), size):
@@ -217,16 +233,30 @@ class Search:
 
     def _frequency(self, start: Trial) -> float:
         """The best known frequency to start from."""
-        scan = self.scans.get(start.names)
-        if scan is None:
-            scan = list(self.scans.values())[-1]
+        known = self.scans.get(start.names) or next(iter(self.scans.values()), None)
+        scan = known or self.scan(start.names)
         return scan.best[0]
 
-    def _attempt(self, names: frozenset[str], start: Trial | None) -> Trial | None:
-        point = None
+    def _attempt(
+        self, names: frozenset[str], start: Trial | None, iterations: int = _QUICK
+    ) -> Trial | None:
+        """Fit a subset from where another one ended.
+
+        A fit without the right term may end far from the rig, in a valley that leads
+        nowhere. Then the nominal parameters are a better place to start from.
+        """
+        free, places = self.parameters(names), [self.problem.start]
         if start is not None:
-            point = self._seeded(names, start)
-        found = fit(self.problem, free=self.parameters(names), start=point)
+            ended = self._seeded(names, start, start.fit.point)
+            nominal = self._seeded(names, start, self.problem.start)
+            places = [ended, nominal] if self._sound(start.fit) else [nominal, ended]
+        found = fit(self.problem, free=free, start=places[0], iterations=iterations)
+        least = min((t.fit.cost for t in self.trials.values()), default=math.inf)
+        for place in places[1:]:
+            if self._sound(found) or found.cost > 2 * least:
+                break
+            again = fit(self.problem, free=free, start=place, iterations=iterations)
+            found = min(found, again, key=_cost)
         if not math.isfinite(found.cost):
             self.failed.add(names)
             return None
@@ -235,20 +265,51 @@ class Search:
         trial = Trial(names, found, bic, count)
         if names not in self.trials or bic < self.trials[names].bic:
             self.trials[names] = trial
+            # what was said about the fit before holds no more
+            for known in (self.scans, self.responses, self.linear):
+                known.pop(names, None)
         return self.trials[names]
 
-    def _seeded(self, names: frozenset[str], start: Trial):
-        """The point of another fit; terms it does not share are without effect."""
-        values = np.array(start.fit.point.values)
+    def _finished(self, trial: Trial) -> Trial:
+        """A subset that may win is fitted to the end."""
+        if trial.fit.converged:
+            return trial
+        return self._attempt(trial.names, trial, _ITERATIONS) or trial
+
+    def _sound(self, found: Fit) -> bool:
+        """Whether a fit ended, and within a few tolerances of what the rig is."""
+        if not found.converged:
+            return False
+        start = np.asarray(self.problem.start.values)[0]
+        for name in self.rig:
+            known = self.problem.parameter(name).prior_stderr
+            nominal = start[self.problem.names.index(name)]
+            if abs(found[name].value - nominal) > _FAR * known:
+                return False
+        return True
+
+    def _seeded(self, names: frozenset[str], start: Trial, place: Point) -> Point:
+        """A place to start from; terms that another fit lacks are without effect."""
+        values = np.array(place.values)
         everything = self.problem.names
         for term in self.terms:
             for one in term.strengths():
                 column = everything.index(one.name)
                 if one.inner and term.name in names - start.names:
                     values[:, column] = self._frequency(start)
-                elif term.name not in names and not one.inner:
+                elif one.inner:
+                    values[:, column] = start.fit.point.values[:, column]
+                elif term.name not in names:
                     values[:, column] = 0.0
-        return start.fit.point._replace(values=values)
+        return place._replace(values=values)
+
+
+def _bic(trial: Trial) -> float:
+    return trial.bic
+
+
+def _cost(found: Fit) -> float:
+    return found.cost if math.isfinite(found.cost) else math.inf
 
 
 def values_of(found: Fit, blocks: Blocks) -> np.ndarray:

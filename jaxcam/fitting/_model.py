@@ -95,6 +95,28 @@ class Turning(eqx.Module):
         )
 
 
+class Input(eqx.Module):
+    """An input that was measured, such as a force or a voltage: where a system keeps it.
+
+    While a recording is predicted, the system has the value that its own recording had,
+    each sample held until the next one, as digital controllers do; over a step of the
+    integration, its mean.
+
+    **Arguments:**
+
+    - `channel`: of the recordings.
+    - `value`: picks the field out of the system, such as `lambda s: s.force`.
+    """
+
+    channel: str = eqx.field(static=True)
+    value: Callable[[HybridSystem], Array] = eqx.field(static=True)
+
+    def at(self, system, t, level, rate):
+        """The system with its input at `level`."""
+        del t, rate
+        return eqx.tree_at(self.value, system, level)
+
+
 class Model(eqx.Module):
     """A system and the sensors that see it; what parameters are picked from.
 
@@ -102,12 +124,13 @@ class Model(eqx.Module):
 
     - `system`: any `HybridSystem`.
     - `sensors`: a `Sensor` for each channel that is fitted.
-    - `drive`: for a system that is turned by a measured drive.
+    - `drive`: for a system that is turned by a measured drive, or that has a measured
+        input.
     """
 
     system: HybridSystem
     sensors: Mapping[str, Sensor]
-    drive: Turning | None = None
+    drive: Turning | Input | None = None
 
     def driven(self, t, angle, rate) -> HybridSystem:
         """The system as it is near time `t`."""

@@ -48,6 +48,7 @@ class Pieces(eqx.Module):
     - `joint`: what comes before each piece of flight: nothing, flight, or an impact.
     - `exists`: false where padded. `angle`, `rate` `(r, k, n)`: the drive in the middle
         of each step; `angle_at`, `rate_at` `(r, k)`: at the beginning of each piece.
+        Of a measured input, `angle` is the level and `rate` is zero.
     - `rest_angle`, `rest_rate` `(r, kc, n + 1)`: the drive at each node of contact.
     - `reach`: how far (s) an impact may be from its recorded time.
     - `drive_error`: standard errors of angle and rate of the drive, per record.
@@ -127,9 +128,14 @@ def _margin(edge, interval: float) -> float:
 
 
 def gather(
-    segments: Sequence[Segments], channels: Sequence[str], steps: int
+    segments: Sequence[Segments],
+    channels: Sequence[str],
+    steps: int,
+    measured: str | None = None,
 ) -> tuple[Pieces, list[tuple[list[Span], list[Span]]]]:
     """Pieces of some records, padded so that similar records share a program.
+
+    **Arguments:** `measured` is the channel of an input, in the place of a drive.
 
     **Raises:** `RecordingError` where there is nothing to fit.
     """
@@ -163,9 +169,17 @@ def gather(
         rest_exists[row, : len(contacts)] = True
     middle = flown.start[..., None] + flown.step[..., None] * (np.arange(steps) + 0.5)
     nodes = rested.start[..., None] + rested.step[..., None] * np.arange(steps + 1)
-    angle, rate = _drive(segments, middle)
-    angle_at, rate_at = _drive(segments, flown.start)
-    rest_angle, rest_rate = _drive(segments, nodes)
+    if measured is None:
+        angle, rate = _drive(segments, middle)
+        angle_at, rate_at = _drive(segments, flown.start)
+        rest_angle, rest_rate = _drive(segments, nodes)
+    else:
+        angle = _mean_input(segments, measured, flown, steps)
+        angle_at = _input(segments, measured, flown.start)
+        rest_angle = _input(segments, measured, nodes)
+        rate, rate_at, rest_rate = (
+            np.zeros(part.shape) for part in (angle, angle_at, rest_angle)
+        )
     pieces = Pieces(
         flown,
         rested,
@@ -217,6 +231,28 @@ def _drive(segments, times):
             angle[row] = np.interp(at, time, part.drive.angle)
             rate[row] = np.interp(at, time, part.drive.rate)
     return angle, rate
+
+
+def _input(segments, channel: str, times):
+    """Each record's input at some times, held since the sample before, of that shape."""
+    found = np.zeros(times.shape)
+    for row, part in enumerate(segments):
+        time = part.recording.time
+        last = np.searchsorted(time, times[row], side="right") - 1
+        found[row] = part.recording[channel][np.maximum(last, 0)]
+    return found
+
+
+def _mean_input(segments, channel: str, flown: Samples, steps: int):
+    """Mean of each record's input over every step, shape `(r, k, n)`."""
+    step = np.asarray(flown.step)[..., None]
+    edges = np.asarray(flown.start)[..., None] + step * np.arange(steps + 1)
+    found = np.zeros((*flown.start.shape, steps))
+    for row, part in enumerate(segments):
+        time, level = part.recording.time, part.recording[channel]
+        total = np.concatenate([[0.0], np.cumsum(level[:-1] * np.diff(time))])
+        found[row] = np.diff(np.interp(edges[row], time, total)) / step[row]
+    return found
 
 
 def _drive_error(part: Segments) -> tuple[float, float]:

@@ -59,7 +59,7 @@ from ..recordings._flight_fit import state_at
 from ..recordings._polynomial import fit_local
 from ._linear import Extras, Sharpness
 from ._linearise import assemble, Layout, Point
-from ._model import filtered_channels, Model
+from ._model import filtered_channels, Input, Model
 from ._parameter import Parameter
 from ._pieces import gather, IMPACT, Pieces, Span
 from ._predict import fly
@@ -138,16 +138,23 @@ class Problem:
         layout = Layout(model, _places(model, parameters))
         nominal = np.array([float(p.where(model)) for p in parameters])
         values = np.tile(nominal, (len(segments), 1))
-        steps = _STEPS
+        measured = model.drive.channel if isinstance(model.drive, Input) else None
+        steps, extras = _STEPS, None
         while True:
-            pieces, cuts = gather(segments, tuple(model.sensors), steps)
+            pieces, cuts = gather(segments, tuple(model.sensors), steps, measured)
+            if steps < _MOST_STEPS and not _follows(model, segments, pieces):
+                steps *= 2
+                continue
             states, guess = _starts(model, segments, cuts, pieces)
             point = Point(jnp.asarray(values), jnp.asarray(states))
-            extras = _extras(layout, pieces, point, guess)
-            settled = _follows(model, pieces) and _fine(layout, pieces, extras, point)
-            if steps >= _MOST_STEPS or settled:
+            if extras is None:
+                # as a scale of errors, that of the first steps will do for all
+                extras, first = _extras(layout, pieces, point, guess), steps
+            if steps >= _MOST_STEPS or _fine(layout, pieces, extras, point):
                 break
             steps *= 2
+        if steps > first:
+            extras = _extras(layout, pieces, point, guess)
         pieces = jax.tree.map(jnp.asarray, pieces)
         return Problem(
             model,
@@ -294,7 +301,9 @@ def _still(model: Model, part: Segments):
     """The system with its drive at the mean speed; its field serves as a guide only."""
     if part.drive is None:
         return model.system
-    return model.driven(0.0, part.drive.phase, part.drive.speed)
+    # arrays: numbers would be constants of a program that is compiled for each record
+    angle, rate = (jnp.asarray(x) for x in (part.drive.phase, part.drive.speed))
+    return model.driven(0.0, angle, rate)
 
 
 def _with_samples(side: list[Span]):
@@ -411,12 +420,15 @@ def _drive_slopes(layout: Layout, pieces: Pieces, point: Point):
     )
 
 
-def _follows(model: Model, pieces: Pieces) -> bool:
-    """Whether the steps are short beside the filters of the sensors.
+def _follows(model: Model, segments, pieces: Pieces) -> bool:
+    """Whether the steps are short beside the filters of the sensors, and the input.
 
     A filter is not at rest after an impact, which the states to begin with do not show.
     """
     longest = float(np.max(np.where(pieces.exists, pieces.flown.step, 0.0)))
+    interval = min(part.recording.interval for part in segments)
+    if isinstance(model.drive, Input) and longest > interval:
+        return False
     corners = [2 * np.pi * s.bandwidth_hz for s in model.sensors.values() if s.filtered]
     return all(longest * corner <= _FILTER_STEP for corner in corners)
 

@@ -1,0 +1,189 @@
+"""How often is an effect named, by its strength, and how often where there is none?
+
+Rigs drawn at random from the box of tolerances, one effect or none, three records of
+two seconds at random speeds, made by a scalar loop (`_numba_rig`) that shares nothing
+with the diagnosis. Strengths are multiples of the least one that a diagnosis of the
+same kind of records says it would name. Prints a table and keeps each verdict in a file
+of JSON lines, from which an interrupted run goes on.
+
+    python -m benchmarks.power --nulls 200
+    python -m benchmarks.power --effects --draws 10
+    python -m benchmarks.power --unlisted --draws 10
+"""
+
+import argparse
+import dataclasses
+import json
+import math
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+
+import jaxcam  # noqa: F401  64-bit floats
+from jaxcam.data import DEMO_RIG
+from jaxcam.data.make_demo import measure
+from jaxcam.discrepancy import diagnose
+from jaxcam.recordings import read_rig, Recording
+
+from ._numba_rig import Hidden, simulate
+from .coverage import random_rig
+
+
+DURATION, SETTLE = 2.0, 8.0
+SPANS_RPM = ((128.0, 145.0), (146.0, 158.0), (159.0, 175.0))
+LEVELS = (0.5, 1.0, 2.0, 4.0)
+#: name of the effect, its number in `Hidden`, and a unit where no limit is stated
+EFFECTS = {
+    "viscous_damping": ("c1", None),
+    "coulomb_friction": ("fc", None),
+    "quadratic_drag": ("c2", None),
+    "nonlinear_spring": ("k3", None),
+    "restitution_velocity": ("rb", None),
+    "cam_profile_error": ("run", None),
+    "sensor_lag": ("lag", None),
+    "external_vibration": ("ext", 0.03),
+    "drive_ripple": ("eps", 2e-6),
+}
+#: effects that have no name, and strengths at which they matter
+UNLISTED = {"imbalance": 0.3, "fading": 0.005, "step": 0.1, "one_way": 0.1}
+
+
+def case(nominal, hidden: Hidden, rng) -> tuple[Recording, ...]:
+    """Three records of one rig."""
+    real = dataclasses.replace(random_rig(nominal, rng), damping=0.0)
+    if hidden.ext:
+        hidden = dataclasses.replace(hidden, fe=rng.uniform(12.0, 40.0))
+    sensors, runs = nominal.sensors, []
+    for number, span in enumerate(SPANS_RPM, start=1):
+        speed = rng.uniform(*span) * math.pi / 30
+        truth = simulate(real, hidden, speed, DURATION, SETTLE)
+        turned = truth.turned - 2 * np.pi * np.floor(truth.turned[0] / (2 * np.pi))
+        channels = {
+            "cam_angle_rad": measure(
+                turned, sensors.cam_noise, sensors.cam_counts_per_turn, rng
+            ),
+            "follower_angle_rad": measure(
+                truth.angle,
+                sensors.follower_noise,
+                sensors.follower_counts_per_turn,
+                rng,
+            ),
+        }
+        runs.append(Recording(f"run{number}", truth.time, channels))
+    return tuple(runs)
+
+
+def judged(nominal, effect: str, strength: float, number: int) -> dict:
+    """Verdict on one case, whose rig and noise follow from its number."""
+    rng = np.random.default_rng([number, sum(effect.encode())])
+    field = EFFECTS[effect][0] if effect in EFFECTS else effect
+    hidden = Hidden() if effect == "none" else Hidden(**{field: strength})
+    begun = time.process_time()
+    found = diagnose(nominal, case(nominal, hidden, rng))
+    sizes = [e.parameters[field] for e in found.effects if field in e.parameters]
+    return {
+        "effect": effect,
+        "strength": strength,
+        "number": number,
+        "verdict": found.verdict,
+        "names": sorted(found.names),
+        "where": sorted({e.where for e in found.effects}),
+        "size": [(one.value, one.stderr) for one in sizes],
+        "after": found.heldout_after / found.noise_floor,
+        "limits": {name: one.value for name, one in found.limits.items()},
+        "seconds": time.process_time() - begun,
+    }
+
+
+class Kept:
+    """Verdicts in a file, computed where they are not there yet."""
+
+    def __init__(self, file: Path):
+        self.file, self.nominal = file, read_rig(DEMO_RIG / "rig.toml")
+        lines = file.read_text().splitlines() if file.exists() else []
+        self.known = {_key(one): one for one in map(json.loads, lines)}
+
+    def get(self, effect: str, strength: float, number: int) -> dict:
+        key = effect, float(f"{strength:.6g}"), number
+        if key not in self.known:
+            one = judged(self.nominal, *key)
+            self.known[key] = one
+            with self.file.open("a") as stream:
+                stream.write(json.dumps(one) + "\n")
+            said = " ".join(one["names"]) or one["verdict"]
+            print(*key, said, f"{one['seconds']:.0f} s", file=sys.stderr, flush=True)
+        return self.known[key]
+
+
+def _key(one: dict) -> tuple[str, float, int]:
+    return one["effect"], one["strength"], one["number"]
+
+
+def nulls(kept: Kept, count: int) -> None:
+    cases = [kept.get("none", 0.0, number) for number in range(count)]
+    wrong = [one for one in cases if one["verdict"] != "none"]
+    print(f"nulls: {len(wrong)} of {count} are not `none`")
+    for one in wrong:
+        print(f"  case {one['number']}: {one['verdict']} {' '.join(one['names'])}")
+
+
+def powers(kept: Kept, draws: int, names) -> None:
+    limits = [kept.get("none", 0.0, number)["limits"] for number in range(3)]
+    print("| effect | unit | " + " | ".join(f"x {x:g}" for x in LEVELS) + " | size |")
+    print("| --- | --- |" + " --- |" * (len(LEVELS) + 1))
+    for effect in names:
+        field, unit = EFFECTS[effect]
+        unit = unit or float(np.median([one[field] for one in limits]))
+        cells, off = [], []
+        for level in LEVELS:
+            cases = [kept.get(effect, level * unit, k) for k in range(draws)]
+            right = [one["names"] == [effect] for one in cases]
+            cells.append(f"{sum(right)}/{draws}")
+            if level == LEVELS[-1]:
+                found = [one["size"][0] for one in cases if one["size"]]
+                off = [abs(v - level * unit) for v, e in found]
+                good = [
+                    o < max(0.15 * level * unit, 2 * e) for o, (v, e) in zip(off, found)
+                ]
+                cells.append(f"{sum(good)}/{len(found)}")
+        print(f"| {effect} | {unit:.3g} | " + " | ".join(cells) + " |", flush=True)
+
+
+def unlisted(kept: Kept, draws: int) -> None:
+    print("| not in the list | strength | unknown | where | none | named |")
+    print("| --- | --- | --- | --- | --- | --- |")
+    for effect, size in UNLISTED.items():
+        for level in (1.0, 3.0):
+            cases = [kept.get(effect, level * size, k) for k in range(draws)]
+            kinds = [one["verdict"] for one in cases]
+            where = sorted({w for one in cases for w in one["where"]})
+            named = sorted({n for one in cases for n in one["names"]} - {"unknown"})
+            print(
+                f"| {effect} | {level * size:.3g} | {kinds.count('unknown')}/{draws} | "
+                f"{' '.join(where)} | {kinds.count('none')} | "
+                f"{kinds.count('effect')} {' '.join(named)} |",
+                flush=True,
+            )
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--nulls", type=int, default=0)
+    parser.add_argument("--effects", nargs="*", choices=EFFECTS)
+    parser.add_argument("--unlisted", action="store_true")
+    parser.add_argument("--draws", type=int, default=10)
+    parser.add_argument("--file", type=Path, default=Path("power.jsonl"))
+    options = parser.parse_args()
+    kept = Kept(options.file)
+    if options.nulls:
+        nulls(kept, options.nulls)
+    if options.effects is not None:
+        powers(kept, options.draws, options.effects or list(EFFECTS))
+    if options.unlisted:
+        unlisted(kept, options.draws)
+
+
+if __name__ == "__main__":
+    main()
