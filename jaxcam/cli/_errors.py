@@ -22,6 +22,8 @@ _OPTIONS = (
     ('engine="diffeqsolve"', "--engine diffeqsolve"),
     ("pass one (diffrax.Dopri8(), diffrax.Tsit5())", "choose --solver dopri8"),
     ('gaps="split"', "--gaps split"),
+    ("pass resume=True", "give --resume"),
+    ("with resume=True", "with --resume"),
 )
 
 

@@ -28,13 +28,16 @@ _GROUP = 16
 class Stroboscope(eqx.Module):
     """Samples of many trajectories, as numpy arrays; NaN where a lane failed."""
 
-    #: (lanes, turns, n) states at t0 + k period, k = 1..turns
+    #: (lanes, turns, n) states at t0 + k period, k = 1..turns, without those skipped
     states: np.ndarray
     #: (lanes,) number of impacts and of attempted steps
     impacts: np.ndarray
     steps: np.ndarray
     #: (lanes,) 0 where the lane reached its end, else an index into `RESULTS`
     code: np.ndarray
+    #: (lanes, turns) impacts in each turn, and how many of them completed a chatter
+    hits: np.ndarray
+    rests: np.ndarray
 
 
 def stroboscope(
@@ -42,6 +45,7 @@ def stroboscope(
     states,
     turns: int,
     *,
+    skip: int = 0,
     t0: float = 0.0,
     where: Callable | None = None,
     values=None,
@@ -58,9 +62,10 @@ def stroboscope(
     **Arguments:**
 
     - `system`: the system; `where(system)` picks one of its parameters, which takes the
-      value `values[i]` in lane i (`where=lambda s: s.speed`). Without it all lanes
-      share the system.
+      value `values[i]` in lane i (`where=lambda s: s.speed`), or a tuple of several,
+      which take the row `values[i]`. Without it all lanes share the system.
     - `states`: shape `(lanes, n)`, or `(n,)` for all lanes alike.
+    - `skip`: number of turns at the start that are not sampled.
     - `period`: s; the system's own forcing period by default.
     - `settings`: accuracy; the default completes chatter as soon as theory allows.
     - `block`: lanes that advance together, of which each that ends makes room for the
@@ -86,8 +91,10 @@ def stroboscope(
     )
     if states.ndim == 1:
         states = np.broadcast_to(states, (lanes, states.shape[0]))
+    picked = None if where is None else where(system)
+    several = (len(picked),) if isinstance(picked, tuple) else ()
     if (where is None) != (values is None) or (
-        values is not None and values.shape != (lanes,)
+        values is not None and values.shape != (lanes, *several)
     ):
         raise ValueError(
             "give where and values together, with one value for each lane: "
@@ -100,6 +107,8 @@ def stroboscope(
         )
     if turns < 1:
         raise ValueError(f"turns is {turns}; give the number of periods, 1 or more")
+    if not 0 <= skip < turns:
+        raise ValueError(f"skip is {skip}; it must be less than the {turns} turns")
     start = jnp.asarray(t0, dtype=jnp.float64)
     _check(*_batch(system, where, values), settings, start, length, states)
 
@@ -111,8 +120,10 @@ def stroboscope(
     def work(first):
         some = slice(first, first + group)
         part = None if values is None else values[some]
+        seen = _Samples(len(states[some]), turns, skip, states.shape[1])
         shape = (start, length, turns, settings, width, rows, max_steps)
-        return _group(system, where, part, states[some], *shape)
+        ends = _group(system, where, part, states[some], *shape, seen)
+        return seen.states[:-1], *ends, *seen.counts()
 
     pieces = []
     with ThreadPoolExecutor(workers) as pool:
@@ -156,21 +167,85 @@ def _look(batched, shared, period, t0, states):
     return eqx.filter_vmap(one, in_axes=(eqx.if_array(0), 0))(batched, states)
 
 
+class _Samples:
+    """Samples of a group as they come, and what happened between them."""
+
+    # rows between two looks are far fewer than this; it packs three counts in one
+    _SHIFT = 20
+
+    def __init__(self, lanes: int, turns: int, skip: int, n: int):
+        self._turns, self._skip = turns, skip
+        # one more than there are lanes, for slots that have none
+        self.states = np.full((lanes + 1, turns - skip, n), np.nan)
+        # the first is for the turns skipped
+        self._hits = np.zeros((lanes + 1, turns - skip + 1), dtype=int)
+        self._rests = np.zeros((lanes + 1, turns - skip + 1), dtype=int)
+        # stops, impacts and completed chatters of each lane so far
+        self._so_far = np.zeros((3, lanes + 1), dtype=int)
+        self._weight = np.zeros(max(Row) + 1, dtype=int)
+        self._weight[Row.IMPACT] = 1
+        self._weight[Row.LAST_IMPACT] = 1 + (1 << self._SHIFT)
+        self._weight[Row.STOP] = 1 << 2 * self._SHIFT
+
+    @staticmethod
+    def row(record):
+        return [jnp.asarray(v) for v in (record.kind, *record.after)]
+
+    def take(self, work, log) -> None:
+        """Put what one stretch of the slots' log shows into its places."""
+        kind = log[..., 0].astype(np.int8)
+        packed = np.cumsum(self._weight[kind], axis=1)
+        who, row = np.nonzero(kind == Row.STOP)
+        stops, hits, rests = self._unpacked(packed[who, row])
+        lane = work[who]
+        place = self._so_far[0, lane] + stops - self._skip
+        # rounding may set the end of the run apart from its last stop
+        real = (place >= 0) & (place <= self._turns - self._skip)
+        at = lane[real], place[real]
+        self._hits[at] = (self._so_far[1, lane] + hits)[real]
+        self._rests[at] = (self._so_far[2, lane] + rests)[real]
+        real &= place > 0
+        self.states[lane[real], place[real] - 1] = log[who[real], row[real], 1:]
+        self._so_far[:, work] += np.stack(self._unpacked(packed[:, -1]))
+
+    def counts(self):
+        """Impacts and completed chatters in each turn; 0 where a lane failed."""
+        for counts in (self._hits, self._rests):
+            yield np.maximum(np.diff(counts[:-1], axis=1), 0)
+
+    def _unpacked(self, packed):
+        mask = (1 << self._SHIFT) - 1
+        return (
+            packed >> 2 * self._SHIFT,
+            packed & mask,
+            (packed >> self._SHIFT) & mask,
+        )
+
+
 def _group(
-    system, where, values, states, t0, period, turns, settings, width, rows, max_steps
+    system,
+    where,
+    values,
+    states,
+    t0,
+    period,
+    turns,
+    settings,
+    width,
+    rows,
+    max_steps,
+    seen,
 ):
     """Run some lanes, `width` at a time; a lane that ends makes room for the next.
 
     Lanes do not know of each other, so their order and company change no result.
+    `seen` takes the log, one `seen.row` an attempt, as it comes.
     """
-    lanes, n = states.shape
-    # one more than there are lanes, for slots that have none
-    samples = np.full((lanes + 1, turns, n), np.nan)
-    filled = np.zeros(lanes + 1, dtype=int)
+    lanes = len(states)
     ends = np.zeros((lanes + 1, 3), dtype=int)
     end = jnp.asarray(float(turns))
     started = _start(system, where, values, states, t0, period, end, settings, width)
-    values = None if values is None else np.append(values, values[-1])
+    values = None if values is None else np.concatenate([values, values[-1:]])
     work, used = np.minimum(np.arange(width), lanes), np.zeros(width)
     lane = jax.tree.map(lambda leaf: leaf[work], started)
     running, waiting = work < lanes, min(width, lanes)
@@ -178,8 +253,9 @@ def _group(
     while np.any(running):
         part = None if values is None else values[work]
         batched, shared = _batch(system, where, part)
-        lane, log = _some(batched, shared, period, t0, end, settings, lane, rows)
-        _harvest(samples, filled, work, np.asarray(log))
+        shape = (period, t0, end, settings, lane, rows, seen.row)
+        lane, log = _some(batched, shared, *shape)
+        seen.take(work, np.asarray(log))
         used += rows
         status = np.array(lane.status)
         over = running & ((status != RUNNING) | (used >= max_steps))
@@ -195,20 +271,7 @@ def _group(
         waiting += len(slots)
         lane = _exchanged(lane._replace(status=status), started, slots, fresh)
     codes = np.array([1, 0, 2, 3])[ends[:lanes, 0]]
-    return samples[:lanes], ends[:lanes, 1], ends[:lanes, 2], codes
-
-
-def _harvest(samples, filled, work, log) -> None:
-    """Put the samples of one stretch into their places."""
-    turns = samples.shape[1]
-    hit = log[..., 0] == float(Row.STOP)
-    rank = filled[work][:, None] + np.cumsum(hit, axis=1) - 1
-    who, row = np.nonzero(hit)
-    # rounding may set the end of the run apart from its last stop
-    real = rank[who, row] < turns
-    who, row = who[real], row[real]
-    samples[work[who], rank[who, row]] = log[who, row, 1:]
-    filled[work] += hit.sum(axis=1)
+    return ends[:lanes, 1], ends[:lanes, 2], codes
 
 
 def _start(system, where, values, states, t0, period, end, settings, width):
@@ -242,8 +305,10 @@ def _batch(system, where, values):
     if where is None:
         return None, system
     nothing = jax.tree.map(lambda _: False, system)
-    picked = eqx.tree_at(where, nothing, True)
-    full = eqx.tree_at(where, system, jnp.asarray(values))
+    picked = eqx.tree_at(where, nothing, replace_fn=lambda _: True)
+    values = jnp.asarray(values)
+    several = isinstance(where(system), tuple)
+    full = eqx.tree_at(where, system, tuple(values.T) if several else values)
     return eqx.partition(full, picked)
 
 
@@ -259,10 +324,6 @@ def _plan(system, period, t0, turns, settings):
         depth=settings.chatter_depth,
         tableau=tableau_of(settings.solver),
     )
-
-
-def _sample_row(record):
-    return [jnp.asarray(v) for v in (record.kind, *record.after)]
 
 
 @eqx.filter_jit
@@ -283,13 +344,13 @@ _WIDE: dict[str, Any] = {"compiler_options": {"xla_cpu_prefer_vector_width": 512
 
 
 @eqx.filter_jit(**_WIDE)
-def _some(batched, shared, period, t0, turns, settings, lane, rows):
+def _some(batched, shared, period, t0, turns, settings, lane, rows, row):
     t0 = jnp.asarray(t0, dtype=jnp.float64)
 
     def one(batched, lane):
         system = eqx.combine(batched, shared).prepared()
         plan = _plan(system, period, t0, turns, settings)
         functions = Functions(system, len(lane.x))
-        return run_raw(functions, plan, lane, rows, _sample_row, batch=True)
+        return run_raw(functions, plan, lane, rows, row, batch=True)
 
     return eqx.filter_vmap(one, in_axes=(eqx.if_array(0), 0))(batched, lane)

@@ -1,0 +1,206 @@
+"""Sweeps beside the bare event loop: speed kept, steps wasted, memory, two cores.
+
+    python -m benchmarks.sweeps                      # all parts
+    python -m benchmarks.sweeps --side 64 --largest 10000 --no-cluster
+
+The two workloads of `benchmarks.speed`. The bare loop is `stroboscope`, one call for
+all lanes; the sweep samples, labels, finds the attractors and stores to disk. One
+pinned core and minimum CPU time of interleaved runs, but for the parts on two cores,
+which are wall time; tolerance 1e-9 on both sides.
+"""
+
+import os
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+from benchmarks import _timing
+
+
+CORE = _timing.pin()
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import typer
+
+from benchmarks import _workloads
+from jaxcam.hybrid import _stroboscope, stroboscope
+from jaxcam.models import CamFollower, rpm_to_rad_s
+from jaxcam.sweeps import basins, cluster, diagram, Grid
+
+
+def rig() -> CamFollower:
+    """Table 4.4 at 145 rpm."""
+    speed = jnp.asarray(rpm_to_rad_s(145.0), dtype=float)
+    return eqx.tree_at(lambda s: s.speed, CamFollower(), speed)
+
+
+def states_at_145(side: int) -> Grid:
+    """The states of workload W2 as cells of a grid."""
+    low = _workloads.contact_angle(0.0) + 0.001
+    return Grid((low, -3.0), (low + 0.249, 3.0), (side, side))
+
+
+def all_cores() -> None:
+    for thread in os.listdir("/proc/self/task"):
+        os.sched_setaffinity(int(thread), range(os.cpu_count() or 1))
+
+
+def swept_to(work):
+    """The sweep with a new folder each time."""
+
+    def call():
+        with tempfile.TemporaryDirectory() as folder:
+            work(Path(folder) / "sweep")
+
+    return call
+
+
+def kept(repeats: int, side: int) -> None:
+    """How much of the bare loop's speed is left, and how many steps are wasted."""
+    system, grid, turns = rig(), states_at_145(side), 30
+    states, lanes = grid.states(), side * side
+    sweep = _workloads.sweep()
+
+    def basin(out):
+        basins(system, grid, turns, keep=12, reruns=0, out=out, workers=1)
+
+    def diagram_of(out):
+        diagram(
+            system, "speed", sweep.speed, sweep.start[:, None], turns=sweep.turns,
+            keep=50, out=out, workers=1,
+        )  # fmt: skip
+
+    parts = {
+        f"basin {side} x {side} x {turns}": (
+            lambda: stroboscope(system, states, turns, skip=turns - 12),
+            basin,
+            lanes * turns,
+        ),
+        "diagram 256 x 100": (
+            lambda: stroboscope(
+                system,
+                sweep.start,
+                sweep.turns,
+                skip=50,
+                where=lambda s: s.speed,
+                values=sweep.speed,
+            ),
+            diagram_of,
+            sweep.lane_turns,
+        ),
+    }
+    for title, (bare, swept, work) in parts.items():
+        calls = {"bare loop": bare, "sweep": swept_to(swept)}
+        rows = _timing.compare(calls, work=work, repeats=repeats)
+        print(f"\n{title}, turns/s")
+        print(_timing.table(rows))
+        idle = " and ".join(
+            f"{idle_slots(call):.1%}" for call in (bare, swept_to(swept))
+        )
+        print(f"attempts of idle slots: {idle}")
+
+
+def idle_slots(call) -> float:
+    """Part of the attempts that the compiled loop made without a lane in the slot."""
+    slots, steps, whole = [], [], _stroboscope._some
+
+    def counting(*arguments):
+        lane, rows = arguments[6], arguments[7]
+        made = whole(*arguments)
+        slots.append(rows * len(np.asarray(lane.status)))
+        steps.append(np.sum(np.asarray(made[0].steps) - np.asarray(lane.steps)))
+        return made
+
+    _stroboscope._some = counting
+    try:
+        call()
+    finally:
+        _stroboscope._some = whole
+    return float(1 - np.sum(steps) / np.sum(slots))
+
+
+def two_cores(side: int, repeats: int, on_cluster: bool) -> None:
+    """Wall time with one and two threads, and with one and two Dask workers."""
+    all_cores()
+    system, grid = rig(), states_at_145(side)
+
+    def run(**options):
+        basins(system, grid, 30, keep=12, reruns=0, block=8, **options)
+
+    def fastest(**options):
+        run(**options)
+        spent = []
+        for _ in range(repeats):
+            started = time.perf_counter()
+            run(**options)
+            spent.append(time.perf_counter() - started)
+        return min(spent)
+
+    one, two = fastest(workers=1), fastest(workers=2)
+    print(f"\ntwo threads: {one / two:.2f} times one ({one:.2f} s, {two:.2f} s)")
+    if not on_cluster:
+        return
+    spent = []
+    for workers in (1, 2):
+        with cluster("local", workers) as executor:
+            spent.append(fastest(executor=executor))
+    one, two = spent
+    print(f"two Dask workers: {one / two:.2f} times one ({one:.2f} s, {two:.2f} s)")
+
+
+_SCALE = """
+import resource, sys, time
+from benchmarks.sweeps import rig, states_at_145
+from jaxcam.sweeps import basins, Grid
+def peak():
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+lanes, folder = int(sys.argv[1]), sys.argv[2]
+side = round(lanes ** 0.5)
+# compiled, and every library loaded
+options = {"keep": 12, "reruns": 0, "workers": 1}
+basins(rig(), states_at_145(64), 30, out=folder + "/first", **options)
+before, started = peak(), time.perf_counter()
+basins(rig(), states_at_145(side), 30, out=folder + "/x", **options)
+print(side * side, time.perf_counter() - started, before, peak() - before)
+"""
+
+
+def scale(largest: int) -> None:
+    """Time and memory against the number of initial states, each in a new process."""
+    print("\n   states        s  us a turn  peak before (MB)  and beyond (MB)")
+    lanes = 10_000
+    while lanes <= largest:
+        with tempfile.TemporaryDirectory() as folder:
+            found = subprocess.run(
+                [sys.executable, "-c", _SCALE, str(lanes), folder],
+                capture_output=True,
+                text=True,
+                check=True,
+            ).stdout.split()
+        number, seconds, before, beyond = map(float, found[-4:])
+        each = seconds / number / 30 * 1e6
+        numbers = f"{number:9.0f}  {seconds:7.2f}  {each:9.2f}"
+        print(f"{numbers}  {before:16.0f}  {beyond:15.0f}")
+        lanes *= 10
+
+
+def main(
+    repeats: int = 3, side: int = 128, largest: int = 100_000, cluster: bool = True
+) -> None:
+    """Print all tables; `--side 64` makes them smaller, `--largest 1000000` longer."""
+    print(f"core {CORE}, jax {jax.__version__}")
+    kept(repeats, side)
+    two_cores(side, repeats, cluster)
+    scale(largest)
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    print(f"\npeak of this process: {peak:.0f} MB")
+
+
+if __name__ == "__main__":
+    typer.run(main)

@@ -1,0 +1,134 @@
+"""Pictures of basins of attraction."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import ListedColormap
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from ._axes import one_axes
+from ._diagram import COLOURS, NOTHING
+from ._labels import labelled
+from ._style import SECTION, styled
+
+
+if TYPE_CHECKING:
+    from ..sweeps import Basins
+
+
+# attractors with a colour and a line of the legend of their own
+_SHOWN = len(COLOURS) - 1
+_OTHERS = "#D9D9D9"
+_MARKS = "osD^vP*X"
+
+
+@styled
+def basin_picture(
+    basins: "Basins",
+    ax: Axes | None = None,
+    *,
+    axes: tuple[int, int] = (0, 1),
+    orbits: bool = True,
+) -> Figure:
+    """Draw which state ends on which attractor, a colour an attractor.
+
+    **Arguments:**
+
+    - `basins`: from [`jaxcam.sweeps.basins`][]; other components than those of `axes`
+        must have one value.
+    - `ax`: axes; a new figure without.
+    - `axes`: the components along x and y.
+    - `orbits`: whether the points of the attractors are marked.
+
+    **Returns:** the figure.
+
+    **Raises:** `ValueError` where a component that is not drawn has several values, or
+    one that is drawn has one.
+    """
+    ax = one_axes(ax)
+    grid = basins.grid
+    others = [i for i in range(len(grid.shape)) if i not in axes]
+    drawn = [grid.shape[i] for i in axes if i < len(grid.shape)]
+    if len(drawn) < 2 or min(drawn) < 2 or any(grid.shape[i] > 1 for i in others):
+        raise ValueError(
+            f"the grid is {grid.shape}; a picture needs several values of the two "
+            "components drawn, and one value of each other one"
+        )
+    number = np.moveaxis(basins.attractor, axes, (0, 1)).reshape(
+        grid.shape[axes[0]], grid.shape[axes[1]]
+    )
+    colours, handles = _colours(basins, orbits)
+    low, high = (np.array(corner)[list(axes)] for corner in (grid.low, grid.high))
+    # white below, one colour an attractor, grey for those without
+    index = np.where(number < 0, 0, np.minimum(number, len(colours) - 2) + 1)
+    image = ax.imshow(
+        index.T,
+        origin="lower",
+        extent=(low[0], high[0], low[1], high[1]),
+        cmap=ListedColormap(colours),
+        vmin=-0.5,
+        vmax=len(colours) - 0.5,
+        interpolation="nearest",
+        aspect="auto",
+    )
+    image.set_zorder(1)
+    if orbits:
+        _mark(ax, basins, axes)
+    components = basins.dataset["component"].values
+    units = basins.dataset["component_unit"].values
+    ax.set_xlabel(labelled(str(components[axes[0]]), str(units[axes[0]])))
+    ax.set_ylabel(labelled(str(components[axes[1]]), str(units[axes[1]])))
+    ax.set_xlim(low[0], high[0])
+    ax.set_ylim(low[1], high[1])
+    ax.grid(False)
+    ax.legend(
+        handles=handles,
+        loc="lower left",
+        bbox_to_anchor=(0.0, 1.0),
+        ncols=min(len(handles), 3),
+    )
+    return ax.figure  # pyright: ignore
+
+
+def _colours(basins, orbits: bool):
+    """Colours by number, behind one for what is no attractor; and the legend."""
+    names = basins.names
+    colours = [NOTHING, *COLOURS[: min(len(names), _SHOWN)]]
+    shares = basins.shares
+    handles: list = [
+        Patch(color=colour, label=f"{name}  {shares[name].share:.1%}")
+        for name, colour in zip(names, colours[1:], strict=False)
+    ]
+    if len(names) > _SHOWN:
+        rest = sum(shares[name].share for name in names[_SHOWN:])
+        colours.append(_OTHERS)
+        handles.append(Patch(color=_OTHERS, label=f"others  {rest:.1%}"))
+    outside = basins.attractor[basins.attractor < 0]
+    if outside.size:
+        word = "cannot start" if np.all(outside == -3) else "none"
+        handles.append(Patch(facecolor=NOTHING, edgecolor="0.5", label=word))
+    if orbits:
+        handles.append(
+            Line2D([], [], marker="o", ls="", mfc="white", mec=SECTION, ms=5,
+                   label="attractors")
+        )  # fmt: skip
+    return colours, handles
+
+
+def _mark(ax: Axes, basins, axes) -> None:
+    for k, orbit in enumerate(basins.orbits[:_SHOWN]):
+        irregular = basins.labels[k, 1] == 0
+        ax.plot(
+            orbit[:, axes[0]],
+            orbit[:, axes[1]],
+            "." if irregular else _MARKS[k % len(_MARKS)],
+            ls="",
+            markersize=2.5 if irregular else 6,
+            markerfacecolor=SECTION if irregular else "white",
+            markeredgecolor=SECTION,
+            markeredgewidth=0.0 if irregular else 0.9,
+            zorder=3,
+        )

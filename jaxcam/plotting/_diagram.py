@@ -1,0 +1,169 @@
+"""Bifurcation diagrams by brute force, and charts over two parameters."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import ListedColormap
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from ._axes import one_axes
+from ._labels import labelled
+from ._style import FLIGHT, IMPACT, SECTION, styled
+
+
+if TYPE_CHECKING:
+    from ..sweeps import Chart, Diagram
+
+
+# each value by itself, upwards, downwards
+_WAYS = {0: (SECTION, ""), 1: (FLIGHT, "upwards"), -1: (IMPACT, "downwards")}
+#: colours of Okabe and Ito, then lighter ones, for things that are many
+COLOURS = (
+    "#0072B2", "#56B4E9", "#E69F00", "#009E73", "#CC79A7", "#D55E00", "#F0E442",
+    "#8C8C8C", "#004D7A", "#A6D8F5", "#8A5F00", "#7FD1B9", "#7A3F62", "#F4B183",
+)  # fmt: skip
+# for what is not an attractor
+NOTHING = "#FFFFFF"
+
+
+@styled
+def sweep_diagram(
+    diagram: "Diagram",
+    ax: Axes | None = None,
+    *,
+    component: int = 0,
+    phase: bool = False,
+    x_label: tuple[str, str] | None = None,
+    y_label: tuple[str, str] | None = None,
+    x_scale: float = 1.0,
+) -> Figure:
+    """Draw what motions settled on, a dot a sample, over the parameter.
+
+    Dots are drawn as an image, so that millions of them stay a small file.
+
+    **Arguments:**
+
+    - `diagram`: from [`jaxcam.sweeps.diagram`][].
+    - `ax`: axes; a new figure without.
+    - `component`: of the state.
+    - `phase`: draws the phase (turns) of each sample instead, for sections that are not
+        taken once a turn.
+    - `x_label`, `y_label`: name and unit of both axes.
+    - `x_scale`: by which parameters are multiplied (30/pi for a speed in rpm).
+
+    **Returns:** the figure.
+
+    **Raises:** `ValueError` for the phase of samples that all have the same.
+    """
+    ax = one_axes(ax)
+    states, values = diagram.states, x_scale * diagram.values
+    points, starts, keep, _ = states.shape
+    if phase:
+        if "phase" not in diagram.dataset:
+            raise ValueError(
+                "samples a turn apart all have one phase; draw a diagram of impacts"
+            )
+        y = diagram.dataset["phase"].values
+        y_label = ("phase", "turns") if y_label is None else y_label
+    else:
+        y = states[..., component]
+    x = np.broadcast_to(values[:, None, None], (points, starts, keep))
+    total = points * starts * keep
+    size = float(np.clip(600 / np.sqrt(max(total, 1)), 0.35, 2.4))
+    ways = [way for way in (1, -1, 0) if np.any(diagram.direction == way)]
+    handles = []
+    for way in ways:
+        colour, word = _WAYS[way]
+        some = diagram.direction == way
+        ax.plot(
+            x[some].ravel(),
+            y[some].ravel(),
+            "o",
+            color=colour,
+            # where both ways lead to the same, the larger dots remain visible
+            markersize=1.7 * size if way == 1 and len(ways) > 1 else size,
+            markeredgewidth=0,
+            rasterized=True,
+            zorder=2 if way >= 0 else 3,
+        )
+        if word:
+            handles.append(
+                Line2D([], [], marker="o", ls="", color=colour, ms=5, label=word)
+            )
+    name = str(diagram.dataset["component"].values[component])
+    unit = str(diagram.dataset["component_unit"].values[component])
+    ax.set_xlabel(labelled(*((diagram.parameter, "-") if not x_label else x_label)))
+    ax.set_ylabel(labelled(*((name, unit) if y_label is None else y_label)))
+    ax.set_xlim(float(values.min()), float(values.max()))
+    if handles:
+        _above(ax, handles)
+    return ax.figure  # pyright: ignore
+
+
+@styled
+def sweep_chart(
+    chart: "Chart",
+    ax: Axes | None = None,
+    *,
+    start: int = 0,
+    x_label: tuple[str, str] | None = None,
+    y_label: tuple[str, str] | None = None,
+    x_scale: float = 1.0,
+    y_scale: float = 1.0,
+) -> Figure:
+    """Draw the labels of a chart, a colour a label.
+
+    **Arguments:**
+
+    - `chart`: from [`jaxcam.sweeps.chart`][].
+    - `ax`: axes; a new figure without.
+    - `start`: which of several starts.
+    - `x_label`, `y_label`: name and unit of the first and the second parameter.
+    - `x_scale`, `y_scale`: by which parameters are multiplied.
+
+    **Returns:** the figure.
+    """
+    ax = one_axes(ax)
+    labels = chart.labels[..., start].astype(str)
+    known, counts = np.unique(labels, return_counts=True)
+    # the most frequent labels get the colours that are easiest to tell apart
+    known = known[np.argsort(-counts, kind="stable")]
+    number = np.argmax(labels[..., None] == known, axis=-1)
+    shown = min(len(known), len(COLOURS))
+    number = np.minimum(number, len(COLOURS) - 1)
+    mesh = ax.pcolormesh(
+        x_scale * chart.first,
+        y_scale * chart.second,
+        number,
+        cmap=ListedColormap(COLOURS[:shown]),
+        vmin=-0.5,
+        vmax=shown - 0.5,
+        shading="nearest",
+        rasterized=True,
+    )
+    mesh.set_zorder(1)
+    words = [str(word) for word in known[:shown]]
+    if len(known) > shown:
+        words[-1] = "others"
+    handles = [
+        Patch(color=colour, label=word)
+        for word, colour in zip(words, COLOURS, strict=False)
+    ]
+    one, other = chart.parameters
+    ax.set_xlabel(labelled(*((one, "-") if x_label is None else x_label)))
+    ax.set_ylabel(labelled(*((other, "-") if y_label is None else y_label)))
+    ax.grid(False)
+    _above(ax, handles)
+    return ax.figure  # pyright: ignore
+
+
+def _above(ax: Axes, handles) -> None:
+    ax.legend(
+        handles=handles,
+        loc="lower left",
+        bbox_to_anchor=(0.0, 1.0),
+        ncols=min(len(handles), 5),
+    )

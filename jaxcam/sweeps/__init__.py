@@ -1,0 +1,41 @@
+"""Many motions: sections, bifurcation diagrams, basins; on threads or a cluster."""
+
+from ._basins import basins as basins
+from ._basins_result import Basins as Basins, Share as Share
+from ._boundary import (
+    basin_entropy as basin_entropy,
+    BasinEntropy as BasinEntropy,
+    Uncertainty as Uncertainty,
+    uncertainty_exponent as uncertainty_exponent,
+)
+from ._cell_mapping import cell_mapping as cell_mapping, CellMapping as CellMapping
+from ._chart import chart as chart
+from ._chart_result import Chart as Chart
+from ._cluster import cluster as cluster
+from ._diagram import diagram as diagram
+from ._diagram_result import Diagram as Diagram, Range as Range
+from ._exponents import Exponents as Exponents, largest_exponents as largest_exponents
+from ._follow import (
+    follow_basins as follow_basins,
+    FollowedBasins as FollowedBasins,
+    match as match,
+)
+from ._grid import Grid as Grid
+from ._impact_section import ImpactSection as ImpactSection
+from ._label import label as label, Labels as Labels, periods as periods
+from ._load import load as load
+from ._map import Map as Map
+from ._poincare_section import (
+    PoincareSection as PoincareSection,
+    return_times as return_times,
+)
+from ._run import (
+    AbstractJob as AbstractJob,
+    Progress as Progress,
+    run_blocks as run_blocks,
+)
+from ._samples import Samples as Samples
+from ._section import AbstractSection as AbstractSection
+from ._starts import monte_carlo as monte_carlo
+from ._store import Layout as Layout, Variable as Variable
+from ._stroboscopic import Stroboscopic as Stroboscopic

@@ -1,0 +1,105 @@
+"""What the blocks of basins are, and what each computes."""
+
+import functools
+from collections.abc import Callable
+
+import numpy as np
+
+from ._fingerprint import cell_codes, fingerprint_size, fingerprints
+from ._grid import Grid
+from ._identity import about_section
+from ._inputs import LANES
+from ._label import APERIODIC
+from ._run import AbstractJob, Arrays
+from ._section import AbstractSection
+from ._settle import settle
+from ._store import Layout, Variable
+
+
+#: extent of the cells by which motions that do not repeat are told apart
+_FINE = 1 / 64
+
+
+class BasinsJob(AbstractJob):
+    """Some rows of the grid at a time."""
+
+    def __init__(
+        self,
+        section: AbstractSection,
+        grid: Grid,
+        turns: int,
+        keep: int,
+        tolerance: float,
+        same: float,
+        reruns: int,
+        scale: np.ndarray,
+        block: int | None,
+    ):
+        self.section, self.grid, self.same, self.scale = section, grid, same, scale
+        self.settings = (turns, keep, tolerance, reruns)
+        n = len(grid.shape)
+        row = int(np.prod(grid.shape[1:]))
+        names = section.names(n)
+        dims = tuple(name.replace(" ", "_") for name, _ in names)
+        tail = grid.shape[1:]
+        variables = {
+            "impacts": Variable(dims, tail, "int32"),
+            "turns": Variable(dims, tail, "int32"),
+            "fingerprint": Variable(
+                (*dims, "mean"), (*tail, fingerprint_size(n)), "float64"
+            ),
+            # zero for motions that repeat, and then next to nothing on disk
+            "cells": Variable((*dims, "sample"), (*tail, keep), "int64"),
+        }
+        coordinates = {
+            dim: (dim, grid.centres(i), {"long_name": name, "units": unit})
+            for i, (dim, (name, unit)) in enumerate(zip(dims, names, strict=True))
+        }
+        rows = max(1, LANES // row) if block is None else block
+        rows = min(rows, grid.shape[0])
+        identity = {
+            "sweep": "basins",
+            **about_section(section),
+            "grid": {"low": grid.low, "high": grid.high, "shape": grid.shape},
+            "turns": turns,
+            "keep": keep,
+            "tolerance": tolerance,
+            "same": same,
+            "reruns": reruns,
+            "scale": scale.tolist(),
+            "block": rows,
+        }
+        self.layout = Layout(grid.shape[0], rows, variables, coordinates, identity)
+
+    def work(self, block: int, before: Arrays | None) -> Callable[[], Arrays]:
+        del before
+        bounds = self.layout.bounds(block)
+        return functools.partial(
+            some_rows, self.section, self.grid, self.scale, bounds, *self.settings
+        )
+
+
+def default_scale(grid: Grid) -> np.ndarray:
+    """The largest extent or coordinate of the grid in each component."""
+    low, high = np.abs(grid.low), np.abs(grid.high)
+    found = np.maximum(grid.extents, np.maximum(low, high))
+    return np.where(found > 0, found, 1.0)
+
+
+def some_rows(section, grid, scale, bounds, turns, keep, tolerance, reruns) -> Arrays:
+    """The motions from some rows of the grid."""
+    states = grid.states(*bounds)
+    samples, labels = settle(
+        section, states, turns, keep, tolerance=tolerance, reruns=reruns
+    )
+    origin = np.array(grid.low)
+    cells = cell_codes(samples.states, origin, scale, _FINE)
+    cells[labels.turns != APERIODIC] = 0
+    print_ = fingerprints(samples.states, labels.turns, origin, scale)
+    shape = (bounds[1] - bounds[0], *grid.shape[1:])
+    return {
+        "impacts": labels.impacts.reshape(shape),
+        "turns": labels.turns.reshape(shape),
+        "fingerprint": print_.reshape(*shape, -1),
+        "cells": cells.reshape(*shape, keep),
+    }

@@ -1,0 +1,109 @@
+"""How mixed basins are, and how rough the boundary between them is."""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.stats import linregress
+
+
+class BasinEntropy(NamedTuple):
+    """Basin entropy, and that of the boxes on the boundary alone (nats)."""
+
+    entropy: float
+    boundary_entropy: float
+
+    @property
+    def fractal(self) -> bool:
+        """Whether the boundary must be fractal: boundary entropy above ln 2."""
+        return self.boundary_entropy > np.log(2)
+
+
+class Uncertainty(NamedTuple):
+    """The uncertainty exponent of a boundary, with its standard error."""
+
+    exponent: float
+    error: float
+    #: box-counting dimension of the boundary: that of the grid less the exponent
+    dimension: float
+    #: distances (cells) and fractions of uncertain states that the fit goes through
+    distance: np.ndarray
+    fraction: np.ndarray
+
+
+def basin_entropy(attractor, box: int = 5) -> BasinEntropy:
+    """Entropy of the attractors within boxes of a grid, averaged over the boxes.
+
+    Daza et al., Scientific Reports 6, 31416 (2016).
+
+    **Arguments:**
+
+    - `attractor`: numbers of attractors on a grid of any dimension; states that cannot
+        start (-3) are left out.
+    - `box`: cells along each side of a box.
+
+    **Raises:** `ValueError` for a box that does not fit into the grid.
+    """
+    attractor = np.asarray(attractor)
+    sides = [k // box for k in attractor.shape]
+    if box < 2 or min(sides) < 1:
+        raise ValueError(
+            f"box is {box}, which must be 2 or more and fit into the grid "
+            f"{attractor.shape}"
+        )
+    cut = attractor[tuple(slice(0, k * box) for k in sides)]
+    shape = [part for k in sides for part in (k, box)]
+    boxes = np.moveaxis(cut.reshape(shape), range(0, 2 * len(sides), 2),
+                        range(len(sides)))  # fmt: skip
+    boxes = boxes.reshape(int(np.prod(sides)), -1)
+    counts = np.stack([(boxes == k).sum(axis=1) for k in np.unique(boxes) if k != -3])
+    total = counts.sum(axis=0)
+    counts, total = counts[:, total > 0], total[total > 0]
+    if not counts.size:
+        return BasinEntropy(np.nan, np.nan)
+    p = counts / total
+    entropy = -np.sum(np.where(p > 0, p * np.log(np.where(p > 0, p, 1.0)), 0.0), axis=0)
+    mixed = (counts > 0).sum(axis=0) > 1
+    boundary = float(entropy[mixed].mean()) if np.any(mixed) else 0.0
+    return BasinEntropy(float(entropy.mean()), boundary)
+
+
+def uncertainty_exponent(attractor, distances=(1, 2, 4, 8, 16)) -> Uncertainty:
+    """How fast the fraction of uncertain states falls with the error of the state.
+
+    A state is uncertain where one at the given distance along an axis ends elsewhere;
+    their fraction goes as distance^exponent (McDonald et al., Physica D 17, 1985).
+
+    **Arguments:**
+
+    - `attractor`: numbers of attractors on a grid of any dimension; pairs with a state
+        that cannot start (-3) are left out.
+    - `distances`: in cells; the longest must fit into the grid.
+
+    **Raises:** `ValueError` where fewer than two distances show uncertain states.
+    """
+    attractor = np.asarray(attractor)
+    axes = [axis for axis, k in enumerate(attractor.shape) if k > 1]
+    # the same states at every distance, so that edges of the grid do not count
+    margin = max(distances)
+    found = []
+    for distance in distances:
+        different = total = 0
+        for axis in axes:
+            part = np.moveaxis(attractor, axis, 0)
+            one = part[:-margin]
+            other = part[distance : distance + len(one)]
+            known = (one != -3) & (other != -3)
+            different += np.count_nonzero((one != other) & known)
+            total += np.count_nonzero(known)
+        if different:
+            found.append((distance, different / total))
+    if len(found) < 2:
+        raise ValueError(
+            "fewer than two distances have states that end elsewhere; use a finer "
+            "grid, or one with a boundary in it"
+        )
+    distance, fraction = map(np.array, zip(*found, strict=True))
+    fit = linregress(np.log(distance), np.log(fraction))
+    exponent = float(fit.slope)  # pyright: ignore
+    error = float(fit.stderr)  # pyright: ignore
+    return Uncertainty(exponent, error, len(axes) - exponent, distance, fraction)

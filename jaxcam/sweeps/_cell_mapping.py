@@ -1,0 +1,86 @@
+"""Simple cell mapping: basins from one turn of each cell. (Hsu, Section 5.3.1)"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ._grid import Grid
+from ._inputs import as_section
+
+
+class CellMapping(NamedTuple):
+    """Where the cells of a grid lead, in the shape of the grid."""
+
+    #: number of the group that a cell leads to; -1 for the sink cell
+    group: np.ndarray
+    #: cells of the cycle that it leads to; 0 for the sink cell
+    period: np.ndarray
+    #: turns until that is reached
+    steps: np.ndarray
+    #: whether the cell is part of a cycle
+    cyclic: np.ndarray
+
+
+def cell_mapping(system, grid: Grid, *, turns: int = 1) -> CellMapping:
+    """Map the centre of every cell once, and follow the cells from then on.
+
+    All states outside of the grid, and those that cannot start, are one sink cell,
+    which leads to itself. Cells are an approximation: a cycle of cells is an attractor
+    where they are small, and groups are numbered by their first cell. Compare with
+    [`jaxcam.sweeps.basins`][], which follows each motion itself.
+
+    **Arguments:**
+
+    - `system`: a hybrid system, or a section that is taken once a turn.
+    - `turns`: of one application of the map.
+
+    **Raises:** `ValueError` for another section, or fewer than one turn.
+    """
+    section = as_section(system)
+    if not section.regular or turns < 1:
+        raise ValueError(
+            "cell mapping needs a section that is taken once a turn, and 1 turn or more"
+        )
+    states = grid.states()
+    samples = section.sample(states, turns, 1)
+    image = grid.cells(samples.final)
+    image[samples.code != 0] = -1
+    return follow_cells(image, grid.shape)
+
+
+def follow_cells(image, shape) -> CellMapping:
+    """Groups of cells that lead to one cycle.
+
+    **Arguments:** `image`: the cell that each cell leads to, -1 for the sink.
+    """
+    image = np.asarray(image)
+    count = len(image)
+    # the sink is a cell of its own at the end
+    pointer = np.append(np.where(image < 0, count, image), count)
+    doublings = max(1, int(count + 1).bit_length())
+    far, smallest = pointer.copy(), np.minimum(np.arange(count + 1), pointer)
+    for _ in range(doublings):
+        smallest = np.minimum(smallest, smallest[far])
+        far = far[far]
+    # after so many turns all are on a cycle; its smallest cell is its name
+    cyclic = np.zeros(count + 1, dtype=bool)
+    cyclic[far] = True
+    name = smallest[far]
+    length = np.bincount(name[cyclic], minlength=count + 1)
+    sink = name == count
+    used = np.unique(name[~sink])
+    group = np.where(sink, -1, np.searchsorted(used, name))
+    period = np.where(sink, 0, length[name])
+    parts = (group, period, _steps(pointer, cyclic), cyclic)
+    return CellMapping(*(part[:-1].reshape(shape) for part in parts))
+
+
+def _steps(pointer, cyclic):
+    """Turns until a cycle is reached, by doubling."""
+    steps = np.where(cyclic, 0, 1)
+    far = np.where(cyclic, np.arange(len(pointer)), pointer)
+    while True:
+        more = steps + steps[far]
+        if np.array_equal(more, steps):
+            return steps
+        steps, far = more, far[far]

@@ -1,0 +1,190 @@
+"""Charts of labels, and of exponents, over two parameters."""
+
+import functools
+from collections.abc import Callable
+from concurrent.futures import Executor
+from pathlib import Path
+
+import numpy as np
+
+from ._chart_result import Chart
+from ._exponents import largest_exponents
+from ._identity import about_section, digest
+from ._inputs import as_section, as_starts, as_values, check_turns
+from ._pick import Pick, pick
+from ._run import AbstractJob, Arrays, Progress, run_blocks
+from ._section import AbstractSection
+from ._settle import settle
+from ._store import Layout, Variable
+
+
+#: motions in a block; fewer than elsewhere, as exponents take long
+_LANES = 1024
+
+
+def chart(
+    system,
+    where: tuple,
+    first,
+    second,
+    states=None,
+    *,
+    turns: int = 300,
+    keep: int = 32,
+    tolerance: float = 1e-6,
+    reruns: int = 0,
+    exponents: int = 0,
+    out: str | Path | None = None,
+    resume: bool = False,
+    executor: Executor | None = None,
+    workers: int | None = None,
+    progress: Callable[[Progress], None] | None = None,
+    block: int | None = None,
+) -> Chart:
+    """The label of the motion at each pair of values of two parameters.
+
+    **Arguments:**
+
+    - `system`: a hybrid system, or a section that is taken once a turn.
+    - `where`: two parameters: `("speed", "stiffness")`, or two functions.
+    - `first`, `second`: their values, shapes `(k,)` and `(l,)`.
+    - `states`: where motions start: `(n,)`, or `(starts, n)`; in contact at rest
+        without.
+    - `turns`, `keep`, `tolerance`, `reruns`: as for [`jaxcam.sweeps.basins`][].
+    - `exponents`: with it, the largest Lyapunov exponent over so many further turns.
+    - `out`, `resume`, `executor`, `workers`, `progress`: as for
+        [`jaxcam.sweeps.run_blocks`][].
+    - `block`: values of the second parameter that are computed together.
+
+    **Returns:** a [`jaxcam.sweeps.Chart`][].
+
+    **Raises:** `ValueError` that names the fix; `RuntimeError` where workers were lost.
+    """
+    section = as_section(system)
+    check_turns(turns, keep, tolerance, reruns)
+    if not isinstance(where, tuple) or len(where) != 2:
+        raise ValueError("where must be a tuple of two parameters: (one, other)")
+    if exponents and exponents < 16:
+        raise ValueError(
+            f"exponents is {exponents}; give 16 turns or more, or 0 for none"
+        )
+    if block is not None and block < 1:
+        raise ValueError(f"block is {block}; give 1 or more values")
+    picked = pick(where, section.system)
+    first, second = as_values(first, 1), as_values(second, 1)
+    job = ChartJob(
+        section, picked, first, second, states, turns, keep, tolerance, reruns,
+        exponents, block,
+    )  # fmt: skip
+    store = run_blocks(
+        job,
+        out=out,
+        resume=resume,
+        executor=executor,
+        workers=workers,
+        progress=progress,
+    )
+    return Chart(store.dataset())
+
+
+class ChartJob(AbstractJob):
+    """Some values of the second parameter, all of the first."""
+
+    def __init__(
+        self,
+        section: AbstractSection,
+        where: Pick,
+        first: np.ndarray,
+        second: np.ndarray,
+        states,
+        turns: int,
+        keep: int,
+        tolerance: float,
+        reruns: int,
+        exponents: int,
+        block: int | None,
+    ):
+        self.section, self.where = section, where
+        self.first, self.second = first, second
+        self.starts = as_starts(section, states, where, self._pairs(0, len(second)))
+        self.settings = (turns, keep, tolerance, reruns, exponents)
+        count = self.starts.shape[1]
+        x, y = (name.replace(".", "_") for name in where.names)
+        tail, dims = (len(first), count), (y, x, "start")
+        variables = {
+            "impacts": Variable(dims, tail, "int32"),
+            "turns": Variable(dims, tail, "int32"),
+            "code": Variable(dims, tail, "int32"),
+        }
+        if exponents:
+            about = {"units": "1/s", "about": "largest Lyapunov exponent"}
+            variables["exponent"] = Variable(dims, tail, "float64", about)
+            variables["exponent_error"] = Variable(dims, tail, "float64", about)
+        rows = max(1, _LANES // (len(first) * count)) if block is None else block
+        rows = min(rows, len(second))
+        identity = {
+            "sweep": "chart",
+            **about_section(section),
+            "where": list(where.names),
+            "first": digest(first),
+            "second": digest(second),
+            "starts": digest(self.starts),
+            "turns": turns,
+            "keep": keep,
+            "tolerance": tolerance,
+            "reruns": reruns,
+            "exponents": exponents,
+            "block": rows,
+        }
+        coordinates = {
+            x: (x, first, {"role": "first"}),
+            y: (y, second, {"role": "second"}),
+        }
+        self.layout = Layout(len(second), rows, variables, coordinates, identity)
+
+    def work(self, block: int, before: Arrays | None) -> Callable[[], Arrays]:
+        del before
+        low, high = self.layout.bounds(block)
+        k = len(self.first)
+        return functools.partial(
+            some_pairs,
+            self.section,
+            self.where,
+            self._pairs(low, high),
+            self.starts[low * k : high * k],
+            (high - low, k),
+            *self.settings,
+        )
+
+    def _pairs(self, low: int, high: int) -> np.ndarray:
+        y, x = np.meshgrid(self.second[low:high], self.first, indexing="ij")
+        return np.stack([x.ravel(), y.ravel()], axis=1)
+
+
+def some_pairs(
+    section, where, pairs, starts, shape, turns, keep, tolerance, reruns, exponents
+) -> Arrays:
+    """Labels, and exponents if wanted, at some pairs of values."""
+    count, n = starts.shape[1:]
+    values = np.repeat(pairs, count, axis=0)
+    samples, labels = settle(
+        section,
+        starts.reshape(-1, n),
+        turns,
+        keep,
+        tolerance=tolerance,
+        reruns=reruns,
+        where=where,
+        values=values,
+    )
+    found = {
+        "impacts": labels.impacts,
+        "turns": labels.turns,
+        "code": samples.code,
+    }
+    if exponents:
+        made = largest_exponents(
+            section, samples.final, exponents, where=where, values=values
+        )
+        found |= {"exponent": made.largest, "exponent_error": made.error}
+    return {name: array.reshape(*shape, count) for name, array in found.items()}

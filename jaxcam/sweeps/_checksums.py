@@ -1,0 +1,122 @@
+"""Whether what is on disk is what was written."""
+
+import json
+import zlib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+import xarray
+import zarr
+
+from ._store import FORMAT, SWEEP, VERSION
+
+
+UNFINISHED = -1
+CHECKSUM = "checksum"
+# attribute with the checksums of what was made of all blocks together
+TOGETHER = "together"
+# zarr's codecs raise these for a chunk that they cannot read
+_UNREADABLE = (OSError, ValueError, RuntimeError, TypeError)
+
+
+def faults(group: zarr.Group) -> list[str]:
+    """What is wrong with each block, or empty words: it is as it was written."""
+    units, size = int(group.attrs["units"]), int(group.attrs["block"])  # pyright: ignore
+    found = []
+    for block in range(-(-units // size)):
+        try:
+            wanted = int(np.asarray(group[CHECKSUM][block]))  # pyright: ignore
+        except (*_UNREADABLE, KeyError):
+            found.append("has an unreadable checksum")
+            continue
+        if wanted == UNFINISHED:
+            found.append("is not finished")
+            continue
+        try:
+            same = checksum(read_block(group, block)) == wanted
+        except (*_UNREADABLE, KeyError):
+            found.append("cannot be read")
+            continue
+        found.append("" if same else "is damaged")
+    return found
+
+
+def checksum(arrays: Mapping[str, np.ndarray]) -> int:
+    """CRC-32 of the arrays of a block, in the order of the layout."""
+    value = 0
+    for array in arrays.values():
+        value = zlib.crc32(np.ascontiguousarray(array).tobytes(), value)
+    return value
+
+
+def opened(path: str | Path) -> xarray.Dataset:
+    """The dataset on disk, read when it is used."""
+    return xarray.open_dataset(
+        path, engine="zarr", consolidated=False, chunks=None, decode_times=False
+    )
+
+
+def read_block(group: zarr.Group, block: int) -> dict[str, np.ndarray]:
+    size = int(group.attrs["block"])  # pyright: ignore
+    some = slice(block * size, (block + 1) * size)
+    stored = list(group.attrs["stored"])  # pyright: ignore
+    return {str(name): np.asarray(group[str(name)][some]) for name in stored}  # pyright: ignore
+
+
+def checked(path: str | Path) -> xarray.Dataset:
+    """The dataset on disk, after a look at all of its blocks.
+
+    **Raises:** `ValueError` that names the blocks that are missing or damaged.
+    """
+    if stored_identity(Path(path)) is None:
+        raise ValueError(f"{path} is not a stored sweep")
+    wrong = faults(zarr.open_group(str(path), mode="r"))
+    bad = [block for block, word in enumerate(wrong) if word]
+    if bad:
+        raise ValueError(
+            f"{path}: block {bad[0]} {wrong[bad[0]]} ({len(bad)} of {len(wrong)} "
+            f"blocks are wrong: {names_of(bad)}); run the sweep again with resume=True "
+            "to compute them anew"
+        )
+    dataset = opened(path)
+    _check_together(path, dataset)
+    return dataset
+
+
+def _check_together(path, dataset: xarray.Dataset) -> None:
+    """Raise `ValueError` where what was made of all blocks together is not whole."""
+    about = f"{path}: the blocks are whole; run the sweep again with resume=True"
+    wanted = dataset.attrs.get(TOGETHER)
+    if wanted is None:
+        if json.loads(dataset.attrs[SWEEP])["sweep"] == "basins":
+            raise ValueError(f"{about} to find the attractors, which are missing")
+        return
+    try:
+        found = checksums(dataset, wanted)
+    except (*_UNREADABLE, KeyError):
+        found = {}
+    bad = [name for name in wanted if found.get(name) != wanted[name]]
+    if bad:
+        raise ValueError(f"{about} to mend {', '.join(bad)}, which cannot be trusted")
+
+
+def checksums(dataset: xarray.Dataset, names) -> dict[str, int]:
+    return {str(n): checksum({"": dataset[n].values}) for n in names}
+
+
+def stored_identity(path: Path) -> dict | None:
+    """What the sweep at a path is of; None where there is no sweep."""
+    try:
+        attributes = dict(zarr.open_group(str(path), mode="r").attrs)
+    except (*_UNREADABLE, KeyError):
+        return None
+    if attributes.get("format") != FORMAT or attributes.get("version") != VERSION:
+        return None
+    return json.loads(str(attributes[SWEEP]))
+
+
+def names_of(blocks: Sequence[int]) -> str:
+    """Numbers of blocks in words, not more than a line of them."""
+    shown = ", ".join(map(str, blocks[:8]))
+    return shown if len(blocks) <= 8 else f"{shown} and {len(blocks) - 8} more"

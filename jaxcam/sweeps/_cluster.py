@@ -1,0 +1,63 @@
+"""Dask as an executor, where one machine is too small."""
+
+import os
+from collections.abc import Iterator
+from concurrent.futures import Executor
+from contextlib import contextmanager
+
+
+@contextmanager
+def cluster(address: str, workers: int | None = None) -> Iterator[Executor]:
+    """An executor on a Dask cluster; give it as `executor`.
+
+    ```python
+    with jaxcam.sweeps.cluster("local", workers=2) as executor:
+        jaxcam.sweeps.basins(system, grid, 100, executor=executor)
+    ```
+
+    A worker that is lost in the middle is replaced by another one, and its blocks are
+    computed again. Code that runs it must be guarded by `if __name__ == "__main__":`.
+
+    **Arguments:**
+
+    - `address`: "local" for processes of one thread each on this machine, which end
+        with the context; or "tcp://host:port" of a scheduler that runs.
+    - `workers`: how many local processes; one a core without.
+
+    **Raises:** `ValueError` for another address, or one where nobody answers; where
+    Dask is not installed.
+    """
+    try:
+        from distributed import Client, LocalCluster
+    except ImportError:
+        raise ValueError(
+            "a cluster needs Dask; install it with: pip install 'jaxcam[cluster]'"
+        ) from None
+    if address != "local" and "://" not in address:
+        raise ValueError(
+            f'cluster is {address!r}; choose "local", or the address of a scheduler, '
+            "such as tcp://127.0.0.1:8786"
+        )
+    if address == "local":
+        made = LocalCluster(
+            n_workers=workers or os.cpu_count() or 1,
+            threads_per_worker=1,
+            dashboard_address=None,  # pyright: ignore
+        )
+    else:
+        made = None
+    try:
+        try:
+            client = Client(address if made is None else made, timeout="10s")
+        except (OSError, TimeoutError):
+            raise ValueError(
+                f"nobody answers at {address}; start a scheduler there, or choose "
+                '"local"'
+            ) from None
+        try:
+            yield client.get_executor(pure=False)
+        finally:
+            client.close()
+    finally:
+        if made is not None:
+            made.close()

@@ -1,0 +1,96 @@
+"""Bifurcation diagrams by brute force."""
+
+from collections.abc import Callable
+from concurrent.futures import Executor
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from ._diagram_job import CarriedJob, DiagramJob
+from ._diagram_result import Diagram
+from ._inputs import as_section, as_starts, as_values, check_turns
+from ._pick import pick
+from ._run import Progress, run_blocks
+from ._samples import BEHIND
+
+
+Direction = Literal["each", "up", "down", "both"]
+_DIRECTIONS = ("each", "up", "down", "both")
+
+
+def diagram(
+    system,
+    where: Callable | str,
+    values,
+    states=None,
+    *,
+    turns: int = 300,
+    keep: int = 100,
+    direction: Direction = "each",
+    tolerance: float = 1e-6,
+    out: str | Path | None = None,
+    resume: bool = False,
+    executor: Executor | None = None,
+    workers: int | None = None,
+    progress: Callable[[Progress], None] | None = None,
+    block: int | None = None,
+) -> Diagram:
+    """The points that motions settle on, over the values of a parameter.
+
+    **Arguments:**
+
+    - `system`: a hybrid system, seen once a period, or a section: with
+        [`jaxcam.sweeps.ImpactSection`][] the diagram is one of impacts, with
+        [`jaxcam.sweeps.Map`][] one of a map.
+    - `where`: the parameter that varies: `lambda s: s.speed`, or `"speed"`.
+    - `values`: of the parameter, shape `(points,)`.
+    - `states`: where motions start: `(n,)`; `(starts, n)` for several of each value;
+        `(points, starts, n)` for others at each, such as those of
+        [`jaxcam.sweeps.monte_carlo`][]. Without, in contact at rest.
+    - `turns`: how many are simulated, of which the last `keep` are kept.
+    - `direction`: "each" value from the same start; or "up", "down" or "both" ways
+        with the state carried from one value to the next, which shows hysteresis.
+    - `tolerance`: for finding periods, up to `keep / 2`.
+    - `out`, `resume`, `executor`, `workers`, `progress`: as for
+        [`jaxcam.sweeps.run_blocks`][].
+    - `block`: values that are computed together and stored at once.
+
+    **Returns:** a [`jaxcam.sweeps.Diagram`][].
+
+    **Raises:** `ValueError` that names the fix; `RuntimeError` where workers were lost.
+    """
+    section = as_section(system)
+    check_turns(turns, keep, tolerance)
+    if direction not in _DIRECTIONS:
+        raise ValueError(
+            f"direction is {direction!r}; choose one of {', '.join(_DIRECTIONS)}"
+        )
+    if block is not None and block < 1:
+        raise ValueError(f"block is {block}; give 1 or more values")
+    picked = pick(where, section.system)
+    if picked.several:
+        raise ValueError(
+            "a diagram has one parameter; use chart for two, or pick one of them"
+        )
+    values = as_values(values, 1)
+    starts = as_starts(section, states, picked, values)
+    kind = DiagramJob if direction == "each" else CarriedJob
+    job = kind(
+        section, picked, values, starts, turns, keep, direction, tolerance, block
+    )
+    store = run_blocks(
+        job,
+        out=out,
+        resume=resume,
+        executor=executor,
+        workers=workers,
+        progress=progress,
+    )
+    made = Diagram(store.dataset())
+    if np.all(made.dataset["code"].values == BEHIND):
+        raise ValueError(
+            "no motion can start: every state is behind the constraint; choose states "
+            "in front of it"
+        )
+    return made

@@ -1,0 +1,196 @@
+"""What the blocks of a bifurcation diagram are, and what each computes."""
+
+import functools
+from collections.abc import Callable
+
+import numpy as np
+
+from ._identity import about_section, digest
+from ._inputs import LANES
+from ._label import label
+from ._pick import Pick
+from ._run import AbstractJob, Arrays
+from ._section import AbstractSection, component_coordinates
+from ._settle import settle
+from ._store import Layout, Variable
+
+
+#: values of a block where the state is carried from one to the next
+_CHAIN = 16
+
+
+class DiagramJob(AbstractJob):
+    """Every value by itself."""
+
+    chained = False
+
+    def __init__(
+        self,
+        section: AbstractSection,
+        where: Pick,
+        values: np.ndarray,
+        starts: np.ndarray,
+        turns: int,
+        keep: int,
+        direction: str,
+        tolerance: float,
+        block: int | None,
+    ):
+        self.section, self.where = section, where
+        self.turns, self.keep, self.tolerance = turns, keep, tolerance
+        self.values, self.starts, going = self._ordered(values, starts, direction)
+        self.layout = self._layout(going, direction, block)
+
+    def _ordered(self, values, starts, direction):
+        return values, starts, np.zeros(len(values), dtype=np.int8)
+
+    def _block(self, starts: int) -> int:
+        return max(1, LANES // starts)
+
+    def work(self, block: int, before: Arrays | None) -> Callable[[], Arrays]:
+        del before
+        first, last = self.layout.bounds(block)
+        return functools.partial(
+            each_value,
+            self.section,
+            self.where,
+            self.values[first:last],
+            self.starts[first:last],
+            self.turns,
+            self.keep,
+            self.tolerance,
+        )
+
+    def _layout(self, going, direction: str, block: int | None) -> Layout:
+        points, starts, n = self.starts.shape
+        keep = self.keep
+        components = self.section.names(n)
+        each, sampled = ("point", "start"), ("point", "start", "sample")
+        variables = {
+            "state": Variable((*sampled, "component"), (starts, keep, n), "float64"),
+            "hits": Variable(sampled, (starts, keep), "int32"),
+            "impacts": Variable(each, (starts,), "int32"),
+            "turns": Variable(each, (starts,), "int32"),
+            "code": Variable(each, (starts,), "int32"),
+        }
+        if not self.section.regular:
+            tail = (starts, keep)
+            variables["time"] = Variable(sampled, tail, "float64", {"units": "s"})
+            variables["phase"] = Variable(sampled, tail, "float64", {"units": "turns"})
+        values = self.values[:, None] if self.values.ndim == 1 else self.values
+        coordinates = {
+            name: ("point", values[:, i], {"role": "parameter"})
+            for i, name in enumerate(self.where.names)
+        }
+        coordinates |= {
+            "direction": ("point", going, {"about": "0 each, 1 up, -1 down"}),
+            **component_coordinates(components),
+        }
+        identity = {
+            "sweep": "diagram",
+            **about_section(self.section),
+            "where": list(self.where.names),
+            "values": digest(self.values),
+            "starts": digest(self.starts),
+            "turns": self.turns,
+            "keep": keep,
+            "direction": direction,
+            "tolerance": self.tolerance,
+        }
+        size = self._block(starts) if block is None else block
+        size = min(size, points)
+        identity["block"] = size
+        return Layout(points, size, variables, coordinates, identity)
+
+
+class CarriedJob(DiagramJob):
+    """Up, down or both ways, each value from where the one before it ended."""
+
+    chained = True
+
+    def _ordered(self, values, starts, direction):
+        order = np.argsort(values, kind="stable")
+        ways = {"up": (1,), "down": (-1,), "both": (1, -1)}[direction]
+        index = np.concatenate([order[::way] for way in ways])
+        going = np.repeat(np.array(ways, dtype=np.int8), len(values))
+        self.first = np.zeros(len(index), dtype=bool)
+        self.first[:: len(values)] = True
+        return values[index], starts[index], going
+
+    def _block(self, starts: int) -> int:
+        del starts
+        return _CHAIN
+
+    def work(self, block: int, before: Arrays | None) -> Callable[[], Arrays]:
+        first, last = self.layout.bounds(block)
+        return functools.partial(
+            one_after_the_other,
+            self.section,
+            self.where,
+            self.values[first:last],
+            self.starts[first:last],
+            self.first[first:last],
+            None if before is None else before["final"][-1],
+            self.turns,
+            self.keep,
+            self.tolerance,
+        )
+
+    def _layout(self, going, direction: str, block: int | None) -> Layout:
+        layout = super()._layout(going, direction, block)
+        starts, n = self.starts.shape[1:]
+        final = Variable(("point", "start", "component"), (starts, n), "float64")
+        return layout._replace(variables={**layout.variables, "final": final})
+
+
+def each_value(section, where, values, starts, turns, keep, tolerance) -> Arrays:
+    """All motions of some values at once."""
+    points, count, n = starts.shape
+    lanes = np.repeat(values, count, axis=0)
+    samples, labels = settle(
+        section,
+        starts.reshape(-1, n),
+        turns,
+        keep,
+        tolerance=tolerance,
+        where=where,
+        values=lanes,
+    )
+    turn = section.turn(where, lanes)
+    return _arrays(samples, labels, turn, (points, count))
+
+
+def one_after_the_other(
+    section, where, values, starts, first, carried, turns, keep, tolerance
+) -> Arrays:
+    """Some values in order; `first` says which of them begin anew."""
+    rows = []
+    for value, start, anew in zip(values, starts, first, strict=True):
+        state = start if anew or carried is None else carried
+        # a lane that failed begins anew
+        state = np.where(np.isfinite(state).all(axis=1, keepdims=True), state, start)
+        lanes = np.full(len(state), value)
+        state = section.lifted(state, where, lanes)
+        samples = section.sample(state, turns, keep, where=where, values=lanes)
+        counted = section.impacting and section.regular
+        labels = label(samples, tolerance, counted)
+        carried = samples.final
+        turn = section.turn(where, lanes)
+        made = _arrays(samples, labels, turn, (1, len(state)))
+        rows.append(made | {"final": carried[None]})
+    return {name: np.concatenate([row[name] for row in rows]) for name in rows[0]}
+
+
+def _arrays(samples, labels, turn, shape) -> Arrays:
+    def put(array):
+        return array.reshape(*shape, *array.shape[1:])
+
+    return {
+        "state": put(samples.states),
+        "hits": put(samples.hits),
+        "impacts": put(labels.impacts),
+        "turns": put(labels.turns),
+        "code": put(samples.code),
+        "time": put(samples.times),
+        "phase": put(np.mod(samples.times / turn[:, None], 1.0)),
+    }

@@ -1,0 +1,127 @@
+"""A sweep on disk: a plain Zarr group, which xarray opens by itself.
+
+Besides the data it has `checksum(block)`: the CRC-32 of each finished block, -1 for one
+that is not done. It is written after the data, so that a block that was interrupted,
+lost or damaged since is known to be so.
+"""
+
+import shutil
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+import xarray
+import zarr
+
+from ._checksums import (
+    CHECKSUM,
+    checksum,
+    checksums,
+    faults,
+    opened,
+    read_block,
+    stored_identity,
+    TOGETHER,
+    UNFINISHED,
+)
+from ._store import Layout, ordered, plain, template
+
+
+class OnDisk:
+    """Blocks in a Zarr group; with `resume` those of an earlier run are kept.
+
+    **Raises:** `ValueError` where there is something else at the path.
+    """
+
+    def __init__(self, path: str | Path, layout: Layout, resume: bool):
+        self.layout = layout
+        self.path = Path(path)
+        if self.path.exists() and any(self.path.iterdir() if self.path.is_dir()
+                                      else [True]):  # fmt: skip
+            self._meet(resume)
+        else:
+            self._create()
+        self._group = zarr.open_group(str(self.path), mode="r+")
+
+    def finished(self) -> list[bool]:
+        return [not word for word in faults(self._group)]
+
+    def write(self, block: int, arrays: Mapping[str, np.ndarray]) -> None:
+        first, last = self.layout.bounds(block)
+        parts = ordered(self.layout, arrays)
+        for name, array in parts.items():
+            self._group[name][first:last] = array  # pyright: ignore
+        self._group[CHECKSUM][block] = checksum(parts)  # pyright: ignore
+
+    def read(self, block: int) -> dict[str, np.ndarray]:
+        return read_block(self._group, block)
+
+    def dataset(self) -> xarray.Dataset:
+        return opened(self.path)
+
+    def add(self, extra: xarray.Dataset) -> None:
+        if TOGETHER in self._group.attrs:
+            del self._group.attrs[TOGETHER]
+        for name in extra.variables:
+            if (self.path / str(name)).exists():
+                shutil.rmtree(self.path / str(name))
+        # attributes of the group are replaced by those of what is added
+        attributes = {k: v for k, v in self._group.attrs.items() if k != TOGETHER}
+        extra = extra.assign_attrs(attributes)
+        extra.to_zarr(self.path, mode="a", consolidated=False, zarr_format=3)
+        # last, so that what is half written is known to be so
+        group = zarr.open_group(str(self.path), mode="r+")
+        group.attrs[TOGETHER] = checksums(extra, extra.data_vars)
+
+    def _create(self) -> None:
+        layout = self.layout
+        # beside its place until it is whole
+        fresh = self.path.with_name(self.path.name + ".new")
+        shutil.rmtree(fresh, ignore_errors=True)
+        fresh.parent.mkdir(parents=True, exist_ok=True)
+        made = template(layout, {})
+        made.to_zarr(fresh, mode="w", consolidated=False, zarr_format=3)
+        group = zarr.open_group(str(fresh), mode="r+")
+        for name, v in layout.variables.items():
+            group.create_array(
+                name,
+                shape=(layout.units, *v.tail),
+                chunks=(layout.block, *(max(1, k) for k in v.tail)),
+                dtype=v.dtype,
+                dimension_names=v.dims,
+                attributes=dict(v.attributes),
+            )
+        group.create_array(
+            CHECKSUM,
+            shape=(layout.blocks,),
+            chunks=(1,),
+            dtype="int64",
+            fill_value=UNFINISHED,
+            dimension_names=("block",),
+            attributes={"about": f"CRC-32 of each block; {UNFINISHED}: not finished"},
+        )
+        if self.path.is_dir():
+            self.path.rmdir()
+        fresh.rename(self.path)
+
+    def _meet(self, resume: bool) -> None:
+        """Go on with what is at the path, if it is the same sweep."""
+        identity = stored_identity(self.path)
+        if identity is None:
+            raise ValueError(f"{self.path} holds something else; choose another folder")
+        if not resume:
+            raise ValueError(
+                f"{self.path} holds a sweep already; pass resume=True to go on with "
+                "it, or choose another folder"
+            )
+        wanted = plain(self.layout.identity)
+        if identity != wanted:
+            differing = [
+                key
+                for key in dict.fromkeys((*identity, *wanted))
+                if identity.get(key) != wanted.get(key)
+            ]
+            raise ValueError(
+                f"{self.path} holds another sweep (other {', '.join(differing)}); "
+                "choose another folder, or ask for the same sweep to go on with it"
+            )

@@ -1,0 +1,84 @@
+"""The largest Lyapunov exponent of many motions, to tell chaos from long transients."""
+
+from typing import NamedTuple
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+
+import variational
+
+from ..hybrid import HybridSystem, Settings
+from ._section import AbstractSection
+
+
+class Exponents(NamedTuple):
+    """Largest exponent of each lane (1/s), and its standard error."""
+
+    largest: np.ndarray
+    error: np.ndarray
+
+    @property
+    def chaotic(self) -> np.ndarray:
+        """Whether the exponent is positive by three standard errors."""
+        return self.largest > 3 * self.error
+
+
+def largest_exponents(
+    section: AbstractSection, states, turns: int, *, where=None, values=None
+) -> Exponents:
+    """Exponents of motions from states that have settled, by `variational`.
+
+    **Arguments:**
+
+    - `states`: shape `(lanes, n)`; lanes that are NaN stay so.
+    - `turns`: how many are averaged, 16 or more.
+    - `where`, `values`: as for a section; motions of one second parameter are computed
+        together.
+
+    **Raises:** `ValueError` for a map, whose exponents are not computed here.
+    """
+    system = section.system
+    if not isinstance(system, HybridSystem):
+        raise ValueError(
+            "Lyapunov exponents are computed for hybrid systems only; leave them out "
+            "for a map"
+        )
+    states = np.asarray(states, dtype=float)
+    lanes = len(states)
+    made = Exponents(np.full(lanes, np.nan), np.full(lanes, np.nan))
+    (ready,) = np.nonzero(np.all(np.isfinite(states), axis=1))
+    if not len(ready):
+        return made
+    values = None if values is None else np.asarray(values, dtype=float)[ready]
+    for some, own, one, column in _together(system, where, values, len(ready)):
+        spectrum = variational.lyapunov_spectrum(
+            own,
+            states[ready[some]],
+            turns,
+            t0=float(getattr(section, "t0", 0.0)),
+            transient=0,
+            turn=getattr(section, "period", None),
+            where=one,
+            values=column,
+            settings=Settings(tolerance=1e-10, chatter_depth=1.0),
+        )
+        made.largest[ready[some]] = np.asarray(spectrum.exponents)[:, 0]
+        made.error[ready[some]] = np.asarray(spectrum.standard_error)[:, 0]
+    return made
+
+
+def _together(system, where, values, lanes):
+    """Lanes that a call can take together, their system, and what varies in it."""
+    everybody = np.arange(lanes)
+    if where is None:
+        yield everybody, system, None, None
+        return
+    if not isinstance(where(system), tuple):
+        yield everybody, system, where, values
+        return
+    for row in np.unique(values[:, 1:], axis=0):
+        (some,) = np.nonzero(np.all(values[:, 1:] == row, axis=1))
+        parts = tuple(map(jnp.asarray, (values[some[0], 0], *row)))
+        own = eqx.tree_at(where, system, parts)
+        yield some, own, lambda s: where(s)[0], values[some, 0]

@@ -1,0 +1,76 @@
+"""Grids of initial states, and the cells that they are the centres of."""
+
+import equinox as eqx
+import numpy as np
+
+
+class Grid(eqx.Module):
+    """A box of states, cut into equal cells.
+
+    **Arguments:**
+
+    - `low`, `high`: corners of the box, one number for each component of the state.
+    - `shape`: number of cells along each component; 1 where it does not vary, with
+        `low` and `high` alike or not.
+
+    **Raises:** `ValueError` where they do not fit together.
+    """
+
+    low: tuple[float, ...] = eqx.field(converter=lambda x: tuple(map(float, x)))
+    high: tuple[float, ...] = eqx.field(converter=lambda x: tuple(map(float, x)))
+    shape: tuple[int, ...] = eqx.field(
+        converter=lambda x: tuple(map(int, x)), static=True
+    )
+
+    def __check_init__(self):
+        if not len(self.low) == len(self.high) == len(self.shape) > 0:
+            raise ValueError(
+                f"low has {len(self.low)} numbers, high {len(self.high)} and shape "
+                f"{len(self.shape)}; give one of each for every component of the state"
+            )
+        if not np.all(np.isfinite([*self.low, *self.high])):
+            raise ValueError("low and high must be finite numbers")
+        for low, high, count in zip(self.low, self.high, self.shape, strict=True):
+            if count < 1 or high < low or (count > 1 and high == low):
+                raise ValueError(
+                    f"{count} cells from {low:g} to {high:g} cannot be made; give 1 or "
+                    "more cells, and low below high"
+                )
+
+    @property
+    def sizes(self) -> np.ndarray:
+        """Extent of a cell along each component, shape `(n,)`."""
+        return self.extents / np.array(self.shape)
+
+    @property
+    def extents(self) -> np.ndarray:
+        """Extent of the box, shape `(n,)`."""
+        return np.array(self.high) - np.array(self.low)
+
+    def centres(self, axis: int) -> np.ndarray:
+        """Centres of the cells along one component."""
+        count = self.shape[axis]
+        return self.low[axis] + self.sizes[axis] * (np.arange(count) + 0.5)
+
+    def states(self, first: int = 0, last: int | None = None) -> np.ndarray:
+        """Centres of the cells, shape `(lanes, n)`, the last component fastest.
+
+        **Arguments:** only rows `first` to `last` of the first component, if given.
+        """
+        axes = [self.centres(i) for i in range(len(self.shape))]
+        axes[0] = axes[0][first:last]
+        parts = np.meshgrid(*axes, indexing="ij")
+        return np.stack([part.ravel() for part in parts], axis=1)
+
+    def cells(self, states) -> np.ndarray:
+        """Which cell each state is in, numbered as `states`; -1 outside."""
+        states = np.asarray(states, dtype=float)
+        sizes = np.where(self.sizes > 0, self.sizes, 1.0)
+        with np.errstate(invalid="ignore"):
+            place = np.floor((states - np.array(self.low)) / sizes)
+        # a component that does not vary does not tell cells apart
+        place = np.where(np.array(self.shape) == 1, 0.0, place)
+        inside = np.all((place >= 0) & (place < np.array(self.shape)), axis=-1)
+        safe = np.where(inside[..., None], place, 0).astype(int)
+        index = np.ravel_multi_index(tuple(np.moveaxis(safe, -1, 0)), self.shape)
+        return np.where(inside, index, -1)

@@ -1,0 +1,125 @@
+"""The impact section: every time that something is hit."""
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+
+from ..hybrid import HybridSystem, Settings
+from ..hybrid._codes import Row
+from ..hybrid._stroboscope import _group
+from ..hybrid._system import with_array_parameters
+from ._hybrid_lanes import (
+    in_contact,
+    lifted,
+    rows_between_looks,
+    run_lanes,
+    turn_lengths,
+)
+from ._samples import Samples
+from ._section import AbstractSection, system_names
+
+
+class ImpactSection(AbstractSection):
+    """States just after each impact, with the time of it.
+
+    A chattering sequence is listed up to the impact after which the rest of it is
+    summed; `Settings(chatter_depth=...)` says how far.
+
+    **Arguments:**
+
+    - `system`: a [`jaxcam.hybrid.HybridSystem`][].
+    - `t0`: s, where motions start.
+    - `period`: s, length of a turn; the system's own forcing period by default.
+    - `settings`: accuracy; by default a tolerance of 1e-9 and chatter listed down to a
+        hundredth of the fastest rebound.
+    - `lanes`: how many motions advance together in one compiled program.
+    - `max_steps`: budget of attempted steps of a lane.
+    """
+
+    system: HybridSystem
+    t0: float = 0.0
+    period: float | None = None
+    settings: Settings | None = None
+    lanes: int = eqx.field(default=128, static=True)
+    max_steps: int = eqx.field(default=1_000_000, static=True)
+    regular: bool = eqx.field(default=False, static=True, init=False)
+    impacting: bool = eqx.field(default=True, static=True, init=False)
+
+    def sample(self, states, turns, keep, *, where=None, values=None) -> Samples:
+        states = np.asarray(states, dtype=float)
+        n = states.shape[1]
+        settings = self.settings
+        if settings is None:
+            settings = Settings(tolerance=1e-9, chatter_depth=0.01)
+        settings.check()
+        system = with_array_parameters(self.system)
+        settings = with_array_parameters(settings)
+        period = None if self.period is None else jnp.asarray(self.period, jnp.float64)
+        t0 = jnp.asarray(self.t0, dtype=jnp.float64)
+
+        def run(states, values, width):
+            seen = _Impacts(len(states), keep, n)
+            rows = rows_between_looks(width, turns)
+            shape = (t0, period, turns, settings, width, rows, self.max_steps, seen)
+            _, _, code = _group(system, where, values, states, *shape)
+            return *seen.found(), code
+
+        lanes = (self.system, self.t0, states, where, values, self.lanes)
+        tails = ((keep, n), (keep,), (keep,), (n,))
+        found, times, rests, final, code = run_lanes(run, *lanes, tails)
+        return Samples(
+            states=found,
+            times=times,
+            hits=np.isfinite(times).astype(int),
+            rests=np.nan_to_num(rests).astype(int),
+            final=final,
+            contact=np.zeros(len(states), dtype=bool),
+            code=code,
+        )
+
+    def starts(self, where=None, values=None) -> np.ndarray:
+        return in_contact(self.system, self.t0, where, values)
+
+    def turn(self, where=None, values=None) -> np.ndarray:
+        return turn_lengths(self.system, self.period, where, values)
+
+    def lifted(self, states, where=None, values=None) -> np.ndarray:
+        return lifted(self.system, self.t0, states, where, values)
+
+    def names(self, n: int) -> tuple[tuple[str, str], ...]:
+        return system_names(self.system, n)
+
+
+class _Impacts:
+    """The last impacts of each lane, in a ring, and its state at the last stop."""
+
+    def __init__(self, lanes: int, keep: int, n: int):
+        # one more than there are lanes, for slots that have none
+        self._ring = np.full((lanes + 1, keep, 2 + n), np.nan)
+        self._number = np.zeros(lanes + 1, dtype=int)
+        self._final = np.full((lanes + 1, n), np.nan)
+
+    @staticmethod
+    def row(record):
+        return [jnp.asarray(v) for v in (record.kind, record.t, *record.after)]
+
+    def take(self, work, log) -> None:
+        kind = log[..., 0].astype(np.int8)
+        hit = (kind == Row.IMPACT) | (kind == Row.LAST_IMPACT)
+        rank = self._number[work][:, None] + np.cumsum(hit, axis=1) - 1
+        who, row = np.nonzero(hit)
+        # row by row, so that the latest is what stays in a place
+        place = work[who], rank[who, row] % self._ring.shape[1]
+        self._ring[place] = log[who, row]
+        self._number[work] += hit.sum(axis=1)
+        who, row = np.nonzero(kind == Row.STOP)
+        self._final[work[who]] = log[who, row, 2:]
+
+    def found(self):
+        keep = self._ring.shape[1]
+        number = self._number[:-1]
+        # the newest impact goes last; a ring that is not full starts with NaN
+        order = (number[:, None] + np.arange(keep)) % keep
+        rows = np.take_along_axis(self._ring[:-1], order[..., None], axis=1)
+        rests = (rows[..., 0] == float(Row.LAST_IMPACT)).astype(float)
+        return rows[..., 2:], rows[..., 1], rests, self._final[:-1]

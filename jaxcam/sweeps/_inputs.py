@@ -1,0 +1,91 @@
+"""What the sweeps accept, and what they say about the rest."""
+
+import numpy as np
+
+from ..hybrid import HybridSystem
+from ._section import AbstractSection
+from ._stroboscopic import Stroboscopic
+
+
+#: motions in a block, unless something else is asked for
+LANES = 4096
+
+
+def as_section(system) -> AbstractSection:
+    """A section as it is; a hybrid system seen once a period of its forcing.
+
+    **Raises:** `ValueError` for anything else, or a system without a period.
+    """
+    if isinstance(system, AbstractSection):
+        section = system
+    elif isinstance(system, HybridSystem):
+        section = Stroboscopic(system)
+    else:
+        raise ValueError(
+            f"a {type(system).__name__} cannot be swept; pass a hybrid system, or a "
+            "section such as Stroboscopic(system) or Map(function, parameters)"
+        )
+    if isinstance(section.system, HybridSystem):
+        section.system.check()
+        if section.system.period is None and getattr(section, "period", 0) is None:
+            raise ValueError(
+                "this system has no forcing period; pass "
+                "Stroboscopic(system, period=...) with a period in seconds"
+            )
+    return section
+
+
+def check_turns(turns: int, keep: int, tolerance: float, reruns: int = 0) -> None:
+    """Raise `ValueError` for numbers that make no sense together."""
+    if not 1 <= keep <= turns:
+        raise ValueError(
+            f"keep is {keep} and turns {turns}; keep 1 or more of the turns"
+        )
+    if not 0 < tolerance < 1:
+        raise ValueError(
+            f"tolerance is {tolerance:g}; give a number in (0, 1), such as 1e-6"
+        )
+    if reruns < 0:
+        raise ValueError(f"reruns is {reruns}; give 0 or more")
+
+
+def as_values(values, parameters: int) -> np.ndarray:
+    """Parameter values, shape `(points,)`, or `(points, parameters)` for several."""
+    values = np.asarray(values, dtype=float)
+    shape = (len(values),) if parameters == 1 else (len(values), parameters)
+    if values.ndim == 0 or values.shape != shape or not len(values):
+        raise ValueError(
+            f"values has shape {values.shape}; give one row for each point and one "
+            f"column for each of {parameters} parameters"
+            if parameters > 1
+            else f"values has shape {values.shape}; give a vector"
+        )
+    if not np.all(np.isfinite(values)):
+        raise ValueError("a value is not finite; every parameter value must be")
+    return values
+
+
+def as_starts(section: AbstractSection, states, where, values) -> np.ndarray:
+    """Initial states of each point, shape `(points, starts, n)`.
+
+    `states` is None for the section's own, `(n,)`, `(starts, n)` or `(points, starts,
+    n)`.
+    """
+    points = len(values)
+    if states is None:
+        return section.starts(where, values)[:, None, :]
+    states = np.asarray(states, dtype=float)
+    if states.ndim < 3:
+        states = np.broadcast_to(np.atleast_2d(states), (points, *_two(states)))
+    if states.ndim != 3 or states.shape[0] != points or 0 in states.shape:
+        raise ValueError(
+            f"states has shape {states.shape}; give (n,), (starts, n), or (points, "
+            f"starts, n) for {points} points"
+        )
+    return states
+
+
+def _two(states) -> tuple[int, int]:
+    if states.ndim == 0 or 0 in states.shape:
+        raise ValueError(f"states has shape {states.shape}; give (n,) or (starts, n)")
+    return (1, len(states)) if states.ndim == 1 else states.shape

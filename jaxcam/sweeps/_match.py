@@ -1,0 +1,43 @@
+"""The same attractor in two pictures: on another grid, or at another parameter."""
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+from scipy.spatial import KDTree
+
+
+def match_orbits(first, second, scale, most: float, labels=None) -> dict[int, int]:
+    """Pairs of orbits that are closest to each other, all distances together.
+
+    **Arguments:**
+
+    - `first`, `second`: orbits, shapes `(k, points, n)` and `(l, points, n)`, filled up
+        with NaN.
+    - `scale`: shape `(n,)`, in whose units distances are.
+    - `most`: orbits farther apart than this are no pair.
+    - `labels`: of both, shapes `(k, 2)` and `(l, 2)`; with them, only orbits of one
+        label are a pair.
+
+    **Returns:** for indices of `second` that have one, that of its partner in `first`.
+    """
+    if not len(first) or not len(second):
+        return {}
+    far = 1e6 + most
+    cost = np.array([[orbit_distance(a, b, scale) for a in first] for b in second])
+    if labels is not None:
+        same = np.all(labels[1][:, None] == labels[0][None], axis=-1)
+        cost = np.where(same, cost, far)
+    # a pair that is too far apart costs as much as none
+    rows, columns = linear_sum_assignment(np.minimum(cost, most))
+    return {
+        int(b): int(a) for b, a in zip(rows, columns, strict=True) if cost[b, a] < most
+    }
+
+
+def orbit_distance(first, second, scale) -> float:
+    """How far the points of one orbit are from the other, on average, either way."""
+    a, b = (np.asarray(orbit) / scale for orbit in (first, second))
+    a, b = a[np.all(np.isfinite(a), axis=1)], b[np.all(np.isfinite(b), axis=1)]
+    if not len(a) or not len(b):
+        return np.inf
+    there, back = KDTree(b).query(a)[0], KDTree(a).query(b)[0]
+    return float(max(np.mean(there), np.mean(back)))

@@ -1,0 +1,163 @@
+"""Blocks on an executor, stored as they finish."""
+
+import abc
+import os
+import time
+from collections.abc import Callable
+from concurrent.futures import (
+    BrokenExecutor,
+    Executor,
+    FIRST_COMPLETED,
+    Future,
+    ThreadPoolExecutor,
+    wait,
+)
+from contextlib import nullcontext
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import xarray
+
+from ._checksums import names_of
+from ._disk import OnDisk
+from ._store import Layout, Memory, Store
+
+
+Arrays = dict[str, np.ndarray]
+# what Dask raises after it has tried a block on several workers in vain
+_LOST = ("KilledWorker", "FutureCancelledError")
+
+
+class Progress(NamedTuple):
+    """How far a sweep is, in blocks and seconds."""
+
+    done: int
+    total: int
+    elapsed: float
+    #: expected time until the end, NaN before the first block
+    remaining: float
+
+
+class AbstractJob(abc.ABC):
+    """A sweep cut into blocks.
+
+    A block depends on nothing but what the job is of; where `chained` is set also on
+    the block before it.
+    """
+
+    layout: Layout
+    chained: bool = False
+
+    @abc.abstractmethod
+    def work(self, block: int, before: Arrays | None) -> Callable[[], Arrays]:
+        """A block as something that can be sent to another process and called there."""
+
+
+def run_blocks(
+    job: AbstractJob,
+    *,
+    out: str | Path | None = None,
+    resume: bool = False,
+    executor: Executor | None = None,
+    workers: int | None = None,
+    progress: Callable[[Progress], None] | None = None,
+) -> Store:
+    """Compute the blocks that are missing and store each as it finishes.
+
+    **Arguments:**
+
+    - `out`: folder of a Zarr group; in memory without.
+    - `resume`: whether to go on with what is in the folder. Blocks that are missing or
+        damaged are computed again.
+    - `executor`: any `concurrent.futures.Executor`; without, `workers` threads, one a
+        core if that is not given either. Results do not depend on it.
+    - `progress`: called after each block, with a [`jaxcam.sweeps.Progress`][].
+
+    **Raises:** `ValueError` for a folder with something else in it; `RuntimeError`
+    where workers were lost. An interruption (Ctrl-C) loses the blocks in work only.
+    """
+    layout = job.layout
+    store = Memory(layout) if out is None else OnDisk(out, layout, resume)
+    if workers is not None and workers < 1:
+        raise ValueError(f"workers is {workers}; give 1 or more")
+    todo = [block for block, done in enumerate(store.finished()) if not done]
+    report = _Report(progress, layout.blocks, len(todo))
+    workers = (os.cpu_count() or 1) if workers is None else workers
+    workers = 1 if job.chained else workers
+    own = ThreadPoolExecutor(workers) if executor is None else nullcontext(executor)
+    with own as pool:
+        # enough that nobody waits for the next block, few enough to stay small
+        width = 2 * (getattr(pool, "_max_workers", None) or _workers_of(pool))
+        if job.chained:
+            width = 1
+        _drive(job, store, todo, pool, width, report)
+    return store
+
+
+def _drive(job, store, todo, pool, width, report) -> None:
+    waiting, pending = iter(todo), {}
+    try:
+        while True:
+            for block in waiting:
+                before = store.read(block - 1) if job.chained and block else None
+                pending[pool.submit(job.work(block, before))] = block
+                if len(pending) >= width:
+                    break
+            if not pending:
+                return
+            done, _ = wait(pending, return_when=FIRST_COMPLETED)
+            for future in done:
+                _take(store, future, pending.pop(future), todo)
+                report()
+    finally:
+        for future in pending:
+            future.cancel()
+
+
+def _take(store: Store, future: Future, block: int, todo) -> None:
+    try:
+        arrays = future.result()
+    except Exception as error:
+        lost = isinstance(error, BrokenExecutor) or type(error).__name__ in _LOST
+        if not lost:
+            raise
+        done = store.finished()
+        left = [b for b in todo if not done[b]]
+        raise RuntimeError(
+            f"a worker was lost; blocks {names_of(left)} are not done: run the sweep "
+            "again with resume=True to compute them"
+        ) from error
+    store.write(block, arrays)
+
+
+def _workers_of(pool) -> int:
+    """Workers of a pool that does not say: those of a Dask client, or the cores."""
+    client = getattr(pool, "_client", None)
+    if client is not None:
+        return max(1, sum(client.nthreads().values()))
+    return os.cpu_count() or 1
+
+
+class _Report:
+    def __init__(self, progress, total: int, todo: int):
+        self._progress, self._total = progress, total
+        self._skipped, self._done = total - todo, 0
+        self._begin = time.monotonic()
+
+    def __call__(self) -> None:
+        self._done += 1
+        if self._progress is None:
+            return
+        elapsed = time.monotonic() - self._begin
+        left = self._total - self._skipped - self._done
+        remaining = elapsed / self._done * left
+        done = self._skipped + self._done
+        self._progress(Progress(done, self._total, elapsed, remaining))
+
+
+def finished_dataset(store: Store, extra: xarray.Dataset | None = None):
+    """The whole dataset, with what was made of all blocks together."""
+    if extra is not None:
+        store.add(extra)
+    return store.dataset()

@@ -1,0 +1,38 @@
+"""What a section sees of many motions."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+
+class Samples(NamedTuple):
+    """The last points of many motions on a section, as numpy arrays."""
+
+    #: (lanes, keep, n); NaN where a lane failed or has fewer points
+    states: np.ndarray
+    #: (lanes, keep) when they were taken: s, or iterations of a map
+    times: np.ndarray
+    #: (lanes, keep) impacts since the point before, and how many completed a chatter
+    hits: np.ndarray
+    rests: np.ndarray
+    #: (lanes, n) state at the end, one whole number of turns after the start
+    final: np.ndarray
+    #: (lanes,) whether contact lasted throughout
+    contact: np.ndarray
+    #: (lanes,) 0, or why there is no result: an index into `RESULTS`, or `BEHIND`
+    code: np.ndarray
+
+
+#: code of a start behind the constraint, or outside of where the map is defined
+BEHIND = -1
+
+
+def joined(old: Samples, which, new: Samples) -> Samples:
+    """The samples with those of some lanes replaced."""
+
+    def put(before, after):
+        made = before.copy()
+        made[which] = after
+        return made
+
+    return Samples(*map(put, old, new))

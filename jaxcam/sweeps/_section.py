@@ -1,0 +1,88 @@
+"""Sections: at which points of a motion it is looked at."""
+
+import abc
+from collections.abc import Callable
+from typing import Any
+
+import equinox as eqx
+import numpy as np
+from equinox import AbstractVar
+
+from ._samples import Samples
+
+
+class AbstractSection(eqx.Module):
+    """A way to sample many motions of one system.
+
+    A lane is one motion. What a section says of it depends on its start and its
+    parameters alone, not on the lanes beside it; everything else in this package
+    relies on that.
+    """
+
+    #: whose leaves are the parameters
+    system: AbstractVar[Any]
+    #: whether samples are a turn apart, so that a label P(m, n) says n turns
+    regular: AbstractVar[bool]
+    #: whether impacts are counted
+    impacting: AbstractVar[bool]
+
+    @abc.abstractmethod
+    def sample(
+        self,
+        states,
+        turns: int,
+        keep: int,
+        *,
+        where: Callable | None = None,
+        values=None,
+    ) -> Samples:
+        """The last `keep` points within `turns` turns.
+
+        **Arguments:**
+
+        - `states`: shape `(lanes, n)`, where each lane starts.
+        - `where`, `values`: `where(system)` picks a parameter, which takes `values[i]`
+            in lane i; or a tuple of parameters, which take the row `values[i]`.
+
+        **Returns:** [`jaxcam.sweeps.Samples`][]. A lane that cannot start has the code
+        `BEHIND` and no points.
+        """
+
+    @abc.abstractmethod
+    def starts(self, where: Callable | None = None, values=None) -> np.ndarray:
+        """Where a lane starts if nothing is said, shape `(lanes, n)`.
+
+        **Raises:** `ValueError` for a system without such a place.
+        """
+
+    @abc.abstractmethod
+    def turn(self, where: Callable | None = None, values=None) -> np.ndarray:
+        """Length of a turn (s, or iterations), shape `(lanes,)`, or `(1,)` for all."""
+
+    @abc.abstractmethod
+    def lifted(self, states, where: Callable | None = None, values=None) -> np.ndarray:
+        """The states, moved out of the constraint where a parameter moved it there."""
+
+    @abc.abstractmethod
+    def names(self, n: int) -> tuple[tuple[str, str], ...]:
+        """Name and unit of each of the `n` components of a state."""
+
+
+def system_names(system, n: int) -> tuple[tuple[str, str], ...]:
+    """Names and units that the class of a system declares, x1, x2, ... without."""
+    names = tuple(getattr(system, "state_names", ()))
+    units = tuple(getattr(system, "state_units", ()))
+    made = [names[i] if i < len(names) else f"x{i + 1}" for i in range(n)]
+    dashes = ("-",) * (n - len(units))
+    return tuple(zip(made, (*units[:n], *dashes), strict=True))
+
+
+def component_coordinates(components) -> dict:
+    """Names and units of the components of a state, as coordinates of a dataset."""
+    # words of any length have a specification in Zarr, arrays of fixed ones have none
+    names = np.array([name for name, _ in components], dtype=object)
+    units = np.array([unit for _, unit in components], dtype=object)
+    return {
+        "component": ("component", names, {}),
+        "component_unit": ("component", units, {}),
+    }

@@ -1,0 +1,118 @@
+"""Where the blocks of a sweep are kept as they finish, and how they lie there."""
+
+import json
+from collections.abc import Mapping
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+import xarray
+
+
+#: name of the attribute with what the sweep is of
+SWEEP = "sweep"
+FORMAT, VERSION = "jaxcam sweep", 1
+
+
+class Variable(NamedTuple):
+    """One array of a sweep: its first dimension is that of the blocks."""
+
+    dims: tuple[str, ...]
+    #: without the first dimension
+    tail: tuple[int, ...]
+    dtype: Any
+    attributes: Mapping[str, Any] = {}
+
+
+class Layout(NamedTuple):
+    """What a sweep stores: `units` along the first dimension, `block` at a time."""
+
+    units: int
+    block: int
+    variables: Mapping[str, Variable]
+    coordinates: Mapping[str, tuple[str, Any, Mapping[str, Any]]]
+    #: what the sweep is of, as JSON; two sweeps are the same where this is
+    identity: Mapping[str, Any]
+
+    @property
+    def blocks(self) -> int:
+        return -(-self.units // self.block)
+
+    def bounds(self, block: int) -> tuple[int, int]:
+        return block * self.block, min((block + 1) * self.block, self.units)
+
+
+class Store(Protocol):
+    """What the blocks are put into and read from."""
+
+    layout: Layout
+
+    def finished(self) -> list[bool]: ...
+    def write(self, block: int, arrays: Mapping[str, np.ndarray]) -> None: ...
+    def read(self, block: int) -> dict[str, np.ndarray]: ...
+    def dataset(self) -> xarray.Dataset: ...
+    def add(self, extra: xarray.Dataset) -> None: ...
+
+
+class Memory:
+    """Blocks in memory."""
+
+    def __init__(self, layout: Layout):
+        self.layout = layout
+        self._arrays = {
+            name: np.zeros((layout.units, *v.tail), dtype=v.dtype)
+            for name, v in layout.variables.items()
+        }
+        self._done = [False] * layout.blocks
+        self._extra = xarray.Dataset()
+
+    def finished(self) -> list[bool]:
+        return list(self._done)
+
+    def write(self, block: int, arrays: Mapping[str, np.ndarray]) -> None:
+        first, last = self.layout.bounds(block)
+        for name, array in ordered(self.layout, arrays).items():
+            self._arrays[name][first:last] = array
+        self._done[block] = True
+
+    def read(self, block: int) -> dict[str, np.ndarray]:
+        first, last = self.layout.bounds(block)
+        return {name: a[first:last] for name, a in self._arrays.items()}
+
+    def dataset(self) -> xarray.Dataset:
+        made = template(self.layout, self._arrays)
+        return made.merge(self._extra, combine_attrs="no_conflicts")
+
+    def add(self, extra: xarray.Dataset) -> None:
+        self._extra = extra
+
+
+def ordered(layout: Layout, arrays) -> dict[str, np.ndarray]:
+    return {
+        name: np.ascontiguousarray(arrays[name], dtype=v.dtype)
+        for name, v in layout.variables.items()
+    }
+
+
+def template(layout: Layout, arrays: Mapping[str, np.ndarray]) -> xarray.Dataset:
+    """Coordinates and attributes, and the arrays that there are."""
+    data = {}
+    for name, array in arrays.items():
+        variable = layout.variables[name]
+        data[name] = (variable.dims, array, dict(variable.attributes))
+    coordinates = {
+        name: (dim, values, dict(attributes))
+        for name, (dim, values, attributes) in layout.coordinates.items()
+    }
+    attributes = {
+        "format": FORMAT,
+        "version": VERSION,
+        "units": layout.units,
+        "block": layout.block,
+        "stored": list(layout.variables),
+        SWEEP: json.dumps(plain(layout.identity)),
+    }
+    return xarray.Dataset(data, coordinates, attributes)
+
+
+def plain(value: Any) -> Any:
+    return json.loads(json.dumps(value))

@@ -1,0 +1,112 @@
+"""Attractors of all blocks together, and which of them each state ends on."""
+
+import numpy as np
+import xarray
+
+from ._attractors import attractor_names, Attractors, find_attractors
+from ._basins_job import BasinsJob
+from ._basins_result import Basins
+from ._label import APERIODIC, OUTSIDE
+from ._match import match_orbits
+from ._section import AbstractSection, component_coordinates
+from ._settle import settle
+from ._store import Store
+
+
+#: points of an orbit that are kept of each attractor
+_SHOWN = 64
+#: distance of two orbits that are one attractor, in units of the scale
+_ALIKE = 0.05
+
+
+def together(job: BasinsJob, store: Store, known: Basins | None) -> xarray.Dataset:
+    """Number of the attractor of each state, and the attractors themselves."""
+    grid, section, layout = job.grid, job.section, job.layout
+    impacts, turns, fingerprint = [], [], []
+    visited, lanes = [], 0
+    for block in range(layout.blocks):
+        part = store.read(block)
+        impacts.append(part["impacts"].ravel())
+        turns.append(part["turns"].ravel())
+        fingerprint.append(part["fingerprint"].reshape(len(turns[-1]), -1))
+        (some,) = np.nonzero(turns[-1] == APERIODIC)
+        visited.append((block, lanes + some, some))
+        lanes += len(turns[-1])
+    impacts, turns = np.concatenate(impacts), np.concatenate(turns)
+    if np.all(turns == OUTSIDE):
+        raise ValueError(
+            "no motion can start: every state of the grid is behind the constraint; "
+            "choose low and high in front of it"
+        )
+
+    def cells():
+        for block, place, some in visited:
+            keep = job.settings[1]
+            yield place, store.read(block)["cells"].reshape(-1, keep)[some]
+
+    starts = grid.states()
+    number, found = find_attractors(
+        impacts, turns, np.concatenate(fingerprint), cells(), starts, job.same
+    )
+    orbit = _orbits(section, starts[found.lane], job)
+    labels = np.stack([found.impacts, found.turns], axis=1)
+    if known is not None:
+        number, labels, orbit = _renumbered(number, found, orbit, known)
+    dims = layout.variables["turns"].dims
+    names = np.array(attractor_names(*labels.T), dtype=object)
+    components = component_coordinates(section.names(len(grid.shape)))
+    about = "number of the attractor; -1 escaped, -2 failed, -3 cannot start"
+    return xarray.Dataset(
+        {
+            "attractor": (dims, number.reshape(grid.shape).astype(np.int32),
+                          {"about": about}),
+            "orbit": (("number", "sample_of_orbit", "component"), orbit),
+            "orbit_impacts": ("number", labels[:, 0].astype(np.int32)),
+            "orbit_turns": ("number", labels[:, 1].astype(np.int32)),
+        },
+        {"number": np.arange(len(labels)), "name": ("number", names), **components},
+    )  # fmt: skip
+
+
+def _orbits(section: AbstractSection, starts, job: BasinsJob) -> np.ndarray:
+    """The last points of the motions that stand for the attractors, in order."""
+    turns, keep, tolerance, reruns = job.settings
+    n = len(job.grid.shape)
+    made = np.full((len(starts), min(_SHOWN, turns), n), np.nan)
+    if not len(starts):
+        return made
+    samples, labels = settle(
+        section, starts, turns, keep, tolerance=tolerance, reruns=reruns
+    )
+    longer = section.sample(samples.final, turns, made.shape[1]).states
+    for k, length in enumerate(labels.turns):
+        orbit = longer[k]
+        if length > 0:
+            # the smallest point first, and what follows it
+            one = orbit[:length]
+            first = int(np.lexsort(np.round(one, 6).T[::-1])[0])
+            orbit = np.full_like(orbit, np.nan)
+            orbit[:length] = np.roll(one, -first, axis=0)
+        made[k] = orbit
+    return made
+
+
+def _renumbered(number, found: Attractors, orbit, known: Basins):
+    """The numbers that attractors have in other basins; new ones come after those."""
+    labels = np.stack([found.impacts, found.turns], axis=1)
+    both = (known.labels, labels)
+    pairs = match_orbits(known.orbits, orbit, known.scale, _ALIKE, both)
+    old = len(known.names)
+    fresh = [k for k in range(len(found)) if k not in pairs]
+    new = np.array(
+        [pairs[k] if k in pairs else old + fresh.index(k) for k in range(len(found))],
+        dtype=int,
+    )
+    if len(new):
+        number = np.where(number >= 0, new[np.maximum(number, 0)], number)
+    labels = np.concatenate([known.labels, labels[fresh]])
+    points = max(known.orbits.shape[1], orbit.shape[1])
+    orbits = np.full((len(labels), points, orbit.shape[2]), np.nan)
+    orbits[:old, : known.orbits.shape[1]] = known.orbits
+    orbits[old:, : orbit.shape[1]] = orbit[fresh]
+    return number, labels, orbits

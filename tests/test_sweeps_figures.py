@@ -1,0 +1,84 @@
+"""Figures of sweeps draw without a warning, and show what the sweeps have."""
+
+import matplotlib
+import numpy as np
+import pytest
+
+
+matplotlib.use("Agg")
+
+import matplotlib.pyplot as plt
+from matplotlib.colors import to_rgba
+from sweep_maps import LOGISTIC, SQUARE_ROOT, SQUARED
+
+from jaxcam import plotting
+from jaxcam.plotting._diagram import COLOURS
+from jaxcam.sweeps import basins, Chart, chart, diagram, Grid, Map
+
+
+pytestmark = pytest.mark.filterwarnings("error")
+
+
+@pytest.fixture(autouse=True)
+def no_figure_stays_open():
+    yield
+    plt.close("all")
+
+
+def test_a_diagram_has_a_dot_for_each_sample_and_a_colour_for_each_way():
+    found = diagram(
+        LOGISTIC, "mu", np.linspace(2.9, 3.5, 7), [0.3], turns=100, keep=8,
+        direction="both",
+    )  # fmt: skip
+    figure = plotting.sweep_diagram(found, x_label=("growth", "-"))
+    (ax,) = figure.axes
+    up, down = ax.lines
+    assert len(up.get_xdata()) == len(down.get_xdata()) == 7 * 8
+    assert up.get_color() != down.get_color() and up.get_rasterized()
+    assert np.array_equal(np.unique(up.get_xdata()), found.values[:7])
+    assert ax.get_xlabel() == "growth (–)" and ax.get_ylabel() == "x1 (–)"
+    words = [text.get_text() for text in ax.get_legend().get_texts()]
+    assert words == ["upwards", "downwards"]
+
+
+def test_a_picture_has_the_colours_of_its_legend(tmp_path):
+    grid = Grid((-2, -1), (2, 1), (12, 6))
+    found = basins(SQUARE_ROOT, grid, 40)
+    figure = plotting.basin_picture(found)
+    (ax,) = figure.axes
+    (image,) = ax.images
+    colours = image.cmap(image.norm(image.get_array()))
+    assert colours.shape == (6, 12, 4)
+    assert np.allclose(colours[:, :6], to_rgba(COLOURS[0]))
+    assert np.allclose(colours[:, 6:], to_rgba(COLOURS[1]))
+    words = [text.get_text() for text in ax.get_legend().get_texts()]
+    assert words == ["period 1 a  50.0%", "period 1 b  50.0%", "attractors"]
+    assert plotting.save_figure(figure, tmp_path / "a.png").stat().st_size > 5000
+
+
+def test_states_that_escape_are_white_and_named():
+    figure = plotting.basin_picture(basins(SQUARED, Grid((-2, -2), (2, 2), (8, 8)), 30))
+    (ax,) = figure.axes
+    words = [text.get_text() for text in ax.get_legend().get_texts()]
+    assert words[1] == "none"
+
+
+def test_a_chart_has_a_colour_for_each_label():
+    two = Map(
+        lambda x, p: p["mu"] * x * (1 - x) + p["shift"], {"mu": 3.0, "shift": 0.0}
+    )
+    found = chart(two, ("mu", "shift"), [2.5, 3.2, 3.5], [0.0, 0.01], [0.3], turns=500)
+    assert isinstance(found, Chart)
+    assert found.labels[0, :, 0].tolist() == ["period 1", "period 2", "period 4"]
+    (ax,) = plotting.sweep_chart(found).axes
+    words = {text.get_text() for text in ax.get_legend().get_texts()}
+    assert words == set(found.labels.ravel().tolist())
+
+
+def test_what_cannot_be_drawn_says_so():
+    line = basins(SQUARE_ROOT, Grid((-2, 0), (2, 0), (12, 1)), 40)
+    with pytest.raises(ValueError, match="several values"):
+        plotting.basin_picture(line)
+    flat = diagram(LOGISTIC, "mu", [3.0], [0.3], turns=20, keep=4)
+    with pytest.raises(ValueError, match="impacts"):
+        plotting.sweep_diagram(flat, phase=True)

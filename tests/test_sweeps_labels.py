@@ -1,0 +1,74 @@
+"""Periods and labels, of sequences that are known and of motions in closed form."""
+
+import numpy as np
+import pytest
+
+import jaxcam
+from jaxcam.models import ImpactOscillator
+from jaxcam.sweeps import label, periods, PoincareSection, return_times, Stroboscopic
+from jaxcam.sweeps._label import names
+from jaxcam.sweeps._pick import pick
+
+
+OSCILLATOR = ImpactOscillator(omega=2.6, restitution=0.8, wall=0.0)
+#: on P(1,1), and on P(6,6), to all digits after many turns
+START = np.array([[-0.66, 0.02], [-1.05037565, 0.19006401]])
+
+
+@pytest.fixture(scope="module")
+def settled():
+    return Stroboscopic(OSCILLATOR, lanes=16).sample(START, 400, 24)
+
+
+def test_periods_of_cycles():
+    """Cycles of length 1 to 12 within 24 points, and noise."""
+    k = np.arange(24)
+    rng = np.random.default_rng(0)
+    cycles = [np.cos(2 * np.pi * k / n) + 0.1 * np.sin(2 * np.pi * k / n)
+              for n in range(1, 13)]  # fmt: skip
+    lanes = np.stack([*cycles, rng.uniform(size=24), np.full(24, np.nan)])
+    assert periods(lanes[..., None]).tolist() == [*range(1, 13), 0, 0]
+
+
+@pytest.mark.parametrize("multiplier", [-0.5, 0.5, 0.6j, -0.4 + 0.3j])
+def test_a_motion_that_spirals_in_is_not_of_a_multiple_period(multiplier):
+    """x_k = Re c^k: period 1 within the tolerance, or none yet; never another."""
+    k = np.arange(24)[None] + np.arange(40)[:, None]
+    lanes = np.real(multiplier**k)[..., None]
+    found = periods(lanes, 1e-6)
+    assert set(found) == {0, 1}
+    size = np.abs(multiplier) ** np.arange(40) * np.abs(multiplier - 1)
+    assert np.all(found[size < 1e-7] == 1) and np.all(found[size > 1e-4] == 0)
+
+
+def test_labels_of_an_oscillator(settled):
+    assert names(label(settled)).tolist() == ["P(1,1)", "P(6,6)"]
+
+
+def test_samples_are_those_of_a_trajectory(settled):
+    """On P(1,1) after 400 turns, and its impacts: to 1e-8."""
+    run = jaxcam.simulate(
+        OSCILLATOR, settled.states[0, -1], 0.0, 5 * float(OSCILLATOR.period)
+    )
+    assert np.abs(np.asarray(run.final) - settled.states[0, -1]).max() < 1e-8
+    assert int(run.impacts.count) == settled.hits[0, -5:].sum()
+
+
+def test_return_times_to_a_section(settled):
+    """The velocity of P(1,1) falls through zero once in a period of 2 pi / omega."""
+    section = PoincareSection(OSCILLATOR, lambda t, x: x[1], direction=1)
+    samples = section.sample(settled.states[:1, -1], 8, 6)
+    times = return_times(samples)
+    assert times.shape == (1, 5)
+    assert np.abs(times - 2 * np.pi / 2.6).max() < 1e-7
+    assert np.all(samples.hits == 1)
+
+
+def test_a_pick_is_a_path_and_says_what_there_is():
+    one = pick(lambda s: s.omega, OSCILLATOR)
+    assert one == pick("omega", OSCILLATOR) and one.names == ("omega",)
+    two = pick(("wall", lambda s: s.damping), OSCILLATOR)
+    assert two.names == ("wall", "damping") and two.several
+    for wrong in ("size", lambda s: s.size):
+        with pytest.raises(ValueError, match="omega, restitution, wall, damping"):
+            pick(wrong, OSCILLATOR)

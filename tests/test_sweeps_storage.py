@@ -1,0 +1,242 @@
+"""Sweeps that are stopped, damaged, or run elsewhere: the result is the same."""
+
+import errno
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import textwrap
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from multiprocessing import get_context
+from pathlib import Path
+
+import numpy as np
+import pytest
+import zarr
+from sweep_maps import LOGISTIC, SQUARE_ROOT
+
+from jaxcam.sweeps import basins, diagram, Grid, load
+from jaxcam.sweeps._disk import OnDisk
+
+
+GRID = Grid((-2, -2), (2, 2), (24, 10))
+#: eight blocks of three rows
+OPTIONS = {"turns": 40, "block": 3}
+
+
+@pytest.fixture(scope="module")
+def whole():
+    return basins(SQUARE_ROOT, GRID, **OPTIONS)
+
+
+@pytest.fixture(scope="module")
+def stored(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("stored") / "sweep"
+    basins(SQUARE_ROOT, GRID, out=folder, **OPTIONS)
+    return folder
+
+
+@pytest.fixture
+def copy(stored, tmp_path):
+    return Path(shutil.copytree(stored, tmp_path / "copy"))
+
+
+def again(folder):
+    return basins(SQUARE_ROOT, GRID, out=folder, resume=True, **OPTIONS)
+
+
+def same(one, other) -> bool:
+    """Equal to the last bit, whatever is only on disk aside."""
+    names = set(one.dataset.variables) & set(other.dataset.variables)
+    assert {"attractor", "fingerprint", "orbit"} <= names
+    return one.dataset[sorted(names)].load().equals(other.dataset[sorted(names)].load())
+
+
+def test_on_disk_as_in_memory(whole, stored):
+    assert same(whole, load(stored))
+
+
+def test_read_without_jaxcam(stored, whole):
+    """xarray alone finds names, units, attractors and the system of the sweep."""
+    script = f"""
+        import json, sys, warnings
+        import xarray
+        warnings.simplefilter("error")
+        data = xarray.open_dataset({str(stored)!r}, engine="zarr", consolidated=False)
+        assert data["attractor"].dims == ("x1", "x2"), data["attractor"].dims
+        assert [str(n) for n in data["name"].values] == ["period 1 a", "period 1 b"]
+        assert json.loads(data.attrs["sweep"])["turns"] == 40
+        print(int((data["attractor"] == 0).sum()), "jaxcam" in sys.modules)
+    """
+    found = subprocess.run(
+        [sys.executable, "-c", textwrap.dedent(script)],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert found.returncode == 0, found.stderr
+    assert found.stdout.split() == [str((whole.attractor == 0).sum()), "False"]
+
+
+def test_a_finished_sweep_is_not_computed_again(copy, whole, monkeypatch):
+    def never(*_):
+        raise AssertionError("a finished block was written again")
+
+    monkeypatch.setattr(OnDisk, "write", never)
+    assert same(again(copy), whole)
+
+
+def _cells(folder, name, block):
+    files = [f for f in (folder / name / "c" / str(block)).rglob("*") if f.is_file()]
+    assert files
+    return files[0]
+
+
+@pytest.mark.parametrize("name", ["turns", "fingerprint", "impacts"])
+def test_a_damaged_chunk_is_named_and_computed_again(copy, whole, name):
+    file = _cells(copy, name, 2)
+    content = bytearray(file.read_bytes())
+    content[-3] ^= 0x55
+    file.write_bytes(bytes(content))
+    with pytest.raises(ValueError, match="block 2 (is damaged|cannot be read).*resume"):
+        load(copy)
+    assert same(again(copy), whole) and same(load(copy), whole)
+
+
+def test_a_missing_chunk_is_named_and_computed_again(copy, whole):
+    _cells(copy, "fingerprint", 5).unlink()
+    _cells(copy, "fingerprint", 6).write_bytes(b"")
+    with pytest.raises(ValueError, match="block 5 .*2 of 8 blocks are wrong: 5, 6"):
+        load(copy)
+    assert same(again(copy), whole)
+
+
+@pytest.mark.parametrize("how", ["lost", "damaged", "never written"])
+def test_attractors_that_are_damaged_are_named_and_found_again(copy, whole, how):
+    if how == "lost":
+        _cells(copy, "attractor", 0).unlink()
+    elif how == "damaged":
+        file = _cells(copy, "attractor", 0)
+        file.write_bytes(file.read_bytes()[:-1])
+    else:
+        group = zarr.open_group(str(copy), mode="r+")
+        del group.attrs["together"]
+    with pytest.raises(ValueError, match="resume=True to .*attractor"):
+        load(copy)
+    assert same(again(copy), whole) and same(load(copy), whole)
+
+
+def test_the_disk_is_full(tmp_path, whole, monkeypatch):
+    """The error comes out, and what was stored before it is kept."""
+    write, count = OnDisk.write, []
+
+    def full(self, block, arrays):
+        count.append(block)
+        if len(count) == 4:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(self.path))
+        write(self, block, arrays)
+
+    folder = tmp_path / "sweep"
+    with monkeypatch.context() as patch:
+        patch.setattr(OnDisk, "write", full)
+        with pytest.raises(OSError, match="No space left"):
+            basins(SQUARE_ROOT, GRID, out=folder, workers=1, **OPTIONS)
+    finished = zarr.open_group(str(folder), mode="r")["checksum"][:]
+    assert np.count_nonzero(finished >= 0) == 3
+    assert same(again(folder), whole)
+
+
+_CHILD = """
+    import sys, time
+    sys.path.insert(0, {tests!r})
+    from sweep_maps import SQUARE_ROOT
+    from jaxcam.sweeps import basins, Grid
+
+    def slowly(at):
+        print(at.done, flush=True)
+        time.sleep(0.3)
+
+    grid = Grid((-2, -2), (2, 2), (24, 10))
+    basins(SQUARE_ROOT, grid, 40, block=3, out={folder!r}, workers=1, progress=slowly)
+"""
+
+
+def test_killed_in_the_middle(tmp_path, whole):
+    """SIGKILL after three of eight blocks; the rest is computed on resuming."""
+    folder = tmp_path / "sweep"
+    script = _CHILD.format(tests=str(Path(__file__).parent), folder=str(folder))
+    child = subprocess.Popen(
+        [sys.executable, "-c", textwrap.dedent(script)],
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    assert child.stdout is not None
+    with child:
+        for line in child.stdout:
+            if line.strip() == "3":
+                child.send_signal(signal.SIGKILL)
+                break
+    assert child.returncode == -signal.SIGKILL
+    with pytest.raises(ValueError, match="is not finished"):
+        load(folder)
+    seen = []
+    found = basins(
+        SQUARE_ROOT, GRID, out=folder, resume=True, progress=seen.append, **OPTIONS
+    )
+    assert seen[0].done >= 4 and seen[-1].done == seen[-1].total == 8
+    assert seen[-1].remaining == 0.0 <= seen[0].remaining
+    assert same(found, whole)
+
+
+def test_another_sweep_is_not_mixed_in(stored):
+    with pytest.raises(ValueError, match="holds a sweep already; pass resume=True"):
+        basins(SQUARE_ROOT, GRID, out=stored, **OPTIONS)
+    with pytest.raises(ValueError, match=r"another sweep \(other turns\)"):
+        basins(SQUARE_ROOT, GRID, 41, block=3, out=stored, resume=True)
+    with pytest.raises(ValueError, match=r"another sweep \(other sweep, "):
+        diagram(LOGISTIC, "mu", [3.0], [0.3], out=stored, resume=True)
+
+
+def test_a_folder_with_something_else_is_left_alone(tmp_path):
+    (tmp_path / "letter.txt").write_text("dear reader")
+    with pytest.raises(ValueError, match="holds something else"):
+        basins(SQUARE_ROOT, GRID, out=tmp_path, **OPTIONS)
+    assert (tmp_path / "letter.txt").read_text() == "dear reader"
+
+
+@pytest.mark.parametrize("workers", [1, 3])
+def test_threads_change_nothing(whole, workers):
+    assert same(basins(SQUARE_ROOT, GRID, workers=workers, **OPTIONS), whole)
+    with ThreadPoolExecutor(workers) as pool:
+        assert same(basins(SQUARE_ROOT, GRID, executor=pool, **OPTIONS), whole)
+
+
+def test_blocks_change_no_result(whole):
+    found = basins(SQUARE_ROOT, GRID, 40, block=7)
+    assert np.array_equal(found.attractor, whole.attractor)
+    assert np.array_equal(found.orbits, whole.orbits, equal_nan=True)
+
+
+@pytest.mark.slow
+def test_processes_change_nothing(whole):
+    with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
+        assert same(basins(SQUARE_ROOT, GRID, executor=pool, **OPTIONS), whole)
+
+
+def test_a_chain_of_values_is_resumed_where_it_stopped(tmp_path):
+    """The state that was carried into a block is read from the one before it."""
+    options = {"turns": 200, "keep": 16, "direction": "both", "block": 4}
+    values = np.linspace(2.8, 3.6, 21)
+    where = lambda p: p["mu"]
+    whole = diagram(LOGISTIC, where, values, [[0.3], [0.6]], **options)
+    folder = tmp_path / "sweep"
+    diagram(LOGISTIC, where, values, [[0.3], [0.6]], out=folder, **options)
+    _cells(folder, "final", 4).unlink()
+    found = diagram(
+        LOGISTIC, where, values, [[0.3], [0.6]], out=folder, resume=True, **options
+    )
+    assert np.array_equal(found.states, whole.states)
+    assert found.direction.tolist() == [1] * 21 + [-1] * 21
+    assert np.array_equal(found.values[:21], values)
+    assert np.array_equal(found.values[21:], values[::-1])
