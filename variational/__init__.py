@@ -21,6 +21,10 @@ from ._composed_map import (
     simulated_at_section as simulated_at_section,
     simulated_by_parameter as simulated_by_parameter,
 )
+from ._filippov import (
+    filippov_monodromy as filippov_monodromy,
+    filippov_saltation as filippov_saltation,
+)
 from ._floquet import (
     floquet_multipliers as floquet_multipliers,
     impact_scale as impact_scale,
@@ -69,6 +73,7 @@ from ._monodromy import monodromy as monodromy, turn_derivative as turn_derivati
 from ._multipliers import eigenvalues as eigenvalues
 from ._nordmark import nordmark_map as nordmark_map, nordmark_window as nordmark_window
 from ._orbit import Event as Event, Orbit as Orbit, orbit_of as orbit_of
+from ._poincare import poincare_derivative as poincare_derivative
 from ._reversed import Reversed as Reversed
 from ._saltation import (
     event_map as event_map,

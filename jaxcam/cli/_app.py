@@ -6,9 +6,11 @@ from typing import Annotated
 
 import typer
 
+from ._basins import basins
 from ._continue import continue_
 from ._demo import demo
 from ._diagnose import diagnose
+from ._diagram import diagram
 from ._errors import INTERRUPTED, one_sentence
 from ._fit import fit
 from ._reproduce import reproduce
@@ -24,6 +26,8 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 app.command()(one_sentence(simulate))
+app.command()(one_sentence(diagram))
+app.command()(one_sentence(basins))
 app.command("continue")(one_sentence(continue_))
 app.command()(one_sentence(demo))
 app.command()(one_sentence(diagnose))

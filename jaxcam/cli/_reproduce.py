@@ -1,4 +1,4 @@
-"""`jaxcam reproduce`: tables of the thesis, printed beside computed."""
+"""`jaxcam reproduce`: tables and figures of the thesis, printed beside computed."""
 
 from pathlib import Path
 from typing import Annotated
@@ -16,7 +16,8 @@ def reproduce(
     target: Annotated[
         str | None,
         typer.Argument(
-            metavar="[TARGET]", help="A table, such as table-5.2; all of them without."
+            metavar="[TARGET]",
+            help="Such as table-5.2 or figure-4.5; all of them without.",
         ),
     ] = None,
     preset: Annotated[
@@ -31,7 +32,8 @@ def reproduce(
         typer.Option("--json", metavar="FILE", help="Write the result; - to print it."),
     ] = None,
     out: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Write a CSV file a table there.")
+        Path | None,
+        typer.Option(metavar="DIR", help="Write CSV files and figures there."),
     ] = None,
 ) -> None:
     """
@@ -41,6 +43,7 @@ def reproduce(
     Examples:
       jaxcam reproduce --list
       jaxcam reproduce table-5.2
+      jaxcam reproduce figure-1.3 --out figures
       jaxcam reproduce table-5.2 --preset table-4.4 --json -
     """
     choose("--preset", preset, _PRESETS)
@@ -70,7 +73,18 @@ def reproduce(
         found[name] = table.to_dict(orient="records")
         if out is not None:
             table.to_csv(out / f"{name}.csv", index=False)
+            _draw(name, system, out)
     output.write_json({"command": "reproduce", "preset": preset, "tables": found})
+
+
+def _draw(name: str, system, out: Path) -> None:
+    """The figure of a target, where it has one."""
+    from ..plotting import save_figure, style
+    from ._reproduce_figures import DRAWINGS
+
+    if name in DRAWINGS:
+        with style():
+            save_figure(DRAWINGS[name](system), out / f"{name}.png")
 
 
 def _rich(title: str, frame):
@@ -86,11 +100,12 @@ def _rich(title: str, frame):
     table.add_column("unit")
     for row in frame.itertuples(index=False):
         lost = not math.isfinite(row.computed)
+        drawn = not math.isfinite(row.printed)
         table.add_row(
             row.quantity,
-            f"{row.printed:.10g}",
+            "" if drawn else f"{row.printed:.10g}",
             "none" if lost else f"{row.computed:.10g}",
-            "" if lost else f"{row.difference:+.2e}",
+            "" if lost or drawn else f"{row.difference:+.2e}",
             row.unit,
         )
     return table

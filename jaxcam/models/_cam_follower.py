@@ -108,6 +108,15 @@ class CamFollower(HybridSystem):
         reach = self._reach(jnp.sin(follower_angle), 1 / jnp.cos(follower_angle))
         return 0.5 * self.stiffness * (reach - self.spring_elongation) ** 2
 
+    def load_terms(self, lift, slope, curvature):
+        """Contact torque (N m) at speed w as `a w^2 + b w + c`: a, b and c. (4.10)
+
+        Lift, slope and curvature are the profile's, for each radian of the cam.
+        """
+        at_rest = jnp.stack([lift, jnp.zeros_like(lift)])
+        spring = -self.inertia * self.vector_field(0.0, at_rest)[1]
+        return self.inertia * curvature, jnp.zeros_like(slope), spring
+
     @property
     def period(self) -> jax.Array:
         """Duration of one turn of the cam (s)."""

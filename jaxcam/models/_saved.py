@@ -6,7 +6,8 @@
             "fields": {"gravity": 9.81, "restitution": 0.8, ...}}}
 ```
 
-A field is a number, a list of numbers, a word, or another object of this kind.
+A field is a number, a list of numbers, a word, another object of this kind, or several
+of them, as `{"items": [...]}`.
 """
 
 import dataclasses
@@ -67,7 +68,7 @@ def load_system(file: str | Path, *, classes: Iterable[type] = ()) -> HybridSyst
     """Read a system that `save_system` wrote.
 
     **Arguments:** `classes` beside those of `jaxcam.models` that may occur in it, such
-    as a system of your own.
+    as a system of your own, or `jaxcam.discrepancy.saved_classes()`.
 
     **Raises:** `ValueError` for a file that is not one, or names another class.
     """
@@ -125,6 +126,9 @@ def _encode(value: Any, place: str) -> Any:
         return {"class": type(value).__name__, "fields": fields}
     if isinstance(value, jax.Array | np.ndarray | np.generic):
         return np.asarray(value).tolist()
+    if isinstance(value, tuple):
+        items = [_encode(one, f"{place}[{k}]") for k, one in enumerate(value)]
+        return {"items": items}
     if value is None or isinstance(value, bool | int | float | str):
         return value
     raise ValueError(
@@ -140,6 +144,11 @@ def _decode(found: Any, known: dict[str, type], place: str) -> Any:
         return found
     if isinstance(found, int | float):
         return found
+    if isinstance(found, dict) and set(found) == {"items"}:
+        items = found["items"] if isinstance(found["items"], list) else []
+        return tuple(
+            _decode(one, known, f"{place}[{k}]") for k, one in enumerate(items)
+        )
     if not isinstance(found, dict) or set(found) != {"class", "fields"}:
         raise ValueError(f"`{place}` needs a `class` and its `fields`.")
     name = found["class"]

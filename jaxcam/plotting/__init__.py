@@ -1,6 +1,8 @@
 """Figures, in one style. Imported by the command line and notebooks only."""
 
+from ._basins import basin_picture as basin_picture
 from ._branch import branch_diagram as branch_diagram
+from ._cam_contour import cam_contour as cam_contour
 from ._chatter_maps import (
     beta_lobes as beta_lobes,
     lambda_cobweb as lambda_cobweb,
@@ -8,6 +10,7 @@ from ._chatter_maps import (
 )
 from ._chatter_region import chattering_region as chattering_region
 from ._compare_recording import compare_recording as compare_recording
+from ._diagram import sweep_chart as sweep_chart, sweep_diagram as sweep_diagram
 from ._grazing_map import cobweb as cobweb
 from ._impact_map import impact_map as impact_map
 from ._local_map import (
@@ -15,6 +18,7 @@ from ._local_map import (
     local_map_diagram as local_map_diagram,
 )
 from ._lyapunov import lyapunov_convergence as lyapunov_convergence
+from ._motion_program import motion_program as motion_program
 from ._multipliers import multipliers as multipliers
 from ._phase_portrait import phase_portrait as phase_portrait
 from ._residual_by_mode import residual_by_mode as residual_by_mode

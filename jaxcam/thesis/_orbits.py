@@ -18,7 +18,7 @@ from ..models import CamFollower, rpm_to_rad_s
 #: a state near the cam, from which Newton finds contact
 NEAR_CAM = (0.3, 0.0)
 #: where the search for the branch begins (rpm), and the longest stride along it
-_SEARCH, _STRIDE = 148.0, 0.5
+SEARCH, _STRIDE = 148.0, 0.5
 
 
 def speed_of(system):
@@ -33,23 +33,23 @@ def at_speed(system: CamFollower, rpm) -> CamFollower:
 
 def first_orbit(system: CamFollower) -> ImpactOrbit | None:
     """P(1,1) at 148 rpm that is no saddle, or None."""
-    orbits = one_impact_orbits(at_speed(system, _SEARCH), jnp.array(NEAR_CAM))
+    orbits = one_impact_orbits(at_speed(system, SEARCH), jnp.array(NEAR_CAM))
     return orbits[0] if orbits else None
 
 
 def orbit_at(system: CamFollower, start: ImpactOrbit, rpm: float) -> ImpactOrbit:
     """The orbit that `start`, at 148 rpm, becomes at another speed."""
-    strides = max(1, int(np.ceil(abs(rpm - _SEARCH) / _STRIDE)))
+    strides = max(1, int(np.ceil(abs(rpm - SEARCH) / _STRIDE)))
     orbit = start
-    for speed in np.linspace(_SEARCH, rpm, strides + 1)[1:]:
-        orbit = _orbit(at_speed(system, speed), orbit)
+    for speed in np.linspace(SEARCH, rpm, strides + 1)[1:]:
+        orbit = next_orbit(at_speed(system, speed), orbit)
     return orbit
 
 
 def multipliers_at(system: CamFollower, start: ImpactOrbit, rpm: float) -> np.ndarray:
     """The two multipliers of P(1,1); NaN where it is lost."""
     orbit = orbit_at(system, start, rpm)
-    return multipliers_of(_monodromy(at_speed(system, rpm), orbit))
+    return multipliers_of(monodromy_of(at_speed(system, rpm), orbit))
 
 
 def multipliers_of(matrix) -> np.ndarray:
@@ -84,9 +84,9 @@ def along_traces(
     The trace is monotonic along the branch, also around the fold, where the speed is
     not.
     """
-    point = SpecialPoint(jnp.asarray(rpm_to_rad_s(_SEARCH)), start)
-    moved = at_speed(system, _SEARCH)
-    first = float(np.trace(np.asarray(_monodromy(moved, start))))
+    point = SpecialPoint(jnp.asarray(rpm_to_rad_s(SEARCH)), start)
+    moved = at_speed(system, SEARCH)
+    first = float(np.trace(np.asarray(monodromy_of(moved, start))))
     strides = max(1, int(np.ceil(abs(trace - first) / stride)))
     for value in np.linspace(first, trace, strides + 1)[1:]:
         point = point_on_line(system, point, (float(value), 0.0))
@@ -94,12 +94,12 @@ def along_traces(
 
 
 @eqx.filter_jit
-def _orbit(system, guess):
+def next_orbit(system, guess):
     return impact_orbit(system, guess)
 
 
 @eqx.filter_jit
-def _monodromy(system, orbit):
+def monodromy_of(system, orbit):
     return orbit_monodromy(system, orbit)
 
 

@@ -1,0 +1,209 @@
+"""The figures of the thesis that `jaxcam reproduce` draws."""
+
+from collections.abc import Callable
+
+import jax.numpy as jnp
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.figure import Figure
+
+from .. import plotting
+from ..maps import LogisticMap, map_diagram, NORMAL_FORMS
+from ..models import CamFollower, rad_s_to_rpm, rpm_to_rad_s
+from ..thesis import _chapter_1, _chapter_2, _chapter_3, _chapter_4
+
+
+_LINE, _OTHER = "#0072B2", "#E69F00"
+
+
+def _turn_over_the_cam(run, ax, label, colour, dashes="solid"):
+    times = np.linspace(float(run.t0), float(run.t1), 1500)
+    gap = np.asarray(run.gap(times))
+    ax.plot(times - times[0], gap, color=colour, ls=dashes, lw=1.2, label=label)
+    ax.set_xlabel("time from release (s)")
+    ax.set_ylabel("angle over cam (rad)")
+
+
+def figure_1_2(system: CamFollower) -> Figure:
+    run = _chapter_1.released_turn(system, _chapter_1.COMPLETE)
+    return plotting.phase_portrait(run).figure  # pyright: ignore
+
+
+def figure_1_3(system: CamFollower) -> Figure:
+    figure, axes = plt.subplots(2, 1, figsize=(6.4, 6.4))
+    for rpm, colour, dashes in (
+        (_chapter_1.COMPLETE, _LINE, "solid"),
+        (_chapter_1.INTERRUPTED, _OTHER, "dashed"),
+    ):
+        run = _chapter_1.released_turn(system, rpm)
+        for ax in axes:
+            _turn_over_the_cam(run, ax, f"{rpm} rpm", colour, dashes)
+    period = 60 / _chapter_1.COMPLETE
+    axes[1].set_xlim(0.97 * period, 1.02 * period)
+    axes[1].set_ylim(-2e-7, 4e-6)
+    axes[0].legend()
+    return figure
+
+
+def figure_2_3(system: CamFollower) -> Figure:
+    del system
+    figure, axes = plt.subplots(1, 3, figsize=(9.6, 3.6))
+    for ax, (mu, start) in zip(axes, _chapter_2.COBWEBS, strict=True):
+        plotting.cobweb(LogisticMap(mu), start, 60, ax)
+        where = dict(transform=ax.transAxes, ha="right", backgroundcolor="white")
+        ax.text(0.97, 0.05, f"$\\mu = {mu}$", **where)
+    return figure
+
+
+def figure_2_4(system: CamFollower) -> Figure:
+    del system
+    figure, ax = plt.subplots()
+    values = np.linspace(2.6, 4.0, 1200)
+    points = np.asarray(map_diagram(LogisticMap(), lambda s: s.mu, values, keep=150))
+    ax.plot(np.repeat(values, 150), points.ravel(), ",", color=_LINE, alpha=0.4)
+    ax.set_xlabel(r"$\mu$")
+    ax.set_ylabel("x")
+    return figure
+
+
+def figure_2_7(system: CamFollower) -> Figure:
+    del system
+    figure, axes = plt.subplots(1, 5, figsize=(12, 3), sharey=True)
+    mu = np.linspace(-1, 1, 401)
+    for ax, form in zip(axes, NORMAL_FORMS.values(), strict=True):
+        for k, branch in enumerate(form.branches):
+            x, stable = branch(mu), form.stable(k, mu)
+            ax.plot(mu, np.where(stable, x, np.nan), color=_LINE, lw=1.8)
+            ax.plot(mu, np.where(stable, np.nan, x), "--", color=_LINE, lw=0.9)
+        ax.set_title(form.title, loc="left")
+        ax.set_xlabel(r"$\mu$")
+    axes[0].set_ylabel("x, or radius")
+    return figure
+
+
+def figure_2_11(system: CamFollower) -> Figure:
+    del system
+    figure, axes = plt.subplots(1, 3, figsize=(9.6, 3.6))
+    for ax, (name, chosen) in zip(axes, _chapter_2.MAPS.items(), strict=True):
+        for x in (np.linspace(-1, 0, 200), np.linspace(1e-9, 1, 200)):
+            ax.plot(x, np.asarray(chosen(jnp.asarray(x))), color=_LINE)
+        ax.plot([-1, 1], [-1, 1], color="0.7", lw=0.8)
+        ax.axvline(0, color="0.7", lw=0.8, ls=":")
+        ax.set_title(name.replace(", ", ",\n"), loc="left", fontsize="medium")
+        ax.set_xlabel("$x_n$")
+    axes[0].set_ylabel("$x_{n+1}$")
+    return figure
+
+
+def figure_3_8(system: CamFollower) -> Figure:
+    branch = _chapter_3.smooth_branch(system)
+    run = _chapter_3.periodic_run(system, 1.0)
+    figure, axes = plt.subplots(1, 3, figsize=(12, 4))
+    plotting.phase_portrait(run, axes[0])
+    plotting.multipliers(branch.multipliers, axes[1])
+    stable = np.max(np.abs(branch.multipliers), axis=1) < 1
+    for chosen, style in ((stable, "-"), (~stable, "--")):
+        angle = np.where(chosen, branch.angle, np.nan)
+        axes[2].plot(branch.speed, angle, "o" + style, ms=3, color=_LINE)
+    axes[2].axvline(branch.fold, color=_OTHER, lw=0.9)
+    axes[2].axvline(branch.flip, color=_OTHER, lw=0.9, ls="--")
+    axes[2].set_xlabel("speed (rpm)")
+    axes[2].set_ylabel("angle at the impact (rad)")
+    return figure
+
+
+def figure_3_11(system: CamFollower) -> Figure:
+    run = _chapter_3.periodic_run(system, 1.0)
+    times = np.linspace(float(run.t0), float(run.t1), 2000)
+    states = np.asarray(run.at(times))
+    phase = np.mod(times, float(run.system.period)) / float(run.system.period)
+    figure = plt.figure()
+    ax = figure.add_subplot(projection="3d")
+    cuts = np.flatnonzero(np.diff(phase) < 0)
+    jumps = np.searchsorted(times, np.asarray(run.impacts.time))
+    pieces = np.split(np.arange(len(times)), np.unique(np.append(cuts + 1, jumps)))
+    for piece in pieces:
+        ax.plot(phase[piece], states[piece, 0], states[piece, 1], color=_LINE, lw=1.5)
+    for t, before, after in zip(
+        np.asarray(run.impacts.time),
+        np.asarray(run.impacts.before),
+        np.asarray(run.impacts.after),
+        strict=True,
+    ):
+        at = np.mod(t, float(run.system.period)) / float(run.system.period)
+        ax.plot([at, at], *np.stack([before, after], 1), color="#D55E00", ls="--", lw=1)
+    ax.set_xlabel("phase (turns)")
+    ax.set_ylabel("angle (rad)")
+    ax.set_zlabel("velocity (rad/s)")  # pyright: ignore
+    ax.set_box_aspect(None, zoom=0.85)  # pyright: ignore
+    return figure
+
+
+def figure_4_5(system: CamFollower) -> Figure:
+    del system
+    program = _chapter_4.program_of_figure_4_5()
+    return plotting.motion_program(program, unit="rise")[0].figure
+
+
+def figure_4_13(system: CamFollower) -> Figure:
+    figure, ax = plt.subplots()
+    times = np.linspace(0, 1, 800)
+    ax.plot(times, np.asarray(_chapter_4.fall_angles(system, jnp.asarray(times))))
+    ax.set_xlabel("time (s)")
+    ax.set_ylabel("follower angle (rad)")
+    return figure
+
+
+def figure_4_14(system: CamFollower) -> Figure:
+    run = _chapter_4.constrained_run(system)
+    figure, ax = plt.subplots()
+    times = np.linspace(float(run.t0), float(run.t1), 600)
+    rig = run.system
+    assert isinstance(rig, CamFollower)
+    lift = np.asarray(rig.contact_angle(rig.cam_angle(jnp.asarray(times))))
+    ax.plot(times, np.asarray(run.at(times))[:, 0], color=_LINE, label="follower")
+    ax.plot(times, lift, ":", color=_OTHER, lw=2, label="contact angle")
+    ax.set_xlabel("time (s)")
+    ax.set_ylabel("angle (rad)")
+    ax.legend()
+    return figure
+
+
+def figure_4_15(system: CamFollower) -> Figure:
+    figure, ax = plt.subplots()
+    rpm = np.linspace(130, 155, 100)
+    r = [system.restitution(rpm_to_rad_s(s), jnp.zeros(())) for s in rpm]  # pyright: ignore
+    ax.plot(rpm, np.asarray(r), color=_LINE, label="this rig")
+    printed = _chapter_4.figure_4_15(system)["printed"]
+    ax.plot(_chapter_4.SPEEDS, printed, "*", color=_OTHER, label="from Table 5.2")
+    ax.set_xlabel("speed (rpm)")
+    ax.set_ylabel("coefficient of restitution")
+    ax.legend()
+    return figure
+
+
+def figure_4_16(system: CamFollower) -> Figure:
+    figure, axes = plt.subplots(2, 2, figsize=(8, 5), sharey=True)
+    for ax, rpm in zip(axes.ravel(), _chapter_4.BOUNCES, strict=True):
+        run = _chapter_1.released_turn(system, rpm)
+        _turn_over_the_cam(run, ax, f"{rpm:g} rpm", _LINE)
+        ax.set_title(f"{rad_s_to_rpm(float(run.system.speed)):.0f} rpm", loc="left")  # pyright: ignore
+        ax.label_outer()
+    return figure
+
+
+DRAWINGS: dict[str, Callable[[CamFollower], Figure]] = {
+    "figure-1.2": figure_1_2,
+    "figure-1.3": figure_1_3,
+    "figure-2.3": figure_2_3,
+    "figure-2.4": figure_2_4,
+    "figure-2.7": figure_2_7,
+    "figure-2.11": figure_2_11,
+    "figure-3.8": figure_3_8,
+    "figure-3.11": figure_3_11,
+    "figure-4.5": figure_4_5,
+    "figure-4.13": figure_4_13,
+    "figure-4.14": figure_4_14,
+    "figure-4.15": figure_4_15,
+    "figure-4.16": figure_4_16,
+}

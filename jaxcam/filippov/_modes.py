@@ -1,0 +1,127 @@
+"""What happens at the surface: crossing, sliding, and the field in force."""
+
+import enum
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ._system import FilippovSystem
+
+
+class Mode(enum.IntEnum):
+    """Which field is in force."""
+
+    BELOW = -1
+    SLIDING = 0
+    ABOVE = 1
+
+
+def surface_rates(
+    system: FilippovSystem, t, state: Float[Array, " n"]
+) -> tuple[Float[Array, ""], Float[Array, ""]]:
+    """Rates of change of H along the fields above and below, time included. (3.9)"""
+    t = jnp.asarray(t, dtype=float)
+
+    def along(field):
+        tangents = (jnp.ones_like(t), field(t, state))
+        return jax.jvp(system.switching, (t, state), tangents)[1]
+
+    return along(system.above), along(system.below)
+
+
+def sliding_share(system: FilippovSystem, t, state) -> Float[Array, ""]:
+    """Share of the field above in sliding motion: between 0 and 1 where it slides."""
+    above, below = surface_rates(system, t, state)
+    difference = below - above
+    safe = jnp.where(difference == 0, 1.0, difference)
+    return jnp.where(difference == 0, 0.5, below / safe)
+
+
+def sliding_field(
+    system: FilippovSystem, t, state: Float[Array, " n"]
+) -> Float[Array, " n"]:
+    """Filippov's convex combination of both fields, tangent to the surface."""
+    share = sliding_share(system, t, state)
+    return share * system.above(t, state) + (1 - share) * system.below(t, state)
+
+
+def equivalent_control(
+    system: FilippovSystem, t, state: Float[Array, " n"]
+) -> tuple[Float[Array, ""], Float[Array, " n"]]:
+    """Utkin's equivalent control of x' = f + g u with u = 1 above and -1 below.
+
+    It solves H_t + H_x (f + g u) = 0 and lies in [-1, 1] where the system slides.
+    Because the control enters linearly, its field is Filippov's. Also the force of dry
+    friction over the largest there is, or the mean of a relay.
+
+    **Returns:** u and the field f + g u.
+    """
+    above, below = system.above(t, state), system.below(t, state)
+    mean, control = (above + below) / 2, (above - below) / 2
+    t = jnp.asarray(t, dtype=float)
+    moved, drift = jnp.ones_like(t), jnp.zeros_like(t)
+    _, free = jax.jvp(system.switching, (t, state), (moved, mean))
+    _, gain = jax.jvp(system.switching, (t, state), (drift, control))
+    u = -free / gain
+    return u, mean + control * u
+
+
+def region(system: FilippovSystem, t, state: Float[Array, " n"]) -> str:
+    """What a motion does that is on the surface at `state`.
+
+    "crossing up", "crossing down", "sliding" (both fields point to the surface),
+    "escaping" (both point away: what follows is not unique), or "tangent".
+    """
+    above, below = (float(rate) for rate in surface_rates(system, t, state))
+    if above == 0 or below == 0:
+        return "tangent"
+    if above > 0:
+        return "crossing up" if below > 0 else "escaping"
+    return "sliding" if below > 0 else "crossing down"
+
+
+def mode_field(system: FilippovSystem, mode, t, state) -> Float[Array, " n"]:
+    """The field in force in a [`jaxcam.filippov.Mode`][]."""
+    share = jnp.where(mode == 0, sliding_share(system, t, state), (mode + 1.0) / 2)
+    return share * system.above(t, state) + (1 - share) * system.below(t, state)
+
+
+def levels(system: FilippovSystem, mode, t, state) -> Float[Array, " 2"]:
+    """What stays positive in a mode: H on its own side; in sliding, both inward rates.
+
+    The second level of a side is one, always.
+    """
+    above, below = surface_rates(system, t, state)
+    height = mode * system.switching(t, state)
+    sliding = jnp.stack([-above, below])
+    return jnp.where(mode == 0, sliding, jnp.stack([height, jnp.ones_like(height)]))
+
+
+def onto_surface(system: FilippovSystem, t, state) -> Float[Array, " n"]:
+    """The state moved to the surface along its gradient."""
+    value, gradient = jax.value_and_grad(system.switching, argnums=1)(t, state)
+    return state - value * gradient / jnp.sum(gradient * gradient)
+
+
+def mode_after(system: FilippovSystem, mode, level, t, state):
+    """The mode in which a motion goes on from an event on the surface.
+
+    A side ends in crossing or sliding; sliding ends where one of the fields begins to
+    point away from the surface, to the side of that field.
+    """
+    above, below = surface_rates(system, t, state)
+    down = jnp.where(below < 0, -1.0, 0.0)
+    up = jnp.where(above > 0, 1.0, 0.0)
+    left = jnp.where(level == 0, 1.0, -1.0)
+    return jnp.where(mode > 0, down, jnp.where(mode < 0, up, left))
+
+
+def first_mode(system: FilippovSystem, t, state):
+    """The mode of a start; escaping counts as above."""
+    height = system.switching(t, state)
+    above, below = surface_rates(system, t, state)
+    on = jnp.abs(height) <= 1e-12 * (1.0 + jnp.max(jnp.abs(state)))
+    slides = (above < 0) & (below > 0)
+    surface = jnp.where(slides, 0.0, jnp.where(above > 0, 1.0, -1.0))
+    return jnp.where(on, surface, jnp.where(height > 0, 1.0, -1.0))

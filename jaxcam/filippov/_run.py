@@ -1,0 +1,90 @@
+"""Runs of the loop: with a record, without one, and of one leg alone."""
+
+import equinox as eqx
+import equinox.internal as eqxi
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ._modes import first_mode
+from ._step import attempt, DONE, in_mode, Lane, RUNNING
+from ._system import FilippovSystem
+
+
+#: attempts between two looks from Python
+CHUNK = 256
+
+
+def first_lane(system: FilippovSystem, state, t0, t1) -> Lane:
+    whole = t1 - t0
+    step = jax.lax.stop_gradient(whole / 64)
+    zero = jnp.zeros_like(t0)
+    return Lane(
+        t0, state, first_mode(system, t0, state), step, step, zero, zero + RUNNING
+    )
+
+
+@eqx.filter_jit
+def start(system, state, t0, t1) -> Lane:
+    return first_lane(system, state, t0, t1)
+
+
+@eqx.filter_jit
+def chunk(system, tolerance, t1, lane: Lane):
+    """Many attempts, with a row for each."""
+
+    def one(lane, _):
+        return attempt(system, tolerance, t1, lane)
+
+    return jax.lax.scan(one, lane, length=CHUNK)
+
+
+def filippov_flow(
+    system: FilippovSystem,
+    state: Float[Array, " n"],
+    t0,
+    t1,
+    *,
+    tolerance=1e-10,
+    max_steps: int = 100_000,
+) -> Float[Array, " n"]:
+    """Where the motion from `state` at `t0` is at `t1`; for use inside `jit`.
+
+    Can be batched and differentiated forward in state, times and parameters: crossing,
+    entering and leaving a sliding mode carry their derivatives. NaN where `t1` is not
+    reached within `max_steps` attempted steps.
+    """
+    t0, t1 = jnp.asarray(t0, dtype=float), jnp.asarray(t1, dtype=float)
+    lane = first_lane(system, state, t0, t1)
+    lane = jax.tree.map(jnp.asarray, lane)
+
+    def running(carry):
+        lane, count = carry
+        return (count < max_steps) & eqxi.unvmap_any(lane.status == RUNNING)
+
+    def one(carry):
+        lane, count = carry
+        return attempt(system, tolerance, t1, lane)[0], count + 1
+
+    lane, _ = jax.lax.while_loop(running, one, (lane, 0))
+    return jnp.where(lane.status == DONE, lane.x, jnp.nan)
+
+
+def leg_flow(
+    system: FilippovSystem,
+    mode,
+    state: Float[Array, " n"],
+    t0,
+    t1,
+    steps: int = 64,
+) -> Float[Array, " n"]:
+    """The flow of one mode from `t0` to `t1` by even steps, events ignored.
+
+    Differentiable; what variational theory calls the flow between two events.
+    """
+    h = (t1 - t0) / steps
+
+    def one(k, x):
+        return in_mode(system, mode, t0 + k * h, x, h)[0]
+
+    return jax.lax.fori_loop(0, steps, one, state)

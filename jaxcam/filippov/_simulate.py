@@ -1,0 +1,99 @@
+"""The motion of a Filippov system, with every switch located."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import ArrayLike, Float
+
+from ..hybrid._system import with_array_parameters
+from ._modes import region
+from ._run import CHUNK, chunk, start
+from ._step import EVENT, NOT_FINITE, NOTHING, RUNNING
+from ._system import FilippovSystem
+from ._trajectory import FilippovTrajectory, Switches
+
+
+_WHY = {
+    RUNNING: "The step budget ran out before t1: raise max_steps.",
+    2: (
+        "No step was short enough: a field or the surface is not smooth here, or the "
+        "tolerance is below rounding."
+    ),
+    NOT_FINITE: "A field returned NaN or infinity: check parameters and state.",
+}
+
+
+def simulate_filippov(
+    system: FilippovSystem,
+    state: Float[ArrayLike, " n"],
+    t0,
+    t1,
+    *,
+    tolerance: float = 1e-10,
+    max_steps: int = 1_000_000,
+) -> FilippovTrajectory:
+    """The motion of a Filippov system from `t0` to `t1`.
+
+    Switches are located to the accuracy of the steps, and also those are found that a
+    step would leap over, as far as a cubic in time tells. On the surface the motion
+    crosses, or slides by Filippov's convex combination until one field becomes tangent.
+
+    **Arguments:** a state `(n,)`, times (s), the error allowed in a step, and the
+    budget of attempted steps.
+
+    **Returns:** a [`jaxcam.filippov.FilippovTrajectory`][].
+
+    **Raises:** `ValueError` for a start that is not finite, or on the part of the
+    surface that both fields point away from, where the motion is not unique.
+    """
+    system = with_array_parameters(system)
+    state = jnp.asarray(state, dtype=jnp.float64)
+    t0, t1 = jnp.asarray(t0, dtype=jnp.float64), jnp.asarray(t1, dtype=jnp.float64)
+    _check(system, state, t0, t1)
+    error = jnp.asarray(tolerance, dtype=jnp.float64)
+    lane = start(system, state, t0, t1)
+    rows, used = [], 0
+    first = float(lane.mode)
+    while int(lane.status) == RUNNING and used < max_steps:
+        lane, found = chunk(system, error, t1, lane)
+        rows.append(jax.tree.map(np.asarray, found))
+        used += CHUNK
+    kind, time, states, mode, _ = (
+        np.concatenate(parts) for parts in zip(*rows, strict=True)
+    )
+    real = kind != NOTHING
+    time = np.append(float(t0), time[real])
+    states = np.concatenate([np.asarray(state)[None], states[real]])
+    mode = np.append(first, mode[real]).astype(int)
+    event = np.flatnonzero(kind[real] == EVENT)
+    return FilippovTrajectory(
+        system,
+        t0,
+        t1,
+        jnp.asarray(time),
+        jnp.asarray(states),
+        jnp.asarray(mode),
+        Switches(
+            jnp.asarray(time[event + 1]),
+            jnp.asarray(states[event + 1]),
+            jnp.asarray(mode[event]),
+            jnp.asarray(mode[event + 1]),
+        ),
+        _WHY.get(int(lane.status), ""),
+    )
+
+
+def _check(system, state, t0, t1):
+    system.check()
+    if state.ndim != 1 or not bool(jnp.all(jnp.isfinite(state))):
+        raise ValueError("Give a state that is one vector of finite numbers.")
+    if not (
+        bool(jnp.isfinite(t0)) and bool(jnp.isfinite(t1)) and float(t1) > float(t0)
+    ):
+        raise ValueError("Give finite times with `t1` after `t0`.")
+    height = abs(float(system.switching(t0, state)))
+    if height <= 1e-12 and region(system, t0, state) == "escaping":
+        raise ValueError(
+            "Both fields point away from the surface at this start, so the motion is "
+            "not unique; start on one of the sides."
+        )

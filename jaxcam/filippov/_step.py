@@ -1,0 +1,177 @@
+"""One attempted step: accept it, retake it shorter, or end it at the surface."""
+
+from typing import Any, NamedTuple
+
+import diffrax
+import jax
+import jax.numpy as jnp
+
+from ..hybrid._runge_kutta import tableau_of
+from ._modes import levels, mode_after, mode_field, onto_surface
+from ._system import FilippovSystem
+
+
+# of order five: over its steps a level is a cubic, nearly, and dips of it are seen
+TABLEAU = tableau_of(diffrax.Dopri5())
+NOTHING, STEP, EVENT = 0, 1, 2
+RUNNING, DONE, FAILED, NOT_FINITE = 0, 1, 2, 3
+
+# an event is reached by a series from this part of the step on, which then errs by its
+# third power
+_CLOSE = 1e-5
+_RETAKES = 80
+
+
+class Lane(NamedTuple):
+    """A motion on its way."""
+
+    t: Any
+    x: Any
+    mode: Any
+    #: length of the next step, and of the last one that no event cut short
+    step: Any
+    natural: Any
+    failures: Any
+    status: Any
+
+
+class Row(NamedTuple):
+    """What an attempt has made: its kind, and time, state, mode and level after it."""
+
+    kind: Any
+    t: Any
+    x: Any
+    mode: Any
+    level: Any
+
+
+def rk_step(field, t, x, h):
+    """One step of the tableau from `(t, x)`: state and error estimate."""
+    stages = [field(t, x)]
+    for node, row in zip(TABLEAU.nodes[1:], TABLEAU.lower, strict=True):
+        point = x
+        for weight, stage in zip(row, stages, strict=False):
+            if weight != 0.0:
+                point = point + (h * weight) * stage
+        stages.append(field(t + node * h, point))
+    pairs = list(zip(TABLEAU.weights, TABLEAU.error, stages, strict=True))
+    after = x + h * sum(w * s for w, _, s in pairs if w != 0.0)
+    return after, h * sum(e * s for _, e, s in pairs if e != 0.0)
+
+
+def in_mode(system: FilippovSystem, mode, t, x, h):
+    """A step of the field in force; sliding stays on the surface."""
+
+    def field(s, y):
+        return mode_field(system, mode, s, y)
+
+    after, error = rk_step(field, t, x, h)
+    held = onto_surface(system, t + h, after)
+    return jnp.where(mode == 0, held, after), error
+
+
+def attempt(system: FilippovSystem, tolerance, t1, lane: Lane) -> tuple[Lane, Row]:
+    """Try one step towards `t1`; a lane that has ended stays as it is."""
+    active = lane.status == RUNNING
+    wanted = jax.lax.stop_gradient(lane.step)
+    last = lane.t + wanted >= t1
+    h = jnp.where(last, t1 - lane.t, wanted)
+    end = jnp.where(last, t1, lane.t + h)
+    after, error = in_mode(system, lane.mode, lane.t, lane.x, h)
+    scale = tolerance * (1 + jnp.maximum(jnp.abs(lane.x), jnp.abs(after)))
+    effort = jnp.sqrt(jnp.mean((error / scale) ** 2))
+    finite = jnp.all(jnp.isfinite(after)) & jnp.isfinite(effort)
+    fits = finite & (effort <= 1)
+
+    def rates(t, x):
+        field = mode_field(system, lane.mode, t, x)
+        return jax.jvp(
+            lambda s, y: levels(system, lane.mode, s, y),
+            (t, x),
+            (jnp.ones_like(t), field),
+        )
+
+    level0, rate0 = rates(lane.t, lane.x)
+    level1, rate1 = rates(end, after)
+    fall = rate1 < 0
+    offset = jnp.where(fall, -level1 / jnp.where(fall, rate1, 1.0), 0.0)
+    through = level1 < 0
+    # an instant cannot be told from another one closer than this
+    blur = 1e-14 * (1 + jnp.abs(end))
+    reached = fall & (jnp.abs(offset) <= _CLOSE * h + blur)
+    where = jnp.where(
+        through,
+        jnp.where(fall, 1 + offset / h, 0.5),
+        _dip(level0, h * rate0, level1, h * rate1),
+    )
+    beyond = where < 1
+    part = jnp.min(jnp.where(beyond & ~reached, where, 1.0))
+    lands = jnp.any(reached) & (part >= 1) & fits & active
+    which = jnp.argmin(jnp.where(reached, offset, jnp.inf))
+    retake = fits & (part < 1)
+    good = fits & ~retake & active
+
+    # the event: the rest of the way by a series, which also carries its derivative
+    delta = jnp.where(lands, offset[which], 0.0)
+
+    def field(t, x):
+        return mode_field(system, lane.mode, t, x)
+
+    first = field(end, after)
+    _, second = jax.jvp(field, (end, after), (jnp.ones_like(end), first))
+    landed = after + delta * (first + delta / 2 * second)
+    t2 = end + delta
+    landed = jnp.where(lands, onto_surface(system, t2, landed), after)
+    mode2 = jnp.where(
+        lands, mode_after(system, lane.mode, which, t2, landed), lane.mode
+    )
+
+    grown = 0.9 * jnp.maximum(effort, 1e-10) ** (-1 / TABLEAU.order)
+    factor = jnp.where(finite, jnp.clip(grown, 0.2, 5.0), 0.2)
+    cut = jnp.clip(part, 0.02, 0.98)
+    natural = jnp.where(good & ~lands & ~last, h * factor, lane.natural)
+    step = jnp.where(fits, jnp.where(retake, h * cut, natural), h * factor)
+    failures = jnp.where(good, 0.0, lane.failures + 1)
+    stuck = failures > _RETAKES
+    done = good & ~lands & last
+    status = jnp.where(
+        done,
+        DONE,
+        jnp.where(stuck, jnp.where(finite, FAILED, NOT_FINITE), RUNNING),
+    )
+    kind = jnp.where(good, jnp.where(lands, EVENT, STEP), NOTHING)
+
+    def keep(new, old):
+        return jnp.where(good, new, old)
+
+    moved = Lane(
+        t=keep(t2, lane.t),
+        x=keep(landed, lane.x),
+        mode=keep(mode2, lane.mode),
+        step=jax.lax.stop_gradient(jnp.where(active, step, lane.step)),
+        natural=jax.lax.stop_gradient(jnp.where(active, natural, lane.natural)),
+        failures=jnp.where(active, failures, lane.failures),
+        status=jnp.where(active, status, lane.status),
+    )
+    return moved, Row(kind, moved.t, moved.x, moved.mode, which)
+
+
+def _dip(value0, slope0, value1, slope1):
+    """Where the cubic through two ends dips below zero between them; 1 where nowhere.
+
+    The place is that of its least value, as a fraction of the step.
+    """
+    a = 2 * (value0 - value1) + slope0 + slope1
+    b = -3 * (value0 - value1) - 2 * slope0 - slope1
+    # a stationary point with p'' > 0: 3 a s^2 + 2 b s + slope0 = 0
+    root = jnp.sqrt(jnp.maximum(b * b - 3 * a * slope0, 0.0))
+    divisor = b + jnp.where(b >= 0, root, -root)
+    divisor = jnp.where(divisor == 0, 1.0, divisor)
+    flat = jnp.where(a == 0, 1.0, a)
+    by_sum = -slope0 / divisor
+    other = jnp.where(a == 0, by_sum, -divisor / (3 * flat))
+    s = jnp.where(b >= 0, by_sum, other)
+    low = value0 + s * (slope0 + s * (b + s * a))
+    slack = 1e-12 * jnp.maximum(jnp.abs(value0), jnp.abs(value1))
+    inside = (s > 0) & (s < 1) & (b * b - 3 * a * slope0 > 0)
+    return jnp.where(inside & (low < -slack), s, 1.0)

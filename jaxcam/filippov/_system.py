@@ -1,0 +1,44 @@
+"""What a Filippov system is: a field on either side of a surface."""
+
+import abc
+from typing import Any, ClassVar
+
+import equinox as eqx
+from jaxtyping import Array, Float
+
+
+class FilippovSystem(eqx.Module):
+    """A system whose vector field jumps across a surface. (2.19)
+
+    Subclass it and state the three methods below, smooth in time and state, also beyond
+    the surface. Every floating-point field is a parameter. The state itself never
+    jumps: that is what tells it from a [`jaxcam.hybrid.HybridSystem`][], where a
+    surface is never crossed, contact takes two conditions on the state (gap and normal
+    velocity) and begins by an impact. Here both sides are open and sliding takes one
+    condition, so that the two have event loops of their own.
+    """
+
+    #: names and units of the state's components
+    state_names: ClassVar[tuple[str, ...]] = ()
+    state_units: ClassVar[tuple[str, ...]] = ()
+
+    @abc.abstractmethod
+    def above(self, t, state: Float[Array, " n"]) -> Float[Array, " n"]:
+        """Rate of change where `switching` is positive, shape `(n,)`."""
+
+    @abc.abstractmethod
+    def below(self, t, state: Float[Array, " n"]) -> Float[Array, " n"]:
+        """Rate of change where `switching` is negative, shape `(n,)`."""
+
+    @abc.abstractmethod
+    def switching(self, t, state: Float[Array, " n"]) -> Float[Array, ""]:
+        """The scalar H whose zero is the surface."""
+
+    @property
+    def period(self) -> Any:
+        """Period of the forcing (s), or `None` for a system without one."""
+        return None
+
+    def check(self) -> None:
+        """Raise `ValueError` where a parameter has no physical meaning."""
+        return None

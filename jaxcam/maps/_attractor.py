@@ -1,0 +1,73 @@
+"""What an orbit ends in: a cycle, and of which period, or chaos."""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+
+
+class Attractor(NamedTuple):
+    """The end of one orbit."""
+
+    #: smallest period up to the longest one looked for; 0 where there is none
+    period: int
+    #: mean of log |f'| along it: positive in chaos
+    lyapunov: float
+    #: whether the orbit stayed finite
+    bounded: bool
+
+    @property
+    def kind(self) -> str:
+        """In words."""
+        if not self.bounded:
+            return "none"
+        if self.period == 1:
+            return "fixed point"
+        if self.period:
+            return f"period {self.period}"
+        return "chaos" if self.lyapunov > 0 else "longer period"
+
+
+def map_attractor(
+    system: Callable,
+    start=0.1,
+    *,
+    transient: int = 20_000,
+    count: int = 20_000,
+    longest: int = 64,
+) -> Attractor:
+    """What the orbit of `start` under a map of one variable ends in.
+
+    **Arguments:** the map, differentiable except on borders; a start; numbers of
+    iterates dropped and used; the longest period that is looked for.
+    """
+    start = jnp.asarray(start, dtype=float)
+    last, rate, bounded, period = _settle(system, start, transient, count, longest)
+    del last
+    return Attractor(int(period), float(rate), bool(bounded))
+
+
+@eqx.filter_jit
+def _settle(system, start, transient, count, longest):
+    x = jax.lax.fori_loop(0, transient, lambda _, x: system(x), start)
+
+    def one(carry, _):
+        x, total = carry
+        following, slope = jax.jvp(system, (x,), (jnp.ones_like(x),))
+        # a superstable orbit has no exponent
+        total = total + jnp.log(jnp.maximum(jnp.abs(slope), 1e-300))
+        return (following, total), None
+
+    (x, total), _ = jax.lax.scan(one, (x, jnp.zeros(())), length=count)
+
+    def image(y, _):
+        y = system(y)
+        return y, y
+
+    _, images = jax.lax.scan(image, x, length=longest)
+    bounded = jnp.all(jnp.isfinite(images)) & (jnp.abs(x) < 1e12)
+    close = jnp.abs(images - x) <= 1e-9 * (1 + jnp.abs(x))
+    period = jnp.where(jnp.any(close), jnp.argmax(close) + 1, 0)
+    return x, total / count, bounded, jnp.where(bounded, period, 0)

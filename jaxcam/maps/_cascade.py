@@ -1,0 +1,76 @@
+"""The period-doubling cascade of a one-dimensional map."""
+
+from collections.abc import Callable
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+
+_NEWTON = 30
+_EXACT = 1e-13
+
+
+def superstable(
+    system: eqx.Module, where: Callable, critical, first: tuple, count: int
+) -> Float[np.ndarray, " count"]:
+    """Parameters at which the critical point has period 1, 2, 4, ..., 2^(count - 1).
+
+    There is one in each window of the cascade, and they accumulate as its doublings do.
+    Each is found by Newton's method from where the two before it point, with the ratio
+    that they have.
+
+    **Arguments:** a map, `where` that picks its parameter, the critical point, guesses
+    of the first two parameters, and how many.
+
+    **Raises:** `ValueError` where Newton's method does not converge; rounding ends the
+    cascade at about the thirteenth.
+    """
+    found: list[float] = []
+    for k in range(count):
+        if k < 2:
+            guess = first[k]
+        else:
+            ratio = (found[-1] - found[-2]) / (found[-2] - found[-3]) if k > 2 else 0.23
+            guess = found[-1] + ratio * (found[-1] - found[-2])
+        value, step = _newton(system, where, float(critical), float(guess), 2**k)
+        half = _miss(system, where, float(critical), value, jnp.asarray(2**k // 2))[0]
+        if not (step < 1e-9 and (k == 0 or abs(float(half)) > 1e-7)):
+            raise ValueError(
+                f"No superstable orbit of period {2**k} was found near {guess:g}; give "
+                "other guesses in `first`, or a smaller `count`."
+            )
+        found.append(value)
+    return np.array(found)
+
+
+def feigenbaum_ratios(parameters: Float[np.ndarray, " n"]) -> Float[np.ndarray, " m"]:
+    """(m_k - m_(k-1)) / (m_(k+1) - m_k), which tends to 4.669... (2.17)"""
+    steps = np.diff(parameters)
+    return steps[:-1] / steps[1:]
+
+
+def _newton(system, where, critical, value, period):
+    step = np.inf
+    for _ in range(_NEWTON):
+        miss, slope = _miss(system, where, critical, value, jnp.asarray(period))
+        step = float(miss) / float(slope)
+        value -= step
+        if abs(step) < _EXACT * max(1.0, abs(value)):
+            break
+    return value, abs(step)
+
+
+@eqx.filter_jit
+def _miss(system, where, critical, value, period):
+    def distance(parameter):
+        moved = eqx.tree_at(where, system, parameter)
+        end = jax.lax.fori_loop(
+            0, period, lambda _, x: moved(x), jnp.asarray(critical, dtype=float)
+        )
+        return end - critical
+
+    value = jnp.asarray(value, dtype=float)
+    return jax.jvp(distance, (value,), (jnp.ones_like(value),))

@@ -1,0 +1,146 @@
+"""Invariant manifolds of saddles of plane maps, grown from the saddle."""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, ArrayLike, Float
+
+
+_NEWTON = 50
+_MOST_POINTS = 20_000
+
+
+class Saddle(NamedTuple):
+    """A fixed point of a plane map with one multiplier inside the unit circle."""
+
+    point: Float[Array, " 2"]
+    #: the multipliers, the stable one first, and their directions as columns
+    multipliers: Float[np.ndarray, " 2"]
+    directions: Float[np.ndarray, "2 2"]
+
+
+def saddle_at(system: Callable, guess: Float[ArrayLike, " 2"]) -> Saddle:
+    """The saddle near a guess, by Newton's method.
+
+    **Raises:** `ValueError` where there is no fixed point, or it is no saddle.
+    """
+    point = jnp.asarray(guess, dtype=float)
+    step = jnp.full(2, jnp.inf)
+    for _ in range(_NEWTON):
+        image, matrix = _linearised(system, point)
+        step = jnp.linalg.solve(matrix - jnp.eye(2), image - point)
+        point = point - step
+        if not float(jnp.max(jnp.abs(step))) > 1e-13 * (1 + float(jnp.max(point))):
+            break
+    if not float(jnp.max(jnp.abs(step))) < 1e-9:
+        raise ValueError("No fixed point was found; give a guess closer to it.")
+    values, vectors = np.linalg.eig(np.asarray(_linearised(system, point)[1]))
+    order = np.argsort(np.abs(values))
+    values, vectors = values[order], vectors[:, order]
+    if np.any(np.imag(values) != 0) or not np.abs(values[0]) < 1 < np.abs(values[1]):
+        raise ValueError(
+            f"The fixed point at {np.asarray(point).tolist()} has multipliers "
+            f"{values[0]:.4g} and {values[1]:.4g}, so it is no saddle; look elsewhere."
+        )
+    return Saddle(point, np.real(values), np.real(vectors))
+
+
+def grow_manifold(
+    system: Callable,
+    point: Float[ArrayLike, " 2"],
+    direction: Float[ArrayLike, " 2"],
+    *,
+    length: float,
+    spacing: float = 0.01,
+    start: float = 1e-5,
+) -> Float[np.ndarray, "points 2"]:
+    """One side of the unstable manifold of a saddle, as a curve from the saddle on.
+
+    A short segment along the unstable direction and its images. New points are put into
+    the first segment wherever their images lie too far apart, so that every point of
+    the curve is an exact image of one on the segment, and a fold is followed round. For
+    the stable manifold give the inverse map.
+
+    **Arguments:** the map, traceable by JAX; the saddle; a direction, whose sign
+    chooses the side; the length of curve wanted, the largest distance of neighbours,
+    and the distance from the saddle at which it begins (its square is the error).
+
+    **Returns:** the points in order, shape `(points, 2)`. The curve ends where the map
+    is not finite, or jumps: there no refinement brings neighbours together.
+
+    **Raises:** `ValueError` where the direction is not stretched by the map.
+    """
+    point = np.asarray(point, dtype=float)
+    unit = np.asarray(direction, dtype=float)
+    unit = unit / np.linalg.norm(unit)
+    matrix = np.asarray(_linearised(system, jnp.asarray(point))[1])
+    stretch = float(unit @ matrix @ unit)
+    if not abs(stretch) > 1:
+        raise ValueError(
+            f"The map stretches this direction by {stretch:.3g}; give the unstable "
+            "direction of a saddle, or the inverse map for its stable manifold."
+        )
+    times = 2 if stretch < 0 else 1
+    ratio = abs(stretch) ** times
+    # even in the logarithm of the distance, which is what the map shifts
+    fractions = np.linspace(0.0, 1.0, 24)
+    pieces, grown, order = [point[None]], 0.0, 0
+    total = 1
+    while grown < length and total < _MOST_POINTS:
+        fractions, images = _refined(
+            system, point, unit, start, ratio, fractions, order * times, spacing
+        )
+        steps = np.linalg.norm(np.diff(images, axis=0), axis=1)
+        far = np.flatnonzero(~(steps <= 4 * spacing))
+        end = int(far[0]) + 1 if len(far) else len(images)
+        pieces.append(images[:end])
+        grown += float(np.sum(steps[: end - 1]))
+        total += end
+        if len(far):
+            break
+        order += 1
+    return np.concatenate(pieces)
+
+
+def _refined(system, point, unit, start, ratio, fractions, order, spacing):
+    """Images of the first segment, with points between any two that are far apart."""
+
+    def images(parts):
+        first = point + start * ratio ** parts[:, None] * unit
+        # few lengths, so that few programs are compiled
+        room = 64
+        while room < len(first):
+            room *= 2
+        padded = np.concatenate([first, np.repeat(first[-1:], room - len(first), 0)])
+        found = _images(system, jnp.asarray(padded), jnp.asarray(order))
+        return np.asarray(found)[: len(first)]
+
+    found = images(fractions)
+    for _ in range(40):
+        steps = np.linalg.norm(np.diff(found, axis=0), axis=1)
+        wide = (steps > spacing) & (np.diff(fractions) > 1e-12)
+        if not np.any(wide) or len(fractions) > _MOST_POINTS:
+            break
+        between = (fractions[:-1] + fractions[1:])[wide] / 2
+        fractions = np.concatenate([fractions, between])
+        found = np.concatenate([found, images(between)])
+        order_of = np.argsort(fractions)
+        fractions, found = fractions[order_of], found[order_of]
+    return fractions, found
+
+
+@eqx.filter_jit
+def _images(system, points, order):
+    def one(x):
+        return jax.lax.fori_loop(0, order, lambda _, y: system(y), x)
+
+    return jax.vmap(one)(points)
+
+
+@eqx.filter_jit
+def _linearised(system, point):
+    return system(point), jax.jacfwd(system)(point)

@@ -1,0 +1,63 @@
+"""Normal forms of the local bifurcations of codimension one. (Figure 2.7)"""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+
+class NormalForm(NamedTuple):
+    """A normal form with its branches in closed form.
+
+    A field x' = f(x, mu), or for `discrete` a map. A branch is a function of mu, NaN
+    where it does not exist. For the Hopf bifurcation it is the radius, x' its rate.
+    """
+
+    title: str
+    field: Callable
+    branches: tuple[Callable, ...]
+    discrete: bool = False
+    #: whether the last branch is an orbit of period two, x -> -x
+    alternates: bool = False
+
+    def stable(self, branch: int, mu) -> np.ndarray:
+        """Whether a branch attracts at each `mu`, by the derivative of the field."""
+        mu = np.atleast_1d(np.asarray(mu, dtype=float))
+        x = np.asarray(self.branches[branch](mu), dtype=float)
+        slope = jax.vmap(jax.grad(self.field))(jnp.asarray(x), jnp.asarray(mu))
+        # an orbit of period two of an odd map: the square of the slope there
+        return np.abs(slope) < 1 if self.discrete else np.asarray(slope) < 0
+
+
+def _zero(mu):
+    return np.zeros_like(mu)
+
+
+def _root(sign):
+    def branch(mu):
+        return sign * np.sqrt(np.where(mu >= 0, mu, np.nan))
+
+    return branch
+
+
+#: Those of Figure 2.7. The map printed for period doubling, (1 + mu) x - x^3, has its
+#: multiplier at +1 and is a pitchfork; with the sign of the map changed it doubles.
+NORMAL_FORMS: dict[str, NormalForm] = {
+    "fold": NormalForm("Fold", lambda x, mu: mu - x * x, (_root(1), _root(-1))),
+    "transcritical": NormalForm(
+        "Transcritical", lambda x, mu: mu * x - x * x, (_zero, lambda mu: mu)
+    ),
+    "pitchfork": NormalForm(
+        "Pitchfork", lambda x, mu: mu * x - x**3, (_zero, _root(1), _root(-1))
+    ),
+    "hopf": NormalForm("Hopf", lambda r, mu: mu * r - r**3, (_zero, _root(1))),
+    "period-doubling": NormalForm(
+        "Period doubling",
+        lambda x, mu: -(1 + mu) * x + x**3,
+        (_zero, _root(1), _root(-1)),
+        discrete=True,
+        alternates=True,
+    ),
+}

@@ -1,0 +1,74 @@
+"""A mass on a moving belt with dry friction."""
+
+from typing import ClassVar
+
+import jax
+import jax.numpy as jnp
+
+from ..filippov import FilippovSystem
+from ._parameters import (
+    parameter,
+    require_finite,
+    require_not_negative,
+    require_positive,
+)
+
+
+class BeltOscillator(FilippovSystem):
+    """`x'' + 2 damping x' + x = amplitude cos(omega t) + friction force`; (x, x').
+
+    Dimensionless. The belt moves at a constant speed and pulls the mass along with
+    `friction / (1 + weakening |x' - belt|)`, which falls with the speed of slip, so
+    that the mass sticks and slips. Sticking is sliding on the surface x' = belt.
+
+    **Arguments:**
+
+    - `belt`: speed of the belt.
+    - `friction`: largest force of friction, in units of the spring's at x = 1.
+    - `weakening`: how fast friction falls with slip; zero is Coulomb's law.
+    - `damping`: damping ratio.
+    - `amplitude`, `omega`: of the forcing; no forcing by default.
+    """
+
+    state_names: ClassVar[tuple[str, ...]] = ("position", "velocity")
+    state_units: ClassVar[tuple[str, ...]] = ("-", "-")
+
+    belt: jax.Array = parameter(0.2)
+    friction: jax.Array = parameter(1.0)
+    weakening: jax.Array = parameter(3.0)
+    damping: jax.Array = parameter(0.0)
+    amplitude: jax.Array = parameter(0.0)
+    omega: jax.Array = parameter(1.0)
+
+    def above(self, t, state) -> jax.Array:
+        """Faster than the belt: friction pulls back."""
+        return self._pulled(t, state, -1.0)
+
+    def below(self, t, state) -> jax.Array:
+        """Slower than the belt: friction pulls along."""
+        return self._pulled(t, state, 1.0)
+
+    def switching(self, t, state) -> jax.Array:
+        """Velocity of slip."""
+        del t
+        return state[1] - self.belt
+
+    @property
+    def period(self):
+        """Period of the forcing."""
+        return 2 * jnp.pi / self.omega
+
+    def check(self) -> None:
+        """Raise `ValueError` where a parameter has no physical meaning."""
+        require_positive(friction=self.friction, omega=self.omega)
+        require_not_negative(weakening=self.weakening, damping=self.damping)
+        require_finite(belt=self.belt, amplitude=self.amplitude)
+
+    def _pulled(self, t, state, side):
+        x, velocity = state[0], state[1]
+        # smooth beyond the surface: on this side the slip has the sign -side
+        slip = -side * (velocity - self.belt)
+        force = side * self.friction / (1 + self.weakening * slip)
+        drive = self.amplitude * jnp.cos(self.omega * t)
+        acceleration = drive + force - x - 2 * self.damping * velocity
+        return jnp.stack([velocity, acceleration])

@@ -1,0 +1,153 @@
+"""What the cam must press with to hold its follower, and when it no longer can."""
+
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, ArrayLike, Float
+
+from ._cam_contour import flat_oscillating_contour, profile_jet
+from ._cam_follower import CamFollower
+from ._motion_program import MotionPieces, MotionProgram
+from ._valve_train import ValveTrain
+
+
+_TURN = 2 * np.pi
+_SAMPLES = 1025
+#: of the golden section, from two steps of the scan to rounding
+_HALVINGS = 60
+_GOLDEN = (5**0.5 - 1) / 2
+
+
+class FloatSpeed(NamedTuple):
+    """The lowest speed at which a follower leaves its cam, and where it does."""
+
+    #: rad/s; infinite where no speed makes it leave
+    speed: Float[Array, ""]
+    #: cam angle (rad)
+    cam_angle: Float[Array, ""]
+
+
+def contact_load(
+    system: CamFollower | ValveTrain, cam_angles: Float[ArrayLike, " angles"]
+) -> Float[Array, " angles"]:
+    """What the cam must press with for permanent contact, at the system's speed. (4.10)
+
+    A torque (N m) about the hinge of a [`jaxcam.models.CamFollower`][], a force (N) on
+    a [`jaxcam.models.ValveTrain`][]. Contact is lost where it would have to be
+    negative.
+
+    **Arguments:** angles of the cam (rad), counted as the profile counts them.
+    """
+    profile = system.profile.prepared()
+    jets = jax.vmap(lambda angle: _jet(profile, angle))(jnp.asarray(cam_angles))
+    square, linear, constant = system.load_terms(*jets)
+    return (square * system.speed + linear) * system.speed + constant
+
+
+def contact_force(
+    system: CamFollower | ValveTrain,
+    cam_angles: Float[ArrayLike, " angles"],
+    *,
+    center: tuple | None = None,
+) -> Float[Array, " angles"]:
+    """The force normal to the contact (N): for a hinged follower, torque over lever.
+
+    The lever is l of (4.19). `center` is the cam's axis (m) from the hinge, known for
+    an eccentric circle.
+
+    **Raises:** `ValueError` where the axis is not known.
+    """
+    load = contact_load(system, cam_angles)
+    if isinstance(system, ValveTrain):
+        return load
+    half_height = getattr(system.profile, "half_height", system.spring_half_height)
+    contour = flat_oscillating_contour(
+        system.profile, cam_angles, center=center, half_height=half_height
+    )
+    return load / contour.arm
+
+
+def float_speed(system: CamFollower | ValveTrain) -> FloatSpeed:
+    """The speed at which the valve floats: the cam would first have to pull.
+
+    The least root, over the cam's angles, of the contact load as a function of the
+    speed. At the joints of a motion program the accelerations on both sides count, and
+    a joint where the velocity falls makes every speed too high. Differentiable in the
+    parameters.
+    """
+    profile = system.profile.prepared()
+    start, end = _pieces(profile)
+
+    def speed_at(piece, angle):
+        a, b, c = system.load_terms(*_jet(profile, angle, piece))
+        return _least_root(a, b, c)
+
+    grid = np.linspace(0.0, 1.0, _SAMPLES)
+    spans = (end - start)[:, None]
+    angles = start[:, None] + spans * grid[None]
+    pieces = np.arange(start.shape[0])
+    over = jax.vmap(jax.vmap(speed_at, in_axes=(None, 0)))
+    speeds = over(pieces, angles)
+    best = jnp.argmin(speeds)
+    piece, step = best // _SAMPLES, best % _SAMPLES
+    step = jnp.clip(step, 1, _SAMPLES - 2)
+    low, high = angles[piece, step - 1], angles[piece, step + 1]
+
+    def shrink(_, ends):
+        low, high = ends
+        left = high - _GOLDEN * (high - low)
+        right = low + _GOLDEN * (high - low)
+        lower = speed_at(piece, left) <= speed_at(piece, right)
+        return jnp.where(lower, low, left), jnp.where(lower, right, high)
+
+    low, high = jax.lax.fori_loop(0, _HALVINGS, shrink, (low, high))
+    refined = (low + high) / 2
+    coarse = angles.reshape(-1)[best]
+    better = speed_at(piece, refined) < speed_at(piece, coarse)
+    # the place of a minimum may be taken as fixed when its value is differentiated
+    angle = jax.lax.stop_gradient(jnp.where(better, refined, coarse))
+    speed = speed_at(piece, angle)
+    fall, where = _sharpest_fall(system.profile)
+    lost = fall < 0
+    return FloatSpeed(jnp.where(lost, 0.0, speed), jnp.where(lost, where, angle))
+
+
+def _jet(profile, angle, piece=None):
+    if isinstance(profile, MotionPieces):
+        piece = profile.local(angle)[0] if piece is None else piece
+        jet = profile.jet(piece, angle)
+        return jet[..., 0], jet[..., 1], jet[..., 2]
+    return profile_jet(profile, angle)
+
+
+def _pieces(profile):
+    if isinstance(profile, MotionPieces):
+        return profile.starts, profile.ends()
+    return jnp.zeros(1), jnp.full(1, _TURN)
+
+
+def _least_root(a, b, c):
+    """Least positive root of a w^2 + b w + c where c > 0, infinite without one."""
+    discriminant = b * b - 4 * a * c
+    real = discriminant >= 0
+    divisor = jnp.sqrt(jnp.where(real, discriminant, 1.0)) - b
+    found = real & (divisor > 0)
+    root = 2 * c / jnp.where(found, divisor, 1.0)
+    return jnp.where(c <= 0, 0.0, jnp.where(found, root, jnp.inf))
+
+
+def _sharpest_fall(profile):
+    """The most negative jump of the profile's slope, and its cam angle.
+
+    A kink that points up throws the follower off, whichever way the cam turns.
+    """
+    if not isinstance(profile, MotionProgram):
+        return jnp.zeros(()), jnp.zeros(())
+    angles, jumps = profile.joints()
+    # less is rounding of slopes of this size
+    scale = 1e-9 * jnp.max(jnp.abs(profile.rises / profile.widths))
+    falls = jnp.where(jumps[:, 1] < -scale, jumps[:, 1], 0.0)
+    first = jnp.argmin(falls)
+    return falls[first], angles[first]

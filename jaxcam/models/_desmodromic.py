@@ -1,0 +1,95 @@
+"""A follower held from both sides: the form-closed, or desmodromic, joint."""
+
+from typing import ClassVar
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+
+from ..hybrid import HybridSystem
+from ._parameters import (
+    as_parameter,
+    parameter,
+    require_finite,
+    require_not_negative,
+    require_positive,
+    require_restitution,
+)
+from ._profile import CamProfile
+from ._restitution import ConstantRestitution
+
+
+class DesmodromicCam(HybridSystem):
+    """A sliding follower between two flanks that move with the cam.
+
+    The flanks ask for the same lift, one from below and one from above, a clearance
+    apart. Two gaps: to the lower flank and to the upper one. No spring is needed; one
+    may help.
+
+    **Arguments:**
+
+    - `profile`: lift (m) of the lower flank as a function of the cam's angle.
+    - `speed`: speed of the cam (rad/s).
+    - `clearance`: room of the follower between the flanks (m).
+    - `mass`, `stiffness`, `preload`, `damping`: of the follower (kg, N/m, N, N s/m), as
+        for [`jaxcam.models.ValveTrain`][].
+    - `restitution`: law `r(speed, approach_speed)` of both flanks.
+    - `phase`: angle of the cam at time zero (rad).
+    """
+
+    state_names: ClassVar[tuple[str, ...]] = ("lift", "follower velocity")
+    state_units: ClassVar[tuple[str, ...]] = ("m", "m/s")
+
+    profile: CamProfile
+    speed: jax.Array = parameter()
+    clearance: jax.Array = parameter()
+    mass: jax.Array = parameter(1.0)
+    stiffness: jax.Array = parameter(0.0)
+    preload: jax.Array = parameter(0.0)
+    damping: jax.Array = parameter(0.0)
+    restitution: eqx.Module = eqx.field(
+        default_factory=lambda: ConstantRestitution(as_parameter(0.5))
+    )
+    phase: jax.Array = parameter(0.0)
+
+    def vector_field(self, t, state) -> jax.Array:
+        """Velocity and acceleration between the flanks, shape `(2,)`."""
+        del t
+        force = self.stiffness * state[0] + self.preload + self.damping * state[1]
+        return jnp.stack([state[1], -force / self.mass])
+
+    def gap(self, t, state) -> jax.Array:
+        """Distances to the lower and the upper flank (m), shape `(2,)`."""
+        over = state[0] - self.profile(self.cam_angle(t))
+        return jnp.stack([over, self.clearance - over])
+
+    def impact(self, t, state) -> jax.Array:
+        """States after an impact on either flank, shape `(2, 2)`."""
+        _, moved = jax.jvp(self.profile, (self.cam_angle(t),), (self.speed,))
+        velocity = state[1] - moved
+        r = self.restitution(self.speed, jnp.abs(velocity))  # pyright: ignore
+        after = jnp.stack([state[0], state[1] - (1 + r) * velocity])
+        return jnp.stack([after, after])
+
+    def cam_angle(self, t) -> jax.Array:
+        """Angle of the cam (rad) at `t` (s), elementwise."""
+        return self.speed * t + self.phase
+
+    @property
+    def period(self) -> jax.Array:
+        """Duration of one turn of the cam (s)."""
+        return 2 * jnp.pi / self.speed
+
+    def prepared(self) -> "DesmodromicCam":
+        """The same system with a profile that is cheaper to evaluate."""
+        return eqx.tree_at(lambda s: s.profile, self, self.profile.prepared())
+
+    def check(self) -> None:
+        """Raise `ValueError` where a parameter has no physical meaning."""
+        require_positive(speed=self.speed, clearance=self.clearance, mass=self.mass)
+        require_not_negative(stiffness=self.stiffness, damping=self.damping)
+        require_finite(preload=self.preload, phase=self.phase)
+        for approach_speed in (0.0, 1.0):
+            r = self.restitution(self.speed, jnp.asarray(approach_speed))  # pyright: ignore
+            require_restitution(r, f" at an approach speed of {approach_speed:g} m/s")
+        self.profile.check()

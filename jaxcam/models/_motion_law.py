@@ -1,0 +1,71 @@
+"""How a follower moves through one segment of a cam's motion program."""
+
+import math
+from typing import NamedTuple
+
+
+class LawPiece(NamedTuple):
+    """`polynomial(u) + amplitude sin(frequency u + phase)` up to the fraction `end`."""
+
+    end: float
+    #: coefficients, lowest power first
+    polynomial: tuple[float, ...]
+    amplitude: float = 0.0
+    frequency: float = 0.0
+    phase: float = 0.0
+
+
+class MotionLaw(NamedTuple):
+    """A rise from 0 to 1 while the fraction u of the segment goes from 0 to 1.
+
+    Laws of your own are made of the same pieces; the last one ends at 1.
+    """
+
+    name: str
+    pieces: tuple[LawPiece, ...]
+
+
+_PI = math.pi
+_SINE = 1 / (4 + _PI)
+
+
+#: The laws that a [`jaxcam.models.Segment`][] may name (R. L. Norton, Cam Design and
+#: Manufacturing Handbook, 2002, chapters 2 to 4). "cubic" is the one cubic without
+#: velocity at both ends, 3u^2 - 2u^3; "modified sine" is a cycloidal law of four times
+#: the frequency in the first and last eighth, joined by a third of that.
+MOTION_LAWS: dict[str, MotionLaw] = {
+    law.name: law
+    for law in (
+        MotionLaw("dwell", (LawPiece(1.0, (0.0,)),)),
+        MotionLaw("constant velocity", (LawPiece(1.0, (0.0, 1.0)),)),
+        MotionLaw(
+            "constant acceleration",
+            (LawPiece(0.5, (0.0, 0.0, 2.0)), LawPiece(1.0, (-1.0, 4.0, -2.0))),
+        ),
+        MotionLaw("cubic", (LawPiece(1.0, (0.0, 0.0, 3.0, -2.0)),)),
+        MotionLaw("simple harmonic", (LawPiece(1.0, (0.5,), 0.5, _PI, -_PI / 2),)),
+        MotionLaw(
+            "cycloidal",
+            (LawPiece(1.0, (0.0, 1.0), -0.5 / _PI, 2 * _PI),),
+        ),
+        MotionLaw("3-4-5", (LawPiece(1.0, (0.0, 0.0, 0.0, 10.0, -15.0, 6.0)),)),
+        MotionLaw(
+            "4-5-6-7",
+            (LawPiece(1.0, (0.0, 0.0, 0.0, 0.0, 35.0, -84.0, 70.0, -20.0)),),
+        ),
+        MotionLaw(
+            "modified sine",
+            (
+                LawPiece(0.125, (0.0, _PI * _SINE), -_SINE / 4, 4 * _PI),
+                LawPiece(
+                    0.875,
+                    (2 * _SINE, _PI * _SINE),
+                    -9 * _SINE / 4,
+                    4 * _PI / 3,
+                    _PI / 3,
+                ),
+                LawPiece(1.0, (4 * _SINE, _PI * _SINE), -_SINE / 4, 4 * _PI),
+            ),
+        ),
+    )
+}

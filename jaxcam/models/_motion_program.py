@@ -1,0 +1,232 @@
+"""A cam's motion program: what the follower does in each part of a turn."""
+
+import math
+from collections.abc import Iterable
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from ._motion_law import MOTION_LAWS, MotionLaw
+from ._parameters import as_parameter, is_concrete, parameter, require_positive
+from ._profile import CamProfile
+
+
+_TURN = 2 * np.pi
+#: parts of the turn, or of the largest rise, that rounding may leave open
+_CLOSED = 1e-9
+
+
+class Segment(NamedTuple):
+    """One segment of a motion program.
+
+    **Arguments:**
+
+    - `law`: a name in [`jaxcam.models.MOTION_LAWS`][], or a
+        [`jaxcam.models.MotionLaw`][].
+    - `width`: cam angle that it takes (rad).
+    - `rise`: change of the lift over it; negative for a fall, 0 for a dwell.
+    """
+
+    law: str | MotionLaw
+    width: Any
+    rise: Any = 0.0
+
+
+class Joint(NamedTuple):
+    """Where two pieces of a program meet: the cam's angle (rad) and what jumps there.
+
+    `jumps`, shape `(joints, 4)`: of lift, velocity, acceleration and jerk, for each
+    radian of the cam.
+    """
+
+    angle: Float[Array, " joints"]
+    jumps: Float[Array, "joints 4"]
+
+
+class MotionProgram(CamProfile):
+    """A lift made of segments, one after the other, closed over a turn.
+
+    The lift is an angle (rad) for an oscillating follower and a length (m) for a
+    translating one. The program is played in its order by a cam whose angle grows,
+    which for [`jaxcam.models.CamFollower`][] means `rotation="counterclockwise"`.
+
+    **Arguments:**
+
+    - `segments`: a list of [`jaxcam.models.Segment`][]; their widths add up to a turn
+        and their rises to zero.
+    - `base`: lift at cam angle zero, where the first segment begins.
+
+    **Raises:** `ValueError` for an unknown law, or a program that does not close.
+    """
+
+    widths: jax.Array
+    rises: jax.Array
+    base: jax.Array
+    laws: tuple[MotionLaw, ...] = eqx.field(static=True)
+
+    def __init__(self, segments: Iterable[Segment], base=0.0):
+        segments = [Segment(*segment) for segment in segments]
+        if not segments:
+            raise ValueError("Give at least one segment of the motion program.")
+        self.laws = tuple(_law(segment.law) for segment in segments)
+        self.widths = as_parameter([segment.width for segment in segments])
+        self.rises = as_parameter([segment.rise for segment in segments])
+        self.base = as_parameter(base)
+        if is_concrete(self.widths, self.rises, self.base):
+            self.check()
+
+    def __call__(self, cam_angle) -> jax.Array:
+        return self.prepared()(cam_angle)
+
+    def prepared(self) -> "MotionPieces":
+        """The program as a table of pieces, differentiable in widths and rises."""
+        ends = jnp.cumsum(self.widths)
+        begins = ends - self.widths
+        lifts = self.base + jnp.cumsum(self.rises) - self.rises
+        owner, before, coefficients, waves = _table(self.laws)
+        widths, rises = self.widths[owner], self.rises[owner]
+        heights = jnp.zeros_like(coefficients).at[:, 0].set(lifts[owner])
+        return MotionPieces(
+            starts=begins[owner] + before * widths,
+            origins=begins[owner],
+            widths=widths,
+            coefficients=heights + rises[:, None] * coefficients,
+            amplitudes=rises * waves[:, 0],
+            frequencies=waves[:, 1],
+            phases=waves[:, 2],
+        )
+
+    def derivatives(self, cam_angle) -> Float[Array, "... 4"]:
+        """Lift, velocity, acceleration, jerk for each radian of the cam.
+
+        At a joint, the values just after it. What a handbook calls s, v, a, j.
+        """
+        pieces = self.prepared()
+        return pieces.jet(pieces.local(cam_angle)[0], cam_angle)
+
+    def joints(self) -> Joint:
+        """Where the pieces meet, with the jumps of lift, velocity, acceleration, jerk.
+
+        Laws in several pieces have joints inside their segment.
+        """
+        pieces = self.prepared()
+        count = pieces.starts.shape[0]
+        here = np.arange(count)
+        previous = np.roll(here, 1)
+        ends = jnp.roll(pieces.ends(), 1)
+        after = pieces.jet(here, pieces.starts)
+        return Joint(pieces.starts, after - pieces.jet(previous, ends))
+
+    def check(self) -> None:
+        """Raise `ValueError` for a program that does not close."""
+        require_positive(widths=self.widths)
+        turn = float(jnp.sum(self.widths))
+        if abs(turn - _TURN) > _CLOSED * _TURN:
+            hint = "; they look like degrees" if turn > 90 else ""
+            raise ValueError(
+                "Make the widths of the segments add up to a turn, 2 pi: they add up "
+                f"to {turn:g} rad{hint}."
+            )
+        for law, rise in zip(self.laws, np.asarray(self.rises), strict=True):
+            if law.name == "dwell" and rise != 0:
+                raise ValueError(f"A dwell cannot rise; give it rise 0, not {rise:g}.")
+        scale = float(jnp.max(jnp.abs(self.rises)))
+        total = float(jnp.sum(self.rises))
+        if not abs(total) <= _CLOSED * max(scale, 1e-300):
+            raise ValueError(
+                "Make the rises and falls of the segments add up to zero: they add up "
+                f"to {total:g}."
+            )
+
+
+class MotionPieces(CamProfile):
+    """A program as pieces of polynomials and sines; `MotionProgram.prepared` makes it.
+
+    **Arguments:** for each piece, all of shape `(pieces,)`: the cam angles (rad) where
+    it starts (`starts`) and where the fraction u is zero (`origins`), the angle over
+    which u grows by one (`widths`), and the numbers of
+    `polynomial(u) + amplitude sin(frequency u + phase)`; `coefficients` has shape
+    `(pieces, powers)`, lowest power first.
+    """
+
+    starts: jax.Array = parameter()
+    origins: jax.Array = parameter()
+    widths: jax.Array = parameter()
+    coefficients: jax.Array = parameter()
+    amplitudes: jax.Array = parameter()
+    frequencies: jax.Array = parameter()
+    phases: jax.Array = parameter()
+
+    def __call__(self, cam_angle) -> jax.Array:
+        piece, u = self.local(cam_angle)
+        coefficients = self.coefficients[piece]
+        value = coefficients[..., -1]
+        for k in reversed(range(self.coefficients.shape[-1] - 1)):
+            value = coefficients[..., k] + u * value
+        wave = jnp.sin(self.frequencies[piece] * u + self.phases[piece])
+        return value + self.amplitudes[piece] * wave
+
+    def local(self, cam_angle):
+        """The piece in force at an angle, and the fraction of its segment passed."""
+        angle = jnp.mod(cam_angle, _TURN)
+        # unrolled: an inner loop would keep a simulation's loop from fusing
+        after = jnp.searchsorted(
+            self.starts, angle, side="right", method="scan_unrolled"
+        )
+        piece = after - 1
+        return piece, (angle - self.origins[piece]) / self.widths[piece]
+
+    def ends(self) -> Float[Array, " pieces"]:
+        """Cam angle at which each piece ends (rad)."""
+        turn = jnp.full_like(self.starts[:1], _TURN)
+        return jnp.concatenate([self.starts[1:], turn])
+
+    def jet(self, piece, cam_angle) -> Float[Array, "... 4"]:
+        """Value and three derivatives of given pieces, continued to any angle.
+
+        A joint has one value on either side; which is meant is said by the piece.
+        """
+        cam_angle = jnp.asarray(cam_angle, dtype=float)
+        angle = jnp.where(cam_angle == _TURN, cam_angle, jnp.mod(cam_angle, _TURN))
+        width = self.widths[piece]
+        u = (angle - self.origins[piece]) / width
+        coefficients = self.coefficients[piece]
+        frequency, phase = self.frequencies[piece], self.phases[piece]
+        powers = self.coefficients.shape[-1]
+        orders = []
+        for k in range(4):
+            value = jnp.zeros_like(u)
+            for n in reversed(range(k, powers)):
+                value = math.perm(n, k) * coefficients[..., n] + u * value
+            turned = jnp.sin(frequency * u + phase + k * np.pi / 2)
+            wave = self.amplitudes[piece] * frequency**k * turned
+            orders.append((value + wave) / width**k)
+        return jnp.stack(orders, axis=-1)
+
+
+def _law(law) -> MotionLaw:
+    if isinstance(law, MotionLaw):
+        return law
+    if law not in MOTION_LAWS:
+        raise ValueError(
+            f"There is no motion law {law!r}; choose one of {', '.join(MOTION_LAWS)}."
+        )
+    return MOTION_LAWS[law]
+
+
+def _table(laws):
+    """Of each piece: its segment, where it starts in it, polynomial, wave."""
+    pieces = [(i, piece) for i, law in enumerate(laws) for piece in law.pieces]
+    powers = max(len(piece.polynomial) for _, piece in pieces)
+    owner = np.array([i for i, _ in pieces])
+    ends = np.array([piece.end for _, piece in pieces])
+    before = np.where(np.diff(owner, prepend=-1) == 0, np.roll(ends, 1), 0.0)
+    coefficients = np.zeros((len(pieces), powers))
+    for row, (_, piece) in zip(coefficients, pieces, strict=True):
+        row[: len(piece.polynomial)] = piece.polynomial
+    waves = np.array([(p.amplitude, p.frequency, p.phase) for _, p in pieces])
+    return owner, before, jnp.asarray(coefficients), jnp.asarray(waves)

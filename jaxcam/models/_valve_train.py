@@ -1,0 +1,107 @@
+"""A valve, or any mass that slides, pressed onto a cam by a spring."""
+
+from typing import ClassVar
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+
+from ..hybrid import HybridSystem
+from ._parameters import (
+    as_parameter,
+    parameter,
+    require_finite,
+    require_not_negative,
+    require_positive,
+    require_restitution,
+)
+from ._profile import CamProfile
+from ._restitution import ConstantRestitution
+
+
+class ValveTrain(HybridSystem):
+    """A sliding follower on a cam of constant speed: m x'' + c x' + k x + F0 = contact.
+
+    The state is the follower's lift and velocity (m, m/s); the gap is the distance
+    between the follower and the lift that the cam asks for.
+
+    **Arguments:**
+
+    - `profile`: lift (m) as a function of the cam's angle, such as a
+        [`jaxcam.models.MotionProgram`][].
+    - `speed`: speed of the cam (rad/s), half that of a four-stroke engine's crank.
+    - `mass`: mass that moves with the valve (kg), with a third of the spring's.
+    - `stiffness`: of the valve spring (N/m).
+    - `preload`: force of the spring at lift zero (N).
+    - `damping`: viscous damping (N s/m).
+    - `restitution`: law `r(speed, approach_speed)`, approach speed in m/s.
+    - `phase`: angle of the cam at time zero (rad).
+    """
+
+    state_names: ClassVar[tuple[str, ...]] = ("lift", "valve velocity")
+    state_units: ClassVar[tuple[str, ...]] = ("m", "m/s")
+
+    profile: CamProfile
+    speed: jax.Array = parameter()
+    mass: jax.Array = parameter()
+    stiffness: jax.Array = parameter()
+    preload: jax.Array = parameter()
+    damping: jax.Array = parameter(0.0)
+    restitution: eqx.Module = eqx.field(
+        default_factory=lambda: ConstantRestitution(as_parameter(0.5))
+    )
+    phase: jax.Array = parameter(0.0)
+
+    def vector_field(self, t, state) -> jax.Array:
+        """Velocity and acceleration of the free valve, shape `(2,)`."""
+        del t
+        lift, velocity = state[0], state[1]
+        force = self.stiffness * lift + self.preload + self.damping * velocity
+        return jnp.stack([velocity, -force / self.mass])
+
+    def gap(self, t, state) -> jax.Array:
+        """Distance between follower and cam (m), a scalar."""
+        return state[0] - self.profile(self.cam_angle(t))
+
+    def impact(self, t, state) -> jax.Array:
+        """State after an impact: the relative velocity v becomes -r v."""
+        _, moved = jax.jvp(self.profile, (self.cam_angle(t),), (self.speed,))
+        velocity = state[1] - moved
+        r = self.restitution(self.speed, jnp.abs(velocity))  # pyright: ignore
+        return jnp.stack([state[0], state[1] - (1 + r) * velocity])
+
+    def cam_angle(self, t) -> jax.Array:
+        """Angle of the cam (rad) at `t` (s), elementwise."""
+        return self.speed * t + self.phase
+
+    def load_terms(self, lift, slope, curvature):
+        """Contact force (N) at speed w as `a w^2 + b w + c`: a, b and c.
+
+        Lift, slope and curvature are the profile's, for each radian of the cam.
+        """
+        return (
+            self.mass * curvature,
+            self.damping * slope,
+            self.stiffness * lift + self.preload,
+        )
+
+    @property
+    def period(self) -> jax.Array:
+        """Duration of one turn of the cam (s)."""
+        return 2 * jnp.pi / self.speed
+
+    def prepared(self) -> "ValveTrain":
+        """The same system with a profile that is cheaper to evaluate."""
+        return eqx.tree_at(lambda s: s.profile, self, self.profile.prepared())
+
+    def check(self) -> None:
+        """Raise `ValueError` where a parameter has no physical meaning."""
+        require_positive(speed=self.speed, mass=self.mass)
+        require_not_negative(
+            stiffness=self.stiffness, preload=self.preload, damping=self.damping
+        )
+        require_finite(phase=self.phase)
+        for approach_speed in (0.0, 1.0):
+            r = self.restitution(self.speed, jnp.asarray(approach_speed))  # pyright: ignore
+            require_restitution(r, f" at an approach speed of {approach_speed:g} m/s")
+        self.profile.check()

@@ -1,0 +1,31 @@
+"""The shape of a cam."""
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from ..models import CamContour
+from ._axes import legend_above, one_axes
+from ._style import CAM, IMPACT, styled
+
+
+@styled
+def cam_contour(contour: CamContour, ax: Axes | None = None) -> Axes:
+    """Draw a cam in its own frame, the axis it turns about, and where it is undercut.
+
+    **Arguments:** the contour over a whole turn, and where to draw.
+
+    **Returns:** the axes.
+    """
+    ax = one_axes(ax)
+    x, y = np.asarray(contour.x), np.asarray(contour.y)
+    ax.fill(x, y, color=CAM, alpha=0.25, lw=0)
+    ax.plot(np.append(x, x[0]), np.append(y, y[0]), color=CAM, label="contour")
+    undercut = np.asarray(contour.radius_of_curvature) <= 0
+    if np.any(undercut):
+        ax.plot(x[undercut], y[undercut], ".", color=IMPACT, label="undercut")
+    ax.plot(0, 0, "k+", ms=9, label="axis")
+    ax.set_aspect("equal")
+    ax.set_xlabel("x (m)")
+    ax.set_ylabel("y (m)")
+    legend_above(ax)
+    return ax

@@ -1,0 +1,22 @@
+"""Many steps as chunks of one length, so that any number of them is compiled once."""
+
+from collections.abc import Callable
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+
+#: steps in a chunk
+CHUNK = 1024
+
+
+def in_chunks(run: Callable[[Any, Any], tuple[Any, Any]], carry, steps: int):
+    """Outputs of `steps` steps, where `run(carry, k)` makes a chunk from step k on."""
+    parts = []
+    for first in range(0, steps, CHUNK):
+        carry, found = run(carry, jnp.asarray(float(first)))
+        keep = min(CHUNK, steps - first)
+        parts.append(jax.tree.map(lambda leaf: np.asarray(leaf)[:keep], found))
+    return jax.tree.map(lambda *leaves: jnp.asarray(np.concatenate(leaves)), *parts)

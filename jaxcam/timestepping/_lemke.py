@@ -1,0 +1,137 @@
+"""Linear complementarity problems, by Lemke's method."""
+
+from typing import NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, ArrayLike, Float, Int
+
+
+# entries of the tableau below this part of the largest one are rounding
+_TINY = 1e-12
+# a vertex is never met twice, and few of the 2^m are met at all
+_PIVOTS = 40
+
+SOLVED, RAY, EXHAUSTED = 0, 1, 2
+
+
+class Pivoting(NamedTuple):
+    """Where Lemke's method ended."""
+
+    #: (m,) the solution, and w = M z + q
+    z: Float[Array, " m"]
+    w: Float[Array, " m"]
+    #: 0 solved, 1 ended on a ray (no solution is known), 2 out of pivots
+    code: Int[Array, ""]
+
+
+def lemke(matrix: Float[Array, "m m"], vector: Float[Array, " m"]) -> Pivoting:
+    """z >= 0, w = M z + q >= 0, z . w = 0; for use inside `jit`, `scan` and `vmap`.
+
+    Lemke's complementary pivots with the lexicographic rule, which cannot cycle (R. W.
+    Cottle, J.-S. Pang, R. E. Stone, The Linear Complementarity Problem, 1992, section
+    4.4). Where M is copositive-plus a ray means that there is no solution; for other M
+    it means that none was found.
+
+    **Arguments:** M, shape `(m, m)`, and q, shape `(m,)`.
+    """
+    m = vector.shape[0]
+    one = jnp.ones(m, dtype=vector.dtype)
+    eye = jnp.eye(m, dtype=vector.dtype)
+    tableau = jnp.concatenate([eye, -matrix, -one[:, None], vector[:, None]], axis=1)
+    artificial = 2 * m
+    basis = jnp.arange(m)
+    trivial = jnp.all(vector >= 0)
+
+    # the artificial variable enters where q is most negative
+    first = _least(jnp.concatenate([vector[:, None], eye], axis=1), one > 0, m)
+    tableau = _pivot(tableau, first, artificial)
+    basis = basis.at[first].set(artificial)
+
+    def running(carry):
+        _, _, _, code, count = carry
+        return (code < 0) & (count < _PIVOTS * m + 40)
+
+    def pivot(carry):
+        tableau, basis, entering, _, count = carry
+        column = tableau[:, entering]
+        rises = column > _TINY * jnp.maximum(1.0, jnp.max(jnp.abs(column)))
+        ray = ~jnp.any(rises)
+        safe = jnp.where(rises, column, 1.0)
+        rows = jnp.concatenate([tableau[:, -1:], tableau[:, :m]], axis=1)
+        rows = rows / safe[:, None]
+        row = _least(rows, rises, m)
+        # the artificial variable leaves as soon as it can
+        ratio = jnp.where(rises, rows[:, 0], jnp.inf)
+        room = _TINY * jnp.maximum(1.0, jnp.abs(jnp.min(ratio)))
+        out = (basis == artificial) & (ratio <= jnp.min(ratio) + room)
+        row = jnp.where(jnp.any(out), jnp.argmax(out), row)
+        leaving = basis[row]
+        moved = _pivot(tableau, row, entering)
+        tableau = jnp.where(ray, tableau, moved)
+        basis = jnp.where(ray, basis, basis.at[row].set(entering))
+        ended = jnp.where(ray, RAY, jnp.where(leaving == artificial, SOLVED, -1))
+        following = jnp.where(leaving < m, leaving + m, leaving - m)
+        return tableau, basis, following, ended, count + 1
+
+    start = (tableau, basis, first + m, jnp.where(trivial, SOLVED, -1), 0)
+    tableau, basis, _, code, _ = jax.lax.while_loop(running, pivot, start)
+    values = jnp.zeros(2 * m + 1, dtype=vector.dtype).at[basis].set(tableau[:, -1])
+    z = jnp.where(trivial, jnp.zeros_like(vector), values[m : 2 * m])
+    code = jnp.where(code < 0, EXHAUSTED, code)
+    return Pivoting(z, matrix @ z + vector, code)
+
+
+def solve_lcp(
+    matrix: Float[ArrayLike, "m m"], vector: Float[ArrayLike, " m"]
+) -> Float[Array, " m"]:
+    """The z of [`jaxcam.timestepping.lemke`][], or an error.
+
+    **Raises:** `ValueError` where Lemke's method finds no solution.
+    """
+    matrix = jnp.asarray(matrix, dtype=jnp.float64)
+    vector = jnp.asarray(vector, dtype=jnp.float64)
+    if matrix.shape != (vector.shape[0], vector.shape[0]):
+        raise ValueError(
+            f"Give a square matrix and a vector of its size: their shapes are "
+            f"{matrix.shape} and {vector.shape}."
+        )
+    found = _lemke(matrix, vector)
+    explain(int(found.code))
+    return found.z
+
+
+_lemke = eqx.filter_jit(lemke)
+
+
+def explain(code: int, where: str = "") -> None:
+    """Raise `ValueError` for a code that is not SOLVED."""
+    if code == RAY:
+        raise ValueError(
+            f"The complementarity problem{where} has no solution that Lemke's method "
+            "can find: its matrix is not copositive-plus and the pivots end on a ray; "
+            "check the signs of the model, or take a shorter step."
+        )
+    if code == EXHAUSTED:
+        raise ValueError(
+            f"The complementarity problem{where} needs too many pivots; scale its rows "
+            "so that they are of one size."
+        )
+
+
+def _least(rows, allowed, m):
+    """The lexicographically least of the allowed rows."""
+    mask = allowed
+    for k in range(m + 1):
+        values = jnp.where(mask, rows[:, k], jnp.inf)
+        least = jnp.min(values)
+        room = _TINY * jnp.maximum(1.0, jnp.abs(least))
+        mask = mask & (values <= jnp.where(jnp.isfinite(least), least + room, least))
+    return jnp.argmax(mask)
+
+
+def _pivot(tableau, row, column):
+    scaled = tableau[row] / tableau[row, column]
+    others = tableau - tableau[:, column, None] * scaled[None]
+    return others.at[row].set(scaled)

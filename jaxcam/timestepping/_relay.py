@@ -1,0 +1,85 @@
+"""Linear systems with ideal relays, and the problem that one step of them poses."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from ._lemke import lemke, Pivoting
+
+
+_LARGEST = 14
+
+
+def _matrix(value) -> jax.Array:
+    return jnp.atleast_2d(jnp.asarray(value, dtype=float))
+
+
+class RelaySystem(eqx.Module):
+    """x' = A x + B u, y = C x + D u, each u_i the relay of -y_i. (3.1)
+
+    A relay gives 1 for y < 0, -1 for y > 0, and anything between where y = 0, which is
+    what sliding needs.
+
+    **Arguments:** matrices of shapes `(n, n)`, `(n, m)`, `(m, n)` and `(m, m)`; no D
+    means zero.
+
+    **Raises:** `ValueError` where the shapes do not fit.
+    """
+
+    A: Float[Array, "n n"]
+    B: Float[Array, "n m"]
+    C: Float[Array, "m n"]
+    D: Float[Array, "m m"]
+
+    def __init__(self, A, B, C, D=None):
+        self.A, self.B, self.C = _matrix(A), _matrix(B), _matrix(C)
+        m = self.C.shape[0]
+        self.D = jnp.zeros((m, m)) if D is None else _matrix(D)
+        n = self.A.shape[0]
+        shapes = [a.shape for a in (self.A, self.B, self.C, self.D)]
+        if shapes != [(n, n), (n, m), (m, n), (m, m)]:
+            raise ValueError(
+                "Give A (n, n), B (n, m), C (m, n) and D (m, m): their shapes are "
+                f"{', '.join(map(str, shapes))}."
+            )
+
+
+def relay_problem(
+    matrix: Float[Array, "m m"], vector: Float[Array, " m"]
+) -> tuple[Float[Array, " m"], Float[Array, " m"], Pivoting]:
+    """u and y with y = M u + q and each u_i the relay of -y_i. (3.3)
+
+    As a complementarity problem of twice the size, of 1 + u with the positive part of y
+    and 1 - u with its negative part. It always has a solution, since u is bounded; only
+    one where M is a P-matrix.
+
+    **Returns:** u and y, shape `(m,)`, and how the pivoting ended.
+    """
+    m = vector.shape[0]
+    eye = jnp.eye(m, dtype=vector.dtype)
+    block = jnp.block([[matrix, eye], [-eye, jnp.zeros_like(eye)]])
+    one = jnp.ones_like(vector)
+    found = lemke(block, jnp.concatenate([vector - matrix @ one, 2 * one]))
+    u = jnp.clip(found.z[:m] - 1, -1.0, 1.0)
+    return u, matrix @ u + vector, found
+
+
+def is_p_matrix(matrix: Float[Array, "m m"]) -> bool:
+    """Whether all principal minors are positive: one solution for every vector.
+
+    **Raises:** `ValueError` for more than 14 rows; there are 2^m minors.
+    """
+    values = np.asarray(matrix)
+    m = values.shape[0]
+    if m > _LARGEST:
+        raise ValueError(
+            f"There are 2^{m} principal minors, too many to try; split the system into "
+            "parts that do not act on each other."
+        )
+    for mask in range(1, 2**m):
+        rows = [i for i in range(m) if mask >> i & 1]
+        if not np.linalg.det(values[np.ix_(rows, rows)]) > 0:
+            return False
+    return True

@@ -1,0 +1,86 @@
+"""Backward Euler steps of a relay system. (3.2)-(3.4)"""
+
+from typing import NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, ArrayLike, Float
+
+from ._chunks import CHUNK, in_chunks
+from ._lemke import explain
+from ._relay import is_p_matrix, relay_problem, RelaySystem
+
+
+class RelayMotion(NamedTuple):
+    """A relay system's motion at the ends of the steps; the first row is the start."""
+
+    #: (steps + 1,) s
+    time: Float[Array, " times"]
+    #: (steps + 1, n)
+    state: Float[Array, "times n"]
+    #: (steps, m) inputs u and outputs y over each step
+    inputs: Float[Array, "steps m"]
+    outputs: Float[Array, "steps m"]
+
+
+def relay_steps(
+    system: RelaySystem, state: Float[ArrayLike, " n"], t1, steps: int
+) -> RelayMotion:
+    """The motion from time zero to `t1` by `steps` backward Euler steps.
+
+    Switches are not located and sliding is nothing special: infinitely many events in
+    finite time cost no more than none. The error is of order one in the step (M. K.
+    Camlibel, W. P. M. H. Heemels, J. M. Schumacher, Consistency of a time-stepping
+    method for a class of piecewise-linear networks, 2002).
+
+    **Raises:** `ValueError` where a step has no solution or more than one: I - h A is
+    singular, or C (I/h - A)^-1 B + D is no P-matrix.
+    """
+    state = jnp.asarray(state, dtype=jnp.float64)
+    n = system.A.shape[0]
+    if state.shape != (n,):
+        raise ValueError(f"Give a state of shape {(n,)}; it has shape {state.shape}.")
+    if not (steps >= 1 and float(t1) > 0):
+        raise ValueError("Give a `t1` after zero and at least one step.")
+    h = jnp.asarray(float(t1) / steps)
+    matrix = np.eye(n) - float(h) * np.asarray(system.A)
+    if not np.linalg.cond(matrix) < 1e12:
+        raise ValueError(
+            "I - h A cannot be inverted for this step; take another number of steps."
+        )
+    one_step = _one_step(system, h)[2]
+    if not is_p_matrix(one_step):
+        raise ValueError(
+            "A step of this relay system has more than one solution: C (I/h - A)^-1 B "
+            "+ D is no P-matrix; change the signs of B or C, or take shorter steps."
+        )
+    states, inputs, outputs, codes = in_chunks(
+        lambda x, _: _run(system, x, h), state, steps
+    )
+    worst = int(jnp.max(codes))
+    explain(worst, f" of step {int(jnp.argmax(codes > 0))}")
+    times = jnp.asarray(np.linspace(0.0, float(t1), steps + 1))
+    states = jnp.concatenate([state[None], states])
+    return RelayMotion(times, states, inputs, outputs)
+
+
+def _one_step(system, h):
+    n = system.A.shape[0]
+    inverse = jnp.linalg.inv(jnp.eye(n) - h * system.A)
+    forced = h * inverse @ system.B
+    return inverse, forced, system.C @ forced + system.D
+
+
+@eqx.filter_jit
+def _run(system, state, h):
+    inverse, forced, matrix = _one_step(system, h)
+
+    def step(x, _):
+        free = inverse @ x
+        u, y, found = relay_problem(matrix, system.C @ free)
+        x = free + forced @ u
+        return x, (x, u, y, found.code)
+
+    return jax.lax.scan(step, state, length=CHUNK)

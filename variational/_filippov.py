@@ -1,0 +1,77 @@
+"""Derivatives of motions that cross a surface or slide on it."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from jaxcam.filippov import (
+    FilippovSystem,
+    FilippovTrajectory,
+    leg_flow,
+    mode_field,
+)
+
+
+def filippov_saltation(
+    system: FilippovSystem, t, state: Float[Array, " n"], before: int, after: int
+) -> Float[Array, "n n"]:
+    """How a deviation just before a switch becomes one just after it.
+
+    With F- and F+ the fields in force before and after, at a crossing and where sliding
+    begins,
+
+        S = I + (F+ - F-) H_x / (H_t + H_x F-).
+
+    Where sliding begins its rank falls by one: the deviation is taken onto the surface.
+    Where sliding ends one field has become tangent, F+ = F-, and S is the identity. (R.
+    I. Leine, H. Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical Systems,
+    2004, chapter 7)
+
+    **Arguments:** time (s) and state `(n,)` of the switch, and the modes before and
+    after it: 1 above, 0 sliding, -1 below.
+    """
+    t = jnp.asarray(t, dtype=float)
+    old = mode_field(system, jnp.asarray(float(before)), t, state)
+    new = mode_field(system, jnp.asarray(float(after)), t, state)
+    identity = jnp.eye(state.shape[0])
+    if before == 0:
+        return identity
+    moved = (jnp.ones_like(t), old)
+    _, speed = jax.jvp(system.switching, (t, state), moved)
+    normal = jax.grad(system.switching, argnums=1)(t, state)
+    return identity + jnp.outer(new - old, normal) / speed
+
+
+def filippov_monodromy(trajectory: FilippovTrajectory) -> Float[Array, "n n"]:
+    """Derivative of the state at the end of a run by that at its start.
+
+    The product of the flows' derivatives between switches and the saltation matrices at
+    them. Over one period of a periodic motion its eigenvalues are the multipliers; each
+    stretch of sliding leaves a zero among them. A start that slides is varied along the
+    surface only.
+
+    **Arguments:** a run of `jaxcam.filippov.simulate_filippov`.
+    """
+    system, switches = trajectory.system, trajectory.switches
+    modes = np.append(np.asarray(trajectory.mode)[0], np.asarray(switches.after))
+    times = [float(trajectory.t0), *map(float, switches.time), float(trajectory.t1)]
+    states = [trajectory.state[0], *switches.state]
+    matrix = jnp.eye(trajectory.state.shape[1])
+    for k, mode in enumerate(modes):
+        span = jnp.asarray(times[k]), jnp.asarray(times[k + 1])
+        matrix = _leg(system, jnp.asarray(float(mode)), states[k], *span) @ matrix
+        if k < len(switches.time):
+            before, after = int(switches.before[k]), int(switches.after[k])
+            point = switches.time[k], switches.state[k]
+            matrix = filippov_saltation(system, *point, before, after) @ matrix
+    return matrix
+
+
+_STEPS = 256
+
+
+@eqx.filter_jit
+def _leg(system, mode, state, t0, t1):
+    return jax.jacfwd(lambda x: leg_flow(system, mode, x, t0, t1, _STEPS))(state)
