@@ -49,7 +49,9 @@ def basins(
     saved: Annotated[
         Path | None,
         typer.Option(
-            "--system", metavar="FILE", help="A system that `jaxcam fit` has written."
+            "--system",
+            metavar="FILE",
+            help="A system that `jaxcam fit` or `diagnose` wrote.",
         ),
     ] = None,
     preset: Annotated[

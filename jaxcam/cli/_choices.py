@@ -43,11 +43,23 @@ def choose(option: str, name: str, known: Iterable[str]) -> str:
     return name
 
 
-def saved_name(file: Path) -> str:
-    """The name of the system in a file. **Raises:** `ValueError` for another one."""
+def load(file: Path) -> HybridSystem:
+    """The system in a file of `jaxcam fit` or `jaxcam diagnose`.
+
+    **Raises:** `ValueError` that says what is wrong with it.
+    """
+    from ..discrepancy import saved_classes
     from ..models import load_system
 
-    model = type(load_system(file)).__name__
+    return load_system(file, classes=saved_classes())
+
+
+def saved_name(file: Path) -> str:
+    """The name of the system in a file. **Raises:** `ValueError` for another one."""
+    from ..discrepancy import WithTerms
+
+    system = load(file)
+    model = type(system.base if isinstance(system, WithTerms) else system).__name__
     for name, ready in SYSTEMS.items():
         if ready.model == model:
             return name
@@ -59,7 +71,8 @@ def make_system(
 ) -> HybridSystem:
     """A ready system; `preset` and a speed in rpm are for the cam-follower alone.
 
-    **Arguments:** `saved` is a file with the system, as `jaxcam fit --json` writes it.
+    **Arguments:** `saved` is a file with the system, as `jaxcam fit --json` and
+    `jaxcam diagnose --out` write it.
 
     **Raises:** `ValueError` that names the fix.
     """
@@ -76,12 +89,12 @@ def make_system(
                     f"parameters of {name}."
                 )
         if saved is not None:
-            return models.load_system(saved)
+            return load(saved)
         return getattr(models, SYSTEMS[name].model)()
     if saved is not None and preset is not None:
         raise ValueError("Give --system or --preset, not both.")
     if saved is not None:
-        system = models.load_system(saved)
+        system = load(saved)
     else:
         system = models.CamFollower() if preset is None else models.preset(preset)
     if rpm is not None:

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 import typer
 
-from ._choices import CAM, choose, make_system, SYSTEMS
+from ._choices import CAM, choose, make_system, saved_name, SYSTEMS
 
 
 ALGORITHMS = {
@@ -47,6 +47,14 @@ def continue_(
     preset: Annotated[
         str | None,
         typer.Option(metavar="NAME", help="Parameters of the cam-follower: table-4.4."),
+    ] = None,
+    saved: Annotated[
+        Path | None,
+        typer.Option(
+            "--system",
+            metavar="FILE",
+            help="A system that `jaxcam fit` or `jaxcam diagnose` has written.",
+        ),
     ] = None,
     set_: Annotated[
         list[str] | None,
@@ -102,6 +110,8 @@ def continue_(
       jaxcam continue impact-oscillator --parameter wall --from -1 --to 0.2
       jaxcam continue cam-follower --from 130 --to 150 --out DIR --resume
     """
+    if saved is not None:
+        system = saved_name(saved)
     choose("SYSTEM", system, SYSTEMS)
     choose("--direction", direction, DIRECTIONS)
     choose("--algorithm", algorithm, ALGORITHMS)
@@ -113,18 +123,16 @@ def continue_(
     if resume and out is None:
         raise ValueError("--resume needs the folder of the interrupted run: --out DIR.")
 
-    from operator import attrgetter
-
     import continuation
 
     from ..models import rad_s_to_rpm
     from ._cache import keep_compiled_programs
     from ._output import Output
-    from ._parameters import parameters, set_parameters
+    from ._parameters import parameters, pick, set_parameters
     from ._progress import progress
 
     keep_compiled_programs()
-    model = set_parameters(make_system(system, preset, None), set_ or ())
+    model = set_parameters(make_system(system, preset, None, saved), set_ or ())
     # speeds are rpm at the command line and rad/s inside
     unit = math.pi / 30 if parameter == "speed" and system == CAM else 1.0
     model = _started(model, parameter, at, unit, low, high)
@@ -141,7 +149,7 @@ def continue_(
         branch = continuation.branch(
             start.problem,
             start,
-            attrgetter(parameter),
+            pick(parameter),
             (unit * low, unit * high),
             getattr(continuation, ALGORITHMS[algorithm])(),
             settings=settings,
@@ -208,12 +216,10 @@ def _started(model, name: str, at: float | None, unit: float, low, high):
 
     **Raises:** `ValueError` for a parameter that does not exist, or a start outside.
     """
-    from operator import attrgetter
-
     import equinox as eqx
     import jax.numpy as jnp
 
-    from ._parameters import parameters
+    from ._parameters import parameters, pick
 
     known = {k: v for k, v in parameters(model).items() if not isinstance(v, list)}
     if name not in known:
@@ -227,7 +233,7 @@ def _started(model, name: str, at: float | None, unit: float, low, high):
             f"the branch starts at {name} = {value:g}, outside {low:g} to {high:g}; "
             "choose the start with --at, or other bounds."
         )
-    return eqx.tree_at(attrgetter(name), model, jnp.asarray(unit * value, dtype=float))
+    return eqx.tree_at(pick(name), model, jnp.asarray(unit * value, dtype=float))
 
 
 def _guess(text: str | None):

@@ -30,7 +30,7 @@ def diagnose(
         Path | None,
         typer.Option(
             metavar="DIR",
-            help="Write verdict.json and index.html here.",
+            help="Write verdict.json, model.json and index.html here.",
         ),
     ] = None,
 ) -> None:
@@ -47,6 +47,7 @@ def diagnose(
     choose("--gaps", gaps, ("mend", "refuse", "split"))
 
     from .. import discrepancy
+    from ..models import save_system
     from ..recordings import read_case, read_rig
     from ._cache import keep_compiled_programs
     from ._demo import _rig_file
@@ -70,6 +71,8 @@ def diagnose(
             page = diagnosis_page(found, figures, tuple(notes))
             (out / "index.html").write_text(page, encoding="utf-8")
             (out / "verdict.json").write_text(to_text(verdict) + "\n", "utf-8")
+            about = {"case": runs.name, "summary": found.summary}
+            save_system(found.system(), out / "model.json", about=about)
     for note in notes:
         output.print(note)
     output.print(found.summary)
@@ -81,4 +84,5 @@ def diagnose(
     )
     if out is not None:
         output.print(f"Report: {out / 'index.html'}")
+        output.print(f"Model: {out / 'model.json'}, for --system of other commands")
     output.write_json(verdict)

@@ -1,8 +1,9 @@
 """Parameters of a system by name: `profile.radius`, `restitution.slope`."""
 
 import math
-from collections.abc import Sequence
-from operator import attrgetter
+import re
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import equinox as eqx
 import jax
@@ -45,8 +46,20 @@ def set_parameters(system: HybridSystem, assignments: Sequence[str]) -> HybridSy
                 f"are {', '.join(_names(system, leaves))}."
             )
         number = jnp.full_like(leaves[name], value)
-        system = eqx.tree_at(attrgetter(name), system, number)
+        system = eqx.tree_at(pick(name), system, number)
     return system
+
+
+def pick(name: str) -> Callable[[Any], Any]:
+    """What picks a parameter out of a system by its name, as `terms[0].c1`."""
+
+    def where(system):
+        for part in re.findall(r"[^.\[\]]+", name):
+            inside = isinstance(system, tuple)
+            system = system[int(part)] if inside else getattr(system, part)
+        return system
+
+    return where
 
 
 def _split(assignment: str) -> tuple[str, float]:
@@ -70,7 +83,10 @@ def _split(assignment: str) -> tuple[str, float]:
 def _leaves(system) -> dict[str, jax.Array]:
     kept = eqx.filter(system, eqx.is_inexact_array)
     found, _ = jax.tree_util.tree_flatten_with_path(kept)
-    return {jax.tree_util.keystr(path).lstrip("."): leaf for path, leaf in found}
+    names = (jax.tree_util.keystr(path).lstrip(".") for path, _ in found)
+    # the drive of a system with terms is called what it is called without them
+    names = [_SPEED if name == f"base.{_SPEED}" else name for name in names]
+    return dict(zip(names, (leaf for _, leaf in found)))
 
 
 def _names(system, leaves) -> list[str]:

@@ -25,7 +25,9 @@ def simulate(
     saved: Annotated[
         Path | None,
         typer.Option(
-            "--system", metavar="FILE", help="A system that `jaxcam fit` has written."
+            "--system",
+            metavar="FILE",
+            help="A system that `jaxcam fit` or `diagnose` wrote.",
         ),
     ] = None,
     preset: Annotated[

@@ -79,8 +79,9 @@ def summary(name: str, trajectory: Trajectory) -> str:
     system, unit = trajectory.system, _unit(trajectory.system)
     reached = float(trajectory.steps.time[-1])
     at = ""
-    if isinstance(system, CamFollower):
-        at = f" at {float(rad_s_to_rpm(system.speed)):.6g} rpm"
+    if isinstance(getattr(system, "base", system), CamFollower):
+        speed = system.speed  # pyright: ignore
+        at = f" at {float(rad_s_to_rpm(speed)):.6g} rpm"
     impacts = _counted(int(trajectory.impacts.count), "impact")
     contacts = _counted(int(trajectory.contacts.count), "contact")
     # a run that begins at the release point begins there, a little before t0
