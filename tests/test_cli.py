@@ -263,7 +263,9 @@ def demonstration(tmp_path_factory):
     folder = tmp_path_factory.mktemp("demo") / "report"
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("JAX_COMPILATION_CACHE_DIR", "as the tests have it")
-        found = jaxcam("demo", "--out", folder, "--json", folder / "again.json")
+        found = jaxcam(
+            "demo", "--no-diagnose", "--out", folder, "--json", folder / "again.json"
+        )
     return folder, found.stdout
 
 

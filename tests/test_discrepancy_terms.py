@@ -5,7 +5,9 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxcam.discrepancy import library, WithTerms
+from jaxcam.cli._choices import make_system, saved_name
+from jaxcam.cli._parameters import parameters, set_parameters
+from jaxcam.discrepancy import library, saved_classes, WithTerms
 from jaxcam.discrepancy._engine import added
 from jaxcam.discrepancy._terms import (
     CamProfileError,
@@ -16,7 +18,12 @@ from jaxcam.discrepancy._terms import (
     RestitutionVelocity,
     ViscousDamping,
 )
-from jaxcam.models import CamFollower, ConstantRestitution
+from jaxcam.models import (
+    CamFollower,
+    ConstantRestitution,
+    load_system,
+    save_system,
+)
 
 
 BASE = CamFollower(speed=15.0, phase=0.3, restitution=ConstantRestitution(0.6))
@@ -100,3 +107,24 @@ def test_what_the_free_ones_imitate_gains_nothing():
     assert added(information, score, np.array([0]), np.array([1])) == 0.0
     both = added(information, score, np.array([0]), np.array([1, 2]))
     assert both == pytest.approx(9.0)
+
+
+def test_a_diagnosed_system_is_saved_and_read_again(tmp_path):
+    """The same field and impact, and what the command line makes of it."""
+    terms = (ViscousDamping(0.1), NonlinearSpring(40.0), RestitutionVelocity(0.02))
+    system = WithTerms(BASE, terms)
+    save_system(system, tmp_path / "model.json")
+    again = load_system(tmp_path / "model.json", classes=saved_classes())
+    assert isinstance(again, WithTerms)
+    state = _state(-0.7)
+    for name in ("vector_field", "gap", "impact"):
+        mine, theirs = (getattr(s, name)(TIME, state) for s in (system, again))
+        assert np.array_equal(np.asarray(mine), np.asarray(theirs))
+    assert saved_name(tmp_path / "model.json") == "cam-follower"
+    faster = make_system("cam-follower", None, 150.0, tmp_path / "model.json")
+    assert float(faster.base.speed) == pytest.approx(5 * np.pi)
+    assert parameters(faster)["speed"] == pytest.approx(5 * np.pi)
+    changed = set_parameters(faster, ["terms[0].c1=0.3"])
+    assert float(changed.terms[0].c1) == 0.3
+    with pytest.raises(ValueError, match="WithTerms"):
+        load_system(tmp_path / "model.json")

@@ -1,4 +1,4 @@
-"""`jaxcam demo`: recordings of a cam-follower rig beside the simulated motion."""
+"""`jaxcam demo`: recordings of a rig beside its simulation, and what that lacks."""
 
 from pathlib import Path
 from typing import Annotated
@@ -28,17 +28,22 @@ def demo(
         Path | None,
         typer.Option("--json", metavar="FILE", help="Write the result; - to print it."),
     ] = None,
+    diagnose: Annotated[
+        bool,
+        typer.Option(help="Say what the model lacks; takes a minute or two at first."),
+    ] = True,
 ) -> None:
     """
-    Compare recordings of a rig with its simulation, flight by flight.
+    Compare recordings of a rig with its simulation; say what the model lacks.
 
     Without --case, a small recording that ships with the package. The report is
-    DIR/index.html, with the figures in it, and DIR/result.json.
+    DIR/index.html, with the figures in it, and DIR/result.json; what the model lacks is
+    in DIR/diagnosis.
 
     \b
     Examples:
       jaxcam demo
-      jaxcam demo --out ./jaxcam-first-look --json -
+      jaxcam demo --out ./jaxcam-first-look --json - --no-diagnose
     """
     from ._choices import choose
 
@@ -72,6 +77,9 @@ def demo(
         found = [rests(run, motion) for run, motion in zip(segments, simulated)]
         report("drawing", None)
         figures = draw(out, segments, comparison, simulated)
+        lacks = None
+        if diagnose and len(segments) > 1:
+            lacks = _diagnosed(out / "diagnosis", nominal, segments, runs.name, report)
     result = {
         "command": "demo",
         "case": runs.name,
@@ -86,10 +94,12 @@ def demo(
         ],
         "comparison": comparison.to_json(),
         "figures": [file.name for file, _ in figures],
+        "diagnosis": None if lacks is None else lacks.to_json(),
     }
     report_of = Report(
         title=f"Recording beside simulation: {runs.name}",
         sentence=comparison.sentence(),
+        lacks=None if lacks is None else lacks.summary,
         runs=[run.sentence() for run in segments],
         comparison=comparison.rows,
         rests=found,
@@ -104,8 +114,21 @@ def demo(
     output.print(comparison.table())
     output.print(comparison.sentence())
     output.print(rest_table(found))
+    if lacks is not None:
+        output.print(lacks.summary)
     output.print(f"Report: {out / 'index.html'}")
     output.write_json(result)
+
+
+def _diagnosed(folder: Path, nominal, segments, case: str, report):
+    """What the model lacks, with a report of its own."""
+    from .. import discrepancy
+    from ._diagnose_files import write_diagnosis
+
+    found = discrepancy.diagnose(nominal, segments, case=case, progress=report)
+    report("drawing", None)
+    write_diagnosis(folder, found, ())
+    return found
 
 
 def _rig_file(folder: Path, rig: Path | None) -> Path:
@@ -129,6 +152,11 @@ def _next_steps(found) -> list[tuple[str, str]]:
         (
             f"jaxcam simulate cam-follower --speed {rpm:.1f} --set restitution.r=0.5",
             "The same with another restitution.",
+        ),
+        (
+            "jaxcam simulate --system DIR/diagnosis/model.json --speed 140",
+            "The motion of the rig with what its model lacked; DIR is the folder of "
+            "this page.",
         ),
         (
             "jaxcam demo --case DIR --rig DIR/rig.toml",

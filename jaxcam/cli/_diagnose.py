@@ -47,12 +47,11 @@ def diagnose(
     choose("--gaps", gaps, ("mend", "refuse", "split"))
 
     from .. import discrepancy
-    from ..models import save_system
     from ..recordings import read_case, read_rig
     from ._cache import keep_compiled_programs
     from ._demo import _rig_file
-    from ._diagnose_page import diagnosis_page, draw
-    from ._output import Output, to_text
+    from ._diagnose_files import write_diagnosis
+    from ._output import Output
     from ._progress import progress
 
     keep_compiled_programs()
@@ -64,15 +63,9 @@ def diagnose(
         found = discrepancy.diagnose(
             nominal, tuple(runs), case=runs.name, seed=seed, progress=report
         )
-        verdict = found.to_json()
         if out is not None:
             report("drawing", None)
-            figures = draw(out, found)
-            page = diagnosis_page(found, figures, tuple(notes))
-            (out / "index.html").write_text(page, encoding="utf-8")
-            (out / "verdict.json").write_text(to_text(verdict) + "\n", "utf-8")
-            about = {"case": runs.name, "summary": found.summary}
-            save_system(found.system(), out / "model.json", about=about)
+            write_diagnosis(out, found, tuple(notes))
     for note in notes:
         output.print(note)
     output.print(found.summary)
@@ -85,4 +78,4 @@ def diagnose(
     if out is not None:
         output.print(f"Report: {out / 'index.html'}")
         output.print(f"Model: {out / 'model.json'}, for --system of other commands")
-    output.write_json(verdict)
+    output.write_json(found.to_json())

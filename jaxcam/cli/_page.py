@@ -16,6 +16,7 @@ class Report:
 
     title: str
     sentence: str
+    lacks: str | None
     runs: Sequence[str]
     comparison: Sequence[Row]
     rests: Sequence[Rests]
@@ -52,12 +53,26 @@ pre { background: var(--shade); padding: .7rem .9rem; border-radius: 6px;
 """
 
 
+def _lacks(summary: str | None) -> list[str]:
+    """What the model lacks, and where more is said of it."""
+    if summary is None:
+        return []
+    return [
+        "<h2>What the model lacks</h2>",
+        *(f'<p class="sentence">{escape(s)}</p>' for s in _split(summary)),
+        '<p class="note"><a href="diagnosis/index.html">How that was found</a>: '
+        "the fit before and after, what else was tried, and what could not be seen."
+        "</p>",
+    ]
+
+
 def page(report: Report) -> str:
     """The page as text; nothing in it is loaded from elsewhere."""
     parts = [
         f"<h1>{escape(report.title)}</h1>",
         # one idea a line is easier to take in than a paragraph of numbers
         *(f'<p class="sentence">{escape(s)}</p>' for s in _split(report.sentence)),
+        *_lacks(report.lacks),
         "<h2>Residuals by mode</h2>",
         _table(_MODES, [_cells(row) for row in report.comparison], text=(0, 6)),
         '<p class="note">Each flight is started where the recording says it started, '

@@ -11,5 +11,5 @@ from ._term import (
     strength as strength,
     Term as Term,
 )
-from ._terms import library as library
+from ._terms import library as library, saved_classes as saved_classes
 from ._with_terms import WithTerms as WithTerms

@@ -10,6 +10,7 @@ from scipy.stats import chi2
 from ..fitting import (
     cam_follower_model,
     cam_follower_parameters,
+    Input,
     Model,
     Parameter,
     Problem,
@@ -21,11 +22,12 @@ from ..recordings._check import check_channels, check_drive
 from ._diagnosis import Diagnosis, Effect, Value
 from ._drive import Ripple, ripple_of
 from ._engine import value_of
-from ._evidence import held_out, limits, redrawn
+from ._evidence import held_out, limits, sure
 from ._search import FALSE_ALARMS, Search, Trial
 from ._structure import Structure, structures
 from ._term import Term, terms_of
 from ._terms import DriveRipple, library
+from ._vibration_scan import LEAST
 from ._with_terms import base_drive, WithTerms
 from ._words import listed, summary_of
 
@@ -45,6 +47,7 @@ def diagnose(
     *,
     sensors: Mapping[str, Sensor] | None = None,
     parameters: Sequence[Parameter] = (),
+    drive: Input | None = None,
     case: str = "",
     seed: int = 0,
     progress: Callable[[str, float | None], None] | None = None,
@@ -59,8 +62,8 @@ def diagnose(
         `jaxcam.recordings.segment` makes of them.
     - `candidates`: terms that may be named; by default `library()`. Those that are not
         `listed` only help to describe what is unknown.
-    - `sensors`, `parameters`: as for `jaxcam.fitting.Problem`, of a system that is not
-        a rig.
+    - `sensors`, `parameters`, `drive`: as for `jaxcam.fitting.Model` and `Problem`, of
+        a system that is not a rig; the drive is an input that was measured.
     - `seed`: of the redrawn blocks.
     - `progress`: called with a sentence and a fraction, or `None`.
 
@@ -75,12 +78,14 @@ def diagnose(
         )
     else:
         problem, rig, terms, unlisted = _of_system(
-            system, recordings, candidates, sensors, parameters, report
+            system, recordings, candidates, sensors, parameters, drive, report
         )
         ripple = None
-    turned = problem.model.drive is not None or system_turns(problem)
+    turned = isinstance(system, Rig) or system_turns(problem)
     search = Search(problem, rig, terms, report)
     best = search.run()
+    report("redrawing stretches of the records", None)
+    best, inclusion, deviation, doubtful = sure(search, best, seed)
     before = search.trials[frozenset()]
     report("looking at what is left over", None)
     left_before = structures(
@@ -100,8 +105,6 @@ def diagnose(
             turned,
         )
     rms_before, rms_after, gained, unseen = held_out(search, before, best, report)
-    report("redrawing stretches of the records", None)
-    inclusion, deviation = redrawn(search, best, seed)
     effects = [
         _effect(search, best, before, name, inclusion, deviation, gained)
         for name in sorted(best.names)
@@ -110,6 +113,11 @@ def diagnose(
         effects.append(_drive_effect(ripple))
     unexplained = [one for one in left_after if one.significant]
     verdict, caveats = _verdict(effects, unexplained, before, best)
+    caveats += [
+        f"A term for {name.replace('_', ' ')} gains something, but in {part:.0%} of "
+        f"the redrawn sets of stretches only; record more before you believe it."
+        for name, part in doubtful
+    ]
     if verdict == "unknown":
         effects.insert(0, _unknown(unexplained, problem, gained))
     alternatives = _alternatives(search, best)
@@ -120,6 +128,12 @@ def diagnose(
                 f"{name.replace('_', ' ')}: the BIC differs by {delta:.1f} only. "
                 f"Record larger and smaller bounces, and speeds further apart."
             )
+    caveats += [
+        f"Something that differs from record to record is left over ({one.sentence}): "
+        f"it is no physics that they share; look at how they were recorded."
+        for one in left_after
+        if one.gain > one.asked and one.foretold <= 0
+    ][:1]
     floor = float(next(iter(problem.model.sensors.values())).floor)
     least = limits(search, best)
     units = {one.name: one.unit for t in terms for one in t.strengths()}
@@ -132,9 +146,11 @@ def diagnose(
         rms_before * floor,
         rms_after * floor,
         floor,
-        "rad",
+        _unit(next(iter(problem.model.sensors))),
         _rig_values(system, best, deviation),
-        summary_of(verdict, effects, unexplained, best, before, rig, least, units),
+        summary_of(
+            verdict, effects, unexplained, best, before, rig, least, units, rms_after
+        ),
         before.fit,
         best.fit,
         tuple(left_before),
@@ -150,6 +166,14 @@ def diagnose(
         {name: hidden for name, (_, _, hidden) in least.items()},
         tuple(caveats),
     )
+
+
+def _unit(channel: str) -> str:
+    """The unit that ends the name of a channel, as in `height_m`."""
+    for unit, written in (("_rad_s", "rad/s"), ("_rad", "rad"), ("_m", "m")):
+        if channel.endswith(unit):
+            return written
+    return ""
 
 
 def system_turns(problem: Problem) -> bool:
@@ -175,13 +199,13 @@ def _of_rig(rig: Rig, recordings, candidates, report):
     parameters = cam_follower_parameters(rig, base=lambda s: s.base)
     names = [p.name for p in parameters]
     report("preparing the fits", None)
-    problem = Problem.build(model, runs, parameters + _own(terms))
+    problem = Problem.build(model, runs, parameters + _own(terms, runs))
     report("reading the drive", None)
     ripple = ripple_of([run.recording for run in runs], rig.sensors.cam_floor)
     return problem, names, terms, unlisted, ripple
 
 
-def _of_system(system, recordings, candidates, sensors, parameters, report):
+def _of_system(system, recordings, candidates, sensors, parameters, drive, report):
     if not sensors:
         raise ValueError(
             "Give the sensors of the recordings, such as "
@@ -195,12 +219,15 @@ def _of_system(system, recordings, candidates, sensors, parameters, report):
             )
     turned = system.period is not None
     if candidates is None:
-        candidates = library(turned, center=0.0)
+        candidates = library(turned, 0.0, clocked=turned or drive is not None)
     terms, unlisted = _sorted(tuple(candidates))
-    model = Model(WithTerms(system, terms), dict(sensors))
+    if drive is not None:
+        value = drive.value
+        drive = Input(drive.channel, lambda s: value(s.base))  # pyright: ignore
+    model = Model(WithTerms(system, terms), dict(sensors), drive)
     inside = [_within(parameter) for parameter in parameters]
     report("preparing the fits", None)
-    problem = Problem.build(model, recordings, inside + _own(terms))
+    problem = Problem.build(model, recordings, inside + _own(terms, recordings))
     return problem, [p.name for p in inside], terms, unlisted
 
 
@@ -220,8 +247,16 @@ def _sorted(terms: tuple[Term, ...]):
     )
 
 
-def _own(terms) -> list[Parameter]:
-    return [p for k, term in enumerate(terms) for p in term.parameters(k)]
+def _own(terms, segments) -> list[Parameter]:
+    """Parameters of the terms; a frequency is one only with periods in a record."""
+    longest = max(part.recording.duration for part in segments)
+    found = [p for k, term in enumerate(terms) for p in term.parameters(k)]
+    return [
+        dataclasses.replace(p, lower=max(p.lower, LEAST / longest))
+        if p.unit == "Hz"
+        else p
+        for p in found
+    ]
 
 
 def _check(rig: Rig, runs: Sequence[Recording]) -> None:

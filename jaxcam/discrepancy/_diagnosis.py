@@ -3,9 +3,13 @@
 import dataclasses
 from typing import Any
 
+import jax.numpy as jnp
+
 from ..fitting import Fit, Model, Residuals
+from ..hybrid import HybridSystem
 from ._drive import Ripple
 from ._structure import Structure
+from ._with_terms import WithTerms
 
 
 @dataclasses.dataclass(frozen=True)
@@ -104,6 +108,29 @@ class Diagnosis:
     def model(self, record: int | str = 0) -> Model:
         """The model with what was missing, for use in every other command."""
         return self.after.model(record)
+
+    def system(self, record: int | str = 0) -> HybridSystem:
+        """The system with the terms that were named and no others.
+
+        A drive turns at the speed of that record. Faults of sensors are not part of it.
+        """
+        model = self.model(record)
+        system = model.system
+        if not isinstance(system, WithTerms):
+            return system
+        terms = [t for t in system.terms if t.name in self.names and t.acts]
+        row = record if isinstance(record, int) else self.records.index(record)
+        drive = self.after.problem.segments[row].drive
+        if drive is not None:
+            angle, rate = (jnp.asarray(x) for x in (0.0, drive.speed))
+            system = model.driven(0.0, angle, rate)
+        base = system.base  # pyright: ignore
+        return WithTerms(base, tuple(terms)) if terms else base
+
+    @property
+    def records(self) -> tuple[str, ...]:
+        """Names of the recordings."""
+        return self.after.problem.records
 
     def to_json(self) -> dict[str, Any]:
         """The verdict as plain numbers and strings."""

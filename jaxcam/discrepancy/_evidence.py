@@ -8,10 +8,11 @@ import numpy as np
 
 from ..fitting import Fit, fit, Problem, Residuals, residuals
 from ._engine import Blocks, blocks_of, gain, off, with_states
-from ._search import Search, Trial, values_of
+from ._search import BEYOND, Search, SURE, Trial, values_of
 
 
-_SLICES = 4
+# Stretches of a record, and pieces in each of them at least
+_SLICES, _PIECES = 4, 8
 _REDRAWN = 200
 # A fit to half of the records starts where the one to all of them ended
 _ITERATIONS = 15
@@ -102,6 +103,24 @@ def _parts(test: Fit, unseen) -> list[Residuals]:
     return found
 
 
+def sure(
+    search: Search, best: Trial, seed: int = 0
+) -> tuple[Trial, dict[str, float], dict[str, float], list[tuple[str, float]]]:
+    """The part of a subset that does not hang on a few stretches of the records.
+
+    **Returns:** the fit, what `redrawn` says of it, and the terms that were dropped
+    with the part of the redrawn sets that would have kept them.
+    """
+    doubtful: list[tuple[str, float]] = []
+    while True:
+        inclusion, deviation = redrawn(search, best, seed)
+        least = min(inclusion, key=inclusion.__getitem__, default=None)
+        if least is None or inclusion[least] >= SURE:
+            return best, inclusion, deviation, doubtful
+        doubtful.append((least, inclusion[least]))
+        best = search.without(best, least)
+
+
 def redrawn(
     search: Search, best: Trial, seed: int = 0
 ) -> tuple[dict[str, float], dict[str, float]]:
@@ -112,7 +131,10 @@ def redrawn(
     the standard deviation of each parameter.
     """
     problem = search.problem
-    blocks = blocks_of(problem, best.fit.point, _SLICES)
+    # what ties one stretch to the next is in neither, so they must hold many ties
+    pieces = max(len(flown) for flown, _ in problem.spans)
+    slices = min(_SLICES, max(1, pieces // _PIECES))
+    blocks = blocks_of(problem, best.fit.point, slices)
     free = blocks.rows(search.parameters(best.names))
     value = values_of(best.fit, blocks)
     rng = np.random.default_rng(seed)
@@ -178,5 +200,6 @@ def limits(search: Search, trial: Trial) -> dict[str, tuple[float, float, str]]:
             if len(rig):
                 hidden = blocks.names[rig[int(np.argmax(np.abs(taken) / own))]]
             size = stderr * float(blocks.scale[row[0]])
-            found[one.name] = (size * math.sqrt(search.asked(term.name)), size, hidden)
+            asked = math.sqrt(search.asked(term.name)) + BEYOND
+            found[one.name] = (size * asked, size, hidden)
     return found

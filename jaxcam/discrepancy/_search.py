@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.stats import chi2, norm
 
 from ..fitting import Fit, fit, Problem
 from ..fitting._linearise import Point
@@ -18,6 +18,10 @@ from ._vibration_scan import Periodogram, periodogram
 
 #: chance that any term at all is named where nothing is missing
 FALSE_ALARMS = 0.01
+#: part of the redrawn sets of stretches in which what is named must be kept, and how
+#: many standard errors beyond what is asked it then is, where all is as it should be
+SURE = 0.9
+BEYOND = float(norm.ppf(SURE))
 MOST_TERMS = 3
 # How many of the best subsets of each size are built upon, and how many are tried
 _KEPT, _TRIED = 3, 6
@@ -143,6 +147,13 @@ class Search:
             if enough:
                 return min(enough, key=lambda trial: trial.bic)
         return best
+
+    def without(self, best: Trial, name: str) -> Trial:
+        """The fit of a subset with one term less."""
+        rest = best.names - {name}
+        known = self.trials.get(rest) or self._attempt(rest, best, _ITERATIONS)
+        assert known is not None
+        return known
 
     def _better(self, best: Trial, other: Trial) -> Trial:
         return other if other.bic < best.bic else best

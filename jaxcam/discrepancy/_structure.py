@@ -10,15 +10,17 @@ from jaxtyping import Float
 from scipy.stats import chi2, norm
 
 from ..fitting import Fit, Problem, residuals
-from ._engine import added, Blocks, blocks_of, extended, off
+from ._engine import added, Blocks, blocks_of, extended, foretold, off
 from ._local_force import force_blocks, Response
-from ._search import FALSE_ALARMS
+from ._search import BEYOND, FALSE_ALARMS
 from ._shapes import Harmonics, Polynomial, Shape, shapes
 from ._term import Term, terms_of
 from ._vibration_scan import Periodogram
 
 
 _LAGS = 20
+# Stretches of each record, the worst of which does not count
+_STRETCHES = 4
 _POINTS = 48
 
 
@@ -28,6 +30,8 @@ class Structure:
 
     - `gain`: growth of twice the log-likelihood; `asked`: what chance and the number of
         parameters would demand.
+    - `foretold`: growth in half of the records with what the other half says, where
+        that was asked; negative for what differs from record to record.
     - `variable`, `grid`, `value`, `stderr` `(k,)`: the shape, where there is one.
     """
 
@@ -50,9 +54,11 @@ class Structure:
         default_factory=lambda: np.zeros(0)
     )
 
+    foretold: float = math.inf
+
     @property
     def significant(self) -> bool:
-        return self.gain > self.asked
+        return self.gain > self.asked and self.foretold > 0
 
     @property
     def place(self) -> str:
@@ -108,6 +114,7 @@ def structures(
                     asked,
                     len(own),
                     **shape,
+                    foretold=foretold(blocks, free, own) if grown > asked else math.inf,
                 )
             )
     made += [_vibration(scan, problem, tests), _coloured(found, tests)]
@@ -130,7 +137,9 @@ def _shape(term: Term, blocks: Blocks, information, score, free, own) -> dict:
 
 def _asked(count: int, samples: int, tests: int, looks: int = 1) -> float:
     chance = FALSE_ALARMS / tests / looks
-    return float(max(count * math.log(samples), chi2.isf(chance, count)))
+    least = max(count * math.log(samples), float(chi2.isf(chance, count)))
+    # as sure as a term that is named
+    return (math.sqrt(least) + BEYOND) ** 2
 
 
 def _function(term: Shape, coefficients, covariance, scale):
@@ -166,18 +175,25 @@ def _vibration(scan: Periodogram, problem: Problem, tests: int) -> Structure:
 
 
 def _coloured(found: Fit, tests: int) -> Structure:
-    """Whether residuals that are close in time are alike."""
-    total, count = 0.0, 0
+    """Whether residuals that are close in time are alike, not in one stretch alone."""
+    totals, counts, cost = [], [], 0.0
     for part in residuals(found):
         value = part.value / part.noise
-        for lag in range(1, _LAGS + 1):
-            same = (part.flight[lag:] == part.flight[:-lag]) & (
-                part.resting[lag:] == part.resting[:-lag]
-            )
-            products = (value[lag:] * value[:-lag])[same]
-            total += float(np.sum(products))
-            count += len(products)
-    score = total / math.sqrt(max(count, 1))
+        cost += float(np.sum(value**2))
+        for stretch in np.array_split(np.arange(len(value)), _STRETCHES):
+            total, count = 0.0, 0
+            for lag in range(1, _LAGS + 1):
+                a, b = stretch[lag:], stretch[:-lag]
+                same = (part.flight[a] == part.flight[b]) & (
+                    part.resting[a] == part.resting[b]
+                )
+                total += float(np.sum((value[a] * value[b])[same]))
+                count += int(np.sum(same))
+            totals.append(total)
+            counts.append(count)
+    worst = int(np.argmax(totals))
+    total, count = np.sum(totals) - totals[worst], np.sum(counts) - counts[worst]
+    score = float(total) / math.sqrt(max(int(count), 1))
     bic = math.log(found.problem.samples)
     # as the gain of one parameter, with the smoothness that states take out ignored
     return Structure(
@@ -185,8 +201,9 @@ def _coloured(found: Fit, tests: int) -> Structure:
         "a smooth motion of a form that no shape has",
         "flight",
         "in flight and at rest",
-        max(score, 0.0) ** 2,
-        max(float(norm.isf(FALSE_ALARMS / tests)) ** 2, bic),
+        # no motion gains more than what is left over
+        min(max(score, 0.0) ** 2, cost),
+        (math.sqrt(max(float(norm.isf(FALSE_ALARMS / tests)) ** 2, bic)) + BEYOND) ** 2,
         1,
     )
 

@@ -6,6 +6,7 @@ import equinox as eqx
 import jax.numpy as jnp
 
 from ._term import Motion, SensorTerm, strength, Term
+from ._with_terms import WithTerms
 
 
 # Speed (rad/s) within which dry friction changes sign, so that it can be integrated;
@@ -233,11 +234,18 @@ class SensorOffset(SensorTerm):
     offset: float = strength("rad", 1e-3)
 
 
-def library(turned: bool = True, center: float = 0.27) -> tuple[Term, ...]:
+def library(
+    turned: bool = True, center: float = 0.27, clocked: bool | None = None
+) -> tuple[Term, ...]:
     """All terms that `diagnose` tries by default.
 
-    **Arguments:** whether the system has a drive, without which no cam can be out of
-    round; and the position about which a nonlinear spring is symmetric.
+    **Arguments:**
+
+    - `turned`: whether the system has a drive, without which no cam can be out of
+        round.
+    - `center`: the position about which a nonlinear spring is symmetric.
+    - `clocked`: whether anything happens at a known time, such as by a drive (the
+        default) or a measured input. Otherwise a lag is another beginning of time.
     """
     found: list[Term] = [
         ViscousDamping(),
@@ -253,6 +261,13 @@ def library(turned: bool = True, center: float = 0.27) -> tuple[Term, ...]:
         SensorGain(),
         SensorOffset(),
     ]
+    if not (turned if clocked is None else clocked):
+        found = [term for term in found if not isinstance(term, SensorLag)]
     if turned:
         found += [CamProfileError(), SpeedDependentBounce()]
     return tuple(found)
+
+
+def saved_classes() -> tuple[type, ...]:
+    """Classes that a saved system with terms may name, for `load_system`."""
+    return (WithTerms, DriveRipple, *(type(term) for term in library()))

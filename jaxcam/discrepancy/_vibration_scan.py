@@ -20,8 +20,8 @@ from ._local_force import Response
 
 # Frequencies a resolution cell (one over the length of a record)
 _FINE = 4
-# Periods in a record at the lowest frequency
-_LEAST = 4.0
+#: periods in a record at the lowest frequency
+LEAST = 4.0
 # Samples a period, and steps of the flights a period, at the highest frequency
 _SAMPLES, _STEPS = 20.0, 2.5
 
@@ -92,7 +92,7 @@ def _frequencies(problem: Problem) -> Float[np.ndarray, " k"]:
     exists = np.asarray(problem.pieces.exists)
     step = float(np.max(np.asarray(problem.pieces.flown.step)[exists]))
     top = min(1 / (_SAMPLES * interval), 1 / (_STEPS * step))
-    return np.arange(_LEAST / length, top, 1 / (_FINE * length))
+    return np.arange(LEAST / length, top, 1 / (_FINE * length))
 
 
 class _Sums:

@@ -36,6 +36,11 @@ class WithTerms(HybridSystem):
     def period(self):
         return self.base.period
 
+    @property
+    def speed(self):
+        """Of the drive (rad/s), where the base has one."""
+        return self.base.speed  # pyright: ignore
+
     def prepared(self) -> "WithTerms":
         return eqx.tree_at(lambda s: s.base, self, self.base.prepared())
 

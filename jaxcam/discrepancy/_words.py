@@ -3,6 +3,10 @@
 from ._search import Trial
 
 
+# Unseen rms, in units of the noise, up to which a model is as good as the sensors
+_NOISE = 1.2
+
+
 def listed(names) -> str:
     names = [str(name).replace("_", " ") for name in names]
     if not names:
@@ -18,9 +22,17 @@ def number(value: float, stderr: float, unit: str) -> str:
 
 
 def summary_of(
-    verdict, effects, unexplained, best: Trial, before: Trial, rig, least, units
+    verdict,
+    effects,
+    unexplained,
+    best: Trial,
+    before: Trial,
+    rig,
+    least,
+    units,
+    unseen: float,
 ) -> str:
-    """One or two sentences."""
+    """One or two sentences; `unseen` is the rms on unseen records, of the noise."""
     if verdict == "none":
         first = next(iter(least.items()), None)
         tail = ""
@@ -28,6 +40,12 @@ def summary_of(
             name, (size, _, _) = first
             unit = "" if units[name] == "-" else f" {units[name]}"
             tail = f" A {name} of {size:.2g}{unit} would have been seen."
+        if unseen > _NOISE:
+            return (
+                "Nothing that the records share is missing. They are not explained "
+                "down to the noise of the sensors, though: what is left is "
+                f"{unseen:.2g} times that, and differs from record to record.{tail}"
+            )
         return (
             "Nothing is missing: with its parameters fitted within their tolerances "
             f"the model explains all records down to the noise of the sensors.{tail}"

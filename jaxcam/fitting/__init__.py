@@ -28,6 +28,7 @@ from ._impact_orbit import (
 from ._implicit import implicit_root as implicit_root
 from ._model import (
     cam_follower_drive as cam_follower_drive,
+    Input as Input,
     Model as Model,
     Sensor as Sensor,
     Turning as Turning,

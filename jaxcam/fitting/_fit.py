@@ -13,7 +13,7 @@ from ._eliminate import eliminate, step_of
 from ._linearise import assemble, Blocks, Costs, Point
 from ._model import Model
 from ._parameter import Parameter
-from ._problem import Problem, Weights, width_of
+from ._problem import loosened, Problem, Weights, width_of
 
 
 _ITERATIONS = 60
@@ -21,6 +21,8 @@ _ITERATIONS = 60
 _PROMISE = 1e-3
 # Steps that may follow before the first one is judged
 _CORRECTIONS = 3
+# A flight of more pieces than this is not foretold from its start at once
+_LONG = 16
 # in units of the parameters' scales, over which a model may bend
 _FIRST_DAMPING, _LEAST_DAMPING, _MOST_DAMPING = 1.0, 1e-6, 1e12
 
@@ -165,6 +167,19 @@ def fit(
     point = start_point(problem, start)
     point = _inside(problem, columns, point)
     extras = problem.weighted(weights)
+    if problem.longest_flight > _LONG and point.states is problem.start.states:
+        loose = loosened(extras)
+        most = max(iterations, _ITERATIONS)
+        point = _descend(problem, columns, loose, point, prior, most, None)[0]
+    found = _descend(problem, columns, extras, point, prior, iterations, progress)
+    point, blocks, costs, cost, converged, count, message = found
+    return finish(
+        problem, columns, point, blocks, costs, cost, prior, converged, count, message
+    )
+
+
+def _descend(problem, columns, extras, point, prior, iterations, progress):
+    """Damped scoring from a point to an optimum near it."""
     local, scales = jnp.asarray(columns.local), jnp.asarray(columns.scales)
 
     def linearise(point):
@@ -214,9 +229,7 @@ def fit(
             f"The optimum was not reached in {iterations} iterations; allow more of "
             f"them, or start closer."
         )
-    return finish(
-        problem, columns, point, blocks, costs, cost, prior, converged, count, message
-    )
+    return point, blocks, costs, cost, converged, count, message
 
 
 def finish(

@@ -96,7 +96,7 @@ class Turning(eqx.Module):
 
 
 class Input(eqx.Module):
-    """An input that was measured, such as a force or a voltage: where a system keeps it.
+    """An input that was measured, as a force or a voltage: where a system keeps it.
 
     While a recording is predicted, the system has the value that its own recording had,
     each sample held until the next one, as digital controllers do; over a step of the

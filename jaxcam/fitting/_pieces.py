@@ -234,7 +234,7 @@ def _drive(segments, times):
 
 
 def _input(segments, channel: str, times):
-    """Each record's input at some times, held since the sample before, of that shape."""
+    """Each record's input at some times, held since the last sample, in their shape."""
     found = np.zeros(times.shape)
     for row, part in enumerate(segments):
         time = part.recording.time

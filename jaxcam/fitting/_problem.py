@@ -139,7 +139,7 @@ class Problem:
         nominal = np.array([float(p.where(model)) for p in parameters])
         values = np.tile(nominal, (len(segments), 1))
         measured = model.drive.channel if isinstance(model.drive, Input) else None
-        steps, extras = _STEPS, None
+        steps, first, extras = _STEPS, _STEPS, None
         while True:
             pieces, cuts = gather(segments, tuple(model.sensors), steps, measured)
             if steps < _MOST_STEPS and not _follows(model, segments, pieces):
@@ -182,6 +182,13 @@ class Problem:
         """Number of samples of all channels that are fitted."""
         known = self.pieces.flown.known, self.pieces.rested.known
         return int(sum(jnp.sum(part) for part in known))
+
+    @property
+    def longest_flight(self) -> int:
+        """Number of pieces of the flight that has most of them."""
+        pieces = (np.array([span.flight for span in side]) for side, _ in self.spans)
+        counts = (np.unique(part, return_counts=True)[1] for part in pieces)
+        return max(int(np.max(count, initial=0)) for count in counts)
 
     def parameter(self, name: str) -> Parameter:
         """**Raises:** `ValueError` that lists the names there are."""
@@ -364,6 +371,19 @@ def _extras(layout: Layout, pieces: Pieces, point: Point, guess) -> Extras:
     gap = jnp.sqrt(jnp.sum(slope**2 * known, axis=-1) + by_drive[..., -1] ** 2)
     impact = jnp.sqrt(known + by_drive[..., :-1] ** 2)
     return extras._replace(sharpness=Sharpness(flight, impact, gap))
+
+
+def loosened(extras: Extras) -> Extras:
+    """Joints within flights that give as much as the samples of a piece allow.
+
+    States that the data suggest do not join. Where a flight has many pieces, to close
+    them all at once would be to foretell the last one from the first, with parameters
+    that are not yet known.
+    """
+    sharpness = extras.sharpness
+    return extras._replace(
+        sharpness=sharpness._replace(flight=sharpness.flight / _JOINT)
+    )
 
 
 def _variances(ss, before):

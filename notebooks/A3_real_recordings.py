@@ -1,0 +1,455 @@
+# ---
+# jupyter:
+#   jupytext:
+#     text_representation:
+#       extension: .py
+#       format_name: light
+# ---
+
+# # A3. What do textbook models lack? Five public recordings
+#
+# A pendulum, falling balls, a marble that bounces on paper, a positioning stage, and a
+# head that places components. Each has a textbook model of a few lines; `diagnose` is
+# asked what it lacks. Nothing is set differently from one to the next: every model
+# states its parameters, its sensor and how noisy that is, and the library is the same.
+#
+# The recordings are public and no part of the package:
+#
+# - `pendulum`: github.com/dynamicslab/MultiArm-Pendulum (MIT), arXiv:2205.06231;
+# - `ball_drop`: github.com/briandesilva/discovery-of-physics-from-data (MIT);
+# - `bouncing_marble`: tracks of a student project (XS06), without a licence;
+# - `positioning_stage`: the EMPS benchmark, www.nonlinearbenchmark.org;
+# - `mounting_head`: Juloski, Heemels, Ferrari-Trecate 2004, without a licence.
+#
+# The environment variable `JAXCAM_RECORDINGS` names the folder in which a folder `real`
+# holds these five; without it this notebook says so and stops.
+
+# +
+import dataclasses
+import os
+import sys
+import time
+from pathlib import Path
+
+import jax.numpy as jnp
+import matplotlib.pyplot as plt
+import numpy as np
+
+import jaxcam
+from jaxcam.discrepancy import diagnose, Diagnosis, library
+from jaxcam.fitting import fit, held_out_cost, Input, Parameter, Sensor
+from jaxcam.recordings import read_case, Recording, segment
+
+
+# ten minutes of work: not without being asked
+folder = Path(os.environ.get("JAXCAM_RECORDINGS", ".")) / "real"
+if not folder.is_dir():
+    print(
+        "Skipped: get the sets from where this notebook says, and name the folder that "
+        "holds `real` in JAXCAM_RECORDINGS."
+    )
+    sys.exit()
+
+found: dict[str, Diagnosis] = {}
+moved: dict[str, tuple[float, float]] = {}
+
+
+def terms(*without: str, **options):
+    """The library, without what the textbook model has or what cannot be there.
+
+    No two of these records were started by one clock, so that a vibration could not
+    have the same phase in both.
+    """
+    every = library(turned=False, **options)
+    return [t for t in every if t.name not in ("external_vibration", *without)]
+
+
+def transferred(result: Diagnosis) -> tuple[float, float]:
+    """Rms of the last record, as the others foretell it, without and with terms."""
+    rms = []
+    for trial in (result.before, result.after):
+        problem = trial.problem
+        *seen, unseen = problem.records
+        known = fit(problem, free=trial.free, start=trial, weights=problem.only(seen))
+        weights = problem.only([unseen])
+        samples = np.asarray(problem.pieces.flown.known)[len(seen)].sum()
+        cost = held_out_cost(problem, known, weights)
+        rms.append(float(np.sqrt(cost / samples)) * result.noise_floor)
+    return rms[0], rms[1]
+
+
+def ask(case: str, system, runs, **options) -> None:
+    """Diagnose one set, and say what was found."""
+    began, used = time.time(), time.process_time()
+    result = diagnose(system, runs, case=case, **options)
+    found[case] = result
+    moved[case] = transferred(result) if len(runs) > 1 else (np.nan, np.nan)
+    print(f"{case}: {result.verdict}. {result.summary}")
+    for name, one in result.rig.items():
+        print(f"    {name} = {one.value:.5g} +- {one.stderr:.2g}")
+    print(f"    rather than {result.alternatives[:3]}")
+    for effect in result.effects:
+        print(
+            f"    {effect.name}: BIC {effect.delta_bic:.0f}, inclusion "
+            f"{effect.inclusion:.2f}, seen in {', '.join(effect.records) or 'none'}"
+        )
+    print(
+        f"    unseen halves {result.heldout_before:.3g} -> {result.heldout_after:.3g}, "
+        f"last record {moved[case][0]:.3g} -> {moved[case][1]:.3g}, "
+        f"noise {result.noise_floor:.3g}"
+    )
+    left = [one for one in result.left_after if one.significant][:2]
+    for one in left:
+        print(f"    left over: {one.sentence}, {one.place}")
+    print(
+        f"    {time.time() - began:.0f} s, {time.process_time() - used:.0f} s of CPU",
+        flush=True,
+    )
+
+
+# -
+
+# ## A pendulum
+#
+# Two swings, from 93 degrees and from 4; it hangs at pi. The encoder has 40000 counts a
+# turn. Ten milliseconds are a seventieth of a swing, and at a thousand samples a second
+# the rounding of neighbours is the same, so every tenth sample is kept. The small swing
+# is followed until it sticks.
+
+
+# +
+class Pendulum(jaxcam.HybridSystem):
+    """A rigid pendulum with a viscous hinge: angle from hanging (rad), and its rate."""
+
+    stiffness: float = 60.0
+    damping: float = 0.05
+
+    def vector_field(self, t, state):
+        angle, rate = state
+        pull = self.stiffness * jnp.sin(angle) + self.damping * rate
+        return jnp.stack([rate, -pull])
+
+    def gap(self, t, state):
+        return state[0] + 100.0  # far from any stop
+
+    def impact(self, t, state):
+        return state
+
+
+count = 2 * np.pi / 40000
+swings = []
+for run in read_case(folder / "pendulum", channels=("angle_rad",)):
+    angle, clock = run["angle_rad"][::10], run.time[::10] - run.time[0]
+    moving = np.flatnonzero(np.abs(angle - angle[-1]) > 2 * count)[-1] + 1
+    part = Recording(run.name, clock[:moving], {"angle_rad": angle[:moving]})
+    swings.append(segment(part, "angle_rad", noise=count / np.sqrt(12)))
+
+#
+ask(
+    "pendulum",
+    Pendulum(),
+    swings,
+    # the model has them already
+    candidates=terms("viscous_damping", "sensor_offset", center=0.0),
+    sensors={"angle_rad": Sensor(0, noise=count / np.sqrt(12), offset=np.pi)},
+    parameters=[
+        Parameter("stiffness", lambda m: m.system.stiffness, scale=0.1, lower=0.0),
+        Parameter("damping", lambda m: m.system.damping, scale=0.01, lower=0.0),
+        Parameter("zero", lambda m: m.sensors["angle_rad"].offset, tolerance=0.01),
+    ],
+)
+# -
+
+# ## Falling balls
+#
+# Five balls, each dropped twice from a bridge and filmed at 15 Hz. Gravity is what it
+# is: the model has no parameter at all. A film has no data sheet, so the noise is the
+# scatter about a smooth curve (degree 5) through each drop, the same for all balls. The
+# hand is in the first samples: a record begins where the ball has fallen a tenth of its
+# way. In the air nothing rubs, and there is no spring and no hinge.
+
+
+# +
+class FallingBody(jaxcam.HybridSystem):
+    """Free fall: height (m) and velocity (m/s)."""
+
+    gravity: float = 9.81
+
+    def vector_field(self, t, state):
+        return jnp.stack([state[1], -self.gravity])
+
+    def gap(self, t, state):
+        return state[0]
+
+    def impact(self, t, state):
+        return state
+
+
+def scatter(time, samples, degree: int) -> float:
+    """Standard deviation about a polynomial."""
+    smooth = np.polynomial.Polynomial.fit(time, samples, degree)
+    freedom = len(time) - degree - 1
+    return float(np.sqrt(np.sum((samples - smooth(time)) ** 2) / freedom))
+
+
+def falling(run: Recording) -> Recording:
+    """The record from where a tenth of the way down is behind it."""
+    height = run["height_m"]
+    first = np.argmax(height < height[0] - 0.1 * np.ptp(height))
+    clock = run.time[first:] - run.time[first]
+    return Recording(run.name, clock, {"height_m": height[first:]})
+
+
+solid = (
+    "coulomb_friction",
+    "stribeck_friction",
+    "asymmetric_friction",
+    "nonlinear_spring",
+    "gravity_imbalance",
+)
+case = read_case(folder / "ball_drop", channels=("height_m",), split="drop")
+drops = [falling(run) for run in case]
+noise = float(np.sqrt(np.mean([scatter(r.time, r["height_m"], 5) ** 2 for r in drops])))
+for ball in sorted({run.name.rsplit("_drop", 1)[0] for run in drops}):
+    both = [run for run in drops if run.name.startswith(ball)]
+    ask(
+        ball,
+        FallingBody(),
+        [segment(run, "height_m", noise=noise) for run in both],
+        candidates=terms(*solid),
+        sensors={"height_m": Sensor(0, noise=noise)},
+    )
+# -
+
+# ## A marble on paper
+#
+# A glass marble falls on stacks of 1 to 100 sheets and is tracked at 200 frames a
+# second; a pixel is 0.799 mm, known to a few per cent from the fall, and a centre to a
+# quarter of a pixel. Tracks are followed from frame to frame; a drop in which the track
+# is lost on the way is left out. The hand is in the first arc, which again begins where
+# a tenth of the way is behind it. The last arc, in which bounces are too low to be told
+# apart, and the rest after it are left out.
+
+
+# +
+class Bouncing(jaxcam.HybridSystem):
+    """A ball above a floor: height (m) and velocity (m/s); constant restitution."""
+
+    coefficient: float = 0.5
+    gravity: float = 9.81
+
+    def vector_field(self, t, state):
+        return jnp.stack([state[1], -self.gravity])
+
+    def gap(self, t, state):
+        return state[0]
+
+    def impact(self, t, state):
+        return jnp.stack([state[0], -self.coefficient * state[1]])
+
+
+pixel = 0.799e-3
+
+
+def tracked(file: Path):
+    """Times (s) and heights (pixels, downwards) of the object seen first."""
+    frames: list[float] = []
+    points: list[np.ndarray] = []
+    for line in file.read_text().splitlines()[2:]:
+        if not line[:1].isdigit():
+            break  # a summary follows the tracks
+        frame, *numbers = (float(x) for x in line.split() if x != "*")
+        pairs = np.reshape(numbers[: len(numbers) // 2 * 2], (-1, 2))
+        if not len(pairs):
+            continue
+        near = 0
+        if points:
+            ahead = 2 * points[-1] - points[-2] if len(points) > 1 else points[-1]
+            away = np.hypot(*(pairs - ahead).T)
+            near = int(np.argmin(away))
+            if away[near] > 60:
+                continue
+        frames.append(frame)
+        points.append(pairs[near])
+    return np.array(frames) / 200, np.array(points)[:, 1]
+
+
+def drop(file: Path) -> Recording:
+    """Heights above the stack (m), from the hand to the rest."""
+    clock, down = tracked(file)
+    low = down > np.mean([down.min(), down.max()])
+    still = [k for k in np.flatnonzero(low) if np.ptp(down[k : k + 20]) < 4]
+    level = np.median(down[still[0] : still[0] + 20])
+    first = np.argmax(down > down[0] + (level - down[0]) / 10)
+    part = slice(first, still[0] + 20)
+    height = (level - down[part]) * pixel
+    return Recording(file.stem, clock[part] - clock[first], {"height_m": height})
+
+
+def arcs(run: Recording):
+    """The arcs of one drop, cut at its impacts."""
+    cut = segment(run, "height_m", np.zeros(len(run)), noise=pixel / 4)
+    flights = tuple(part for part in cut.flights if part.stop.kind == "impact")
+    return dataclasses.replace(cut, flights=flights, contacts=())
+
+
+for sheets in ("001", "008", "016", "100"):
+    files = sorted((folder / "bouncing_marble").glob(f"sheets{sheets}_*.tsv"))
+    whole = [run for run in map(drop, files) if np.diff(run.time).max() < 1.5 / 200]
+    ask(
+        f"marble on {int(sheets)}",
+        Bouncing(),
+        [arcs(run) for run in whole],
+        candidates=terms("sensor_offset", *solid),
+        sensors={"height_m": Sensor(0, noise=pixel / 4)},
+        parameters=[
+            Parameter("restitution", lambda m: m.system.coefficient, scale=0.01),
+            Parameter("gravity", lambda m: m.system.gravity, tolerance=0.5),
+            # the marble rolls a little on the stack, towards the camera or away
+            Parameter(
+                "level",
+                lambda m: m.sensors["height_m"].offset,
+                tolerance=0.005,
+                per_record=True,
+            ),
+        ],
+    )
+# -
+
+# ## A positioning stage
+#
+# A motor moves a load by a screw: force in, position out (the EMPS benchmark). The
+# measured force is an input of the system, which holds each sample until the next. Four
+# samples are made one: of the position the first, of the force the mean, so that no
+# impulse is lost.
+
+
+# +
+class Stage(jaxcam.HybridSystem):
+    """A mass with viscous friction: position (m) and velocity (m/s)."""
+
+    inverse_mass: float = 0.0105
+    viscous: float = 2.0
+    offset: float = 0.0
+    force: float = 0.0
+
+    def vector_field(self, t, state):
+        pushed = self.inverse_mass * self.force - self.offset
+        return jnp.stack([state[1], pushed - self.viscous * state[1]])
+
+    def gap(self, t, state):
+        return state[0] + 100.0
+
+    def impact(self, t, state):
+        return state
+
+
+def slower(run: Recording, channel: str, by: str, count: int, part=slice(None)):
+    """Every so many samples of a channel, and the mean of its input in between."""
+    size = len(run) // count * count
+    clock = run.time[:size:count][part]
+    channels = {
+        channel: run[channel][:size:count][part],
+        by: run[by][:size].reshape(-1, count).mean(axis=1)[part],
+    }
+    name = run.name if part == slice(None) else f"{run.name}_{part.start}"
+    return Recording(name, clock - clock[0], channels)
+
+
+case = read_case(folder / "positioning_stage", channels=("position_m",))
+encoder = 5e-8  # its smallest step (m)
+ask(
+    "positioning stage",
+    Stage(),
+    [
+        segment(
+            slower(run, "position_m", "motor_force_N", 4), "position_m", noise=encoder
+        )
+        for run in case
+    ],
+    candidates=terms("viscous_damping", center=0.125, clocked=True),
+    sensors={"position_m": Sensor(0, noise=encoder)},
+    parameters=[
+        Parameter("1/mass", lambda m: m.system.inverse_mass, scale=1e-4, lower=0.0),
+        Parameter("viscous", lambda m: m.system.viscous, scale=0.05, lower=0.0),
+        Parameter("offset", lambda m: m.system.offset, scale=0.01),
+    ],
+    drive=Input("motor_force_N", lambda system: system.force),
+)
+# -
+
+# ## A mounting head
+#
+# A head that places components on a board, pushed by a motor: voltage in, position out.
+# It is on a spring; somewhere it touches the board. There is one record: its halves are
+# two.
+
+
+# +
+class Head(jaxcam.HybridSystem):
+    """Mass, spring and damper, pushed by a motor: position (m) and velocity (m/s)."""
+
+    gain: float = 100.0
+    stiffness: float = 650.0
+    damping: float = 13.0
+    offset: float = 0.0
+    voltage: float = 0.0
+
+    def vector_field(self, t, state):
+        pushed = -self.gain * self.voltage - self.offset
+        pulled = self.stiffness * state[0] + self.damping * state[1]
+        return jnp.stack([state[1], pushed - pulled])
+
+    def gap(self, t, state):
+        return state[0] + 100.0
+
+    def impact(self, t, state):
+        return state
+
+
+(run,) = read_case(folder / "mounting_head", channels=("position_m",))
+halves = (slice(0, 1875), slice(1875, 3750))
+ask(
+    "mounting head",
+    Head(),
+    [
+        segment(
+            slower(run, "position_m", "voltage_V", 8, half), "position_m", noise=5e-6
+        )
+        for half in halves
+    ],
+    candidates=terms("viscous_damping", center=0.0125, clocked=True),
+    sensors={"position_m": Sensor(0, noise=5e-6)},
+    parameters=[
+        Parameter("gain", lambda m: m.system.gain, scale=1.0, lower=0.0),
+        Parameter("stiffness", lambda m: m.system.stiffness, scale=10.0, lower=0.0),
+        Parameter("damping", lambda m: m.system.damping, scale=0.3, lower=0.0),
+        Parameter("offset", lambda m: m.system.offset, scale=0.1),
+    ],
+    drive=Input("voltage_V", lambda system: system.voltage),
+)
+# -
+
+# ## All of them
+#
+# Residuals on data that no parameter has seen, in units of the noise: with the textbook
+# model (open) and with what it lacks (filled).
+
+# +
+figure, axes = plt.subplots(figsize=(10, 4), layout="constrained")
+for row, result in enumerate(found.values()):
+    before = result.heldout_before / result.noise_floor
+    after = result.heldout_after / result.noise_floor
+    axes.plot([before, after], [row, row], color="0.8", zorder=1)
+    axes.plot(before, row, "o", color="C0", fillstyle="none")
+    axes.plot(after, row, "o", color="C0")
+    names = ", ".join(name.replace("_", " ") for name in result.names) or "nothing"
+    axes.text(1.02, row, names, transform=axes.get_yaxis_transform(), va="center")
+axes.axvline(1.0, color="0.5", linewidth=0.8)
+axes.set_yticks(range(len(found)), list(found))
+axes.set_xscale("log")
+axes.set_xlabel("residual on unseen data (times the noise)")
+axes.invert_yaxis()
+if __name__ == "__main__":
+    plt.show()
+# -
