@@ -89,7 +89,7 @@ def _maps(plt, found: Diagnosis):
     records = [part.record for part in found.unseen[0]]
     end = float(norm.isf(0.005 / (_BINS * len(records) * 2)))
     image = None
-    for column, parts in zip(axes.T, found.unseen):
+    for column, parts, which in zip(axes.T, found.unseen, ("before", "after")):
         for axis, resting in zip(column, (False, True)):
             rows = [_binned(part, resting) for part in parts]
             image = axis.imshow(
@@ -102,7 +102,7 @@ def _maps(plt, found: Diagnosis):
                 interpolation="nearest",
             )
             axis.set_yticks(range(len(rows)), [part.record for part in parts])
-            axis.set_title("contact" if resting else "flight")
+            axis.set_title(f"{'contact' if resting else 'flight'}, {which}")
             axis.grid(False)
     for axis in axes[-1]:
         axis.set_xlabel("cam angle in its turn (rad)")

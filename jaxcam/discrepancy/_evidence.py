@@ -71,6 +71,8 @@ def held_out(
                 break
         for name, a, b in zip(problem.records, *costs):
             gained[name] = gained.get(name, 0.0) + float(a - b) / 2
+    for parts in unseen_parts:
+        parts.sort(key=lambda part: problem.records.index(part.record))
     rms = np.sqrt(squares / np.maximum(counts, 1))
     return float(rms[0]), float(rms[1]), gained, unseen_parts
 
