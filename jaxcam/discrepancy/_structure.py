@@ -18,6 +18,7 @@ from ._term import Term, terms_of
 from ._vibration_scan import Periodogram
 
 
+_SHAPELESS = "coloured_residuals"
 _LAGS = 20
 # Stretches of each record, the worst of which does not count
 _STRETCHES = 4
@@ -118,7 +119,15 @@ def structures(
                 )
             )
     made += [_vibration(scan, problem, tests), _coloured(found, tests)]
-    return sorted(made, key=lambda one: one.gain - one.asked, reverse=True)
+    # a shape says more than that there is one
+    return sorted(
+        made,
+        key=lambda one: (
+            one.significant and one.name != _SHAPELESS,
+            one.gain - one.asked,
+        ),
+        reverse=True,
+    )
 
 
 def _shape(term: Term, blocks: Blocks, information, score, free, own) -> dict:
@@ -197,7 +206,7 @@ def _coloured(found: Fit, tests: int) -> Structure:
     bic = math.log(found.problem.samples)
     # as the gain of one parameter, with the smoothness that states take out ignored
     return Structure(
-        "coloured_residuals",
+        _SHAPELESS,
         "a smooth motion of a form that no shape has",
         "flight",
         "in flight and at rest",
