@@ -15,7 +15,6 @@ from jaxcam.data.make_demo import RealRig
 
 # A gap that opens from zero is not yet closed again by rounding errors (rad)
 _ROUNDING = 1e-13
-_WANDER = ((0.7, 0.31), (0.3, 0.87))
 
 
 @dataclasses.dataclass(frozen=True)

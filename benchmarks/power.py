@@ -23,12 +23,11 @@ import numpy as np
 
 import jaxcam  # noqa: F401  64-bit floats
 from jaxcam.data import DEMO_RIG
-from jaxcam.data.make_demo import measure
 from jaxcam.discrepancy import diagnose
 from jaxcam.recordings import read_rig, Recording
 
 from ._numba_rig import Hidden, simulate
-from .coverage import random_rig
+from .coverage import random_rig, recording
 
 
 DURATION, SETTLE = 2.0, 8.0
@@ -59,19 +58,7 @@ def case(nominal, hidden: Hidden, rng) -> tuple[Recording, ...]:
     for number, span in enumerate(SPANS_RPM, start=1):
         speed = rng.uniform(*span) * math.pi / 30
         truth = simulate(real, hidden, speed, DURATION, SETTLE)
-        turned = truth.turned - 2 * np.pi * np.floor(truth.turned[0] / (2 * np.pi))
-        channels = {
-            "cam_angle_rad": measure(
-                turned, sensors.cam_noise, sensors.cam_counts_per_turn, rng
-            ),
-            "follower_angle_rad": measure(
-                truth.angle,
-                sensors.follower_noise,
-                sensors.follower_counts_per_turn,
-                rng,
-            ),
-        }
-        runs.append(Recording(f"run{number}", truth.time, channels))
+        runs.append(recording(truth, sensors, f"run{number}", rng))
     return tuple(runs)
 
 

@@ -186,7 +186,7 @@ def test_both_ways_over_a_hundred_impacts_and_in_all_variables():
     omega, r, wall = 2.8, 0.8, -0.2
     speed, phase, _ = max(closed_form(omega, r, wall, 1))
     system = impact_oscillator(omega=omega, restitution=r, wall=wall)
-    where = lambda s: (s.omega, s.wall, s.restitution, s.damping)  # noqa: E731
+    where = lambda s: (s.omega, s.wall, s.restitution, s.damping)
     for turns in (1, 100):
         orbit = variational.orbit_of(
             system,
@@ -216,7 +216,7 @@ def test_both_ways_over_a_hundred_impacts_and_in_all_variables():
 def test_a_sticking_orbit_has_forgotten_where_it_came_from():
     system = CamFollower(speed=rpm_to_rad_s(140.0))
     period = float(system.period)
-    where = lambda s: s.stiffness  # noqa: E731
+    where = lambda s: s.stiffness
     orbit = variational.orbit_of(system, settled_state(system), period, 0.0)
     kinds = [e.kind for e in orbit.signature]
     assert kinds[-2:] == ["stick", "release"] and orbit.sticks

@@ -60,7 +60,6 @@ class Search:
         self.problem, self.rig, self.terms = problem, tuple(rig), tuple(terms)
         self.progress = progress
         self.trials: dict[frozenset[str], Trial] = {}
-        self.failed: set[frozenset[str]] = set()
         self.scans: dict[frozenset[str], Periodogram] = {}
         self.responses: dict[frozenset[str], Response] = {}
         self.linear: dict[frozenset[str], Blocks] = {}
@@ -269,7 +268,6 @@ class Search:
             again = fit(self.problem, free=free, start=place, iterations=iterations)
             found = min(found, again, key=_cost)
         if not math.isfinite(found.cost):
-            self.failed.add(names)
             return None
         count = self.count(names)
         bic = found.cost + count * math.log(self.problem.samples)
