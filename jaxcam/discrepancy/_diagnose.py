@@ -22,7 +22,7 @@ from ..recordings._check import check_channels, check_drive
 from ._diagnosis import Diagnosis, Effect, Value
 from ._drive import Ripple, ripple_of
 from ._engine import value_of
-from ._evidence import held_out, limits, sure
+from ._evidence import held_out, limits, redrawn, sure
 from ._search import FALSE_ALARMS, Search, Trial
 from ._structure import Structure, structures
 from ._term import Term, terms_of
@@ -85,25 +85,23 @@ def diagnose(
     search = Search(problem, rig, terms, report)
     best = search.run()
     report("redrawing stretches of the records", None)
-    best, inclusion, deviation, doubtful = sure(search, best, seed)
+    found = best
+    best, inclusion, deviation, doubtful = sure(search, found, seed)
     before = search.trials[frozenset()]
     report("looking at what is left over", None)
-    left_before = structures(
-        before.fit,
-        search.response(frozenset()),
-        unlisted,
-        search.scan(frozenset()),
-        turned,
-    )
-    left_after = left_before
-    if best.names:
-        left_after = structures(
-            best.fit,
-            search.response(best.names),
-            unlisted,
-            search.scan(best.names),
-            turned,
-        )
+
+    def left(trial: Trial) -> list[Structure]:
+        response, scan = search.response(trial.names), search.scan(trial.names)
+        return structures(trial.fit, response, unlisted, scan, turned)
+
+    left_before = left(before)
+    left_after = left(best) if best.names else left_before
+    if doubtful and any(one.significant for one in left_after):
+        # that something is there is sure; what explains all of it is what it is
+        with_all = left(found)
+        if not any(one.significant for one in with_all):
+            best, left_after, doubtful = found, with_all, []
+            inclusion, deviation = redrawn(search, best, seed)
     rms_before, rms_after, gained, unseen = held_out(search, before, best, report)
     effects = [
         _effect(search, best, before, name, inclusion, deviation, gained)

@@ -5,10 +5,11 @@ import math
 from collections.abc import Callable
 
 import numpy as np
+from scipy.stats import chi2
 
 from ..fitting import Fit, fit, Problem, Residuals, residuals
 from ._engine import Blocks, blocks_of, gain, off, with_states
-from ._search import BEYOND, Search, SURE, Trial, values_of
+from ._search import BEYOND, FALSE_ALARMS, Search, SURE, Trial, values_of
 
 
 # Stretches of a record, and pieces in each of them at least
@@ -116,11 +117,23 @@ def sure(
     doubtful: list[tuple[str, float]] = []
     while True:
         inclusion, deviation = redrawn(search, best, seed)
-        least = min(inclusion, key=inclusion.__getitem__, default=None)
-        if least is None or inclusion[least] >= SURE:
+        vague = {name for name in inclusion if _vague(search, best, name, deviation)}
+        least = min(
+            inclusion, key=lambda n: (n not in vague, inclusion[n]), default=None
+        )
+        if least is None or (least not in vague and inclusion[least] >= SURE):
             return best, inclusion, deviation, doubtful
         doubtful.append((least, inclusion[least]))
         best = search.without(best, least)
+
+
+def _vague(search: Search, best: Trial, name: str, deviation) -> bool:
+    """Whether the strengths of a term could be zero by what redrawing does to them."""
+    own = [one.name for one in search.term(name).strengths() if not one.inner]
+    found = [best.fit[one] for one in own]
+    errors = [max(one.stderr, deviation[one.name]) for one in found]
+    size = sum((one.value / error) ** 2 for one, error in zip(found, errors))
+    return size < chi2.isf(FALSE_ALARMS, len(own))
 
 
 def redrawn(

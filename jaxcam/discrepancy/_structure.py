@@ -172,6 +172,11 @@ def _function(term: Shape, coefficients, covariance, scale):
 def _vibration(scan: Periodogram, problem: Problem, tests: int) -> Structure:
     frequency, grown = scan.best_separate
     count = 2 * scan.records + 1
+    seen = math.inf
+    if scan.records > 1:
+        # a frequency that one record suggests must be seen in the others
+        chance = chi2.isf(FALSE_ALARMS, 2 * (scan.records - 1))
+        seen = scan.elsewhere - float(chance)
     return Structure(
         "resonance",
         f"a force at {frequency:.4g} Hz with a phase of its own in each record",
@@ -180,6 +185,7 @@ def _vibration(scan: Periodogram, problem: Problem, tests: int) -> Structure:
         grown,
         _asked(count, problem.samples, tests, scan.cells),
         count,
+        foretold=seen,
     )
 
 

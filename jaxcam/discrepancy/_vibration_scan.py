@@ -31,13 +31,16 @@ class Periodogram:
     """Growth of twice the log-likelihood at each `frequency` (Hz), shape `(k,)`.
 
     `gain` with one phase for all records, `separate` with a phase for each record.
-    `records` is their number, `cells` that of frequencies that can be told apart.
+    `records` is their number, `cells` that of frequencies that can be told apart;
+    `elsewhere` is what the highest separate peak gains without the record that it gains
+    most in.
     """
 
     frequency: Float[np.ndarray, " k"]
     gain: Float[np.ndarray, " k"]
     separate: Float[np.ndarray, " k"]
     records: int
+    elsewhere: float = 0.0
 
     @property
     def best(self) -> tuple[float, float]:
@@ -83,7 +86,11 @@ def periodogram(problem: Problem, response: Response) -> Periodogram:
     whole = tuple(sum(part) for part in zip(*parts))
     gain = _gain(inside, score, [whole])
     separate = _gain(inside, score, parts)
-    return Periodogram(frequency, gain, separate, len(parts))
+    top = [int(np.argmax(separate))]
+    peak = [tuple(one[..., top] for one in part) for part in parts]
+    rest = [_gain(inside, score, peak[:r] + peak[r + 1 :])[0] for r in range(len(peak))]
+    elsewhere = min(rest) if len(peak) > 1 else 0.0
+    return Periodogram(frequency, gain, separate, len(parts), float(elsewhere))
 
 
 def _frequencies(problem: Problem) -> Float[np.ndarray, " k"]:

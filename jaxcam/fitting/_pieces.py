@@ -109,9 +109,7 @@ def spans(segments: Segments) -> tuple[list[Span], list[Span]]:
         before = flight.stop
     rested = []
     for number, contact in enumerate(segments.contacts):
-        rows = np.flatnonzero(
-            (time >= contact.settled) & (time < contact.stop.time) & valid
-        )
+        rows = np.flatnonzero(segments.resting(contact) & valid)
         for block in np.array_split(rows, max(1, -(-len(rows) // _PIECE))):
             if len(block):
                 a, b = float(time[block[0]]), float(time[block[-1]])

@@ -8,6 +8,7 @@ from jaxtyping import Float
 
 from ._cut import cut, Motion
 from ._drive import Drive, read_drive
+from ._hidden_hops import may_hop, sure_contact
 from ._polynomial import measured_noise
 from ._recording import Recording
 from ._rig import Rig
@@ -110,11 +111,14 @@ def _segment_rig(recording, rig: Rig, drive: Drive, surface: Surface, channel):
     )
     turned = np.interp(found.impacts.time, recording.time, drive.angle)
     error = surface.slope_stderr(turned) * drive.speed
+    releases = [c.stop.time for c in found.contacts if c.stop.kind == "release"]
+    seen = np.searchsorted(recording.time, releases)
     return dataclasses.replace(
         found,
         clock=drive.clock,
         drive=drive,
         surface=surface,
+        sure=sure_contact(may_hop(rig, drive), seen),
         impacts=dataclasses.replace(found.impacts, turned=turned, surface_stderr=error),
     )
 

@@ -3,7 +3,7 @@
 import dataclasses
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from ._drive import Drive
 from ._recording import Recording
@@ -121,6 +121,7 @@ class Segments:
     - `clock`: time of the model at each sample (s): record time, or that of a drive
         at constant speed.
     - `drive`, `surface`: what the gap was computed with, for a cam-follower.
+    - `sure`: samples at which contact is no hidden hop, shape `(k,)`; `None`: all.
     """
 
     recording: Recording
@@ -133,6 +134,13 @@ class Segments:
     gap: Float[np.ndarray, " k"] | None = None
     drive: Drive | None = None
     surface: Surface | None = None
+    sure: Bool[np.ndarray, " k"] | None = None
+
+    def resting(self, contact: Contact) -> Bool[np.ndarray, " k"]:
+        """Samples at which the follower rests: settled, and beyond doubt."""
+        time = self.recording.time
+        rows = (time >= contact.settled) & (time < contact.stop.time)
+        return rows if self.sure is None else rows & self.sure
 
     def sentence(self) -> str:
         """What was found, in words."""

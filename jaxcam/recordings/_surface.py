@@ -16,6 +16,7 @@ from jaxtyping import Array, Float
 
 from ..models import EccentricCircle
 from ._drive import Drive, read_drive
+from ._hidden_hops import pressed
 from ._kinks import find_kinks
 from ._padding import padded
 from ._polynomial import crossing, fit_local
@@ -97,17 +98,18 @@ def fit_surface(
     """
     drives = drives or [read_drive(recording) for recording in recordings]
     noise = rig.sensors.follower_floor
+    sure = [pressed(rig, drive) for drive in drives]
     points = [
-        _impact_points(recording, drive, channel, noise)
-        for recording, drive in zip(recordings, drives)
+        _impact_points(recording, drive, channel, noise, rows)
+        for recording, drive, rows in zip(recordings, drives, sure)
     ]
     surface = _solve(
         nominal_surface(rig), rig, *(np.concatenate(p) for p in zip(*points))
     )
     for band in _BANDS:
         both = [
-            _with_contacts(surface, recording, drive, channel, band, noise, found)
-            for recording, drive, found in zip(recordings, drives, points)
+            _with_contacts(surface, recording, drive, channel, band, noise, *found)
+            for recording, drive, *found in zip(recordings, drives, points, sure)
         ]
         surface = _solve(surface, rig, *(np.concatenate(p) for p in zip(*both)))
     return surface
@@ -122,13 +124,13 @@ def refine_surface(surface: Surface, rig: Rig, segments: Sequence) -> Surface:
     turned, angle, error = [], [], []
     for part in segments:
         time, drive = part.recording.time, part.drive
-        impacts = part.impacts
+        impacts, sure = part.impacts, pressed(rig, drive)
         sharp = impacts.time_stderr < 2 * part.recording.interval
         turned.append(np.interp(impacts.time[sharp], time, drive.angle))
         angle.append(impacts.angle[sharp])
         error.append(impacts.angle_stderr[sharp])
         for contact in part.contacts:
-            rows = (time >= contact.settled) & (time < contact.stop.time)
+            rows = part.resting(contact) & sure
             turned.append(drive.angle[rows])
             angle.append(part.recording[part.channel][rows])
             error.append(np.full(rows.sum(), part.noise))
@@ -136,7 +138,7 @@ def refine_surface(surface: Surface, rig: Rig, segments: Sequence) -> Surface:
     return _solve(surface, rig, *joined)
 
 
-def _impact_points(recording, drive, channel, noise):
+def _impact_points(recording, drive, channel, noise, sure):
     """Cam angle, follower angle and its error at each jump in velocity."""
     time, samples = recording.time, recording[channel]
     interval = recording.interval
@@ -158,15 +160,16 @@ def _impact_points(recording, drive, channel, noise):
         error.append(before.value_stderr(moment) + after.value_stderr(moment))
     if len(kinks) == 0:
         # no impact in the whole record: either all contact, or nothing to learn
-        return drive.angle[::8], samples[::8], np.full(len(samples[::8]), 4 * noise)
+        rows = np.flatnonzero(sure)[::8]
+        return drive.angle[rows], samples[rows], np.full(len(rows), 4 * noise)
     return np.array(turned), np.array(angle), np.array(error)
 
 
-def _with_contacts(surface, recording, drive, channel, band, noise, impacts):
+def _with_contacts(surface, recording, drive, channel, band, noise, impacts, sure):
     """Impact points and every eighth sample of stretches inside the band."""
     gap = recording[channel] - surface.angle(drive.angle)
     shortest = max(4, round(0.008 / recording.interval))
-    inside = np.abs(gap) < band
+    inside = (np.abs(gap) < band) & sure
     keep = np.zeros(len(gap), dtype=bool)
     for start, stop in stretches(inside):
         if stop - start >= shortest:
