@@ -169,7 +169,7 @@ class SingularPoints(AbstractProblem):
                 if small and n >= 3:
                     names["pair"] = "fold-Neimark-Sacker"
         elif self.kind == FLIP:
-            if self.base.normal_forms:
+            if self.base.normal_forms and not self.base.dear:
                 names["degenerate"] = "generalized flip"
             names["double"] = "1:2 resonance"
             names["other"] = "fold-flip"

@@ -3,6 +3,7 @@
 from typing import Any
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 
@@ -13,15 +14,29 @@ from ._program import Corrected
 from ._test_functions import FLIP, FOLD, HOPF, NEIMARK_SACKER
 
 
+def _around(problem, u, parameters):
+    motion, y = problem.local_motion(u, parameters)
+    return (lambda y, _: motion(y)), y
+
+
+@eqx.filter_jit
+def _a(problem, parameters, u):
+    motion, y = problem.local_motion(u, parameters)
+    return jax.jacfwd(motion)(y)
+
+
 @eqx.filter_jit
 def _b(problem, parameters, u, a, b, of_residual: bool):
-    function = problem.residual if of_residual else problem.motion
-    return second(function, u, parameters, a, b)
+    if of_residual:
+        return second(problem.residual, u, parameters, a, b)
+    motion, y = _around(problem, u, parameters)
+    return second(motion, y, None, a, b)
 
 
 @eqx.filter_jit
 def _c(problem, parameters, u, a, b, c):
-    return third(problem.motion, u, parameters, a, b, c)
+    motion, y = _around(problem, u, parameters)
+    return third(motion, y, None, a, b, c)
 
 
 def _parts(x: Any):
@@ -32,12 +47,17 @@ def _parts(x: Any):
 
 
 class _Derivatives:
-    """B and C of a problem at a point, for complex arguments too."""
+    """A, B and C of a problem at a point, for complex arguments too."""
 
     def __init__(self, problem: AbstractProblem, leaf: int, z: np.ndarray):
         self.problem = problem
         self.parameters = with_leaf(problem.parameters, leaf, jnp.asarray(z[-1]))
         self.u = jnp.asarray(z[:-1])
+
+    def a(self, at: Corrected) -> np.ndarray:
+        if type(self.problem).local_motion is AbstractProblem.local_motion:
+            return at.linearisation
+        return np.asarray(_a(self.problem, self.parameters, self.u))
 
     def b(self, x, y, of_residual: bool = False):
         total = 0.0
@@ -84,29 +104,36 @@ def null_vectors(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def fold_form(problem, leaf, z, at: Corrected) -> tuple[float | None, str]:
-    """Coefficient a of x' = a x^2, and to which side the branch opens."""
+    """Coefficient a of x' = a x^2 or x -> x + a x^2, and where the branch opens."""
     n = z.size - 1
+    d = _Derivatives(problem, leaf, z)
     jacobian = at.jacobian
     right, left = null_vectors(jacobian[:, :n])
-    bending = float(left @ _Derivatives(problem, leaf, z).b(right, right, True))
+    bending = float(left @ d.b(right, right, True))
     slope = float(left @ jacobian[:, n])
     if slope == 0 or not np.isfinite(bending):
         return None, ""
     side = "larger" if -bending / slope > 0 else "smaller"
     words = f"the branch lies at {side} parameters"
+    if problem.stability == "none":
+        return None, words
+    if type(problem).local_motion is not AbstractProblem.local_motion:
+        a = d.a(at)
+        right, left = null_vectors(a - np.eye(a.shape[0]))
+        bending = float(left @ d.b(right, right))
     overlap = float(left @ right)
-    if problem.stability == "none" or abs(overlap) < 1e-12:
+    if abs(overlap) < 1e-12:
         return None, words
     return bending / 2 / overlap, words
 
 
 def flip_form(problem, leaf, z, at: Corrected) -> tuple[float | None, str]:
     """Coefficient c of x -> -x + c x^3; positive: the doubled orbit is stable."""
-    a = at.linearisation
+    d = _Derivatives(problem, leaf, z)
+    a = d.a(at)
     one = np.eye(a.shape[0])
     right, left = null_vectors(a + one)
     left = left / (left @ right)
-    d = _Derivatives(problem, leaf, z)
     inner = np.linalg.solve(a - one, d.b(right, right))
     c = float(left @ (d.c(right, right, right) - 3 * d.b(right, inner))) / 6
     return c, "supercritical" if c > 0 else "subcritical"
@@ -114,7 +141,8 @@ def flip_form(problem, leaf, z, at: Corrected) -> tuple[float | None, str]:
 
 def hopf_form(problem, leaf, z, at: Corrected) -> tuple[float | None, str]:
     """First Lyapunov coefficient; negative: the limit cycle is stable."""
-    a = at.linearisation
+    d = _Derivatives(problem, leaf, z)
+    a = d.a(at)
     values, vectors = _eigen(a)
     critical = values.imag > 0
     if not np.any(critical):
@@ -124,7 +152,7 @@ def hopf_form(problem, leaf, z, at: Corrected) -> tuple[float | None, str]:
     q = vectors[:, k] / np.linalg.norm(vectors[:, k])
     _, p = null_vectors(a - 1j * omega * np.eye(a.shape[0]))
     p = p / np.conj(np.vdot(p, q))
-    d, qc = _Derivatives(problem, leaf, z), q.conj()
+    qc = q.conj()
     one = np.eye(a.shape[0])
     total = (
         np.vdot(p, d.c(q, q, qc))
@@ -137,7 +165,8 @@ def hopf_form(problem, leaf, z, at: Corrected) -> tuple[float | None, str]:
 
 def neimark_sacker_form(problem, leaf, z, at: Corrected) -> tuple[float | None, str]:
     """Real part of the cubic coefficient; negative: the invariant curve is stable."""
-    a = at.linearisation
+    d = _Derivatives(problem, leaf, z)
+    a = d.a(at)
     values, vectors = _eigen(a)
     critical = values.imag > 0
     if not np.any(critical):
@@ -148,7 +177,7 @@ def neimark_sacker_form(problem, leaf, z, at: Corrected) -> tuple[float | None, 
     one = np.eye(a.shape[0])
     _, p = null_vectors(a - turn * one)
     p = p / np.conj(np.vdot(p, q))
-    d, qc = _Derivatives(problem, leaf, z), q.conj()
+    qc = q.conj()
     total = (
         np.vdot(p, d.c(q, q, qc))
         + 2 * np.vdot(p, d.b(q, np.linalg.solve(one - a + 0j, d.b(q, qc))))

@@ -20,6 +20,8 @@ def periodic_orbits(
     system: HybridSystem,
     orbit: Orbit | Float[ArrayLike, " n"] | None = None,
     period: float | int | None = None,
+    *,
+    beyond: bool = False,
 ) -> Start:
     """The family of periodic orbits that an orbit belongs to, and where it is on it.
 
@@ -31,10 +33,13 @@ def periodic_orbits(
     - `orbit`: from [`continuation.periodic_orbit`][]; or a guess of its state, or None,
       with `period`, as taken there.
 
+    - `beyond`: for an orbit that sticks, whether to go on behind the interruption of
+      its chattering with the orbits that have finitely many impacts.
+
     **Returns:** a [`continuation.Start`][], for [`continuation.follow`][].
 
-    **Raises:** `ValueError` as `periodic_orbit`; and for an orbit that sticks but does
-    not repeat every forcing period.
+    **Raises:** `ValueError` as `periodic_orbit`; and for an orbit that sticks without
+    forcing.
     """
     system = with_array_parameters(system)
     if not isinstance(orbit, Orbit):
@@ -43,13 +48,12 @@ def periodic_orbits(
     length = float(orbit.period)
     number = 0 if base is None else round(length / base)
     if orbit.sticks:
-        if number != 1:
+        if number == 0:
             raise ValueError(
-                f"this orbit sticks and repeats after {number or 'no'} forcing "
-                "periods; only orbits that stick in every forcing period can be "
-                "followed"
+                "this orbit sticks without forcing; only orbits that stick once in "
+                "some forcing periods can be followed"
             )
-        problem, state = on_release(system)
+        problem, state = on_release(system, number, beyond)
         return Start(problem, state)
     n = int(orbit.state.shape[0])
     m = int(orbit.impacts.count)

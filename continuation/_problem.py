@@ -1,7 +1,7 @@
 """What is followed: a residual, its kind of stability, and what to watch on the way."""
 
 import abc
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, Literal
 
 import equinox as eqx
@@ -48,6 +48,7 @@ class Start(eqx.Module):
       branch that leaves a branch point is found and not the one that was known. None:
       along the branch through `state`, in the direction asked for.
     - `step`: first step; None: as the settings say.
+    - `reason`: what is to be known about the first point.
     """
 
     problem: "AbstractProblem"
@@ -55,6 +56,7 @@ class Start(eqx.Module):
     parameter: float | None = None
     tangent: np.ndarray | None = None
     step: float | None = None
+    reason: str = eqx.field(static=True, default="")
 
 
 class AbstractProblem(eqx.Module):
@@ -71,8 +73,8 @@ class AbstractProblem(eqx.Module):
     - `residual(u, parameters)`.
 
     **Traced** (called inside compiled programs; jax functions, differentiable forward):
-    `residual`, `jacobian`, `linearisation`, `motion`, `monitor`, `observe`, `watched`,
-    `seen`, `scale`.
+    `residual`, `jacobian`, `linearisation`, `motion`, `local_motion`, `monitor`,
+    `observe`, `watched`, `seen`, `scale`.
     Everything about them that is not an array must be static: one program is compiled
     for each structure of a problem, and reused for all values of arrays in it.
     `residual` and monitors of `ends=False` are to be smooth; where an orbit does not
@@ -122,15 +124,26 @@ class AbstractProblem(eqx.Module):
     def motion(self, u: Float[Array, " n"], parameters: PyTree) -> Float[Array, " n"]:
         """The vector field, or the map, whose derivative is `linearisation`.
 
-        Normal-form coefficients come from its second and third derivatives. Override it
-        together with `linearisation`, or set `normal_forms` to False.
+        Override it together with `linearisation`, or override `local_motion`, or set
+        `normal_forms` to False.
         """
         moved = self.residual(u, parameters)
         return moved + u if self.stability == "map" else moved
 
+    def local_motion(
+        self, u: Float[Array, " n"], parameters: PyTree
+    ) -> tuple[Callable[[Float[Array, " k"]], Float[Array, " k"]], Float[Array, " k"]]:
+        """The vector field or map around a solution, and the point where it is there.
+
+        Normal-form coefficients come from its first three derivatives; its eigenvalues
+        must be those of `linearisation`, and any number of others off the imaginary
+        axis or the unit circle. By default `motion`.
+        """
+        return lambda y: self.motion(y, parameters), u
+
     @property
     def normal_forms(self) -> bool:
-        """Whether `motion` can be differentiated three times."""
+        """Whether `local_motion` can be differentiated three times."""
         return True
 
     def monitor(

@@ -61,7 +61,7 @@ class Run:
             step = start.step
         step = self.walk.settings.step if step is None else step
         here = stand(problem, at, step, 0.0, ())
-        point = self._point(here, kind)
+        point = self._point(here, kind, start.reason)
         refusal = here.problem.check(point)
         if refusal is not None:
             raise ValueError(f"the start is not admissible: {refusal}")
@@ -135,8 +135,14 @@ class Run:
             if not refusal:
                 assert attempt.at is not None
                 there = self._moved(here, attempt, step)
-                events = sign_changes(self.walk, here, there)
-                over = self._pass_events(here, there, events)
+                names = sign_changes(self.walk, here, there)
+                passed = located_between(self.walk, here, there, names)
+                doubt = self._doubt(here, passed)
+                if doubt and step / 2 >= self.walk.settings.min_step:
+                    # the step may have led to another branch
+                    step /= 2
+                    continue
+                over = self._pass_events(here, there, passed)
                 if over is not None:
                     return over
                 refusal = self._refusal(there)
@@ -196,10 +202,16 @@ class Run:
 
     # Special points
 
-    def _pass_events(self, here: Here, there: Here, names: list[str]):
+    def _doubt(self, here: Here, passed: list[tuple[str, Located]]) -> bool:
+        """Whether the branch would end at a point that was not found."""
+        return any(
+            self._ends(here, name) and not located.converged for name, located in passed
+        )
+
+    def _pass_events(self, here: Here, there: Here, passed: list[tuple[str, Located]]):
         """Put special points into `pending`; how to go on where one ends it all."""
         chord = there.at.z - here.at.z
-        for name, located in located_between(self.walk, here, there, names):
+        for name, located in passed:
             point = self._special(here, chord, name, located)
             if point is None:
                 continue

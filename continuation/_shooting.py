@@ -24,17 +24,12 @@ from jaxcam.hybrid import HybridSystem
 from jaxcam.hybrid._normal import gaps, impacts, normal_velocity
 from variational import saltation_matrix
 
-from ._admissible import (
-    DIP,
-    dips,
-    IMPACT,
-    inadmissible,
-    lowest_times,
-    nodes_of,
-    orbit_grazing,
-)
+from ._admissible import DIP, IMPACT, inadmissible
+from ._lowest_gap import dips, lowest_times, nodes_of
+from ._orbit_grazing import orbit_grazing
 from ._problem import AbstractProblem, Monitor, Stability, Start
 from ._shooting_flight import flight_end, flight_nodes
+from ._shooting_map import map_of_period
 
 
 class ImpactingOrbits(AbstractProblem):
@@ -99,9 +94,12 @@ class ImpactingOrbits(AbstractProblem):
         moved = matrix @ basis
         return basis.T @ (moved - along[:, None] * (normal @ moved)[None, :])
 
-    @property
-    def normal_forms(self) -> bool:
-        return False
+    def local_motion(self, u, parameters):
+        """The map from the first impact to the one a period later.
+
+        In its phase and the state after it, without forcing in the state alone.
+        """
+        return map_of_period(self, u, parameters)
 
     @property
     def dear(self) -> bool:
@@ -133,7 +131,7 @@ class ImpactingOrbits(AbstractProblem):
             lambda a, b: flight_end(parameters, a[0], a[1:], b[0], steps=self.steps)
         )(starts, ends)
 
-    def _hit(self):
+    def hit(self):
         """Index of the constraint that ends each flight."""
         return jnp.asarray(self.constraints[1:] + self.constraints[:1])
 
@@ -145,7 +143,7 @@ class ImpactingOrbits(AbstractProblem):
             after = impacts(parameters, end[0], x)[which]
             return jnp.concatenate([gap[None], end[1:] - after])
 
-        return jax.vmap(one)(ends, before, self._hit()).reshape(-1)
+        return jax.vmap(one)(ends, before, self.hit()).reshape(-1)
 
     def monodromy(self, u, parameters, first: int = 0) -> Float[Array, "n n"]:
         """Derivative of the state one period after impact `first` by that there."""
@@ -167,7 +165,7 @@ class ImpactingOrbits(AbstractProblem):
             flown, before = jax.jacfwd(fly, has_aux=True)(start[1:])
             return saltation_matrix(parameters, end[0], before, which) @ flown
 
-        return jax.vmap(one)(starts, ends, self._hit())
+        return jax.vmap(one)(starts, ends, self.hit())
 
     def antiperiodic(self, u, parameters) -> Float[Array, "u u"]:
         """Derivative of the equations for a deviation that changes sign each period.
@@ -204,7 +202,7 @@ class ImpactingOrbits(AbstractProblem):
     def _speeds(self, parameters, ends, before):
         found = jax.vmap(
             lambda end, x, which: -normal_velocity(parameters, end, x)[which]
-        )(ends, before, self._hit())
+        )(ends, before, self.hit())
         # the flight of row k ends in impact k + 1
         return jnp.roll(found, 1)
 

@@ -12,6 +12,7 @@ import jax as _jax
 # before anything below makes an array
 _jax.config.update("jax_enable_x64", True)
 
+from ._citation import citation as citation
 from .hybrid import (
     HybridSystem as HybridSystem,
     Settings as Settings,

@@ -7,7 +7,7 @@ import pytest
 from typer.testing import CliRunner
 
 from jaxcam.cli import app
-from jaxcam.thesis import TARGETS
+from jaxcam.thesis import Target, TARGETS
 
 
 @pytest.fixture(autouse=True)
@@ -31,7 +31,7 @@ def test_a_table_on_the_terminal_and_in_files(tmp_path):
     assert found.exit_code == 0, found.output
     assert "cam radius R" in found.stdout and "0.045" in found.stdout
     (rows,) = json.loads(file.read_text())["tables"].values()
-    names = ["quantity", "printed", "computed", "unit", "difference"]
+    names = ["quantity", "printed", "computed", "unit", "difference", "relative"]
     assert list(rows[0]) == names
     # the calibrated rig is another one than Table 4.4, by a few per cent
     shifts = {row["quantity"]: row["difference"] for row in rows}
@@ -62,3 +62,87 @@ def test_wrong_input_ends_with_a_sentence(arguments, word):
     assert found.stdout == ""
     (line,) = found.stderr.splitlines()
     assert word in line and line.endswith(".")
+
+
+@pytest.fixture
+def few(monkeypatch):
+    """Three targets in place of all, one of which fails; what was computed."""
+    computed = []
+
+    def counted(name):
+        compute = TARGETS[name].compute
+
+        def wrapped(system):
+            computed.append(name)
+            return compute(system)
+
+        return TARGETS[name]._replace(compute=wrapped)
+
+    def fails(system):
+        computed.append("figure-5.99")
+        raise RuntimeError("no such orbit")
+
+    kept = {name: counted(name) for name in ("figure-2.7", "table-4.4")}
+    for name in list(TARGETS):
+        monkeypatch.delitem(TARGETS, name)
+    monkeypatch.setitem(TARGETS, "figure-2.7", kept["figure-2.7"])
+    monkeypatch.setitem(TARGETS, "figure-5.99", Target("Nothing <at all>", fails))
+    monkeypatch.setitem(TARGETS, "table-4.4", kept["table-4.4"])
+    return computed
+
+
+def test_one_page_holds_everything_and_one_failure_stops_nothing(few, tmp_path):
+    found = jaxcam("all", "--out", tmp_path, "--json", tmp_path / "found.json")
+    assert found.exit_code == 1
+    assert "figure-5.99 failed: RuntimeError: no such orbit" in found.stderr
+    assert few == ["figure-2.7", "figure-5.99", "table-4.4"]
+    page = (tmp_path / "index.html").read_text(encoding="utf-8")
+    assert "cam radius R" in page and "Nothing &lt;at all&gt;" in page
+    assert "Failed: RuntimeError: no such orbit" in page
+    assert page.count("data:image/png;base64,") == 1
+    # nothing is loaded from elsewhere; dark screens and telephones are thought of
+    assert "http" not in page.replace("http-equiv", "") and "src=" in page
+    assert "prefers-color-scheme: dark" in page and "width=device-width" in page
+    written = json.loads((tmp_path / "found.json").read_text())
+    assert set(written["tables"]) == {"figure-2.7", "table-4.4"}
+    assert list(written["failed"]) == ["figure-5.99"]
+
+
+def test_resume_computes_what_is_missing_or_had_other_settings(few, tmp_path):
+    jaxcam("--out", tmp_path)
+    first = (tmp_path / "index.html").read_text(encoding="utf-8")
+    few.clear()
+    found = jaxcam("--out", tmp_path, "--resume")
+    # the one that failed is tried again
+    assert few == ["figure-5.99"] and "cam radius R" in found.stdout
+    assert (tmp_path / "index.html").read_text(encoding="utf-8").count("<tr>") == (
+        first.count("<tr>")
+    )
+    few.clear()
+    (tmp_path / "figure-2.7.png").unlink()
+    (tmp_path / "table-4.4.json").write_text("{ half of a file")
+    jaxcam("--out", tmp_path, "--resume")
+    assert few == ["figure-2.7", "figure-5.99", "table-4.4"]
+    few.clear()
+    jaxcam("--out", tmp_path, "--resume", "--preset", "table-4.4")
+    assert few == ["figure-2.7", "figure-5.99", "table-4.4"]
+
+
+def test_a_run_that_is_stopped_keeps_what_was_done(few, tmp_path, monkeypatch):
+    def stopped(system):
+        raise KeyboardInterrupt
+
+    monkeypatch.setitem(TARGETS, "figure-5.99", Target("Stopped", stopped))
+    found = jaxcam("--out", tmp_path)
+    assert found.exit_code == 130
+    assert (tmp_path / "figure-2.7.json").is_file()
+    assert "1 of 3 targets" in (tmp_path / "index.html").read_text(encoding="utf-8")
+    monkeypatch.delitem(TARGETS, "figure-5.99")
+    few.clear()
+    assert jaxcam("--out", tmp_path, "--resume").exit_code == 0
+    assert few == ["table-4.4"]
+
+
+def test_resume_needs_a_folder():
+    found = jaxcam("--resume")
+    assert found.exit_code == 2 and "--out" in found.stderr

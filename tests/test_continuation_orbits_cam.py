@@ -127,3 +127,27 @@ def test_orbit_that_sticks_from_its_beginning_to_its_interruption():
     assert abs(float(direct) - last.parameter) < 1e-9
     times = [float(p.observed["sticking time"]) for p in branch.regular]
     assert min(times) > 0
+
+
+@pytest.mark.slow
+def test_family_of_period_three():
+    # Figure 5.12; the seed is where one motion in seven of a sweep at 155.25 rpm ends
+    seed = np.array([0.47075613, 2.29945954])
+    start = continuation.periodic_orbits(rig(155.25), seed, 3)
+    assert start.problem.periods == 3  # pyright: ignore
+    ends = {}
+    for direction in (-1, 1):
+        for point in continuation.follow(
+            start.problem, start, speed, bounds(150.0, 160.0), direction=direction
+        ):
+            if point.special:
+                ends[direction] = point
+                break
+    fold, flip = ends[-1], ends[1]
+    assert (fold.kind, flip.kind) == ("fold", "flip")
+    assert fold.converged and flip.converged
+    print("fold", rad_s_to_rpm(fold.parameter), "flip", rad_s_to_rpm(flip.parameter))
+    assert 154.75 < rad_s_to_rpm(fold.parameter) < 155.25
+    # the thesis has its doubling, P(6, 6), at 156 rpm
+    assert 155.75 < rad_s_to_rpm(flip.parameter) < 156.0
+    assert flip.criticality == "supercritical"

@@ -11,7 +11,8 @@ from scipy.optimize import minimize_scalar
 from textbook_systems import DampedImpactOscillator, parameters
 
 import continuation
-from jaxcam.models import BouncingBall
+from continuation._lowest_gap import lowest_times
+from jaxcam.models import BouncingBall, ImpactOscillator
 
 
 C, D, E, W = 0.1, 1.0, 0.8, 1.0
@@ -148,3 +149,30 @@ def test_ball_on_a_table(k):
         assert found is not None and found.kind == name and found.converged
         assert abs(found.parameter * w**2 / g - exact) < 1e-9
         np.testing.assert_allclose(np.prod(found.multipliers).real, r**2)
+
+
+def test_penetration_shorter_than_a_step_is_seen():
+    # a low bounce shortly before release: it comes back through the wall, and off it
+    # again, all within the first of sixteen steps
+    early, w = 0.05, 1.1
+    t0, u = (np.pi / 2 - early) / w, 0.3 * w * (early / w) ** 2
+    gamma = 1 / (1 - w * w)
+    a, b = -gamma * np.cos(w * t0), -u + gamma * w * np.sin(w * t0)
+
+    def gap(s):
+        return -gamma * np.cos(w * (t0 + s)) - a * np.cos(s) - b * np.sin(s)
+
+    inside: Any = minimize_scalar(
+        gap, bounds=(0.5 * early, 2 * early), method="bounded", options={"xatol": 1e-12}
+    )
+    assert inside.fun < -1e-6
+    length = 2.0
+    assert inside.x < length / 16 and gap(length) > 0.1
+    time, value = lowest_times(
+        ImpactOscillator(omega=w, wall=0.0, restitution=0.5),
+        jnp.array([t0, 0.0, -u]),
+        jnp.asarray(t0 + length),
+        16,
+    )
+    assert abs(float(time[0]) - t0 - inside.x) < 1e-6
+    assert abs(float(value[0]) - inside.fun) < 1e-11

@@ -7,6 +7,7 @@ m = (1 - r) / (2 w), the orbits with approach speed V against a wall at sigma ar
 """
 
 import jax.numpy as jnp
+import mpmath
 import numpy as np
 import pytest
 
@@ -114,14 +115,48 @@ def test_flip_behind_a_grazing_is_not_reported(case):
     found = points[-1]
     assert found.kind == "grazing" and found.converged
     assert min(begin, end) < found.parameter < max(begin, end)
-    # the orbit there touches the wall in flight, by the solution between impacts
-    time = found.state[0] * 2 * np.pi / exact.w
+    assert abs(lowest_gap(exact, found.state)) < 1e-8
+
+
+def lowest_gap(exact, state):
+    """Lowest gap between impacts of an orbit (phase, wall, speed), in closed form."""
+    phase, sigma, speed = state
+    time = phase * 2 * np.pi / exact.w
     t = np.linspace(0, 2 * np.pi * exact.n / exact.w, 200001)[1:-1]
     forced = exact.gamma * np.cos(exact.w * (time + t))
-    a = found.state[1] - exact.gamma * np.cos(exact.w * time)
-    b = found.state[2] + exact.gamma * exact.w * np.sin(exact.w * time)
-    gap = found.parameter - forced - a * np.cos(t) - b * np.sin(t)
-    assert abs(gap[100:-100].min()) < 1e-8
+    a = sigma - exact.gamma * np.cos(exact.w * time)
+    b = speed + exact.gamma * exact.w * np.sin(exact.w * time)
+    gap = sigma - forced - a * np.cos(t) - b * np.sin(t)
+    return gap[100:-100].min()
+
+
+def restitution(system):
+    return system.restitution
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "name, case",
+    [("fold", SETS[0]), ("flip", SETS[0]), ("grazing", TRAPS[1])],
+)
+def test_curves_in_wall_and_restitution(name, case):
+    w, r, n = case
+    exact = Exact(w, r, n)
+    towards = exact.fold if name == "fold" else exact.flip
+    other = exact.flip if name == "fold" else exact.fold
+    begin = other + (0.5 if name != "grazing" else 0.1) * (towards - other)
+    direction = 1 if exact.at(towards)[0] > exact.at(begin)[0] else -1
+    found = first(*exact.problem(begin), (name,), (-4.0, 4.0), direction)[-1]
+    curve = continuation.curve(found, (wall, restitution), ((-4.0, 4.0), (0.5, 0.9)))
+    values = np.array([point.parameters for point in curve.points])
+    # both ends lie on the bounds of the restitution
+    np.testing.assert_allclose(np.sort(values[[0, -1], 1]), [0.5, 0.9], atol=0)
+    for point, (sigma, r) in zip(curve.points, values, strict=True):
+        here = Exact(w, r, n)
+        if name == "grazing":
+            assert abs(lowest_gap(here, point.state[:3])) < 1e-8
+        else:
+            assert abs(here.at(getattr(here, name))[0] - sigma) < 1e-9
 
 
 def test_resonance_has_the_same_multipliers_for_every_wall():
@@ -150,3 +185,83 @@ def test_orbit_from_a_guess_with_its_multipliers():
         exact.trace(phi), abs=1e-8
     )
     assert complex(jnp.prod(orbit.multipliers)).real == pytest.approx(0.64, abs=1e-9)
+
+
+class Digits:
+    """The map from impact to impact, in phase and rebound speed, with fifty digits."""
+
+    def __init__(self, exact, phi):
+        self.w, self.r, self.n = mpmath.mpf(exact.w), mpmath.mpf(exact.r), exact.n
+        gamma, half = 1 / (1 - self.w**2), mpmath.pi * self.n / self.w
+        k, m = (1 + self.r) * mpmath.cot(half) / 2, (1 - self.r) / (2 * self.w)
+        speed = abs(gamma) * mpmath.sin(phi) / m
+        self.sigma = abs(gamma) * mpmath.cos(phi) - k * speed
+        angle = mpmath.atan2(-m * speed / gamma, (self.sigma + k * speed) / gamma)
+        self.period = 2 * mpmath.pi / self.w
+        self.point = np.array([angle / (2 * mpmath.pi), -self.r * speed])
+
+    def __call__(self, t, v):
+        w, gamma = self.w, 1 / (1 - self.w**2)
+        a = self.sigma - gamma * mpmath.cos(w * t)
+        b = v + gamma * w * mpmath.sin(w * t)
+
+        def position(s):
+            free = a * mpmath.cos(s) + b * mpmath.sin(s)
+            return gamma * mpmath.cos(w * (t + s)) + free - self.sigma
+
+        s = mpmath.findroot(position, self.n * self.period)
+        speed = -gamma * w * mpmath.sin(w * (t + s))
+        speed += -a * mpmath.sin(s) + b * mpmath.cos(s)
+        return t + s - self.n * self.period, -self.r * speed
+
+    def along(self, *directions):
+        """Derivative of the map along these directions, by differences."""
+        h = mpmath.mpf(10) ** -8
+        total = np.array([mpmath.mpf(0)] * 2)
+        for signs in np.ndindex(*[2] * len(directions)):
+            moved, weight = self.point, 1
+            for sign, direction in zip(signs, directions, strict=True):
+                moved = moved + (1 - 2 * sign) * h * direction
+                weight *= 1 - 2 * sign
+            t, v = self(moved[0] * self.period, moved[1])
+            total = total + weight * np.array([t / self.period, v])
+        return total / (2 * h) ** len(directions)
+
+    def null_vectors(self, critical):
+        """Right and left eigenvectors, the right one of length one."""
+        one = np.eye(2).astype(int)
+        a = np.stack([self.along(e * mpmath.mpf(1)) for e in one], axis=1)
+        m = a - critical * one
+        right, left = np.array([-m[0, 1], m[0, 0]]), np.array([-m[1, 0], m[0, 0]])
+        right = right / mpmath.sqrt(right @ right)
+        return a, right, left / (left @ right)
+
+
+@pytest.mark.parametrize("case", [(2.8, 0.8, 1), (2.5, 0.6, 1)])
+def test_coefficients_of_normal_forms_by_differences_with_many_digits(case):
+    exact = Exact(*case)
+    with mpmath.workdps(50):
+        for name, critical in (("fold", 1), ("flip", -1)):
+            phi = getattr(exact, name)
+            middle = (exact.fold + exact.flip) / 2
+            direction = 1 if exact.at(phi)[0] > exact.at(middle)[0] else -1
+            found = first(*exact.problem(middle), (name,), (-4.0, 4.0), direction)[-1]
+            digits = Digits(exact, phi)
+            a, q, p = digits.null_vectors(critical)
+            b = digits.along(q, q)
+            if name == "fold":
+                want = abs(p @ b) / 2
+                assert found.criticality.startswith("the branch lies at")
+            else:
+                m = a - np.eye(2).astype(int)
+                determinant = m[0, 0] * m[1, 1] - m[0, 1] * m[1, 0]
+                inner = np.array(
+                    [m[1, 1] * b[0] - m[0, 1] * b[1], m[0, 0] * b[1] - m[1, 0] * b[0]]
+                )
+                inner = inner / determinant
+                cubic = digits.along(q, q, q) - 3 * digits.along(q, inner)
+                want = (p @ cubic) / 6
+                supercritical = "supercritical" if want > 0 else "subcritical"
+                assert found.criticality == supercritical
+            got = abs(found.coefficient) if name == "fold" else found.coefficient
+            assert got == pytest.approx(float(want), rel=1e-6)

@@ -139,3 +139,13 @@ def test_slope_of_the_scalar_chatter_map_passes_one_below_its_fixed_point():
 def test_period_doubling_needs_a_multiplier_of_minus_one():
     printed = jax.grad(lambda x, mu: (1 + mu) * x - x**3)
     assert printed(0.0, 0.0) == 1.0
+
+
+def test_forcing_on_the_cylinder():
+    """(2.5) as printed has the forcing of (2.4) for omega = 1 only."""
+    for omega in (1.0, W):
+        t = np.linspace(0, 4 * np.pi, 501)
+        phase = np.mod(t, 2 * np.pi / omega)
+        assert_allclose(np.cos(omega * phase), np.cos(omega * t), atol=1e-12)
+        off = np.max(np.abs(np.cos(phase) - np.cos(omega * t)))
+        assert off < 1e-12 if omega == 1 else off > 0.5

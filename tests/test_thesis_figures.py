@@ -90,5 +90,6 @@ def test_every_drawing_is_a_target_and_is_written(tmp_path):
     assert found.exit_code == 0, found.output
     assert {file.name for file in tmp_path.iterdir()} == {
         "figure-2.7.csv",
+        "figure-2.7.json",
         "figure-2.7.png",
     }

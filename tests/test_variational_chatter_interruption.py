@@ -92,6 +92,49 @@ def test_interruption_is_differentiable():
     assert abs(float(rate) / ((ends[1] - ends[0]) / (2 * h)) - 1) < 1e-8
 
 
+def sticks_in_the_second_period(w, r):
+    """Whether the orbit from release chatters to rest in the second period, not before.
+
+    Flights in closed form, the next impact by a scan and bisection.
+    """
+    g, period, bar = 1 / (1 - w * w), 2 * np.pi / w, float(scaling_law(r).lambda_bar)
+    release = np.pi / 2 / w
+    t, u = release, 0.0
+    for _ in range(400):
+        a, b = -g * np.cos(w * t), -u + g * w * np.sin(w * t)
+
+        def position(s, t=t, a=a, b=b):
+            # of the forced and the free part, without their cancelling at s = 0
+            d = w * s
+            forced = np.cos(w * t) * (np.cos(d) - 1) - np.sin(w * t) * np.sin(d)
+            return g * forced + a * (np.cos(s) - 1) + b * np.sin(s)
+
+        grid = np.geomspace(1e-7, 2 * period, 20000)
+        hit = int(np.argmax(position(grid) > 0))
+        s = brentq(position, grid[hit - 1], grid[hit], xtol=1e-16)
+        v = -g * w * np.sin(w * (t + s)) - a * np.sin(s) + b * np.cos(s)
+        t, u = t + s, r * v
+        turn = int((t - release) // period) + 1
+        end = release + turn * period
+        close = 1e-4 < (end - t) * w < 3e-2
+        lam = u / (w * (t - end) ** 2)
+        if turn > 2:
+            return False
+        if close and lam < bar / 2:
+            return turn == 2
+    raise AssertionError("neither in 400 impacts")
+
+
+@pytest.mark.parametrize("low, high", [(2.96, 2.99), (3.19, 3.24)])
+def test_orbit_that_sticks_every_second_period(low, high):
+    r = 0.3
+    oscillator = ImpactOscillator(omega=jnp.asarray(3.1), restitution=jnp.asarray(r))
+    w = float(chatter_interruption(oscillator, omega, (low, high), periods=2))
+    inwards = 1.0 if low < 3 else -1.0
+    assert sticks_in_the_second_period(w * (1 + 1e-7 * inwards), r)
+    assert not sticks_in_the_second_period(w * (1 - 1e-7 * inwards), r)
+
+
 def test_a_bracket_without_interruption_is_refused():
     oscillator = ImpactOscillator(omega=jnp.asarray(1.0), restitution=jnp.asarray(0.5))
     with pytest.raises(ValueError, match="interrupted, or does not occur, at both"):

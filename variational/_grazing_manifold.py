@@ -59,7 +59,7 @@ def grazing_manifold(
 def _manifold(system, n, points, horizon) -> GrazingManifold:
     grid = system.period * jnp.linspace(0.0, 1.0, 4 * points, endpoint=False)
     push = contact_acceleration(system, grid, jnp.zeros(2))
-    # the stretch that starts at the last rise through zero
+    # all times without contact, spread evenly, wherever in the period they lie
     order = jnp.argsort(push <= 0, stable=True)
     count = jnp.sum(push > 0)
     picks = order[(jnp.arange(points) * count) // points]

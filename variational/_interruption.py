@@ -66,7 +66,9 @@ class Interruption(eqx.Module):
     turns: Int[Array, ""]
 
 
-def interruption_in(system: HybridSystem, where: Callable, low, high) -> Interruption:
+def interruption_in(
+    system: HybridSystem, where: Callable, low, high, periods: int = 1
+) -> Interruption:
     """The interruption between two values of a parameter; for use inside `jit`.
 
     Safeguarded Newton on the margin. The value is differentiable forward in every other
@@ -76,32 +78,36 @@ def interruption_in(system: HybridSystem, where: Callable, low, high) -> Interru
     **Arguments:** as in [`variational.chatter_interruption`][].
     """
     low, high = jnp.asarray(low, jnp.float64), jnp.asarray(high, jnp.float64)
-    return _solve(line(system, where), low, high)
+    return _solve(line(system, where), low, high, periods=periods)
 
 
-def _margin(along: Line, value):
+def _margin(along: Line, value, periods: int):
     """Margin; a turn without impact or chatter counts as interrupted."""
-    orbit = prepared_orbit(along.at(value).prepared(), 0.0)
+    orbit = prepared_orbit(along.at(value).prepared(), 0.0, periods)
     return jnp.where(jnp.isnan(orbit.margin), jnp.inf, orbit.margin)
 
 
-def _slope(along: Line, value):
+def _slope(along: Line, value, periods: int):
     """Margin and its derivative by the parameter."""
-    return jax.jvp(lambda v: _margin(along, v), (value,), (jnp.ones_like(value),))
+
+    def margin(value):
+        return _margin(along, value, periods)
+
+    return jax.jvp(margin, (value,), (jnp.ones_like(value),))
 
 
 @eqx.filter_custom_jvp
-def _solve(along: Line, low, high) -> Interruption:
-    return _search(along, low, high)
+def _solve(along: Line, low, high, *, periods: int) -> Interruption:
+    return _search(along, low, high, periods)
 
 
 @_solve.def_jvp
-def _solve_jvp(primals, tangents):
+def _solve_jvp(primals, tangents, *, periods: int):
     """Implicit function theorem: margin(value, parameters) stays zero."""
     along, low, high = primals
     moved, _, _ = tangents
-    found = _solve(along, low, high)
-    rate = _rate(along, moved, found.value)
+    found = _solve(along, low, high, periods=periods)
+    rate = _rate(along, moved, found.value, periods)
     zeros = jax.tree.map(_no_tangent, found)
     by_value = jnp.where(found.converged, -rate / found.slope, jnp.nan)
     return found, eqx.tree_at(lambda f: f.value, zeros, by_value, is_leaf=_is_none)
@@ -116,18 +122,18 @@ def _no_tangent(leaf):
 
 
 @eqx.filter_jit
-def _rate(along: Line, moved: Line, value):
+def _rate(along: Line, moved: Line, value, periods: int):
     """Change of the margin at a fixed value of the parameter."""
-    return eqx.filter_jvp(lambda a: _margin(a, value), (along,), (moved,))[1]
+    return eqx.filter_jvp(lambda a: _margin(a, value, periods), (along,), (moved,))[1]
 
 
 @eqx.filter_jit
-def _search(along: Line, low, high) -> Interruption:
+def _search(along: Line, low, high, periods: int) -> Interruption:
     """Newton's method, halving where it leaves the bracket or does not converge."""
 
     def look(carry):
         points, signs, value, step, ends, _, count, _ = carry
-        margin, slope = _slope(along, value)
+        margin, slope = _slope(along, value, periods)
         # the two ends come first
         at_end = jnp.arange(2) == count
         ends = jnp.where(at_end, margin, ends)
@@ -166,21 +172,26 @@ def _search(along: Line, low, high) -> Interruption:
 
 
 def chatter_interruption(
-    system: HybridSystem, where: Callable, bracket: tuple[float, float]
+    system: HybridSystem,
+    where: Callable,
+    bracket: tuple[float, float],
+    periods: int = 1,
 ) -> Float[Array, ""]:
     """The parameter value at which complete chattering ends at the release point.
 
-    There the impacts of the orbit that sticks once a period accumulate at the very
-    moment of release: on one side it is periodic and sticks, on the other it does not
-    stick and is followed by lobes of periodic windows and chaos (section 5.4, chapter
-    6).
+    There the impacts of the orbit that sticks once in so many periods accumulate at the
+    very moment of release: on one side it is periodic and sticks, on the other it does
+    not stick then and is followed by lobes of periodic windows and chaos (section 5.4,
+    chapter 6).
 
     **Arguments:**
 
     - `system`: two states, one constraint and a period.
     - `where`: picks the parameter, `lambda s: s.speed`.
     - `bracket`: two values of it, chattering complete at one and interrupted at the
-      other.
+      other. With several periods, near the interruption: elsewhere contact may come
+      earlier, which counts as interrupted too.
+    - `periods`: of the forcing in one of the orbit.
 
     **Returns:** the value, in the parameter's unit; differentiable forward in the other
     parameters.
@@ -190,7 +201,7 @@ def chatter_interruption(
     """
     check_chatter_system(system)
     low, high = bracket
-    found = interruption_in(system, where, low, high)
+    found = interruption_in(system, where, low, high, periods)
     if not isinstance(found.converged, Tracer):
         _require(found, low, high)
     return found.value

@@ -32,9 +32,13 @@ def demo(
         bool,
         typer.Option(help="Say what the model lacks; takes a minute or two at first."),
     ] = True,
+    branches: Annotated[
+        bool,
+        typer.Option(help="Follow two branches of orbits of the thesis' rig."),
+    ] = True,
 ) -> None:
     """
-    Compare recordings of a rig with its simulation; say what the model lacks.
+    Follow orbits of a rig; compare recordings with its simulation; say what it lacks.
 
     Without --case, a small recording that ships with the package. The report is
     DIR/index.html, with the figures in it, and DIR/result.json; what the model lacks is
@@ -43,7 +47,7 @@ def demo(
     \b
     Examples:
       jaxcam demo
-      jaxcam demo --out ./jaxcam-first-look --json - --no-diagnose
+      jaxcam demo --out ./jaxcam-first-look --json - --no-diagnose --no-branches
     """
     from ._choices import choose
 
@@ -51,7 +55,9 @@ def demo(
 
     from ..data import DEMO_RIG
     from ..recordings import compare_case, merge, read_case, read_rig, segment_case
+    from ._beside import beside
     from ._cache import keep_compiled_programs
+    from ._demo_branches import follow_branches
     from ._demo_figures import draw
     from ._output import Output, to_text
     from ._page import page, Report
@@ -63,7 +69,10 @@ def demo(
     runs = read_case(folder, gaps=gaps)  # pyright: ignore
     nominal = read_rig(_rig_file(folder, rig))
     output = Output(json_file, out)
-    with progress("finding impacts and contacts") as report:
+    with (
+        beside(follow_branches, out if branches else None) as followed,
+        progress("finding impacts and contacts") as report,
+    ):
         segments = segment_case(tuple(runs), nominal)
         parts = []
         for k, run in enumerate(segments):
@@ -80,6 +89,9 @@ def demo(
         lacks = None
         if diagnose and len(segments) > 1:
             lacks = _diagnosed(out / "diagnosis", nominal, segments, runs.name, report)
+        if branches:
+            report("following branches of orbits", None)
+        paths = followed()
     result = {
         "command": "demo",
         "case": runs.name,
@@ -94,12 +106,14 @@ def demo(
         ],
         "comparison": comparison.to_json(),
         "figures": [file.name for file, _ in figures],
+        "branches": None if paths is None else [list(row) for row in paths.rows],
         "diagnosis": None if lacks is None else lacks.to_json(),
     }
     report_of = Report(
         title=f"Recording beside simulation: {runs.name}",
         sentence=comparison.sentence(),
         lacks=None if lacks is None else lacks.summary,
+        branches=paths,
         runs=[run.sentence() for run in segments],
         comparison=comparison.rows,
         rests=found,
@@ -116,6 +130,8 @@ def demo(
     output.print(rest_table(found))
     if lacks is not None:
         output.print(lacks.summary)
+    for orbit, kind, rpm, _ in paths.rows if paths is not None else ():
+        output.print(f"{orbit}: {kind} at {rpm} rpm.")
     output.print(f"Report: {out / 'index.html'}")
     output.write_json(result)
 
@@ -157,6 +173,11 @@ def _next_steps(found) -> list[tuple[str, str]]:
             "jaxcam simulate --system DIR/diagnosis/model.json --speed 140",
             "The motion of the rig with what its model lacked; DIR is the folder of "
             "this page.",
+        ),
+        (
+            "jaxcam continue --preset calibrated --from 130 --to 154 --at 145 "
+            "--state 0.4245,1.828 --out ./jaxcam-branch",
+            "The branch P(1,1) of this page, with all its points.",
         ),
         (
             "jaxcam demo --case DIR --rig DIR/rig.toml",

@@ -22,6 +22,12 @@ def diagnose(
         ),
     ] = "mend",
     seed: Annotated[int, typer.Option(help="Of the redrawn stretches.")] = 0,
+    predict: Annotated[
+        bool,
+        typer.Option(
+            help="Speeds at which the motion changes, with and without what was found."
+        ),
+    ] = True,
     json_file: Annotated[
         Path | None,
         typer.Option("--json", metavar="FILE", help="The verdict; - prints it."),
@@ -50,8 +56,9 @@ def diagnose(
     from ..recordings import read_case, read_rig
     from ._cache import keep_compiled_programs
     from ._demo import _rig_file
-    from ._diagnose_files import write_diagnosis
+    from ._diagnose_files import write_diagnosis, write_verdict
     from ._output import Output
+    from ._predictions import as_data, prediction_table
     from ._progress import progress
 
     keep_compiled_programs()
@@ -63,9 +70,15 @@ def diagnose(
         found = discrepancy.diagnose(
             nominal, tuple(runs), case=runs.name, seed=seed, progress=report
         )
+        foretold, figures = (), []
         if out is not None:
             report("drawing", None)
-            write_diagnosis(out, found, tuple(notes))
+            figures = write_diagnosis(out, found, tuple(notes))
+        if predict and found.verdict != "unknown":
+            report("predicting with and without", None)
+            foretold = discrepancy.predictions(found)
+            if out is not None:
+                write_verdict(out, found, figures, tuple(notes), foretold)
     for note in notes:
         output.print(note)
     output.print(found.summary)
@@ -75,7 +88,9 @@ def diagnose(
         f"On records not seen: {found.heldout_before:.3e} {found.unit} before, "
         f"{found.heldout_after:.3e} after, noise {found.noise_floor:.3e}."
     )
+    if foretold:
+        output.print(prediction_table(foretold))
     if out is not None:
         output.print(f"Report: {out / 'index.html'}")
         output.print(f"Model: {out / 'model.json'}, for --system of other commands")
-    output.write_json(found.to_json())
+    output.write_json({**found.to_json(), **as_data(foretold)})

@@ -7,10 +7,11 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 
-from ..discrepancy import Diagnosis, Structure
+from ..discrepancy import Diagnosis, Prediction, Structure
 from ..discrepancy._words import listed, number
 from ..fitting import Residuals
 from ._page import _figure, _split, _STYLE, _table
+from ._predictions import HEADINGS, prediction_rows
 
 
 matplotlib.use("Agg")
@@ -161,7 +162,10 @@ def _ranking(plt, found: Diagnosis):
 
 
 def diagnosis_page(
-    found: Diagnosis, figures: Sequence[tuple[Path, str]], notes: Sequence[str]
+    found: Diagnosis,
+    figures: Sequence[tuple[Path, str]],
+    notes: Sequence[str],
+    foretold: Sequence[Prediction] = (),
 ) -> str:
     """The page as text; nothing in it is loaded from elsewhere."""
     title = f"{found.case or 'Recordings'}: {_title(found)}"
@@ -216,6 +220,13 @@ def diagnosis_page(
     if found.caveats:
         items = "".join(f"<li>{escape(caveat)}</li>" for caveat in found.caveats)
         parts += ["<h2>Caveats</h2>", f"<ul>{items}</ul>"]
+    if foretold:
+        parts += [
+            "<h2>What changes</h2>",
+            _table(HEADINGS, prediction_rows(foretold), text=(0,)),
+            '<p class="note">Speeds of the cam in rpm at which the motion of this rig '
+            "changes, with the standard errors that those of the fit make.</p>",
+        ]
     parts += [
         "<h2>Is anything left over?</h2>",
         _table(("form", "where", "gain", "asked", "left"), left, text=(0, 1)),

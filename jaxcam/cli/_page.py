@@ -7,6 +7,7 @@ from html import escape
 from pathlib import Path
 
 from ..recordings import Row
+from ._demo_branches import Branches, HEADINGS as HEADINGS_OF_BRANCHES
 from ._rests import HEADINGS, rest_rows, Rests
 
 
@@ -17,6 +18,7 @@ class Report:
     title: str
     sentence: str
     lacks: str | None
+    branches: Branches | None
     runs: Sequence[str]
     comparison: Sequence[Row]
     rests: Sequence[Rests]
@@ -66,6 +68,17 @@ def _lacks(summary: str | None) -> list[str]:
     ]
 
 
+def _branches(found: Branches | None) -> list[str]:
+    """Two branches of orbits and where they change."""
+    if found is None:
+        return []
+    return [
+        "<h2>Orbits of the thesis' rig</h2>",
+        _figure(found.figure, found.caption),
+        _table(HEADINGS_OF_BRANCHES, found.rows, text=(0, 1)),
+    ]
+
+
 def page(report: Report) -> str:
     """The page as text; nothing in it is loaded from elsewhere."""
     parts = [
@@ -73,6 +86,7 @@ def page(report: Report) -> str:
         # one idea a line is easier to take in than a paragraph of numbers
         *(f'<p class="sentence">{escape(s)}</p>' for s in _split(report.sentence)),
         *_lacks(report.lacks),
+        *_branches(report.branches),
         "<h2>Residuals by mode</h2>",
         _table(_MODES, [_cells(row) for row in report.comparison], text=(0, 6)),
         '<p class="note">Each flight is started where the recording says it started, '

@@ -1,5 +1,6 @@
 """`jaxcam reproduce`: tables and figures of the thesis, printed beside computed."""
 
+import time
 from pathlib import Path
 from typing import Annotated
 
@@ -10,6 +11,8 @@ from ._choices import choose
 
 #: the rigs, and which of them is meant where nothing is said
 _PRESETS = ("calibrated", "table-4.4")
+_SIZES = ("default", "full")
+_ALL = "all"
 
 
 def reproduce(
@@ -17,13 +20,20 @@ def reproduce(
         str | None,
         typer.Argument(
             metavar="[TARGET]",
-            help="Such as table-5.2 or figure-4.5; all of them without.",
+            help="Such as table-5.2 or figure-4.5; all of them without, or with all.",
         ),
     ] = None,
     preset: Annotated[
         str,
         typer.Option(metavar="NAME", help=f"The rig: {' or '.join(_PRESETS)}."),
     ] = _PRESETS[0],
+    size: Annotated[
+        str,
+        typer.Option(
+            metavar="NAME",
+            help="full for diagrams and basins as fine as published ones; or default.",
+        ),
+    ] = _SIZES[0],
     list_: Annotated[
         bool, typer.Option("--list", help="Say what there is, and compute nothing.")
     ] = False,
@@ -33,8 +43,15 @@ def reproduce(
     ] = None,
     out: Annotated[
         Path | None,
-        typer.Option(metavar="DIR", help="Write CSV files and figures there."),
+        typer.Option(
+            metavar="DIR",
+            help="Write numbers and figures there; of all targets, a page as well.",
+        ),
     ] = None,
+    resume: Annotated[
+        bool,
+        typer.Option("--resume", help="Go on with what a stopped run left in DIR."),
+    ] = False,
 ) -> None:
     """
     Compute what the thesis prints; show both and the difference.
@@ -44,16 +61,19 @@ def reproduce(
       jaxcam reproduce --list
       jaxcam reproduce table-5.2
       jaxcam reproduce figure-1.3 --out figures
+      jaxcam reproduce all --out thesis
+      jaxcam reproduce all --out thesis --resume
       jaxcam reproduce table-5.2 --preset table-4.4 --json -
     """
     choose("--preset", preset, _PRESETS)
+    choose("--size", size, _SIZES)
+    if resume and out is None:
+        raise ValueError("--resume needs the folder of the stopped run: --out DIR.")
 
-    from .. import models
-    from ..thesis import reproduce as compute, TARGETS
-    from ._cache import keep_compiled_programs
+    from ..thesis import TARGETS
     from ._output import Output
-    from ._progress import progress
 
+    target = None if target == _ALL else target
     names = list(TARGETS) if target is None else [choose("TARGET", target, TARGETS)]
     output = Output(json_file, out)
     if list_:
@@ -62,50 +82,75 @@ def reproduce(
         titles = {name: TARGETS[name].title for name in names}
         output.write_json({"command": "reproduce", "targets": titles})
         return
+    _compute(names, preset, size, output, resume, several=target is None)
+
+
+def _compute(names, preset, size, output, resume, several: bool) -> None:
+    from .. import models
+    from ..thesis import TARGETS
+    from ._cache import keep_compiled_programs
+    from ._errors import fail, STOPPED_EARLY
+    from ._progress import progress
+    from ._reproduce_page import write_page
+    from ._reproduce_record import earlier, make, Settings, write
+
     keep_compiled_programs()
     system = models.preset(preset)
-    found = {}
+    settings = Settings.of(preset, size)  # pyright: ignore
+    out = output.folder
+    records, begin = [], time.perf_counter()
     for position, name in enumerate(names):
-        with progress("computing") as report:
-            report(f"computing {name}", position / len(names))
-            table = compute(name, system)
-        output.print(_rich(f"{name}: {TARGETS[name].title} ({preset})", table))
-        found[name] = table.to_dict(orient="records")
+        record = None
+        if resume and out is not None:
+            record = earlier(out, name, settings)
+        if record is None:
+            with progress("computing") as report:
+                words = f"{name} ({position + 1} of {len(names)})"
+                report(words, position / len(names))
+                # of many targets one that fails does not cost the others
+                record = make(name, system, settings, out, keep_going=several)
+            write(record, out)
+        records.append(record)
+        if record.error is None:
+            title = f"{name}: {TARGETS[name].title} ({preset})"
+            output.print(_rich(title, record.table))
+        else:
+            fail(f"{name} failed: {record.error}")
+        if several and out is not None:
+            write_page(out, records, settings, of=len(names))
+    failed = [record.name for record in records if record.error is not None]
+    if several:
+        minutes = (time.perf_counter() - begin) / 60
+        words = f", {len(failed)} failed: {', '.join(failed)}" if failed else ""
+        output.print(f"{len(records)} targets in {minutes:.1f} minutes{words}.")
         if out is not None:
-            table.to_csv(out / f"{name}.csv", index=False)
-            _draw(name, system, out)
-    output.write_json({"command": "reproduce", "preset": preset, "tables": found})
-
-
-def _draw(name: str, system, out: Path) -> None:
-    """The figure of a target, where it has one."""
-    from ..plotting import save_figure, style
-    from ._reproduce_figures import DRAWINGS
-
-    if name in DRAWINGS:
-        with style():
-            save_figure(DRAWINGS[name](system), out / f"{name}.png")
+            output.print(f"Page: {out / 'index.html'}")
+    found = {record.name: record.rows for record in records if record.error is None}
+    errors = {record.name: record.error for record in records if record.name in failed}
+    output.write_json(
+        {
+            "command": "reproduce",
+            "preset": preset,
+            "size": size,
+            "tables": found,
+            "failed": errors,
+        }
+    )
+    if failed:
+        raise typer.Exit(STOPPED_EARLY)
 
 
 def _rich(title: str, frame):
     """A pandas table as a table for the terminal."""
-    import math
-
     from rich.table import Table
 
+    from ._reproduce_page import cells, HEADINGS
+
     table = Table(title=title)
-    table.add_column("quantity", overflow="fold")
-    for name in ("printed", "computed", "difference"):
+    table.add_column(HEADINGS[0], overflow="fold")
+    for name in HEADINGS[1:-1]:
         table.add_column(name, justify="right")
-    table.add_column("unit")
+    table.add_column(HEADINGS[-1])
     for row in frame.itertuples(index=False):
-        lost = not math.isfinite(row.computed)
-        drawn = not math.isfinite(row.printed)
-        table.add_row(
-            row.quantity,
-            "" if drawn else f"{row.printed:.10g}",
-            "none" if lost else f"{row.computed:.10g}",
-            "" if lost or drawn else f"{row.difference:+.2e}",
-            row.unit,
-        )
+        table.add_row(*cells(row))
     return table

@@ -1,4 +1,4 @@
-"""The figures of the thesis that `jaxcam reproduce` draws."""
+"""What `jaxcam reproduce` draws; the drawings of chapters 1, 3 and 4."""
 
 from collections.abc import Callable
 
@@ -8,9 +8,19 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from .. import plotting
-from ..maps import LogisticMap, map_diagram, NORMAL_FORMS
 from ..models import CamFollower, rad_s_to_rpm, rpm_to_rad_s
-from ..thesis import _chapter_1, _chapter_2, _chapter_3, _chapter_4
+from ..thesis import (
+    _chapter_1,
+    _chapter_3,
+    _chapter_3_branches as branches,
+    _chapter_4,
+)
+from . import (
+    _reproduce_chapter_2,
+    _reproduce_chapter_5,
+    _reproduce_chapter_6,
+    _reproduce_motions,
+)
 
 
 _LINE, _OTHER = "#0072B2", "#E69F00"
@@ -42,56 +52,6 @@ def figure_1_3(system: CamFollower) -> Figure:
     axes[1].set_xlim(0.97 * period, 1.02 * period)
     axes[1].set_ylim(-2e-7, 4e-6)
     axes[0].legend()
-    return figure
-
-
-def figure_2_3(system: CamFollower) -> Figure:
-    del system
-    figure, axes = plt.subplots(1, 3, figsize=(9.6, 3.6))
-    for ax, (mu, start) in zip(axes, _chapter_2.COBWEBS, strict=True):
-        plotting.cobweb(LogisticMap(mu), start, 60, ax)
-        where = dict(transform=ax.transAxes, ha="right", backgroundcolor="white")
-        ax.text(0.97, 0.05, f"$\\mu = {mu}$", **where)
-    return figure
-
-
-def figure_2_4(system: CamFollower) -> Figure:
-    del system
-    figure, ax = plt.subplots()
-    values = np.linspace(2.6, 4.0, 1200)
-    points = np.asarray(map_diagram(LogisticMap(), lambda s: s.mu, values, keep=150))
-    ax.plot(np.repeat(values, 150), points.ravel(), ",", color=_LINE, alpha=0.4)
-    ax.set_xlabel(r"$\mu$")
-    ax.set_ylabel("x")
-    return figure
-
-
-def figure_2_7(system: CamFollower) -> Figure:
-    del system
-    figure, axes = plt.subplots(1, 5, figsize=(12, 3), sharey=True)
-    mu = np.linspace(-1, 1, 401)
-    for ax, form in zip(axes, NORMAL_FORMS.values(), strict=True):
-        for k, branch in enumerate(form.branches):
-            x, stable = branch(mu), form.stable(k, mu)
-            ax.plot(mu, np.where(stable, x, np.nan), color=_LINE, lw=1.8)
-            ax.plot(mu, np.where(stable, np.nan, x), "--", color=_LINE, lw=0.9)
-        ax.set_title(form.title, loc="left")
-        ax.set_xlabel(r"$\mu$")
-    axes[0].set_ylabel("x, or radius")
-    return figure
-
-
-def figure_2_11(system: CamFollower) -> Figure:
-    del system
-    figure, axes = plt.subplots(1, 3, figsize=(9.6, 3.6))
-    for ax, (name, chosen) in zip(axes, _chapter_2.MAPS.items(), strict=True):
-        for x in (np.linspace(-1, 0, 200), np.linspace(1e-9, 1, 200)):
-            ax.plot(x, np.asarray(chosen(jnp.asarray(x))), color=_LINE)
-        ax.plot([-1, 1], [-1, 1], color="0.7", lw=0.8)
-        ax.axvline(0, color="0.7", lw=0.8, ls=":")
-        ax.set_title(name.replace(", ", ",\n"), loc="left", fontsize="medium")
-        ax.set_xlabel("$x_n$")
-    axes[0].set_ylabel("$x_{n+1}$")
     return figure
 
 
@@ -192,18 +152,51 @@ def figure_4_16(system: CamFollower) -> Figure:
     return figure
 
 
-DRAWINGS: dict[str, Callable[[CamFollower], Figure]] = {
+def figure_3_9(system: CamFollower) -> Figure:
+    branch = branches.sticking_branch(system)
+    figure, axes = plt.subplots(1, 2, figsize=(10.0, 4.4))
+    scale = 30 / np.pi
+    plotting.branch_diagram(
+        branch, axes[0], x_label=("speed", "rpm"), y_label=("angle", "rad"),
+        x_scale=scale,
+    )  # fmt: skip
+    speeds, times, _ = branches.sticking_times(system)
+    axes[1].plot(speeds, 1e3 * times, color=_LINE, label="motion")
+    speeds, times = np.array(branches.sticking_along(branch)).T
+    axes[1].plot(speeds, 1e3 * times, "o", ms=3.5, color=_OTHER, label="followed")
+    axes[1].legend()
+    for point in branch.special:
+        axes[1].axvline(scale * point.parameter, color=_OTHER, ls=":", lw=1.2)
+    axes[1].axhline(0, color="0.4", lw=0.7)
+    axes[1].set_xlabel("speed (rpm)")
+    axes[1].set_ylabel("sticking time in a turn (ms)")
+    return figure
+
+
+def figure_3_12(system: CamFollower) -> Figure:
+    branch = branches.hitting_branch(system)
+    figure, ax = plt.subplots(figsize=(7.6, 4.8))
+    plotting.branch_diagram(
+        branch, ax, x_label=("speed", "rpm"), y_label=("angle", "rad"),
+        x_scale=30 / np.pi,
+    )  # fmt: skip
+    return figure
+
+
+DRAWINGS: dict[str, Callable[..., Figure]] = {
     "figure-1.2": figure_1_2,
     "figure-1.3": figure_1_3,
-    "figure-2.3": figure_2_3,
-    "figure-2.4": figure_2_4,
-    "figure-2.7": figure_2_7,
-    "figure-2.11": figure_2_11,
+    **_reproduce_chapter_2.DRAWINGS,
     "figure-3.8": figure_3_8,
+    "figure-3.9": figure_3_9,
     "figure-3.11": figure_3_11,
+    "figure-3.12": figure_3_12,
     "figure-4.5": figure_4_5,
     "figure-4.13": figure_4_13,
     "figure-4.14": figure_4_14,
     "figure-4.15": figure_4_15,
     "figure-4.16": figure_4_16,
+    **_reproduce_motions.DRAWINGS,
+    **_reproduce_chapter_5.DRAWINGS,
+    **_reproduce_chapter_6.DRAWINGS,
 }

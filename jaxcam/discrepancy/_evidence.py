@@ -133,7 +133,7 @@ def _vague(search: Search, best: Trial, name: str, deviation) -> bool:
     found = [best.fit[one] for one in own]
     errors = [max(one.stderr, deviation[one.name]) for one in found]
     size = sum((one.value / error) ** 2 for one, error in zip(found, errors))
-    return size < chi2.isf(FALSE_ALARMS, len(own))
+    return bool(size < chi2.isf(FALSE_ALARMS, len(own)))
 
 
 def redrawn(

@@ -8,18 +8,12 @@ from ..hybrid import HybridSystem, Settings
 from ..hybrid._codes import Row
 from ..hybrid._stroboscope import _group
 from ..hybrid._system import with_array_parameters
-from ._hybrid_lanes import (
-    in_contact,
-    lifted,
-    rows_between_looks,
-    run_lanes,
-    turn_lengths,
-)
+from ._hybrid_lanes import rows_between_looks, run_lanes
 from ._samples import Samples
-from ._section import AbstractSection, system_names
+from ._system_section import AbstractSystemSection
 
 
-class ImpactSection(AbstractSection):
+class ImpactSection(AbstractSystemSection):
     """States just after each impact, with the time of it.
 
     A chattering sequence is listed up to the impact after which the rest of it is
@@ -76,18 +70,6 @@ class ImpactSection(AbstractSection):
             contact=np.zeros(len(states), dtype=bool),
             code=code,
         )
-
-    def starts(self, where=None, values=None) -> np.ndarray:
-        return in_contact(self.system, self.t0, where, values)
-
-    def turn(self, where=None, values=None) -> np.ndarray:
-        return turn_lengths(self.system, self.period, where, values)
-
-    def lifted(self, states, where=None, values=None) -> np.ndarray:
-        return lifted(self.system, self.t0, states, where, values)
-
-    def names(self, n: int) -> tuple[tuple[str, str], ...]:
-        return system_names(self.system, n)
 
 
 class _Impacts:

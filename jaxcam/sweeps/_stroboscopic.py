@@ -4,19 +4,12 @@ import equinox as eqx
 import numpy as np
 
 from ..hybrid import HybridSystem, Settings, stroboscope
-from ._hybrid_lanes import (
-    in_contact,
-    lifted,
-    rows_between_looks,
-    run_lanes,
-    smallest_gaps,
-    turn_lengths,
-)
+from ._hybrid_lanes import rows_between_looks, run_lanes, smallest_gaps
 from ._samples import Samples
-from ._section import AbstractSection, system_names
+from ._system_section import AbstractSystemSection
 
 
-class Stroboscopic(AbstractSection):
+class Stroboscopic(AbstractSystemSection):
     """States at t0 + k period, k = 1, 2, ...; a turn is one period.
 
     **Arguments:**
@@ -73,18 +66,6 @@ class Stroboscopic(AbstractSection):
             contact=self._touching(samples, hits, code, where, values),
             code=code,
         )
-
-    def starts(self, where=None, values=None) -> np.ndarray:
-        return in_contact(self.system, self.t0, where, values)
-
-    def turn(self, where=None, values=None) -> np.ndarray:
-        return turn_lengths(self.system, self.period, where, values)
-
-    def lifted(self, states, where=None, values=None) -> np.ndarray:
-        return lifted(self.system, self.t0, states, where, values)
-
-    def names(self, n: int) -> tuple[tuple[str, str], ...]:
-        return system_names(self.system, n)
 
     def _touching(self, samples, hits, code, where, values):
         """In contact at the end, and no impact on the way there."""

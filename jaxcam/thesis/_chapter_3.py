@@ -21,6 +21,7 @@ from ._orbits import (
     SEARCH,
 )
 from ._printed import FLIP_SPEED, FOLD_SPEED, TRACES
+from ._remember import remembered
 
 
 if TYPE_CHECKING:
@@ -45,6 +46,7 @@ class SmoothBranch(NamedTuple):
     flip: float
 
 
+@remembered
 def smooth_branch(system: CamFollower, points: int = 16) -> SmoothBranch:
     """Orbits, multipliers, fold and flip; NaN where the rig has no such orbit."""
     start = first_orbit(system)
@@ -69,6 +71,7 @@ def smooth_branch(system: CamFollower, points: int = 16) -> SmoothBranch:
     return SmoothBranch(speeds, angles, values, fold, flip)
 
 
+@remembered
 def periodic_run(system: CamFollower, turns: float = 2.0) -> Trajectory:
     """The P(1,1) orbit of Figures 3.8 (a) and 3.11, from half a turn after an impact.
 

@@ -10,6 +10,7 @@ from variational import chatter_frame, find_lobes, fit_local_map, Lobes, scaling
 from ..models import CamFollower, rpm_to_rad_s
 from ._chatter import at_speed, sticking_state
 from ._frame import frame
+from ._remember import remembered
 
 
 if TYPE_CHECKING:
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
 
 
 #: speed at which Figure 5.25 is drawn (rpm), and its range of perturbations
-_SPEED = 152.6
+MAP_SPEED = 152.6
 _PERCENT = 1.0
 
 Q, M, DELTA_PI, DELTA_X = -0.62, -0.535, 2.243e-4, 1.022e-3
@@ -25,7 +26,8 @@ CUBIC = (1695.91, -15119.51, 44927.06, -44486.71)
 ROOT, X_0, P_0, ALPHA, X_INF = 0.12089, 0.33964, 0.33667, 0.33715, 0.33717
 
 
-def lobes_of(system: CamFollower, rpm: float = _SPEED, most: int = 6) -> Lobes:
+@remembered
+def lobes_of(system: CamFollower, rpm: float = MAP_SPEED, most: int = 6) -> Lobes:
     """The lobes of Figure 5.25, for this rig."""
     system = at_speed(system, rpm_to_rad_s(rpm))
     state = sticking_state(system)[0]
@@ -42,7 +44,7 @@ def table_5_3(system: CamFollower) -> "pd.DataFrame":
     """
     lobes = lobes_of(system)
     local = fit_local_map(lobes)
-    release = chatter_frame(at_speed(system, rpm_to_rad_s(_SPEED)))
+    release = chatter_frame(at_speed(system, rpm_to_rad_s(MAP_SPEED)))
     law = scaling_law(release.restitution)
     middle = X_0 - DELTA_X / 2
     polynomial = np.polyval(CUBIC[::-1], middle) + ROOT * np.sqrt(DELTA_X / 2)

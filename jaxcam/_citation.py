@@ -1,0 +1,84 @@
+"""BibTeX of the methods behind a result."""
+
+import re
+from importlib.metadata import version
+from pathlib import Path
+
+
+#: one entry a publication; the only copy of the bibliography
+_REFERENCES = Path(__file__).with_name("references.bib")
+
+#: what can be asked for, and the keys of `references.bib` it stands for
+_TOPICS: dict[str, tuple[str, ...]] = {
+    "basin entropy": ("daza2016",),
+    "basin stability": ("menck2013",),
+    "bootstrap": ("rubin1981",),
+    "cell mapping": ("hsu1992",),
+    "chatter": ("budd1994", "nordmark2009"),
+    "chatter interruption": ("alzate2008", "dankowicz2017"),
+    "continuation": ("keller1977",),
+    "deflation": ("farrell2015",),
+    "differential equations": ("kidger2021",),
+    "discrepancy": ("desilva2020",),
+    "equinox": ("kidger2021equinox",),
+    "filippov": ("filippov1988", "leine2004"),
+    "grazing": ("nordmark1991", "dibernardo2001"),
+    "impacting systems": ("dibernardo2008",),
+    "lyapunov": ("benettin1980",),
+    "normal forms": ("kuznetsov2004",),
+    "period doubling": ("feigenbaum1978",),
+    "root finding": ("rader2024",),
+    "saltation": ("leine2004", "dibernardo2008", "kong2024"),
+    "special points": ("govaerts2000", "kuznetsov2004"),
+    "thesis": ("alzate2008",),
+    "time-stepping": ("moreau1988", "cottle1992", "camlibel2002"),
+    "uncertainty exponent": ("mcdonald1985",),
+}
+
+
+def citation(*names: str) -> str:
+    """BibTeX entries of the methods that were used.
+
+    `print(jaxcam.citation())` gives the entry of this package and, in lines that BibTeX
+    ignores, the topics to ask for; `jaxcam.citation("chatter", "saltation")` gives
+    their entries, each of them once.
+
+    **Arguments:** topics, or keys of single entries ("nordmark1991"); capitals do not
+    matter.
+
+    **Returns:** text to append to a `.bib` file.
+
+    **Raises:** `ValueError` for an unknown name, with the names there are.
+    """
+    if not names:
+        lines = ["% Methods, by topic: jaxcam.citation(topic, ...)"]
+        lines += [f"%   {topic}: {', '.join(_TOPICS[topic])}" for topic in _TOPICS]
+        return _tool() + "\n" + "\n".join(lines) + "\n"
+    entries = _entries()
+    keys: dict[str, None] = {}
+    for name in names:
+        asked = name.strip().lower()
+        if asked not in _TOPICS and asked not in entries:
+            raise ValueError(
+                f"{name!r} is no topic of the bibliography; ask for one of "
+                f"{', '.join(_TOPICS)}."
+            )
+        keys |= dict.fromkeys(_TOPICS.get(asked, (asked,)))
+    return "\n".join(entries[key] for key in keys)
+
+
+def _entries() -> dict[str, str]:
+    """Entries by key; each ends with a brace at the start of a line."""
+    text = _REFERENCES.read_text(encoding="utf-8")
+    found = re.finditer(r"^@\w+\{([^,\s]+),\n.*?^\}\n", text, re.DOTALL | re.MULTILINE)
+    return {entry[1]: entry[0] for entry in found}
+
+
+def _tool() -> str:
+    return (
+        "@software{jaxcam,\n"
+        "  author = {{jaxcam contributors}},\n"
+        "  title = {jaxcam: motion of mechanical systems with impacts},\n"
+        f"  version = {{{version('jaxcam')}}},\n"
+        "}\n"
+    )

@@ -1,0 +1,35 @@
+"""Work in a process of its own, beside that of a command."""
+
+import multiprocessing
+from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TypeVar
+
+
+T = TypeVar("T")
+
+
+@contextmanager
+def beside(
+    work: Callable[[Path], T], folder: Path | None
+) -> Iterator[Callable[[], T | None]]:
+    """Begin `work(folder)` in another process; the function given waits for its result.
+
+    Without a folder nothing is done and the result is `None`.
+    """
+    if folder is None:
+        yield lambda: None
+        return
+    # a fork would share the threads of a compiler that is at work already
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(1, mp_context=context) as pool:
+        running = pool.submit(work, folder)
+        try:
+            yield running.result
+        except BaseException:
+            running.cancel()
+            for process in pool._processes.values():  # pyright: ignore
+                process.terminate()
+            raise

@@ -1,0 +1,86 @@
+"""Two branches of the thesis' rig for `jaxcam demo`: P(1,1) and P(inf,1)."""
+
+import dataclasses
+from pathlib import Path
+
+
+# Of the orbit with one impact a turn at 145 rpm, near it: angle (rad), velocity (rad/s)
+_NEAR = (0.4245, 1.828)
+_AT_RPM = 145.0
+# Bounds (rpm) of P(1,1) and of P(inf,1)
+_BOUNDS = ((130.0, 154.0), (115.0, 160.0))
+
+
+@dataclasses.dataclass(frozen=True)
+class Branches:
+    """What was found: rows under `HEADINGS`, and a figure."""
+
+    rows: tuple[tuple[str, str, str, str], ...]
+    figure: Path
+    caption: str
+
+
+HEADINGS = ("orbit", "what happens", "at (rpm)", "largest multiplier")
+_CAPTION = (
+    "The rig of the thesis, path following: angle of the follower once a turn against "
+    "the speed of the cam. Stable orbits solid, unstable ones dashed. P(1,1) hits once "
+    "a turn, P(inf,1) chatters, sticks and is released again."
+)
+
+
+def _interrupted(point) -> bool:
+    """Where the orbit that sticks ends."""
+    return point.kind == "interruption of chattering"
+
+
+def follow_branches(folder: Path) -> Branches:
+    """Follow both branches and draw them.
+
+    Made for a process of its own, beside other work: it takes half a minute to compile.
+    """
+    import equinox as eqx
+    import jax.numpy as jnp
+    import matplotlib
+
+    import continuation
+
+    from ..models import preset, rad_s_to_rpm, rpm_to_rad_s
+    from ._cache import keep_compiled_programs
+
+    keep_compiled_programs()
+    matplotlib.use("Agg")
+    from ..plotting import branch_diagram, save_figure
+
+    def speed(system):
+        return system.speed
+
+    rig = eqx.tree_at(speed, preset("calibrated"), jnp.asarray(rpm_to_rad_s(_AT_RPM)))
+    starts = (
+        continuation.periodic_orbits(rig, jnp.asarray(_NEAR), 1),
+        continuation.periodic_orbits(rig, continuation.periodic_orbit(rig)),
+    )
+    branches = [
+        continuation.branch(
+            start.problem,
+            start,
+            speed,
+            (float(rpm_to_rad_s(low)), float(rpm_to_rad_s(high))),
+            direction="both",
+            callbacks=[_interrupted],
+        )
+        for start, (low, high) in zip(starts, _BOUNDS)
+    ]
+    rows = []
+    for name, branch in zip(("P(1,1)", "P(inf,1)"), branches):
+        for point in branch.special:
+            largest = max(abs(m) for m in point.multipliers)
+            rpm = float(rad_s_to_rpm(point.parameter))
+            rows.append((name, str(point.kind), f"{rpm:.6f}", f"{largest:.4g}"))
+    figure = branch_diagram(
+        branches,
+        x_label=("speed", "rpm"),
+        y_label=("angle of the follower", "rad"),
+        x_scale=float(rad_s_to_rpm(1.0)),
+    )
+    file = save_figure(figure, folder / "branches.png")
+    return Branches(tuple(rows), file, _CAPTION)

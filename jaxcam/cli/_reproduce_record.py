@@ -1,0 +1,119 @@
+"""What has been reproduced, on disk: a file a target, complete or not there."""
+
+import dataclasses
+import json
+import math
+import os
+import time
+from pathlib import Path
+from typing import Any
+
+from ..models import CamFollower
+from ..thesis import reproduce, TARGETS
+from ..thesis._registry import Size
+from ._output import to_text
+
+
+@dataclasses.dataclass(frozen=True)
+class Settings:
+    """What decides a result, besides its target."""
+
+    version: str
+    preset: str
+    size: Size
+
+    @staticmethod
+    def of(preset: str, size: Size) -> "Settings":
+        from importlib.metadata import version
+
+        return Settings(version("jaxcam"), preset, size)
+
+
+@dataclasses.dataclass(frozen=True)
+class Record:
+    """One target: its numbers and how long they took (s), or why there are none."""
+
+    name: str
+    settings: Settings
+    seconds: float
+    rows: list[dict[str, Any]]
+    error: str | None = None
+    figure: bool = False
+
+    @property
+    def table(self):
+        """The rows as pandas has them."""
+        import pandas as pd
+
+        numbers = ("printed", "computed", "difference", "relative")
+        table = pd.DataFrame(self.rows, columns=["quantity", *numbers, "unit"])
+        return table.astype(dict.fromkeys(numbers, float))
+
+
+def make(
+    name: str,
+    system: CamFollower,
+    settings: Settings,
+    out: Path | None,
+    keep_going: bool,
+) -> Record:
+    """Compute a target, and draw it where there is a folder for that.
+
+    **Arguments:** `keep_going`: an exception becomes part of the record.
+    """
+    begin, rows, drawn = time.perf_counter(), [], False
+    try:
+        table = reproduce(name, system, settings.size)
+        rows = table.to_dict(orient="records")
+        if out is not None:
+            table.to_csv(out / f"{name}.csv", index=False)
+            drawn = _draw(name, system, settings.size, out)
+        error = None
+    except Exception as problem:
+        if not keep_going:
+            raise
+        error = f"{type(problem).__name__}: {problem}"
+    seconds = time.perf_counter() - begin
+    return Record(name, settings, seconds, rows, error, drawn)
+
+
+def _draw(name: str, system, size: str, out: Path) -> bool:
+    """The figure of a target, where it has one."""
+    from ..plotting import save_figure, style
+    from ._reproduce_figures import DRAWINGS
+
+    if name not in DRAWINGS:
+        return False
+    sized = (size,) if TARGETS[name].sized else ()
+    with style():
+        save_figure(DRAWINGS[name](system, *sized), out / f"{name}.png")
+    return True
+
+
+def write(record: Record, out: Path | None) -> None:
+    """Store a record; a run that is killed leaves the old one or the new one."""
+    if out is None:
+        return
+    text = to_text(dataclasses.asdict(record))
+    part = out / f"{record.name}.json.part"
+    part.write_text(text + "\n", encoding="utf-8")
+    os.replace(part, out / f"{record.name}.json")
+
+
+def earlier(out: Path, name: str, settings: Settings) -> Record | None:
+    """The record of a run before with the same settings, if it is complete."""
+    try:
+        found = json.loads((out / f"{name}.json").read_text(encoding="utf-8"))
+        found["settings"] = Settings(**found["settings"])
+        record = Record(**found)
+    except (OSError, ValueError, TypeError, KeyError):
+        return None
+    if record.settings != settings or record.error is not None:
+        return None
+    if record.figure and not (out / f"{name}.png").is_file():
+        return None
+    rows = [
+        {key: math.nan if value is None else value for key, value in row.items()}
+        for row in record.rows
+    ]
+    return dataclasses.replace(record, rows=rows)

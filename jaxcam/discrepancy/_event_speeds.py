@@ -1,0 +1,167 @@
+"""Speeds at which the motion of a cam-follower rig changes.
+
+Where contact is lost for the first time (valve float), where the orbit with one impact
+a turn appears in a fold and where it doubles its period, and where complete chattering
+is interrupted.
+"""
+
+import dataclasses
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from variational import chatter_interruption
+
+from ..fitting import (
+    detachment,
+    ImpactOrbit,
+    one_impact_orbits,
+    orbit_monodromy,
+    orbit_where,
+    SpecialPoint,
+)
+from ..models import float_speed
+from ._with_terms import WithTerms
+
+
+#: what happens at each of the speeds, in their order
+EVENTS = (
+    "valve float",
+    "P(1,1) appears (fold)",
+    "P(1,1) doubles its period (flip)",
+    "chattering is interrupted",
+)
+# Stride of the sum of multipliers on the way along the branch
+_STRIDE = 0.1
+# Where the branch is looked for, and the interruption, as multiples of valve float
+_SEARCH = (1.18, 1.14, 1.22, 1.1, 1.26, 1.32, 1.4)
+_BRACKET = (1.1, 1.4)
+
+
+@dataclasses.dataclass(frozen=True)
+class EventSpeeds:
+    """The four speeds (rad/s) of one system, and what is needed to find those nearby.
+
+    `values`: shape `(4,)`, in the order of `EVENTS`; NaN where one was not found.
+    """
+
+    values: np.ndarray
+    lift: SpecialPoint | None
+    fold: SpecialPoint | None
+    flip: SpecialPoint | None
+
+    def near(self, system: WithTerms) -> "EventSpeeds":
+        """Those of a system that differs a little."""
+        values, found = np.full(4, np.nan), []
+        if self.lift is not None:
+            orbit = self.lift.orbit
+            moved = _at(system, self.lift.parameter)
+            found.append(_lifted(moved, orbit.times[0], orbit.states[0]))
+        else:
+            found.append(None)
+        for point, sign in ((self.fold, 1.0), (self.flip, -1.0)):
+            if point is None:
+                found.append(None)
+                continue
+            moved = _at(system, point.parameter)
+            found.append(_on_line(moved, point.orbit, sign, sign))
+        for k, point in enumerate(found):
+            if point is not None:
+                values[k] = float(point.parameter)
+        if np.isfinite(values[0]):
+            values[3] = _interruption(system, values[0])
+        kept = [
+            p if p is not None and np.isfinite(p.parameter) else None for p in found
+        ]
+        return EventSpeeds(values, *kept)
+
+
+def event_speeds(system: WithTerms) -> EventSpeeds:
+    """Find the four speeds of a rig, at whatever speed it now turns.
+
+    The base is a [`jaxcam.models.CamFollower`][]; terms must not depend on time other
+    than through the phase of the cam.
+    """
+    lift = _float_of(system)
+    if lift is None:
+        return EventSpeeds(np.full(4, np.nan), None, None, None)
+    speed = float(lift.parameter)
+    fold = flip = None
+    for share in _SEARCH:
+        orbits = one_impact_orbits(_at(system, share * speed), lift.orbit.states[0])
+        if orbits:
+            start = SpecialPoint(jnp.asarray(share * speed), orbits[0])
+            fold, flip = (_towards(system, start, sign) for sign in (1.0, -1.0))
+            break
+    return EventSpeeds(np.full(4, np.nan), lift, fold, flip).near(system)
+
+
+def _speed(system):
+    return system.base.speed
+
+
+def _at(system, speed):
+    return eqx.tree_at(_speed, system, jnp.asarray(speed, dtype=float))
+
+
+def _float_of(system: WithTerms) -> SpecialPoint | None:
+    """Valve float, from where the base alone would float."""
+    base = float_speed(system.base)  # pyright: ignore
+    if not (np.isfinite(base.speed) and base.speed > 0):
+        return None
+    moved = _at(system, base.speed)
+    rig = moved.base
+    t = (base.cam_angle - rig.phase) / base.speed
+    angle = rig.contact_angle(rig.cam_angle(t))
+    found = _lifted(moved, t, jnp.stack([angle, jnp.zeros_like(angle)]))
+    return found if np.isfinite(found.parameter) else None
+
+
+def _towards(system, start: SpecialPoint, sign: float) -> SpecialPoint | None:
+    """The fold (+1) or the flip (-1) of the branch through an orbit.
+
+    The sum of the multipliers is monotonic along the branch, also around the fold,
+    where the speed is not; at the two points it is +-(1 + their product).
+    """
+    moved = _at(system, start.parameter)
+    matrix = np.asarray(_monodromy(moved, start.orbit))
+    trace, goal = float(np.trace(matrix)), sign * (1 + float(np.linalg.det(matrix)))
+    point = start
+    for value in np.linspace(trace, goal, 2 + int(abs(goal - trace) / _STRIDE))[1:]:
+        moved = _at(system, point.parameter)
+        point = _on_line(moved, point.orbit, float(value), 0.0)
+    point = _on_line(_at(system, point.parameter), point.orbit, sign, sign)
+    return point if np.isfinite(point.parameter) else None
+
+
+def _interruption(system, lifted: float) -> float:
+    bracket = _BRACKET[0] * lifted, _BRACKET[1] * lifted
+    try:
+        return float(chatter_interruption(system, _speed, bracket))
+    except ValueError:
+        return float("nan")
+
+
+@eqx.filter_jit
+def _lifted(system, t, state) -> SpecialPoint:
+    return detachment(system, _speed, t, state)
+
+
+@eqx.filter_jit
+def _monodromy(system, orbit: ImpactOrbit) -> Float[Array, "2 2"]:
+    return orbit_monodromy(system, orbit)
+
+
+def _on_line(system, orbit: ImpactOrbit, offset: float, slope: float) -> SpecialPoint:
+    """Where the sum of the multipliers is `offset + slope` times their product."""
+    return _compiled(system, orbit, jnp.asarray(offset), jnp.asarray(slope))
+
+
+@eqx.filter_jit
+def _compiled(system, orbit, offset, slope) -> SpecialPoint:
+    def test(matrix):
+        return jnp.trace(matrix) - offset - slope * jnp.linalg.det(matrix)
+
+    return orbit_where(system, _speed, orbit, test)

@@ -1,0 +1,100 @@
+"""What a rig will do, with and without what its model lacked."""
+
+import dataclasses
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from ..fitting import Fit
+from ..models import CamFollower
+from ._diagnosis import Diagnosis, Value
+from ._event_speeds import event_speeds, EVENTS
+from ._with_terms import WithTerms
+
+
+# Rigs drawn from the errors of a fit
+_DRAWS = 12
+
+
+@dataclasses.dataclass(frozen=True)
+class Prediction:
+    """A speed of the cam (rad/s) at which the motion changes.
+
+    `before` and `after`: of the textbook model refitted, and with what it lacked, with
+    the standard errors that those of the fits make; NaN where there is no such speed.
+    """
+
+    name: str
+    before: Value
+    after: Value
+
+
+def predictions(found: Diagnosis, seed: int = 0) -> tuple[Prediction, ...]:
+    """Speeds at which the motion of a cam-follower rig changes, by both its models.
+
+    Valve float, the fold and the flip of P(1,1), and the interruption of complete
+    chattering. Their errors come from rigs drawn from the errors of the fits. The terms
+    that were named are part of the second model, but for those that have a frequency
+    of their own: their motion is not periodic with the cam.
+
+    **Arguments:** a diagnosis, and the `seed` of the rigs that are drawn.
+
+    **Returns:** nothing for a system that is no cam-follower.
+    """
+    if not isinstance(found.after.model(0).system.base, CamFollower):  # pyright: ignore
+        return ()
+    sides = []
+    for fit, present in ((found.before, False), (found.after, True)):
+        sides.append(_speeds(fit, found.names, present, np.random.default_rng(seed)))
+    return tuple(
+        Prediction(name, *(Value(float(v), float(e), "rad/s") for v, e in pair))
+        for name, *pair in zip(EVENTS, *sides)
+    )
+
+
+def _speeds(fit: Fit, names, present: bool, rng) -> list[tuple[float, float]]:
+    """The speeds and their standard errors."""
+    row = np.asarray(fit.point.values[0])
+    free = [fit.problem.names.index(one.name) for one in fit.estimates]
+    best = event_speeds(_system(fit, row, names, present))
+    scale = np.sqrt(np.diag(fit.covariance))
+    root = np.linalg.cholesky(
+        fit.covariance / np.outer(scale, scale) + 1e-12 * np.eye(len(scale))
+    )
+    drawn = []
+    for _ in range(_DRAWS):
+        moved = row.copy()
+        moved[free] += scale * (root @ rng.standard_normal(len(free)))
+        drawn.append(best.near(_system(fit, moved, names, present)).values)
+    errors = [_spread(column) for column in np.array(drawn).T]
+    return [(float(v), e) for v, e in zip(best.values, errors)]
+
+
+def _spread(drawn: np.ndarray) -> float:
+    known = drawn[np.isfinite(drawn)]
+    return float(np.std(known, ddof=1)) if len(known) > 2 else float("nan")
+
+
+def _system(fit: Fit, values: np.ndarray, names, present: bool) -> WithTerms:
+    """The rig with some parameters; terms have no strength where they are absent.
+
+    Both models are of one kind, so that one program serves them.
+    """
+    model = fit.problem.layout.at(jnp.asarray(values))
+    system = model.system
+    assert isinstance(system, WithTerms)
+    terms = tuple(
+        term if present else jax.tree.map(jnp.zeros_like, term)
+        for term in system.terms
+        if term.name in names
+        and term.acts
+        and not any(one.inner for one in term.strengths())
+    )
+    system = WithTerms(system.base, terms)
+    return jax.tree.map(jnp.asarray, eqx.tree_at(_phase, system, 0.0))
+
+
+def _phase(system: WithTerms):
+    return system.base.phase  # pyright: ignore

@@ -1,0 +1,191 @@
+"""Table 5.1 and Figures 5.1, 5.11 and 5.12: what is met over the speed."""
+
+from typing import Any, TYPE_CHECKING
+
+import numpy as np
+
+from .. import sweeps
+from ..models import CamFollower, rad_s_to_rpm, rpm_to_rad_s
+from ._chatter import INTERRUPTION, interruption
+from ._frame import frame
+from ._remember import remembered
+
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+#: cycles at each speed and how many are kept, as section 5.2 prints them
+TURNS, KEEP = 300, 100
+#: rpm between speeds of Figure 5.1 and its ends
+_STEP = {"default": 0.25, "full": 0.1}
+_ENDS = 120.0, 170.0
+#: what the text says of it: sections 5.2.1 and 5.2.2
+_SAID = {
+    (1, "contact", "to"): 125.0,
+    (1, "P(inf,1)", "to"): 152.67,
+    (-1, "P(1,1)", "from"): 135.946,
+    (-1, "P(1,1)", "to"): 152.0,
+    (-1, "P(4,4)", "from"): 157.5,
+}
+#: rpm of Figure 5.11, and how many speeds
+_ZOOM = 152.6, 153.2
+_ZOOMED = {"default": 401, "full": 2001}
+#: Figure 5.12: rpm, starts at each, cycles and how many are kept; how many speeds
+_MONTE_CARLO = 152.0, 160.0
+_STARTS, _MC_TURNS, _MC_KEEP = 20, 100, 50
+_DRAWN = {"default": 161, "full": 801}
+#: box from which its starts are drawn
+BOX = (0.34, -3.0), (0.55, 3.0)
+_NAN = float("nan")
+
+
+@remembered
+def both_ways(system: CamFollower, size: str) -> sweeps.Diagram:
+    """The diagram of Figure 5.1: upwards from contact, and back."""
+    low, high = _ENDS
+    speeds = np.linspace(low, high, round((high - low) / _STEP[size]) + 1)
+    return sweeps.diagram(
+        system,
+        "speed",
+        rpm_to_rad_s(speeds),
+        direction="both",
+        turns=TURNS,
+        keep=KEEP,
+    )
+
+
+def _spans(made: sweeps.Diagram, label: str, way: int) -> list[tuple[float, float]]:
+    """Ranges (rpm) of a label in one direction, the widest first."""
+    found = [
+        (float(rad_s_to_rpm(r.low)), float(rad_s_to_rpm(r.high)))
+        for r in made.ranges()
+        if r.label == label and r.direction == way
+    ]
+    return sorted(found, key=lambda span: span[0] - span[1]) or [(_NAN, _NAN)]
+
+
+def figure_5_1(system: CamFollower, size: str) -> "pd.DataFrame":
+    """Figure 5.1: where each orbit was met, upwards and downwards."""
+    made = both_ways(system, size)
+    rows: list[tuple[str, Any, Any, str]] = []
+    for way, word in ((1, "upwards"), (-1, "downwards")):
+        for label in ("contact", "P(inf,1)", "P(1,1)", "P(2,2)", "P(4,4)"):
+            low, high = _spans(made, label, way)[0]
+            if np.isfinite(low):
+                for end, value in (("from", low), ("to", high)):
+                    printed = _SAID.get((way, label, end), _NAN)
+                    rows.append((f"{word}: {label} {end}", printed, value, "rpm"))
+    return frame(rows)
+
+
+def table_5_1(system: CamFollower, size: str) -> "pd.DataFrame":
+    """Table 5.1, the simulated column, read off the diagram of Figure 5.1.
+
+    Contact and what follows from it belong to the way up, as does the beginning of
+    aperiodic motion; orbits with one impact a turn are met on the way down. The
+    chattering route to chaos begins behind the last speed with P(inf,1) and ends,
+    with the chaos it leads to, at the first speed of the way up from which the motion
+    is on the period-doubling cascade. The two printed rows are not told apart here.
+    """
+    made = both_ways(system, size)
+    contact = _spans(made, "contact", 1)[0]
+    sticking = _spans(made, "P(inf,1)", 1)[0]
+    one, two = _spans(made, "P(1,1)", -1)[0], _spans(made, "P(2,2)", -1)[0]
+    up = made.direction == 1
+    speeds = np.asarray(rad_s_to_rpm(made.values))[up]
+    labels = made.labels[up, 0]
+    behind = speeds > sticking[1]
+    cascade = {f"P({2**k},{2**k})" for k in range(1, 5)}
+    settled = speeds[behind & np.isin(labels, list(cascade))]
+    end = settled.min() if len(settled) else _NAN
+    route = speeds[behind & (speeds < end)]
+    first, last = (route.min(), route.max()) if len(route) else (_NAN, _NAN)
+    return frame(
+        [
+            ("permanent contact, to", 125.0, contact[1], "rpm"),
+            ("detachment", 125.0, sticking[0], "rpm"),
+            ("P(inf,1), from", 125.0, sticking[0], "rpm"),
+            ("P(inf,1), to", 152.0, sticking[1], "rpm"),
+            ("chattering route to chaos, from", 152.6, first, "rpm"),
+            ("chaos, to", 154.5, last, "rpm"),
+            ("P(1,1), from", 135.0, one[0], "rpm"),
+            ("P(1,1), to", 151.0, one[1], "rpm"),
+            ("P(2,2), from", 152.0, two[0], "rpm"),
+            ("P(2,2) and its doublings, to", 170.0, _last_cascade(made), "rpm"),
+            ("P(2,2) itself, to", _NAN, two[1], "rpm"),
+        ]
+    )
+
+
+def _last_cascade(made: sweeps.Diagram) -> float:
+    """Highest speed (rpm) of the way down with an orbit of the doubling cascade."""
+    down = made.direction == -1
+    labels = made.labels[down, 0]
+    wanted = np.isin(labels, [f"P({2**k},{2**k})" for k in range(1, 5)])
+    speeds = np.asarray(rad_s_to_rpm(made.values))[down]
+    return float(speeds[wanted].max()) if np.any(wanted) else _NAN
+
+
+@remembered
+def onset(system: CamFollower, size: str) -> sweeps.Diagram:
+    """The diagram of Figure 5.11, each speed from contact at rest."""
+    speeds = np.linspace(*_ZOOM, _ZOOMED[size])
+    return sweeps.diagram(system, "speed", rpm_to_rad_s(speeds), turns=TURNS, keep=KEEP)
+
+
+def figure_5_11(system: CamFollower, size: str) -> "pd.DataFrame":
+    """Figure 5.11: where P(inf,1) ends, and the windows behind it."""
+    made = onset(system, size)
+    speeds = np.asarray(rad_s_to_rpm(made.values))
+    labels = made.labels[:, 0]
+    sticks = labels == "P(inf,1)"
+    first = speeds[~sticks].min() if np.any(~sticks) else _NAN
+    behind = labels[speeds >= first]
+    repeats = np.char.startswith(behind.astype(str), "P(")
+    changes = int(np.count_nonzero(np.diff(repeats.astype(int))))
+    exact = rad_s_to_rpm(interruption(system).speed)
+    return frame(
+        [
+            ("first speed without P(inf,1)", 152.67, first, "rpm"),
+            ("interruption", INTERRUPTION, exact, "rpm"),
+            ("part of the speeds behind it that repeat", _NAN, np.mean(repeats), ""),
+            ("changes between windows and chaos", _NAN, changes, ""),
+        ]
+    )
+
+
+@remembered
+def monte_carlo(system: CamFollower, size: str) -> sweeps.Diagram:
+    """The diagram of Figure 5.12, with starts drawn anew at each speed."""
+    speeds = np.linspace(*_MONTE_CARLO, _DRAWN[size])
+    states = sweeps.monte_carlo(*BOX, _STARTS, 0, len(speeds))
+    return sweeps.diagram(
+        system,
+        "speed",
+        rpm_to_rad_s(speeds),
+        states,
+        turns=_MC_TURNS,
+        keep=_MC_KEEP,
+    )
+
+
+def figure_5_12(system: CamFollower, size: str) -> "pd.DataFrame":
+    """Figure 5.12: which orbits the random starts end on, and where."""
+    made = monte_carlo(system, size)
+    speeds = np.asarray(rad_s_to_rpm(made.values))
+    rows: list[tuple[str, Any, Any, str]] = []
+    cascades = {
+        "sticking orbit": ("P(inf,1)",),
+        "orbit with one impact a turn, doubled": ("P(2,2)", "P(4,4)", "P(8,8)"),
+        "orbit with three turns, or doubled": ("P(3,3)", "P(6,6)", "P(12,12)"),
+    }
+    met = 0
+    for name, labels in cascades.items():
+        where = speeds[np.any(np.isin(made.labels, labels), axis=1)]
+        met += bool(len(where))
+        low, high = (where.min(), where.max()) if len(where) else (_NAN, _NAN)
+        rows.append((f"{name}: lowest speed", _NAN, low, "rpm"))
+        rows.append((f"{name}: highest speed", _NAN, high, "rpm"))
+    rows.insert(0, ("coexisting cascades", 3, met, ""))
+    return frame(rows)

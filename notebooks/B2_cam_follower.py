@@ -1,0 +1,78 @@
+# ---
+# jupyter:
+#   jupytext:
+#     text_representation:
+#       extension: .py
+#       format_name: light
+# ---
+
+# # B2. One impact a turn: the cam-follower
+#
+# Between 136 and 152 rpm the rig of the thesis (chapter 5) has a motion with one impact
+# in every turn of the cam. It is born at a fold, beside the motion that sticks, and
+# doubles its period at a flip. The derivative of either speed by any other parameter
+# comes from the implicit function theorem, without following anything again: what a
+# stiffer spring would do.
+
+# +
+import equinox as eqx
+import jax.numpy as jnp
+import matplotlib.pyplot as plt
+import numpy as np
+
+import continuation
+from jaxcam.models import preset, rad_s_to_rpm, rpm_to_rad_s
+from jaxcam.plotting import branch_diagram
+
+
+# -
+
+# ## The branch
+
+
+# +
+def speed(s):
+    return s.speed
+
+
+rig = eqx.tree_at(speed, preset("calibrated"), jnp.asarray(rpm_to_rad_s(145.0)))
+start = continuation.periodic_orbits(rig, np.array([0.4245, 1.828]), 1)
+family = continuation.branch(
+    start.problem,
+    start,
+    speed,
+    (rpm_to_rad_s(130.0), rpm_to_rad_s(154.0)),
+    direction="both",
+)
+figure = branch_diagram(
+    family,
+    x_scale=float(rad_s_to_rpm(1.0)),
+    x_label=("speed", "rpm"),
+    y_label=("follower angle once a turn", "rad"),
+)
+# -
+
+# ## What moves its ends
+
+# +
+for point in family.special:
+    by = continuation.sensitivity(point, speed)
+    print(f"{point.kind} at {rad_s_to_rpm(point.parameter):.3f} rpm moves by")
+    print(f"  {float(rad_s_to_rpm(by.stiffness)):8.3f} rpm a N/m of the spring")
+    print(
+        f"  {float(rad_s_to_rpm(by.profile.eccentricity)) / 1e3:8.3f} rpm a mm "
+        "of the cam's eccentricity"
+    )
+# -
+
+# Flight is conservative, so the two multipliers of every orbit of the branch have the
+# product r squared. The thesis' Table 5.2 prints ten such pairs, and they gave the law
+# of restitution that it does not print.
+
+# +
+for point in family.regular[:: len(family.regular) // 5]:
+    r = float(rig.restitution(jnp.asarray(point.parameter), jnp.zeros(())))
+    product = float(np.prod(point.multipliers).real)
+    print(f"{rad_s_to_rpm(point.parameter):7.2f} rpm: {product:.9f} = {r * r:.9f}")
+    assert abs(product - r * r) < 1e-7
+plt.show()

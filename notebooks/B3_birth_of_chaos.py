@@ -1,0 +1,201 @@
+# ---
+# jupyter:
+#   jupytext:
+#     text_representation:
+#       extension: .py
+#       format_name: light
+# ---
+
+# # B3. The birth of chaos
+#
+# The thesis' main finding, in its chapter 6. Below 152.67 rpm the follower chatters to
+# rest once a turn, rides on the cam and is released, and so every turn is like the last
+# one. Above, the moment of release comes before the chatter has ended: there is no rest
+# any more, and the motion is chaotic at once, without a period doubling. The theory
+# fits on a page and is in `docs/chatter.md`; here it is drawn.
+
+# +
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import matplotlib.pyplot as plt
+import numpy as np
+
+import continuation
+import jaxcam
+import variational
+from jaxcam.hybrid import stroboscope
+from jaxcam.models import preset, rad_s_to_rpm, rpm_to_rad_s
+from jaxcam.plotting import (
+    beta_lobes,
+    cobweb,
+    lambda_cobweb,
+    lobe_scaling,
+    style,
+)
+
+
+def speed(s):
+    return s.speed
+
+
+def at(value):
+    return eqx.tree_at(speed, rig, jnp.asarray(value))
+
+
+rig = preset("calibrated")
+# -
+
+# ## Where chattering is interrupted
+#
+# The impacts accumulate exactly at the release. As an equation for the speed this has a
+# root that ordinary methods miss (the time of rest falls to zero like a power), so a
+# smooth measure of it is solved.
+
+bracket = (rpm_to_rad_s(150.0), rpm_to_rad_s(154.0))
+critical = continuation.chatter_interruption(rig, speed, bracket)
+print(f"complete chattering ends at {rad_s_to_rpm(critical):.5f} rpm")
+
+# The gap shortly before the release, a little below and a little above that speed. The
+# gaps shrink so fast that only their cube roots can be seen.
+
+# +
+frame = variational.chatter_frame(at(critical))
+period = float(at(critical).period)
+
+with style():
+    figure, panels = plt.subplots(2, 1, figsize=(6.4, 4.2), layout="constrained")
+    for ax, shift, name in zip(panels, (-0.3, 0.3), ("below", "above")):
+        near = at(critical + rpm_to_rad_s(shift))
+        run = jaxcam.simulate(near, None, 0.0, 2.2 * period)
+        release = float(variational.chatter_frame(near).release)
+        end = release + float(near.period) * np.ceil((0.6 * period - release) / period)
+        times = np.linspace(end - 0.06, end + 0.04, 4000)
+        gaps = np.asarray(run.gap(times))
+        ax.plot(1e3 * (times - end), np.cbrt(np.maximum(gaps, 0.0)))
+        ax.axvline(0.0, color="black", lw=0.8, ls=":")
+        ax.set_ylabel("cube root of gap")
+        ax.set_title(f"{rad_s_to_rpm(near.speed):.2f} rpm, {name}", loc="left")
+    panels[-1].set_xlabel("time from release (ms)")
+# -
+
+# ## From impact to impact: the lambda-map
+#
+# Near release the acceleration that presses the follower onto the cam is $c\tau$, with
+# $\tau$ the time from release. In $\lambda = u/(c\tau^2)$, with $u$ the rebound speed,
+# one hop is a map of one variable that knows nothing but the restitution $r$. Its fixed
+# point is unstable: from below it the impacts complete in time, from above they are too
+# fast, come to $\lambda > 3/8$, and do not come back.
+
+# +
+r = float(frame.restitution)
+law = variational.scaling_law(r)
+print(
+    f"r = {r:.4f}: lambda_bar = {law.lambda_bar:.5f}, p = {law.p:.4f}, q = {law.q:.4f}"
+)
+with style():
+    figure, (left, right) = plt.subplots(
+        1, 2, figsize=(10, 4.2), width_ratios=(2, 3), layout="constrained"
+    )
+lambda_cobweb(r, left)
+
+# All remaining impacts in one function: what an interrupted sequence leaves over. One
+# impact is moved by a little, and the motion itself followed to the end of the turn.
+
+composed = variational.composed_map(at(critical), speed, 36)
+corners = [3 / 8]
+for _ in range(8):
+    corners.append(float(variational.lambda_inverse(corners[-1], r)))
+share = np.linspace(0.01, 0.99, 40) ** 2
+deviation = np.array([a + share * (b - a) for a, b in zip(corners, corners[1:])])
+deviation -= float(law.lambda_bar)
+moved = variational.simulated_at_section(
+    at(critical), composed, deviation.ravel() / float(composed.covector[0])
+)
+left_over = np.asarray(moved.velocity).reshape(deviation.shape)
+left_over = left_over - float(composed.relative[1])
+scale = float(composed.tau) ** 2 * float(composed.relative_vector[1])
+simulated = left_over / scale
+few = slice(0, 4)
+drawn = beta_lobes(r, right, measured=(deviation[few].ravel(), simulated[few].ravel()))
+# -
+
+# Each lobe is narrower by $q$ and lower by $p^2$ than the next one outside it. So their
+# heights follow a power law with $\kappa = 2\ln p/\ln q$, which the motion obeys over
+# two decades.
+
+depth = np.max(np.abs(simulated), axis=1)
+exponent = np.polyfit(np.log(deviation[2:, 0]), np.log(depth[2:]), 1)[0]
+print(f"kappa = {law.kappa:.4f} in theory, {exponent:.4f} in the motion")
+assert abs(exponent / float(law.kappa) - 1) < 0.02
+drawn = lobe_scaling(deviation[:, 0], depth, float(law.kappa))
+
+# ## A turn as a map, and what it iterates to
+#
+# All motions leave the lobes along one line, so once a turn the state is a number, and
+# a turn is a map of that number (section 5.4 of the thesis). It is measured at the
+# interruption, by following 900 states through a turn: flat where the chattering
+# completes, lobes where it does not. The speed moves the map sideways; the fixed point
+# then leaves the flat part and falls among lobes that are steeper than one. That is how
+# chaos is born.
+
+# +
+interrupted = at(critical)
+start = composed.state
+along = composed.vector / composed.vector[0]
+
+
+@jax.jit
+@jax.vmap
+def turn(deviation):
+    return variational.section_turn(interrupted, start + deviation * along).state
+
+
+inside = np.geomspace(1e-6, 1e-3, 900)
+points = np.concatenate([[-1e-3, 0.0], inside])
+images = np.asarray(turn(points)[:, 0] - start[0])
+rate = composed.incidence * composed.vector[0] / composed.feedback
+print(f"the map moves by {rate * rpm_to_rad_s(1.0):.6f} rad / rpm")
+
+
+def moved_map(deviation, shift):
+    return np.interp(deviation + shift, points, images)
+
+
+# the motion itself, and the map, moved as the theory says
+rpm = np.linspace(-0.02, 0.15, 171)
+beyond = np.asarray(rpm_to_rad_s(rpm))
+motion = stroboscope(
+    rig, start, 200, skip=160, where=speed, values=float(critical) + beyond
+)
+iterated = np.zeros((200, len(rpm)))
+for k in range(199):
+    iterated[k + 1] = moved_map(iterated[k], float(rate) * beyond)
+
+shift = float(rate) * float(rpm_to_rad_s(0.1))
+micro = 1e6  # rad to microrad
+
+
+def turn_in_microrad(x):
+    return jnp.asarray(micro * moved_map(np.asarray(x) / micro, shift))
+
+
+with style():
+    figure, (left, right) = plt.subplots(1, 2, figsize=(10, 4.4), layout="constrained")
+    cobweb(turn_in_microrad, 0.0, 60, left, skip=30)
+    deviation = micro * (motion.states[:, :, 0] - float(start[0]))
+    right.plot(np.repeat(rpm, 40), deviation.ravel(), ",", color="C1")
+    right.plot(np.repeat(rpm, 40), micro * iterated[160:].T.ravel(), ",", color="C0")
+    right.plot([], [], "C1.", label="motion")
+    right.plot([], [], "C0.", label="map")
+    right.legend(loc="upper left")
+    left.set(xlabel="deviation (µrad)", ylabel="one turn later (µrad)")
+    right.set(xlabel="speed beyond the interruption (rpm)", ylabel="deviation (µrad)")
+
+widths = np.ptp(motion.states[:, :, 0], axis=1)
+predicted = np.ptp(iterated[160:], axis=0)
+for nearest in (-0.01, 0.05, 0.1):
+    k = int(np.argmin(abs(rpm - nearest)))
+    print(f"{rpm[k]:+.3f} rpm: width {widths[k]:.2e} rad, map {predicted[k]:.2e} rad")
+assert widths[rpm < -0.005].max() < 1e-9 < 1e-5 < widths[rpm > 0.05].min()
+plt.show()
