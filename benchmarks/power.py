@@ -6,7 +6,7 @@ with the diagnosis. Strengths are multiples of the least one that a diagnosis of
 same kind of records says it would name. Prints a table and keeps each verdict in a file
 of JSON lines, from which an interrupted run goes on.
 
-    python -m benchmarks.power --nulls 200
+    python -m benchmarks.power --nulls 200 --first 200
     python -m benchmarks.power --effects --draws 10
     python -m benchmarks.power --unlisted --draws 10
 """
@@ -108,8 +108,9 @@ def _key(one: dict) -> tuple[str, float, int]:
     return one["effect"], one["strength"], one["number"]
 
 
-def nulls(kept: Kept, count: int) -> None:
-    cases = [kept.get("none", 0.0, number) for number in range(count)]
+def nulls(kept: Kept, count: int, first: int) -> None:
+    numbers = range(first, first + count)
+    cases = [kept.get("none", 0.0, number) for number in numbers]
     wrong = [one for one in cases if one["verdict"] != "none"]
     print(f"nulls: {len(wrong)} of {count} are not `none`")
     for one in wrong:
@@ -158,6 +159,7 @@ def unlisted(kept: Kept, draws: int) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--nulls", type=int, default=0)
+    parser.add_argument("--first", type=int, default=0, help="number of the first null")
     parser.add_argument("--effects", nargs="*", choices=EFFECTS)
     parser.add_argument("--unlisted", action="store_true")
     parser.add_argument("--draws", type=int, default=10)
@@ -165,7 +167,7 @@ def main() -> None:
     options = parser.parse_args()
     kept = Kept(options.file)
     if options.nulls:
-        nulls(kept, options.nulls)
+        nulls(kept, options.nulls, options.first)
     if options.effects is not None:
         powers(kept, options.draws, options.effects or list(EFFECTS))
     if options.unlisted:

@@ -110,7 +110,7 @@ def demo(
         "diagnosis": None if lacks is None else lacks.to_json(),
     }
     report_of = Report(
-        title=f"Recording beside simulation: {runs.name}",
+        title=f"{runs.name}: recordings, simulation, and what lies between",
         sentence=comparison.sentence(),
         lacks=None if lacks is None else lacks.summary,
         branches=paths,

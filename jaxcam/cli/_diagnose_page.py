@@ -37,7 +37,7 @@ def draw(folder: Path, found: Diagnosis) -> list[tuple[Path, str]]:
 
 
 _UNSEEN = (
-    "Residuals on records that no parameter has seen, one flight ahead: the textbook "
+    "Residuals on a record that no parameter has seen, one flight ahead: the textbook "
     "model refitted to the other records (above), and with what was found (below). The "
     "band is twice the noise on either side."
 )
@@ -56,8 +56,10 @@ _RANKING = "How much worse other explanations are, by their BIC (a logarithmic s
 
 def _unseen(plt, found: Diagnosis):
     before, after = found.unseen
-    figure, axes = plt.subplots(2, 1, figsize=(8.5, 4.6), sharex=True, sharey=True)
-    name = before[0].record
+    figure, axes = plt.subplots(
+        2, 1, figsize=(8.5, 4.6), sharex=True, sharey=True, layout="constrained"
+    )
+    name = max(zip(before, after), key=_improvement)[0].record
     for axis, parts, label in zip(
         axes, (before, after), ("textbook model, refitted", "with what was found")
     ):
@@ -77,8 +79,15 @@ def _unseen(plt, found: Diagnosis):
         axis.set_title(f"{name}: {label}")
         axis.set_ylabel("residual (mrad)")
     axes[-1].set_xlabel("time (s)")
-    axes[0].legend(markerscale=6, loc="upper right")
+    handles, labels = axes[0].get_legend_handles_labels()
+    figure.legend(handles, labels, markerscale=6, ncols=2, loc="outside upper right")
     return figure
+
+
+def _improvement(pair: tuple[Residuals, Residuals]) -> float:
+    """Ratio of the mean squares of a record before and after."""
+    before, after = (float(np.mean(part.value**2)) for part in pair)
+    return before / max(after, 1e-300)
 
 
 def _maps(plt, found: Diagnosis):

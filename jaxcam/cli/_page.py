@@ -83,9 +83,10 @@ def page(report: Report) -> str:
     """The page as text; nothing in it is loaded from elsewhere."""
     parts = [
         f"<h1>{escape(report.title)}</h1>",
+        *_lacks(report.lacks),
+        "<h2>Recording beside simulation</h2>",
         # one idea a line is easier to take in than a paragraph of numbers
         *(f'<p class="sentence">{escape(s)}</p>' for s in _split(report.sentence)),
-        *_lacks(report.lacks),
         *_branches(report.branches),
         "<h2>Residuals by mode</h2>",
         _table(_MODES, [_cells(row) for row in report.comparison], text=(0, 6)),

@@ -113,10 +113,11 @@ def _float_of(system: WithTerms) -> SpecialPoint | None:
         return None
     moved = _at(system, base.speed)
     rig = moved.base
-    t = (base.cam_angle - rig.phase) / base.speed
+    sense = -1.0 if rig.rotation == "clockwise" else 1.0
+    t = (sense * base.cam_angle - rig.phase) / base.speed
     angle = rig.contact_angle(rig.cam_angle(t))
     found = _lifted(moved, t, jnp.stack([angle, jnp.zeros_like(angle)]))
-    return found if np.isfinite(found.parameter) else None
+    return found if found.parameter > 0 else None
 
 
 def _towards(system, start: SpecialPoint, sign: float) -> SpecialPoint | None:
