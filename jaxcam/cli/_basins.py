@@ -6,6 +6,17 @@ from typing import Annotated
 import typer
 
 from ._choices import CAM, choose, make_system, saved_name, SYSTEMS
+from ._options import (
+    Cluster,
+    JsonFile,
+    Preset,
+    Resume,
+    SavedSystem,
+    Settings,
+    Speed,
+    System,
+    Workers,
+)
 
 
 _FILE = "basins.zarr"
@@ -17,9 +28,7 @@ _BOXES = {
 
 
 def basins(
-    system: Annotated[
-        str, typer.Argument(metavar="SYSTEM", help=f"One of {', '.join(SYSTEMS)}.")
-    ] = CAM,
+    system: System = CAM,
     low: Annotated[
         str | None, typer.Option(metavar="A,B", help="Lowest state of the grid.")
     ] = None,
@@ -43,50 +52,18 @@ def basins(
             "as many turns.",
         ),
     ] = 1,
-    speed: Annotated[
-        float | None, typer.Option(metavar="RPM", help="Speed of the cam in rpm.")
-    ] = None,
-    saved: Annotated[
-        Path | None,
-        typer.Option(
-            "--system",
-            metavar="FILE",
-            help="A system that `jaxcam fit` or `diagnose` wrote.",
-        ),
-    ] = None,
-    preset: Annotated[
-        str | None,
-        typer.Option(metavar="NAME", help="The cam-follower: table-4.4 or calibrated."),
-    ] = None,
-    set_: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--set",
-            metavar="NAME=VALUE",
-            help="A parameter in SI units, such as restitution.r=0.6; repeatable.",
-        ),
-    ] = None,
-    workers: Annotated[
-        int | None, typer.Option(metavar="N", help="Threads, or local processes.")
-    ] = None,
-    cluster: Annotated[
-        str | None,
-        typer.Option(
-            metavar="ADDRESS", help="local, or tcp://host:port of a Dask scheduler."
-        ),
-    ] = None,
-    json_file: Annotated[
-        Path | None,
-        typer.Option("--json", metavar="FILE", help="Write the result; - to print it."),
-    ] = None,
+    speed: Speed = None,
+    saved: SavedSystem = None,
+    preset: Preset = None,
+    set_: Settings = None,
+    workers: Workers = None,
+    cluster: Cluster = None,
+    json_file: JsonFile = None,
     out: Annotated[
         Path | None,
         typer.Option(metavar="DIR", help="Write the basins and their picture there."),
     ] = None,
-    resume: Annotated[
-        bool,
-        typer.Option("--resume", help="Go on with what a stopped run left in DIR."),
-    ] = False,
+    resume: Resume = False,
 ) -> None:
     """
     Find the attractors, and which initial states end on each.

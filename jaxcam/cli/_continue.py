@@ -7,6 +7,16 @@ from typing import Annotated, Any
 import typer
 
 from ._choices import CAM, choose, make_system, saved_name, SYSTEMS
+from ._options import (
+    Highest,
+    JsonFile,
+    Lowest,
+    Preset,
+    Resume,
+    SavedSystem,
+    Settings,
+    System,
+)
 
 
 ALGORITHMS = {
@@ -19,9 +29,7 @@ _FILE = "branch.jsonl"
 
 
 def continue_(
-    system: Annotated[
-        str, typer.Argument(metavar="SYSTEM", help=f"One of {', '.join(SYSTEMS)}.")
-    ] = CAM,
+    system: System = CAM,
     parameter: Annotated[
         str,
         typer.Option(
@@ -30,40 +38,17 @@ def continue_(
             "profile.eccentricity.",
         ),
     ] = "speed",
-    low: Annotated[
-        float | None,
-        typer.Option("--from", metavar="A", help="Its lowest value (rpm for speed)."),
-    ] = None,
-    high: Annotated[
-        float | None,
-        typer.Option("--to", metavar="B", help="Its highest value (rpm for speed)."),
-    ] = None,
+    low: Lowest = None,
+    high: Highest = None,
     at: Annotated[
         float | None,
         typer.Option(
             metavar="P", help="Its value at the start; without, that of the system."
         ),
     ] = None,
-    preset: Annotated[
-        str | None,
-        typer.Option(metavar="NAME", help="Parameters of the cam-follower: table-4.4."),
-    ] = None,
-    saved: Annotated[
-        Path | None,
-        typer.Option(
-            "--system",
-            metavar="FILE",
-            help="A system that `jaxcam fit` or `jaxcam diagnose` has written.",
-        ),
-    ] = None,
-    set_: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--set",
-            metavar="NAME=VALUE",
-            help="Another parameter, in SI units: restitution.r=0.6; repeatable.",
-        ),
-    ] = None,
+    preset: Preset = None,
+    saved: SavedSystem = None,
+    set_: Settings = None,
     state: Annotated[
         str | None,
         typer.Option(
@@ -85,21 +70,12 @@ def continue_(
     max_points: Annotated[
         int, typer.Option(metavar="N", help="Points in each direction.")
     ] = 300,
-    json_file: Annotated[
-        Path | None,
-        typer.Option("--json", metavar="FILE", help="Write the result; - to print it."),
-    ] = None,
+    json_file: JsonFile = None,
     out: Annotated[
         Path | None,
         typer.Option(metavar="DIR", help="Write the branch and its figure there."),
     ] = None,
-    resume: Annotated[
-        bool,
-        typer.Option(
-            "--resume",
-            help="Go on with the branch that a stopped run left in DIR.",
-        ),
-    ] = False,
+    resume: Resume = False,
 ) -> None:
     """
     Follow a periodic orbit in a parameter; list its bifurcations.

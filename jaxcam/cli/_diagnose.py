@@ -1,26 +1,18 @@
 """`jaxcam diagnose`: what physics a rig's model leaves out, from its recordings."""
 
+import shutil
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from ._options import Case, Gaps, Resume, RigFile
+
 
 def diagnose(
-    case: Annotated[
-        Path, typer.Argument(metavar="CASE", help="A folder of recordings of one rig.")
-    ],
-    rig: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="The rig; CASE/rig.toml without."),
-    ] = None,
-    gaps: Annotated[
-        str,
-        typer.Option(
-            metavar="NAME",
-            help="Faulty runs: mend them (dropped samples, slips), refuse, or split.",
-        ),
-    ] = "mend",
+    case: Case,
+    rig: RigFile = None,
+    gaps: Gaps = "mend",
     seed: Annotated[int, typer.Option(help="Of the redrawn stretches.")] = 0,
     predict: Annotated[
         bool,
@@ -28,6 +20,7 @@ def diagnose(
             help="Speeds at which the motion changes, with and without what was found."
         ),
     ] = True,
+    resume: Resume = False,
     json_file: Annotated[
         Path | None,
         typer.Option("--json", metavar="FILE", help="The verdict; - prints it."),
@@ -47,6 +40,7 @@ def diagnose(
     Examples:
       jaxcam diagnose ./case --rig rig.toml --out ./jaxcam-diagnosis
       jaxcam diagnose ./case --json -
+      jaxcam diagnose ./case --out ./jaxcam-diagnosis --resume
     """
     from ._choices import choose
 
@@ -65,10 +59,23 @@ def diagnose(
     runs = read_case(case, gaps=gaps)  # pyright: ignore
     nominal = read_rig(_rig_file(case, rig))
     output = Output(json_file, out)
+    keep = None if out is None else out / "fits"
+    if resume and (keep is None or not keep.is_dir()):
+        raise ValueError(
+            "--resume: there is nothing to go on with; give --out the folder of a run "
+            "that was stopped."
+        )
+    if keep is not None and not resume:
+        shutil.rmtree(keep, ignore_errors=True)
     notes = dict.fromkeys(n for run in runs for n in run.meta.get("notes", ()))
     with progress("finding impacts and contacts") as report:
         found = discrepancy.diagnose(
-            nominal, tuple(runs), case=runs.name, seed=seed, progress=report
+            nominal,
+            tuple(runs),
+            case=runs.name,
+            seed=seed,
+            progress=report,
+            keep=keep,
         )
         foretold, figures = (), []
         if out is not None:

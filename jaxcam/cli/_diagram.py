@@ -7,6 +7,18 @@ from typing import Annotated
 import typer
 
 from ._choices import CAM, choose, make_system, saved_name, SYSTEMS
+from ._options import (
+    Cluster,
+    Highest,
+    JsonFile,
+    Lowest,
+    Preset,
+    Resume,
+    SavedSystem,
+    Settings,
+    System,
+    Workers,
+)
 
 
 DIRECTIONS = ("each", "up", "down", "both")
@@ -15,23 +27,15 @@ _FILE = "diagram.zarr"
 
 
 def diagram(
-    system: Annotated[
-        str, typer.Argument(metavar="SYSTEM", help=f"One of {', '.join(SYSTEMS)}.")
-    ] = CAM,
+    system: System = CAM,
     parameter: Annotated[
         str,
         typer.Option(
             metavar="NAME", help="The parameter that varies, such as speed or omega."
         ),
     ] = "speed",
-    low: Annotated[
-        float | None,
-        typer.Option("--from", metavar="A", help="Its lowest value (rpm for speed)."),
-    ] = None,
-    high: Annotated[
-        float | None,
-        typer.Option("--to", metavar="B", help="Its highest value (rpm for speed)."),
-    ] = None,
+    low: Lowest = None,
+    high: Highest = None,
     points: Annotated[int, typer.Option(metavar="N", help="How many values.")] = 200,
     turns: Annotated[
         int, typer.Option(metavar="N", help="Forcing periods at each value.")
@@ -69,47 +73,17 @@ def diagram(
         typer.Option("--high", metavar="A,B", help="Highest state of random starts."),
     ] = None,
     seed: Annotated[int, typer.Option(metavar="N", help="Of random starts.")] = 0,
-    saved: Annotated[
-        Path | None,
-        typer.Option(
-            "--system",
-            metavar="FILE",
-            help="A system that `jaxcam fit` or `diagnose` wrote.",
-        ),
-    ] = None,
-    preset: Annotated[
-        str | None,
-        typer.Option(metavar="NAME", help="The cam-follower: table-4.4 or calibrated."),
-    ] = None,
-    set_: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--set",
-            metavar="NAME=VALUE",
-            help="Another parameter, in SI units: restitution.r=0.6; repeatable.",
-        ),
-    ] = None,
-    workers: Annotated[
-        int | None, typer.Option(metavar="N", help="Threads, or local processes.")
-    ] = None,
-    cluster: Annotated[
-        str | None,
-        typer.Option(
-            metavar="ADDRESS", help="local, or tcp://host:port of a Dask scheduler."
-        ),
-    ] = None,
-    json_file: Annotated[
-        Path | None,
-        typer.Option("--json", metavar="FILE", help="Write the result; - to print it."),
-    ] = None,
+    saved: SavedSystem = None,
+    preset: Preset = None,
+    set_: Settings = None,
+    workers: Workers = None,
+    cluster: Cluster = None,
+    json_file: JsonFile = None,
     out: Annotated[
         Path | None,
         typer.Option(metavar="DIR", help="Write the samples and the figure there."),
     ] = None,
-    resume: Annotated[
-        bool,
-        typer.Option("--resume", help="Go on with what a stopped run left in DIR."),
-    ] = False,
+    resume: Resume = False,
 ) -> None:
     """
     Draw where motions settle over a parameter; list what they are.

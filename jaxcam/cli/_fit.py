@@ -5,22 +5,13 @@ from typing import Annotated, Any
 
 import typer
 
+from ._options import Case, Gaps, RigFile
+
 
 def fit(
-    case: Annotated[
-        Path, typer.Argument(metavar="CASE", help="A folder of recordings of one rig.")
-    ],
-    rig: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="The rig; CASE/rig.toml without."),
-    ] = None,
-    gaps: Annotated[
-        str,
-        typer.Option(
-            metavar="NAME",
-            help="Faulty runs: mend them (dropped samples, slips), refuse, or split.",
-        ),
-    ] = "mend",
+    case: Case,
+    rig: RigFile = None,
+    gaps: Gaps = "mend",
     bootstrap: Annotated[
         int,
         typer.Option(

@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from ._choices import choose
+from ._options import JsonFile, Resume
 
 
 #: the rigs, and which of them is meant where nothing is said
@@ -37,10 +38,7 @@ def reproduce(
     list_: Annotated[
         bool, typer.Option("--list", help="Say what there is, and compute nothing.")
     ] = False,
-    json_file: Annotated[
-        Path | None,
-        typer.Option("--json", metavar="FILE", help="Write the result; - to print it."),
-    ] = None,
+    json_file: JsonFile = None,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -48,10 +46,7 @@ def reproduce(
             help="Write numbers and figures there; of all targets, a page as well.",
         ),
     ] = None,
-    resume: Annotated[
-        bool,
-        typer.Option("--resume", help="Go on with what a stopped run left in DIR."),
-    ] = False,
+    resume: Resume = False,
 ) -> None:
     """
     Compute what the thesis prints; show both and the difference.

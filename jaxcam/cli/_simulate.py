@@ -16,35 +16,15 @@ from ._choices import (
     SOLVERS,
     SYSTEMS,
 )
+from ._options import JsonFile, Preset, SavedSystem, Settings, Speed, System
 
 
 def simulate(
-    system: Annotated[
-        str, typer.Argument(metavar="SYSTEM", help=f"One of {', '.join(SYSTEMS)}.")
-    ] = CAM,
-    saved: Annotated[
-        Path | None,
-        typer.Option(
-            "--system",
-            metavar="FILE",
-            help="A system that `jaxcam fit` or `diagnose` wrote.",
-        ),
-    ] = None,
-    preset: Annotated[
-        str | None,
-        typer.Option(metavar="NAME", help="The cam-follower: table-4.4 or calibrated."),
-    ] = None,
-    speed: Annotated[
-        float | None, typer.Option(metavar="RPM", help="Speed of the cam in rpm.")
-    ] = None,
-    set_: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--set",
-            metavar="NAME=VALUE",
-            help="A parameter in SI units, such as restitution.r=0.6; repeatable.",
-        ),
-    ] = None,
+    system: System = CAM,
+    saved: SavedSystem = None,
+    preset: Preset = None,
+    speed: Speed = None,
+    set_: Settings = None,
     state: Annotated[
         str | None,
         typer.Option(
@@ -80,10 +60,7 @@ def simulate(
             help="loop, or diffeqsolve: one call a flight, also for implicit solvers.",
         ),
     ] = None,
-    json_file: Annotated[
-        Path | None,
-        typer.Option("--json", metavar="FILE", help="Write the result; - to print it."),
-    ] = None,
+    json_file: JsonFile = None,
     out: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Write figures there.")
     ] = None,

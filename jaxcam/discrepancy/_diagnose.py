@@ -3,6 +3,7 @@
 import dataclasses
 import math
 from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 
 import numpy as np
 from scipy.stats import chi2
@@ -23,6 +24,7 @@ from ._diagnosis import Diagnosis, Effect, Value
 from ._drive import Ripple, ripple_of
 from ._engine import value_of
 from ._evidence import held_out, limits, redrawn, sure
+from ._kept_trials import KeptTrials
 from ._search import FALSE_ALARMS, Search, Trial
 from ._structure import Structure, structures
 from ._term import Term, terms_of
@@ -51,6 +53,7 @@ def diagnose(
     case: str = "",
     seed: int = 0,
     progress: Callable[[str, float | None], None] | None = None,
+    keep: Path | None = None,
 ) -> Diagnosis:
     """What physics a model leaves out, from recordings of the real thing.
 
@@ -66,6 +69,8 @@ def diagnose(
         a system that is not a rig; the drive is an input that was measured.
     - `seed`: of the redrawn blocks.
     - `progress`: called with a sentence and a fraction, or `None`.
+    - `keep`: a folder in which fits are kept until the diagnosis is done; one that was
+        interrupted goes on from there.
 
     **Raises:** `RecordingError` for recordings from which nothing can be told, with one
     sentence that says why.
@@ -82,7 +87,8 @@ def diagnose(
         )
         ripple = None
     turned = isinstance(system, Rig) or system_turns(problem)
-    search = Search(problem, rig, terms, report)
+    kept = None if keep is None else KeptTrials(keep, problem)
+    search = Search(problem, rig, terms, report, kept)
     best = search.run()
     report("redrawing stretches of the records", None)
     found = best
@@ -132,6 +138,8 @@ def diagnose(
         for one in left_after
         if one.gain > one.asked and one.foretold <= 0
     ][:1]
+    if kept is not None:
+        kept.clear()
     floor = float(next(iter(problem.model.sensors.values())).floor)
     least = limits(search, best)
     units = {one.name: one.unit for t in terms for one in t.strengths()}

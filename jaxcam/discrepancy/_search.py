@@ -11,6 +11,7 @@ from scipy.stats import chi2, norm
 from ..fitting import Fit, fit, Problem
 from ..fitting._linearise import Point
 from ._engine import added, Blocks, blocks_of, gain
+from ._kept_trials import KeptTrials
 from ._local_force import force_response, Response
 from ._term import Term
 from ._vibration_scan import Periodogram, periodogram
@@ -47,7 +48,8 @@ class Search:
     """All that was tried on one problem.
 
     **Arguments:** the problem, the names of the parameters of the rig (free in every
-    fit), the terms that may be named, and `progress(sentence, fraction)`.
+    fit), the terms that may be named, `progress(sentence, fraction)`, and where fits
+    are kept for a run that is interrupted.
     """
 
     def __init__(
@@ -56,7 +58,9 @@ class Search:
         rig: Sequence[str],
         terms: Sequence[Term],
         progress: Callable[[str, float | None], None],
+        kept: KeptTrials | None = None,
     ):
+        self.kept = kept
         self.problem, self.rig, self.terms = problem, tuple(rig), tuple(terms)
         self.progress = progress
         self.trials: dict[frozenset[str], Trial] = {}
@@ -260,6 +264,9 @@ class Search:
             ended = self._seeded(names, start, start.fit.point)
             nominal = self._seeded(names, start, self.problem.start)
             places = [ended, nominal] if self._sound(start.fit) else [nominal, ended]
+        known = self.kept.get(names) if self.kept is not None else None
+        if known is not None and names not in self.trials:
+            places.insert(0, known)
         found = fit(self.problem, free=free, start=places[0], iterations=iterations)
         least = min((t.fit.cost for t in self.trials.values()), default=math.inf)
         for place in places[1:]:
@@ -274,6 +281,8 @@ class Search:
         trial = Trial(names, found, bic, count)
         if names not in self.trials or bic < self.trials[names].bic:
             self.trials[names] = trial
+            if self.kept is not None:
+                self.kept.put(names, found.point)
             # what was said about the fit before holds no more
             for known in (self.scans, self.responses, self.linear):
                 known.pop(names, None)

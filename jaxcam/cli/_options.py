@@ -1,0 +1,74 @@
+"""Arguments and options that several commands share, each said once."""
+
+from pathlib import Path
+from typing import Annotated, TypeAlias
+
+import typer
+
+from ._choices import SYSTEMS
+
+
+System: TypeAlias = Annotated[
+    str, typer.Argument(metavar="SYSTEM", help=f"One of {', '.join(SYSTEMS)}.")
+]
+SavedSystem: TypeAlias = Annotated[
+    Path | None,
+    typer.Option(
+        "--system",
+        metavar="FILE",
+        help="A system that `jaxcam fit` or `diagnose` wrote.",
+    ),
+]
+Preset: TypeAlias = Annotated[
+    str | None,
+    typer.Option(metavar="NAME", help="The cam-follower: table-4.4 or calibrated."),
+]
+Settings: TypeAlias = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="NAME=VALUE",
+        help="A parameter in SI units, such as restitution.r=0.6; repeatable.",
+    ),
+]
+Speed: TypeAlias = Annotated[
+    float | None, typer.Option(metavar="RPM", help="Speed of the cam in rpm.")
+]
+Lowest: TypeAlias = Annotated[
+    float | None,
+    typer.Option("--from", metavar="A", help="Its lowest value (rpm for speed)."),
+]
+Highest: TypeAlias = Annotated[
+    float | None,
+    typer.Option("--to", metavar="B", help="Its highest value (rpm for speed)."),
+]
+Workers: TypeAlias = Annotated[
+    int | None, typer.Option(metavar="N", help="Threads, or local processes.")
+]
+Cluster: TypeAlias = Annotated[
+    str | None,
+    typer.Option(
+        metavar="ADDRESS", help="local, or tcp://host:port of a Dask scheduler."
+    ),
+]
+JsonFile: TypeAlias = Annotated[
+    Path | None,
+    typer.Option("--json", metavar="FILE", help="Write the result; - to print it."),
+]
+Resume: TypeAlias = Annotated[
+    bool,
+    typer.Option("--resume", help="Go on with what a stopped run left in DIR."),
+]
+Case: TypeAlias = Annotated[
+    Path, typer.Argument(metavar="CASE", help="A folder of recordings of one rig.")
+]
+RigFile: TypeAlias = Annotated[
+    Path | None, typer.Option(metavar="FILE", help="The rig; CASE/rig.toml without.")
+]
+Gaps: TypeAlias = Annotated[
+    str,
+    typer.Option(
+        metavar="NAME",
+        help="Faulty runs: mend them (dropped samples, slips), refuse, or split.",
+    ),
+]

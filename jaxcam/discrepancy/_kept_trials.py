@@ -1,0 +1,73 @@
+"""Fits of a diagnosis on disk, from which one that was interrupted goes on."""
+
+import hashlib
+import os
+import shutil
+import zipfile
+from collections.abc import Iterable
+from pathlib import Path
+
+import jax.numpy as jnp
+import numpy as np
+
+from ..fitting import Problem
+from ..fitting._linearise import Point
+
+
+class KeptTrials:
+    """Where the fit of each subset of terms ended, one small file a subset.
+
+    A file counts only for the same recordings, parameters and rig; one that was cut off
+    while it was written, or that belongs to another problem, is passed over.
+
+    **Arguments:** the folder, made when something is kept, and the problem.
+    """
+
+    def __init__(self, folder: Path, problem: Problem):
+        self.folder, self.mark = folder, _mark_of(problem)
+
+    def get(self, names: Iterable[str]) -> Point | None:
+        """Where a fit ended, or `None`."""
+        try:
+            with (
+                self._file(names).open("rb") as stream,
+                np.load(stream, allow_pickle=False) as found,
+            ):
+                if str(found["mark"]) != self.mark:
+                    return None
+                values, states = found["values"], found["states"]
+        except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+            return None
+        return Point(jnp.asarray(values), jnp.asarray(states))
+
+    def put(self, names: Iterable[str], point: Point) -> None:
+        """Keep where a fit ended; the file is whole or absent."""
+        self.folder.mkdir(parents=True, exist_ok=True)
+        file = self._file(names)
+        part = file.with_suffix(f".{os.getpid()}.part")
+        with part.open("wb") as stream:
+            np.savez(
+                stream,
+                mark=np.array(self.mark),
+                values=np.asarray(point.values),
+                states=np.asarray(point.states),
+            )
+        os.replace(part, file)
+
+    def clear(self) -> None:
+        """Forget everything, once the diagnosis is done."""
+        shutil.rmtree(self.folder, ignore_errors=True)
+
+    def _file(self, names: Iterable[str]) -> Path:
+        return self.folder / f"{'+'.join(sorted(names)) or 'none'}.npz"
+
+
+def _mark_of(problem: Problem) -> str:
+    """A hash of what a problem is made of."""
+    found = hashlib.sha256(repr(problem.names).encode())
+    found.update(np.asarray(problem.start.values).tobytes())
+    for part in problem.segments:
+        found.update(part.recording.name.encode())
+        found.update(np.ascontiguousarray(part.recording.time).tobytes())
+        found.update(np.ascontiguousarray(part.recording[part.channel]).tobytes())
+    return found.hexdigest()

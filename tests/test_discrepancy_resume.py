@@ -1,0 +1,68 @@
+"""A diagnosis that is interrupted goes on, and says the same."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from fitting_rigs import NOMINAL, recorded
+
+from jaxcam.discrepancy import diagnose
+from jaxcam.discrepancy._kept_trials import KeptTrials
+from jaxcam.fitting import cam_follower_model, cam_follower_parameters, Problem
+from jaxcam.recordings import segment_case
+
+
+@pytest.fixture(scope="module")
+def problem():
+    runs = segment_case(recorded(), NOMINAL)
+    return Problem.build(
+        cam_follower_model(NOMINAL), runs, cam_follower_parameters(NOMINAL)
+    )
+
+
+@pytest.mark.slow
+def test_what_is_kept_comes_back_for_the_same_problem_only(problem, tmp_path):
+    kept = KeptTrials(tmp_path, problem)
+    assert kept.get({"viscous_damping"}) is None
+    kept.put({"viscous_damping", "sensor_lag"}, problem.start)
+    found = kept.get(["sensor_lag", "viscous_damping"])
+    assert found is not None
+    np.testing.assert_array_equal(found.values, problem.start.values)
+    np.testing.assert_array_equal(found.states, problem.start.states)
+    moved = dataclasses.replace(
+        problem, start=problem.start._replace(values=problem.start.values + 1e-9)
+    )
+    assert KeptTrials(tmp_path, moved).get({"viscous_damping", "sensor_lag"}) is None
+
+
+@pytest.mark.slow
+def test_a_file_that_was_cut_off_is_passed_over(problem, tmp_path):
+    kept = KeptTrials(tmp_path, problem)
+    kept.put((), problem.start)
+    file = tmp_path / "none.npz"
+    whole = file.read_bytes()
+    for length in (0, 1, 40, len(whole) // 2, len(whole) - 1):
+        file.write_bytes(whole[:length])
+        assert kept.get(()) is None
+
+
+@pytest.mark.slow
+def test_interrupted_and_resumed(tmp_path):
+    """Verdict and every number as without interruption, to a thousandth of an error."""
+    runs = recorded(seed=5)
+    whole = diagnose(NOMINAL, runs)
+    calls = []
+
+    def stop(sentence, fraction):
+        calls.append(sentence)
+        if sentence.startswith("redrawing"):
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        diagnose(NOMINAL, runs, progress=stop, keep=tmp_path / "fits")
+    assert list((tmp_path / "fits").glob("*.npz"))
+    again = diagnose(NOMINAL, runs, keep=tmp_path / "fits")
+    assert not (tmp_path / "fits").exists()
+    assert (again.verdict, again.names) == (whole.verdict, whole.names)
+    for one in whole.after.estimates:
+        assert abs(again.after[one.name].value - one.value) < 1e-3 * one.stderr
