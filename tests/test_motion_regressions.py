@@ -104,3 +104,39 @@ def test_integers_known_while_tracing_are_combined_bit_by_bit():
     )
     made = scalar(split(jnp.ones(4)))
     assert [float(e) for e in made] == [0.0, 1.0, 0.0, 1.0]
+
+
+class Weightless(jaxcam.HybridSystem):
+    """A body at rest without a force, above a table that moves up and down."""
+
+    lift: float = 0.5
+    speed: float = 6.0
+
+    @property
+    def period(self):
+        return 2 * jnp.pi / self.speed
+
+    def table(self, t):
+        return 0.5 * self.lift * (1 - jnp.cos(self.speed * t))
+
+    def vector_field(self, t, state):
+        return jnp.stack([state[1], jnp.zeros_like(state[1])])
+
+    def gap(self, t, state):
+        return state[0] - self.table(t)
+
+    def impact(self, t, state):
+        rate = jax.grad(self.table)(t)
+        return jnp.stack([state[0], rate - 0.5 * (state[1] - rate)])
+
+
+@pytest.mark.parametrize("height", [0.01, 0.25, 0.4999])
+def test_at_rest_without_a_force_no_rise_of_the_surface_is_stepped_over(height):
+    # the error of a step says nothing there; steps are a quarter of a period at most
+    system = Weightless()
+    period = 2 * np.pi / 6.0
+    trajectory = jaxcam.simulate(system, jnp.array([height, 0.0]), 0.0, 20 * period)
+    assert trajectory.successful
+    first = np.arccos(1 - 2 * height / 0.5) / 6.0
+    assert abs(trajectory.impacts.time[0] - first) < 1e-10
+    assert float(trajectory.gap(np.linspace(0.0, 20 * period, 4001)).min()) > -1e-9

@@ -19,7 +19,6 @@ from jaxcam.hybrid._codes import Row
 from jaxcam.hybrid._functions import Functions
 from jaxcam.hybrid._lane import first_lane, RUNNING
 from jaxcam.hybrid._run import run_raw
-from jaxcam.hybrid._runge_kutta import tableau_of
 from jaxcam.hybrid._system import with_array_parameters
 
 from ._event_law import completed_law
@@ -212,16 +211,10 @@ _WIDE: dict[str, Any] = {"compiler_options": {"xla_cpu_prefer_vector_width": 512
 
 def _plan(system, length, t0, turns, settings) -> Plan:
     length = system.period if length is None else length
-    return Plan(
-        t0=t0,
-        t1=t0 + turns * length,
-        stop_period=length,
-        longest_contact=length / 8,
-        tolerance=settings.tolerance,
-        smallness=settings.chatter_smallness,
-        depth=settings.chatter_depth,
-        tableau=tableau_of(settings.solver),
-    )
+    end = t0 + turns * length
+    # shorter in contact, where the tangent is carried along
+    plan = Plan.of(system, settings, t0, end, period=length, stop_period=length)
+    return plan._replace(longest_step=length / 8)
 
 
 @eqx.filter_jit

@@ -7,12 +7,14 @@ import jax.numpy as jnp
 
 from ._gap_polynomial import end_curvature, Jet, time_to_contact, time_to_release
 from ._lane import FINISHED, Lane, NOT_FINITE, RUNNING, STEP_FAILED
-from ._runge_kutta import Tableau
+from ._runge_kutta import Tableau, tableau_of
 from ._select import any_of, select
 
 
 # consecutive attempts without progress in time after which a lane gives up
 _PATIENCE = 80
+# steps in a period of the forcing, at least
+_PARTS = 4
 
 
 class Plan(NamedTuple):
@@ -22,11 +24,28 @@ class Plan(NamedTuple):
     t1: Any
     # the run also stops, and records, at t0 + k stop_period
     stop_period: Any
-    longest_contact: Any
+    # so short that no whole rise and fall of a surface fits in, where the error of a
+    # step says nothing: in contact, and at rest without a force
+    longest_step: Any
     tolerance: Any
     smallness: Any
     depth: Any
     tableau: Tableau
+
+    @staticmethod
+    def of(system, settings, t0, t1, *, period=None, stop_period=jnp.inf) -> "Plan":
+        """The plan of a run from `t0` to `t1`; `period` is the system's own without."""
+        period = system.period if period is None else period
+        return Plan(
+            t0=t0,
+            t1=t1,
+            stop_period=stop_period,
+            longest_step=jnp.inf if period is None else period / _PARTS,
+            tolerance=settings.tolerance,
+            smallness=settings.chatter_smallness,
+            depth=settings.chatter_depth,
+            tableau=tableau_of(settings.solver),
+        )
 
 
 class Attempt(NamedTuple):
@@ -110,7 +129,7 @@ def _longest(plan, lane, attempt):
     grown = jnp.where(any_of(lane.contact) & (effort == 0.0), lane.longest, grown)
     failed = jnp.where(attempt.fits, lane.longest, h * factor)
     longest = jnp.where(attempt.good, grown, failed)
-    return jnp.minimum(longest, plan.t1 - lane.t + h)
+    return jnp.minimum(jnp.minimum(longest, plan.longest_step), plan.t1 - lane.t + h)
 
 
 def _next_length(plan, lane, attempt, longest):
@@ -123,7 +142,7 @@ def _next_length(plan, lane, attempt, longest):
     for k, (jet, contact) in enumerate(zip(attempt.jets, attempt.contact, strict=True)):
         ends = lane.jets[k], attempt.arrived[k]
         flight = time_to_contact(jet, end_curvature(*ends, inverse))
-        held = jnp.minimum(time_to_release(*ends, inverse), plan.longest_contact)
+        held = jnp.minimum(time_to_release(*ends, inverse), plan.longest_step)
         limit = jnp.where(contact, held, jnp.where(flight > 0, flight, jnp.inf))
         ahead = jnp.minimum(ahead, limit)
     again = jnp.where(attempt.fits, jnp.minimum(attempt.shorter, h), longest)

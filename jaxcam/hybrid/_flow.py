@@ -13,7 +13,6 @@ from ._lane import first_lane, RUNNING
 from ._loop import iterate
 from ._materialise import depend_on, with_kept
 from ._one_kernel import one_kernel
-from ._runge_kutta import tableau_of
 from ._settings import Settings
 from ._system import HybridSystem, with_array_parameters
 from ._types import RealScalar
@@ -67,17 +66,7 @@ def flow(
     settings = with_array_parameters(settings)
     t0, t1 = jnp.asarray(t0, jnp.float64), jnp.asarray(t1, jnp.float64)
     functions = Functions(system, state.shape[0])
-    period = system.period
-    plan = Plan(
-        t0=t0,
-        t1=t1,
-        stop_period=jnp.inf,
-        longest_contact=jnp.inf if period is None else period / 4,
-        tolerance=settings.tolerance,
-        smallness=settings.chatter_smallness,
-        depth=settings.chatter_depth,
-        tableau=tableau_of(settings.solver),
-    )
+    plan = Plan.of(system, settings, t0, t1)
     x = tuple(state[i] for i in range(state.shape[0]))
     lane = jax.tree.map(jnp.asarray, first_lane(functions, t0, x, t1))
     body, kept = with_kept(

@@ -148,7 +148,7 @@ def _iterate(functions: Functions, plan: Plan, lane: Lane) -> tuple[Lane, Record
     settled = functions.onto(frame, jets3, x3, contact)
     moved = largest([jnp.abs(a - b) for a, b in zip(settled, x3, strict=True)])
     converged = ~sticking | (moved <= 1e-7 * (1.0 + size))
-    scale = jnp.minimum(lane.longest, plan.longest_contact)
+    scale = jnp.minimum(lane.longest, plan.longest_step)
     held = earliest(
         [
             _where_free(

@@ -160,18 +160,7 @@ def _release_point(system, t0):
 def _prepare(system, settings, t0, state, t1):
     system = system.prepared()
     functions = Functions(system, state.shape[0])
-    period = system.period
-    longest = jnp.inf if period is None else period / 4
-    plan = Plan(
-        t0=t0,
-        t1=t1,
-        stop_period=jnp.inf,
-        longest_contact=longest,
-        tolerance=settings.tolerance,
-        smallness=settings.chatter_smallness,
-        depth=settings.chatter_depth,
-        tableau=tableau_of(settings.solver),
-    )
+    plan = Plan.of(system, settings, t0, t1)
     x = tuple(state[i] for i in range(state.shape[0]))
     lane = first_lane(functions, t0, x, t1)
     return functions, plan, lane

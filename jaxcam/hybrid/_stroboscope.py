@@ -16,7 +16,6 @@ from ._functions import Functions
 from ._lane import FINISHED, first_lane, RUNNING
 from ._normal import gaps
 from ._run import run_raw
-from ._runge_kutta import tableau_of
 from ._settings import Settings
 from ._system import HybridSystem, with_array_parameters
 
@@ -314,16 +313,8 @@ def _batch(system, where, values):
 
 def _plan(system, period, t0, turns, settings):
     period = system.period if period is None else period
-    return Plan(
-        t0=t0,
-        t1=t0 + turns * period,
-        stop_period=period,
-        longest_contact=period / 4,
-        tolerance=settings.tolerance,
-        smallness=settings.chatter_smallness,
-        depth=settings.chatter_depth,
-        tableau=tableau_of(settings.solver),
-    )
+    end = t0 + turns * period
+    return Plan.of(system, settings, t0, end, period=period, stop_period=period)
 
 
 @eqx.filter_jit
