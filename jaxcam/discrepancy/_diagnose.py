@@ -1,36 +1,19 @@
 """From recordings to a verdict: effect, none or unknown."""
 
-import dataclasses
-import math
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
-import numpy as np
-from scipy.stats import chi2
-
-from ..fitting import (
-    cam_follower_model,
-    cam_follower_parameters,
-    Input,
-    Model,
-    Parameter,
-    Problem,
-    Sensor,
-)
+from ..fitting import Input, Parameter, Sensor
 from ..hybrid import HybridSystem
-from ..recordings import Recording, RecordingError, Rig, segment_case, Segments
-from ..recordings._check import check_channels, check_drive
-from ._diagnosis import Diagnosis, Effect, Value
-from ._drive import Ripple, ripple_of
-from ._engine import value_of
+from ..recordings import Recording, Rig, Segments
+from ._diagnosis import Diagnosis, Value
+from ._effects import drive_effect, ripples, term_effect, unknown_effect
 from ._evidence import held_out, limits, redrawn, sure
 from ._kept_trials import KeptTrials
-from ._search import FALSE_ALARMS, Search, Trial
+from ._search import Search, Trial
+from ._stated import rig_problem, system_problem, turns
 from ._structure import Structure, structures
 from ._term import Term, terms_of
-from ._terms import DriveRipple, library
-from ._vibration_scan import LEAST
-from ._with_terms import base_drive, WithTerms
 from ._words import listed, summary_of
 
 
@@ -39,7 +22,6 @@ from ._words import listed, summary_of
 _SHARE = 0.15**2
 # Subsets within this BIC of the best one are as good
 _TIE = 10.0
-_FOLLOWER = "follower_angle_rad"
 
 
 def diagnose(
@@ -78,15 +60,15 @@ def diagnose(
     report = progress or (lambda sentence, fraction: None)
     recordings = tuple(recordings)
     if isinstance(system, Rig):
-        problem, rig, terms, unlisted, ripple = _of_rig(
+        problem, rig, terms, unlisted, ripple = rig_problem(
             system, recordings, candidates, report
         )
     else:
-        problem, rig, terms, unlisted = _of_system(
+        problem, rig, terms, unlisted = system_problem(
             system, recordings, candidates, sensors, parameters, drive, report
         )
         ripple = None
-    turned = isinstance(system, Rig) or system_turns(problem)
+    turned = isinstance(system, Rig) or turns(problem)
     kept = None if keep is None else KeptTrials(keep, problem)
     search = Search(problem, rig, terms, report, kept)
     best = search.run()
@@ -110,11 +92,11 @@ def diagnose(
             inclusion, deviation = redrawn(search, best, seed)
     rms_before, rms_after, gained, unseen = held_out(search, before, best, report)
     effects = [
-        _effect(search, best, before, name, inclusion, deviation, gained)
+        term_effect(search, best, before, name, inclusion, deviation, gained)
         for name in sorted(best.names)
     ]
-    if ripple is not None and _ripples(ripple, len(terms) + 1):
-        effects.append(_drive_effect(ripple))
+    if ripple is not None and ripples(ripple, len(terms) + 1):
+        effects.append(drive_effect(ripple))
     unexplained = [one for one in left_after if one.significant]
     verdict, caveats = _verdict(effects, unexplained, before, best)
     caveats += [
@@ -123,7 +105,7 @@ def diagnose(
         for name, part in doubtful
     ]
     if verdict == "unknown":
-        effects.insert(0, _unknown(unexplained, problem, gained))
+        effects.insert(0, unknown_effect(unexplained, problem, gained))
     alternatives = _alternatives(search, best)
     for name, delta in alternatives:
         if delta < _TIE:
@@ -182,201 +164,6 @@ def _unit(channel: str) -> str:
     return ""
 
 
-def system_turns(problem: Problem) -> bool:
-    """Whether the phase of a drive means something."""
-    return problem.model.system.period is not None
-
-
-def _of_rig(rig: Rig, recordings, candidates, report):
-    runs = tuple(recordings)
-    if len(runs) < 2:
-        raise RecordingError(
-            f"There is {len(runs)} recording; give at least two of the same rig at "
-            f"different speeds, so that one can test what the other says."
-        )
-    _check(rig, [r.recording if isinstance(r, Segments) else r for r in runs])
-    report("finding impacts and contacts", None)
-    if not all(isinstance(run, Segments) for run in runs):
-        runs = segment_case(runs, rig)  # pyright: ignore
-    terms = tuple(library() if candidates is None else candidates)
-    terms, unlisted = _sorted(terms)
-    base = cam_follower_model(rig)
-    model = Model(WithTerms(base.system, terms), base.sensors, base_drive())
-    parameters = cam_follower_parameters(rig, base=lambda s: s.base)
-    names = [p.name for p in parameters]
-    report("preparing the fits", None)
-    problem = Problem.build(model, runs, parameters + _own(terms, runs))
-    report("reading the drive", None)
-    ripple = ripple_of([run.recording for run in runs], rig.sensors.cam_floor)
-    return problem, names, terms, unlisted, ripple
-
-
-def _of_system(system, recordings, candidates, sensors, parameters, drive, report):
-    if not sensors:
-        raise ValueError(
-            "Give the sensors of the recordings, such as "
-            'sensors={"angle_rad": Sensor(0, noise=1e-4)}.'
-        )
-    for part in recordings:
-        if not isinstance(part, Segments):
-            raise ValueError(
-                "Cut the recordings first: `jaxcam.recordings.segment(recording, "
-                "channel)` for each of them."
-            )
-    turned = system.period is not None
-    if candidates is None:
-        candidates = library(turned, 0.0, clocked=turned or drive is not None)
-    terms, unlisted = _sorted(tuple(candidates))
-    if drive is not None:
-        value = drive.value
-        drive = Input(drive.channel, lambda s: value(s.base))  # pyright: ignore
-    model = Model(WithTerms(system, terms), dict(sensors), drive)
-    inside = [_within(parameter) for parameter in parameters]
-    report("preparing the fits", None)
-    problem = Problem.build(model, recordings, inside + _own(terms, recordings))
-    return problem, [p.name for p in inside], terms, unlisted
-
-
-def _within(parameter: Parameter) -> Parameter:
-    """The same parameter of the system that a `WithTerms` holds."""
-
-    def where(model):
-        return parameter.where(Model(model.system.base, model.sensors, model.drive))
-
-    return dataclasses.replace(parameter, where=where)
-
-
-def _sorted(terms: tuple[Term, ...]):
-    return (
-        tuple(term for term in terms if term.listed),
-        tuple(term for term in terms if not term.listed),
-    )
-
-
-def _own(terms, segments) -> list[Parameter]:
-    """Parameters of the terms; a frequency is one only with periods in a record."""
-    longest = max(part.recording.duration for part in segments)
-    found = [p for k, term in enumerate(terms) for p in term.parameters(k)]
-    return [
-        dataclasses.replace(p, lower=max(p.lower, LEAST / longest))
-        if p.unit == "Hz"
-        else p
-        for p in found
-    ]
-
-
-def _check(rig: Rig, runs: Sequence[Recording]) -> None:
-    """Records that cannot be those of the rig.
-
-    **Raises:** `RecordingError` that says what is wrong with which.
-    """
-    surface = rig.system(1.0)
-    angles = np.asarray(surface.contact_angle(np.linspace(0, 2 * np.pi, 64)))
-    low, high = float(angles.min()), float(angles.max())
-    for run in runs:
-        check_channels(run)
-        check_drive(run)
-        samples = run[_FOLLOWER]
-        least = float(np.min(samples))
-        # the follower cannot be below the cam, by more than tolerances explain
-        room = (high - low) / 2
-        if least >= low - room and least <= high:
-            continue
-        if low - room <= float(np.min(-samples)) <= high:
-            raise RecordingError(
-                f"{run.name}: `{_FOLLOWER}` has the wrong sign for this rig, whose "
-                f"follower is between {low:.3g} and {high:.3g} rad on the cam; "
-                f"multiply the column by -1."
-            )
-        raise RecordingError(
-            f"{run.name}: `{_FOLLOWER}` goes down to {least:.3g} rad where the cam of "
-            f"this rig is between {low:.3g} and {high:.3g} rad; check that the column "
-            f"and the rig file belong to this record, and that it is in radians."
-        )
-
-
-def _ripples(ripple: Ripple, tests: int) -> bool:
-    asked = max(2 * math.log(ripple.count), chi2.isf(FALSE_ALARMS / tests, 2))
-    return bool(ripple.gain > asked)
-
-
-def _effect(
-    search: Search, best: Trial, before: Trial, name, inclusion, deviation, gained
-) -> Effect:
-    term = search.term(name)
-    less = search.trials.get(best.names - {name}, before)
-    parameters = {
-        one.name: Value(
-            best.fit[one.name].value,
-            max(best.fit[one.name].stderr, deviation.get(one.name, 0.0)),
-            one.unit,
-        )
-        for one in term.strengths()
-    }
-    if name == "external_vibration":
-        parameters = _polar(parameters)
-    records = _seen_in(search, best, [one.name for one in term.strengths()])
-    alone = sum(gained.values())
-    return Effect(
-        name,
-        term.sentence,
-        parameters,
-        term.where,
-        term.region,
-        records,
-        best.bic - less.bic,
-        alone,
-        inclusion[name],
-    )
-
-
-def _polar(parts: dict[str, Value]) -> dict[str, Value]:
-    a, b, fe = parts["ext_sin"], parts["ext_cos"], parts["fe"]
-    size = math.hypot(a.value, b.value)
-    error = math.hypot(a.value * a.stderr, b.value * b.stderr) / size
-    phase = math.hypot(a.value * b.stderr, b.value * a.stderr) / size**2
-    return {
-        "ext": Value(size, error, "rad/s^2"),
-        "fe": fe,
-        "phase": Value(math.atan2(b.value, a.value), phase, "rad"),
-    }
-
-
-def _seen_in(search: Search, best: Trial, names) -> tuple[str, ...]:
-    """Records in which the effect is larger than three of their own errors."""
-    blocks = search.blocks(best)
-    rows = blocks.rows(names)
-    found = []
-    for k, record in enumerate(blocks.record):
-        value = np.array([value_of(best.fit, blocks.names[r]) for r in rows])
-        value = value / blocks.scale[rows]
-        inside = blocks.information[k][np.ix_(rows, rows)]
-        if value @ inside @ value > chi2.isf(1e-3, len(rows)):
-            found.append(record)
-    return tuple(found)
-
-
-def _drive_effect(ripple: Ripple) -> Effect:
-    term = DriveRipple()
-    seen = tuple(
-        name for name, (eps, error) in ripple.per_record.items() if eps > 3 * error
-    )
-    return Effect(
-        term.name,
-        term.sentence,
-        {
-            "eps": Value(ripple.eps, ripple.eps_stderr, "-"),
-            "psi": Value(ripple.psi, ripple.psi_stderr, "rad"),
-        },
-        term.where,
-        term.region,
-        seen,
-        ripple.delta_bic,
-        ripple.heldout_gain,
-        ripple.inclusion,
-    )
-
-
 def _verdict(effects, unexplained: list[Structure], before: Trial, best: Trial):
     caveats = []
     if not unexplained:
@@ -391,21 +178,6 @@ def _verdict(effects, unexplained: list[Structure], before: Trial, best: Trial):
         )
         return "effect", caveats
     return "unknown", caveats
-
-
-def _unknown(unexplained: list[Structure], problem: Problem, gained) -> Effect:
-    first = unexplained[0]
-    return Effect(
-        "unknown",
-        first.sentence,
-        {},
-        first.where,
-        first.place,
-        problem.records,
-        -first.gain + first.count * math.log(problem.samples),
-        sum(gained.values()),
-        1.0,
-    )
 
 
 def _alternatives(search: Search, best: Trial) -> list[tuple[str, float]]:

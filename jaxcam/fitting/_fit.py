@@ -13,7 +13,8 @@ from ._eliminate import eliminate, step_of
 from ._linearise import assemble, Blocks, Costs, Point
 from ._model import Model
 from ._parameter import Parameter
-from ._problem import loosened, Problem, Weights, width_of
+from ._problem import Problem, Weights
+from ._sharpness import loosened, width_of
 
 
 _ITERATIONS = 60

@@ -55,14 +55,14 @@ import numpy as np
 from jaxtyping import Float
 
 from ..recordings import RecordingError, Segments
-from ..recordings._flight_fit import state_at
-from ..recordings._polynomial import fit_local
-from ._linear import Extras, Sharpness
-from ._linearise import assemble, Layout, Point
-from ._model import filtered_channels, Input, Model
+from ._linear import Extras
+from ._linearise import Layout, Point
+from ._model import Input, Model
 from ._parameter import Parameter
-from ._pieces import gather, IMPACT, Pieces, Span
+from ._pieces import gather, Pieces, Span
 from ._predict import fly
+from ._sharpness import JOINT, joint_sharpness
+from ._starts import suggested_starts
 
 
 # Steps of a piece to begin with, and at most
@@ -71,13 +71,6 @@ _STEPS, _MOST_STEPS = 10, 160
 _STEP_ERROR = 0.01
 # Step over time constant of a filter: Hermite's error is then 1e-4 of a jump
 _FILTER_STEP = 0.4
-_WIDTH = 4
-# A joint within a flight is this much sharper than what its samples say of the state
-_JOINT = 1e-3
-# An impact is this much sharper than what the flights on both sides say of themselves:
-# a tenth of their variance is next to nothing to lose, and it forgets what chaos and
-# small faults of the model make of the past
-_IMPACT = 10**-0.5
 
 
 class Weights(eqx.Module):
@@ -145,16 +138,16 @@ class Problem:
             if steps < _MOST_STEPS and not _follows(model, segments, pieces):
                 steps *= 2
                 continue
-            states, guess = _starts(model, segments, cuts, pieces)
+            states, guess = suggested_starts(model, segments, cuts, pieces)
             point = Point(jnp.asarray(values), jnp.asarray(states))
             if extras is None:
                 # as a scale of errors, that of the first steps will do for all
-                extras, first = _extras(layout, pieces, point, guess), steps
+                extras, first = joint_sharpness(layout, pieces, point, guess), steps
             if steps >= _MOST_STEPS or _fine(layout, pieces, extras, point):
                 break
             steps *= 2
         if steps > first:
-            extras = _extras(layout, pieces, point, guess)
+            extras = joint_sharpness(layout, pieces, point, guess)
         pieces = jax.tree.map(jnp.asarray, pieces)
         return Problem(
             model,
@@ -269,177 +262,6 @@ def _places(model: Model, parameters) -> tuple[int, ...]:
     return tuple(places)
 
 
-def _size(model: Model) -> int:
-    from ..recordings._compare import _size as size_of
-
-    return size_of(model.system, {n: s.observe for n, s in model.sensors.items()})
-
-
-def _starts(model: Model, segments, cuts, pieces: Pieces):
-    """States that polynomials through the samples suggest, shape `(r, k, n)`."""
-    size = _size(model)
-    lags = filtered_channels(model)
-    sensors = model.sensors
-    direct = [name for name in sensors if name not in lags] or list(sensors)
-    states = np.zeros((*pieces.joint.shape, size + len(lags)))
-    guess = np.zeros((*pieces.rest_exists.shape, size))
-    for row, (part, sides) in enumerate(zip(segments, cuts)):
-        for side, found in zip(sides, (states, guess)):
-            if not side:
-                continue
-            clock = np.array([span.start for span in side])
-            local = [
-                [_local(part, span, name, sensors[name]) for name in direct]
-                for span in _with_samples(side)
-            ]
-            both = np.array(local)
-            picks = [sensors[name].observe for name in direct]
-            system = _still(model, part)
-            state = state_at(system, picks, clock, both[..., 0], both[..., 1], size)
-            found[row, : len(side), :size] = state
-            if found is states:
-                for place, name in enumerate(lags):
-                    seen = jax.vmap(sensors[name].seen)(jnp.asarray(state))
-                    found[row, : len(side), size + place] = seen
-    return states, guess
-
-
-def _still(model: Model, part: Segments):
-    """The system with its drive at the mean speed; its field serves as a guide only."""
-    if part.drive is None:
-        return model.system
-    # arrays: numbers would be constants of a program that is compiled for each record
-    angle, rate = (jnp.asarray(x) for x in (part.drive.phase, part.drive.speed))
-    return model.driven(0.0, angle, rate)
-
-
-def _with_samples(side: list[Span]):
-    """Pieces too short for a polynomial borrow the samples of their neighbours."""
-    for k, span in enumerate(side):
-        if len(span.rows) >= 4:
-            yield span
-            continue
-        near = [s for s in side[max(0, k - 1) : k + 2] if s.flight == span.flight]
-        rows = np.concatenate([s.rows for s in near])
-        yield dataclasses.replace(span, rows=rows)
-
-
-def _local(part: Segments, span: Span, channel: str, sensor):
-    """Value and slope of a channel at the beginning of a piece."""
-    time = part.recording.time[span.rows]
-    values = part.recording[channel][span.rows]
-    fine = np.isfinite(values)
-    if np.sum(fine) < 2:
-        return 0.0, 0.0
-    fit = fit_local(time[fine], values[fine], float(sensor.floor), span.start)
-    return fit.value(span.start), fit.slope(span.start)
-
-
-def _extras(layout: Layout, pieces: Pieces, point: Point, guess) -> Extras:
-    """How sharp the joints are: as sharp as the drive, and as the samples can tell."""
-    records, width = pieces.joint.shape
-    size = point.states.shape[-1]
-    one = jnp.ones((records, width, size))
-    extras = Extras(
-        jnp.asarray(guess),
-        Sharpness(one, one, one[..., 0]),
-        jnp.asarray(pieces.exists, dtype=float),
-        jnp.asarray(pieces.rest_exists, dtype=float),
-    )
-    # as wide as a fit of everything, which then is compiled already
-    none = jnp.zeros((records, width_of(len(layout.places))), dtype=int)
-    alone = eqx.tree_at(lambda p: p.joint, pieces, jnp.zeros_like(pieces.joint))
-    blocks, _ = assemble(
-        layout, alone, extras, point, none, jnp.zeros(none.shape, dtype=float)
-    )
-    information = jnp.diagonal(blocks.ss, axis1=-2, axis2=-1)
-    usual = jnp.nanmedian(jnp.where(information > 0, information, jnp.nan), axis=(0, 1))
-    # a state that no sample sees is tied as tightly as the least visible one
-    usual = jnp.where(jnp.isnan(usual), jnp.nanmin(usual), usual)
-    floor = _JOINT / jnp.sqrt(usual)
-    flight = jnp.broadcast_to(floor, one.shape)
-    sharp = extras._replace(sharpness=Sharpness(flight, flight, one[..., 0]))
-    inner = jnp.where(jnp.asarray(pieces.joint) == IMPACT, 0, pieces.joint)
-    flights = eqx.tree_at(lambda p: p.joint, pieces, inner)
-    blocks, _ = assemble(
-        layout, flights, sharp, point, none, jnp.zeros(none.shape, dtype=float)
-    )
-    known = _IMPACT**2 * _variances(np.asarray(blocks.ss), np.asarray(blocks.before))
-    before = np.concatenate([known[:, :1], known[:, :-1]], axis=1)
-    known = jnp.asarray(np.minimum(known, before))
-    slope, by_drive = _drive_slopes(layout, pieces, point)
-    gap = jnp.sqrt(jnp.sum(slope**2 * known, axis=-1) + by_drive[..., -1] ** 2)
-    impact = jnp.sqrt(known + by_drive[..., :-1] ** 2)
-    return extras._replace(sharpness=Sharpness(flight, impact, gap))
-
-
-def loosened(extras: Extras) -> Extras:
-    """Joints within flights that give as much as the samples of a piece allow.
-
-    States that the data suggest do not join. Where a flight has many pieces, to close
-    them all at once would be to foretell the last one from the first, with parameters
-    that are not yet known.
-    """
-    sharpness = extras.sharpness
-    return extras._replace(
-        sharpness=sharpness._replace(flight=sharpness.flight / _JOINT)
-    )
-
-
-def _variances(ss, before):
-    """Variance of each state from the samples of its own flight, shape `(r, k, n)`."""
-    records, width, size, _ = ss.shape
-    found = np.zeros((records, width, size))
-    for r in range(records):
-        matrix = np.zeros((width, size, width, size))
-        for k in range(width):
-            dead = np.diagonal(ss[r, k]) <= 0
-            matrix[k, :, k] = ss[r, k] + np.diag(dead.astype(float))
-            if k:
-                matrix[k, :, k - 1] = before[r, k]
-                matrix[k - 1, :, k] = before[r, k].T
-        flat = matrix.reshape(width * size, -1)
-        scale = 1 / np.sqrt(np.diagonal(flat))
-        inverse = np.linalg.inv(flat * np.outer(scale, scale))
-        found[r] = (np.diagonal(inverse) * scale**2).reshape(width, size)
-    return np.abs(found)
-
-
-@eqx.filter_jit
-def _drive_slopes(layout: Layout, pieces: Pieces, point: Point):
-    """Slope of the gap, `(r, k, n)`, and errors of an impact due to the drive."""
-
-    def one(values, state, t, angle, rate, error):
-        model = layout.at(values)
-        size = state.shape[0] - len(filtered_channels(model))
-
-        def landed(drive):
-            system = model.driven(t, drive[0], drive[1])
-            x = system.impact(t, state[:size])
-            gap = jnp.min(jnp.atleast_1d(system.gap(t, state[:size])))
-            if x.ndim == 2:
-                x = x[jnp.argmin(system.gap(t, state[:size]))]
-            return jnp.concatenate([x, state[size:], gap[None]])
-
-        def gap_of(x):
-            system = model.driven(t, angle, rate)
-            return jnp.min(jnp.atleast_1d(system.gap(t, x[:size])))
-
-        jacobian = jax.jacfwd(landed)(jnp.stack([angle, rate]))
-        spread = jnp.sqrt(jacobian**2 @ error**2)
-        return jax.grad(gap_of)(state), spread
-
-    along = jax.vmap(one, in_axes=(None, 0, 0, 0, 0, None))
-    return jax.vmap(along)(
-        point.values,
-        point.states,
-        jnp.asarray(pieces.flown.start),
-        jnp.asarray(pieces.angle_at),
-        jnp.asarray(pieces.rate_at),
-        jnp.asarray(pieces.drive_error),
-    )
-
-
 def _follows(model: Model, segments, pieces: Pieces) -> bool:
     """Whether the steps are short beside the filters of the sensors, and the input.
 
@@ -461,7 +283,7 @@ def _fine(layout: Layout, pieces: Pieces, extras: Extras, point: Point) -> bool:
     part = pieces.flown
     coarse = _ends(layout, point, part.start, part.step, pieces.angle, pieces.rate)
     fine = _ends(layout, point, part.start, part.step / 2, *half)
-    change = np.abs(coarse - fine) / (np.asarray(extras.sharpness.flight) / _JOINT)
+    change = np.abs(coarse - fine) / (np.asarray(extras.sharpness.flight) / JOINT)
     return bool(np.max(np.where(pieces.exists[..., None], change, 0.0)) < _STEP_ERROR)
 
 
@@ -473,8 +295,3 @@ def _ends(layout: Layout, point: Point, start, step, angle, rate):
 
     drive = (jnp.asarray(part) for part in (start, step, angle, rate))
     return jax.vmap(one)(point.values, point.states, *drive)
-
-
-def width_of(number: int) -> int:
-    """Columns that programs are compiled for: a multiple of four, to share them."""
-    return _WIDTH * max(1, -(-number // _WIDTH))

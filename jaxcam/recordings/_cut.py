@@ -108,6 +108,7 @@ def cut(
         else contact
         for span, contact in zip(resting, contacts)
     ]
+    contacts = _settled_alike(contacts, flights)
     impacts = [
         (_crossed(motion, place, before[place], after[place]), number)
         for number, (_, place) in enumerate(spans)
@@ -349,6 +350,25 @@ def _contact(motion, span, boundaries, flights, restitution) -> Contact:
     end = int(np.searchsorted(motion.time, stop.time))
     last = min(last, end) if stop.kind == "release" else last
     return Contact(start, stop, first, last, min(settled, stop.time))
+
+
+def _settled_alike(contacts: list[Contact], flights: list[Flight]) -> list[Contact]:
+    """Contacts whose beginning was not seen settle as late as the others of a record.
+
+    Where a record begins, the follower may be in the midst of bounces.
+    """
+    long = [f.stop for f in flights if f.last - f.first > _SHORTEST_FLIGHT]
+    seen = [any(contact.start is stop for stop in long) for contact in contacts]
+    known = [c.settled - c.start.time for c, one in zip(contacts, seen) if one]
+    longest = max(known, default=0.0)
+    return [
+        contact
+        if one
+        else dataclasses.replace(
+            contact, settled=min(contact.start.time + longest, contact.stop.time)
+        )
+        for contact, one in zip(contacts, seen)
+    ]
 
 
 def _gather(found: list[tuple[dict, int]]) -> Impacts:

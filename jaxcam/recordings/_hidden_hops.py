@@ -22,6 +22,8 @@ from ._rig import Quantity, Rig
 _GRID = 720
 # Standard deviations of the tolerances that count
 _SPREAD = 3.0
+# How much earlier (rad) than elsewhere a release may be
+_EARLY = 0.1
 
 
 def hop_phases(rig: Rig, speed: float) -> Bool[np.ndarray, " 720"]:
@@ -116,3 +118,20 @@ def sure_contact(
         if np.any((releases >= first) & (releases <= last)):
             sure[first:last] = True
     return sure
+
+
+def before_release(
+    angle: Float[np.ndarray, " k"], first: int, releases: Int[np.ndarray, " releases"]
+) -> Bool[np.ndarray, " k"]:
+    """Samples of a contact that the record cuts off at which it surely goes on.
+
+    Those before the phase at which the follower was released elsewhere in the record: a
+    release just before the end is not seen.
+
+    **Arguments:** the angle that the cam has turned (rad), the first sample of the
+    contact, and the samples at which releases were seen.
+    """
+    if not len(releases):
+        return np.ones(len(angle), dtype=bool)
+    ahead = (angle[releases] - _EARLY - angle[first]) % (2 * np.pi)
+    return angle < angle[first] + np.min(ahead)

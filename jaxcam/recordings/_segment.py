@@ -8,7 +8,7 @@ from jaxtyping import Float
 
 from ._cut import cut, Motion
 from ._drive import Drive, read_drive
-from ._hidden_hops import may_hop, sure_contact
+from ._hidden_hops import before_release, may_hop, sure_contact
 from ._polynomial import measured_noise
 from ._recording import Recording
 from ._rig import Rig
@@ -113,12 +113,17 @@ def _segment_rig(recording, rig: Rig, drive: Drive, surface: Surface, channel):
     error = surface.slope_stderr(turned) * drive.speed
     releases = [c.stop.time for c in found.contacts if c.stop.kind == "release"]
     seen = np.searchsorted(recording.time, releases)
+    seen = np.minimum(seen, len(recording) - 1)
+    sure = sure_contact(may_hop(rig, drive), seen)
+    last = found.contacts[-1] if found.contacts else None
+    if last is not None and last.stop.kind == "end of record":
+        sure &= before_release(drive.angle, last.first, seen)
     return dataclasses.replace(
         found,
         clock=drive.clock,
         drive=drive,
         surface=surface,
-        sure=sure_contact(may_hop(rig, drive), seen),
+        sure=sure,
         impacts=dataclasses.replace(found.impacts, turned=turned, surface_stderr=error),
     )
 

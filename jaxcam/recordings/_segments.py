@@ -140,6 +140,8 @@ class Segments:
         """Samples at which the follower rests: settled, and beyond doubt."""
         time = self.recording.time
         rows = (time >= contact.settled) & (time < contact.stop.time)
+        # a release that few samples tell of may be placed after the contact
+        rows[contact.last :] = False
         return rows if self.sure is None else rows & self.sure
 
     def sentence(self) -> str:
