@@ -3,7 +3,6 @@
 from ._diagnose import diagnose as diagnose
 from ._diagnosis import Diagnosis as Diagnosis, Effect as Effect, Value as Value
 from ._drive import Ripple as Ripple, ripple_of as ripple_of
-from ._event_causes import event_causes as event_causes, EventCause as EventCause
 from ._event_speeds import event_speeds as event_speeds, EventSpeeds as EventSpeeds
 from ._predictions import Prediction as Prediction, predictions as predictions
 from ._structure import Structure as Structure
