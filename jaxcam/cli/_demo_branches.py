@@ -20,7 +20,7 @@ class Branches:
     caption: str
 
 
-HEADINGS = ("orbit", "what happens", "at (rpm)", "largest multiplier")
+HEADINGS = ("orbit", "what happens", "at (rpm)", "size of the largest multiplier")
 _CAPTION = (
     "The rig of the thesis, path following: angle of the follower once a turn against "
     "the speed of the cam. Stable orbits solid, unstable ones dashed. P(1,1) hits once "

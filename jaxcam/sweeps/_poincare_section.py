@@ -7,12 +7,12 @@ import jax.numpy as jnp
 import numpy as np
 
 from ..hybrid import HybridSystem, Settings, simulate
-from ._hybrid_lanes import admissible, in_contact, lifted, turn_lengths
+from ._hybrid_lanes import admissible
 from ._samples import BEHIND, Samples
-from ._section import AbstractSection, system_names
+from ._system_section import AbstractSystemSection
 
 
-class PoincareSection(AbstractSection):
+class PoincareSection(AbstractSystemSection):
     """Where motions cross `function(t, state) = 0`, and when.
 
     Motions are made one after the other by [`jaxcam.simulate`][]: right for dozens of
@@ -56,18 +56,6 @@ class PoincareSection(AbstractSection):
             t1 = self.t0 + turns * lengths[lane]
             self._one(system, states[lane], t1, int(lane), made)
         return made
-
-    def starts(self, where=None, values=None) -> np.ndarray:
-        return in_contact(self.system, self.t0, where, values)
-
-    def turn(self, where=None, values=None) -> np.ndarray:
-        return turn_lengths(self.system, self.period, where, values)
-
-    def lifted(self, states, where=None, values=None) -> np.ndarray:
-        return lifted(self.system, self.t0, states, where, values)
-
-    def names(self, n: int) -> tuple[tuple[str, str], ...]:
-        return system_names(self.system, n)
 
     def _system(self, where, value) -> HybridSystem:
         if where is None:

@@ -107,21 +107,24 @@ def _error(found: Rebuilt) -> float:
     return float(np.median(np.abs(found.predicted[:, 1] - velocity))) / range_
 
 
+def _lobe_rows(found):
+    """What a prediction misses of the lobes, and how high they are."""
+    return [
+        ("median error over the range of the velocity", _NAN, _error(found), ""),
+        (
+            "largest velocity of the lobes, simulated",
+            _NAN,
+            found.simulated[:, 1].max(),
+            "rad/s",
+        ),
+        ("the same, predicted", _NAN, np.nanmax(found.predicted[:, 1]), "rad/s"),
+    ]
+
+
 def figure_6_14(system: CamFollower) -> "pd.DataFrame":
     """Figure 6.14: prediction and simulation after D* has been moved."""
     found = rebuilt_state(system)
-    return frame(
-        [
-            ("median error over the range of the velocity", _NAN, _error(found), ""),
-            (
-                "largest velocity of the lobes, simulated",
-                _NAN,
-                found.simulated[:, 1].max(),
-                "rad/s",
-            ),
-            ("the same, predicted", _NAN, found.predicted[:, 1].max(), "rad/s"),
-        ]
-    )
+    return frame(_lobe_rows(found))
 
 
 def figure_6_15(system: CamFollower) -> "pd.DataFrame":
@@ -148,15 +151,4 @@ def figure_6_15(system: CamFollower) -> "pd.DataFrame":
 def figure_6_16(system: CamFollower) -> "pd.DataFrame":
     """Figure 6.16: a whole turn by the composed map, without any compensation."""
     found = rebuilt_turn(system)
-    return frame(
-        [
-            ("median error over the range of the velocity", _NAN, _error(found), ""),
-            (
-                "largest velocity of the lobes, simulated",
-                _NAN,
-                found.simulated[:, 1].max(),
-                "rad/s",
-            ),
-            ("the same, predicted", _NAN, np.nanmax(found.predicted[:, 1]), "rad/s"),
-        ]
-    )
+    return frame(_lobe_rows(found))
