@@ -148,6 +148,33 @@ def test_a_ball_on_a_floor(noise):
     assert np.max(np.abs(off)) < 4
 
 
+@pytest.mark.parametrize("after", [1, 2, 4, 6, 9, 14])
+def test_no_flight_goes_through_an_impact_at_an_end_of_the_record(after):
+    """A sample beyond an impact is in no flight with those before it.
+
+    However near to the last or the first sample of the record the impact is. Of the
+    samples on its own side a flight loses ten at most.
+    """
+    interval, noise = 1e-3, 1e-4
+    hit = math.sqrt(2 * 0.5 / 9.81)
+    clock = np.arange(-0.25, 0.25, interval) + 0.3 * interval
+    parabola = hit - np.abs(clock)
+    height = 0.5 - 9.81 / 2 * parabola**2
+    rng = np.random.default_rng(after)
+    height = height + noise * rng.standard_normal(len(clock))
+    landed = int(np.searchsorted(clock, 0.0))
+    for first, last in ((0, landed + after), (landed - after, len(clock))):
+        time, seen = clock[first:last] - clock[first], height[first:last]
+        recording = Recording("ball", time, {"height_m": seen})
+        found = segment(recording, "height_m", np.zeros(len(time)), noise=noise)
+        at = landed - first
+        long = max(found.flights, key=lambda flight: flight.last - flight.first)
+        kept = long.last - long.first
+        side = (0, at) if first == 0 else (at, len(time))
+        assert side[0] <= long.first and long.last <= side[1]
+        assert kept >= side[1] - side[0] - 10
+
+
 def test_noise_alone_makes_no_cut():
     rng = np.random.default_rng(5)
     time = np.arange(4000) * 1e-3

@@ -8,7 +8,7 @@ from ..hybrid import HybridSystem
 from ..recordings import Recording, Rig, Segments
 from ._diagnosis import Diagnosis, Value
 from ._effects import drive_effect, ripples, term_effect, unknown_effect
-from ._evidence import held_out, limits, redrawn, sure
+from ._evidence import held_out, limits, redrawn, rms_of, sure
 from ._kept_trials import KeptTrials
 from ._search import Search, Trial
 from ._stated import rig_problem, system_problem, turns
@@ -137,7 +137,16 @@ def diagnose(
         _unit(next(iter(problem.model.sensors))),
         _rig_values(system, best, deviation),
         summary_of(
-            verdict, effects, unexplained, best, before, rig, least, units, rms_after
+            verdict,
+            effects,
+            unexplained,
+            best,
+            before,
+            rig,
+            least,
+            units,
+            rms_of(best.fit),
+            rms_after,
         ),
         before.fit,
         best.fit,

@@ -50,8 +50,7 @@ def held_out(
             test = with_states(problem, known, unseen)
             parts = _parts(test, unseen)
             unseen_parts[which].extend(parts)
-            square = sum(float(np.sum((p.value / p.noise) ** 2)) for p in parts)
-            count = sum(len(p.value) for p in parts)
+            square, count = _square(parts)
             squares[which] += square
             counts[which] += count
             flown = np.sum(
@@ -76,6 +75,18 @@ def held_out(
         parts.sort(key=lambda part: problem.records.index(part.record))
     rms = np.sqrt(squares / np.maximum(counts, 1))
     return float(rms[0]), float(rms[1]), gained, unseen_parts
+
+
+def rms_of(fitted: Fit) -> float:
+    """Rms of the residuals of a fit on its own records, in units of the noise."""
+    square, count = _square(residuals(fitted))
+    return math.sqrt(square / max(count, 1))
+
+
+def _square(parts: list[Residuals]) -> tuple[float, int]:
+    """Sum of the squares in units of the noise, and the number of samples."""
+    square = sum(float(np.sum((part.value / part.noise) ** 2)) for part in parts)
+    return square, sum(len(part.value) for part in parts)
 
 
 def _halves(problem: Problem):

@@ -3,7 +3,7 @@
 from ._search import Trial
 
 
-# Unseen rms, in units of the noise, up to which a model is as good as the sensors
+# Rms in units of the noise up to which a model is as good as the sensors
 _NOISE = 1.2
 
 
@@ -30,9 +30,13 @@ def summary_of(
     rig,
     least,
     units,
+    fitted: float,
     unseen: float,
 ) -> str:
-    """One or two sentences; `unseen` is the rms on unseen records, of the noise."""
+    """One or two sentences; the last two are rms in units of the noise.
+
+    On the records that were fitted, and on those that the parameters have not seen.
+    """
     if verdict == "none":
         first = next(iter(least.items()), None)
         tail = ""
@@ -40,11 +44,17 @@ def summary_of(
             name, (size, _, _) = first
             unit = "" if units[name] == "-" else f" {units[name]}"
             tail = f" A {name} of {size:.2g}{unit} would have been seen."
-        if unseen > _NOISE:
+        if fitted > _NOISE:
             return (
                 "Nothing that the records share is missing. They are not explained "
                 "down to the noise of the sensors, though: what is left is "
-                f"{unseen:.2g} times that, and differs from record to record.{tail}"
+                f"{fitted:.2g} times that, and differs from record to record.{tail}"
+            )
+        if unseen > _NOISE:
+            tail = (
+                f"{tail} Half of the records do not pin the parameters down well "
+                f"enough to predict the others: they miss by {unseen:.2g} times the "
+                "noise."
             )
         return (
             "Nothing is missing: with its parameters fitted within their tolerances "

@@ -6,9 +6,10 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float
 
-from ._cut import cut, Motion
+from ._cut import cut
 from ._drive import Drive, read_drive
 from ._hidden_hops import before_release, may_hop, sure_contact
+from ._motion import Motion
 from ._polynomial import measured_noise
 from ._recording import Recording
 from ._rig import Rig

@@ -1,0 +1,96 @@
+"""Where a record stays near the surface for so long that it is contact.
+
+The rule has two thresholds and a duration, so that noise alone makes no cut: a
+contact stays within four times the noise for 5 ms; a flight rises above six times the
+noise.
+"""
+
+from typing import TypeAlias
+
+import numpy as np
+from scipy.ndimage import binary_closing
+
+from ._motion import Motion
+from ._surface import stretches
+
+
+# First sample of a stretch, and one past its last
+Span: TypeAlias = tuple[int, int]
+
+# Gaps, in units of the noise: below the one contact may be, above the other flight is
+LOW, HIGH = 4.0, 6.0
+# Seconds
+SHORTEST_CONTACT = 0.005
+# A stretch near the surface that is shorter than this (s) may be a graze
+_GRAZE = 0.03
+# Standard errors by which a slope or a curvature must differ from zero
+SIGNIFICANT = 5.0
+# Fewest samples in a flight
+SHORTEST_FLIGHT = 5
+
+
+def contact_stretches(motion: Motion) -> tuple[list[Span], list[Span]]:
+    """Stretches near the surface that last, with lower bounces between them.
+
+    And those that may as well be slow impacts, or grazes.
+    """
+    near = motion.gap < LOW * motion.noise
+    # one outlier in thousands of samples is no flight
+    near = binary_closing(np.pad(near, 3, mode="edge"), np.ones(3))[3:-3]
+    shortest = max(4, round(SHORTEST_CONTACT / motion.interval))
+    long = [pair for pair in stretches(near) if pair[1] - pair[0] >= shortest]
+    starts = [first for first, _ in long[1:]] + [len(near)]
+    doubtful = [
+        (first, last)
+        for (first, last), end in zip(long, starts)
+        if _grazes(motion, first, last) or _bounces(motion, first, last, end)
+    ]
+    found = [pair for pair in long if pair not in doubtful]
+    joined: list[Span] = []
+    for first, last in found:
+        between = slice(joined[-1][1], first) if joined else slice(0, first)
+        low = np.max(motion.gap[between], initial=-np.inf) < HIGH * motion.noise
+        if low and (joined or first < SHORTEST_FLIGHT):
+            first = joined.pop()[0] if joined else 0
+        joined.append((first, last))
+    if joined and len(near) - joined[-1][1] < SHORTEST_FLIGHT:
+        joined[-1] = (joined[-1][0], len(near))
+    return joined, doubtful
+
+
+def overlap(one: Span, other: Span) -> bool:
+    """Whether two stretches are closer than the shortest flight."""
+    margin = SHORTEST_FLIGHT
+    return one[0] - margin < other[1] and other[0] < one[1] + margin
+
+
+def _grazes(motion: Motion, first: int, last: int) -> bool:
+    """Whether a short stretch near the surface is the bottom of a parabola."""
+    inside = motion.time[first:last]
+    if len(inside) * motion.interval > _GRAZE or first == 0 or last == len(motion.time):
+        return False
+    scaled = np.linspace(-1.0, 1.0, len(inside))
+    inverse = np.linalg.pinv(scaled[:, None] ** np.arange(3))
+    curvature = inverse[2] @ motion.gap[first:last]
+    error = motion.noise * np.sqrt(np.sum(inverse[2] ** 2))
+    return bool(curvature > SIGNIFICANT * error)
+
+
+def _bounces(motion: Motion, first: int, last: int, end: int) -> bool:
+    """Whether a short stretch near the surface is a slow impact.
+
+    The flight after an impact is bent down from its first sample, or it would not
+    have come; the flight after a release opens as a cubic and is bent up.
+    """
+    flight = motion.gap[last:end]
+    if (
+        (last - first) * motion.interval > _GRAZE
+        or first == 0
+        or np.max(flight, initial=0.0) < HIGH * motion.noise
+    ):
+        return False
+    reach = max(8, round(0.02 / motion.interval))
+    rows = slice((first + last) // 2, min(last + reach, end))
+    scaled = np.linspace(-1.0, 1.0, len(motion.gap[rows]))
+    inverse = np.linalg.pinv(scaled[:, None] ** np.arange(3))
+    return bool(inverse[2] @ motion.gap[rows] < 0)

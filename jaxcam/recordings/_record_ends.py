@@ -1,0 +1,59 @@
+"""What the ends of a record hide: impacts next to them, and bounces before it began."""
+
+import dataclasses
+
+import numpy as np
+
+from ._contact_stretches import LOW, SHORTEST_CONTACT, SHORTEST_FLIGHT, Span
+from ._motion import Motion
+from ._segments import Contact, Flight
+
+
+def clear_of_end(motion: Motion, span: Span) -> Span:
+    """The part of a flight that surely comes before an impact at the record's end.
+
+    And after one at its beginning. So near to an end an impact shows in too few samples
+    to be found; but the flight, followed on, says where it would be.
+    """
+    first, last = span
+    count = len(motion.time)
+    tail = max(SHORTEST_FLIGHT + 1, round(SHORTEST_CONTACT / motion.interval))
+    # of what the fit says beyond its samples nothing is believed
+    if last - first < 3 * tail:
+        return span
+    if last == count:
+        fit = motion.fit(first, last - tail, at_end=True)
+        rows = np.arange(last - tail, last)
+        down = _near(motion, fit, rows)
+        last = int(rows[np.argmax(down)]) if np.any(down) else last
+    if first == 0:
+        fit = motion.fit(tail, last, at_end=False)
+        rows = np.arange(tail)
+        down = _near(motion, fit, rows)
+        first = int(rows[down][-1]) + 1 if np.any(down) else first
+    return first, last
+
+
+def _near(motion: Motion, fit, rows):
+    """Whether a flight has come down to the surface at these samples."""
+    heights = np.array([fit.value(time) for time in motion.time[rows]])
+    return heights - motion.contact[rows] < LOW * motion.noise
+
+
+def settled_alike(contacts: list[Contact], flights: list[Flight]) -> list[Contact]:
+    """Contacts whose beginning was not seen settle as late as the others of a record.
+
+    Where a record begins, the follower may be in the midst of bounces.
+    """
+    long = [f.stop for f in flights if f.last - f.first > SHORTEST_FLIGHT]
+    seen = [any(contact.start is stop for stop in long) for contact in contacts]
+    known = [c.settled - c.start.time for c, one in zip(contacts, seen) if one]
+    longest = max(known, default=0.0)
+    return [
+        contact
+        if one
+        else dataclasses.replace(
+            contact, settled=min(contact.start.time + longest, contact.stop.time)
+        )
+        for contact, one in zip(contacts, seen)
+    ]
