@@ -1,14 +1,21 @@
 """Runs that once went wrong, each with what was wrong."""
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
 import jaxcam
-from jaxcam.hybrid import stroboscope
+from jaxcam.hybrid import contact_state, stroboscope
 from jaxcam.hybrid._scalarise import scalarise, split
-from jaxcam.models import BouncingBall, CamFollower, ImpactOscillator, rpm_to_rad_s
+from jaxcam.models import (
+    BouncingBall,
+    CamFollower,
+    ImpactOscillator,
+    preset,
+    rpm_to_rad_s,
+)
 
 
 def test_release_point_start_reaches_the_end():
@@ -140,3 +147,32 @@ def test_at_rest_without_a_force_no_rise_of_the_surface_is_stepped_over(height):
     first = np.arccos(1 - 2 * height / 0.5) / 6.0
     assert abs(trajectory.impacts.time[0] - first) < 1e-10
     assert float(trajectory.gap(np.linspace(0.0, 20 * period, 4001)).min()) > -1e-9
+
+
+@pytest.mark.parametrize("gap", [0.0, 1e-17, -1e-17, 1e-13])
+@pytest.mark.parametrize("speed", [1e-9, -1e-9, 1e-17, -1e-3])
+@pytest.mark.parametrize(
+    "system, surface",
+    [(ImpactOscillator(2.8, 0.8, 0.3, 0.1), 0.3), (ImpactOscillator(2.8, 0.8), 0.0)],
+)
+def test_starts_within_rounding_of_the_surface(system, surface, gap, speed):
+    # where the first hop was lower than rounding no step was short enough
+    made = jaxcam.simulate(system, jnp.array([surface + gap, speed]), 0.0, 3.0)
+    assert made.successful, made.result
+    assert np.min(np.asarray(made.gap(made.steps.time))) >= -1e-12
+
+
+def test_hops_before_a_release_do_not_sink_into_the_surface():
+    """Close below the interruption of chattering contact lasts less than a hop.
+
+    Rounding of each landing added up to more than the height of the next hop.
+    """
+    system = preset("calibrated")
+    speed = rpm_to_rad_s(152.67692308)
+    system = eqx.tree_at(lambda s: s.speed, system, jnp.asarray(speed))
+    period = float(system.period)
+    time = period / 4
+    start = contact_state(system, jnp.array([time]), jnp.array([0.27, 0.0]))[0]
+    made = jaxcam.simulate(system, start, time, time + 40 * period)
+    assert made.successful, made.result
+    assert np.min(np.asarray(made.gap(made.steps.time))) >= -1e-14

@@ -108,7 +108,8 @@ def diagnose(
         effects.insert(0, unknown_effect(unexplained, problem, gained))
     alternatives = _alternatives(search, best)
     for name, delta in alternatives:
-        if delta < _TIE:
+        # what was found to hang on a few stretches of the records is no equal
+        if abs(delta) < _TIE:
             caveats.append(
                 f"These records cannot tell {listed(sorted(best.names))} from "
                 f"{name.replace('_', ' ')}: the BIC differs by {delta:.1f} only. "

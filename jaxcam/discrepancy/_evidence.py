@@ -15,7 +15,9 @@ from ._search import BEYOND, FALSE_ALARMS, Search, SURE, Trial, values_of
 # Stretches of a record, and pieces in each of them at least
 _SLICES, _PIECES = 4, 8
 _REDRAWN = 200
-# A fit to half of the records starts where the one to all of them ended
+# Parts that records are dealt out to, each of which the others predict
+_FOLDS = 3
+# A fit to some of the records starts where the one to all of them ended
 _ITERATIONS = 15
 
 
@@ -24,8 +26,8 @@ def held_out(
 ) -> tuple[float, float, dict[str, float], tuple[list[Residuals], list[Residuals]]]:
     """Two models on records that their parameters have not seen.
 
-    Records are dealt out to two halves; each is predicted with what the other one says.
-    One record alone is cut in two.
+    Records are dealt out to three parts, two records to two, and each part is predicted
+    with what the others say. One record alone is cut in two.
 
     **Returns:** rms of the residuals in units of the noise, without and with the terms,
     what was gained in the logarithm of the likelihood, by record, and the residuals
@@ -33,13 +35,14 @@ def held_out(
     """
     problem = search.problem
     unseen_parts: tuple[list[Residuals], list[Residuals]] = ([], [])
-    halves = _halves(problem)
+    folds = _folds(problem)
     squares, counts = np.zeros(2), np.zeros(2)
     gained: dict[str, float] = {}
-    for fold, (seen, unseen) in enumerate((halves, halves[::-1])):
+    for fold, (seen, unseen) in enumerate(folds):
         costs = []
         for which, trial in enumerate((before, after)):
-            progress("predicting records not seen", (2 * fold + which) / 4)
+            done = (2 * fold + which) / (2 * len(folds))
+            progress("predicting records not seen", done)
             known = fit(
                 problem,
                 free=trial.fit.free,
@@ -89,11 +92,19 @@ def _square(parts: list[Residuals]) -> tuple[float, int]:
     return square, sum(len(part.value) for part in parts)
 
 
-def _halves(problem: Problem):
-    if len(problem.records) > 1:
-        return problem.only(problem.records[::2]), problem.only(problem.records[1::2])
-    middle = problem.segments[0].recording.time.mean()
-    return problem.between(-np.inf, middle), problem.between(middle, np.inf)
+def _folds(problem: Problem):
+    """Weights of what is seen and what is not, for each part of the records."""
+    names = problem.records
+    if len(names) == 1:
+        middle = problem.segments[0].recording.time.mean()
+        halves = problem.between(-np.inf, middle), problem.between(middle, np.inf)
+        return [halves, halves[::-1]]
+    count = min(_FOLDS, len(names))
+    dealt = [names[k::count] for k in range(count)]
+    return [
+        (problem.only([n for n in names if n not in part]), problem.only(part))
+        for part in dealt
+    ]
 
 
 def _parts(test: Fit, unseen) -> list[Residuals]:

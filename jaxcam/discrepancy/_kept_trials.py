@@ -4,6 +4,7 @@ import hashlib
 import os
 import shutil
 import zipfile
+import zlib
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -12,6 +13,19 @@ import numpy as np
 
 from ..fitting import Problem
 from ..fitting._linearise import Point
+
+
+# what numpy raises for files that are not its own, or were
+_BROKEN = (
+    OSError,
+    ValueError,
+    LookupError,
+    EOFError,
+    MemoryError,
+    NotImplementedError,
+    zipfile.BadZipFile,
+    zlib.error,
+)
 
 
 class KeptTrials:
@@ -36,7 +50,7 @@ class KeptTrials:
                 if str(found["mark"]) != self.mark:
                     return None
                 values, states = found["values"], found["states"]
-        except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+        except _BROKEN:
             return None
         return Point(jnp.asarray(values), jnp.asarray(states))
 

@@ -52,9 +52,9 @@ def summary_of(
             )
         if unseen > _NOISE:
             tail = (
-                f"{tail} Half of the records do not pin the parameters down well "
-                f"enough to predict the others: they miss by {unseen:.2g} times the "
-                "noise."
+                f"{tail} A part of the records does not pin the parameters down well "
+                f"enough to predict the others, though: it misses by {unseen:.2g} "
+                "times the noise."
             )
         return (
             "Nothing is missing: with its parameters fitted within their tolerances "

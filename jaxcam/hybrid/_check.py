@@ -57,9 +57,9 @@ _gaps = eqx.filter_jit(gaps)
 
 def _check_shapes(system, t0, state) -> None:
     n = state.shape[0]
-    wanted = len(type(system).state_names)
+    wanted = len(system.state_names)
     if wanted and wanted != n:
-        names = ", ".join(type(system).state_names)
+        names = ", ".join(system.state_names)
         raise ValueError(
             f"state has {n} components but {type(system).__name__} has {wanted}: "
             f"{names}"

@@ -43,13 +43,13 @@ def judge(left: Jet, right: Jet, h, slack, rounding, scale, room) -> Verdict:
     later step).
     """
     polynomial = bernstein(left, right, h)
-    # a polynomial that errs by a part of the gap's own size says nothing
-    size = jnp.maximum(scale, jnp.maximum(jnp.abs(left.gap), jnp.abs(right.gap)))
-    vague = polynomial.error > _TRUST * size
     inward = moves_in(right, rounding)
     behind = (right.gap < -slack) | ((right.gap < 0) & inward)
     # on the surface at the very start and moving, or pulled, in: no time passes
     now = (left.gap <= 0) & moves_in(left, rounding) & (h == 0)
+    # a polynomial that errs by a part of the gap's own size says nothing
+    size = jnp.maximum(scale, jnp.maximum(jnp.abs(left.gap), jnp.abs(right.gap)))
+    vague = (polynomial.error > _TRUST * size) & ~now
     # judged by the straight line, since the series can vanish far from the root
     distance = jnp.abs(right.gap)
     speed = jnp.abs(right.velocity)

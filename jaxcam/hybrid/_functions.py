@@ -75,6 +75,7 @@ class Functions:
         self._impact = bind(impacts, time, state)
         self._velocity = bind(normal_velocity, time, state)
         self._frame = bind(_frame, time, state)
+        self._lift = bind(_lift, time, state)
         self._chatter = bind(completion_coefficients, time, state, state)
 
     @contextlib.contextmanager
@@ -121,6 +122,10 @@ class Functions:
             tuple(lift_velocity),
             tuple(damping),
         )
+
+    def lift(self, t, x):
+        """Directions in which the gaps grow by one."""
+        return tuple(map(tuple, self._lift(t, _pack(x))))
 
     def chatter(self, t, before, after):
         """C, r0 and the state P of `_chatter.py` for each constraint."""
@@ -177,10 +182,13 @@ def _mode_taylor(system, t, x, contact):
 
 def _frame(system, t, x):
     """Directions E (gap by one) and D (velocity by one), v_x E, and C = a_x D."""
-    gradient = jax.jacfwd(lambda y: gaps(system, t, y))(x)
     slope = jax.jacfwd(lambda y: normal_velocity(system, t, y))(x)
     curve = jax.jacfwd(lambda y: normal_acceleration(system, t, y))(x)
     push = normal_directions(system, t, x)
-    square = jnp.sum(gradient * gradient, axis=1)
-    lift = gradient / square[:, None]
+    lift = _lift(system, t, x)
     return lift, push, jnp.sum(slope * lift, axis=1), jnp.sum(curve * push, axis=1)
+
+
+def _lift(system, t, x):
+    gradient = jax.jacfwd(lambda y: gaps(system, t, y))(x)
+    return gradient / jnp.sum(gradient * gradient, axis=1)[:, None]

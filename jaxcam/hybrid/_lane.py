@@ -2,6 +2,7 @@
 
 from typing import Any, NamedTuple
 
+import jax
 import jax.numpy as jnp
 
 from ._functions import Functions
@@ -38,16 +39,25 @@ def first_lane(functions: Functions, t0, x, t1) -> Lane:
     """The lane at its start: in contact where gap and velocity are zero and a < 0."""
     free = tuple(jnp.asarray(False) for _ in range(functions.m))
     jets = functions.jets(t0, x, free)
+    lifts = functions.lift(t0, x)
     size = largest([jnp.abs(e) for e in x])
     tiny = 1e-12 * (1.0 + size)
     contact, settled = [], []
-    for jet in jets:
-        touching = (jnp.abs(jet.gap) <= tiny) & (jnp.abs(jet.velocity) <= tiny)
+    for jet, lift in zip(jets, lifts, strict=True):
+        gap, velocity = jet.gap, jet.velocity
+        near = jnp.abs(gap) <= tiny
+        # a hop so low that rounding hides it is none
+        hop = 1e-12 * size * jnp.abs(jet.acceleration)
+        low = (velocity > 0) & (jet.acceleration < 0) & (velocity * velocity <= hop)
+        touching = near & ((jnp.abs(velocity) <= tiny) | low)
         contact.append(touching & (jet.acceleration < 0))
         # off the surface a start is taken as it is; on it, rounding is removed
+        behind = near & (gap < 0)
+        shift = jax.lax.stop_gradient(jnp.where(behind, gap, 0.0))
+        x = tuple(a - shift * b for a, b in zip(x, lift, strict=True))
         settled.append(
             Jet(
-                jnp.where(touching, 0.0, jet.gap),
+                jnp.where(touching | behind, 0.0, gap),
                 jnp.where(touching, 0.0, jet.velocity),
                 jet.acceleration,
                 jet.jerk,

@@ -162,7 +162,7 @@ def _iterate(functions: Functions, plan: Plan, lane: Lane) -> tuple[Lane, Record
     good = good & ~(held.retake & sticking & ~lands) & converged
     delay = jnp.where(released, held.offset, 0.0)
     left = _taylor_of_release(functions, settled, rates, frame, jets3, delay, contact)
-    x4 = select(sticking & ~lands, left, x3)
+    x4 = select(sticking & ~lands, left, _off_rounding(frame, jets3, x3, hit))
     x4 = select(begins, chatter.state, x4)
     t4 = t2 + delay
 
@@ -282,6 +282,17 @@ def _kept_contacts(functions, lane, lands, t, x):
         c & (~lands | (jnp.abs(v) <= 1e-12 * (1.0 + lane.fastest)))
         for c, v in zip(lane.contact, speeds, strict=True)
     )
+
+
+def _off_rounding(frame, jets, x, hit):
+    """The state after an impact without the gap that rounding left it.
+
+    It would add up over the impacts of a chatter, whose last hops are lower than it.
+    """
+    for direction, jet, here in zip(frame.lift, jets, hit, strict=True):
+        gap = jax.lax.stop_gradient(jnp.where(here, jet.gap, 0.0))
+        x = tuple(a - gap * b for a, b in zip(x, direction, strict=True))
+    return x
 
 
 def _taylor(x, rates, tau):

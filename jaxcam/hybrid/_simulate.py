@@ -131,7 +131,7 @@ def _released(system, t0, traced):
             "state=None needs a system with a forcing period; pass the state to start "
             "from"
         )
-    names = type(system).state_names
+    names = system.state_names
     if (names and len(names) != 2) or _constraints(system, t0) != 1:
         raise ValueError(
             "state=None needs a system with two states and one constraint; pass the "
