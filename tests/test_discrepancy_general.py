@@ -8,7 +8,13 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from jaxcam import HybridSystem
-from jaxcam.discrepancy import diagnose, library, strength, Term
+from jaxcam.discrepancy import (
+    compare_experiments,
+    diagnose,
+    library,
+    strength,
+    Term,
+)
 from jaxcam.fitting import Parameter, Sensor
 from jaxcam.recordings import Recording, segment
 
@@ -147,3 +153,26 @@ def test_vibration_is_found_at_its_frequency():
     for name, truth in (("ext", 0.3), ("fe", 11.3), ("phase", 0.6)):
         assert values[name].value == pytest.approx(truth, abs=4 * values[name].stderr)
     assert values["fe"].stderr < 0.05
+
+
+def test_one_more_record_says_what_its_energy_says():
+    """For a linear motion the information grows with the square of the amplitude.
+
+    Beside two records of amplitude 0.3, one of 0.3 brings the error of the damping to
+    sqrt(2/3) of what it was, and one of 0.6 to sqrt(1/3), within 5 %.
+    """
+    damping = next(t for t in library(False, 0.0) if t.name == "viscous_damping")
+    motions = [_free(0.3, 0.1), _free(0.3, 0.1)]
+    found = _diagnosed(motions, candidates=[damping])
+    assert found.names == ("viscous_damping",)
+    rng = np.random.default_rng(7)
+    more = []
+    for name, size in (("same", 0.3), ("twice", 0.6)):
+        noisy = _free(size, 0.1) + _NOISE * rng.standard_normal(len(_TIME))
+        record = Recording(name, _TIME, {"angle_rad": noisy})
+        more.append(segment(record, "angle_rad", noise=_NOISE))
+    best, other = compare_experiments(found, more)
+    assert (best.name, other.name) == ("twice", "same")
+    assert best.factor == pytest.approx(np.sqrt(1 / 3), rel=0.05)
+    assert other.factor == pytest.approx(np.sqrt(2 / 3), rel=0.05)
+    assert best.now["c1"] == pytest.approx(found.after["c1"].stderr, rel=0.05)

@@ -1,5 +1,6 @@
 """`jaxcam diagnose`: what physics a rig's model leaves out, from its recordings."""
 
+import dataclasses
 import shutil
 from pathlib import Path
 from typing import Annotated
@@ -20,6 +21,10 @@ def diagnose(
             help="Speeds at which the motion changes, with and without what was found."
         ),
     ] = True,
+    propose: Annotated[
+        bool,
+        typer.Option("--next", help="Which record to make next, by its speed."),
+    ] = False,
     resume: Resume = False,
     json_file: Annotated[
         Path | None,
@@ -40,6 +45,7 @@ def diagnose(
     Examples:
       jaxcam diagnose ./case --rig rig.toml --out ./jaxcam-diagnosis
       jaxcam diagnose ./case --json -
+      jaxcam diagnose ./case --next --out ./jaxcam-diagnosis
       jaxcam diagnose ./case --out ./jaxcam-diagnosis --resume
     """
     from ._choices import choose
@@ -51,8 +57,8 @@ def diagnose(
     from ._cache import keep_compiled_programs
     from ._demo import _rig_file
     from ._diagnose_files import write_diagnosis, write_verdict
+    from ._outlook import Outlook, terminal_table
     from ._output import Output
-    from ._predictions import as_data, prediction_table
     from ._progress import progress
 
     keep_compiled_programs()
@@ -77,15 +83,20 @@ def diagnose(
             progress=report,
             keep=keep,
         )
-        foretold, figures = (), []
+        outlook, figures = Outlook(), []
         if out is not None:
             report("drawing", None)
             figures = write_diagnosis(out, found, tuple(notes))
         if predict and found.verdict != "unknown":
             report("predicting with and without", None)
-            foretold = discrepancy.predictions(found)
-            if out is not None:
-                write_verdict(out, found, figures, tuple(notes), foretold)
+            outlook = Outlook(discrepancy.predictions(found))
+        if propose:
+            proposed = discrepancy.next_experiments(
+                found, nominal, seed=seed, progress=report
+            )
+            outlook = dataclasses.replace(outlook, experiments=proposed)
+        if out is not None:
+            write_verdict(out, found, figures, tuple(notes), outlook)
     for note in notes:
         output.print(note)
     output.print(found.summary)
@@ -95,9 +106,9 @@ def diagnose(
         f"On records not seen: {found.heldout_before:.3e} {found.unit} before, "
         f"{found.heldout_after:.3e} after, noise {found.noise_floor:.3e}."
     )
-    if foretold:
-        output.print(prediction_table(foretold))
+    for table in outlook.tables():
+        output.print(terminal_table(table))
     if out is not None:
         output.print(f"Report: {out / 'index.html'}")
         output.print(f"Model: {out / 'model.json'}, for --system of other commands")
-    output.write_json({**found.to_json(), **as_data(foretold)})
+    output.write_json({**found.to_json(), **outlook.data()})

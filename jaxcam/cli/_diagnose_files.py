@@ -4,11 +4,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TypeAlias
 
-from ..discrepancy import Diagnosis, Prediction
+from ..discrepancy import Diagnosis
 from ..models import save_system
 from ._diagnose_page import diagnosis_page, draw
-from ._output import to_text
-from ._predictions import as_data
+from ._outlook import Outlook
+from ._output import to_text, write_text
 
 
 # Each figure's file and caption
@@ -30,10 +30,10 @@ def write_verdict(
     found: Diagnosis,
     figures: Figures,
     notes: Sequence[str],
-    foretold: Sequence[Prediction] = (),
+    outlook: Outlook = Outlook(),
 ) -> None:
     """Write verdict.json, and index.html with figures that are drawn already."""
-    verdict = to_text({**found.to_json(), **as_data(foretold)})
-    (folder / "verdict.json").write_text(verdict + "\n", encoding="utf-8")
-    page = diagnosis_page(found, figures, tuple(notes), foretold)
-    (folder / "index.html").write_text(page, encoding="utf-8")
+    verdict = to_text({**found.to_json(), **outlook.data()})
+    write_text(folder / "verdict.json", verdict + "\n")
+    page = diagnosis_page(found, figures, tuple(notes), outlook)
+    write_text(folder / "index.html", page)

@@ -7,11 +7,11 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 
-from ..discrepancy import Diagnosis, Prediction, Structure
+from ..discrepancy import Diagnosis, Structure
 from ..discrepancy._words import listed, number
 from ..fitting import Residuals
+from ._outlook import Outlook
 from ._page import _figure, _split, _STYLE, _table
-from ._predictions import HEADINGS, prediction_rows
 
 
 matplotlib.use("Agg")
@@ -174,7 +174,7 @@ def diagnosis_page(
     found: Diagnosis,
     figures: Sequence[tuple[Path, str]],
     notes: Sequence[str],
-    foretold: Sequence[Prediction] = (),
+    outlook: Outlook = Outlook(),
 ) -> str:
     """The page as text; nothing in it is loaded from elsewhere."""
     title = f"{found.case or 'Recordings'}: {_title(found)}"
@@ -229,12 +229,11 @@ def diagnosis_page(
     if found.caveats:
         items = "".join(f"<li>{escape(caveat)}</li>" for caveat in found.caveats)
         parts += ["<h2>Caveats</h2>", f"<ul>{items}</ul>"]
-    if foretold:
+    for one in outlook.tables():
         parts += [
-            "<h2>What changes</h2>",
-            _table(HEADINGS, prediction_rows(foretold), text=(0,)),
-            '<p class="note">Speeds of the cam in rpm at which the motion of this rig '
-            "changes, with the standard errors that those of the fit make.</p>",
+            f"<h2>{one.title}</h2>",
+            _table(one.headings, one.rows, text=(0,)),
+            f'<p class="note">{one.note}</p>',
         ]
     parts += [
         "<h2>Is anything left over?</h2>",

@@ -16,7 +16,7 @@ from ._term import Term
 from ._with_terms import WithTerms
 
 
-# Alternatives that are worse by less than this in BIC are to be told from what was named
+# What is worse by less than this in BIC is to be told from what was named
 _RIVAL = 30.0
 # Speeds that are tried, and how far beyond those recorded
 _SPEEDS, _BEYOND = 7, 0.05
@@ -63,9 +63,7 @@ def compare_experiments(
     """
     fit = found.after
     problem = Problem.build(fit.problem.model, records, fit.problem.parameters)
-    values = np.repeat(
-        np.asarray(fit.point.values)[:1], len(problem.segments), axis=0
-    )
+    values = np.repeat(np.asarray(fit.point.values)[:1], len(problem.segments), axis=0)
     point = problem.start._replace(values=jnp.asarray(values))
     known, more = blocks_of(fit.problem, fit.point), blocks_of(problem, point)
     questions = _questions(found, asked)
@@ -118,7 +116,8 @@ def next_experiments(
     if speeds is None:
         known = [drive.speed for drive in drives]
         low, high = min(known), max(known)
-        speeds = np.linspace((1 - _BEYOND) * low, (1 + _BEYOND) * high, _SPEEDS)
+        grid = np.linspace((1 - _BEYOND) * low, (1 + _BEYOND) * high, _SPEEDS)
+        speeds = [float(speed) for speed in grid]
     length = parts[0].recording.duration if duration is None else duration
     report = progress or (lambda sentence, fraction: None)
     rng = np.random.default_rng(seed)

@@ -5,12 +5,16 @@ from jaxtyping import Float, Int
 from scipy.signal import find_peaks
 
 
+# Seconds on either side of a kink that it takes to see it
+WINDOW = 0.01
+
+
 def find_kinks(
     samples: Float[np.ndarray, " k"],
     interval: float,
     noise: float,
     *,
-    window: float = 0.01,
+    window: float = WINDOW,
     threshold: float = 7.0,
 ) -> Int[np.ndarray, " kinks"]:
     """Index of the first sample after each jump in velocity.

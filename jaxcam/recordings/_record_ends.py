@@ -4,9 +4,14 @@ import dataclasses
 
 import numpy as np
 
-from ._contact_stretches import LOW, SHORTEST_CONTACT, SHORTEST_FLIGHT, Span
+from ._contact_stretches import LOW, SHORTEST_FLIGHT, Span
+from ._kinks import WINDOW
 from ._motion import Motion
 from ._segments import Contact, Flight
+
+
+# Samples of a flight that say where it goes on to
+_LEAST = 12
 
 
 def clear_of_end(motion: Motion, span: Span) -> Span:
@@ -17,9 +22,8 @@ def clear_of_end(motion: Motion, span: Span) -> Span:
     """
     first, last = span
     count = len(motion.time)
-    tail = max(SHORTEST_FLIGHT + 1, round(SHORTEST_CONTACT / motion.interval))
-    # of what the fit says beyond its samples nothing is believed
-    if last - first < 3 * tail:
+    tail = max(SHORTEST_FLIGHT + 1, round(WINDOW / motion.interval))
+    if last - first < tail + _LEAST:
         return span
     if last == count:
         fit = motion.fit(first, last - tail, at_end=True)
