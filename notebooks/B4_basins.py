@@ -36,7 +36,7 @@ system = ImpactOscillator(omega=2.6, restitution=0.8, wall=0.0)
 grid = sweeps.Grid((-3.0, -2.5), (0.0, 2.5), (96, 96))
 found = sweeps.basins(system, grid, turns=400, reruns=4)
 for name, share in found.shares.items():
-    print(f"{name}: {share.share:.1%} +- {share.error:.1%}")
+    print(f"{name}: {share.share:.1%} +- {share.stderr:.1%}")
 assert found.names == ["P(1,1)", "P(6,6)"]
 figure = basin_picture(found)
 # -
@@ -72,7 +72,7 @@ for ax, name, points in zip(panels, found.names, found.orbits, strict=True):
 
 # +
 uncertain = sweeps.uncertainty_exponent(found.attractor)
-print(f"exponent {uncertain.exponent:.2f} +- {uncertain.error:.2f}")
+print(f"exponent {uncertain.exponent:.2f} +- {uncertain.stderr:.2f}")
 print(f"dimension of the boundary {uncertain.dimension:.2f}")
 print(f"twice as exact: {2**-uncertain.exponent:.0%} of the uncertain states are left")
 assert 0 < uncertain.exponent < 1 < uncertain.dimension < 2

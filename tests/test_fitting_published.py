@@ -263,7 +263,7 @@ def test_free_fall_gives_inertia_over_stiffness():
     noise = 1e-4
     rng = np.random.default_rng(4)
     noisy = fit(exact + noise * rng.standard_normal(len(times)), noise)
-    shift = (noisy.estimates - [98.0, *start]) / noisy.standard_errors
+    shift = (noisy.estimates - [98.0, *start]) / noisy.stderr
     assert np.all(np.abs(shift) < 4)
     assert 90 < noisy.chi_square < 220  # 148 expected, 17 its deviation
     assert dataclasses.is_dataclass(noisy)

@@ -119,7 +119,7 @@ def test_shares_are_stable_under_refinement(coexisting):
     finer = basins(SECTION, Grid((-1, -2), (0, 2), (10, 20)), **OPTIONS)
     assert finer.names == coexisting.names
     one, other = coexisting.shares["P(6,6)"], finer.shares["P(6,6)"]
-    assert abs(one.share - other.share) < 3 * np.hypot(one.error, other.error)
+    assert abs(one.share - other.share) < 3 * np.hypot(one.stderr, other.stderr)
 
 
 def test_an_attractor_keeps_its_number_where_others_are_absent(coexisting):

@@ -41,7 +41,7 @@ def test_basins_of_newton_are_half_planes(halves):
         (1, 40), dtype=int))  # fmt: skip
     assert halves.shares["period 1 a"].share == 0.5
     # sqrt(p (1 - p) / N)
-    assert halves.shares["period 1 a"].error == pytest.approx(0.5 / 40)
+    assert halves.shares["period 1 a"].stderr == pytest.approx(0.5 / 40)
 
 
 def test_states_that_escape_are_told_apart():

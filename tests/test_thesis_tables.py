@@ -143,7 +143,7 @@ def test_preset_is_what_the_fit_finds(calibrated):
     numbers = fit.numbers()
     assert np.max(np.abs(numbers["computed"] - numbers["printed"])) < 1.1e-5
     preset_values = [float(v) for v in free(Observed(calibrated, jnp.asarray(0.0)))]
-    shift = (fit.estimates - preset_values)[:-1] / fit.standard_errors[:-1]
+    shift = (fit.estimates - preset_values)[:-1] / fit.stderr[:-1]
     assert np.max(np.abs(shift)) < 0.02
     assert len(fit.weak()) == 1
     assert "stiffness" in fit.weak()[0]

@@ -27,7 +27,7 @@ def test_multipliers_in_and_out_of_the_picture():
 def test_exponents_settle_in_a_band():
     running = np.array([[0.3, -0.5], [0.1, -0.4], [0.2, -0.45]])
     spectrum = SimpleNamespace(
-        running=running, turn=2.0, exponents=running[-1], standard_error=[0.1, 0.1]
+        running=running, turn=2.0, exponents=running[-1], stderr=[0.1, 0.1]
     )
     figure = plotting.lyapunov_convergence(spectrum)
     curves = [x for x in figure.axes[0].lines if "exponent" in str(x.get_label())]

@@ -35,7 +35,7 @@ def test_sum_rule_on_chaotic_and_periodic_motions(damping):
     np.testing.assert_allclose(made.exponents.sum(axis=1), exact, atol=1e-10)
     if damping:
         largest = np.asarray(made.exponents)[:, 0]
-        error = np.asarray(made.standard_error)[:, 0]
+        error = np.asarray(made.stderr)[:, 0]
         # a motion of either kind, by many standard errors
         assert largest[0] < -0.05 and np.any(largest > 5 * error)
         np.testing.assert_allclose(

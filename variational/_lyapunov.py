@@ -31,7 +31,7 @@ class LyapunovSpectrum(eqx.Module):
     #: (n,) or (lanes, n), the largest first
     exponents: Float[Array, "*lanes n"]
     #: standard error of each, from the scatter of blocks of consecutive turns
-    standard_error: Float[Array, "*lanes n"]
+    stderr: Float[Array, "*lanes n"]
     #: impacts per second
     impact_rate: Float[Array, "*lanes"]
     #: (turns, n) finite-time exponents, each over one turn
@@ -175,7 +175,7 @@ def _summary(seen: _Seen, carry: _Carry, length, transient, blocks):
     status = np.asarray(carry.lane.status).astype(int)
     return LyapunovSpectrum(
         exponents=jnp.asarray(local.mean(axis=1)),
-        standard_error=jnp.asarray(error),
+        stderr=jnp.asarray(error),
         impact_rate=jnp.asarray(impacts / (turns * length)),
         local=jnp.asarray(local),
         state=jnp.asarray(seen.states),

@@ -9,15 +9,14 @@ import numpy as np
 from jaxtyping import Float
 
 from ..fitting import Fit, Model, Parameter, Problem, Weights
-from ..fitting._eliminate import eliminate, step_of
-from ..fitting._fit import (
-    _PROMISE,
-    _total,
+from ..fitting._columns import (
     free_columns,
     invert,
     off_nominal,
     prior_information,
 )
+from ..fitting._eliminate import eliminate, step_of
+from ..fitting._fit import PROMISE, total_cost
 from ..fitting._linearise import assemble, Layout, Point
 from ..fitting._problem import _places
 from ._term import Term
@@ -259,8 +258,8 @@ def with_states(problem: Problem, found: Fit, weights: Weights) -> Fit:
         blocks, costs_here = assemble(
             problem.layout, problem.pieces, extras, point, local, scales
         )
-        total = _total(costs_here, extras)
-        if total > best - _PROMISE:
+        total = total_cost(costs_here, extras)
+        if total > best - PROMISE:
             break
         best, costs, kept = total, costs_here, point
         reduced = eliminate(blocks)

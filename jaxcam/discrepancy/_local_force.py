@@ -14,8 +14,8 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
 from ..fitting import Problem
+from ..fitting._columns import free_columns, off_nominal, prior_information
 from ..fitting._eliminate import eliminate
-from ..fitting._fit import free_columns, off_nominal, prior_information
 from ..fitting._linear import Linear, linear
 from ..fitting._linearise import chained, Point
 from ..fitting._predict import runge_kutta

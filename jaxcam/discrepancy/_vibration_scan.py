@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Complex, Float
 
 from ..fitting import Problem
-from ..fitting._fit import invert
+from ..fitting._columns import invert
 from ._local_force import Response
 
 

@@ -7,12 +7,8 @@ from ._cam_follower import (
     rig_sensors as rig_sensors,
 )
 from ._find_orbits import one_impact_orbits as one_impact_orbits
-from ._fit import (
-    Estimate as Estimate,
-    Fit as Fit,
-    fit as fit,
-    held_out_cost as held_out_cost,
-)
+from ._fit import fit as fit, held_out_cost as held_out_cost
+from ._fit_result import Estimate as Estimate, Fit as Fit
 from ._free_fall import fit_free_fall as fit_free_fall, FreeFall as FreeFall
 from ._identify import Identifiability as Identifiability, identify as identify
 from ._impact_orbit import (

@@ -6,7 +6,8 @@ from collections.abc import Callable
 import numpy as np
 from jaxtyping import Float
 
-from ._fit import Fit, fit
+from ._fit import fit
+from ._fit_result import Fit
 from ._problem import Weights
 
 

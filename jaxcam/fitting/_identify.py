@@ -7,7 +7,9 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from ._fit import Fit, fit, free_columns, reduced
+from ._columns import free_columns, reduced
+from ._fit import fit
+from ._fit_result import Fit
 from ._linearise import assemble
 from ._problem import Problem
 

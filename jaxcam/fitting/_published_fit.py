@@ -16,7 +16,7 @@ class PublishedFit:
     """Result of [`jaxcam.fitting.fit_published`][].
 
     - `model`: with the estimates in it.
-    - `estimates`, `standard_errors`, `covariance`: `(p,)`, `(p,)`, `(p, p)`; priors
+    - `estimates`, `stderr`, `covariance`: `(p,)`, `(p,)`, `(p, p)`; priors
         included, errors of the data as stated.
     - `shares`, `directions`: `(p,)` and `(p, p)`; how much of what is known of each
         combination of parameters comes from the data and not from the priors (1 all, 0
@@ -81,12 +81,12 @@ class PublishedFit:
         )
 
     @property
-    def standard_errors(self) -> Float[np.ndarray, " p"]:
+    def stderr(self) -> Float[np.ndarray, " p"]:
         return np.sqrt(np.diag(self.covariance))
 
     @property
     def correlation(self) -> Float[np.ndarray, "p p"]:
-        errors = self.standard_errors
+        errors = self.stderr
         return self.covariance / np.outer(errors, errors)
 
     @property
@@ -103,7 +103,7 @@ class PublishedFit:
                 "nominal": self.nominal,
                 "tolerance": self.tolerances,
                 "estimate": self.estimates,
-                "standard error": self.standard_errors,
+                "standard error": self.stderr,
             }
         )
 

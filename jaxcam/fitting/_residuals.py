@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 from jaxtyping import Float
 
-from ._fit import Fit
+from ._fit_result import Fit
 from ._linearise import predict
 
 

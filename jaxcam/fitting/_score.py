@@ -7,15 +7,15 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from ._fit import (
+from ._columns import (
     Columns,
-    Fit,
     free_columns,
     invert,
     off_nominal,
     prior_information,
     reduced,
 )
+from ._fit_result import Fit
 from ._linearise import assemble
 from ._problem import Problem, Weights
 

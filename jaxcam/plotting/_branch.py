@@ -43,6 +43,11 @@ _SHORT = {
 }
 
 
+def mark_of(kind: str) -> tuple[str, str]:
+    """Mark and colour of a kind of special point."""
+    return _MARKS.get(kind, _OTHER)
+
+
 @styled
 def branch_diagram(
     branches: "Branch | Iterable[Branch]",
@@ -124,7 +129,7 @@ def _solid(point) -> bool:
 
 def _mark(ax: Axes, branch, value, x_scale, letters: bool) -> None:
     for point in branch.special:
-        mark, colour = _MARKS.get(point.kind, _OTHER)
+        mark, colour = mark_of(point.kind)
         ys = np.atleast_1d(np.asarray(value(point), dtype=float))
         x = x_scale * point.parameter
         ax.plot(

@@ -36,7 +36,7 @@ def lyapunov_convergence(spectrum, ax: Axes | None = None) -> Figure:
             time[finite], running[finite, k], color=f"C{k}", label=f"exponent {k + 1}"
         )[0]
         last = float(spectrum.exponents[k])
-        error = float(spectrum.standard_error[k])
+        error = float(spectrum.stderr[k])
         if np.isfinite(last):
             ax.axhspan(
                 last - error, last + error, color=line.get_color(), alpha=0.2, lw=0

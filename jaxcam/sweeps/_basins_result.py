@@ -14,7 +14,7 @@ class Share(NamedTuple):
     """Part of the states that end on an attractor, and its standard error."""
 
     share: float
-    error: float
+    stderr: float
 
 
 class Basins:

@@ -22,7 +22,7 @@ class Uncertainty(NamedTuple):
     """The uncertainty exponent of a boundary, with its standard error."""
 
     exponent: float
-    error: float
+    stderr: float
     #: box-counting dimension of the boundary: that of the grid less the exponent
     dimension: float
     #: distances (cells) and fractions of uncertain states that the fit goes through

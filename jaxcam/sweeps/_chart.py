@@ -119,7 +119,7 @@ class ChartJob(AbstractJob):
         if exponents:
             about = {"units": "1/s", "about": "largest Lyapunov exponent"}
             variables["exponent"] = Variable(dims, tail, "float64", about)
-            variables["exponent_error"] = Variable(dims, tail, "float64", about)
+            variables["exponent_stderr"] = Variable(dims, tail, "float64", about)
         rows = max(1, _LANES // (len(first) * count)) if block is None else block
         rows = min(rows, len(second))
         identity = {
@@ -186,5 +186,5 @@ def some_pairs(
         made = largest_exponents(
             section, samples.final, exponents, where=where, values=values
         )
-        found |= {"exponent": made.largest, "exponent_error": made.error}
+        found |= {"exponent": made.largest, "exponent_stderr": made.stderr}
     return {name: array.reshape(*shape, count) for name, array in found.items()}

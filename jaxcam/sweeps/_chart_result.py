@@ -11,7 +11,7 @@ class Chart:
 
     `dataset` has a dimension for each parameter, the second one first, and `start`; the
     variables are `impacts` and `turns` (the label), `code` (0, or why a motion failed),
-    and, if asked for, `exponent` and `exponent_error` (1/s).
+    and, if asked for, `exponent` and `exponent_stderr` (1/s).
     """
 
     def __init__(self, dataset: xarray.Dataset):
@@ -40,7 +40,7 @@ class Chart:
         found = names(numbers)
         if "exponent" in self.dataset:
             largest = self.dataset["exponent"].values
-            error = self.dataset["exponent_error"].values
+            error = self.dataset["exponent_stderr"].values
             chaotic = (numbers.turns == APERIODIC) & (largest > 3 * error)
             found = np.where(chaotic, "chaotic", found)
         return found

@@ -1,6 +1,7 @@
 """Whether what is on disk is what was written."""
 
 import json
+import warnings
 import zlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -8,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import xarray
 import zarr
+import zarr.errors
 
 from ._store import FORMAT, SWEEP, VERSION
 
@@ -16,8 +18,8 @@ UNFINISHED = -1
 CHECKSUM = "checksum"
 # attribute with the checksums of what was made of all blocks together
 TOGETHER = "together"
-# zarr's codecs raise these for a chunk that they cannot read
-_UNREADABLE = (OSError, ValueError, RuntimeError, TypeError)
+# what zarr and its codecs raise for chunks and descriptions that were damaged
+UNREADABLE = (OSError, ValueError, RuntimeError, TypeError, LookupError, AttributeError)
 
 
 def faults(group: zarr.Group) -> list[str]:
@@ -27,7 +29,7 @@ def faults(group: zarr.Group) -> list[str]:
     for block in range(-(-units // size)):
         try:
             wanted = int(np.asarray(group[CHECKSUM][block]))  # pyright: ignore
-        except (*_UNREADABLE, KeyError):
+        except UNREADABLE:
             found.append("has an unreadable checksum")
             continue
         if wanted == UNFINISHED:
@@ -35,7 +37,7 @@ def faults(group: zarr.Group) -> list[str]:
             continue
         try:
             same = checksum(read_block(group, block)) == wanted
-        except (*_UNREADABLE, KeyError):
+        except UNREADABLE:
             found.append("cannot be read")
             continue
         found.append("" if same else "is damaged")
@@ -51,9 +53,25 @@ def checksum(arrays: Mapping[str, np.ndarray]) -> int:
 
 
 def opened(path: str | Path) -> xarray.Dataset:
-    """The dataset on disk, read when it is used."""
-    return xarray.open_dataset(
-        path, engine="zarr", consolidated=False, chunks=None, decode_times=False
+    """The dataset on disk, read when it is used.
+
+    **Raises:** `ValueError` where its description or a coordinate is damaged.
+    """
+    try:
+        with warnings.catch_warnings():
+            # a folder without a description; what it lacks is said by who needs it
+            warnings.simplefilter("ignore", zarr.errors.ZarrUserWarning)
+            return xarray.open_dataset(
+                path, engine="zarr", consolidated=False, chunks=None, decode_times=False
+            )
+    except UNREADABLE:
+        raise damaged(path) from None
+
+
+def damaged(path: str | Path) -> ValueError:
+    return ValueError(
+        f"{path}: what describes the sweep (zarr.json, coordinates) is damaged; remove "
+        "the folder, and run the sweep again"
     )
 
 
@@ -94,7 +112,7 @@ def _check_together(path, dataset: xarray.Dataset) -> None:
         return
     try:
         found = checksums(dataset, wanted)
-    except (*_UNREADABLE, KeyError):
+    except UNREADABLE:
         found = {}
     bad = [name for name in wanted if found.get(name) != wanted[name]]
     if bad:
@@ -109,11 +127,15 @@ def stored_identity(path: Path) -> dict | None:
     """What the sweep at a path is of; None where there is no sweep."""
     try:
         attributes = dict(zarr.open_group(str(path), mode="r").attrs)
-    except (*_UNREADABLE, KeyError):
+        if attributes.get("format") != FORMAT or attributes.get("version") != VERSION:
+            return None
+        identity = json.loads(str(attributes[SWEEP]))
+        # the sizes of its blocks, without which nothing can be read
+        whole = int(attributes["units"]) > 0 and int(attributes["block"]) > 0  # pyright: ignore
+        stored = all(isinstance(name, str) for name in attributes["stored"])  # pyright: ignore
+    except (*UNREADABLE, RecursionError):
         return None
-    if attributes.get("format") != FORMAT or attributes.get("version") != VERSION:
-        return None
-    return json.loads(str(attributes[SWEEP]))
+    return identity if isinstance(identity, dict) and whole and stored else None
 
 
 def names_of(blocks: Sequence[int]) -> str:

@@ -17,12 +17,14 @@ from ._checksums import (
     CHECKSUM,
     checksum,
     checksums,
+    damaged,
     faults,
     opened,
     read_block,
     stored_identity,
     TOGETHER,
     UNFINISHED,
+    UNREADABLE,
 )
 from ._store import Layout, ordered, plain, template
 
@@ -125,3 +127,29 @@ class OnDisk:
                 f"{self.path} holds another sweep (other {', '.join(differing)}); "
                 "choose another folder, or ask for the same sweep to go on with it"
             )
+        self._check_description()
+
+    def _check_description(self) -> None:
+        """Raise `ValueError` where blocks could not be written beside those there."""
+        layout = self.layout
+        wanted = {
+            name: ((layout.units, *v.tail), np.dtype(v.dtype))
+            for name, v in layout.variables.items()
+        }
+        wanted[CHECKSUM] = ((layout.blocks,), np.dtype("int64"))
+        try:
+            group = zarr.open_group(str(self.path), mode="r")
+            found = {
+                name: (group[name].shape, group[name].dtype)  # pyright: ignore
+                for name in wanted
+            }
+            sizes = (group.attrs["units"], group.attrs["block"], group.attrs["stored"])
+            opened(self.path).close()
+        except UNREADABLE:
+            raise damaged(self.path) from None
+        if found != wanted or sizes != (
+            layout.units,
+            layout.block,
+            [*layout.variables],
+        ):
+            raise damaged(self.path)

@@ -16,12 +16,12 @@ class Exponents(NamedTuple):
     """Largest exponent of each lane (1/s), and its standard error."""
 
     largest: np.ndarray
-    error: np.ndarray
+    stderr: np.ndarray
 
     @property
     def chaotic(self) -> np.ndarray:
         """Whether the exponent is positive by three standard errors."""
-        return self.largest > 3 * self.error
+        return self.largest > 3 * self.stderr
 
 
 def largest_exponents(
@@ -64,7 +64,7 @@ def largest_exponents(
             settings=Settings(tolerance=1e-10, chatter_depth=1.0),
         )
         made.largest[ready[some]] = np.asarray(spectrum.exponents)[:, 0]
-        made.error[ready[some]] = np.asarray(spectrum.standard_error)[:, 0]
+        made.stderr[ready[some]] = np.asarray(spectrum.stderr)[:, 0]
     return made
 
 

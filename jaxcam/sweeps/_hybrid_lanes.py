@@ -57,7 +57,7 @@ def in_contact(system: HybridSystem, t0, where=None, values=None) -> np.ndarray:
     **Raises:** `ValueError` where a state has not two components or there are several
     constraints.
     """
-    names = type(system).state_names
+    names = system.state_names
     gap = jax.eval_shape(system.gap, jnp.asarray(t0, float), jnp.zeros(2))
     if (names and len(names) != 2) or gap.size != 1:
         raise ValueError(

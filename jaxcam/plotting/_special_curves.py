@@ -1,0 +1,82 @@
+"""Curves of special points in two parameters: a chart of where what happens."""
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patheffects import withStroke
+
+from ._axes import legend_above, one_axes
+from ._branch import mark_of
+from ._labels import labelled
+from ._style import styled
+
+
+if TYPE_CHECKING:
+    from continuation import Branch
+
+
+@styled
+def special_curves(
+    curves: "Branch | Iterable[Branch]",
+    ax: Axes | None = None,
+    *,
+    x_label: tuple[str, str] | None = None,
+    y_label: tuple[str, str] | None = None,
+    x_scale: float = 1.0,
+    y_scale: float = 1.0,
+) -> Figure:
+    """Draw curves of special points in the plane of two parameters.
+
+    Each kind of point has the colour that it has on a branch. Points of codimension two
+    on the curves, and crossings with other curves found there, are marked and named.
+
+    **Arguments:**
+
+    - `curves`: from `continuation.curve`, one or several, all in the same parameters.
+    - `ax`: axes; a new figure without.
+    - `x_label`, `y_label`: name and unit of the first and the second parameter; the
+      parameters' names without.
+    - `x_scale`, `y_scale`: by which they are multiplied (30/pi for a speed in rpm).
+
+    **Returns:** the figure.
+
+    **Raises:** `ValueError` for branches in one parameter.
+    """
+    ax = one_axes(ax)
+    several: list[Branch] = (
+        [curves] if hasattr(curves, "points") else list(curves)  # pyright: ignore
+    )
+    scale = np.array([x_scale, y_scale])
+    for curve in several:
+        if len(curve.names) != 2:
+            raise ValueError(
+                "a chart needs curves in two parameters; give branches made by "
+                "continuation.curve"
+            )
+        kind = curve.points[0].signature.split(" of ")[0]
+        values = scale * np.array([point.parameters for point in curve.points])
+        ax.plot(*values.T, "-", color=mark_of(kind)[1], label=kind, zorder=2)
+        for point in curve.special:
+            _mark(ax, scale * np.array(point.parameters), point.kind)
+    names = several[0].names if several else ("first parameter", "second parameter")
+    ax.set_xlabel(labelled(*((names[0], "-") if x_label is None else x_label)))
+    ax.set_ylabel(labelled(*((names[1], "-") if y_label is None else y_label)))
+    ax.margins(x=0.03, y=0.0)
+    legend_above(ax)
+    return ax.figure  # pyright: ignore
+
+
+def _mark(ax: Axes, place: np.ndarray, kind: str) -> None:
+    ax.plot(*place, "o", color="black", markersize=4, zorder=4)
+    ax.annotate(
+        kind,
+        (float(place[0]), float(place[1])),
+        xytext=(5, 4),
+        textcoords="offset points",
+        fontsize="x-small",
+        path_effects=[withStroke(linewidth=2.5, foreground="white")],
+        zorder=5,
+    )
