@@ -29,7 +29,7 @@ import numpy as np
 import typer
 
 from benchmarks import _workloads
-from jaxcam.hybrid import _stroboscope, stroboscope
+from jaxcam.hybrid import _refilled_lanes, stroboscope
 from jaxcam.models import CamFollower, rpm_to_rad_s
 from jaxcam.sweeps import basins, cluster, diagram, Grid
 
@@ -108,7 +108,7 @@ def kept(repeats: int, side: int) -> None:
 
 def idle_slots(call) -> float:
     """Part of the attempts that the compiled loop made without a lane in the slot."""
-    slots, steps, whole = [], [], _stroboscope._some
+    slots, steps, whole = [], [], _refilled_lanes._some
 
     def counting(*arguments):
         lane, rows = arguments[6], arguments[7]
@@ -117,11 +117,11 @@ def idle_slots(call) -> float:
         steps.append(np.sum(np.asarray(made[0].steps) - np.asarray(lane.steps)))
         return made
 
-    _stroboscope._some = counting
+    _refilled_lanes._some = counting
     try:
         call()
     finally:
-        _stroboscope._some = whole
+        _refilled_lanes._some = whole
     return float(1 - np.sum(steps) / np.sum(slots))
 
 

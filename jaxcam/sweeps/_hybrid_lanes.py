@@ -9,8 +9,8 @@ import numpy as np
 
 from ..hybrid import HybridSystem
 from ..hybrid._normal import gaps
+from ..hybrid._refilled_lanes import split_lanes
 from ..hybrid._release_point import contact_state
-from ..hybrid._stroboscope import _batch
 from ..hybrid._system import with_array_parameters
 from ._samples import BEHIND
 
@@ -29,7 +29,7 @@ def rows_between_looks(width: int, turns: int) -> int:
 
 def smallest_gaps(system: HybridSystem, t0, states, where=None, values=None):
     """Smallest gap of each state at `t0`, shape `(lanes,)`."""
-    batched, shared = _batch(with_array_parameters(system), where, values)
+    batched, shared = split_lanes(with_array_parameters(system), where, values)
     return np.asarray(_gaps(batched, shared, jnp.asarray(t0, float), _rows(states)))
 
 
@@ -47,7 +47,7 @@ def lifted(system: HybridSystem, t0, states, where=None, values=None) -> np.ndar
     states = np.asarray(states, dtype=float)
     if np.all(smallest_gaps(system, t0, states, where, values) >= 0):
         return states
-    batched, shared = _batch(with_array_parameters(system), where, values)
+    batched, shared = split_lanes(with_array_parameters(system), where, values)
     return np.asarray(_lifted(batched, shared, jnp.asarray(t0, float), _rows(states)))
 
 
@@ -64,7 +64,7 @@ def in_contact(system: HybridSystem, t0, where=None, values=None) -> np.ndarray:
             "only a system with two states and one constraint has a start of its own; "
             "pass the states to start from"
         )
-    batched, shared = _batch(with_array_parameters(system), where, values)
+    batched, shared = split_lanes(with_array_parameters(system), where, values)
     t0 = jnp.asarray(t0, float)
     if batched is None:
         return np.asarray(_contact_states(None, shared, t0))[None]
@@ -83,7 +83,9 @@ def turn_lengths(system: HybridSystem, period, where=None, values=None) -> np.nd
         )
     if period is not None or where is None:
         return np.array([float(length)])
-    return np.asarray(_periods(*_batch(with_array_parameters(system), where, values)))
+    return np.asarray(
+        _periods(*split_lanes(with_array_parameters(system), where, values))
+    )
 
 
 def run_lanes(run, system, t0, states, where, values, lanes: int, tails):

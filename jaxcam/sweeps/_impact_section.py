@@ -6,7 +6,7 @@ import numpy as np
 
 from ..hybrid import HybridSystem, Settings
 from ..hybrid._codes import Row
-from ..hybrid._stroboscope import _group
+from ..hybrid._refilled_lanes import run_refilled
 from ..hybrid._system import with_array_parameters
 from ._hybrid_lanes import rows_between_looks, run_lanes
 from ._samples import Samples
@@ -55,7 +55,7 @@ class ImpactSection(AbstractSystemSection):
             seen = _Impacts(len(states), keep, n)
             rows = rows_between_looks(width, turns)
             shape = (t0, period, turns, settings, width, rows, self.max_steps, seen)
-            _, _, code = _group(system, where, values, states, *shape)
+            _, _, code = run_refilled(system, where, values, states, *shape)
             return *seen.found(), code
 
         lanes = (self.system, self.t0, states, where, values, self.lanes)
