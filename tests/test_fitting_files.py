@@ -124,7 +124,7 @@ def test_saved_systems_are_checked(tmp_path):
         (changed(format="other"), "no saved system"),
         (changed(version=99), "version 99"),
         (changed(system={**inner, "class": "Popen"}), "'Popen', which is not known"),
-        (changed(system={**inner, "fields": {"gravity": 1.0}}), "correct"),
+        (changed(system={**inner, "fields": {"gravity": 1.0}}), "lacks"),
     ]
     for found, message in cases:
         file.write_text(json.dumps(found))

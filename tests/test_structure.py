@@ -75,7 +75,9 @@ def test_nobody_below_imports_the_command_line(room):
 
 
 def test_every_room_has_its_place():
-    rooms = {p.name for p in (ROOT / "jaxcam").iterdir() if (p / "__init__.py").exists()}
+    rooms = {
+        p.name for p in (ROOT / "jaxcam").iterdir() if (p / "__init__.py").exists()
+    }
     assert rooms <= set(FLOOR) | _LAST
 
 

@@ -78,7 +78,7 @@ def basins(
         system = saved_name(saved)
     choose("SYSTEM", system, SYSTEMS)
 
-    from ._sweep import at_least, check_cluster, numbers, running, show
+    from ._sweep import at_least, check_cluster, check_size, numbers, running, show
 
     box = _BOXES.get(system)
     if box is None and (low is None or high is None):
@@ -98,6 +98,7 @@ def basins(
     at_least("--turns", turns, keep)
     at_least("--reruns", reruns, 0)
     at_least("--workers", workers, 1)
+    check_size("--shape and --keep", *(max(1, int(k)) for k in cells), keep)
     check_cluster(cluster)
     if resume and out is None:
         raise ValueError("--resume needs the folder of the interrupted run: --out DIR.")
@@ -156,7 +157,7 @@ def basins(
                 {
                     "name": name,
                     "share": share.share,
-                    "standard_error": share.error,
+                    "stderr": share.stderr,
                     "orbit": _points(orbits.get(name)),
                 }
                 for name, share in shares.items()
@@ -195,7 +196,7 @@ def _table(shares):
     for column in ("attractor", "share of states", "standard error"):
         table.add_column(column)
     for name, share in shares.items():
-        table.add_row(name, f"{share.share:.4%}", f"{share.error:.4%}")
+        table.add_row(name, f"{share.share:.4%}", f"{share.stderr:.4%}")
     return table
 
 

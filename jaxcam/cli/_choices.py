@@ -1,5 +1,6 @@
 """What can be chosen by name at the command line: systems and solvers."""
 
+import difflib
 import math
 from collections.abc import Iterable
 from pathlib import Path
@@ -33,14 +34,20 @@ SOLVERS = {
 }
 ENGINES = ("loop", "diffeqsolve")
 CAM = "cam-follower"
+# more names than these are not read
+_LISTED = 20
 
 
 def choose(option: str, name: str, known: Iterable[str]) -> str:
     """The name, if it is known. **Raises:** `ValueError` that lists those that are."""
     known = tuple(known)
-    if name not in known:
-        raise ValueError(f"{option} is {name!r}; choose one of {', '.join(known)}.")
-    return name
+    if name in known:
+        return name
+    some, words = known, "choose one of"
+    if len(known) > _LISTED:
+        some = difflib.get_close_matches(name, known, n=4, cutoff=0.3) or known[:4]
+        words = f"choose one of the {len(known)} that --list shows, such as"
+    raise ValueError(f"{option} is {name[:100]!r}; {words} {', '.join(some)}.")
 
 
 def load(file: Path) -> HybridSystem:

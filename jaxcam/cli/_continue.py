@@ -83,7 +83,8 @@ def continue_(
     \b
     Examples:
       jaxcam continue cam-follower --from 130 --to 160 --at 145 --state 0.37,1.8
-      jaxcam continue impact-oscillator --parameter wall --from -1 --to 0.2
+      jaxcam continue impact-oscillator --set damping=0.05 --parameter wall \\
+        --at 0.2 --from 0.12 --to 0.3 --state=-0.1462,0
       jaxcam continue cam-follower --from 130 --to 150 --out DIR --resume
     """
     if saved is not None:

@@ -59,7 +59,7 @@ def demo(
     from ._cache import keep_compiled_programs
     from ._demo_branches import follow_branches
     from ._demo_figures import draw
-    from ._output import Output, to_text
+    from ._output import Output, to_text, write_text
     from ._page import page, Report
     from ._progress import progress
     from ._rests import rest_table, rests, simulate_run
@@ -120,8 +120,8 @@ def demo(
         figures=figures,
         next_steps=_next_steps(found),
     )
-    (out / "index.html").write_text(page(report_of), encoding="utf-8")
-    (out / "result.json").write_text(to_text(result) + "\n", encoding="utf-8")
+    write_text(out / "index.html", page(report_of))
+    write_text(out / "result.json", to_text(result) + "\n")
 
     for run in segments:
         output.print(run.sentence())

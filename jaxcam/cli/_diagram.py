@@ -102,7 +102,7 @@ def diagram(
     choose("--section", section, SECTIONS)
 
     from ._continue import _bounds
-    from ._sweep import at_least, check_cluster, numbers, running, show
+    from ._sweep import at_least, check_cluster, check_size, numbers, running, show
 
     low, high = _bounds(low, high)
     for option, value in (
@@ -113,6 +113,8 @@ def diagram(
     ):
         at_least(option, value, 1)
     at_least("--turns", turns, keep)
+    at_least("--seed", seed, 0)
+    check_size("--points, --starts and --keep", points, starts or 1, keep)
     check_cluster(cluster)
     if resume and out is None:
         raise ValueError("--resume needs the folder of the interrupted run: --out DIR.")

@@ -6,6 +6,8 @@ from typing import ParamSpec, TypeVar
 
 import typer
 
+from ._lock import release
+
 
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
@@ -46,16 +48,25 @@ def one_sentence(command: Callable[_P, _R]) -> Callable[_P, _R]:
         except ValueError as error:
             fail(str(error))
             raise typer.Exit(BAD_INPUT) from None
+        finally:
+            release()
 
     return wrapper
 
 
 def fail(message: str) -> None:
     """Print one line on the error stream."""
-    line = " ".join(message.split())
+    line = " ".join(map(_shortened, message.split()))
+    # what stands in a file or an argument does not steer the terminal
+    line = "".join(c if c.isprintable() else "?" for c in line)
     for python, option in _OPTIONS:
         line = line.replace(python, option)
     typer.echo(line if line.endswith((".", "?")) else f"{line}.", err=True)
+
+
+def _shortened(word: str) -> str:
+    """Paths have a few hundred letters at most, and nobody reads more."""
+    return word if len(word) <= 300 else f"{word[:40]}...{word[-20:]}"
 
 
 def _about_file(error: OSError) -> str:

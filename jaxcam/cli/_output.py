@@ -2,12 +2,15 @@
 
 import json
 import math
+import os
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import typer
 from rich.console import Console
+
+from ._lock import hold
 
 
 class Output:
@@ -26,6 +29,7 @@ class Output:
             if folder.exists() and not folder.is_dir():
                 raise ValueError(f"{folder}: this is a file; give --out a folder.")
             _make(folder)
+            hold(folder)
             _try(folder / ".jaxcam-can-write")
         if json_file is not None and not self.to_stdout:
             if json_file.is_dir():
@@ -35,6 +39,8 @@ class Output:
             _make(json_file.parent)
             if not json_file.exists():
                 _try(json_file)
+            elif json_file.is_file():
+                _try(_beside(json_file))
         # nothing but JSON goes to standard output where that is asked for
         self.console = Console(quiet=self.to_stdout, highlight=False)
 
@@ -50,8 +56,27 @@ class Output:
         if self.to_stdout:
             typer.echo(text)
         else:
-            self.json_file.write_text(text + "\n", encoding="utf-8")
+            write_text(self.json_file, text + "\n")
             self.print(f"Data: {self.json_file}")
+
+
+def write_text(file: Path, text: str) -> None:
+    """Write a file; a run that is killed leaves the old one or the new one."""
+    if file.exists() and (file.is_symlink() or not file.is_file()):
+        # a device, or what a link points to, is written where it is
+        file.write_text(text, encoding="utf-8")
+        return
+    part = _beside(file)
+    try:
+        part.write_text(text, encoding="utf-8")
+        os.replace(part, file)
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def _beside(file: Path) -> Path:
+    """Where a file is written before it takes its place."""
+    return file.with_name(f"{file.name[:200]}.{os.getpid()}.part")
 
 
 def to_text(found: dict[str, Any]) -> str:

@@ -14,6 +14,10 @@ from ..thesis._registry import Size
 from ._output import to_text
 
 
+# what a file that is not a record raises, brackets in brackets included
+_BROKEN = (OSError, ValueError, TypeError, LookupError, AttributeError, RecursionError)
+
+
 @dataclasses.dataclass(frozen=True)
 class Settings:
     """What decides a result, besides its target."""
@@ -106,14 +110,15 @@ def earlier(out: Path, name: str, settings: Settings) -> Record | None:
         found = json.loads((out / f"{name}.json").read_text(encoding="utf-8"))
         found["settings"] = Settings(**found["settings"])
         record = Record(**found)
-    except (OSError, ValueError, TypeError, KeyError):
+        rows = [
+            {key: math.nan if value is None else value for key, value in row.items()}
+            for row in record.rows
+        ]
+        _ = record.table
+    except _BROKEN:
         return None
     if record.settings != settings or record.error is not None:
         return None
     if record.figure and not (out / f"{name}.png").is_file():
         return None
-    rows = [
-        {key: math.nan if value is None else value for key, value in row.items()}
-        for row in record.rows
-    ]
     return dataclasses.replace(record, rows=rows)

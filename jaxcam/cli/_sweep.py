@@ -10,6 +10,10 @@ import typer
 from ._errors import fail, STOPPED_EARLY
 
 
+# numbers that a sweep keeps; a few of 8 bytes each fit into the memory of a laptop
+_MOST = 2 * 10**8
+
+
 def numbers(option: str, text: str, example: str) -> tuple[float, ...]:
     """Finite numbers with commas between them. **Raises:** `ValueError`."""
     try:
@@ -27,6 +31,15 @@ def numbers(option: str, text: str, example: str) -> tuple[float, ...]:
 def at_least(option: str, value: int | None, least: int) -> None:
     if value is not None and value < least:
         raise ValueError(f"{option} is {value}; give {least} or more.")
+
+
+def check_size(options: str, *counts: int) -> None:
+    """Refuse a sweep that would not fit into memory, before it is tried."""
+    if math.prod(counts) > _MOST:
+        raise ValueError(
+            f"{options} are {' times '.join(f'{float(c):.6g}' for c in counts)} "
+            f"numbers, more than {_MOST:.0e}; give fewer."
+        )
 
 
 def check_cluster(address: str | None) -> None:

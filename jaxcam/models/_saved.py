@@ -33,6 +33,9 @@ from ._triple_integrator import TripleIntegrator
 
 
 _FORMAT, _VERSION = "jaxcam.system", 1
+_LARGEST = 1e300
+_MISFITS = (TypeError, AttributeError, LookupError, ArithmeticError, RecursionError)
+_MISFIT = "the fields of `{}` do not fit together; save the system again."
 _KNOWN: tuple[type, ...] = (
     BouncingBall,
     CamFollower,
@@ -75,7 +78,7 @@ def load_system(file: str | Path, *, classes: Iterable[type] = ()) -> HybridSyst
     file = Path(file)
     try:
         found = json.loads(file.read_text("utf-8"))
-    except (json.JSONDecodeError, UnicodeDecodeError):
+    except (ValueError, RecursionError):
         raise ValueError(
             f"{file}: this is no JSON; give a file that `jaxcam fit` or `save_system` "
             f"wrote."
@@ -106,15 +109,25 @@ def system_from_json(found: Any, *, classes: Iterable[type] = ()) -> HybridSyste
         )
     if found.get("version") != _VERSION:
         raise ValueError(
-            f"the file has the version {found.get('version')!r} and this program reads "
-            f"{_VERSION}; update the program, or save the system again."
+            f"the file has the version {_short(found.get('version'))} and this program "
+            f"reads {_VERSION}; update the program, or save the system again."
         )
     known = {cls.__name__: cls for cls in (*_KNOWN, *classes)}
     system = _decode(found.get("system"), known, "system")
     if not isinstance(system, HybridSystem):
         raise ValueError(f"{type(system).__name__} is no system; save a system.")
-    system.check()
+    try:
+        with np.errstate(all="ignore"):
+            system.check()
+    except _MISFITS:
+        # a word where a number belongs, a list where a law does
+        raise ValueError(_MISFIT.format("system")) from None
     return system
+
+
+def _short(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= 40 else f"{text[:40]}..."
 
 
 def _encode(value: Any, place: str) -> Any:
@@ -139,10 +152,15 @@ def _encode(value: Any, place: str) -> Any:
 
 def _decode(found: Any, known: dict[str, type], place: str) -> Any:
     if isinstance(found, list):
-        return jnp.asarray(found, dtype=float)
+        try:
+            return jnp.asarray(np.asarray(found, dtype=float))
+        except (*_MISFITS, ValueError):
+            raise ValueError(f"`{place}` is no list of numbers; correct it.") from None
     if isinstance(found, bool) or found is None or isinstance(found, str):
         return found
     if isinstance(found, int | float):
+        if abs(found) > _LARGEST:
+            raise ValueError(f"`{place}` is too large for a number; correct it.")
         return found
     if isinstance(found, dict) and set(found) == {"items"}:
         items = found["items"] if isinstance(found["items"], list) else []
@@ -152,18 +170,19 @@ def _decode(found: Any, known: dict[str, type], place: str) -> Any:
     if not isinstance(found, dict) or set(found) != {"class", "fields"}:
         raise ValueError(f"`{place}` needs a `class` and its `fields`.")
     name = found["class"]
-    if name not in known:
+    if not isinstance(name, str) or name not in known:
         raise ValueError(
-            f"`{place}` is a {name!r}, which is not known; if it is a class of your "
-            f"own, pass it as classes=[...]."
+            f"`{place}` is a {_short(name)}, which is not known; if it is a class of "
+            f"your own, pass it as classes=[...]."
         )
     cls = known[name]
     fields = {field.name: field for field in dataclasses.fields(cls)}
-    given = found["fields"]
-    for wrong in set(given) ^ set(fields):
+    given = found["fields"] if isinstance(found["fields"], dict) else {}
+    for wrong in sorted(set(given) ^ set(fields)):
+        what = "lacks" if wrong in fields else "has an unknown field"
         raise ValueError(
-            f"`{place}` has the fields {', '.join(sorted(given))}, and {name} has "
-            f"{', '.join(fields)}: correct `{wrong}`."
+            f"`{place}` {what} {_short(wrong)}; the fields of {name} are "
+            f"{', '.join(fields)}."
         )
     made = object.__new__(cls)
     for key, field in fields.items():
@@ -173,6 +192,9 @@ def _decode(found: Any, known: dict[str, type], place: str) -> Any:
             value = jnp.asarray(value, dtype=float)
         object.__setattr__(made, key, value)
     check = getattr(made, "__check_init__", None)
-    if check is not None:
-        check()
+    try:
+        if check is not None:
+            check()
+    except _MISFITS:
+        raise ValueError(_MISFIT.format(place)) from None
     return made

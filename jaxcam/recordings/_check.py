@@ -11,6 +11,8 @@ from ._recording import Recording
 _SPEED_TOLERANCE = 0.05
 # A follower is a lever that cannot pass the vertical; in degrees it always does.
 _FOLLOWER_RANGE = np.pi / 2
+# s; faster than any encoder or gyro is read
+_SHORTEST = 1e-9
 
 _DEGREES = "multiply it by pi/180 or name the column `{}_deg`"
 
@@ -37,6 +39,11 @@ def find_gaps(
             f"those with the same time."
         )
     usual = float(np.median(steps))
+    if usual < _SHORTEST:
+        raise RecordingError(
+            f"{name}: samples are {usual:.3g} s apart, which no sensor can do; check "
+            f"the unit of the time."
+        )
     found = np.flatnonzero(steps > 1.5 * usual)
     if len(found) and gaps == "refuse":
         first = int(found[0])
@@ -84,7 +91,7 @@ def check_drive(recording: Recording) -> None:
     speed = float(angle[-1] - angle[0]) / recording.duration
     if nominal is None:
         return
-    ratio = abs(speed) / nominal
+    ratio = abs(speed) / nominal if nominal > 0 else np.inf
     looks = {
         180 / np.pi: f"`cam_angle_rad` looks like degrees; {_DEGREES}",
         1 / (2 * np.pi): "`cam_angle_rad` looks like turns; multiply it by 2 pi or "

@@ -14,7 +14,7 @@ from ._check import check_channels, check_drive, find_gaps
 from ._errors import RecordingError
 from ._mend import mend, Mended
 from ._recording import Case, Recording
-from ._table import read_table, SUFFIXES as TEXT
+from ._table import read_table, shown, SUFFIXES as TEXT
 from ._units import si
 
 
@@ -78,8 +78,7 @@ def read_recordings(
         if gaps == "mend":
             find_gaps(label, time, "split")
             whole = Recording(name, time, values, speed, {"file": str(file)})
-            mended = mend(whole)
-            pieces = _turning(mended)
+            pieces = _turning(label, mend(whole))
         else:
             pieces = _split(
                 name, time, values, speed, file, find_gaps(label, time, gaps)
@@ -155,8 +154,11 @@ def _split(name, time, values, speed, file, breaks) -> list[Recording]:
     ]
 
 
-def _turning(mended: Mended) -> list[Recording]:
-    """The pieces, less those in which a cam turns too little to be followed."""
+def _turning(label: str, mended: Mended) -> list[Recording]:
+    """The pieces, less those in which a cam turns too little to be followed.
+
+    **Raises:** `RecordingError` where none is left.
+    """
     pieces, notes = [], list(mended.notes)
     for piece in mended.recordings:
         cam = piece.channels.get("cam_angle_rad")
@@ -164,6 +166,11 @@ def _turning(mended: Mended) -> list[Recording]:
             notes.append(f"{piece.name}: it has less than half a turn; it is left out.")
         else:
             pieces.append(piece)
+    if not pieces:
+        raise RecordingError(
+            f"{label}: the cam turns by less than half a turn; record the run for "
+            f"longer, or check `cam_angle_rad`."
+        )
     return [
         dataclasses.replace(p, meta={**p.meta, "notes": tuple(notes)}) for p in pieces
     ]
@@ -181,7 +188,8 @@ def _columns(file: Path):
 def _require(file, columns, needed) -> None:
     missing = [name for name in needed if name not in columns]
     if missing:
-        there = ", ".join(f"`{name}`" for name in columns)
+        there = ", ".join(map(shown, list(columns)[:12]))
+        there += f" and {len(columns) - 12} more" if len(columns) > 12 else ""
         raise RecordingError(
             f"{file}: the column `{missing[0]}` is missing; the file has {there}."
         )
@@ -197,5 +205,6 @@ def _stem(file: Path) -> str:
 
 
 def _nominal_speed(file: Path) -> float | None:
-    found = re.search(r"(\d+(?:\.\d+)?)\s*rpm", file.name)
+    number = r"(?<![\d.])(\d{1,6}(?:\.\d{1,9})?)\s*rpm"
+    found = re.search(number, file.name, re.ASCII)
     return float(found[1]) * 2 * math.pi / 60 if found else None

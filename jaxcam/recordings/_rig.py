@@ -15,6 +15,12 @@ from ..models import CamFollower, ConstantRestitution, EccentricCircle
 from ._errors import RigError
 
 
+# bytes of a file; a rig takes two thousand
+_LARGEST = 1_000_000
+# of a quantity in SI units, so that products of several are numbers
+_LARGEST_NUMBER = 1e30
+
+
 @dataclasses.dataclass(frozen=True)
 class Quantity:
     """A nominal value and how far a real one may differ from it, in SI units."""
@@ -143,12 +149,7 @@ def read_rig(file: str | Path) -> Rig:
     **Raises:** `RigError`, one sentence that names the file and the key.
     """
     file = Path(file)
-    if not file.is_file():
-        raise RigError(f"{file}: there is no such file; give the path of a rig.toml.")
-    try:
-        tables = tomllib.loads(file.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise RigError(f"{file}: this is not a TOML file: {error}.") from None
+    tables = _tables(file)
     _known(file, "", tables, ("geometry", "dynamics", "impact", "sensors"))
     geometry = _Section(file, "geometry", tables)
     dynamics = _Section(file, "dynamics", tables)
@@ -177,6 +178,23 @@ def read_rig(file: str | Path) -> Rig:
     return rig
 
 
+def _tables(file: Path) -> dict[str, Any]:
+    """What is in the file, not looked at."""
+    if not file.is_file():
+        raise RigError(f"{file}: there is no such file; give the path of a rig.toml.")
+    with file.open("rb") as stream:
+        raw = stream.read(_LARGEST + 1)
+    if len(raw) > _LARGEST:
+        raise RigError(f"{file}: this is too large for a rig; give a rig.toml.")
+    try:
+        return tomllib.loads(raw.decode("utf-8-sig"))
+    except RecursionError:
+        raise RigError(f"{file}: brackets are nested too deep; remove them.") from None
+    except ValueError as error:
+        # the TOML, its encoding, or an integer of thousands of digits
+        raise RigError(f"{file}: this is not a TOML file: {error}.") from None
+
+
 def _sensors(section: "_Section") -> Sensors:
     gyro = None
     if "gyro" in section.table:
@@ -187,8 +205,8 @@ def _sensors(section: "_Section") -> Sensors:
         section.read.append("gyro")
     sensors = Sensors(
         sample_rate=section.positive("sample_rate", "Hz"),
-        cam_counts_per_turn=int(section.positive("cam_counts_per_turn", "")),
-        follower_counts_per_turn=int(section.positive("follower_counts_per_turn", "")),
+        cam_counts_per_turn=section.count("cam_counts_per_turn"),
+        follower_counts_per_turn=section.count("follower_counts_per_turn"),
         cam_noise=section.positive("cam_noise", "rad"),
         follower_noise=section.positive("follower_noise", "rad"),
         gyro=gyro,
@@ -228,11 +246,17 @@ class _Section:
             raise self._error(key, f"is {number:g}, and must be positive")
         return number
 
+    def count(self, key: str) -> int:
+        number = self.positive(key, "")
+        if number != int(number):
+            raise self._error(key, f"is {number:g}, and must be a whole number")
+        return int(number)
+
     def choice(self, key: str, *choices: str) -> str:
         value, _ = self._parts(key, "")
         if value not in choices:
             quoted = " or ".join(f'"{choice}"' for choice in choices)
-            raise self._error(key, f"is {value!r}, and must be {quoted}")
+            raise self._error(key, f"is {_short(value)}, and must be {quoted}")
         return value
 
     def done(self) -> None:
@@ -253,14 +277,14 @@ class _Section:
         place = f"{self.name}.{key}"
         _known(self.file, place, entry, ("value", "tolerance", "unit"))
         if entry.get("unit", unit) != unit:
-            found = entry["unit"]
-            raise self._error(key, f'is given in "{found}", and "{unit}" is used')
+            found = _short(entry["unit"])
+            raise self._error(key, f'is given in {found}, and "{unit}" is used')
         return entry["value"], entry.get("tolerance")
 
     def _number(self, key: str, value: Any) -> float:
         number = isinstance(value, int | float) and not isinstance(value, bool)
-        if not number or not math.isfinite(value):
-            raise self._error(key, f"is {value!r}, and must be a number")
+        if not number or not abs(value) < _LARGEST_NUMBER:
+            raise self._error(key, f"is {_short(value)}, and must be a number in SI")
         return float(value)
 
     def _tolerance(self, key: str, value: Any) -> float:
@@ -279,7 +303,17 @@ def _known(file: Path, place: str, table: dict[str, Any], names) -> None:
             where = f"[{place}]" if place else "a rig file"
             found = difflib.get_close_matches(key, names, n=1)
             hint = f"is `{found[0]}` meant?" if found else "remove it."
-            raise RigError(f"{file}: {where} has an unknown key `{key}`; {hint}")
+            word = _short(key).strip("'\"")
+            raise RigError(f"{file}: {where} has an unknown key `{word}`; {hint}")
+
+
+def _short(value: Any) -> str:
+    """A value of the file in a sentence."""
+    # of an integer of thousands of digits Python makes no text
+    huge = isinstance(value, int) and abs(value) > _LARGEST_NUMBER
+    text = "a huge integer" if huge else repr(value)
+    text = text.replace("'", '"') if isinstance(value, str) else text
+    return text if len(text) <= 40 else f"{text[:40]}..."
 
 
 def _meant(name: str, rig: Rig) -> str:

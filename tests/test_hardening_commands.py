@@ -1,0 +1,25 @@
+"""Command lines of any kind: accepted, or refused with one sentence and exit code 2."""
+
+import hostile_commands as hostile
+import pytest
+from hypothesis import given, HealthCheck, settings
+
+
+FEW = settings(max_examples=20, suppress_health_check=list(HealthCheck))
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("lines")
+
+
+@pytest.fixture(autouse=True)
+def keep_the_cache_of_the_tests(monkeypatch):
+    """A command sets the folder of compiled programs; here it is the tests' own."""
+    monkeypatch.setenv("JAX_COMPILATION_CACHE_DIR", "as the tests have it")
+
+
+@FEW
+@given(line=hostile.lines())
+def test_any_line(folder, line):
+    hostile.run_or_say(folder, line)

@@ -1,0 +1,131 @@
+"""Commands that are stopped at any time, or started twice: nothing is lost or mixed."""
+
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import continuation
+from jaxcam.sweeps import load
+
+
+#: each takes a few seconds once it is compiled, and stores what it has as it goes
+LINES = {
+    "diagram": (
+        "diagram impact-oscillator --parameter omega --from 2.6 --to 2.9 --points 96 "
+        "--turns 400 --keep 20 --state=-0.5,0"
+    ),
+    "basins": "basins impact-oscillator --shape 48,256 --turns 60 --keep 20",
+    "continue": (
+        "continue impact-oscillator --parameter wall --at 0.2 --from 0.12 --to 0.3 "
+        "--state=-0.1462,0 --set damping=0.05"
+    ),
+}
+STORED = {
+    "diagram": "diagram.zarr",
+    "basins": "basins.zarr",
+    "continue": "branch.jsonl",
+}
+
+
+def start(line: str, out: Path, *more: str) -> subprocess.Popen:
+    command = "from jaxcam.cli import main; main()"
+    arguments = [sys.executable, "-c", command, *line.split(), "--out", str(out), *more]
+    return subprocess.Popen(
+        arguments,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "PYTHONUNBUFFERED": "1"},
+    )
+
+
+def finish(process: subprocess.Popen) -> str:
+    """The error stream of a process that ends well."""
+    _, errors = process.communicate(timeout=300)
+    assert process.returncode == 0, errors
+    return errors
+
+
+def content(name: str, out: Path):
+    """What a command stored, as something that can be compared."""
+    if name == "continue":
+        points = continuation.load(out / STORED[name]).points
+        back = continuation.load(out / "branch.back.jsonl").points
+        return [(p.label, p.kind, p.parameter, p.state.tolist()) for p in back + points]
+    made = load(out / STORED[name]).dataset
+    return {str(k): np.asarray(v) for k, v in made.variables.items()}
+
+
+def same(one, other) -> bool:
+    if isinstance(one, list):
+        return one == other
+    return one.keys() == other.keys() and all(
+        np.array_equal(v, other[k], equal_nan=v.dtype.kind == "f")
+        for k, v in one.items()
+    )
+
+
+@pytest.fixture(scope="module", params=list(LINES))
+def whole(request, tmp_path_factory):
+    """A command, what it stores without an interruption, and how long it takes (s)."""
+    name, out = request.param, tmp_path_factory.mktemp("whole") / "out"
+    begin = time.monotonic()
+    finish(start(LINES[name], out))
+    first = time.monotonic() - begin
+    begin = time.monotonic()
+    finish(start(LINES[name], out.with_name("again")))
+    return name, content(name, out), min(first, time.monotonic() - begin)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGKILL])
+def test_stopped_at_random_and_resumed(whole, how, tmp_path):
+    name, wanted, seconds = whole
+    draw, out = random.Random(f"{name}{how}"), tmp_path / "out"
+    stopped = 0
+    for _ in range(3):
+        more = ["--resume"] if (out / STORED[name]).exists() else []
+        process = start(LINES[name], out, *more)
+        time.sleep(seconds * draw.uniform(0.2, 1.0))
+        process.send_signal(how)
+        _, errors = process.communicate(timeout=60)
+        if process.returncode == 0:
+            break
+        stopped += 1
+        if how == signal.SIGINT:
+            # before Python has read the command there is nobody to say a sentence
+            begun = "Traceback" not in errors or "jaxcam/cli/_errors.py" not in errors
+            assert begun, errors
+            assert process.returncode in (130, -signal.SIGINT, 1), errors
+    assert stopped
+    more = ["--resume"] if (out / STORED[name]).exists() else []
+    finish(start(LINES[name], out, *more))
+    assert same(content(name, out), wanted)
+
+
+@pytest.mark.slow
+def test_two_on_one_folder(whole, tmp_path):
+    """The second says what is the matter; the first ends as if it were alone."""
+    name, wanted, _ = whole
+    out = tmp_path / "out"
+    first = start(LINES[name], out)
+    while not (out / STORED[name]).exists() and first.poll() is None:
+        time.sleep(0.05)
+    second = start(LINES[name], out, "--resume")
+    _, errors = second.communicate(timeout=300)
+    alone = first.poll() is not None
+    finish(first)
+    if second.returncode == 2:
+        (sentence,) = errors.splitlines()
+        assert "another jaxcam is writing" in sentence
+    else:
+        # it came when the first had gone
+        assert alone and second.returncode == 0, errors
+    assert same(content(name, out), wanted)
