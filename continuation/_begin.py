@@ -23,7 +23,7 @@ def settle(
     if not at.success:
         # Newton has no answer where the derivative is singular; the start may
         # still be one
-        given = evaluate(problem, walk.leaf, z, across, walk.width)
+        given = evaluate(problem, walk.leaf, z, across, walk.width, walk.settings)
         size = np.abs(_residual(problem, z, walk.leaf)) / given.scale[:-1]
         if not np.all(size <= walk.settings.tolerance):
             raise ValueError(
@@ -41,7 +41,7 @@ def leave(
     """The first point of a branch that leaves z along a tangent."""
     settings = walk.settings
     zero = np.zeros_like(z)
-    scale = evaluate(problem, walk.leaf, z, zero + 1.0, walk.width).scale
+    scale = evaluate(problem, walk.leaf, z, zero + 1.0, walk.width, walk.settings).scale
     tangent = np.asarray(start.tangent, float)
     tangent = tangent / np.linalg.norm(tangent / scale)
     step = settings.step if start.step is None else start.step
@@ -55,7 +55,9 @@ def leave(
         moved = np.linalg.norm((at.z - guess) / scale)
         if at.success and moved <= step and low <= at.z[-1] <= high:
             # the tangent has turned since the start: continue outwards
-            outwards = evaluate(problem, walk.leaf, at.z, at.z - z, walk.width)
+            outwards = evaluate(
+                problem, walk.leaf, at.z, at.z - z, walk.width, walk.settings
+            )
             if np.all(np.isfinite(outwards.tangent)):
                 return outwards, step
         step /= 2
@@ -77,7 +79,9 @@ def _oriented(
         tangent = null[-1] * (np.sign(null[-1].sum()) or 1.0)
     tangent = direction * tangent / np.linalg.norm(tangent)
     if len(null) == 1:
-        return evaluate(problem, walk.leaf, at.z, tangent * at.scale, walk.width)
+        return evaluate(
+            problem, walk.leaf, at.z, tangent * at.scale, walk.width, walk.settings
+        )
     at = with_field(at, "determinant", np.zeros(()))
     return with_field(at, "tangent", tangent * at.scale)
 

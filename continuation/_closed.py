@@ -34,7 +34,9 @@ def closed(
     # they are the same
     if not at.success or miss > np.sqrt(walk.settings.tolerance) + 1e-6:
         return None
-    back = evaluate(here.problem, walk.leaf, origin.z, origin.tangent, walk.width)
+    back = evaluate(
+        here.problem, walk.leaf, origin.z, origin.tangent, walk.width, walk.settings
+    )
     return stand(
         here.problem, back, here.step, here.arclength + float(along), here.trail
     )

@@ -4,7 +4,6 @@ import os
 from collections.abc import Callable, Iterable
 from typing import Any
 
-import jax.numpy as jnp
 import numpy as np
 
 from ._algorithms import AbstractAlgorithm
@@ -15,8 +14,13 @@ from ._locate import monitor_points, singular_points, Walk
 from ._parameter import as_arrays, leaf_of, pick
 from ._point import Branch, Point, set_parameters
 from ._problem import Start
+from ._program import evaluate
 from ._settings import Settings
 from ._test_functions import FLIP, FOLD, HOPF, NEIMARK_SACKER
+
+
+# a monitor below this, relative to one plus the unknowns, is taken for zero
+_ZERO = 1e-7
 
 
 def extended(
@@ -42,15 +46,18 @@ def extended(
     z = np.append(point.state, leaf_of(problem.parameters, leaf))
     if point.kind in (FOLD, FLIP, HOPF, NEIMARK_SACKER):
         return singular_points(problem, point.kind, walk, z)
-    values = problem.monitor(jnp.asarray(point.state), problem.parameters)
-    same = {
-        abs(float(values[key])): key
-        for key, monitor in problem.monitors().items()
-        if monitor.kind == point.kind
-    }
+    same = [
+        k for k, monitor in problem.monitors().items() if monitor.kind == point.kind
+    ]
+    if len(same) > 1:
+        # several monitors may share a kind: the one that is zero here, and the last
+        # where others vanish with it, such as the gap beside an impact without speed
+        at = evaluate(problem, walk.leaf, z, np.ones_like(z), walk.width, walk.settings)
+        sizes = {k: abs(float(at.monitors[k])) for k in same}
+        most = max(min(sizes.values()), _ZERO * (1.0 + float(np.max(np.abs(z)))))
+        same = [k for k in same if sizes[k] <= most]
     if same:
-        # several monitors may share a kind: the one that is zero here
-        return monitor_points(problem, same[min(same)], walk)
+        return monitor_points(problem, same[-1], walk)
     raise ValueError(
         f"points of kind {point.kind!r} form no curve in two parameters; folds, flips, "
         "Neimark-Sacker and Hopf points and the zeros of a problem's monitors do"

@@ -302,10 +302,11 @@ class MonitorPoints(AbstractProblem):
 
     def monitors(self) -> dict[str, Monitor]:
         own = self.base.monitors()[self.name]
+        silent = (self.name, *self.base.vanishing_with(self.name))
         return {
             name: Monitor(f"{own.kind}-{other.kind}", ends=other.ends)
             for name, other in self.base.monitors().items()
-            if name != self.name
+            if name not in silent
         }
 
     def scale(self, u: Float[Array, " n"], parameters: PyTree):

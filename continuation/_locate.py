@@ -77,7 +77,9 @@ def monitor_points(
 def _newton(problem, name: str, walk: Walk, guess: np.ndarray):
     """Newton on the extended system: (z, success)."""
     if name == BRANCH_POINT:
-        at = evaluate(problem, walk.leaf, guess, np.ones_like(guess), walk.width)
+        at = evaluate(
+            problem, walk.leaf, guess, np.ones_like(guess), walk.width, walk.settings
+        )
         if not np.all(np.isfinite(at.jacobian)):
             return guess, False
         # the left vector that the whole derivative nearly annihilates

@@ -73,7 +73,7 @@ def special_here(
     `chord` points along the branch there.
     """
     problem = here.problem
-    at = evaluate(problem, walk.leaf, located.z, chord, walk.width)
+    at = evaluate(problem, walk.leaf, located.z, chord, walk.width, walk.settings)
     if not np.all(np.isfinite(at.tangent)) or name == BRANCH_POINT:
         at = with_field(at, "tangent", chord / np.linalg.norm(chord / at.scale))
     monitors = problem.monitors()

@@ -136,7 +136,7 @@ def _settled(system, base, number: int, free: bool, t0):
 
 def _somewhere(system, t0):
     """A state outside the constraints: the release point where there is one."""
-    names = type(system).state_names
+    names = system.state_names
     n = len(names) or _dimension(system)
     try:
         run = simulate(system, None, t0, float(t0) + 1e-9 * float(system.period))

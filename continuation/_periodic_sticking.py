@@ -19,6 +19,7 @@ from jaxcam.hybrid._normal import gaps
 from variational._chatter_frame import chatter_frame, ChatterFrame, frame_at
 from variational._chatter_orbit import ChatterOrbit, orbit_from
 from variational._impact_map import next_impact
+from variational._interruption_margin import interruption_margin
 
 from ._behind_interruption import orbit_behind
 from ._problem import AbstractProblem, Monitor, Stability, Start
@@ -98,7 +99,7 @@ class StickingOrbits(AbstractProblem):
         frame = self._frame(u, system)
         if name == DETACHMENT:
             return frame.jerk * system.period**3
-        return -orbit_from(system, frame, self.periods).margin
+        return -interruption_margin(system, frame, self.periods)
 
     def monitor(self, u, parameters) -> dict[str, Float[Array, ""]]:
         return self.seen(u, parameters)[0]

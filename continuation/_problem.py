@@ -157,6 +157,11 @@ class AbstractProblem(eqx.Module):
         """Test functions of this problem by name; may depend on its structure only."""
         return {}
 
+    def vanishing_with(self, name: str) -> tuple[str, ...]:
+        """Monitors that are zero wherever this one is, and say nothing more there."""
+        del name
+        return ()
+
     def observe(self, u: Float[Array, " n"], parameters: PyTree) -> dict[str, Array]:
         """Further quantities to keep with each point (`point.observed`)."""
         del u, parameters

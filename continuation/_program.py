@@ -85,8 +85,11 @@ def correct_(
     tolerance,
     max_iterations: int,
     least_norm: bool,
+    given: Any = False,
 ) -> Corrected:
     """Correct `guess` and evaluate everything at the point found.
+
+    Or at the guess itself, where it is `given` as a solution.
 
     `normal` (n+1,) is the covector of the plane through the guess in which the solution
     is sought; it is ignored with `least_norm` (Moore-Penrose). `old` gives the
@@ -102,10 +105,12 @@ def correct_(
         return jnp.concatenate([g, plane[None]])
 
     y, success, iterations = newton(equations, guess / scale, tolerance, max_iterations)
-    return evaluate_(problem, leaf, y * scale, old, width, success, iterations)
+    z = jnp.where(given, guess, y * scale)
+    iterations = jnp.where(given, 0, iterations)
+    return _seen(problem, leaf, z, old, width, success | given, iterations)
 
 
-def evaluate_(problem, leaf, z, old, width, success, iterations) -> Corrected:
+def _seen(problem, leaf, z, old, width, success, iterations) -> Corrected:
     """Everything about a point that is taken as it is."""
     u, p = z[:-1], z[-1]
     parameters = with_leaf(problem.parameters, leaf, p)
@@ -138,7 +143,6 @@ def evaluate_(problem, leaf, z, old, width, success, iterations) -> Corrected:
 
 
 _correct = eqx.filter_jit(correct_)
-_evaluate = eqx.filter_jit(evaluate_)
 
 
 def _plain(at: Corrected) -> Corrected:
@@ -151,7 +155,9 @@ def _plain(at: Corrected) -> Corrected:
     )
 
 
-def correct(problem, leaf, guess, normal, old, width, settings, least_norm=False):
+def correct(
+    problem, leaf, guess, normal, old, width, settings, least_norm=False, given=False
+):
     """`correct_`, compiled, with numbers as arguments and NumPy arrays as result."""
     return _plain(
         _correct(
@@ -164,23 +170,18 @@ def correct(problem, leaf, guess, normal, old, width, settings, least_norm=False
             np.asarray(settings.tolerance),
             settings.max_iterations,
             least_norm,
+            np.asarray(given),
         )
     )
 
 
-def evaluate(problem, leaf, z, old, width) -> Any:
-    """`evaluate_`, compiled."""
-    return _plain(
-        _evaluate(
-            problem,
-            leaf,
-            np.asarray(z),
-            np.asarray(old),
-            np.asarray(width),
-            np.asarray(True),
-            np.asarray(0),
-        )
-    )
+def evaluate(problem, leaf, z, old, width, settings) -> Any:
+    """Everything about a point that is taken as it is.
+
+    By the program of `correct`, whose iterations cost less than another program does to
+    compile.
+    """
+    return correct(problem, leaf, z, old, old, width, settings, given=True)
 
 
 @eqx.filter_jit

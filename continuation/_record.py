@@ -82,12 +82,12 @@ def read(
     path: str | os.PathLike, problem: AbstractProblem | None = None
 ) -> tuple[Branch, dict]:
     """A branch and the header of its file."""
-    text = Path(path).read_text("utf-8")
-    lines = text.split("\n")[:-1]
     try:
+        text = Path(path).read_text("utf-8")
+        lines = text.split("\n")[:-1]
         header, *rest = [json.loads(line) for line in lines]
-    except ValueError as error:
-        raise ValueError(f"{path} is not a saved branch; it is not JSON") from error
+    except (ValueError, RecursionError):
+        raise ValueError(f"{path} is not a saved branch; it is not JSON") from None
     if not isinstance(header, dict) or header.get("format") != FORMAT:
         raise ValueError(f"{path} is not a saved branch")
     if header.get("version") != VERSION:
@@ -95,12 +95,18 @@ def read(
             f"{path} has version {header.get('version')} of the format, this program "
             f"reads version {VERSION}; read it with the program that wrote it"
         )
-    leaf = int(header["leaf"])
-    attach = _attacher(problem, leaf)
-    points = tuple(_point_from_json(line, attach) for line in rest)
-    low, high = header["bounds"]
-    names = tuple(header["parameters"])
-    return Branch(points, header["parameter"], (low, high), leaf, names), header
+    try:
+        leaf = int(header["leaf"])
+        attach = _attacher(problem, leaf)
+        points = tuple(_point_from_json(line, attach) for line in rest)
+        low, high = header["bounds"]
+        names = tuple(header["parameters"])
+        branch = Branch(points, header["parameter"], (low, high), leaf, names)
+    except (TypeError, ValueError, LookupError, AttributeError, ArithmeticError):
+        raise ValueError(
+            f"{path} is damaged; remove it, or the lines that were changed"
+        ) from None
+    return branch, header
 
 
 def _attacher(problem: AbstractProblem | None, leaf: int) -> Callable:

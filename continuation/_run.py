@@ -74,7 +74,7 @@ class Run:
         z = np.append(start.state, start.parameter)
         problem = with_parameter(problem, walk.leaf, z[-1])
         problem = problem.refreshed(z[:-1], problem.parameters)
-        at = evaluate(problem, walk.leaf, z, start.tangent, walk.width)
+        at = evaluate(problem, walk.leaf, z, start.tangent, walk.width, walk.settings)
         # to the last digit what they were when the point was found
         at = with_field(at, "tangent", np.asarray(start.tangent))
         at = with_field(at, "scale", np.asarray(start.scale))
@@ -87,7 +87,7 @@ class Run:
             first = passed[0]
             self.origin = evaluate(
                 problem, walk.leaf, np.append(first.state, first.parameter),
-                first.tangent, walk.width,
+                first.tangent, walk.width, walk.settings,
             )  # fmt: skip
         elif start.label == 1:
             self.origin = at

@@ -231,6 +231,14 @@ class ImpactingOrbits(AbstractProblem):
         names += [f"{IMPACT} {k}" for k in range(m)]
         return {name: Monitor(kind="grazing", ends=True) for name in names}
 
+    def vanishing_with(self, name: str) -> tuple[str, ...]:
+        """The gaps of the flights beside an impact without speed."""
+        m = len(self.constraints)
+        if not name.startswith(IMPACT):
+            return ()
+        number = int(name.rsplit(" ", 1)[1])
+        return f"{DIP} {(number - 1) % m}", f"{DIP} {number}"
+
     def watched(self, name: str, u, parameters) -> Float[Array, ""]:
         number = int(name.rsplit(" ", 1)[1])
         if name.startswith(IMPACT):

@@ -48,7 +48,7 @@ def emanating(
     start = None
     if point.kind in (FLIP, HOPF):
         z = np.append(point.state, point.parameter)
-        at = evaluate(problem, leaf, z, point.tangent, width)
+        at = evaluate(problem, leaf, z, point.tangent, width, Settings())
         if point.kind == FLIP:
             one = np.eye(at.linearisation.shape[0])
             right, _ = null_vectors(at.linearisation + one)
@@ -105,7 +105,7 @@ def other_direction(
 ) -> np.ndarray:
     """(n+1,) direction of the branch that crosses at a simple branch point, (3.37)."""
     z = np.append(point.state, point.parameter)
-    at = evaluate(problem, leaf, z, point.tangent, width)
+    at = evaluate(problem, leaf, z, point.tangent, width, Settings())
     left, _, rows = np.linalg.svd(at.jacobian * at.scale[None, :])
     basis = rows[-2:]
     form = np.asarray(

@@ -57,18 +57,24 @@ class ImpactPoint(eqx.Module):
     found: Bool[Array, "..."]
 
 
-def _step(rates, s, y, h):
+def runge_kutta_step(rates, s, y, h):
     """One step of length `h`: the state after it and the error estimate."""
 
     def stage(stages, row):
         i, lower, node = row
-        k = rates(s + node * h, y + h * (lower @ stages))
+        k = rates(s + node * h, y + h * _combined(lower, stages))
         return stages.at[i].set(k), None
 
     rows = (jnp.arange(_LAST), jnp.asarray(_LOWER), jnp.asarray(_NODES))
     start = jnp.zeros((_LAST, y.shape[0]))
     stages, _ = jax.lax.scan(stage, start, rows)
-    return y + h * (_WEIGHTS @ stages), h * (_ERROR @ stages)
+    weights, wrong = jnp.asarray(_WEIGHTS), jnp.asarray(_ERROR)
+    return y + h * _combined(weights, stages), h * _combined(wrong, stages)
+
+
+def _combined(weights, stages):
+    """Weighted sum of the stages; with derivatives a product of matrices is slower."""
+    return jnp.sum(weights[:, None] * stages, axis=0)
 
 
 def next_impact(
@@ -111,17 +117,17 @@ def next_impact(
         """Length of the step at which the gap is lowest, where v rises through 0."""
 
         def newton(_, length):
-            end, _ = _step(rates, s, y, length)
+            end, _ = runge_kutta_step(rates, s, y, length)
             pull = rates(s + length, end)[n]
             moved = length - velocity(end) / jnp.where(pull > 0, pull, jnp.inf)
             return jnp.clip(moved, 0.0, h)
 
         length = jax.lax.fori_loop(0, 8, newton, share * h)
-        return length, _step(rates, s, y, length)[0][-1]
+        return length, runge_kutta_step(rates, s, y, length)[0][-1]
 
     def look(carry):
         s, y, h, _, count = carry
-        end, error = _step(rates, s, y, h)
+        end, error = runge_kutta_step(rates, s, y, h)
         size = jnp.max(jnp.abs(error) / (_TOLERANCE * (1 + jnp.abs(end))))
         good = size <= 1
         dips = good & (velocity(y) < 0) & (velocity(end) > 0) & (end[-1] > 0)
@@ -153,7 +159,7 @@ def next_impact(
     # z / (time since the impact) has no root at the impact itself
     def refine(carry):
         low, high, guess, _, count = carry
-        end, _ = _step(rates, s, y, guess)
+        end, _ = runge_kutta_step(rates, s, y, guess)
         elapsed = s + guess
         value = end[-1] / elapsed
         slope = (velocity(end) - value) / elapsed
@@ -175,7 +181,7 @@ def next_impact(
     # two more steps of Newton carry first and second derivatives
     def newton(_, carry):
         _, _, length = carry
-        end, _ = _step(rates, s, y, length)
+        end, _ = runge_kutta_step(rates, s, y, length)
         fall = velocity(end)
         moved = length - end[-1] / jnp.where(fall < 0, fall, -jnp.inf)
         return end, length, moved
@@ -226,7 +232,7 @@ def fly(system: HybridSystem, time, state, speed, duration, height: ArrayLike = 
     def advance(carry):
         share, part, y, count = carry
         part = jnp.minimum(part, 1 - share)
-        end, error = _step(rates, share * duration, y, part * duration)
+        end, error = runge_kutta_step(rates, share * duration, y, part * duration)
         size = frozen(jnp.max(jnp.abs(error) / (_TOLERANCE * (1 + jnp.abs(end)))))
         good = size <= 1
         factor = 0.9 * jnp.maximum(size, 1e-12) ** -0.125

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 
-from ._axes import legend_above, one_axes
+from ._axes import one_axes
 from ._branch import mark_of
 from ._labels import labelled
 from ._style import styled
@@ -56,7 +56,7 @@ def special_curves(
                 "a chart needs curves in two parameters; give branches made by "
                 "continuation.curve"
             )
-        kind = curve.points[0].signature.split(" of ")[0]
+        kind = curve.points[0].signature.rsplit(" of ", 1)[0]
         values = scale * np.array([point.parameters for point in curve.points])
         ax.plot(*values.T, "-", color=mark_of(kind)[1], label=kind, zorder=2)
         for point in curve.special:
@@ -65,7 +65,12 @@ def special_curves(
     ax.set_xlabel(labelled(*((names[0], "-") if x_label is None else x_label)))
     ax.set_ylabel(labelled(*((names[1], "-") if y_label is None else y_label)))
     ax.margins(x=0.03, y=0.0)
-    legend_above(ax)
+    # beside the curves: above them is too little room for such long names
+    handles, labels = ax.get_legend_handles_labels()
+    unique = dict(zip(labels, handles, strict=True))
+    ax.legend(
+        unique.values(), unique.keys(), loc="center left", bbox_to_anchor=(1.0, 0.5)
+    )
     return ax.figure  # pyright: ignore
 
 
