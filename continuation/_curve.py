@@ -8,14 +8,15 @@ import numpy as np
 
 from ._algorithms import AbstractAlgorithm
 from ._branch import branch
-from ._extended import MonitorPoints, SingularPoints
 from ._follow import checked_bounds
 from ._locate import monitor_points, singular_points, Walk
+from ._monitor_points import MonitorPoints
 from ._parameter import as_arrays, leaf_of, pick
 from ._point import Branch, Point, set_parameters
 from ._problem import Start
 from ._program import evaluate
 from ._settings import Settings
+from ._singular_points import SingularPoints
 from ._test_functions import FLIP, FOLD, HOPF, NEIMARK_SACKER
 
 

@@ -6,11 +6,13 @@ import jax.numpy as jnp
 import numpy as np
 
 from ._bialternate import determinant_on_plane, trace_on_plane
-from ._extended import BranchPoints, matrix_at, MonitorPoints, SingularPoints
+from ._branch_points import BranchPoints
+from ._monitor_points import MonitorPoints
 from ._normal_forms import null_vectors
 from ._problem import AbstractProblem
 from ._program import correct, Corrected, evaluate, solve
 from ._settings import Settings
+from ._singular_points import matrix_at, SingularPoints
 from ._test_functions import (
     BRANCH_POINT,
     HOPF,

@@ -28,6 +28,7 @@ from ._admissible import DIP, IMPACT, inadmissible
 from ._lowest_gap import dips, lowest_times, nodes_of
 from ._orbit_grazing import orbit_grazing
 from ._problem import AbstractProblem, Monitor, Stability, Start
+from ._run_twice import run_twice
 from ._shooting_flight import flight_end, flight_nodes
 from ._shooting_map import map_of_period
 
@@ -308,7 +309,7 @@ class ImpactingOrbits(AbstractProblem):
         parameters = point.problem.parameters
         matrix = np.asarray(_antiperiodic(self, u, parameters))
         deviation = np.linalg.svd(matrix)[2][-1]
-        state, tangent = _twice(self, np.asarray(point.state), deviation)
+        state, tangent = run_twice(self, np.asarray(point.state), deviation)
         twice = ImpactingOrbits(
             parameters,
             2 * self.constraints,
@@ -338,25 +339,3 @@ class ImpactingOrbits(AbstractProblem):
 @eqx.filter_jit
 def _antiperiodic(problem: ImpactingOrbits, u, parameters):
     return problem.antiperiodic(u, parameters)
-
-
-def _twice(problem: ImpactingOrbits, u, deviation):
-    """State and tangent of the orbit run through twice, deviating with each sign."""
-    if not problem.constraints:
-        # the state at time zero only
-        return u, deviation
-    shape = (len(problem.constraints), 1 + problem.dimension)
-    first, moved = u.reshape(shape).copy(), deviation.reshape(shape).copy()
-    change = np.concatenate([moved, -moved])
-    if problem.periods:
-        second = first + np.eye(1, shape[1]) * problem.periods
-        return np.concatenate([first, second]).ravel(), change.ravel()
-    period, first[0, 0] = first[0, 0], 0.0
-    second = first + np.eye(1, shape[1])
-    rows = np.concatenate([first, second])
-    # time counts from the first impact, which must not move
-    change[:, 0] -= change[0, 0]
-    rows[:, 0] /= 2
-    change[:, 0] /= 2
-    rows[0, 0] = 2 * period
-    return rows.ravel(), change.ravel()
