@@ -23,7 +23,9 @@ def jaxcam(*arguments):
 
 
 def test_examples_in_the_help_name_options_that_exist():
-    found = re.findall(r"^\s+(jaxcam continue.*?)\s*$", jaxcam("--help").stdout, re.M)
+    # an example may go on in the next line
+    text = re.sub(r"\\\s*\n\s*", "", jaxcam("--help").stdout)
+    found = re.findall(r"^\s+(jaxcam continue.*?)\s*$", text, re.M)
     command = get_command(app).commands["continue"]  # pyright: ignore
     assert len(found) >= 3
     for line in found:
