@@ -43,7 +43,7 @@ EFFECTS = {
     "cam_profile_error": ("run", None),
     "sensor_lag": ("lag", None),
     "external_vibration": ("ext", 0.03),
-    "drive_ripple": ("eps", 2e-6),
+    "drive_ripple": ("eps", 1e-5),
 }
 #: effects that have no name, and strengths at which they matter
 UNLISTED = {"imbalance": 0.3, "fading": 0.005, "step": 0.1, "one_way": 0.1}
