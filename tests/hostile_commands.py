@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from typer.main import get_command
 from typer.testing import CliRunner
 
-import continuation._periodic  # noqa: F401
+import continuation._periodic  # noqa: F401  what is patched below
 import jaxcam.discrepancy
 import jaxcam.fitting
 import jaxcam.recordings

@@ -171,6 +171,8 @@ def test_one_more_record_says_what_its_energy_says():
         noisy = _free(size, 0.1) + _NOISE * rng.standard_normal(len(_TIME))
         record = Recording(name, _TIME, {"angle_rad": noisy})
         more.append(segment(record, "angle_rad", noise=_NOISE))
+    with pytest.raises(ValueError, match="There is no parameter 'friction'"):
+        compare_experiments(found, more, ["friction"])
     best, other = compare_experiments(found, more)
     assert (best.name, other.name) == ("twice", "same")
     assert best.factor == pytest.approx(np.sqrt(1 / 3), rel=0.05)

@@ -60,8 +60,12 @@ def compare_experiments(
     - `asked`: names of parameters; by default the strengths of what was named. The
         terms whose BIC is not much worse stay free beside them, so that the best record
         also tells them apart. Where nothing was named, all terms, one at a time.
+
+    **Raises:** `ValueError` for a name that is no parameter.
     """
     fit = found.after
+    for name in asked or ():
+        fit.problem.parameter(name)
     problem = Problem.build(fit.problem.model, records, fit.problem.parameters)
     values = np.repeat(np.asarray(fit.point.values)[:1], len(problem.segments), axis=0)
     point = problem.start._replace(values=jnp.asarray(values))

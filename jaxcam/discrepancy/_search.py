@@ -30,8 +30,6 @@ _KEPT, _TRIED = 3, 6
 _QUICK, _ITERATIONS = 15, 60
 # Subsets within this BIC of the best one may lead to a better one than it does
 _RIVAL = 50.0
-# Cost a sample, of three times the noise, at which the best subset explains too little
-_HOPELESS = 9.0
 # Standard deviations of what is known of a rig beyond which its fit went astray
 _FAR = 3.0
 
@@ -115,9 +113,6 @@ class Search:
             if not kept:
                 break
             best = self._better(best, kept[0])
-        if best.fit.cost > _HOPELESS * self.problem.samples:
-            # which of the terms that do not explain it explain least is no question
-            return best
         return self._swapped(self._smallest(best))
 
     def _promised(
