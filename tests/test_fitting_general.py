@@ -8,6 +8,7 @@ import pytest
 
 from jaxcam import fitting
 from jaxcam.fitting._likelihood import score
+from jaxcam.fitting._linearise import cost_of
 from jaxcam.hybrid import HybridSystem
 from jaxcam.models import BouncingBall, PowerLawRestitution
 from jaxcam.recordings import mend, record, Recording, RecordingError, segment
@@ -78,6 +79,24 @@ def test_a_readers_system_with_values_of_each_record(balls):
     assert float(found.model("b").system.restitution) == found["restitution@b"].value
     rms = [part.rms / part.noise for part in fitting.residuals(found)]
     assert np.max(np.abs(np.array(rms) - 1)) < 0.1
+
+
+def test_short_flights_start_with_the_velocity_that_gravity_allows():
+    """Few samples show no curvature; at the truth none is off by more than noise."""
+    model = fitting.Model(TRUE, SENSORS)
+    runs = [ball_record(TRUE, seed, name=str(seed)) for seed in range(4)]
+    problem = fitting.Problem.build(model, runs, PARAMETERS)
+    alone = eqx.tree_at(
+        lambda p: p.joint, problem.pieces, jnp.zeros_like(problem.pieces.joint)
+    )
+    costs = cost_of(problem.layout, alone, problem.extras, problem.start)
+    shortest = 100
+    for row, (flown, _) in enumerate(problem.spans):
+        for k, span in enumerate(flown):
+            count = len(span.rows)
+            shortest = min(shortest, count)
+            assert costs.flown[row, k] < count + 5 * np.sqrt(2 * count)
+    assert shortest < 24
 
 
 def test_freeing_another_parameter_compiles_nothing(balls):

@@ -1,5 +1,6 @@
 """Where contact is beyond doubt, and where a record's ends hide what happened."""
 
+import dataclasses
 import math
 
 import numpy as np
@@ -8,6 +9,7 @@ import pytest
 from jaxcam.data import DEMO_RIG
 from jaxcam.models import float_speed
 from jaxcam.recordings import read_rig
+from jaxcam.recordings._cut import settling_time
 from jaxcam.recordings._hidden_hops import before_release, hop_phases, sure_contact
 from jaxcam.recordings._record_ends import settled_alike
 from jaxcam.recordings._segments import Boundary, Contact, Flight
@@ -62,3 +64,18 @@ def test_a_contact_at_the_beginning_settles_as_late_as_the_others():
     short = Contact(boundary(0.0, "end of record"), boundary(0.1, "release"), 0, 9, 0.0)
     found = settled_alike([first, short, second], [flight])
     assert [one.settled for one in found] == pytest.approx([0.2, 0.1, 2.2])
+
+
+def test_bounces_are_waited_for_from_the_latest_landing_that_is_possible():
+    """A flight of 10 to 14 ms and a restitution of a half: 10 to 14 ms more."""
+    flight = Flight(
+        Boundary(1.0, 1e-4, "impact", ""),
+        Boundary(1.01, 4e-3, "landing", ""),
+        0,
+        5,
+        0.1,
+    )
+    settled = settling_time(flight, 0.5)
+    assert settled == pytest.approx(1.028)
+    exact = dataclasses.replace(flight, stop=Boundary(1.01, 0.0, "landing", ""))
+    assert settling_time(exact, 0.5) == pytest.approx(1.02)

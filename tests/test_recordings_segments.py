@@ -89,7 +89,8 @@ def test_contacts(runs):
             assert abs(nearest.stop.time - released) < 0.004
             # accumulation, from the last bounce that could be seen
             assert nearest.start.time < landed + 1e-3
-            assert abs(nearest.settled - landed) < 0.015
+            # rather 20 ms late than in the midst of bounces
+            assert -0.003 < nearest.settled - landed < 0.02
         inside = [
             segments.gap[(segments.clock >= c.settled) & (segments.clock < c.stop.time)]
             for c in segments.contacts

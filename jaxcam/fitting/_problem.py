@@ -61,7 +61,7 @@ from ._model import Input, Model
 from ._parameter import Parameter
 from ._pieces import gather, Pieces, Span
 from ._predict import fly
-from ._sharpness import JOINT, joint_sharpness
+from ._sharpness import JOINT, joint_sharpness, own_states
 from ._starts import suggested_starts
 
 
@@ -149,6 +149,7 @@ class Problem:
         if steps > first:
             extras = joint_sharpness(layout, pieces, point, guess)
         pieces = jax.tree.map(jnp.asarray, pieces)
+        point = own_states(layout, pieces, extras, point)
         return Problem(
             model,
             parameters,

@@ -135,7 +135,7 @@ def _landing(motion: Motion, place: int, before: LocalFit) -> Boundary:
     shift = -height / slope if slope < 0 else 0.0
     limit = 10 * motion.interval
     time = time + float(np.clip(shift, -limit, limit))
-    stderr = before.value_stderr(time) / abs(slope) if slope < 0 else limit
+    stderr = min(limit, before.value_stderr(time) / -slope) if slope < 0 else limit
     evidence = (
         f"the gap stays within {LOW:g} times the noise for "
         f"{SHORTEST_CONTACT * 1e3:g} ms and more; approach speed {max(0, -slope):.2g}"
@@ -183,12 +183,21 @@ def _contact(motion, span, boundaries, flights, restitution) -> Contact:
     settled = start.time
     before = [flight for flight in flights if flight.stop is start]
     if before and start.kind == "landing":
-        # bounces shrink by r in duration: the rest of a geometric series
-        rest = restitution / (1 - min(restitution, 0.95))
-        settled += before[0].duration * rest
+        settled = settling_time(before[0], restitution)
     end = int(np.searchsorted(motion.time, stop.time))
     last = min(last, end) if stop.kind == "release" else last
     return Contact(start, stop, first, last, min(settled, stop.time))
+
+
+def settling_time(flight: Flight, restitution: float) -> float:
+    """When the bounces after a landing have died out, if it was as late as it may be.
+
+    They shrink by the restitution in duration: the rest of a geometric series.
+    """
+    landing = flight.stop
+    late = landing.stderr if np.isfinite(landing.stderr) else 0.0
+    rest = restitution / (1 - min(restitution, 0.95))
+    return landing.time + late + (flight.duration + late) * rest
 
 
 def _gather(found: list[tuple[dict, int]]) -> Impacts:
