@@ -84,13 +84,18 @@ def diagnose(
 
     left_before = left(before)
     left_after = left(best) if best.names else left_before
+    held = None
     if doubtful and any(one.significant for one in left_after):
         # that something is there is sure; what explains all of it is what it is
         with_all = left(found)
         if not any(one.significant for one in with_all):
-            best, left_after, doubtful = found, with_all, []
-            inclusion, deviation = redrawn(search, best, seed)
-    rms_before, rms_after, gained, unseen = held_out(search, before, best, report)
+            whole = held_out(search, before, found, report)
+            # but what does not foretell data that it has not seen explains nothing
+            if whole[1] < whole[0]:
+                best, left_after, doubtful, held = found, with_all, [], whole
+                inclusion, deviation = redrawn(search, best, seed)
+    held = held or held_out(search, before, best, report)
+    rms_before, rms_after, gained, unseen = held
     effects = [
         term_effect(search, best, before, name, inclusion, deviation, gained)
         for name in sorted(best.names)
