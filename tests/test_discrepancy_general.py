@@ -71,17 +71,20 @@ def _pulled(x0, force):
     return found.y[0]
 
 
-def _diagnosed(motions, seed=1, **options):
+_STIFF = Parameter("stiffness", lambda m: m.system.stiffness, 3.0)
+
+
+def _diagnosed(motions, seed=1, system=None, parameters=(_STIFF,), **options):
     rng = np.random.default_rng(seed)
     runs = []
     for number, motion in enumerate(motions):
         noisy = motion + _NOISE * rng.standard_normal(len(motion))
         runs.append(Recording(f"run{number}", _TIME, {"angle_rad": noisy}))
     return diagnose(
-        Swing(),
+        Swing() if system is None else system,
         [segment(run, "angle_rad", noise=_NOISE) for run in runs],
         sensors={"angle_rad": Sensor(0, noise=_NOISE)},
-        parameters=[Parameter("stiffness", lambda m: m.system.stiffness, 3.0)],
+        parameters=list(parameters),
         **options,
     )
 
@@ -118,6 +121,38 @@ def test_damping_is_named_with_its_strength():
     # the model that comes back is the one with damping
     field = found.model().system.vector_field(0.0, jnp.array([0.0, 1.0]))
     assert float(field[1]) == pytest.approx(-one.value)
+
+
+class Rubbed(Swing):
+    """A swing whose textbook has a damping, which cannot be negative."""
+
+    damping: float = 0.05
+
+    def vector_field(self, t, state):
+        pull = self.stiffness * state[0] + self.damping * state[1]
+        return jnp.stack([state[1], -pull])
+
+
+def test_a_parameter_at_its_bound_takes_up_nothing():
+    """Dry friction of 0.2 rad/s^2, and a little push that no damping can be."""
+
+    def force(t, x, v):
+        return -0.2 * np.tanh(v / 1e-3) + 0.01 * v
+
+    found = _diagnosed(
+        [_pulled(x0, force) for x0 in (0.3, 0.1)],
+        system=Rubbed(),
+        parameters=[
+            _STIFF,
+            Parameter("damping", lambda m: m.system.damping, scale=0.01, lower=0.0),
+        ],
+    )
+    assert found.rig["damping"].value == 0.0
+    friction = {e.name: e for e in found.effects}["coulomb_friction"].parameters["fc"]
+    # up to 2 rad/s, the push looks like a tenth of the friction
+    assert friction.value == pytest.approx(0.19, abs=0.02)
+    # were the damping free to be negative, each stretch would trade it for friction
+    assert friction.stderr < 0.01
 
 
 def _magnet(t, x, v):

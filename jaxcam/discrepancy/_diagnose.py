@@ -10,7 +10,7 @@ from ._diagnosis import Diagnosis, Value
 from ._effects import drive_effect, ripples, term_effect, unknown_effect
 from ._evidence import held_out, limits, redrawn, rms_of, sure
 from ._kept_trials import KeptTrials
-from ._search import Search, Trial
+from ._search import Search, SURE, Trial
 from ._stated import rig_problem, system_problem, turns
 from ._structure import Structure, structures
 from ._term import Term, terms_of
@@ -104,11 +104,7 @@ def diagnose(
         effects.append(drive_effect(ripple))
     unexplained = [one for one in left_after if one.significant]
     verdict, caveats = _verdict(effects, unexplained, before, best)
-    caveats += [
-        f"A term for {name.replace('_', ' ')} gains something, but in {part:.0%} of "
-        f"the redrawn sets of stretches only; record more before you believe it."
-        for name, part in doubtful
-    ]
+    caveats += [_doubt(name, part) for name, part in doubtful]
     if verdict == "unknown":
         effects.insert(0, unknown_effect(unexplained, problem, gained))
     alternatives = _alternatives(search, best)
@@ -193,6 +189,17 @@ def _verdict(effects, unexplained: list[Structure], before: Trial, best: Trial):
         )
         return "effect", caveats
     return "unknown", caveats
+
+
+def _doubt(name: str, part: float) -> str:
+    """Why a term that gains something was not named."""
+    but = f"in {part:.0%} of the redrawn sets of stretches only"
+    if part >= SURE:
+        but = "its strength varies so much between stretches that it might be zero"
+    return (
+        f"A term for {name.replace('_', ' ')} gains something, but {but}; record more "
+        f"before you believe it."
+    )
 
 
 def _alternatives(search: Search, best: Trial) -> list[tuple[str, float]]:

@@ -133,29 +133,32 @@ def sure(
 ) -> tuple[Trial, dict[str, float], dict[str, float], list[tuple[str, float]]]:
     """The part of a subset that does not hang on a few stretches of the records.
 
+    A term whose strength might be zero is dropped first, then the one that fewest of
+    the redrawn sets need.
+
     **Returns:** the fit, what `redrawn` says of it, and the terms that were dropped
     with the part of the redrawn sets that would have kept them.
     """
     doubtful: list[tuple[str, float]] = []
     while True:
         inclusion, deviation = redrawn(search, best, seed)
-        vague = {name for name in inclusion if _vague(search, best, name, deviation)}
+        sizes = {name: _size(search, best, name, deviation) for name in inclusion}
         least = min(
-            inclusion, key=lambda n: (n not in vague, inclusion[n]), default=None
+            sizes, key=lambda n: (min(sizes[n], 1.0), inclusion[n]), default=None
         )
-        if least is None or (least not in vague and inclusion[least] >= SURE):
+        if least is None or (sizes[least] >= 1 and inclusion[least] >= SURE):
             return best, inclusion, deviation, doubtful
         doubtful.append((least, inclusion[least]))
         best = search.without(best, least)
 
 
-def _vague(search: Search, best: Trial, name: str, deviation) -> bool:
-    """Whether the strengths of a term could be zero by what redrawing does to them."""
+def _size(search: Search, best: Trial, name: str, deviation) -> float:
+    """Strengths of a term beside what redrawing does to them; below one, maybe zero."""
     own = [one.name for one in search.term(name).strengths() if not one.inner]
     found = [best.fit[one] for one in own]
     errors = [max(one.stderr, deviation[one.name]) for one in found]
     size = sum((one.value / error) ** 2 for one, error in zip(found, errors))
-    return bool(size < chi2.isf(FALSE_ALARMS, len(own)))
+    return float(size / chi2.isf(FALSE_ALARMS, len(own)))
 
 
 def redrawn(
@@ -172,7 +175,7 @@ def redrawn(
     pieces = max(len(flown) for flown, _ in problem.spans)
     slices = min(_SLICES, max(1, pieces // _PIECES))
     blocks = blocks_of(problem, best.fit.point, slices)
-    free = blocks.rows(search.parameters(best.names))
+    free = blocks.rows(_inside(best.fit))
     value = values_of(best.fit, blocks)
     rng = np.random.default_rng(seed)
     kept = dict.fromkeys(sorted(best.names), 0)
@@ -187,15 +190,27 @@ def redrawn(
         for name in kept:
             kept[name] += _needed(search, blocks, information, score, best, name, top)
     spread = np.std(np.array(estimates), axis=0)
-    deviation = {blocks.names[k]: float(s) for k, s in zip(free, spread)}
+    deviation = dict.fromkeys(best.fit.free, 0.0)
+    deviation |= {blocks.names[k]: float(s) for k, s in zip(free, spread)}
     return {name: k / _REDRAWN for name, k in kept.items()}, deviation
+
+
+def _inside(found: Fit) -> list[str]:
+    """Free parameters but those that press against a bound, where they stay."""
+    values = np.asarray(found.point.values)
+    kept = []
+    for name in found.free:
+        parameter = found.problem.parameter(name)
+        column = values[:, found.problem.names.index(name)]
+        if np.all((column > parameter.lower) & (column < parameter.upper)):
+            kept.append(name)
+    return kept
 
 
 def _needed(search, blocks: Blocks, information, score, best, name, top) -> bool:
     """Whether nothing else in the place of a term is as good."""
     gone = blocks.rows([one.name for one in search.term(name).strengths()])
-    free = blocks.rows(search.parameters(best.names))
-    rest = np.setdiff1d(free, gone)
+    rest = np.setdiff1d(blocks.rows(_inside(best.fit)), gone)
     value = values_of(best.fit, blocks)
     step = np.zeros(len(blocks.names))
     step[gone] = -value[gone]

@@ -20,6 +20,8 @@ _IMPACT = 10**-0.5
 _WIDTH = 4
 # Directions of a state that its samples see less than this part of the best one stay
 _BLIND = 1e-10
+# Samples of a piece that show its curvature well enough
+_FEW = 24
 
 
 def width_of(number: int) -> int:
@@ -68,10 +70,10 @@ def states_only(layout: Layout, pieces: Pieces, extras: Extras, point: Point):
 
 
 def own_states(layout: Layout, pieces: Pieces, extras: Extras, point: Point) -> Point:
-    """States that the samples of each piece suggest, moved on by what the model knows.
+    """States of short pieces, which their few samples do not tell, by the model.
 
-    One step of Gauss and Newton without joints. A few samples do not show the curvature
-    of a flight, and a wrong velocity never meets the flight before it.
+    One step of Gauss and Newton without joints. Few samples do not show the curvature
+    of a flight, and with a wrong velocity it never meets the flight before it.
     """
     alone = eqx.tree_at(lambda p: p.joint, pieces, jnp.zeros_like(pieces.joint))
     blocks, before = states_only(layout, alone, extras, point)
@@ -82,7 +84,8 @@ def own_states(layout: Layout, pieces: Pieces, extras: Extras, point: Point) -> 
     step = unit * jnp.einsum("rkab,rkb->rka", inverse, unit * blocks.s)
     moved = Point(point.values, point.states + step)
     _, after = states_only(layout, alone, extras, moved)
-    better = (after.flown < before.flown)[..., None]
+    few = jnp.sum(pieces.flown.known, axis=(-3, -2, -1)) < _FEW
+    better = (few & (after.flown < before.flown))[..., None]
     return Point(point.values, jnp.where(better, moved.states, point.states))
 
 
