@@ -3,6 +3,8 @@
 import mpmath
 import numpy as np
 
+from variational import scaling_law
+
 
 def oscillator_hop(w, t, u):
     """Next impact of x'' + x = cos wt, x <= 0, after one at t with rebound speed u."""
@@ -35,3 +37,24 @@ def oscillator_hop(w, t, u):
             if abs(step) < mpmath.mpf(10) ** -38:
                 break
     return s, velocity(s)
+
+
+def completes(w, r):
+    """Whether the orbit from release chatters to rest before the next release."""
+    with mpmath.workdps(40):
+        w, r = mpmath.mpf(w), mpmath.mpf(r)
+        t, u = mpmath.pi / 2 / w, mpmath.mpf(0)
+        end = t + 2 * mpmath.pi / w
+        bar = float(scaling_law(float(r)).lambda_bar)
+        for _ in range(400):
+            hop = oscillator_hop(w, t, u)
+            if hop is None or hop[0] >= end:
+                return False
+            t, u = hop[0], r * hop[1]
+            # close to release the coordinate tells: it leaves lambda_bar either way
+            lam = float(u / (w * (t - end) ** 2))
+            if (end - t) * w < 1e-2 and lam < bar / 2:
+                return True
+            if (end - t) * w < 1e-2 and lam > 3 / 8:
+                return False
+        raise AssertionError("neither in 400 impacts")

@@ -118,8 +118,9 @@ def test_the_pendulum_rubs_and_stirs_the_air(told):
 @real
 @pytest.mark.slow
 @pytest.mark.parametrize("ball", ["baseball", "bowling_ball"])
-def test_heavy_balls_fall_freely(told, ball):
-    assert told["found"][ball].verdict == "none"
+def test_no_air_is_seen_by_heavy_balls(told, ball):
+    """What the film leaves over of the baseball is smooth, but no drag of both drops."""
+    assert set(told["found"][ball].names) <= {"unknown"}
 
 
 @real

@@ -90,13 +90,14 @@ def test_short_flights_start_with_the_velocity_that_gravity_allows():
         lambda p: p.joint, problem.pieces, jnp.zeros_like(problem.pieces.joint)
     )
     costs = cost_of(problem.layout, alone, problem.extras, problem.start)
-    shortest = 100
+    short = 0
     for row, (flown, _) in enumerate(problem.spans):
         for k, span in enumerate(flown):
             count = len(span.rows)
-            shortest = min(shortest, count)
-            assert costs.flown[row, k] < count + 5 * np.sqrt(2 * count)
-    assert shortest < 24
+            if count < 24:
+                short += 1
+                assert costs.flown[row, k] < count + 5 * np.sqrt(2 * count)
+    assert short > 0
 
 
 def test_freeing_another_parameter_compiles_nothing(balls):

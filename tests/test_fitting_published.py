@@ -14,6 +14,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+import optimistix as optx
 import pytest
 from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
@@ -203,6 +204,37 @@ def test_priors_and_covariance_of_a_linear_model():
     assert_allclose(fit.shares, [0.0, 1.0], atol=1e-4)
     (sentence,) = fit.weak()
     assert "p" in sentence and "q" in sentence and "0 %" in sentence
+
+
+def test_the_optimum_is_that_of_optimistix():
+    """A decay that bends in its parameters, with priors that pull."""
+
+    class Decay(eqx.Module):
+        rate: jax.Array
+        size: jax.Array
+
+    times = jnp.linspace(0.0, 3.0, 7)
+
+    def values(m):
+        return m.size * jnp.exp(-m.rate * times)
+
+    nominal, priors, sigma = np.array([0.5, 1.0]), np.array([0.5, 0.3]), 0.02
+    printed = np.round(np.asarray(values(Decay(jnp.asarray(0.9), jnp.asarray(2.0)))), 1)
+    fit = fit_published(
+        Decay(jnp.asarray(nominal[0]), jnp.asarray(nominal[1])),
+        lambda m: (m.rate, m.size),
+        [Published("decay", values, printed, sigma)],
+        names=["rate", "size"],
+        tolerances=priors,
+    )
+
+    def misses(p, _):
+        off = (values(Decay(*p)) - printed) / sigma
+        return jnp.append(off, (p - nominal) / priors)
+
+    solver = optx.LevenbergMarquardt(rtol=1e-12, atol=1e-12)
+    dense = optx.least_squares(misses, solver, jnp.asarray(nominal))
+    assert_allclose(fit.estimates, dense.value, rtol=1e-8)
 
 
 def test_wrong_input_is_refused():

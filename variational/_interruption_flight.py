@@ -30,7 +30,18 @@ _LAST_CHANGE = 1e-3
 _LANDINGS, _LOWERINGS = 100, 8
 
 _SEARCH, _LAND, _LAST, _BOTTOM = range(4)
-_frozen = jax.lax.stop_gradient
+#: lengths of steps and decisions carry no derivative
+frozen = jax.lax.stop_gradient
+
+
+def nothing() -> tuple[Float[Array, ""], Int[Array, ""], Bool[Array, ""]]:
+    """Zero, none and no, as the scalars that a loop carries."""
+    return jnp.zeros(()), jnp.asarray(0), jnp.asarray(False)
+
+
+def period_of(system: HybridSystem) -> Float[Array, ""]:
+    """Forcing period (s), as the float that a loop carries."""
+    return jnp.asarray(system.period, jnp.float64)
 
 
 class Flight(NamedTuple):
@@ -56,17 +67,17 @@ class Flight(NamedTuple):
 
 def leave(system: HybridSystem, time, state) -> Flight:
     """The start of a flight at release, without relative velocity."""
-    zero, none = jnp.zeros(()), jnp.asarray(0)
+    zero, none, no = nothing()
     return Flight(
         time=time,
         y=jnp.concatenate([state, jnp.zeros(2)]),
-        since=_frozen(time),
+        since=frozen(time),
         length=_longest(system) / 8,
         mode=none,
         low=zero,
         high=zero,
         tries=none,
-        rises=jnp.asarray(False),
+        rises=no,
     )
 
 
@@ -81,10 +92,10 @@ def step(system: HybridSystem, f: Flight) -> tuple[Flight, Bool[Array, ""]]:
     end, wrong = runge_kutta_step(rates, f.time, f.y, f.length)
     rate = rates(f.time + f.length, end)
     # the landing moves with the motion: zero, but for its derivative
-    late = end[-1] / jnp.where(_frozen(end[-2]) < 0, end[-2], -jnp.inf)
+    late = end[-1] / jnp.where(frozen(end[-2]) < 0, end[-2], -jnp.inf)
     lands = (f.mode == _LAST) | ((f.mode == _LAND) & (f.tries >= _LANDINGS))
     there = end - late * rate
-    moved, taken = _next(system, f, *_frozen((end, wrong, rate)))
+    moved, taken = _next(system, f, *frozen((end, wrong, rate)))
     return (
         moved._replace(
             time=jnp.where(
@@ -101,7 +112,7 @@ def step(system: HybridSystem, f: Flight) -> tuple[Flight, Bool[Array, ""]]:
 def _next(system, f: Flight, end, wrong, rate) -> tuple[Flight, Bool[Array, ""]]:
     """What the next step is for, and how long; whether this one is taken."""
     size = jnp.max(jnp.abs(wrong) / (_TOLERANCE * (1 + jnp.abs(end))))
-    fall, rise, gap, pull = _frozen(f.y[-2]), end[-2], end[-1], rate[-2]
+    fall, rise, gap, pull = frozen(f.y[-2]), end[-2], end[-1], rate[-2]
     searches, bottoms = f.mode == _SEARCH, f.mode == _BOTTOM
     good = ~searches | (size <= 1)
 
@@ -116,7 +127,7 @@ def _next(system, f: Flight, end, wrong, rate) -> tuple[Flight, Bool[Array, ""]]
     towards = f.length + change
     falls &= (towards > low) & (towards < high)
     towards = jnp.where(falls, towards, (low + high) / 2)
-    elapsed = _frozen(f.time) + f.length - f.since
+    elapsed = frozen(f.time) + f.length - f.since
     least = jnp.minimum(elapsed * jnp.abs(pull), jnp.abs(rise))
     close = landing & falls & (jnp.abs(change * pull) <= _LAST_CHANGE * least)
 
@@ -154,13 +165,13 @@ def bounce(system: HybridSystem, f: Flight) -> Flight:
     x, approach = f.y[:-2], f.y[-2]
     after = one_constraint(system.impact(f.time, x), 1)
     speed = rebound_speed(system, f.time, x, approach)
-    pull = -_frozen(normal_acceleration(system, f.time, after)[0])
+    pull = -frozen(normal_acceleration(system, f.time, after)[0])
     # a parabola returns after 2 u / pull
-    parabola = 2.2 * _frozen(speed) / jnp.where(pull > 0, pull, 1.0)
+    parabola = 2.2 * frozen(speed) / jnp.where(pull > 0, pull, 1.0)
     longest = _longest(system)
     return f._replace(
         y=jnp.concatenate([after, jnp.stack([speed, jnp.zeros_like(speed)])]),
-        since=_frozen(f.time),
+        since=frozen(f.time),
         length=jnp.where(pull > 0, jnp.minimum(parabola, longest), longest / 8),
         mode=jnp.zeros_like(f.mode),
         tries=jnp.zeros_like(f.tries),
@@ -169,4 +180,4 @@ def bounce(system: HybridSystem, f: Flight) -> Flight:
 
 
 def _longest(system):
-    return _frozen(jnp.asarray(system.period, jnp.float64)) / _STEPS_PER_PERIOD
+    return frozen(period_of(system)) / _STEPS_PER_PERIOD

@@ -12,7 +12,15 @@ from jaxcam import HybridSystem
 from jaxcam.hybrid import normal_acceleration
 
 from ._chatter_frame import ChatterFrame
-from ._interruption_flight import bounce, Flight, leave, step
+from ._interruption_flight import (
+    bounce,
+    Flight,
+    frozen,
+    leave,
+    nothing,
+    period_of,
+    step,
+)
 from ._lambda_map import koenigs
 from ._scaling_law import scaling_law
 
@@ -24,7 +32,6 @@ _SMALL = 1e-6
 _ENOUGH = 1e-16
 # time from release, over the period, below which rounding decides what comes next
 _NEAR = 1e-12
-_frozen = jax.lax.stop_gradient
 
 
 class _Sequence(NamedTuple):
@@ -56,6 +63,8 @@ def interruption_margin(
     compiled, batched and differentiated forward, once.
 
     **Returns:** NaN for a last period without impact, or where contact comes earlier.
+
+    **Raises:** `ValueError` where it is differentiated twice.
     """
     return _margin(system, frame, periods=periods)
 
@@ -89,12 +98,28 @@ def _with_slope(leaves, direction, treedef, moving, shapes, ends, periods):
         return value, value
 
     by_each, value = jax.jacfwd(margin, has_aux=True)(local)
-    return value, by_each @ direction
+    return value, _last(by_each) @ direction
+
+
+@jax.custom_jvp
+def _last(slope):
+    """The slope itself, which has no derivative: landings are right to first order."""
+    return slope
+
+
+@_last.defjvp
+def _last_jvp(primals, tangents):
+    del primals, tangents
+    raise ValueError(
+        "interruption_margin can be differentiated once only; for second derivatives "
+        "differentiate variational.chatter_accumulation(...).margin, or take "
+        "differences of first ones"
+    )
 
 
 def _followed(system, frame: ChatterFrame, periods: int) -> Float[Array, ""]:
     """The margin, from the motion that leaves the release."""
-    period = jnp.asarray(system.period, jnp.float64)
+    period = period_of(system)
 
     def look(carry):
         flight, said, count = carry
@@ -114,11 +139,9 @@ def _followed(system, frame: ChatterFrame, periods: int) -> Float[Array, ""]:
         waits = flight.time - flight.since < 2 * period
         return ~said.over & waits & (count < _MAX_STEPS)
 
-    none = jnp.asarray(0)
-    nothing = _Sequence(
-        jnp.asarray(False), none + 1, -period, jnp.zeros(()), none - 1, none
-    )
-    start = (leave(system, frame.release, frame.state), nothing, none)
+    zero, none, no = nothing()
+    silence = _Sequence(no, none + 1, -period, zero, none - 1, none)
+    start = (leave(system, frame.release, frame.state), silence, none)
     said = jax.lax.while_loop(goes_on, look, start)[1]
     known = said.rank >= 0
     lam = said.speed / (frame.jerk * said.tau * said.tau)
@@ -130,10 +153,10 @@ def _followed(system, frame: ChatterFrame, periods: int) -> Float[Array, ""]:
 
 def _heard(system, frame, periods: int, s: _Sequence, f: Flight) -> _Sequence:
     """What the impact says that the flight has just left."""
-    period = jnp.asarray(system.period, jnp.float64)
-    law = scaling_law(_frozen(frame.restitution))
+    period = period_of(system)
+    law = scaling_law(frozen(frame.restitution))
     since, speed = f.time - frame.release, f.y[-2]
-    passed = jnp.floor(_frozen(since / period)).astype(s.turn.dtype)
+    passed = jnp.floor(frozen(since / period)).astype(s.turn.dtype)
     turn = jnp.clip(passed + 1, s.turn, periods)
     tau = since - turn.astype(jnp.float64) * period
     early = tau < -_NEAR * period

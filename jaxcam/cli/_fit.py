@@ -94,6 +94,7 @@ def fit(
         output.print(sentence)
     output.print(parameter_table(problem, found, again))
     output.print(correlation_table(found))
+    output.print(found.most_correlated())
     for law in laws.values():
         output.print(law.sentence())
     ratio = sum(q["ratio"] for q in quality) / len(quality)
@@ -110,6 +111,7 @@ def fit(
         "sentence": sentence,
         "notes": list(dict.fromkeys(notes)),
         "identifiability": seen.sentences(),
+        "most_correlated": found.most_correlated(),
         "residuals": quality,
         "restitution": {name: law.sentence() for name, law in laws.items()},
         "figures": figures,

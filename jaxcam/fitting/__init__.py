@@ -6,10 +6,12 @@ from ._cam_follower import (
     cam_follower_parameters as cam_follower_parameters,
     rig_sensors as rig_sensors,
 )
+from ._ellipse import Ellipse as Ellipse
 from ._find_orbits import one_impact_orbits as one_impact_orbits
 from ._fit import fit as fit, held_out_cost as held_out_cost
 from ._fit_result import Estimate as Estimate, Fit as Fit
 from ._free_fall import fit_free_fall as fit_free_fall, FreeFall as FreeFall
+from ._grazing_point import graze_of_orbit as graze_of_orbit
 from ._identify import Identifiability as Identifiability, identify as identify
 from ._impact_orbit import (
     clearance as clearance,
@@ -22,6 +24,9 @@ from ._impact_orbit import (
     orbit_trace as orbit_trace,
 )
 from ._implicit import implicit_root as implicit_root
+from ._interruption_point import (
+    interruption_of_chattering as interruption_of_chattering,
+)
 from ._model import (
     cam_follower_drive as cam_follower_drive,
     Input as Input,
@@ -31,7 +36,11 @@ from ._model import (
 )
 from ._parameter import Parameter as Parameter
 from ._problem import Problem as Problem, Weights as Weights
-from ._profile import Profile as Profile, profile as profile
+from ._profile import (
+    excess_cost as excess_cost,
+    Profile as Profile,
+    profile as profile,
+)
 from ._published import (
     fit_published as fit_published,
     Published as Published,

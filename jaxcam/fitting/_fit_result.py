@@ -1,6 +1,7 @@
 """What a fit found: estimates, their covariance, and how it ended."""
 
 import dataclasses
+from collections.abc import Sequence
 from typing import Any
 
 import jax
@@ -8,6 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from ._columns import invert, prior_information, reduced
+from ._ellipse import Ellipse, ellipse_of, most_correlated
 from ._linearise import Costs, Point
 from ._model import Model
 from ._problem import Problem
@@ -22,6 +24,11 @@ class Estimate:
     stderr: float
     unit: str = ""
     record: str | None = None
+
+    @property
+    def label(self) -> str:
+        """The name, with `@record` where each record has its own."""
+        return self.name if self.record is None else f"{self.name}@{self.record}"
 
     @property
     def interval(self) -> tuple[float, float]:
@@ -59,7 +66,7 @@ class Fit:
         **Raises:** `KeyError` that lists the names there are.
         """
         for one in self.estimates:
-            if name in (one.name, f"{one.name}@{one.record}"):
+            if name in (one.name, one.label):
                 return one
         known = ", ".join(one.name for one in self.estimates)
         raise KeyError(f"{name!r} was not fitted; the fitted parameters are {known}")
@@ -70,6 +77,23 @@ class Fit:
         size = np.sqrt(np.diag(self.covariance))
         size = np.where(size > 0, size, 1.0)
         return self.covariance / np.outer(size, size)
+
+    def ellipse(self, names: Sequence[str], level: float = 0.95) -> Ellipse:
+        """Joint confidence region of two or more parameters, the others left free.
+
+        **Arguments:** names as in `estimates`, with `@record` where each record has its
+        own; the probability that the region holds the truth.
+
+        **Raises:** `KeyError` for a name that was not fitted; `ValueError` for a level
+        outside 0 and 1, fewer than two names, or an error that is not finite.
+        """
+        labels = [one.label for one in self.estimates]
+        values = [one.value for one in self.estimates]
+        return ellipse_of(names, labels, values, self.covariance, level)
+
+    def most_correlated(self) -> str:
+        """The pair of parameters that is told apart worst, in a sentence."""
+        return most_correlated([e.label for e in self.estimates], self.correlation)
 
     @property
     def data_cost(self) -> float:

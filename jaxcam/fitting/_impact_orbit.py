@@ -126,7 +126,7 @@ def orbit_monodromy(
 
     **Returns:** shape `(n, n)`. Its eigenvalues are the Floquet multipliers.
     """
-    durations = _durations(system, orbit, turns)
+    durations = durations_of(system, orbit, turns)
 
     def transition(t, state, duration):
         def end(x):
@@ -168,7 +168,7 @@ def clearance(
     They are the approach and rebound speeds of its impacts, the durations of its
     flights, and the gap at the end of each Runge-Kutta step inside a flight.
     """
-    durations = _durations(system, orbit, turns)
+    durations = durations_of(system, orbit, turns)
 
     def one(t, state, duration):
         stops = _stops(system, t, state, duration, steps)
@@ -185,7 +185,7 @@ def clearance(
     return jnp.min(jax.vmap(one)(orbit.times, orbit.states, durations))
 
 
-def _durations(system, orbit, turns):
+def durations_of(system, orbit, turns):
     span = turns * system.period
     return jnp.append(orbit.times[1:], orbit.times[0] + span) - orbit.times
 
@@ -199,7 +199,7 @@ def orbit_residual(
     steps: int = 32,
 ) -> Float[Array, " unknowns"]:
     """What is zero for a periodic orbit: k gaps, and k states that must meet."""
-    durations = _durations(system, orbit, turns)
+    durations = durations_of(system, orbit, turns)
 
     def closes(t, state, duration, following):
         end = fly(system, t, state, duration, steps)

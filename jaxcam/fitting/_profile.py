@@ -1,7 +1,7 @@
-"""Profile likelihood: how much worse the best fit is with one parameter held."""
+"""Profile likelihood: how much worse the best fit is with parameters held."""
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from jaxtyping import Float
@@ -69,12 +69,8 @@ def profile(
     **Raises:** `KeyError` for a parameter that was not fitted; `ValueError` for one
     that differs from record to record.
     """
+    _require_shared(found, name)
     estimate = found[name]
-    if estimate.record is not None:
-        raise ValueError(
-            f"{name!r} has a value for each record; profile a parameter that all "
-            f"records share."
-        )
     problem, others = found.problem, [n for n in found.free if n != name]
     parameter = problem.parameter(name)
     if values is None:
@@ -98,12 +94,57 @@ def profile(
     # what was known of the parameter itself counts although it is held
     cost = np.array([fits[k].cost for k in range(len(tried))])
     if prior:
-        nominal = parameter.nominal
-        nominal = float(problem.start.values[0, place]) if nominal is None else nominal
-        cost = cost + ((tried - nominal) / parameter.prior_stderr) ** 2
+        cost = cost + _known(problem, name, tried)
     return Profile(
         name,
         tried,
         cost - min(np.min(cost), found.cost),
         tuple(fits[k] for k in range(len(tried))),
     )
+
+
+def excess_cost(
+    found: Fit,
+    values: Mapping[str, float],
+    *,
+    weights: Weights | None = None,
+    prior: bool = True,
+) -> float:
+    """Cost above the optimum with several parameters held and all others fitted.
+
+    The joint confidence region of d parameters, bent as the model is: values are inside
+    where this is below the quantile of a chi-square with d degrees of freedom,
+    `found.ellipse(names).limit`.
+
+    **Arguments:** the fit, in which all of these were free; `weights` and `prior` as
+    they were for it.
+
+    **Raises:** as in [`jaxcam.fitting.profile`][].
+    """
+    problem, cost = found.problem, 0.0
+    point = found.point
+    for name, value in values.items():
+        _require_shared(found, name)
+        place = problem.names.index(name)
+        point = point._replace(values=point.values.at[:, place].set(value))
+        cost += float(_known(problem, name, value)) if prior else 0.0
+    others = [n for n in found.free if n not in values]
+    held = fit(problem, free=others, start=point, weights=weights, prior=prior)
+    return held.cost + cost - found.cost
+
+
+def _require_shared(found: Fit, name: str) -> None:
+    if found[name].record is not None:
+        raise ValueError(
+            f"{name!r} has a value for each record; profile a parameter that all "
+            f"records share."
+        )
+
+
+def _known(problem, name: str, values):
+    """What was known of a parameter, as a cost of values of it."""
+    parameter = problem.parameter(name)
+    nominal = parameter.nominal
+    if nominal is None:
+        nominal = float(problem.start.values[0, problem.names.index(name)])
+    return ((values - nominal) / parameter.prior_stderr) ** 2

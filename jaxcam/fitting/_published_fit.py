@@ -1,10 +1,13 @@
 """What a fit to published numbers found, and what it could not see."""
 
 import dataclasses
+from collections.abc import Sequence
 from typing import Any, TYPE_CHECKING
 
 import numpy as np
 from jaxtyping import Bool, Float
+
+from ._ellipse import Ellipse, ellipse_of, most_correlated
 
 
 if TYPE_CHECKING:
@@ -88,6 +91,17 @@ class PublishedFit:
     def correlation(self) -> Float[np.ndarray, "p p"]:
         errors = self.stderr
         return self.covariance / np.outer(errors, errors)
+
+    def ellipse(self, names: Sequence[str], level: float = 0.95) -> Ellipse:
+        """Joint confidence region of two or more parameters, the others left free.
+
+        **Raises:** as in [`jaxcam.fitting.Fit`][].
+        """
+        return ellipse_of(names, self.names, self.estimates, self.covariance, level)
+
+    def most_correlated(self) -> str:
+        """The pair of parameters that is told apart worst, in a sentence."""
+        return most_correlated(self.names, self.correlation)
 
     @property
     def chi_square(self) -> float:

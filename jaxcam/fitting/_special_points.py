@@ -22,7 +22,8 @@ class SpecialPoint(eqx.Module):
 
     #: value of the parameter, in its own unit
     parameter: Float[Array, ""]
-    #: the impacts of the orbit; for a detachment the time and state of the contact
+    #: the impacts of the orbit, behind its graze if it has one; for a detachment the
+    #: time and state of the contact
     orbit: ImpactOrbit
 
 

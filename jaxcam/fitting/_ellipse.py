@@ -1,0 +1,117 @@
+"""Where several parameters are together: the ellipsoid of their covariance."""
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+import scipy.stats
+from jaxtyping import Bool, Float
+
+
+@dataclasses.dataclass(frozen=True)
+class Ellipse:
+    """Joint confidence region of d parameters, an ellipse or an ellipsoid.
+
+    The points p with (p - centre)' C^-1 (p - centre) below the quantile of a chi-square
+    with d degrees of freedom, C the covariance of these parameters with all others left
+    free. As exact as the model is straight over the region; see
+    [`jaxcam.fitting.excess_cost`][] for one that bends.
+
+    - `names`: `(d,)`, the order of everything else.
+    - `centre`, `covariance`: `(d,)` and `(d, d)`, in the units of the parameters.
+    - `level`: probability that the region holds the truth.
+    """
+
+    names: tuple[str, ...]
+    centre: Float[np.ndarray, " d"]
+    covariance: Float[np.ndarray, "d d"]
+    level: float
+
+    @property
+    def limit(self) -> float:
+        """Chi-square at the edge."""
+        return float(scipy.stats.chi2.ppf(self.level, len(self.names)))
+
+    @property
+    def axes(self) -> Float[np.ndarray, "d d"]:
+        """Half axes, one a row, from the centre to the edge, the longest first.
+
+        They are at right angles where each parameter is counted in its standard error,
+        so that they do not depend on the units.
+        """
+        return (self._roots() * np.sqrt(self.limit)).T
+
+    def chi_square(self, points: Float[np.ndarray, "*k d"]) -> Float[np.ndarray, "*k"]:
+        """Squared distance of points from the centre, in standard errors."""
+        off = (np.asarray(points, dtype=float) - self.centre) @ np.linalg.pinv(
+            self._roots()
+        ).T
+        return np.sum(off**2, axis=-1)
+
+    def contains(self, points: Float[np.ndarray, "*k d"]) -> Bool[np.ndarray, "*k"]:
+        """Whether points are inside."""
+        return self.chi_square(points) <= self.limit
+
+    def polygon(self, points: int = 181) -> Float[np.ndarray, "k 2"]:
+        """The edge of an ellipse as a closed line, shape `(points, 2)`, to be drawn.
+
+        **Raises:** `ValueError` for more than two parameters.
+        """
+        if len(self.names) != 2:
+            raise ValueError(
+                f"An ellipsoid of {len(self.names)} parameters has no outline; ask for "
+                f"the ellipse of two of them."
+            )
+        angle = np.linspace(0.0, 2 * np.pi, points)
+        return self.centre + np.stack([np.cos(angle), np.sin(angle)], axis=1) @ (
+            self.axes
+        )
+
+    def _roots(self) -> Float[np.ndarray, "d d"]:
+        """Columns whose outer products add to the covariance."""
+        size = np.sqrt(np.diag(self.covariance))
+        values, vectors = np.linalg.eigh(self.covariance / np.outer(size, size))
+        return (size[:, None] * vectors * np.sqrt(np.maximum(values, 0.0)))[:, ::-1]
+
+
+def ellipse_of(
+    names: Sequence[str], labels: Sequence[str], centre, covariance, level: float
+) -> Ellipse:
+    """The region of the parameters `names` among those with these labels."""
+    if not 0 < level < 1:
+        raise ValueError(f"The level is {level:g}; give a probability between 0 and 1.")
+    if len(set(names)) != len(names) or len(names) < 2:
+        raise ValueError(
+            f"A joint region needs two or more different parameters, not "
+            f"{', '.join(names) or 'none'}."
+        )
+    missing = [name for name in names if name not in labels]
+    if missing:
+        raise KeyError(
+            f"{missing[0]!r} was not fitted; the fitted parameters are "
+            f"{', '.join(labels)}"
+        )
+    rows = [list(labels).index(name) for name in names]
+    part = np.asarray(covariance)[np.ix_(rows, rows)]
+    if not np.all(np.isfinite(part) & (np.diag(part) > 0)[:, None]):
+        raise ValueError(
+            f"One of {', '.join(names)} has no finite error; hold what the data cannot "
+            f"see."
+        )
+    return Ellipse(tuple(names), np.asarray(centre, dtype=float)[rows], part, level)
+
+
+def most_correlated(labels: Sequence[str], correlation) -> str:
+    """The pair of parameters that are told apart worst, in a sentence."""
+    if len(labels) < 2:
+        return "Fewer than two parameters were fitted, so none are correlated."
+    size = np.abs(np.where(np.isfinite(correlation), correlation, 0.0))
+    i, k = divmod(int(np.argmax(np.tril(size, -1))), len(labels))
+    value = float(np.clip(correlation[i, k], -1.0, 1.0))
+    kept = max(1 - value**2, np.finfo(float).eps) ** 0.5
+    together = "in opposite directions" if value < 0 else "together"
+    return (
+        f"{labels[k]} and {labels[i]} are told apart worst: their errors go {together} "
+        f"(correlation {value:+.4f}), and if one were known, the error of the other "
+        f"would be {kept:.2g} times what it is."
+    )
