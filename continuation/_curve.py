@@ -9,7 +9,7 @@ import numpy as np
 from ._algorithms import AbstractAlgorithm
 from ._branch import branch
 from ._follow import checked_bounds
-from ._locate import monitor_points, singular_points, Walk
+from ._locate import singular_points, Walk
 from ._monitor_points import MonitorPoints
 from ._parameter import as_arrays, leaf_of, pick
 from ._point import Branch, Point, set_parameters
@@ -20,6 +20,8 @@ from ._singular_points import SingularPoints
 from ._test_functions import FLIP, FOLD, HOPF, NEIMARK_SACKER
 
 
+# its `parameters` is a property, which type checkers take for an argument
+_monitored: Any = MonitorPoints
 # a monitor below this, relative to one plus the unknowns, is taken for zero
 _ZERO = 1e-7
 
@@ -58,7 +60,9 @@ def extended(
         most = max(min(sizes.values()), _ZERO * (1.0 + float(np.max(np.abs(z)))))
         same = [k for k in same if sizes[k] <= most]
     if same:
-        return monitor_points(problem, same[-1], walk)
+        return _monitored(
+            problem, same[-1], leaf, np.asarray(walk.width), np.asarray(walk.bounds)
+        )
     raise ValueError(
         f"points of kind {point.kind!r} form no curve in two parameters; folds, flips, "
         "Neimark-Sacker and Hopf points and the zeros of a problem's monitors do"

@@ -7,7 +7,7 @@ import numpy as np
 
 from ._bialternate import determinant_on_plane, trace_on_plane
 from ._branch_points import BranchPoints
-from ._monitor_points import MonitorPoints
+from ._monitor_points import monitor_level
 from ._normal_forms import null_vectors
 from ._problem import AbstractProblem
 from ._program import correct, Corrected, evaluate, solve
@@ -23,7 +23,6 @@ from ._test_functions import (
 
 # their `parameters` is a property, which type checkers take for an argument
 _singular: Any = SingularPoints
-_monitored: Any = MonitorPoints
 _crossing: Any = BranchPoints
 
 
@@ -62,20 +61,6 @@ def singular_points(
     return empty.refreshed(np.asarray(z), problem.parameters)
 
 
-def monitor_points(
-    problem: AbstractProblem, name: str, walk: Walk, level: float = 0.0
-) -> MonitorPoints:
-    """The extended problem of a zero of a monitor."""
-    return _monitored(
-        problem,
-        name,
-        walk.leaf,
-        np.asarray(walk.width),
-        np.asarray(walk.bounds),
-        np.asarray(level),
-    )
-
-
 def _newton(problem, name: str, walk: Walk, guess: np.ndarray):
     """Newton on the extended system: (z, success)."""
     if name == BRANCH_POINT:
@@ -91,7 +76,7 @@ def _newton(problem, name: str, walk: Walk, guess: np.ndarray):
         value, success, _ = solve(extended, u, walk.settings)
         return value[: guess.size], success
     if name in problem.monitors():
-        extended = monitor_points(problem, name, walk)
+        extended = monitor_level(problem, name, walk.leaf, walk.width)
     else:
         extended = singular_points(problem, name, walk, guess)
     value, success, _ = solve(extended, guess, walk.settings)
@@ -196,7 +181,7 @@ def ahead(
     z, level, failures = a.z, value, 0
 
     def reached(target: float):
-        extended = monitor_points(problem, name, walk, target)
+        extended = monitor_level(problem, name, walk.leaf, walk.width, target)
         found, success, _ = solve(extended, z, walk.settings)
         way = (found - a.z) / a.scale
         forward = float(way @ (a.tangent / a.scale)) > 0

@@ -2,7 +2,7 @@
 
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, Int
 
 from jaxcam.hybrid import HybridSystem
 from jaxcam.hybrid._normal import gaps, normal_acceleration, normal_velocity
@@ -58,15 +58,17 @@ def lowest_times(
         k = chosen[which]
         node_t, node_x = times[k], states[k]
 
-        def newton(_, s):
+        def newton(_, found):
+            # the gap belongs to the time before its last change, which is rounding
+            s, _ = found
             x = flight_nodes(system, node_t, node_x, node_t + s, 1)[1][-1]
             v = normal_velocity(system, node_t + s, x)[which]
             a = normal_acceleration(system, node_t + s, x)[which]
-            return jnp.clip(s - v / jnp.where(a > 0, a, jnp.inf), -h, 2 * h)
+            better = jnp.clip(s - v / jnp.where(a > 0, a, jnp.inf), -h, 2 * h)
+            return better, gaps(system, node_t + s, x)[which]
 
-        s = jax.lax.fori_loop(0, 4, newton, share[k, which] * h)
-        x = flight_nodes(system, node_t, node_x, node_t + s, 1)[1][-1]
-        there = gaps(system, node_t + s, x)[which]
+        first = (share[k, which] * h, jnp.zeros_like(h))
+        s, there = jax.lax.fori_loop(0, 5, newton, first)
         high = jnp.max(heights[:, which])
         return (
             jnp.where(exists[which], node_t + s, end),
@@ -99,6 +101,37 @@ def dips(
         return jnp.where(found, gaps(system, time, x)[which], values[which])
 
     return jax.vmap(one)(starts, ends)
+
+
+def gap_or_speed(
+    system: HybridSystem,
+    starts: Float[Array, "m row"],
+    ends: Float[Array, " m"],
+    number: Int[Array, ""],
+    hit: Int[Array, " m"] | None,
+    steps: int,
+) -> Float[Array, ""]:
+    """The lowest gap of flight `number`, or from m on the approach speed of an impact.
+
+    Flown once for either, so that one small program serves for all. `hit` are the
+    constraints that end the flights; None for a closed orbit without impacts.
+    """
+    m = ends.shape[0]
+    landed = number >= m
+    # flight k ends in impact k + 1
+    k = jnp.where(landed, number - 1, number) % m
+    start, end = starts[k], ends[k]
+    still = jax.lax.stop_gradient((system, start, end))
+    times, heights = lowest_times(*still, steps, whole_turn=hit is None)
+    lowest = jnp.argmin(heights)
+    turns = times[lowest] < still[2]
+    if hit is None:
+        x = flight_end(system, start[0], start[1:], times[lowest], steps=steps)
+        return gaps(system, times[lowest], x)[lowest]
+    time = jnp.where(~landed & turns, times[lowest], end)
+    x = flight_end(system, start[0], start[1:], time, steps=steps)
+    gap = jnp.where(turns, gaps(system, time, x)[lowest], heights[lowest])
+    return jnp.where(landed, -normal_velocity(system, time, x)[hit[k]], gap)
 
 
 def _rise(speeds, changes):

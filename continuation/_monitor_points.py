@@ -1,18 +1,18 @@
 """Points at which a monitor is zero, as solutions of a larger problem."""
 
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, PyTree
 
+from ._extended import AbstractExtended
 from ._parameter import with_leaf
-from ._point import Point
 from ._problem import AbstractProblem, Monitor, Stability
 
 
-class MonitorPoints(AbstractProblem):
+class MonitorPoints(AbstractExtended):
     """Points (u, parameter) on a branch where a monitor of the problem is zero."""
 
     base: AbstractProblem
@@ -20,45 +20,15 @@ class MonitorPoints(AbstractProblem):
     leaf: int = eqx.field(static=True)
     width: Array
     bounds: Array
-    #: the value that the monitor is to have
-    level: Array = eqx.field(default_factory=lambda: jnp.zeros(()))
     stability: ClassVar[Stability] = "none"
 
-    @property
-    def parameters(self) -> PyTree:
-        return self.base.parameters
-
-    @property
-    def detects(self) -> bool:
-        return False
-
-    def _split(self, u, parameters):
-        return u[:-1], with_leaf(parameters, self.leaf, u[-1])
-
     def residual(self, u: Float[Array, " n"], parameters: PyTree):
-        inner, inside = self._split(u, parameters)
-        value = self.base.watched(self.name, inner, inside) - self.level
-        return jnp.concatenate(
-            [self.base.residual(inner, inside), jnp.reshape(value, (1,))]
-        )
-
-    def linearisation(self, u: Float[Array, " n"], parameters: PyTree, jacobian):
-        del jacobian
-        inner, inside = self._split(u, parameters)
-        return self.base.linearisation(inner, inside, self.base.jacobian(inner, inside))
-
-    @property
-    def normal_forms(self) -> bool:
-        return False
-
-    def observe(self, u: Float[Array, " n"], parameters: PyTree) -> dict[str, Array]:
-        return self.base.observe(*self._split(u, parameters))
-
-    def monitor(self, u: Float[Array, " n"], parameters: PyTree) -> dict[str, Array]:
-        return self.seen(u, parameters)[0]
+        inner, inside = self.inside(u, parameters)
+        value = self.base.watched(self.name, inner, inside)
+        return jnp.append(self.base.residual(inner, inside), value)
 
     def seen(self, u: Float[Array, " n"], parameters: PyTree):
-        values, observed = self.base.seen(*self._split(u, parameters))
+        values, observed = self.base.seen(*self.inside(u, parameters))
         return {name: values[name] for name in self.monitors()}, observed
 
     def monitors(self) -> dict[str, Monitor]:
@@ -70,23 +40,53 @@ class MonitorPoints(AbstractProblem):
             if name not in silent
         }
 
-    def scale(self, u: Float[Array, " n"], parameters: PyTree):
-        sizes = self.base.scale(*self._split(u, parameters))
-        return jnp.concatenate([sizes, jnp.reshape(self.width, (1,))])
-
-    def free(self, u: np.ndarray) -> tuple[float, ...]:
-        return (*self.base.free(u[:-1]), float(u[-1]))
-
-    def limits(self) -> dict[int, tuple[float, float]]:
-        return {
-            **self.base.limits(),
-            -1: (float(self.bounds[0]), float(self.bounds[1])),
-        }
-
-    def check(self, point: Point) -> str | None:
-        return self.base.check(point.inner(self.base, self.leaf))
-
     @property
     def signature(self) -> str:
         kind = self.base.monitors()[self.name].kind
         return f"{kind} of {self.base.signature}"
+
+
+class MonitorLevel(AbstractProblem):
+    """The point (u, parameter) on a branch where a monitor has some value.
+
+    The number of the monitor is an array where the problem can do with that, so that
+    one program finds the zeros of all.
+    """
+
+    base: AbstractProblem
+    leaf: int = eqx.field(static=True)
+    width: Array
+    which: str | Array
+    level: Array
+    stability: ClassVar[Stability] = "none"
+
+    @property
+    def parameters(self) -> PyTree:
+        return self.base.parameters
+
+    def residual(self, u: Float[Array, " n"], parameters: PyTree):
+        inner, inside = u[:-1], with_leaf(parameters, self.leaf, u[-1])
+        if isinstance(self.which, str):
+            value = self.base.watched(self.which, inner, inside)
+        else:
+            value = self.base.watched_by_number(self.which, inner, inside)
+        return jnp.append(self.base.residual(inner, inside), value - self.level)
+
+    def scale(self, u: Float[Array, " n"], parameters: PyTree):
+        inside = with_leaf(parameters, self.leaf, u[-1])
+        sizes = self.base.scale(u[:-1], inside)
+        return jnp.concatenate([sizes, jnp.reshape(self.width, (1,))])
+
+
+# its `parameters` is a property, which type checkers take for an argument
+_level: Any = MonitorLevel
+
+
+def monitor_level(
+    problem: AbstractProblem, name: str, leaf: int, width, level: float = 0.0
+) -> MonitorLevel:
+    """The problem of the point where a monitor has this value."""
+    which: Any = name
+    if type(problem).watched_by_number is not AbstractProblem.watched_by_number:
+        which = np.asarray(list(problem.monitors()).index(name))
+    return _level(problem, leaf, np.asarray(width), which, np.asarray(level))

@@ -7,15 +7,22 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from ._admissible import DIP, IMPACT, look
+from ._admissible import DIP, IMPACT
 from ._lowest_gap import lowest_times
-from ._parameter import with_leaf
+from ._parameter import as_arrays
+from ._point import set_parameters
 from ._problem import Start
+from ._program import evaluate
+from ._settings import Settings
 from ._signature import with_impact, without_impact
 
 
 if TYPE_CHECKING:
     from ._shooting import ImpactingOrbits
+
+
+# distance at which the sign of a slope is taken, of unknowns of size one
+_NUDGE = 1e-6
 
 
 @eqx.filter_jit
@@ -35,8 +42,11 @@ def orbit_grazing(problem: "ImpactingOrbits", point: Any) -> Start | None:
     """
     u = jnp.asarray(point.state)
     parameters = point.problem.parameters
-    values, _ = look(problem, u, parameters)
-    values = {name: abs(float(v)) for name, v in values.items()}
+    z = np.append(point.state, point.parameter)
+    at = evaluate(
+        problem, point.leaf, z, np.ones_like(z), np.asarray(point.scale[-1]), Settings()
+    )
+    values = {name: abs(float(v)) for name, v in at.monitors.items()}
     name = min(values, key=values.__getitem__)
     speeds = {key: v for key, v in values.items() if key.startswith(IMPACT)}
     slowest = min(speeds, key=speeds.__getitem__, default=name)
@@ -54,26 +64,32 @@ def orbit_grazing(problem: "ImpactingOrbits", point: Any) -> Start | None:
         time = float(times[number, which])
         changed, state = with_impact(problem, u, parameters, number, time, which)
         watched = f"{IMPACT} {number + 1 if problem.constraints else 0}"
-    tangent, slope = _direction(
-        changed, jnp.asarray(state), parameters, point.leaf, watched
-    )
-    tangent = np.asarray(tangent) * (1.0 if float(slope) >= 0 else -1.0)
-    if not np.all(np.isfinite(tangent)):
+    changed = set_parameters(changed, as_arrays(changed.parameters, point.leaf))
+    tangent = _direction(changed, np.asarray(state), point, watched)
+    if tangent is None:
         return None
     return Start(changed, state, float(point.parameter), tangent)
 
 
-@eqx.filter_jit
-def _direction(problem, u, parameters, leaf: int, watched: str):
-    """The direction of the branch, and the slope of a monitor along it."""
-    p = jax.tree.leaves(parameters)[leaf]
-    whole = jax.jacfwd(
-        lambda z: problem.residual(z[:-1], with_leaf(parameters, leaf, z[-1]))
-    )(jnp.append(u, p))
-    tangent = jnp.linalg.svd(whole)[2][-1]
-    _, slope = jax.jvp(
-        lambda z: problem.watched(watched, z[:-1], with_leaf(parameters, leaf, z[-1])),
-        (jnp.append(u, p),),
-        (tangent,),
+def _direction(problem, u, point: Any, watched: str) -> np.ndarray | None:
+    """The direction of the branch in which a monitor grows.
+
+    By the program that the branch goes on with; only the sign of the slope is wanted,
+    for which differences do.
+    """
+    z = np.append(u, point.parameter)
+    one, width, settings = np.ones_like(z), np.asarray(point.scale[-1]), Settings()
+    at = evaluate(problem, point.leaf, z, one, width, settings)
+    if not np.all(np.isfinite(at.jacobian)):
+        return None
+    tangent = np.linalg.svd(at.jacobian)[2][-1]
+    ahead, behind = (
+        evaluate(
+            problem, point.leaf, z + sign * _NUDGE * tangent, one, width, settings
+        ).monitors[watched]
+        for sign in (1, -1)
     )
-    return tangent, slope
+    slope = float(ahead - behind)
+    if not np.isfinite(slope):
+        return None
+    return tangent if slope >= 0 else -tangent

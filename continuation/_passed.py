@@ -83,7 +83,9 @@ def special_here(
             return None
     coefficient, words = None, ""
     if name not in monitors and located.converged:
-        coefficient, words = normal_form(kind, problem, walk.leaf, located.z, at)
+        coefficient, words = normal_form(
+            kind, problem, walk.leaf, located.z, at, walk.settings
+        )
     length = float(np.linalg.norm((located.z - here.at.z) / here.at.scale))
     there = Here(problem, at, {}, here.step, here.arclength + length, ())
     return Special(there, kind, located, coefficient, words)

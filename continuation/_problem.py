@@ -8,7 +8,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float, PyTree
+from jaxtyping import Array, Float, Int, PyTree
 
 
 #: what the eigenvalues of `linearisation` mean
@@ -73,8 +73,9 @@ class AbstractProblem(eqx.Module):
     - `residual(u, parameters)`.
 
     **Traced** (called inside compiled programs; jax functions, differentiable forward):
-    `residual`, `jacobian`, `linearisation`, `motion`, `local_motion`, `monitor`,
-    `observe`, `watched`, `seen`, `scale`.
+    `residual`, `jacobian`, `linearisation`, `derivatives`, `motion`, `local_motion`,
+    `local_jacobian`, `monitor`, `observe`, `watched`,
+    `watched_by_number`, `seen`, `scale`.
     Everything about them that is not an array must be static: one program is compiled
     for each structure of a problem, and reused for all values of arrays in it.
     `residual` and monitors of `ends=False` are to be smooth; where an orbit does not
@@ -121,11 +122,31 @@ class AbstractProblem(eqx.Module):
             return jacobian + jnp.eye(jacobian.shape[0], dtype=jacobian.dtype)
         return jacobian
 
+    def derivatives(
+        self, u: Float[Array, " n"], p: Float[Array, ""], parameters_at: Callable
+    ) -> tuple[Float[Array, "n n+1"], Float[Array, "k k"]]:
+        """Derivative of the residual by u and the parameter, and `linearisation`.
+
+        `parameters_at(p)` are the parameters with the value p of the one that varies.
+        To be overridden where the two share work.
+        """
+        if type(self).jacobian is AbstractProblem.jacobian:
+            whole = jax.jacfwd(lambda z: self.residual(z[:-1], parameters_at(z[-1])))(
+                jnp.append(u, p)
+            )
+        else:
+            _, by_p = jax.jvp(
+                lambda p: self.residual(u, parameters_at(p)), (p,), (jnp.ones_like(p),)
+            )
+            by_u = self.jacobian(u, parameters_at(p))
+            whole = jnp.concatenate([by_u, by_p[:, None]], axis=1)
+        return whole, self.linearisation(u, parameters_at(p), whole[:, :-1])
+
     def motion(self, u: Float[Array, " n"], parameters: PyTree) -> Float[Array, " n"]:
         """The vector field, or the map, whose derivative is `linearisation`.
 
-        Override it together with `linearisation`, or override `local_motion`, or set
-        `normal_forms` to False.
+        Override it together with `linearisation`, or override `local_motion` (where
+        `dear`, `local_jacobian`), or set `normal_forms` to False.
         """
         moved = self.residual(u, parameters)
         return moved + u if self.stability == "map" else moved
@@ -140,6 +161,17 @@ class AbstractProblem(eqx.Module):
         axis or the unit circle. By default `motion`.
         """
         return lambda y: self.motion(y, parameters), u
+
+    def local_jacobian(
+        self, u: Float[Array, " n"], parameters: PyTree
+    ) -> tuple[Callable[[Float[Array, " k"]], Float[Array, "k k"]], Float[Array, " k"]]:
+        """The Jacobian of `local_motion` as a function, and the point where it is.
+
+        Where `dear`, normal-form coefficients come from central differences of this,
+        and `local_motion` is not asked for.
+        """
+        motion, y = self.local_motion(u, parameters)
+        return jax.jacfwd(motion), y
 
     @property
     def normal_forms(self) -> bool:
@@ -172,6 +204,16 @@ class AbstractProblem(eqx.Module):
     ) -> Float[Array, ""]:
         """One of the monitors alone, where that is less work."""
         return self.monitor(u, parameters)[name]
+
+    def watched_by_number(
+        self, number: Int[Array, ""], u: Float[Array, " n"], parameters: PyTree
+    ) -> Float[Array, ""]:
+        """One of the monitors alone, by its place in `monitors`.
+
+        To be overridden where one program is to find the zeros of all of them.
+        """
+        values = self.monitor(u, parameters)
+        return jnp.stack([values[name] for name in self.monitors()])[number]
 
     def seen(
         self, u: Float[Array, " n"], parameters: PyTree

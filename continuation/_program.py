@@ -114,17 +114,9 @@ def _seen(problem, leaf, z, old, width, success, iterations) -> Corrected:
     """Everything about a point that is taken as it is."""
     u, p = z[:-1], z[-1]
     parameters = with_leaf(problem.parameters, leaf, p)
-    if type(problem).jacobian is AbstractProblem.jacobian:
-        jacobian = jax.jacfwd(lambda z: residual_at(problem, leaf, z))(z)
-        j_u = jacobian[:, :-1]
-    else:
-        j_u = problem.jacobian(u, parameters)
-        _, j_p = jax.jvp(
-            lambda p: residual_at(problem, leaf, jnp.append(u, p)),
-            (p,),
-            (jnp.ones_like(p),),
-        )
-        jacobian = jnp.concatenate([j_u, j_p[:, None]], axis=1)
+    jacobian, linearisation = problem.derivatives(
+        u, p, lambda p: with_leaf(problem.parameters, leaf, p)
+    )
     scale = scale_at(problem, leaf, z, width)
     tangent, determinant = tangent_and_determinant(jacobian, scale, old)
     monitors, observed = problem.seen(u, parameters)
@@ -133,7 +125,7 @@ def _seen(problem, leaf, z, old, width, success, iterations) -> Corrected:
         success=jnp.asarray(success) & jnp.all(jnp.isfinite(jacobian)),
         iterations=jnp.asarray(iterations),
         jacobian=jacobian,
-        linearisation=problem.linearisation(u, parameters, j_u),
+        linearisation=linearisation,
         tangent=tangent,
         determinant=determinant,
         scale=scale,

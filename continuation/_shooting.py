@@ -25,12 +25,12 @@ from jaxcam.hybrid._normal import gaps, impacts, normal_velocity
 from variational import saltation_matrix
 
 from ._admissible import DIP, IMPACT, inadmissible
-from ._lowest_gap import dips, lowest_times, nodes_of
+from ._lowest_gap import dips, gap_or_speed, lowest_times, nodes_of
 from ._orbit_grazing import orbit_grazing
 from ._problem import AbstractProblem, Monitor, Stability, Start
 from ._run_twice import run_twice
 from ._shooting_flight import flight_end, flight_nodes
-from ._shooting_map import map_of_period
+from ._shooting_map import around_the_period, equations_and_monodromy
 
 
 class ImpactingOrbits(AbstractProblem):
@@ -95,12 +95,18 @@ class ImpactingOrbits(AbstractProblem):
         moved = matrix @ basis
         return basis.T @ (moved - along[:, None] * (normal @ moved)[None, :])
 
-    def local_motion(self, u, parameters):
-        """The map from the first impact to the one a period later.
+    def local_jacobian(self, u, parameters):
+        """Of the map from the first impact to the one a period later.
 
         In its phase and the state after it, without forcing in the state alone.
         """
-        return map_of_period(self, u, parameters)
+        return around_the_period(self, u, parameters)
+
+    def derivatives(self, u, p, parameters_at):
+        """Both from one Jacobian of each flight."""
+        if not self.constraints or not self.periods:
+            return AbstractProblem.derivatives(self, u, p, parameters_at)
+        return equations_and_monodromy(self, u, p, parameters_at)
 
     @property
     def dear(self) -> bool:
@@ -247,6 +253,11 @@ class ImpactingOrbits(AbstractProblem):
         starts, ends = self.flights(u, parameters)
         whole = not self.constraints
         return dips(parameters, starts, ends, self.steps, whole_turn=whole)[number]
+
+    def watched_by_number(self, number, u, parameters) -> Float[Array, ""]:
+        starts, ends = self.flights(u, parameters)
+        hit = self.hit() if self.constraints else None
+        return gap_or_speed(parameters, starts, ends, number, hit, self.steps)
 
     def observe(self, u, parameters) -> dict[str, Array]:
         """Period (s); time (s) and state after the first impact; integration error;

@@ -13,9 +13,10 @@ from ._bialternate import (
     multiplicative,
     trace_on_plane,
 )
+from ._extended import AbstractExtended
 from ._multilinear import second, third
 from ._parameter import with_leaf
-from ._point import Point, set_parameters, with_field
+from ._point import set_parameters, with_field
 from ._problem import AbstractProblem, Monitor, Stability
 from ._test_functions import FLIP, FOLD, HOPF, NEIMARK_SACKER
 
@@ -50,7 +51,7 @@ def matrix_at(problem, kind: str, leaf: int, z) -> np.ndarray:
     return np.asarray(_singular_matrix(problem, kind, leaf, np.asarray(z)))
 
 
-class SingularPoints(AbstractProblem):
+class SingularPoints(AbstractExtended):
     """Points (u, parameter) on a branch where a matrix is singular.
 
     G = 0 and g = 0, where [[M, b], [c', 0]] (v, g) = (0, 1) (Govaerts, Numerical
@@ -62,26 +63,14 @@ class SingularPoints(AbstractProblem):
     base: AbstractProblem
     kind: str = eqx.field(static=True)
     leaf: int = eqx.field(static=True)
-    #: width of the bounds of the parameter that is an unknown here
     width: Array
     bounds: Array
     b: Array
     c: Array
     stability: ClassVar[Stability] = "none"
 
-    @property
-    def parameters(self) -> PyTree:
-        return self.base.parameters
-
-    @property
-    def detects(self) -> bool:
-        return False
-
-    def _split(self, u, parameters):
-        return u[:-1], with_leaf(parameters, self.leaf, u[-1])
-
     def _matrix(self, u, parameters):
-        inner, parameters = self._split(u, parameters)
+        inner, parameters = self.inside(u, parameters)
         return singular_matrix(self.base, self.kind, inner, parameters)
 
     def _bordered(self, m, transposed: bool):
@@ -93,18 +82,9 @@ class SingularPoints(AbstractProblem):
         return jnp.linalg.solve(jnp.concatenate([top, bottom[None, :]]), right)
 
     def residual(self, u: Float[Array, " n"], parameters: PyTree):
-        inner, inside = self._split(u, parameters)
+        inner, inside = self.inside(u, parameters)
         g = self._bordered(self._matrix(u, parameters), False)[-1]
         return jnp.concatenate([self.base.residual(inner, inside), g[None]])
-
-    def linearisation(self, u: Float[Array, " n"], parameters: PyTree, jacobian):
-        del jacobian
-        inner, inside = self._split(u, parameters)
-        return self.base.linearisation(inner, inside, self.base.jacobian(inner, inside))
-
-    @property
-    def normal_forms(self) -> bool:
-        return False
 
     def null_vectors(self, u, parameters):
         """Unit right and left null vectors of the singular matrix."""
@@ -112,11 +92,6 @@ class SingularPoints(AbstractProblem):
         right = self._bordered(m, False)[:-1]
         left = self._bordered(m, True)[:-1]
         return right / jnp.linalg.norm(right), left / jnp.linalg.norm(left)
-
-    def scale(self, u: Float[Array, " n"], parameters: PyTree):
-        inner, inside = self._split(u, parameters)
-        sizes = self.base.scale(inner, inside)
-        return jnp.concatenate([sizes, jnp.reshape(self.width, (1,))])
 
     def refreshed(self, u: np.ndarray, parameters: PyTree) -> "SingularPoints":
         base = set_parameters(self.base, parameters)
@@ -126,21 +101,6 @@ class SingularPoints(AbstractProblem):
         b = left[:, -1] * (-1.0 if left[:, -1] @ np.asarray(self.b) < 0 else 1.0)
         c = right[-1] * (-1.0 if right[-1] @ np.asarray(self.c) < 0 else 1.0)
         return with_field(with_field(self, "b", b), "c", c)
-
-    def free(self, u: np.ndarray) -> tuple[float, ...]:
-        return (*self.base.free(u[:-1]), float(u[-1]))
-
-    def limits(self) -> dict[int, tuple[float, float]]:
-        return {
-            **self.base.limits(),
-            -1: (float(self.bounds[0]), float(self.bounds[1])),
-        }
-
-    def observe(self, u: Float[Array, " n"], parameters: PyTree) -> dict[str, Array]:
-        return self.base.observe(*self._split(u, parameters))
-
-    def check(self, point: Point) -> str | None:
-        return self.base.check(point.inner(self.base, self.leaf))
 
     @property
     def signature(self) -> str:
@@ -192,12 +152,9 @@ class SingularPoints(AbstractProblem):
             )
         return found
 
-    def monitor(self, u: Float[Array, " n"], parameters: PyTree) -> dict[str, Array]:
-        return self.seen(u, parameters)[0]
-
     def seen(self, u: Float[Array, " n"], parameters: PyTree):
         wanted = self.monitors()
-        inner, inside = self._split(u, parameters)
+        inner, inside = self.inside(u, parameters)
         base = self.base
         a = base.linearisation(inner, inside, base.jacobian(inner, inside))
         one = jnp.eye(a.shape[0], dtype=a.dtype)

@@ -1,14 +1,16 @@
-"""Small recordings of known rigs, shared by the tests of fitting."""
+"""Small recordings of known rigs, and a ball, shared by the tests of fitting."""
 
 import dataclasses
 import functools
 import math
 
+import jax.numpy as jnp
 import numpy as np
 
 from jaxcam import fitting
 from jaxcam.data import DEMO_RIG
 from jaxcam.data.make_demo import measure, RealRig, simulate_rig
+from jaxcam.hybrid import HybridSystem
 from jaxcam.recordings import read_rig, Recording, segment_case
 
 
@@ -71,3 +73,22 @@ def assert_inside(found: fitting.Fit, most: float = 3.3) -> None:
     for one in found.estimates:
         off = abs(one.value - TRUTH[one.name]) / one.stderr
         assert off < most, f"{one.name} is {off:.1f} standard errors off"
+
+
+class DraggedBall(HybridSystem):
+    """A ball on a fixed floor with viscous drag, as a reader would write it."""
+
+    state_names = ("height", "velocity")
+
+    gravity: float = 9.81
+    drag: float = 0.0
+    restitution: float = 0.8
+
+    def vector_field(self, t, state):
+        return jnp.stack([state[1], -self.gravity - self.drag * state[1]])
+
+    def gap(self, t, state):
+        return state[0]
+
+    def impact(self, t, state):
+        return jnp.stack([state[0], -self.restitution * state[1]])

@@ -12,6 +12,7 @@ from continuation_examples import (
 )
 
 import continuation
+from continuation._differences import along
 
 
 BOUNDS = (-1.5, 1.5)
@@ -112,3 +113,26 @@ def test_no_branch_leaves_a_fold():
     branch = continuation.branch(problem, [1.0], mu, (-1.0, 1.5), direction=-1)
     with pytest.raises(ValueError, match="branches leave branch points"):
         continuation.switch(branch.special[0], mu, BOUNDS)
+
+
+def test_differences_along_a_line_are_right_to_many_digits():
+    def matrices(moves):
+        x, y = 0.3 + moves[:, 0], -0.7 + moves[:, 1]
+        rows = [[np.sin(3 * x), np.exp(x * y)], [x * y, 1 / (2 + x + y)]]
+        return np.moveaxis(np.array(rows), -1, 0)
+
+    direction = np.array([1.0, 0.5]) / 128
+    first, second = along(matrices, direction)
+    x, y, a, b = 0.3, -0.7, *direction
+    e, s, d = np.exp(x * y), a + b, 2 + x + y
+    t = a * y + x * b
+    want = [[3 * a * np.cos(3 * x), e * t], [t, -s / d**2]]
+    again = [
+        [-9 * a * a * np.sin(3 * x), e * (t * t + 2 * a * b)],
+        [2 * a * b, 2 * s * s / d**3],
+    ]
+    assert np.max(np.abs(first - want)) < 1e-11 * np.max(np.abs(want))
+    assert np.max(np.abs(second - again)) < 1e-8 * np.max(np.abs(again))
+    # without a derivative there is no number
+    rough = along(lambda moves: np.abs(moves[:, :1, None]) ** 0.5, direction)[1]
+    assert np.all(np.isnan(rough))

@@ -6,6 +6,7 @@ m = (1 - r) / (2 w), the orbits with approach speed V against a wall at sigma ar
     m V = |gamma| sin(phi),   sigma + k V = |gamma| cos(phi),   0 < phi < pi.
 """
 
+import jax
 import jax.numpy as jnp
 import mpmath
 import numpy as np
@@ -128,6 +129,32 @@ def lowest_gap(exact, state):
     b = speed + exact.gamma * exact.w * np.sin(exact.w * time)
     gap = sigma - forced - a * np.cos(t) - b * np.sin(t)
     return gap[100:-100].min()
+
+
+def test_monitors_by_number_are_those_by_name():
+    # five periods from impact to impact, so that the gap has minima on the way
+    exact = Exact(2.8, 0.8, 1)
+    once, row = exact.problem((exact.fold + exact.flip) / 2)
+    twice = continuation.ImpactingOrbits(once.parameters, (0, 0), 10, 2)
+    # no orbit, so that the two halves differ
+    u = jnp.asarray(np.concatenate([row, row + [5.0, 0.01, 0.02]]))
+
+    def by_name(u):
+        values = twice.monitor(u, twice.parameters)
+        return jnp.stack([values[name] for name in twice.monitors()])
+
+    def by_number(u):
+        return jax.vmap(lambda k: twice.watched_by_number(k, u, twice.parameters))(
+            jnp.arange(4)
+        )
+
+    found = [
+        jax.jit(lambda u, f=f: (f(u), jax.jacfwd(f)(u)))(u)
+        for f in (by_name, by_number)
+    ]
+    for a, b in zip(*found, strict=True):
+        assert len(np.unique(np.round(a, 12), axis=0)) == 4
+        np.testing.assert_allclose(a, b, rtol=1e-12, atol=1e-13)
 
 
 def restitution(system):

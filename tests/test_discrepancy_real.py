@@ -119,7 +119,7 @@ def test_the_pendulum_rubs_and_stirs_the_air(told):
 @pytest.mark.slow
 @pytest.mark.parametrize("ball", ["baseball", "bowling_ball"])
 def test_no_air_is_seen_by_heavy_balls(told, ball):
-    """What the film leaves over of the baseball is smooth, but no drag of both drops."""
+    """What the film leaves over of the baseball is smooth, but no drag of both."""
     assert set(told["found"][ball].names) <= {"unknown"}
 
 

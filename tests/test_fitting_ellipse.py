@@ -6,36 +6,16 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 import scipy.stats
+from fitting_rigs import DraggedBall
 from numpy.testing import assert_allclose
 
 from jaxcam import fitting
-from jaxcam.hybrid import HybridSystem
 from jaxcam.recordings import record, segment
 
 
 NOISE = 1e-3
 TRUTH = {"gravity": 9.7, "drag": 0.12, "restitution": 0.75}
-
-
-class Ball(HybridSystem):
-    """A ball on a fixed floor with viscous drag."""
-
-    state_names = ("height", "velocity")
-
-    gravity: float = 9.7
-    drag: float = 0.12
-    restitution: float = 0.75
-
-    def vector_field(self, t, state):
-        return jnp.stack([state[1], -self.gravity - self.drag * state[1]])
-
-    def gap(self, t, state):
-        return state[0]
-
-    def impact(self, t, state):
-        return jnp.stack([state[0], -self.restitution * state[1]])
-
-
+BALL = DraggedBall(**TRUTH)
 SENSORS = {"height_m": fitting.Sensor(0, noise=NOISE)}
 PARAMETERS = [
     fitting.Parameter(name, lambda m, name=name: getattr(m.system, name), scale=0.1)
@@ -45,7 +25,7 @@ PARAMETERS = [
 
 def fitted(seed) -> fitting.Fit:
     run = record(
-        Ball(),
+        BALL,
         SENSORS,
         1.2,
         rng=np.random.default_rng(seed),
@@ -53,7 +33,7 @@ def fitted(seed) -> fitting.Fit:
         interval=2e-3,
     )
     part = segment(run, "height_m", np.zeros(len(run)), noise=NOISE, restitution=0.75)
-    problem = fitting.Problem.build(fitting.Model(Ball(), SENSORS), [part], PARAMETERS)
+    problem = fitting.Problem.build(fitting.Model(BALL, SENSORS), [part], PARAMETERS)
     return fitting.fit(problem)
 
 

@@ -5,6 +5,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from fitting_rigs import DraggedBall
 
 from jaxcam import fitting
 from jaxcam.fitting._likelihood import score
@@ -12,25 +13,6 @@ from jaxcam.fitting._linearise import cost_of
 from jaxcam.hybrid import HybridSystem
 from jaxcam.models import BouncingBall, PowerLawRestitution
 from jaxcam.recordings import mend, record, Recording, RecordingError, segment
-
-
-class DraggedBall(HybridSystem):
-    """A ball on a fixed floor with viscous drag, as a reader would write it."""
-
-    state_names = ("height", "velocity")
-
-    gravity: float = 9.81
-    drag: float = 0.0
-    restitution: float = 0.8
-
-    def vector_field(self, t, state):
-        return jnp.stack([state[1], -self.gravity - self.drag * state[1]])
-
-    def gap(self, t, state):
-        return state[0]
-
-    def impact(self, t, state):
-        return jnp.stack([state[0], -self.restitution * state[1]])
 
 
 NOISE = 1e-3

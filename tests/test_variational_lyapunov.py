@@ -7,6 +7,7 @@ from textbook_systems import parameters
 
 import variational
 from jaxcam.models import ImpactOscillator
+from variational._lyapunov import _in_turn
 
 
 # omega, wall: one impact a turn, and chaos
@@ -74,3 +75,26 @@ def test_what_does_not_fit_is_refused():
         variational.lyapunov_spectrum(
             system, jnp.zeros((3, 2)), where=lambda s: s.omega, values=LANES
         )
+
+
+@pytest.mark.parametrize("lanes", [100, 128, 129, 300])
+@pytest.mark.parametrize("each", [True, False])
+def test_blocks_of_lanes_are_put_together_in_order(lanes, each):
+    """Whether the lanes have a length of a turn each, or one for all."""
+    sizes = set()
+
+    def some(batched, states):
+        sizes.add(len(states))
+        first, turn = states[:, 0], jnp.ones(1) if batched is None else batched
+        table = states[:, None, :]
+        return variational.LyapunovSpectrum(
+            states, states, first, table, states, turn, first
+        )
+
+    states = jnp.arange(2.0 * lanes).reshape(lanes, 2)
+    lengths = jnp.arange(1.0 * lanes) if each else None
+    made = _in_turn(some, lengths, states)
+    assert len(sizes) == 1 and max(sizes) <= 128
+    np.testing.assert_array_equal(made.exponents, states)
+    np.testing.assert_array_equal(made.impact_rate, states[:, 0])
+    np.testing.assert_array_equal(made.turn, lengths if each else np.ones(1))
