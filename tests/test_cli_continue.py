@@ -54,6 +54,12 @@ def test_branch_of_the_oscillator(tmp_path):
     again = jaxcam(*arguments, "--json", file, "--out", folder, "--resume")
     assert again.exit_code == 0, again.output
     assert json.loads(file.read_text())["points"] == data["points"]
+    # what an interrupted run left is not replaced
+    lines = (folder / "branch.jsonl").read_text().splitlines(keepends=True)
+    (folder / "branch.jsonl").write_text("".join(lines[:-1]))
+    refused = jaxcam(*arguments, "--out", folder)
+    assert refused.exit_code == 2 and "add --resume" in refused.output
+    assert len((folder / "branch.jsonl").read_text().splitlines()) == len(lines) - 1
 
 
 @pytest.mark.parametrize(

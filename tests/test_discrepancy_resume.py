@@ -5,7 +5,10 @@ import dataclasses
 import numpy as np
 import pytest
 from fitting_rigs import NOMINAL, recorded
+from typer.testing import CliRunner
 
+from jaxcam.cli import app
+from jaxcam.data import DEMO_RIG
 from jaxcam.discrepancy import diagnose
 from jaxcam.discrepancy._kept_trials import KeptTrials
 from jaxcam.fitting import cam_follower_model, cam_follower_parameters, Problem
@@ -44,6 +47,17 @@ def test_a_file_that_was_cut_off_is_passed_over(problem, tmp_path):
     for length in (0, 1, 40, len(whole) // 2, len(whole) - 1):
         file.write_bytes(whole[:length])
         assert kept.get(()) is None
+
+
+def test_what_an_interrupted_run_left_is_not_replaced(tmp_path, monkeypatch):
+    # a command sets the folder of compiled programs; here it is the tests' own
+    monkeypatch.setenv("JAX_COMPILATION_CACHE_DIR", "as the tests have it")
+    (tmp_path / "fits").mkdir()
+    (tmp_path / "fits" / "none.npz").write_bytes(b"something")
+    line = ["diagnose", str(DEMO_RIG), "--out", str(tmp_path)]
+    found = CliRunner().invoke(app, line)
+    assert found.exit_code == 2 and "add --resume" in " ".join(found.output.split())
+    assert (tmp_path / "fits" / "none.npz").exists()
 
 
 @pytest.mark.slow

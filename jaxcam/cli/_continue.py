@@ -99,6 +99,8 @@ def continue_(
         raise ValueError(f"--max-points is {max_points}; give 2 or more.")
     if resume and out is None:
         raise ValueError("--resume needs the folder of the interrupted run: --out DIR.")
+    if out is not None and not resume:
+        _refuse_interrupted(out / _FILE)
 
     import continuation
 
@@ -170,6 +172,23 @@ def continue_(
             "figures": figures,
         }
     )
+
+
+def _refuse_interrupted(path: Path) -> None:
+    """**Raises:** `ValueError` where the branch that a folder holds has no end."""
+    import continuation
+
+    for file in (path, path.with_suffix(f".back{path.suffix}")):
+        try:
+            points = continuation.load(file).points if file.is_file() else ()
+        except ValueError:
+            # no branch, so nothing is lost
+            continue
+        if points and points[-1].kind != "end":
+            raise ValueError(
+                f"{file} holds a branch that was interrupted; add --resume to go on "
+                f"with it, or give another folder to --out."
+            )
 
 
 def _bounds(low: float | None, high: float | None) -> tuple[float, float]:

@@ -1,7 +1,6 @@
 """`jaxcam diagnose`: what physics a rig's model leaves out, from its recordings."""
 
 import dataclasses
-import shutil
 from pathlib import Path
 from typing import Annotated
 
@@ -71,8 +70,11 @@ def diagnose(
             "--resume: there is nothing to go on with; give --out the folder of a run "
             "that was stopped."
         )
-    if keep is not None and not resume:
-        shutil.rmtree(keep, ignore_errors=True)
+    if keep is not None and not resume and any(keep.glob("*.npz")):
+        raise ValueError(
+            f"{keep} holds the fits of a run that was stopped; add --resume to go on "
+            f"with it, or give another folder to --out."
+        )
     notes = dict.fromkeys(n for run in runs for n in run.meta.get("notes", ()))
     with progress("finding impacts and contacts") as report:
         found = discrepancy.diagnose(
