@@ -5,7 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxcam.discrepancy import event_speeds, library, WithTerms
+from jaxcam.discrepancy import event_causes, event_speeds, library, WithTerms
 from jaxcam.models import preset, rad_s_to_rpm
 
 
@@ -41,3 +41,33 @@ def test_a_system_nearby_is_the_same_as_found_anew(damped):
     system = WithTerms(rig, (type(damping)(jnp.asarray(0.02)),))
     near = damped[0.0].near(system)
     np.testing.assert_allclose(near.values, damped[0.02].values, rtol=1e-8)
+
+
+@pytest.mark.slow
+def test_the_cause_of_moved_events_is_found(damped):
+    """Damping of 0.02 1/s from the four speeds that it makes, to a part in 1e4."""
+    rig = preset("calibrated")
+    damping = next(term for term in library() if term.name == "viscous_damping")
+    speeds = damped[0.02].values
+    first, second = event_causes(
+        rig,
+        speeds,
+        np.full(4, 1e-4 * speeds[0]),
+        [damping],
+        lambda s: s.restitution.intercept,
+        0.01,
+    )
+    assert (first.name, second.name) == ("viscous_damping", "none")
+    assert first.strength == pytest.approx(0.02, rel=1e-4)
+    np.testing.assert_allclose(first.speeds, speeds, rtol=1e-8)
+    assert first.misfit < 1e-6 < 1 < second.misfit
+
+
+def test_what_four_speeds_cannot_decide_is_refused():
+    rig, terms = preset("calibrated"), library()
+    where = lambda s: s.restitution.intercept  # noqa: E731  as a reader writes it
+    with pytest.raises(ValueError, match="four speeds and four errors"):
+        event_causes(rig, [1.0, 2.0], [0.1, 0.1], terms, where, 0.1)
+    several = [term for term in terms if len(term.strengths()) > 1]
+    with pytest.raises(ValueError, match="only terms of one strength"):
+        event_causes(rig, [1.0] * 4, [0.1] * 4, several, where, 0.1)

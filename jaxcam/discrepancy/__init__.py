@@ -3,6 +3,7 @@
 from ._diagnose import diagnose as diagnose
 from ._diagnosis import Diagnosis as Diagnosis, Effect as Effect, Value as Value
 from ._drive import Ripple as Ripple, ripple_of as ripple_of
+from ._event_causes import event_causes as event_causes, EventCause as EventCause
 from ._event_speeds import event_speeds as event_speeds, EventSpeeds as EventSpeeds
 from ._next_experiment import (
     compare_experiments as compare_experiments,

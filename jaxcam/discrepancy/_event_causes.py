@@ -1,0 +1,194 @@
+"""Which physics would bring the speeds at which a motion changes to those observed.
+
+For a rig without recordings whose motion was seen to change at known speeds: each
+term is given the strength, and the rig one parameter beside it, with which the speeds
+come nearest.
+"""
+
+import dataclasses
+import math
+from collections.abc import Callable, Sequence
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+from scipy.optimize import least_squares
+
+from ..models import CamFollower
+from ._event_speeds import event_speeds, EventSpeeds
+from ._term import Term
+from ._with_terms import WithTerms
+
+
+# Strengths on the way to large ones: the first, in units of the term's size, their
+# ratio, and how many; each is found from the one before it
+_FIRST, _RATIO, _MOST = 0.1, 1.5, 24
+# The way ends where the misfit is so many times the least one on it
+_WORSE = 4.0
+# What a speed that no longer exists counts, in errors of the observation
+_ABSENT = 10.0
+# Relative step of differences, and fits at most
+_DIFFERENCE, _FITS = 1e-3, 40
+
+
+@dataclasses.dataclass(frozen=True)
+class EventCause:
+    """One explanation of the speeds at which a motion changes.
+
+    - `name`: of the term, or `"none"`; `strength` with its `unit`.
+    - `beside`: the parameter of the rig that was fitted with it.
+    - `speeds`: shape `(4,)`, rad/s, valve float, fold and flip of P(1,1), interruption
+        of chattering; NaN where there is none.
+    - `misfit`: sum of the squares of what is left of them, and of the pull on the
+        parameter, in the errors of each.
+    """
+
+    name: str
+    strength: float
+    unit: str
+    beside: float
+    speeds: Float[np.ndarray, "4"]
+    misfit: float
+
+
+def event_causes(
+    rig: CamFollower,
+    observed: Sequence[float],
+    errors: Sequence[float],
+    terms: Sequence[Term],
+    where: Callable,
+    tolerance: float,
+) -> tuple[EventCause, ...]:
+    """Rank terms by how near they bring a rig to the speeds that were observed.
+
+    Each term is tried alone. A few numbers cannot decide between terms of which each
+    has a strength of its own: terms within a few units of misfit of the first are its
+    equals.
+
+    **Arguments:**
+
+    - `observed`, `errors`: valve float, fold and flip of P(1,1) and interruption of
+        chattering (rad/s), NaN where one was not seen, and how well each is known.
+    - `terms`: candidates, of one strength each.
+    - `where`, `tolerance`: a parameter of the rig that is fitted beside each term, and
+        how far it may be off; `lambda rig: rig.restitution.intercept`, say.
+
+    **Returns:** explanations, the best first; one of them is no term at all.
+
+    **Raises:** `ValueError` for a term with several strengths, or if `observed` are
+    not four speeds.
+    """
+    if np.shape(observed) != (4,) or np.shape(errors) != (4,):
+        raise ValueError(
+            "Give four speeds and four errors (valve float, fold, flip, interruption), "
+            "with NaN for a speed that was not observed."
+        )
+    for term in terms:
+        if len(term.strengths()) != 1:
+            raise ValueError(
+                f"The term {term.name!r} has {len(term.strengths())} strengths; only "
+                f"terms of one strength can be told apart by so few numbers."
+            )
+    goal = _Goal(np.asarray(observed), np.asarray(errors), where, tolerance)
+    paths, here = [], None
+    for term in terms or (None,):
+        system = WithTerms(rig, () if term is None else (term,))
+        # with a strength of zero every system is the same rig
+        paths.append(_Path(goal, jax.tree.map(jnp.asarray, system), here))
+        here = paths[0].here
+    found = [_none(paths[0])]
+    found += [_best(path, term) for path, term in zip(paths, terms)]
+    return tuple(sorted(found, key=lambda one: one.misfit))
+
+
+@dataclasses.dataclass(frozen=True)
+class _Goal:
+    observed: Float[np.ndarray, "4"]
+    errors: Float[np.ndarray, "4"]
+    where: Callable
+    tolerance: float
+
+    def left(self, speeds, pull: float) -> Float[np.ndarray, " m"]:
+        """What is left of each speed and of the parameter, in their errors."""
+        off = ((speeds - self.observed) / self.errors)[np.isfinite(self.observed)]
+        return np.append(np.where(np.isfinite(off), off, _ABSENT), pull)
+
+
+class _Path:
+    """The four speeds of a rig whose strength and parameter change by small steps."""
+
+    def __init__(self, goal: _Goal, system: WithTerms, here: EventSpeeds | None):
+        self.goal, self.system = goal, system
+        self.nominal = float(goal.where(system.base))
+        self.here = event_speeds(self.changed(0.0, 0.0)) if here is None else here
+
+    def changed(self, strength: float, pull: float) -> WithTerms:
+        value = jnp.asarray(self.parameter(pull))
+        system = eqx.tree_at(lambda s: self.goal.where(s.base), self.system, value)
+        if not system.terms:
+            return system
+        return eqx.tree_at(
+            lambda s: s.terms[0].numbers()[0], system, jnp.asarray(strength)
+        )
+
+    def at(self, strength: float, pull: float) -> EventSpeeds:
+        return self.here.near(self.changed(strength, pull))
+
+    def left(self, strength: float, pull: float) -> Float[np.ndarray, " m"]:
+        found = self.at(strength, pull)
+        if np.isfinite(found.values).all():
+            # the next search begins here
+            self.here = found
+        return self.goal.left(found.values, pull)
+
+    def parameter(self, pull: float) -> float:
+        return self.nominal + self.goal.tolerance * pull
+
+    def cause(self, name: str, strength: float, unit: str, pull: float) -> EventCause:
+        speeds = self.at(strength, pull).values
+        misfit = float(np.sum(self.goal.left(speeds, pull) ** 2))
+        return EventCause(name, strength, unit, self.parameter(pull), speeds, misfit)
+
+
+def _none(path: _Path) -> EventCause:
+    start = path.here
+    found = least_squares(
+        lambda x: path.left(0.0, x[0]), [0.0], diff_step=_DIFFERENCE, max_nfev=_FITS
+    )
+    cause = path.cause("none", 0.0, "", float(found.x[0]))
+    path.here = start
+    return cause
+
+
+def _best(path: _Path, term: Term) -> EventCause:
+    strength, start = term.strengths()[0], path.here
+    size = strength.size
+    ways = []
+    for sign in (1.0,) if strength.lower >= 0 else (1.0, -1.0):
+        path.here = start
+        ways.append(_along(path, sign * size))
+    first, path.here = min(ways, key=lambda way: way[0])[1:]
+    found = least_squares(
+        lambda x: path.left(size * x[0], x[1]),
+        [first / size, 0.0],
+        diff_step=_DIFFERENCE,
+        max_nfev=_FITS,
+    )
+    return path.cause(
+        term.name, size * float(found.x[0]), strength.unit, float(found.x[1])
+    )
+
+
+def _along(path: _Path, size: float) -> tuple[float, float, EventSpeeds]:
+    """Least misfit on the way from nothing to large strengths, and where it is."""
+    best = (math.inf, 0.0, path.here)
+    for k in range(_MOST):
+        strength = size * _FIRST * _RATIO**k
+        misfit = float(np.sum(path.left(strength, 0.0) ** 2))
+        if misfit < best[0]:
+            best = misfit, strength, path.here
+        if misfit > _WORSE * best[0]:
+            break
+    return best
