@@ -101,7 +101,7 @@ def read_parquet(file: Path) -> dict[str, Float[np.ndarray, " k"]]:
     except ImportError:
         raise RecordingError(
             f"{file}: to read Parquet, install the package pyarrow (pip install "
-            f"pyarrow), or save the table as CSV."
+            f"'jaxcam[parquet]'), or save the table as CSV."
         ) from None
     try:
         about = parquet.ParquetFile(io.BytesIO(raw)).metadata
