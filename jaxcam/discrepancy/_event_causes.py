@@ -173,6 +173,7 @@ def _best(path: _Path, term: Term) -> EventCause:
     found = least_squares(
         lambda x: path.left(size * x[0], x[1]),
         [first / size, 0.0],
+        bounds=([strength.lower / size, -np.inf], [strength.upper / size, np.inf]),
         diff_step=_DIFFERENCE,
         max_nfev=_FITS,
     )
