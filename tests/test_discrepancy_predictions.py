@@ -65,7 +65,10 @@ def test_the_cause_of_moved_events_is_found(damped):
 
 def test_what_four_speeds_cannot_decide_is_refused():
     rig, terms = preset("calibrated"), library()
-    where = lambda s: s.restitution.intercept  # noqa: E731  as a reader writes it
+
+    def where(rig):
+        return rig.restitution.intercept
+
     with pytest.raises(ValueError, match="four speeds and four errors"):
         event_causes(rig, [1.0, 2.0], [0.1, 0.1], terms, where, 0.1)
     several = [term for term in terms if len(term.strengths()) > 1]

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from ..fitting import Fit, fit, Problem, Residuals, residuals
-from ._engine import Blocks, blocks_of, gain, off, with_states
+from ._engine import blocks_of, gain, off, with_states
 from ._search import BEYOND, FALSE_ALARMS, Search, SURE, Trial, values_of
 
 
@@ -166,9 +166,9 @@ def redrawn(
 ) -> tuple[dict[str, float], dict[str, float]]:
     """Draw stretches of the records again, a second or so each.
 
-    **Returns:** of each term, in which part of the redrawn sets it would be kept: no
-    other term in its place, and not the gain of leaving it out, is as good by BIC. And
-    the standard deviation of each parameter.
+    **Returns:** of each term, in which part of the redrawn sets it would be kept,
+    because a fit without it is worse by BIC; and the standard deviation of each
+    parameter.
     """
     problem = search.problem
     # what ties one stretch to the next is in neither, so they must hold many ties
@@ -179,6 +179,10 @@ def redrawn(
     value = values_of(best.fit, blocks)
     rng = np.random.default_rng(seed)
     kept = dict.fromkeys(sorted(best.names), 0)
+    own = {
+        name: blocks.rows([one.name for one in search.term(name).strengths()])
+        for name in kept
+    }
     estimates = []
     number = len(blocks.record)
     for _ in range(_REDRAWN):
@@ -188,7 +192,8 @@ def redrawn(
         estimates.append((value[free] + step) * blocks.scale[free])
         top = gain(information, score, free)
         for name in kept:
-            kept[name] += _needed(search, blocks, information, score, best, name, top)
+            lost = _lost(information, score, value, free, own[name], top)
+            kept[name] += bool(lost > len(own[name]) * math.log(problem.samples))
     spread = np.std(np.array(estimates), axis=0)
     deviation = dict.fromkeys(best.fit.free, 0.0)
     deviation |= {blocks.names[k]: float(s) for k, s in zip(free, spread)}
@@ -207,18 +212,13 @@ def _inside(found: Fit) -> list[str]:
     return kept
 
 
-def _needed(search, blocks: Blocks, information, score, best, name, top) -> bool:
-    """Whether nothing else in the place of a term is as good."""
-    gone = blocks.rows([one.name for one in search.term(name).strengths()])
-    rest = np.setdiff1d(blocks.rows(_inside(best.fit)), gone)
-    value = values_of(best.fit, blocks)
-    step = np.zeros(len(blocks.names))
+def _lost(information, score, value, free, gone, top: float) -> float:
+    """What is lost where some strengths are zero and all else is fitted again."""
+    step = np.zeros(len(value))
     step[gone] = -value[gone]
     lost = step @ information @ step - 2 * step @ score
     moved = score - information @ step
-    own = search.count([name]) * math.log(search.problem.samples)
-    without = top + lost - gain(information, moved, rest) - own
-    return bool(without > 0)
+    return top + lost - gain(information, moved, np.setdiff1d(free, gone))
 
 
 def limits(search: Search, trial: Trial) -> dict[str, tuple[float, float, str]]:
