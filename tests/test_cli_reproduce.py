@@ -7,6 +7,7 @@ import pytest
 from typer.testing import CliRunner
 
 from jaxcam.cli import app
+from jaxcam.cli._source_mark import mark_of, source_mark
 from jaxcam.thesis import Target, TARGETS
 
 
@@ -126,6 +127,38 @@ def test_resume_computes_what_is_missing_or_had_other_settings(few, tmp_path):
     few.clear()
     jaxcam("--out", tmp_path, "--resume", "--preset", "table-4.4")
     assert few == ["figure-2.7", "figure-5.99", "table-4.4"]
+
+
+def test_resume_computes_again_what_other_code_computed(few, tmp_path, monkeypatch):
+    """All targets once the mark of the code is another one, and a sentence says so."""
+    from jaxcam.cli import _reproduce_record
+
+    jaxcam("--out", tmp_path)
+    few.clear()
+    monkeypatch.setattr(_reproduce_record, "source_mark", lambda: "another")
+    found = jaxcam("--out", tmp_path, "--resume")
+    assert few == ["figure-2.7", "figure-5.99", "table-4.4"]
+    assert "code has changed since 3 of 3 targets" in " ".join(found.stdout.split())
+    # and not a second time
+    few.clear()
+    found = jaxcam("--out", tmp_path, "--resume")
+    assert few == ["figure-5.99"] and "has changed" not in found.stdout
+
+
+def test_mark_of_the_code_sees_every_change(tmp_path):
+    """Contents, names and versions count; what Python does not read does not."""
+    (tmp_path / "room").mkdir()
+    (tmp_path / "room" / "_a.py").write_text("x = 1\n")
+    first = mark_of([tmp_path], ["jax 1"])
+    (tmp_path / "room" / "_a.cpython-312.pyc").write_bytes(b"compiled")
+    assert mark_of([tmp_path], ["jax 1"]) == first
+    assert mark_of([tmp_path], ["jax 2"]) != first
+    (tmp_path / "room" / "_a.py").write_text("x = 2\n")
+    second = mark_of([tmp_path], ["jax 1"])
+    (tmp_path / "room" / "_a.py").rename(tmp_path / "room" / "_b.py")
+    third = mark_of([tmp_path], ["jax 1"])
+    assert len({first, second, third}) == 3
+    assert source_mark() == source_mark() != first
 
 
 def test_a_run_that_is_stopped_keeps_what_was_done(few, tmp_path, monkeypatch):

@@ -87,12 +87,19 @@ def _compute(names, preset, size, output, resume, several: bool) -> None:
     from ._errors import fail, STOPPED_EARLY
     from ._progress import progress
     from ._reproduce_page import write_page
-    from ._reproduce_record import earlier, make, Settings, write
+    from ._reproduce_record import by_other_code, earlier, make, Settings, write
 
     keep_compiled_programs()
     system = models.preset(preset)
     settings = Settings.of(preset, size)  # pyright: ignore
     out = output.folder
+    if resume and out is not None:
+        changed = by_other_code(out, names, settings)
+        if changed:
+            output.print(
+                f"The code has changed since {len(changed)} of {len(names)} targets "
+                "were computed; they are computed again."
+            )
     records, begin = [], time.perf_counter()
     for position, name in enumerate(names):
         record = None

@@ -5,6 +5,7 @@ import json
 import math
 import os
 import time
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ from ..models import CamFollower
 from ..thesis import reproduce, TARGETS
 from ..thesis._registry import Size
 from ._output import to_text
+from ._source_mark import source_mark
 
 
 # what a file that is not a record raises, brackets in brackets included
@@ -25,12 +27,14 @@ class Settings:
     version: str
     preset: str
     size: Size
+    #: of the code that computed it; see `source_mark`
+    code: str
 
     @staticmethod
     def of(preset: str, size: Size) -> "Settings":
         from importlib.metadata import version
 
-        return Settings(version("jaxcam"), preset, size)
+        return Settings(version("jaxcam"), preset, size, source_mark())
 
 
 @dataclasses.dataclass(frozen=True)
@@ -107,9 +111,7 @@ def write(record: Record, out: Path | None) -> None:
 def earlier(out: Path, name: str, settings: Settings) -> Record | None:
     """The record of a run before with the same settings, if it is complete."""
     try:
-        found = json.loads((out / f"{name}.json").read_text(encoding="utf-8"))
-        found["settings"] = Settings(**found["settings"])
-        record = Record(**found)
+        record = _read(out, name)
         rows = [
             {key: math.nan if value is None else value for key, value in row.items()}
             for row in record.rows
@@ -122,3 +124,24 @@ def earlier(out: Path, name: str, settings: Settings) -> Record | None:
     if record.figure and not (out / f"{name}.png").is_file():
         return None
     return dataclasses.replace(record, rows=rows)
+
+
+def by_other_code(out: Path, names: Iterable[str], settings: Settings) -> list[str]:
+    """The targets that were computed with the same settings, but by other code."""
+    found = []
+    for name in names:
+        try:
+            was = _read(out, name).settings
+        except _BROKEN:
+            continue
+        alike = dataclasses.replace(was, code=settings.code, version=settings.version)
+        if alike == settings and was != settings:
+            found.append(name)
+    return found
+
+
+def _read(out: Path, name: str) -> Record:
+    found = json.loads((out / f"{name}.json").read_text(encoding="utf-8"))
+    # records of versions that had no mark are those of other code
+    found["settings"] = Settings(**{"code": "", **found["settings"]})
+    return Record(**found)

@@ -1,0 +1,48 @@
+"""A mark of the code that computes, by which results of other code are told apart."""
+
+import functools
+import hashlib
+import importlib.util
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+
+_PACKAGES = ("jaxcam", "variational", "continuation")
+#: what decides digits besides
+_BENEATH = ("jax", "jaxlib", "diffrax", "equinox", "numpy", "scipy", "matplotlib")
+
+
+@functools.cache
+def source_mark() -> str:
+    """A hash of every source file of the project and of the versions beneath it.
+
+    It changes with a comment, too: what is computed once too often costs minutes, a
+    result of code that is gone costs trust.
+    """
+    folders = [folder for name in _PACKAGES for folder in _folders(name)]
+    versions = [f"{name} {_version(name)}" for name in _BENEATH]
+    return mark_of(folders, versions)
+
+
+def mark_of(folders: list[Path], words: list[str]) -> str:
+    """Hash of all that Python reads in some folders: names, contents; and of words."""
+    found = hashlib.sha256("\n".join(words).encode())
+    for folder in folders:
+        for file in sorted(folder.rglob("*")):
+            if file.suffix in (".py", ".mplstyle", ".toml") and file.is_file():
+                found.update(f"\n{file.relative_to(folder).as_posix()}\n".encode())
+                found.update(file.read_bytes())
+    return found.hexdigest()[:16]
+
+
+def _folders(package: str) -> list[Path]:
+    spec = importlib.util.find_spec(package)
+    places = None if spec is None else spec.submodule_search_locations
+    return [Path(place) for place in places or ()]
+
+
+def _version(distribution: str) -> str:
+    try:
+        return version(distribution)
+    except PackageNotFoundError:
+        return "?"
