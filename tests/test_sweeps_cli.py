@@ -92,6 +92,7 @@ def test_basins_of_the_oscillator(tmp_path):
         ("basins bouncing-ball", "corners of the grid"),
         ("basins --shape 4", "one of each"),
         ("basins --shape 4.5,3", "whole numbers"),
+        ("diagram --from 130 --to 140 --dwell 60", "such as 60,10"),
         ("basins --shape 4,0", "1 or more"),
         ("basins --turns 10", "--turns is 10"),
         ("basins --low 1,x", "such as 0.34,-2"),

@@ -47,6 +47,39 @@ def test_carried_states_start_where_the_last_value_ended():
     assert np.array_equal(made.states[1], again)
 
 
+def test_seconds_of_a_rig_in_whole_turns(tmp_path):
+    """As many turns as fit: 42 and 12 of 2.417 s, 48 and 14 of 2.094 s, bit for bit."""
+    values = [2.6, 3.0]
+    made = diagram(
+        SECTION,
+        "omega",
+        values,
+        START,
+        direction="both",
+        dwell=(100.0, 30.0),
+        out=tmp_path / "d",
+    )
+    filled = np.isfinite(made.states[:, 0, :, 0]).sum(axis=1)
+    assert filled.tolist() == [12, 14, 14, 12]
+    first = SECTION.sample(np.array([START]), 54, 12)
+    assert np.array_equal(made.states[0, :, :12], first.states)
+    own = Stroboscopic(ImpactOscillator(omega=3.0, restitution=0.8), lanes=8)
+    then = own.sample(first.final, 62, 14)
+    assert np.array_equal(made.states[1], then.states)
+    assert made.labels[0, 0] == "P(1,1)"
+    with pytest.raises(ValueError, match="another sweep|something else"):
+        diagram(
+            SECTION,
+            "omega",
+            values,
+            START,
+            direction="both",
+            dwell=(99.0, 30.0),
+            out=tmp_path / "d",
+            resume=True,
+        )
+
+
 def test_a_wall_that_moves_takes_the_state_with_it():
     """A state carried behind the wall is put onto it; no motion fails."""
     made = diagram(
@@ -98,6 +131,13 @@ def test_random_starts_show_what_one_start_hides():
         ({"tolerance": 0.0}, "tolerance is 0"),
         ({"block": 0}, "block is 0"),
         ({"workers": 0}, "workers is 0"),
+        ({"dwell": (60, 10)}, "choose the direction up"),
+        ({"dwell": (60, 2), "direction": "up"}, "store longer"),
+        ({"dwell": (-1, 10), "direction": "up"}, "seconds to wait and to store"),
+        (
+            {"system": ImpactSection(OSCILLATOR), "dwell": (6, 9), "direction": "up"},
+            "once a turn",
+        ),
     ],
 )
 def test_bad_input_is_one_sentence(options, word):

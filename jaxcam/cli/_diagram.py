@@ -51,6 +51,14 @@ def diagram(
             "the same start.",
         ),
     ] = "both",
+    dwell: Annotated[
+        str | None,
+        typer.Option(
+            metavar="A,B",
+            help="Seconds to wait and to store at each value, as a rig is driven, in "
+            "place of --turns and --keep.",
+        ),
+    ] = None,
     section: Annotated[
         str, typer.Option(metavar="NAME", help=f"One of {', '.join(SECTIONS)}.")
     ] = "stroboscope",
@@ -94,6 +102,7 @@ def diagram(
       jaxcam diagram --from 152 --to 160 --starts 20 --low 0.34,-2 --high 0.5,3
       jaxcam diagram impact-oscillator --parameter omega --from 2.6 --to 2.9
       jaxcam diagram --from 150 --to 154 --section impacts --direction each
+      jaxcam diagram --from 120 --to 200 --direction up --dwell 60,10
     """
     if saved is not None:
         system = saved_name(saved)
@@ -124,6 +133,12 @@ def diagram(
         )
     if starts is not None and state is not None:
         raise ValueError("Give --state or --starts, not both.")
+    seconds = None if dwell is None else numbers("--dwell", dwell, "60,10")
+    if seconds is not None and len(seconds) != 2:
+        raise ValueError(
+            f"--dwell is {dwell!r}; give the seconds to wait and to store, such as "
+            "60,10."
+        )
     given = None if state is None else numbers("--state", state, "0.4,1.8")
     box = None
     if starts is not None:
@@ -163,6 +178,7 @@ def diagram(
             turns=turns,
             keep=keep,
             direction=direction,  # pyright: ignore
+            dwell=seconds,  # pyright: ignore
             out=None if out is None else out / _FILE,
             resume=resume,
             progress=show(report),
@@ -175,7 +191,10 @@ def diagram(
     ranges = made.ranges()
     name = "speed in rpm" if unit != 1.0 else parameter
     output.print(_table(ranges, name, unit))
+    # with --dwell fewer turns fit into the seconds of slow values
     total = int(np.prod(made.states.shape[:3]))
+    if seconds is not None:
+        total = int(np.isfinite(made.states[..., 0]).sum())
     failed = int(np.count_nonzero(made.dataset["code"].values))
     sentence = (
         f"{system}: {total} samples, {name} from {low:g} to {high:g}; "
@@ -193,6 +212,7 @@ def diagram(
             "parameter": parameter,
             "turns": turns,
             "keep": keep,
+            "dwell": seconds,
             "direction": made.direction,
             "values": made.values,
             "labels": made.labels,

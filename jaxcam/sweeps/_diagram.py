@@ -9,6 +9,7 @@ import numpy as np
 
 from ._diagram_job import CarriedJob, DiagramJob
 from ._diagram_result import Diagram
+from ._dwell import dwell_turns, DwellJob
 from ._inputs import as_section, as_starts, as_values, check_turns
 from ._pick import pick
 from ._run import Progress, run_blocks
@@ -28,6 +29,7 @@ def diagram(
     turns: int = 300,
     keep: int = 100,
     direction: Direction = "each",
+    dwell: tuple[float, float] | None = None,
     tolerance: float = 1e-6,
     out: str | Path | None = None,
     resume: bool = False,
@@ -51,6 +53,8 @@ def diagram(
     - `turns`: how many are simulated, of which the last `keep` are kept.
     - `direction`: "each" value from the same start; or "up", "down" or "both" ways
         with the state carried from one value to the next, which shows hysteresis.
+    - `dwell`: s to wait at each value and s to store, as a rig is driven up or down, in
+        place of `turns` and `keep`. Samples that a value has no turns for are NaN.
     - `tolerance`: for finding periods, up to `keep / 2`.
     - `out`, `resume`, `executor`, `workers`, `progress`: as for
         [`jaxcam.sweeps.run_blocks`][].
@@ -74,11 +78,20 @@ def diagram(
             "a diagram has one parameter; use chart for two, or pick one of them"
         )
     values = as_values(values, 1)
+    if dwell is not None:
+        if direction == "each":
+            raise ValueError(
+                "dwell is for states that are carried on; choose the direction up, "
+                "down or both"
+            )
+        many, kept = dwell_turns(section, picked, values, dwell)
+        turns, keep = int(many.max()), int(kept.max())
     starts = as_starts(section, states, picked, values)
-    kind = DiagramJob if direction == "each" else CarriedJob
-    job = kind(
-        section, picked, values, starts, turns, keep, direction, tolerance, block
-    )
+    of = section, picked, values, starts, turns, keep, direction, tolerance, block
+    if dwell is not None:
+        job = DwellJob(*of, dwell=dwell)
+    else:
+        job = DiagramJob(*of) if direction == "each" else CarriedJob(*of)
     store = run_blocks(
         job,
         out=out,

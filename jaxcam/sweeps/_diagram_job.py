@@ -10,6 +10,7 @@ from ._inputs import LANES
 from ._label import label
 from ._pick import Pick
 from ._run import AbstractJob, Arrays
+from ._samples import filled
 from ._section import AbstractSection, component_coordinates
 from ._settle import settle
 from ._store import Layout, Variable
@@ -131,7 +132,8 @@ class CarriedJob(DiagramJob):
             self.starts[first:last],
             self.first[first:last],
             None if before is None else before["final"][-1],
-            self.turns,
+            np.full(last - first, self.turns),
+            np.full(last - first, self.keep),
             self.keep,
             self.tolerance,
         )
@@ -161,21 +163,29 @@ def each_value(section, where, values, starts, turns, keep, tolerance) -> Arrays
 
 
 def one_after_the_other(
-    section, where, values, starts, first, carried, turns, keep, tolerance
+    section, where, values, starts, first, carried, turns, keep, room, tolerance
 ) -> Arrays:
-    """Some values in order; `first` says which of them begin anew."""
+    """Some values in order; `first` says which of them begin anew.
+
+    **Arguments:** `turns`, `keep`: of each value; `room`: samples that there is room
+    for, NaN where fewer are kept.
+    """
     rows = []
-    for value, start, anew in zip(values, starts, first, strict=True):
+    for value, start, anew, many, kept in zip(
+        values, starts, first, turns, keep, strict=True
+    ):
         state = start if anew or carried is None else carried
         # a lane that failed begins anew
         state = np.where(np.isfinite(state).all(axis=1, keepdims=True), state, start)
         lanes = np.full(len(state), value)
         state = section.lifted(state, where, lanes)
-        samples = section.sample(state, turns, keep, where=where, values=lanes)
+        many, kept = int(many), int(kept)
+        samples = section.sample(state, many, kept, where=where, values=lanes)
         counted = section.impacting and section.regular
         labels = label(samples, tolerance, counted)
         carried = samples.final
         turn = section.turn(where, lanes)
+        samples = filled(samples, room)
         made = _arrays(samples, labels, turn, (1, len(state)))
         rows.append(made | {"final": carried[None]})
     return {name: np.concatenate([row[name] for row in rows]) for name in rows[0]}

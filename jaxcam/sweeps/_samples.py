@@ -36,3 +36,21 @@ def joined(old: Samples, which, new: Samples) -> Samples:
         return made
 
     return Samples(*map(put, old, new))
+
+
+def filled(samples: Samples, keep: int) -> Samples:
+    """The samples with as many places for each lane, empty ones behind the others."""
+    missing = keep - samples.states.shape[1]
+    if missing == 0:
+        return samples
+
+    def put(array, empty):
+        places = [(0, 0), (0, missing), *[(0, 0)] * (array.ndim - 2)]
+        return np.pad(array, places, constant_values=empty)
+
+    return samples._replace(
+        states=put(samples.states, np.nan),
+        times=put(samples.times, np.nan),
+        hits=put(samples.hits, 0),
+        rests=put(samples.rests, 0),
+    )

@@ -1,0 +1,77 @@
+"""A diagram in seconds, as a rig makes one: wait at each value, then store."""
+
+import functools
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from ._diagram_job import CarriedJob, one_after_the_other
+from ._pick import Pick
+from ._run import Arrays
+from ._section import AbstractSection
+
+
+#: of a turn, so that rounding costs none
+_SLACK = 1e-9
+
+
+def dwell_turns(
+    section: AbstractSection, where: Pick, values, dwell: tuple[float, float]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Turns at each value, and how many of them are stored.
+
+    **Arguments:** `dwell`: s to wait, and s to store. The wait ends with the turn in
+    which it is over, and whole turns alone are stored.
+
+    **Raises:** `ValueError` where there is not one whole turn to store.
+    """
+    if not section.regular:
+        raise ValueError(
+            "dwell counts turns; look at the motion once a turn, not at impacts"
+        )
+    wait, store = (float(seconds) for seconds in dwell)
+    if not (0 <= wait < math.inf and 0 < store < math.inf):
+        raise ValueError(
+            f"dwell is {dwell}; give the seconds to wait and to store, such as (60, 10)"
+        )
+    length = np.broadcast_to(section.turn(where, values), np.shape(values))
+    waited = np.ceil(wait / length - _SLACK).astype(int)
+    stored = np.floor(store / length + _SLACK).astype(int)
+    if np.min(stored) < 1:
+        raise ValueError(
+            f"dwell stores {store:g} s, and a turn takes up to {np.max(length):.3g} s; "
+            "store longer"
+        )
+    return waited + stored, stored
+
+
+class DwellJob(CarriedJob):
+    """Up, down or both ways, with as many turns at a value as its seconds hold."""
+
+    def __init__(self, *arguments, dwell: tuple[float, float]):
+        self.dwell = dwell
+        super().__init__(*arguments)
+
+    def work(self, block: int, before: Arrays | None) -> Callable[[], Arrays]:
+        first, last = self.layout.bounds(block)
+        values = self.values[first:last]
+        turns, keep = dwell_turns(self.section, self.where, values, self.dwell)
+        return functools.partial(
+            one_after_the_other,
+            self.section,
+            self.where,
+            values,
+            self.starts[first:last],
+            self.first[first:last],
+            None if before is None else before["final"][-1],
+            turns,
+            keep,
+            self.keep,
+            self.tolerance,
+        )
+
+    def _layout(self, going, direction: str, block: int | None):
+        layout = super()._layout(going, direction, block)
+        identity = {**layout.identity, "dwell": list(map(float, self.dwell))}
+        return layout._replace(identity=identity)
