@@ -64,10 +64,6 @@ class ChatterFrame(eqx.Module):
         gap = after**3 / 6 + deviation * after + parts.gamma * tau**3
         return self.jerk * jnp.stack([gap, after * after / 2 + deviation])
 
-    def section_vector(self, section) -> Float[Array, "2"]:
-        """B: gap and normal velocity at a section by epsilon = tau*^2 beta. (6.103)"""
-        return self.jerk * jnp.stack([section - self.release, jnp.ones(())])
-
 
 def chatter_frame(system: HybridSystem, time=0.0) -> ChatterFrame:
     """Release point and scales of chattering; differentiable in the parameters.

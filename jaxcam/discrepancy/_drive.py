@@ -12,7 +12,6 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from jaxtyping import Float
 from scipy.stats import chi2
 
 from ..recordings import Recording
@@ -145,10 +144,3 @@ def _amplitudes(recording: Recording, channel: str, orders, noise: float):
         found[k] = s - 1j * c
         errors[k] = noise * order * math.sqrt((inverse[0, 0] + inverse[1, 1]) / 2)
     return found, errors
-
-
-def without_ripple(
-    angle: Float[np.ndarray, " k"], ripple: Ripple
-) -> Float[np.ndarray, " k"]:
-    """The drive's angle as it would be if it did not ripple."""
-    return angle - ripple.eps * np.sin(angle - ripple.psi)

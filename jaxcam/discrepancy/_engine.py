@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from ..fitting import Fit, Model, Parameter, Problem, Weights
+from ..fitting import Fit, Model, Problem, Weights
 from ..fitting._columns import (
     free_columns,
     invert,
@@ -21,11 +21,6 @@ from ..fitting._linearise import assemble, Layout, Point
 from ..fitting._problem import _places
 from ._term import Term
 from ._with_terms import WithTerms
-
-
-def term_parameters(terms: Sequence[Term]) -> dict[str, list[Parameter]]:
-    """Parameters of each term, by the term's name."""
-    return {term.name: term.parameters(k) for k, term in enumerate(terms)}
 
 
 def extended(problem: Problem, terms: Sequence[Term], at: Point) -> Problem:

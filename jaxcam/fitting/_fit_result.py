@@ -95,20 +95,6 @@ class Fit:
         """The pair of parameters that is told apart worst, in a sentence."""
         return most_correlated([e.label for e in self.estimates], self.correlation)
 
-    @property
-    def data_cost(self) -> float:
-        """Minus twice the log-likelihood of samples and joints, all with weight one."""
-        return float(sum(np.sum(np.asarray(part)) for part in self._counted()))
-
-    def _counted(self):
-        exists = np.asarray(self.problem.pieces.exists)
-        rests = np.asarray(self.problem.pieces.rest_exists)
-        return (
-            np.where(exists, self.costs.flown, 0.0),
-            np.where(exists, self.costs.joints, 0.0),
-            np.where(rests, self.costs.rested, 0.0),
-        )
-
     def model(self, record: int | str = 0) -> Model:
         """The model with the parameters that were found; of one record where some
         parameters differ from record to record."""

@@ -19,8 +19,6 @@ class NormalForm(NamedTuple):
     field: Callable
     branches: tuple[Callable, ...]
     discrete: bool = False
-    #: whether the last branch is an orbit of period two, x -> -x
-    alternates: bool = False
 
     def stable(self, branch: int, mu) -> np.ndarray:
         """Whether a branch attracts at each `mu`, by the derivative of the field."""
@@ -58,6 +56,5 @@ NORMAL_FORMS: dict[str, NormalForm] = {
         lambda x, mu: -(1 + mu) * x + x**3,
         (_zero, _root(1), _root(-1)),
         discrete=True,
-        alternates=True,
     ),
 }

@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-import xarray
 
 from ._checksums import names_of
 from ._disk import OnDisk
@@ -154,10 +153,3 @@ class _Report:
         remaining = elapsed / self._done * left
         done = self._skipped + self._done
         self._progress(Progress(done, self._total, elapsed, remaining))
-
-
-def finished_dataset(store: Store, extra: xarray.Dataset | None = None):
-    """The whole dataset, with what was made of all blocks together."""
-    if extra is not None:
-        store.add(extra)
-    return store.dataset()
