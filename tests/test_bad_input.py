@@ -1,5 +1,6 @@
 """Bad input is refused before anything runs, in one sentence that names the fix."""
 
+import math
 from typing import ClassVar
 
 import diffrax
@@ -209,6 +210,12 @@ def wrong(name, function):
         ("impact", lambda s, t, x: jnp.stack([x, x]), "one row for each gap"),
         ("gap", lambda s, t, x: x[0].astype(jnp.float32), "use 64-bit floats"),
         ("gap", lambda s, t, x: x[0] * jnp.nan, "the gap is not finite"),
+        ("vector_field", lambda s, t, x: [x[1], -1.0], "vector_field returns a list"),
+        ("gap", lambda s, t, x: [x[0]], "gap returns a list; return one array"),
+        ("impact", lambda s, t, x: (x[0], -x[1]), "impact returns a tuple"),
+        ("gap", lambda s, t, x: x[0] - np.cos(t), "jnp.cos, not np.cos"),
+        ("gap", lambda s, t, x: x[0] - math.cos(t), "jnp.cos, not np.cos"),
+        ("gap", lambda s, t, x: x[0] if t > 0 else x[0] + 1, "jnp.where instead"),
     ],
 )
 def test_functions_that_return_something_else(name, function, words):

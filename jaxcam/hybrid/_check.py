@@ -5,6 +5,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
+from jax.errors import ConcretizationTypeError, TracerArrayConversionError
 
 from ._normal import gaps
 from ._settings import Settings
@@ -64,18 +65,18 @@ def _check_shapes(system, t0, state) -> None:
             f"state has {n} components but {type(system).__name__} has {wanted}: "
             f"{names}"
         )
-    rate = jax.eval_shape(system.vector_field, t0, state)
+    rate = _shape(system, "vector_field", t0, state)
     if rate.shape != (n,):
         raise ValueError(
             f"vector_field returns shape {rate.shape} for a state of shape {(n,)}; "
             "return one rate for each component, such as jnp.stack([...])"
         )
-    gap = jax.eval_shape(system.gap, t0, state)
+    gap = _shape(system, "gap", t0, state)
     if len(gap.shape) > 1:
         raise ValueError(
             f"gap returns shape {gap.shape}; return a scalar or a vector of gaps"
         )
-    after = jax.eval_shape(system.impact, t0, state)
+    after = _shape(system, "impact", t0, state)
     if after.shape != (*gap.shape, n):
         raise ValueError(
             f"impact returns shape {after.shape} but gap has shape {gap.shape} and the "
@@ -87,3 +88,21 @@ def _check_shapes(system, t0, state) -> None:
                 f"{name} returns {made.dtype}; use 64-bit floats (importing jaxcam "
                 "turns them on)"
             )
+
+
+def _shape(system, name, t0, state):
+    """Shape and type of what a function of the reader returns."""
+    try:
+        made = jax.eval_shape(getattr(system, name), t0, state)
+    except (ConcretizationTypeError, TracerArrayConversionError) as error:
+        raise ValueError(
+            f"{name} needs the values of time or state, which are not "
+            "known while it is compiled; write it with jax.numpy (jnp.cos, not np.cos "
+            "or math.cos), and jnp.where instead of if"
+        ) from error
+    if not isinstance(made, jax.ShapeDtypeStruct):
+        raise ValueError(
+            f"{name} returns a {type(made).__name__}; return one array, "
+            "such as jnp.stack([...])"
+        )
+    return made
