@@ -6,6 +6,7 @@ import jax.numpy as jnp
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from .. import plotting
 from ..models import CamFollower, rad_s_to_rpm, rpm_to_rad_s
@@ -19,6 +20,7 @@ from . import (
     _reproduce_chapter_2,
     _reproduce_chapter_5,
     _reproduce_chapter_6,
+    _reproduce_experiment,
     _reproduce_motions,
 )
 
@@ -62,11 +64,14 @@ def figure_3_8(system: CamFollower) -> Figure:
     plotting.phase_portrait(run, axes[0])
     plotting.multipliers(branch.multipliers, axes[1])
     stable = np.max(np.abs(branch.multipliers), axis=1) < 1
-    for chosen, style in ((stable, "-"), (~stable, "--")):
-        angle = np.where(chosen, branch.angle, np.nan)
-        axes[2].plot(branch.speed, angle, "o" + style, ms=3, color=_LINE)
-    axes[2].axvline(branch.fold, color=_OTHER, lw=0.9)
-    axes[2].axvline(branch.flip, color=_OTHER, lw=0.9, ls="--")
+    axes[2].plot(branch.speed, branch.angle, "--", color=_LINE, lw=1.2)
+    angle = np.where(stable, branch.angle, np.nan)
+    axes[2].plot(branch.speed, angle, "o-", ms=3, color=_LINE)
+    for speed, word in ((branch.fold, "fold"), (branch.flip, "flip")):
+        axes[2].axvline(speed, color=_OTHER, lw=0.9)
+        axes[2].text(
+            speed, 1.01, word, ha="center", transform=axes[2].get_xaxis_transform()
+        )
     axes[2].set_xlabel("speed (rpm)")
     axes[2].set_ylabel("angle at the impact (rad)")
     return figure
@@ -92,9 +97,11 @@ def figure_3_11(system: CamFollower) -> Figure:
     ):
         at = np.mod(t, float(run.system.period)) / float(run.system.period)
         ax.plot([at, at], *np.stack([before, after], 1), color="#D55E00", ls="--", lw=1)
-    ax.set_xlabel("phase (turns)")
-    ax.set_ylabel("angle (rad)")
+    ax.set_xlabel("phase (turns)", labelpad=8)
+    ax.set_ylabel("angle (rad)", labelpad=10)
     ax.set_zlabel("velocity (rad/s)")  # pyright: ignore
+    ax.set_xticks([0, 0.5, 1])
+    ax.yaxis.set_major_locator(MaxNLocator(4))
     ax.set_box_aspect(None, zoom=0.85)  # pyright: ignore
     return figure
 
@@ -196,6 +203,7 @@ DRAWINGS: dict[str, Callable[..., Figure]] = {
     "figure-4.14": figure_4_14,
     "figure-4.15": figure_4_15,
     "figure-4.16": figure_4_16,
+    **_reproduce_experiment.DRAWINGS,
     **_reproduce_motions.DRAWINGS,
     **_reproduce_chapter_5.DRAWINGS,
     **_reproduce_chapter_6.DRAWINGS,

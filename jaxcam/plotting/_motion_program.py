@@ -28,7 +28,7 @@ def motion_program(program: MotionProgram, axes=None, *, unit: str = "rad"):
 
     **Returns:** the four axes.
     """
-    figure, axes = several_axes(axes, (4, 1), sharex=True, figsize=(6.4, 7.2))
+    figure, axes = several_axes(axes, (4, 1), sharex=True, figsize=(6.4, 8.4))
     del figure
     axes = axes[:, 0]
     pieces = program.prepared()

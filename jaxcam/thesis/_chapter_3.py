@@ -2,10 +2,12 @@
 
 from typing import NamedTuple, TYPE_CHECKING
 
+import jax.numpy as jnp
 import numpy as np
 
+from ..fitting import SpecialPoint
 from ..hybrid import simulate, Trajectory
-from ..models import CamFollower, rad_s_to_rpm
+from ..models import CamFollower, rad_s_to_rpm, rpm_to_rad_s
 from ._frame import frame
 from ._orbits import (
     along_traces,
@@ -31,10 +33,12 @@ if TYPE_CHECKING:
 #: speed at which the orbit is drawn (rpm)
 SPEED = 147.941373499943
 _RANGE = (138.0, 153.5)
+#: points below that, and how far the sum of the multipliers goes beyond the fold's
+_NEAR_FOLD, _BEYOND = 12, 0.1
 
 
 class SmoothBranch(NamedTuple):
-    """The P(1,1) branch of a rig."""
+    """The P(1,1) branch of a rig, from the saddles behind its fold on."""
 
     #: (k,) rpm
     speed: np.ndarray
@@ -57,6 +61,7 @@ def smooth_branch(system: CamFollower, points: int = 16) -> SmoothBranch:
     angles, values = np.zeros(points), np.zeros((points, 2), dtype=complex)
     # both ways from where the orbit is known, each from its neighbour
     middle = int(np.argmin(np.abs(speeds - SEARCH)))
+    orbit = start
     for walk in (range(middle, points), range(middle - 1, -1, -1)):
         orbit = orbit_at(system, start, speeds[walk[0]])
         for k in walk:
@@ -64,11 +69,34 @@ def smooth_branch(system: CamFollower, points: int = 16) -> SmoothBranch:
             orbit = next_orbit(rig, orbit)
             angles[k] = float(orbit.states[0, 0])
             values[k] = multipliers_of(monodromy_of(rig, orbit))
+        below = list(_around_the_fold(system, orbit, speeds[0]))[::-1]
+    speeds = np.concatenate([[row[0] for row in below], speeds])
+    angles = np.concatenate([[row[1] for row in below], angles])
+    values = np.concatenate([[row[2] for row in below], values])
     near = along_traces(system, start, TRACES[0])
     fold = float(rad_s_to_rpm(point_on_line(system, near, FOLD).parameter))
     near = along_traces(system, start, TRACES[-2])
     flip = float(rad_s_to_rpm(point_on_line(system, near, FLIP).parameter))
     return SmoothBranch(speeds, angles, values, fold, flip)
+
+
+def _around_the_fold(system: CamFollower, orbit, rpm: float):
+    """Speed (rpm), angle and multipliers of orbits from `rpm` through the fold.
+
+    Around it the sum of the multipliers goes on, where the speed turns back.
+    """
+    point = SpecialPoint(jnp.asarray(rpm_to_rad_s(rpm)), orbit)
+    matrix = np.asarray(monodromy_of(at_speed(system, rpm), orbit))
+    end = 1 + np.linalg.det(matrix) + _BEYOND
+    for value in np.linspace(np.trace(matrix), end, _NEAR_FOLD + 1)[1:]:
+        point = point_on_line(system, point, (float(value), 0.0))
+        rig = at_speed(system, rad_s_to_rpm(point.parameter))
+        values = multipliers_of(monodromy_of(rig, point.orbit))
+        yield (
+            float(rad_s_to_rpm(point.parameter)),
+            float(point.orbit.states[0, 0]),
+            values,
+        )
 
 
 @remembered

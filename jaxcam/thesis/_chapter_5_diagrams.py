@@ -7,6 +7,7 @@ import numpy as np
 from .. import sweeps
 from ..models import CamFollower, rad_s_to_rpm, rpm_to_rad_s
 from ._chatter import INTERRUPTION, interruption
+from ._events import events, spans
 from ._frame import frame
 from ._remember import remembered
 
@@ -55,23 +56,13 @@ def both_ways(system: CamFollower, size: str) -> sweeps.Diagram:
     )
 
 
-def _spans(made: sweeps.Diagram, label: str, way: int) -> list[tuple[float, float]]:
-    """Ranges (rpm) of a label in one direction, the widest first."""
-    found = [
-        (float(rad_s_to_rpm(r.low)), float(rad_s_to_rpm(r.high)))
-        for r in made.ranges()
-        if r.label == label and r.direction == way
-    ]
-    return sorted(found, key=lambda span: span[0] - span[1]) or [(_NAN, _NAN)]
-
-
 def figure_5_1(system: CamFollower, size: str) -> "pd.DataFrame":
     """Figure 5.1: where each orbit was met, upwards and downwards."""
     made = both_ways(system, size)
     rows: list[tuple[str, Any, Any, str]] = []
     for way, word in ((1, "upwards"), (-1, "downwards")):
         for label in ("contact", "P(inf,1)", "P(1,1)", "P(2,2)", "P(4,4)"):
-            low, high = _spans(made, label, way)[0]
+            low, high = spans(made, label, way)[0]
             if np.isfinite(low):
                 for end, value in (("from", low), ("to", high)):
                     printed = _SAID.get((way, label, end), _NAN)
@@ -82,49 +73,25 @@ def figure_5_1(system: CamFollower, size: str) -> "pd.DataFrame":
 def table_5_1(system: CamFollower, size: str) -> "pd.DataFrame":
     """Table 5.1, the simulated column, read off the diagram of Figure 5.1.
 
-    Contact and what follows from it belong to the way up, as does the beginning of
-    aperiodic motion; orbits with one impact a turn are met on the way down. The
-    chattering route to chaos begins behind the last speed with P(inf,1) and ends,
-    with the chaos it leads to, at the first speed of the way up from which the motion
-    is on the period-doubling cascade. The two printed rows are not told apart here.
+    The two printed rows of the route to chaos and of chaos are not told apart here.
     """
     made = both_ways(system, size)
-    contact = _spans(made, "contact", 1)[0]
-    sticking = _spans(made, "P(inf,1)", 1)[0]
-    one, two = _spans(made, "P(1,1)", -1)[0], _spans(made, "P(2,2)", -1)[0]
-    up = made.direction == 1
-    speeds = np.asarray(rad_s_to_rpm(made.values))[up]
-    labels = made.labels[up, 0]
-    behind = speeds > sticking[1]
-    cascade = {f"P({2**k},{2**k})" for k in range(1, 5)}
-    settled = speeds[behind & np.isin(labels, list(cascade))]
-    end = settled.min() if len(settled) else _NAN
-    route = speeds[behind & (speeds < end)]
-    first, last = (route.min(), route.max()) if len(route) else (_NAN, _NAN)
+    found = events(made, made)
     return frame(
         [
-            ("permanent contact, to", 125.0, contact[1], "rpm"),
-            ("detachment", 125.0, sticking[0], "rpm"),
-            ("P(inf,1), from", 125.0, sticking[0], "rpm"),
-            ("P(inf,1), to", 152.0, sticking[1], "rpm"),
-            ("chattering route to chaos, from", 152.6, first, "rpm"),
-            ("chaos, to", 154.5, last, "rpm"),
-            ("P(1,1), from", 135.0, one[0], "rpm"),
-            ("P(1,1), to", 151.0, one[1], "rpm"),
-            ("P(2,2), from", 152.0, two[0], "rpm"),
-            ("P(2,2) and its doublings, to", 170.0, _last_cascade(made), "rpm"),
-            ("P(2,2) itself, to", _NAN, two[1], "rpm"),
+            ("permanent contact, to", 125.0, found.contact_to, "rpm"),
+            ("detachment", 125.0, found.sticking_from, "rpm"),
+            ("P(inf,1), from", 125.0, found.sticking_from, "rpm"),
+            ("P(inf,1), to", 152.0, found.sticking_to, "rpm"),
+            ("chattering route to chaos, from", 152.6, found.route_from, "rpm"),
+            ("chaos, to", 154.5, found.chaos_to, "rpm"),
+            ("P(1,1), from", 135.0, found.one_from, "rpm"),
+            ("P(1,1), to", 151.0, found.one_to, "rpm"),
+            ("P(2,2), from", 152.0, found.two_from, "rpm"),
+            ("P(2,2) and its doublings, to", 170.0, found.doubled_to, "rpm"),
+            ("P(2,2) itself, to", _NAN, spans(made, "P(2,2)", -1)[0][1], "rpm"),
         ]
     )
-
-
-def _last_cascade(made: sweeps.Diagram) -> float:
-    """Highest speed (rpm) of the way down with an orbit of the doubling cascade."""
-    down = made.direction == -1
-    labels = made.labels[down, 0]
-    wanted = np.isin(labels, [f"P({2**k},{2**k})" for k in range(1, 5)])
-    speeds = np.asarray(rad_s_to_rpm(made.values))[down]
-    return float(speeds[wanted].max()) if np.any(wanted) else _NAN
 
 
 @remembered
