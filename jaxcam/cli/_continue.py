@@ -83,8 +83,7 @@ def continue_(
     \b
     Examples:
       jaxcam continue cam-follower --from 130 --to 160 --at 145 --state 0.37,1.8
-      jaxcam continue impact-oscillator --set damping=0.05 --parameter wall \\
-        --at 0.2 --from 0.12 --to 0.3 --state=-0.1462,0
+      jaxcam continue impact-oscillator --parameter omega --from 2 --to 3 --at 2.2
       jaxcam continue cam-follower --from 130 --to 150 --out DIR --resume
     """
     if saved is not None:
