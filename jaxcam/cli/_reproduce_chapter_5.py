@@ -161,9 +161,10 @@ def figure_5_27(system: CamFollower) -> Figure:
         ax.annotate(
             rf"$(x_{j}, \Pi(x_{j}))$",
             (lobes.corners[j], lobes.values[j]),
-            (6, -14 if j else 4),
+            ((6, 4), (6, -14), (-5, -12), (-5, -12))[j],
             textcoords="offset points",
             fontsize=10,
+            ha="left" if j < 2 else "right",
         )
     limit = float(fitted.alpha_inf)
     ax.axhline(limit, color=RECORDED, ls=":", lw=1)

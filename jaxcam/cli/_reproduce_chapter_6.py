@@ -127,6 +127,7 @@ def _cam_velocity(run, times):
 def _region(close: bool) -> Callable[[CamFollower], Figure]:
     def draw(system: CamFollower) -> Figure:
         drawn, gap, rate, times, gaps, rates, period = _marked(system)
+        gap, gaps = 1e3 * gap, 1e3 * gaps
         figure = plt.figure(figsize=(9.6, 5.2))
         grid = figure.add_gridspec(2, 2, width_ratios=(3, 2))
         top = figure.add_subplot(grid[0, 0])
@@ -146,18 +147,20 @@ def _region(close: bool) -> Callable[[CamFollower], Figure]:
             top.plot(time, height, label=name, **style)
             below.plot(time, speed, **style)
             right.plot(height, speed, **style)
-        top.set_ylabel("angle (rad)")
+        top.set_ylabel("over cam (mrad)")
         below.set_ylabel("velocity (rad/s)")
         below.set_xlabel("time (s)")
-        right.set_xlabel("angle over cam (rad)")
+        right.set_xlabel("over cam (mrad)")
+        right.set_ylabel("velocity (rad/s)")
         top.tick_params(labelbottom=False)
-        top.set_xlim(0, period)
+        # the section is at the end of the period, and its mark is wider
+        top.set_xlim(0, 1.02 * period)
         top.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=3)
         if close:
             top.set_xlim(times[0] - 0.03, times[1] + 0.06)
-            top.set_ylim(-1e-4, 6e-3)
+            top.set_ylim(-0.1, 6)
             below.set_ylim(-0.25, 0.25)
-            right.set_xlim(-2e-5, 1e-3)
+            right.set_xlim(-0.02, 1)
             right.set_ylim(-0.15, 0.15)
         return figure
 

@@ -124,11 +124,12 @@ def _mark(ax: Axes, basins, axes) -> None:
         ax.plot(
             orbit[:, axes[0]],
             orbit[:, axes[1]],
-            "." if irregular else _MARKS[k % len(_MARKS)],
+            "o" if irregular else _MARKS[k % len(_MARKS)],
             ls="",
-            markersize=2.5 if irregular else 6,
-            markerfacecolor=SECTION if irregular else "white",
+            # white shows on every colour; what does not repeat has many points
+            markersize=2.8 if irregular else 6,
+            markerfacecolor="white",
             markeredgecolor=SECTION,
-            markeredgewidth=0.0 if irregular else 0.9,
+            markeredgewidth=0.4 if irregular else 0.9,
             zorder=3,
         )

@@ -35,13 +35,16 @@ class Picture(NamedTuple):
     #: corners of the states
     low: tuple[float, float] = _BOX[0]
     high: tuple[float, float] = _BOX[1]
+    #: how often motions that do not repeat yet go on, for twice as many turns
+    reruns: int = _RERUNS
 
 
 PICTURES = {
     "figure-5.14": Picture(145.0, ("P(inf,1)", "P(1,1)"), {"A": A, "B": B}),
     "figure-5.16": Picture(152.3, ("P(inf,1)", "P(2,2)"), {"C": C, "D1": D1, "D2": D2}),
     "figure-5.18": Picture(154.2, ("aperiodic", "P(2,2)"), {"E": E, "F1": F1}),
-    "figure-5.20": Picture(156.0, ("P(2,2)", "P(6,6)"), {"G1": G1, "H1": H1}),
+    # P(6,6) is reached so slowly that two reruns leave most of it without a label
+    "figure-5.20": Picture(156.0, ("P(2,2)", "P(6,6)"), {"G1": G1, "H1": H1}, reruns=4),
     "figure-5.22": Picture(160.5, ("aperiodic",), {}, (0.3, -10.0), (1.2, 10.0)),
     "figure-5.23": Picture(160.5, ("aperiodic",), {}, *_ZOOM),
 }
@@ -57,7 +60,7 @@ def basins_of(system: CamFollower, target: str, size: str) -> sweeps.Basins:
         sweeps.Grid(picture.low, picture.high, (count, count)),
         _TURNS,
         keep=_KEEP,
-        reruns=_RERUNS,
+        reruns=picture.reruns,
     )
 
 
