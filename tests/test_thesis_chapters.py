@@ -105,6 +105,24 @@ def test_experiment_of_section_4_7_meets_the_events_of_the_model(calibrated):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(("rig", "stiffer"), [("table-4.4", 1.0), ("calibrated", 1.25)])
+def test_figures_around_the_interruption_of_another_rig(rig, stiffer):
+    """Sticking in the last turn below it and none above, wherever that is.
+
+    Table 4.4 has another phase, in which time zero is in contact; a stiffer spring is
+    interrupted 11 rpm further on.
+    """
+    other = preset(rig)
+    other = eqx.tree_at(lambda s: s.stiffness, other, stiffer * other.stiffness)
+    rows = found("figure-1.3", other)["computed"]
+    assert abs(rows["interruption"] - 152.67658) > 2
+    below, above = rows.iloc[1:]
+    assert below > 1e-3 and above == 0
+    widths = found("figure-5.25", other).filter(like="width", axis=0)["computed"]
+    assert len(widths) >= 4 and widths.between(0.4, 0.8).all()
+
+
+@pytest.mark.slow
 def test_onset_and_sticking_time(calibrated):
     """Interruption to 0.01 rpm; the sticking time falls with kappa/2, not a root."""
     assert abs(found("figure-5.11", calibrated)["difference"].iloc[0]) < 0.01

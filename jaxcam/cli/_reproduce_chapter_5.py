@@ -34,10 +34,11 @@ def figure_5_9(system: CamFollower) -> Figure:
     made = chatter.impacts_at(system)
     figure, axes = plt.subplots(1, 3, figsize=(10.5, 3.8))
     phase = made.dataset["phase"].values[:, 0]
-    for k, (ax, rpm) in enumerate(zip(axes, chatter.IMPACT_SPEEDS, strict=True)):
+    each = chatter.impact_speeds(system)
+    for k, (ax, rpm) in enumerate(zip(axes, each, strict=True)):
         speeds = chatter.rebound_speeds(system, k)
         ax.semilogy(phase[k], speeds, ".", ms=3, color=FLIGHT)
-        ax.set_title(f"{rpm} rpm")
+        ax.set_title(f"{rpm:g} rpm")
         ax.set_xlabel("phase (turns)")
         ax.set_ylim(1e-6, 5)
     axes[0].set_ylabel("rebound speed (rad/s)")

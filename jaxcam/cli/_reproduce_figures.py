@@ -37,20 +37,21 @@ def _turn_over_the_cam(run, ax, label, colour, dashes="solid"):
 
 
 def figure_1_2(system: CamFollower) -> Figure:
-    run = _chapter_1.released_turn(system, _chapter_1.COMPLETE)
+    run = _chapter_1.released_turn(system, _chapter_1.both_sides(system)[0])
     return plotting.phase_portrait(run).figure  # pyright: ignore
 
 
 def figure_1_3(system: CamFollower) -> Figure:
     figure, axes = plt.subplots(2, 1, figsize=(6.4, 6.4))
+    complete, interrupted = _chapter_1.both_sides(system)
     for rpm, colour, dashes in (
-        (_chapter_1.COMPLETE, _LINE, "solid"),
-        (_chapter_1.INTERRUPTED, _OTHER, "dashed"),
+        (complete, _LINE, "solid"),
+        (interrupted, _OTHER, "dashed"),
     ):
         run = _chapter_1.released_turn(system, rpm)
         for ax in axes:
-            _turn_over_the_cam(run, ax, f"{rpm} rpm", colour, dashes)
-    period = 60 / _chapter_1.COMPLETE
+            _turn_over_the_cam(run, ax, f"{rpm:g} rpm", colour, dashes)
+    period = 60 / complete
     axes[1].set_xlim(0.97 * period, 1.02 * period)
     axes[1].set_ylim(-2e-7, 4e-6)
     axes[0].legend()

@@ -12,7 +12,7 @@ from variational import chatter_accumulation, scaling_law
 from .. import sweeps
 from ..hybrid import normal_velocity, Settings
 from ..models import CamFollower, rad_s_to_rpm, rpm_to_rad_s
-from ._chatter import interruption
+from ._chatter import beside_interruption, interruption
 from ._frame import frame
 from ._orbits import speed_of
 from ._remember import remembered
@@ -24,10 +24,15 @@ if TYPE_CHECKING:
 
 #: cycles at each speed, and how many are looked at
 TURNS, KEEP = 300, 100
-#: Figure 5.9: speeds (rpm)
-IMPACT_SPEEDS = 152.66, 152.882, 153.45
+#: Figure 5.9: printed speeds (rpm); Figure 5.24: one at which the time is given
+_IMPACT_SPEEDS, _BELOW = (152.66, 152.882, 153.45), 152.65
 _IMPACTS = 1500
 _NAN = float("nan")
+
+
+def impact_speeds(system: CamFollower) -> list[float]:
+    """Speeds (rpm) of Figure 5.9: one below the interruption, two above it."""
+    return [beside_interruption(system, rpm) for rpm in _IMPACT_SPEEDS]
 
 
 @remembered
@@ -39,7 +44,7 @@ def impacts_at(system: CamFollower) -> sweeps.Diagram:
     return sweeps.diagram(
         section,
         "speed",
-        rpm_to_rad_s(np.array(IMPACT_SPEEDS)),
+        rpm_to_rad_s(np.array(impact_speeds(system))),
         turns=_IMPACTS,
         keep=_IMPACTS,
     )
@@ -49,16 +54,17 @@ def figure_5_9(system: CamFollower) -> "pd.DataFrame":
     """Figure 5.9: impacts a turn, and whether chattering is complete."""
     made = impacts_at(system)
     section = sweeps.Stroboscopic(system)
-    speeds = rpm_to_rad_s(np.array(IMPACT_SPEEDS))
+    each = impact_speeds(system)
+    speeds = rpm_to_rad_s(np.array(each))
     starts = section.starts(speed_of, speeds)
     samples = section.sample(starts, TURNS, KEEP, where=speed_of, values=speeds)
     rows: list[tuple[str, Any, Any, str]] = []
-    for k, (rpm, printed) in enumerate(zip(IMPACT_SPEEDS, (1, _NAN, _NAN))):
+    for k, (rpm, printed) in enumerate(zip(each, (1, _NAN, _NAN), strict=True)):
         share = np.mean(samples.rests[k] > 0)
-        rows.append((f"{rpm} rpm: part of the turns that stick", printed, share, ""))
+        rows.append((f"{rpm:g} rpm: part of the turns that stick", printed, share, ""))
         phase = made.dataset["phase"].values[k, 0]
         spread = len(np.unique(np.round(phase[np.isfinite(phase)], 6)))
-        rows.append((f"{rpm} rpm: different phases of impacts", _NAN, spread, ""))
+        rows.append((f"{rpm:g} rpm: different phases of impacts", _NAN, spread, ""))
     return frame(rows)
 
 
@@ -106,12 +112,13 @@ def figure_5_24(system: CamFollower) -> "pd.DataFrame":
     rig = interruption(system)
     law = scaling_law(rig.restitution(rig.speed, jnp.zeros(())))  # pyright: ignore
     kappa = float(law.kappa)
-    at = np.interp(152.65, speeds, times)
+    below = beside_interruption(system, _BELOW)
+    at = np.interp(below, speeds, times)
     return frame(
         [
             ("where sticking ends", 152.67, end, "rpm"),
             ("exponent of its fall (a square root in the text)", 0.5, power, ""),
             ("the same by theory, kappa/2", 0.5, kappa / 2, ""),
-            ("sticking time at 152.65 rpm", _NAN, at, "s"),
+            (f"sticking time at {below:g} rpm", _NAN, at, "s"),
         ]
     )

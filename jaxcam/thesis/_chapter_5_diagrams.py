@@ -6,7 +6,7 @@ import numpy as np
 
 from .. import sweeps
 from ..models import CamFollower, rad_s_to_rpm, rpm_to_rad_s
-from ._chatter import INTERRUPTION, interruption
+from ._chatter import beside_interruption, INTERRUPTION, interruption
 from ._events import events, spans
 from ._frame import frame
 from ._remember import remembered
@@ -97,7 +97,8 @@ def table_5_1(system: CamFollower, size: str) -> "pd.DataFrame":
 @remembered
 def onset(system: CamFollower, size: str) -> sweeps.Diagram:
     """The diagram of Figure 5.11, each speed from contact at rest."""
-    speeds = np.linspace(*_ZOOM, _ZOOMED[size])
+    low, high = (beside_interruption(system, rpm) for rpm in _ZOOM)
+    speeds = np.linspace(low, high, _ZOOMED[size])
     return sweeps.diagram(system, "speed", rpm_to_rad_s(speeds), turns=TURNS, keep=KEEP)
 
 

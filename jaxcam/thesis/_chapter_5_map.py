@@ -20,7 +20,7 @@ from ._chapter_5_diagrams import onset
 from ._chatter import at_speed, interruption, pick_speed, sticking_state
 from ._frame import frame
 from ._remember import remembered
-from ._table_5_3 import DELTA_X, lobes_of, M, MAP_SPEED, X_0
+from ._table_5_3 import DELTA_X, lobes_of, M, map_rig, X_0
 
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ def measured(system: CamFollower) -> tuple[Lobes, LocalMap]:
 def figure_5_25(system: CamFollower) -> "pd.DataFrame":
     """Figure 5.25: the state that is deviated from, and the lobes around it."""
     lobes, local = measured(system)
-    state = sticking_state(at_speed(system, rpm_to_rad_s(MAP_SPEED)))[0]
+    state = sticking_state(map_rig(system))[0]
     apart = np.abs(np.diff(lobes.corners))
     rows: list[tuple[str, Any, Any, str]] = [
         ("angle that is deviated from", 0.3371, state[0], "rad"),
