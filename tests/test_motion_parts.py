@@ -6,15 +6,21 @@ size of the numbers that go in, which is about one.
 """
 
 import itertools
+import math
 
 import diffrax
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 from numpy.polynomial import Polynomial
 from scipy.interpolate import BPoly
 
+from jaxcam import Settings
+from jaxcam.hybrid._advance import Plan
+from jaxcam.hybrid._codes import Row
 from jaxcam.hybrid._flight import earliest, judge, moves_in, Verdict
+from jaxcam.hybrid._functions import Functions
 from jaxcam.hybrid._gap_polynomial import (
     bernstein,
     crossing,
@@ -27,9 +33,12 @@ from jaxcam.hybrid._gap_polynomial import (
     time_to_release,
     time_to_root,
 )
+from jaxcam.hybrid._lane import first_lane
+from jaxcam.hybrid._loop import iterate
 from jaxcam.hybrid._normal import _solve_masked
 from jaxcam.hybrid._release import judge_contact
 from jaxcam.hybrid._runge_kutta import step, tableau_of
+from jaxcam.models import BouncingBall
 
 
 S = np.linspace(0.0, 1.0, 401)
@@ -304,6 +313,27 @@ def test_contact_lets_go_close_to_the_root(late):
 def test_contact_that_is_pulled_at_once_lets_go():
     found = contact(0.1, 1.0, 0.1, 1.0, h=0.0)
     assert found.lands and found.offset == 0.0
+
+
+# --- one attempt as a whole
+
+
+@pytest.mark.parametrize("room, kind", [(2e-6, Row.IMPACT), (5e-7, Row.STEP)])
+def test_an_impact_beyond_the_end_is_left_out(room, kind):
+    """The step ends 1e-6 s before the impact, the run `room` after that step."""
+    ball = BouncingBall()
+    length = math.sqrt(2 / 9.81) - 1e-6
+    t0, t1 = jnp.asarray(0.0), jnp.asarray(length + room)
+    functions = Functions(ball, 2)
+
+    @jax.jit
+    def attempt(t1):
+        lane = first_lane(functions, t0, (jnp.asarray(1.0), jnp.asarray(0.0)), t1)
+        lane = lane._replace(step=jnp.asarray(length), longest=jnp.asarray(1.0))
+        return iterate(functions, Plan.of(ball, Settings(), t0, t1), lane)[1]
+
+    record = attempt(t1)
+    assert int(record.kind) == kind and float(record.t) <= float(t1)
 
 
 # --- the rest
