@@ -22,6 +22,7 @@ from jaxcam.hybrid._codes import Row
 from jaxcam.hybrid._flight import earliest, judge, moves_in, Verdict
 from jaxcam.hybrid._functions import Functions
 from jaxcam.hybrid._gap_polynomial import (
+    Bernstein,
     bernstein,
     crossing,
     end_curvature,
@@ -107,6 +108,14 @@ def test_lowest_is_below_the_gap_less_its_error(seed):
     # and no lower than the jets make it
     b = np.array(polynomial.coefficients)
     assert bound >= b.min() - 2 * float(polynomial.error) - 1e-12
+
+
+@pytest.mark.parametrize("place", range(1, 7))
+def test_lowest_looks_at_every_coefficient_inside(place):
+    b = [jnp.asarray(-1.0 if k == place else 1.0) for k in range(8)]
+    error = 0.125 if place in (3, 4) else 0.0
+    found = lowest(Bernstein(tuple(b), jnp.asarray(error)))
+    assert float(found) == -1.0 - 2 * error
 
 
 @pytest.mark.parametrize("root", [0.05, 0.3, 0.62, 0.97])
