@@ -21,6 +21,10 @@ from ._composed_map import (
     simulated_at_section as simulated_at_section,
     simulated_by_parameter as simulated_by_parameter,
 )
+from ._covariant import (
+    covariant_vectors as covariant_vectors,
+    CovariantVectors as CovariantVectors,
+)
 from ._filippov import (
     filippov_monodromy as filippov_monodromy,
     filippov_saltation as filippov_saltation,

@@ -1,0 +1,136 @@
+"""Covariant Lyapunov vectors: the directions that a motion carries along with it."""
+
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from jaxcam.hybrid import flow, HybridSystem, Settings
+from jaxcam.hybrid._system import with_array_parameters
+
+from ._lyapunov import orthonormal
+
+
+class CovariantVectors(eqx.Module):
+    """Directions at the start of each turn, the fastest growing first.
+
+    What `vectors[k, :, j]` is after a turn points along `vectors[k + 1, :, j]`.
+    """
+
+    #: (turns, n) states at the start of each turn
+    state: Float[Array, "turns n"]
+    #: (turns, n, n) a unit vector in each column; NaN where the motion ever sticks
+    vectors: Float[Array, "turns n n"]
+    #: (turns, n) 1/s, how fast each grew in the turn
+    local: Float[Array, "turns n"]
+    #: 0 where every turn was finished, else an index into `RESULTS`
+    code: Array
+
+    @property
+    def exponents(self) -> Float[Array, " n"]:
+        """Their mean growth (1/s), which are the Lyapunov exponents."""
+        return self.local.mean(axis=0)
+
+    @property
+    def angle(self) -> Float[Array, " turns"]:
+        """The smallest angle (rad) between two of them; 0 where a tangency is."""
+        size = jnp.abs(jnp.einsum("kij,kil->kjl", self.vectors, self.vectors))
+        n = size.shape[-1]
+        others = size * (1.0 - jnp.eye(n))[None]
+        return jnp.arccos(jnp.minimum(jnp.max(others, axis=(1, 2)), 1.0))
+
+
+def covariant_vectors(
+    system: HybridSystem,
+    state: Float[Array, " n"],
+    turns: int = 200,
+    *,
+    t0: float = 0.0,
+    transient: int = 100,
+    settings: Settings | None = None,
+) -> CovariantVectors:
+    """The covariant Lyapunov vectors along a motion, impacts included.
+
+    Forwards, an orthonormal frame is carried by the derivative M of each turn,
+    M Q = Q' R; backwards, vectors are carried inside it by the inverses of the R, where
+    they turn to what they must have been (Ginelli et al., Physical Review Letters 99,
+    130601, 2007). For a periodic orbit they are the eigenvectors of the
+    monodromy matrix.
+
+    Pure; may be compiled and batched with `vmap` over states and parameters.
+
+    **Arguments:**
+
+    - `state`: shape `(n,)`, at time `t0` (s).
+    - `turns`: how many are returned, after `transient` others, in which the motion
+        settles and the frame turns; as many follow, from which the vectors turn back.
+    - `settings`: accuracy; a tolerance of 1e-12 by default.
+
+    **Returns:** a [`variational.CovariantVectors`][]. A motion that sticks forgets
+    every deviation, so it has no such directions, and all of them are NaN.
+
+    **Raises:** `ValueError` for a system without a period, or for numbers of turns that
+    make no sense.
+    """
+    if system.period is None:
+        raise ValueError(
+            "this system has no forcing period; covariant vectors are taken once a turn"
+        )
+    if turns < 1 or transient < 1:
+        raise ValueError(
+            f"turns is {turns} and transient {transient}; give 1 or more of each"
+        )
+    system = with_array_parameters(system)
+    settings = Settings(tolerance=1e-12) if settings is None else settings
+    return _vectors(
+        system,
+        jnp.asarray(state, jnp.float64),
+        jnp.asarray(t0, jnp.float64),
+        with_array_parameters(settings),
+        turns,
+        transient,
+    )
+
+
+@eqx.filter_jit
+def _vectors(system, state, t0, settings, turns: int, transient: int):
+    n = state.shape[0]
+    # each turn begins at the same phase, so its time need not grow
+    period: Any = system.period
+
+    def turn(x):
+        end = flow(system, x, t0, t0 + period, settings=settings)
+        return end.state, (end.state, end.code)
+
+    def forwards(carry, _):
+        x, frame = carry
+        matrix, (after, code) = jax.jacfwd(turn, has_aux=True)(x)
+        moved = matrix @ frame
+        new, _ = orthonormal(moved)
+        return (after, new), (x, frame, new.T @ moved, code)
+
+    def backwards(inner, triangle):
+        # of the frame behind a turn, its vectors before it
+        solved = jax.scipy.linalg.solve_triangular(triangle, inner)
+        growth = 1 / jnp.linalg.norm(solved, axis=0, keepdims=True)
+        solved = solved * growth
+        return solved, (solved, growth[0])
+
+    count = transient + turns + transient
+    start = (state, jnp.eye(n))
+    _, (states, frames, triangles, codes) = jax.lax.scan(
+        forwards, start, None, length=count
+    )
+    # with ones above the diagonal no vector lies in a smaller space than it should
+    upper = jnp.triu(jnp.ones((n, n)))
+    upper = upper / jnp.linalg.norm(upper, axis=0, keepdims=True)
+    _, (inner, growth) = jax.lax.scan(
+        backwards, upper, jnp.triu(triangles), reverse=True
+    )
+    vectors = jnp.einsum("kij,kjl->kil", frames, inner)
+    some = slice(transient, transient + turns)
+    return CovariantVectors(
+        states[some], vectors[some], jnp.log(growth[some]) / period, jnp.max(codes)
+    )
