@@ -20,25 +20,36 @@ _SHORT = {
 }
 
 
-def table(branch: Branch, *, every: int = 0, components: int = 3) -> rich.table.Table:
+def table(
+    branch: Branch,
+    *,
+    every: int = 0,
+    components: int = 3,
+    shown: tuple[str, float] | None = None,
+) -> rich.table.Table:
     """Special points, ends and every so manieth ordinary point of a branch.
 
     **Arguments:**
 
     - `every`: show each ordinary point whose label it divides; 0 shows none.
     - `components`: how many of the state.
+    - `shown`: head of the parameter's column and a factor, where it is shown in another
+      unit: `("speed (rpm)", 30 / math.pi)`.
 
     **Returns:** a table that `rich.print` shows.
     """
     found = rich.table.Table()
     names = branch.names or (branch.name,)
+    factor = 1.0
+    if shown is not None:
+        names, factor = (shown[0], *names[1:]), shown[1]
     n = min(components, max((p.state.size for p in branch.points), default=0))
     heads = _heads(names, n)
     for head in heads:
         found.add_column(head, justify="right" if head != "type" else "left")
     for point in branch.points:
         if point.kind != "regular" or (every and point.label % every == 0):
-            found.add_row(*_row(point, len(names), n))
+            found.add_row(*_row(point, len(names), n, factor))
     return found
 
 
@@ -46,12 +57,13 @@ def _heads(names: tuple[str, ...], n: int) -> list[str]:
     return ["label", "type", *names, "|u|", *[f"u{i + 1}" for i in range(n)], "stable"]
 
 
-def _row(point: Point, parameters: int, n: int) -> list[str]:
+def _row(point: Point, parameters: int, n: int, factor: float) -> list[str]:
     kind = _SHORT.get(point.kind, point.kind)
     if not point.converged:
         kind += " (not converged)"
     stable = {True: "yes", False: "no", None: ""}[point.stable]
-    values = point.parameters[-parameters:] or (point.parameter,)
+    first, *others = point.parameters[-parameters:] or (point.parameter,)
+    values = (factor * first, *others)
     state = [f"{x:.6g}" for x in point.state[:n]]
     return [
         str(point.label),

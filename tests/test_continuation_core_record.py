@@ -143,6 +143,9 @@ def test_table_and_progress(whole):
     text = console.export_text()
     assert text.count("LP") == 2 and text.count("EP") == 2
     assert "-0.384900179" in text
+    console.print(continuation.table(whole, shown=("a thousandth", 1e3)))
+    text = console.export_text()
+    assert "a thousandth" in text and "-384.900179" in text
     show = continuation.Progress(console=console)
     for point in whole.points:
         show(point)

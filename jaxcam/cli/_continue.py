@@ -82,7 +82,7 @@ def continue_(
 
     \b
     Examples:
-      jaxcam continue cam-follower --from 130 --to 160 --at 145 --state 0.37,1.8
+      jaxcam continue cam-follower --from 130 --to 160 --at 145 --state 0.545,0.37
       jaxcam continue impact-oscillator --parameter omega --from 2 --to 3 --at 2.2
       jaxcam continue cam-follower --from 130 --to 150 --out DIR --resume
     """
@@ -140,7 +140,8 @@ def continue_(
         if out is not None:
             report("drawing", None)
             figures = [_draw(branch, model, parameter, unit, out)]
-    output.print(continuation.table(branch))
+    shown = ("speed (rpm)", 1 / unit) if unit != 1.0 else None
+    output.print(continuation.table(branch, shown=shown))
     count = len(branch.regular)
     kinds = [point.kind for point in branch.special]
     found = ", ".join(f"{kinds.count(k)} {k}" for k in dict.fromkeys(kinds)) or "none"

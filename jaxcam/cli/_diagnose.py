@@ -68,7 +68,7 @@ def diagnose(
     if resume and (keep is None or not keep.is_dir()):
         raise ValueError(
             "--resume: there is nothing to go on with; give --out the folder of a run "
-            "that was stopped."
+            "that was stopped, or leave --resume out to begin anew."
         )
     if keep is not None and not resume and any(keep.glob("*.npz")):
         raise ValueError(
