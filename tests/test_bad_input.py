@@ -1,6 +1,7 @@
 """Bad input is refused before anything runs, in one sentence that names the fix."""
 
 import math
+from collections.abc import Callable
 from typing import ClassVar
 
 import diffrax
@@ -220,6 +221,23 @@ def wrong(name, function):
 )
 def test_functions_that_return_something_else(name, function, words):
     assert words in refusal(wrong(name, function), ABOVE)
+
+
+class Driven(Faller):
+    """A ball whose rates the reader passes as a function."""
+
+    rates: Callable = lambda t, state: jnp.stack([state[1], -jnp.ones_like(t)])
+
+    def vector_field(self, t, state):
+        return self.rates(t, state)
+
+
+def test_another_function_in_the_same_class_is_looked_at_too():
+    """What was seen to fit is remembered; nothing else passes for it."""
+    assert bool(simulate(Driven(), ABOVE, 0.0, 0.1).successful)
+    scalar = Driven(lambda t, state: state[1])
+    assert "one rate for each component" in refusal(scalar, ABOVE)
+    assert "3 components" in refusal(Driven(), [1.0, 0.0, 0.0])
 
 
 # --- what a trajectory is asked

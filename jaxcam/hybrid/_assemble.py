@@ -1,9 +1,12 @@
 """From the log of a run to impacts, contacts and steps."""
 
+from types import ModuleType
 from typing import NamedTuple
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 
 from ._codes import Row
 from ._events import Contacts, Impacts, Steps
@@ -19,30 +22,35 @@ class Parts(NamedTuple):
     steps: Steps
 
 
-def assemble(system, t0, state, contact, log: Log, sizes: tuple[int, int]) -> Parts:
-    """Sort the rows of a log into impacts, contacts and steps of fixed lengths."""
+def assemble(
+    system, t0, state, contact, log: Log, sizes: tuple[int, int], xp: ModuleType = jnp
+) -> Parts:
+    """Sort the rows of a log into impacts, contacts and steps of fixed lengths.
+
+    With `xp=numpy` a log that is not traced is sorted without compiling anything.
+    """
     rows = log.kind.shape[0]
     max_impacts, max_contacts = sizes
     valid = log.kind > 0
-    order = jnp.nonzero(valid, size=rows, fill_value=rows)[0]
-    count = jnp.sum(valid)
+    order = _places(xp, valid, rows, rows)
+    count = xp.sum(valid)
 
     def first(start, rest, fill):
-        padded = jnp.concatenate([rest, jnp.full_like(rest[:1], fill)])
-        return jnp.concatenate([start[None], padded[order]])
+        padded = xp.concatenate([rest, xp.full_like(rest[:1], fill)])
+        return xp.concatenate([start[None], padded[order]])
 
-    time = first(t0, log.t, jnp.inf)
+    time = first(t0, log.t, xp.inf)
     kept = first(contact, log.contact > 0.5, False)
-    steps = Steps(time, first(state, log.after, jnp.nan), kept, count + 1)
+    steps = Steps(time, first(state, log.after, xp.nan), kept, count + 1)
 
     hits = kinds(log, Row.IMPACT, Row.LAST_IMPACT)
-    number = jnp.sum(hits)
-    index = jnp.nonzero(hits, size=max_impacts, fill_value=0)[0]
-    real = jnp.arange(max_impacts) < number
-    t_hit = jnp.where(real, log.t[index], jnp.inf)
-    before = jnp.where(real[:, None], log.before[index], jnp.nan)
-    after = jnp.where(real[:, None], log.after[index], jnp.nan)
-    which = jnp.where(real, log.constraint[index], 0.0).astype(jnp.int32)
+    number = xp.sum(hits)
+    index = _places(xp, hits, max_impacts, 0)
+    real = xp.arange(max_impacts) < number
+    t_hit = xp.where(real, log.t[index], xp.inf)
+    before = xp.where(real[:, None], log.before[index], xp.nan)
+    after = xp.where(real[:, None], log.after[index], xp.nan)
+    which = xp.where(real, log.constraint[index], 0.0).astype(xp.int32)
     impacts = Impacts(
         t_hit,
         before,
@@ -54,30 +62,45 @@ def assemble(system, t0, state, contact, log: Log, sizes: tuple[int, int]) -> Pa
     )
 
     # a contact begins at the row after its last impact, and ends where its flag falls
-    began = jnp.concatenate([kept[:1], kept[1:] & ~kept[:-1]])
-    fell = jnp.concatenate([jnp.zeros_like(kept[:1]), kept[:-1] & ~kept[1:]])
-    fell = fell & (jnp.arange(rows + 1) <= count)[:, None]
+    began = xp.concatenate([kept[:1], kept[1:] & ~kept[:-1]])
+    fell = xp.concatenate([xp.zeros_like(kept[:1]), kept[:-1] & ~kept[1:]])
+    fell = fell & (xp.arange(rows + 1) <= count)[:, None]
     reached = time[count]
-    ends = jnp.where(fell, time[:, None], jnp.inf)
-    ends = jax.lax.cummin(ends, axis=0, reverse=True)
-    later = jnp.concatenate([time[1:], jnp.full_like(time[:1], jnp.inf)])
-    starts = jnp.where(jnp.arange(rows + 1) == 0, time, later)
+    ends = _least_to_come(xp, xp.where(fell, time[:, None], xp.inf))
+    later = xp.concatenate([time[1:], xp.full_like(time[:1], xp.inf)])
+    starts = xp.where(xp.arange(rows + 1) == 0, time, later)
     width = kept.shape[1]
-    flat = jnp.nonzero(began.ravel(), size=max_contacts, fill_value=0)[0]
+    flat = _places(xp, began.ravel(), max_contacts, 0)
     row, column = flat // width, flat % width
-    total = jnp.sum(began & (starts[:, None] < jnp.inf))
-    real = jnp.arange(max_contacts) < total
+    total = xp.sum(began & (starts[:, None] < xp.inf))
+    real = xp.arange(max_contacts) < total
     end = ends[row, column]
     contacts = Contacts(
-        jnp.where(real, starts[row], jnp.inf),
-        jnp.where(real, jnp.minimum(end, reached), jnp.inf),
-        real & (end < jnp.inf),
-        jnp.where(real, column, 0).astype(jnp.int32),
+        xp.where(real, starts[row], xp.inf),
+        xp.where(real, xp.minimum(end, reached), xp.inf),
+        real & (end < xp.inf),
+        xp.where(real, column, 0).astype(xp.int32),
         total,
     )
     return Parts(impacts, contacts, steps)
 
 
+def _places(xp: ModuleType, mask, size: int, fill: int):
+    """Where a mask holds: `size` indices, those that are missing `fill`."""
+    if xp is jnp:
+        return jnp.nonzero(mask, size=size, fill_value=fill)[0]
+    found = np.flatnonzero(mask)[:size]
+    return np.pad(found, (0, size - len(found)), constant_values=fill)
+
+
+def _least_to_come(xp: ModuleType, values):
+    """The smallest of each entry and all later ones, along the first axis."""
+    if xp is jnp:
+        return jax.lax.cummin(values, axis=0, reverse=True)
+    return np.minimum.accumulate(values[::-1])[::-1]
+
+
+@eqx.filter_jit
 def _speeds(system, times, states, which, real):
     speeds = jax.vmap(lambda t, x: normal_velocity(system, t, x))(times, states)
     picked = jnp.take_along_axis(speeds, which[:, None], axis=1)[:, 0]

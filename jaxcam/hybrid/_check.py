@@ -24,11 +24,11 @@ def check_start(system: HybridSystem, settings: Settings, t0, state, t1) -> None
         raise ValueError(
             f"state has shape {state.shape}; pass one vector, and jax.vmap for many"
         )
-    if not bool(jnp.all(jnp.isfinite(state))):
+    if not np.all(np.isfinite(state)):
         raise ValueError(
             f"state is {np.asarray(state).tolist()}; every component must be finite"
         )
-    if not (bool(jnp.isfinite(t0)) and bool(jnp.isfinite(t1))):
+    if not (np.isfinite(t0) and np.isfinite(t1)):
         raise ValueError("t0 and t1 must be finite times in seconds")
     if float(t1) < float(t0):
         raise ValueError(
@@ -36,14 +36,17 @@ def check_start(system: HybridSystem, settings: Settings, t0, state, t1) -> None
             "forward, so exchange them"
         )
     for leaf in jax.tree.leaves(eqx.filter(system, eqx.is_inexact_array)):
-        if not bool(jnp.all(jnp.isfinite(leaf))):
+        if not np.all(np.isfinite(leaf)):
             raise ValueError(
                 "a parameter of the system is not finite; print the system to see which"
             )
-    _check_shapes(system, t0, state)
+    signature = _signature(system, state)
+    if signature is None or signature not in _WELL_SHAPED:
+        _check_shapes(system, t0, state)
+        _WELL_SHAPED.add(signature)
     system.check()
     values = np.asarray(_gaps(system, t0, state))
-    size = 1.0 + float(jnp.max(jnp.abs(state)))
+    size = 1.0 + float(np.max(np.abs(state)))
     if not np.all(np.isfinite(values)):
         raise ValueError("the gap is not finite at t0; check the state and parameters")
     if np.min(values) < -1e-12 * size:
@@ -54,6 +57,22 @@ def check_start(system: HybridSystem, settings: Settings, t0, state, t1) -> None
 
 
 _gaps = eqx.filter_jit(gaps)
+
+# systems whose shapes were seen to fit: to look costs as much as a short batch
+_WELL_SHAPED: set = set()
+
+
+def _signature(system, state):
+    """All that the shapes of a system's functions can depend on; `None` if unknown."""
+    arrays, rest = eqx.partition(system, eqx.is_array)
+    shapes = tuple((leaf.shape, leaf.dtype) for leaf in jax.tree.leaves(arrays))
+    fixed, structure = jax.tree.flatten(rest)
+    signature = structure, tuple(fixed), shapes, state.shape
+    try:
+        hash(signature)
+    except TypeError:
+        return None
+    return signature
 
 
 def _check_shapes(system, t0, state) -> None:

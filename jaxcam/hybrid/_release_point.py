@@ -6,12 +6,9 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ._functions import Functions
+from ._normal import free_jet, gaps, normal_acceleration, normal_velocity
 from ._system import HybridSystem
-from ._types import RealScalar
-
-
-_ON = (True,)
+from ._types import RealScalar, State
 
 
 class ReleasePoint(eqx.Module):
@@ -30,7 +27,7 @@ def contact_state(system: HybridSystem, times, guess) -> Float[Array, "times n"]
 
     Gap and normal velocity zero fix it; found by Newton from `guess`, shape `(n,)`.
     """
-    return _contact(Functions(system, guess.shape[0]), jnp.asarray(times), guess)[0]
+    return _contact(system, jnp.asarray(times), guess)[0]
 
 
 def contact_acceleration(system: HybridSystem, times, guess) -> Float[Array, " times"]:
@@ -38,24 +35,29 @@ def contact_acceleration(system: HybridSystem, times, guess) -> Float[Array, " t
 
     The follower detaches where its maximum over the period is positive.
     """
-    return _contact(Functions(system, guess.shape[0]), jnp.asarray(times), guess)[1]
+    return _contact(system, jnp.asarray(times), guess)[1]
 
 
-def _contact(functions: Functions, times, guess):
+def _contact(system: HybridSystem, times, guess):
     """States and accelerations of contact: twelve steps of Newton at each time."""
 
     def one(t):
-        def newton(_, carry):
-            x, _ = carry
-            jets = functions.jets(t, x, _ON)
-            x = functions.onto(functions.frame(t, x), jets, x, _ON)
-            return x, jets[0].acceleration
-
-        start = tuple(guess[i] for i in range(guess.shape[0]))
-        x, acceleration = jax.lax.fori_loop(0, 12, newton, (start, jnp.zeros_like(t)))
-        return jnp.stack(x), acceleration
+        x = jax.lax.fori_loop(0, 12, lambda _, x: _onto(system, t, x), guess)
+        return x, normal_acceleration(system, t, x)[0]
 
     return jax.vmap(one)(times)
+
+
+def _onto(system: HybridSystem, t: RealScalar, x: State) -> State:
+    """One Newton step of the two states onto gap = normal velocity = 0."""
+
+    def both(y):
+        return gaps(system, t, y)[0], normal_velocity(system, t, y)[0]
+
+    gap, velocity = both(x)
+    (a, b), (c, d) = jax.jacfwd(both)(x)
+    step = jnp.stack([d * gap - b * velocity, a * velocity - c * gap])
+    return x - step / (a * d - b * c)
 
 
 def release_point(
@@ -70,11 +72,10 @@ def release_point(
     `t` with `holds` 1. `holds` is 2 where there is no contact at all in a period.
     """
     system = system.prepared()
-    functions = Functions(system, 2)
     guess = jnp.zeros(2) if guess is None else guess
     t = jnp.asarray(t, dtype=jnp.float64)
     grid = t - system.period * jnp.linspace(1.0, 0.0, samples + 1)
-    states, values = _contact(functions, grid, guess)
+    states, values = _contact(system, grid, guess)
     held = values[-1] < 0
     rises = (values[:-1] < 0) & (values[1:] >= 0)
     last = jnp.where(jnp.any(rises), samples - 1 - jnp.argmax(rises[::-1]), 0)
@@ -86,15 +87,14 @@ def release_point(
 
     def newton(_, carry):
         time, x = carry
-        jets = functions.jets(time, x, _ON)
-        slope = jnp.where(jets[0].jerk > 0, jets[0].jerk, jnp.inf)
-        moved = jnp.clip(time - jets[0].acceleration / slope, low, high)
-        x = functions.onto(functions.frame(time, x), jets, x, _ON)
-        return jnp.where(held, t, moved), x
+        _, _, acceleration, jerk = free_jet(system, time, x)[0]
+        slope = jnp.where(jerk > 0, jerk, jnp.inf)
+        moved = jnp.clip(time - acceleration / slope, low, high)
+        return jnp.where(held, t, moved), _onto(system, time, x)
 
     first = jnp.where(held, t, start)
     from_grid = jnp.where(held, states[-1], states[last])
-    time, x = jax.lax.fori_loop(0, 16, newton, (first, (from_grid[0], from_grid[1])))
+    time, x = jax.lax.fori_loop(0, 16, newton, (first, from_grid))
     never = ~held & ~jnp.any(rises)
     holds = jnp.where(never, 2.0, jnp.where(held, 1.0, 0.0))
-    return ReleasePoint(time, jnp.stack(x), holds)
+    return ReleasePoint(time, x, holds)

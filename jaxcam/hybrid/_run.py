@@ -32,22 +32,31 @@ class Log(NamedTuple):
     contact: Float[Array, "rows m"]
 
 
-def run(functions: Functions, plan: Plan, lane: Lane, rows: int) -> tuple[Lane, Log]:
+def run(
+    functions: Functions, plan: Plan, lane: Lane, rows: int, alone: bool = False
+) -> tuple[Lane, Log]:
     """Iterate until the lane has finished or the log is full.
 
     Forward mode only. Under `vmap` the iterations are shared by all lanes, so that one
-    row of the log is written for all of them at once.
+    row of the log is written for all of them at once. `alone` says that there is no
+    `vmap`.
     """
-    lane, log = run_raw(functions, plan, lane, rows, _row)
+    lane, log = run_raw(functions, plan, lane, rows, _row, alone=alone)
     return lane, _unpack(log, functions)
 
 
 def run_raw(
-    functions: Functions, plan: Plan, lane: Lane, rows: int, row, batch: bool = False
+    functions: Functions,
+    plan: Plan,
+    lane: Lane,
+    rows: int,
+    row,
+    batch: bool = False,
+    alone: bool = False,
 ):
     """`run` with a log of what `row` makes of each record: a list of scalars.
 
-    `batch` says that many lanes will be run by `vmap`.
+    `batch` says that many lanes will be run by `vmap`, `alone` that none will.
     """
     lane = jax.tree.map(jnp.asarray, lane)
 
@@ -55,7 +64,8 @@ def run_raw(
         lane, record = iterate(functions, plan, lane)
         return lane, jnp.stack(row(record))
 
-    keeping, kept = with_kept(body, lane)
+    # scalars of one lane are never computed twice, and to keep them costs compile time
+    keeping, kept = (_as_it_is(body), []) if alone else with_kept(body, lane)
     width = len(row(_empty_record(functions)))
     blocks = -(-rows // _BLOCK)
     log = jnp.zeros((blocks * _BLOCK, width))
@@ -77,6 +87,14 @@ def run_raw(
     _, last, log = loop(start)
     lane, kept = last
     return lane._replace(steps=depend_on(lane.steps, kept)), log
+
+
+def _as_it_is(body):
+    def whole(state):
+        lane, row = body(state[0])
+        return (lane, []), row
+
+    return whole
 
 
 def run_reversible(

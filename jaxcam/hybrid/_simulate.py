@@ -100,8 +100,7 @@ def simulate(
         log, contact, code = simulate_segments(
             system, settings, t_start, state, t1, budget, progress
         )
-        rows = log.kind.shape[0]
-        parts = _assemble(system, t_start, state, contact, log, (rows, rows))
+        parts = _assemble(system, t_start, state, contact, log)
         return Trajectory(system, settings, t0, t1, *_trim(parts), code)
     tableau_of(settings.solver)
     if traced or derivatives == "reverse":
@@ -117,8 +116,7 @@ def simulate(
         log, contact, code = _chunks(
             system, settings, t_start, state, t1, budget, progress
         )
-        rows = log.kind.shape[0]
-        parts = _assemble(system, t_start, state, contact, log, (rows, rows))
+        parts = _assemble(system, t_start, state, contact, log)
     return Trajectory(system, settings, t0, t1, *_trim(parts), code)
 
 
@@ -178,17 +176,21 @@ def _whole(system, settings, t0, state, t1, rows, derivatives):
 def _begin(system, settings, t0, state, t1, rows):
     functions, plan, lane = _prepare(system, settings, t0, state, t1)
     contact = jnp.stack(lane.contact)
-    lane, log = run(functions, plan, lane, rows)
+    lane, log = run(functions, plan, lane, rows, alone=True)
     return lane, log, contact
 
 
 @eqx.filter_jit
 def _go_on(system, settings, t0, state, t1, lane: Lane, rows):
     functions, plan, _ = _prepare(system, settings, t0, state, t1)
-    return run(functions, plan, lane, rows)
+    return run(functions, plan, lane, rows, alone=True)
 
 
-_assemble = eqx.filter_jit(assemble)
+def _assemble(system, t0, state, contact, log: Log) -> Parts:
+    """The parts of a run that is not traced."""
+    t0, state, contact, log = jax.tree.map(np.asarray, (t0, state, contact, log))
+    rows = log.kind.shape[0]
+    return assemble(system, t0, state, contact, log, (rows, rows), np)
 
 
 def _chunks(system, settings, t0, state, t1, budget, progress):
@@ -230,7 +232,7 @@ def _trim(parts: Parts) -> Parts:
         number = int(part.count)
         # in numpy: jax would compile a slice for every new length
         return jax.tree.map(
-            lambda a: jnp.asarray(np.asarray(a)[:number]) if a.ndim else a, part
+            lambda a: jnp.asarray(np.asarray(a)[:number] if a.ndim else a), part
         )
 
     return Parts(

@@ -57,18 +57,13 @@ class EccentricCircle(CamProfile):
         1e-13 rad. Inside `jax.jit` the values cannot be seen and nothing is raised;
         call `check` before.
         """
-        mean, cosines, sines = self._spectrum()
-        keep = self.harmonics
-        if is_concrete(cosines, sines):
-            tail = np.max(
-                np.sum(np.hypot(cosines[..., keep:], sines[..., keep:]), axis=-1)
+        mean, cosines, sines, left_out = _series(self)
+        if is_concrete(left_out) and not left_out <= _TAIL:
+            raise ValueError(
+                f"Raise `harmonics` of the cam profile: the {self.harmonics} kept now "
+                f"leave out up to {left_out:.1e} rad of it."
             )
-            if not tail <= _TAIL:
-                raise ValueError(
-                    f"Raise `harmonics` of the cam profile: the {keep} kept now leave "
-                    f"out up to {tail:.1e} rad of it."
-                )
-        return FourierProfile(mean, cosines[:keep], sines[:keep])
+        return FourierProfile(mean, cosines, sines)
 
     def check(self) -> None:
         """Raise `ValueError` for an impossible geometry or too few harmonics."""
@@ -93,11 +88,17 @@ class EccentricCircle(CamProfile):
             )
         self.prepared()
 
-    def _spectrum(self):
-        # four times the kept harmonics: what is folded back onto them by sampling is
-        # then far smaller than the first harmonic left out
-        points = max(64, 4 * self.harmonics)
-        angles = 2 * np.pi * np.arange(points) / points
-        spectrum = jnp.fft.rfft(self(jnp.asarray(angles, dtype=float))) / points
-        harmonics = spectrum[1 : points // 2]
-        return spectrum[0].real, 2 * harmonics.real, -2 * harmonics.imag
+
+@eqx.filter_jit
+def _series(circle: EccentricCircle):
+    """Mean, cosines and sines that are kept, and what the others add up to (rad)."""
+    keep = circle.harmonics
+    # four times the kept harmonics: what is folded back onto them by sampling is
+    # then far smaller than the first harmonic left out
+    points = max(64, 4 * keep)
+    angles = 2 * np.pi * np.arange(points) / points
+    spectrum = jnp.fft.rfft(circle(jnp.asarray(angles, dtype=float))) / points
+    harmonics = spectrum[1 : points // 2]
+    cosines, sines = 2 * harmonics.real, -2 * harmonics.imag
+    left_out = jnp.sum(jnp.hypot(cosines[keep:], sines[keep:]))
+    return spectrum[0].real, cosines[:keep], sines[:keep], left_out
