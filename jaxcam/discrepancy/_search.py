@@ -30,6 +30,8 @@ _KEPT, _TRIED = 3, 6
 _QUICK, _ITERATIONS = 15, 60
 # Subsets within this BIC of the best one may lead to a better one than it does
 _RIVAL = 50.0
+# Cost a sample, one where nothing but noise is left, of a fit that explains the data
+_EXPLAINED = 1.2
 # Standard deviations of what is known of a rig beyond which its fit went astray
 _FAR = 3.0
 
@@ -104,7 +106,9 @@ class Search:
             for k, names in enumerate(order):
                 said = " and ".join(sorted(names)).replace("_", " ")
                 self.progress(f"fitting {said}", k / len(order))
-                self._attempt(names, promised[names][1])
+                start = promised[names][1]
+                if self._settles(start, self._attempt(names, start)):
+                    break
             found = [t for n, t in self.trials.items() if len(n) == size]
             lowest = min((t.fit.cost for t in self.trials.values()), default=math.inf)
             kept = sorted(found, key=_bic)[:_KEPT]
@@ -114,6 +118,19 @@ class Search:
                 break
             best = self._better(best, kept[0])
         return self._swapped(self._smallest(best))
+
+    def _settles(self, start: Trial, trial: Trial | None) -> bool:
+        """Whether a subset explains what the one that promised it could not.
+
+        What the other one promises of further subsets is then worth little; this one's
+        own quadratic model tells which of them are as good, and these are fitted.
+        """
+        enough = _EXPLAINED * self.problem.samples
+        if trial is None or not trial.fit.cost < enough < start.fit.cost:
+            return False
+        for names in self._exchanges(trial, _RIVAL):
+            self._attempt(names, trial)
+        return True
 
     def _promised(
         self, kept: Sequence[Trial], best: Trial
@@ -178,8 +195,9 @@ class Search:
             best = self._smallest(found)
         return best
 
-    def _exchanges(self, best: Trial) -> list[frozenset[str]]:
-        """Subsets that the quadratic model about the best fit finds as good."""
+    def _exchanges(self, best: Trial, worse: float = 0.0) -> list[frozenset[str]]:
+        """Subsets that the quadratic model about the best fit finds as good, or `worse`
+        by that much BIC at most."""
         blocks = self.blocks(best)
         information, score = blocks.total()
         free = blocks.rows(self.parameters(best.names))
@@ -200,7 +218,7 @@ class Search:
                 rows = np.union1d(rest, blocks.rows(new))
                 change = top + cost - gain(information, moved, rows)
                 extra = self.count([term.name]) - self.count([out])
-                if change + extra * math.log(self.problem.samples) < 0:
+                if change + extra * math.log(self.problem.samples) < worse:
                     found.append((best.names - {out}) | {term.name})
         return found[:_TRIED]
 
