@@ -1,7 +1,9 @@
 """Commands that are stopped at any time, or started twice: nothing is lost or mixed."""
 
+import json
 import os
 import random
+import shutil
 import signal
 import subprocess
 import sys
@@ -12,6 +14,7 @@ import numpy as np
 import pytest
 
 import continuation
+from jaxcam.data import DEMO_RIG
 from jaxcam.sweeps import load
 
 
@@ -48,7 +51,7 @@ def start(line: str, out: Path, *more: str) -> subprocess.Popen:
 
 def finish(process: subprocess.Popen) -> str:
     """The error stream of a process that ends well."""
-    _, errors = process.communicate(timeout=300)
+    _, errors = process.communicate(timeout=600)
     assert process.returncode == 0, errors
     return errors
 
@@ -119,7 +122,7 @@ def test_two_on_one_folder(whole, tmp_path):
     while not (out / STORED[name]).exists() and first.poll() is None:
         time.sleep(0.05)
     second = start(LINES[name], out, "--resume")
-    _, errors = second.communicate(timeout=300)
+    _, errors = second.communicate(timeout=600)
     alone = first.poll() is not None
     finish(first)
     if second.returncode == 2:
@@ -129,3 +132,42 @@ def test_two_on_one_folder(whole, tmp_path):
         # it came when the first had gone
         assert alone and second.returncode == 0, errors
     assert same(content(name, out), wanted)
+
+
+@pytest.mark.slow
+def test_a_diagnosis_that_is_killed_goes_on(tmp_path):
+    """Names as without interruption, parameters to a thousandth of their errors.
+
+    Beside it a second one on the same folder says what is the matter.
+    """
+    case = tmp_path / "case"
+    case.mkdir()
+    for name in ("rig.toml", "run2_146.0rpm.csv.gz", "run3_158.0rpm.csv.gz"):
+        shutil.copy(DEMO_RIG / name, case)
+    line = f"diagnose {case} --no-predict"
+    begin = time.monotonic()
+    finish(start(line, tmp_path / "whole"))
+    alone = time.monotonic() - begin
+    out = tmp_path / "out"
+    process = start(line, out)
+    while not list((out / "fits").glob("*.npz")) and process.poll() is None:
+        time.sleep(0.05)
+    second = start(line, out, "--resume")
+    _, errors = second.communicate(timeout=600)
+    (sentence,) = errors.splitlines()
+    assert second.returncode == 2 and "another jaxcam is writing" in sentence
+    # some way into the fits
+    time.sleep(random.Random(4).uniform(0.1, 0.3) * alone)
+    process.kill()
+    process.communicate(timeout=60)
+    assert process.returncode == -signal.SIGKILL
+    assert list((out / "fits").glob("*.npz"))
+    finish(start(line, out, "--resume"))
+    assert not (out / "fits").exists()
+    files = [out, tmp_path / "whole"]
+    again, whole = (json.loads((f / "verdict.json").read_text()) for f in files)
+    assert again["verdict"] == whole["verdict"]
+    names = [[one["name"] for one in found["effects"]] for found in (again, whole)]
+    assert names[0] == names[1]
+    for name, one in whole["rig"].items():
+        assert abs(again["rig"][name]["value"] - one["value"]) <= 1e-3 * one["stderr"]
