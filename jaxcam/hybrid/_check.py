@@ -41,9 +41,10 @@ def check_start(system: HybridSystem, settings: Settings, t0, state, t1) -> None
                 "a parameter of the system is not finite; print the system to see which"
             )
     signature = _signature(system, state)
-    if signature is None or signature not in _WELL_SHAPED:
+    if signature not in _WELL_SHAPED:
         _check_shapes(system, t0, state)
-        _WELL_SHAPED.add(signature)
+        if signature is not None:
+            _WELL_SHAPED.add(signature)
     system.check()
     values = np.asarray(_gaps(system, t0, state))
     size = 1.0 + float(np.max(np.abs(state)))
