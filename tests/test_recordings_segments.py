@@ -246,3 +246,30 @@ def test_hops_as_low_as_the_noise_are_not_contact(rpm):
     true = (truths[0].angle - gaps[0])[rested]
     cam = found[0].surface.angle(found[0].drive.angle[rested])
     assert np.max(np.abs(cam - true)) < 0.5 * noise
+
+
+@pytest.mark.parametrize("rpm", [155.0, 156.25])
+def test_no_flight_begins_before_the_one_ahead_has_landed(rpm):
+    """A hop of some noise may land as the cam recedes: there is no release then.
+
+    Parts follow each other in time, and a flight's samples are, within two of them, no
+    earlier than its beginning.
+    """
+    rng = np.random.default_rng(3)
+    rig = read_rig(DEMO_RIG / "rig.toml")
+    runs = []
+    for number, speed in enumerate((rpm, 158.0)):
+        truth = simulate_rig(RIG, speed * math.pi / 30, 2.0, settle=6.0)
+        turned = truth.turned - 2 * np.pi * np.floor(truth.turned[0] / (2 * np.pi))
+        cam = measure(turned, rig.sensors.cam_noise, 20000, rng)
+        angle = measure(truth.angle, rig.sensors.follower_noise, 40000, rng)
+        channels = {"cam_angle_rad": cam, "follower_angle_rad": angle}
+        runs.append(Recording(f"run{number}", truth.time, channels))
+    part = segment_case(runs, rig)[0]
+    both = sorted((*part.flights, *part.contacts), key=lambda one: one.first)
+    for one, following in zip(both, both[1:]):
+        assert one.start.time <= one.stop.time <= following.start.time + 1e-12
+    for flight in part.flights[1:]:
+        assert part.recording.time[flight.first] >= flight.start.time - 1e-3
+    slow = [c for c in part.contacts if c.stop.kind == "impact"]
+    assert slow and all(not np.any(part.resting(contact)) for contact in slow)

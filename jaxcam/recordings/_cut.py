@@ -53,11 +53,14 @@ def cut(
             boundaries[first] = _landing(motion, first, before[first])
         if last in after:
             end = next(stop for start, stop in spans if start == last)
-            boundaries[last] = _release(motion, first, last, end)
+            release = _release(motion, first, last, end)
+            latest = float(motion.time[(last + end) // 2])
+            boundaries[last] = _not_before(boundaries.get(first), release, latest)
     for place in (0, len(motion.time)):
         boundaries[place] = _end(motion, place, "the record ends here")
 
-    flights = [_flight(motion, span, boundaries) for span in spans]
+    left = {last for _, last in resting}
+    flights = [_flight(motion, span, boundaries, left) for span in spans]
     contacts = [
         _contact(motion, span, boundaries, flights, restitution) for span in resting
     ]
@@ -159,7 +162,22 @@ def _release(motion: Motion, first: int, last: int, end: int) -> Boundary:
     return Boundary(time, stderr, "release", evidence)
 
 
-def _flight(motion: Motion, span, boundaries) -> Flight:
+def _not_before(landing: Boundary | None, release: Boundary, latest) -> Boundary:
+    """The release, unless the follower may still have been landing by then.
+
+    A low hop that lands as the surface recedes bounces at once, too low to be seen. The
+    flight begins at `latest` (s) in any case.
+    """
+    if landing is None or landing.kind != "landing":
+        return release
+    late = landing.time + 2 * landing.stderr
+    if release.time > late:
+        return release
+    evidence = "bounces too low to be seen may last until here"
+    return Boundary(min(late, latest), landing.stderr, "impact", evidence)
+
+
+def _flight(motion: Motion, span, boundaries, left: set[int]) -> Flight:
     first, last = clear_of_end(motion, span)
     start, stop = (boundaries[place] for place in span)
     hidden = "an impact may hide between here and the end of the record"
@@ -168,7 +186,7 @@ def _flight(motion: Motion, span, boundaries) -> Flight:
     height = float(np.max(motion.gap[first:last]))
     # the threshold is passed long after release: give those samples to the flight
     begin = int(np.searchsorted(motion.time, start.time))
-    first = begin if start.kind == "release" else first
+    first = begin if span[0] in left and start is boundaries[span[0]] else first
     return Flight(start, stop, first, last, height)
 
 
@@ -185,8 +203,9 @@ def _contact(motion, span, boundaries, flights, restitution) -> Contact:
     if before and start.kind == "landing":
         settled = settling_time(before[0], restitution)
     end = int(np.searchsorted(motion.time, stop.time))
-    last = min(last, end) if stop.kind == "release" else last
-    return Contact(start, stop, first, last, min(settled, stop.time))
+    last = last if stop.kind == "end of record" else end
+    settled = stop.time if stop.kind == "impact" else min(settled, stop.time)
+    return Contact(start, stop, first, last, settled)
 
 
 def settling_time(flight: Flight, restitution: float) -> float:
