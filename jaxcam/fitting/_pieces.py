@@ -110,7 +110,10 @@ def spans(segments: Segments) -> tuple[list[Span], list[Span]]:
     rested = []
     for number, contact in enumerate(segments.contacts):
         rows = np.flatnonzero(segments.resting(contact) & valid)
-        for block in np.array_split(rows, max(1, -(-len(rows) // _PIECE))):
+        # by time: where little of a contact is beyond doubt, samples lie far apart
+        whole = np.arange(rows[0], rows[-1] + 1) if len(rows) else rows
+        for stretch in np.array_split(whole, max(1, -(-len(whole) // _PIECE))):
+            block = np.intersect1d(stretch, rows, assume_unique=True)
             if len(block):
                 a, b = float(time[block[0]]), float(time[block[-1]])
                 rested.append(Span(a, max(b, a + interval), block, FREE, number))
