@@ -14,13 +14,13 @@ import resource
 import subprocess
 import sys
 import tempfile
-import time
 from pathlib import Path
 
 from benchmarks import _timing
 
 
-CORE = _timing.pin()
+# not where another process of these benchmarks imports this module
+CORE = _timing.pin() if __name__ == "__main__" else None
 
 import equinox as eqx
 import jax
@@ -31,7 +31,7 @@ import typer
 from benchmarks import _workloads
 from jaxcam.hybrid import _refilled_lanes, stroboscope
 from jaxcam.models import CamFollower, rpm_to_rad_s
-from jaxcam.sweeps import basins, cluster, diagram, Grid
+from jaxcam.sweeps import basins, diagram, Grid
 
 
 def rig() -> CamFollower:
@@ -44,11 +44,6 @@ def states_at_145(side: int) -> Grid:
     """The states of workload W2 as cells of a grid."""
     low = _workloads.contact_angle(0.0) + 0.001
     return Grid((low, -3.0), (low + 0.249, 3.0), (side, side))
-
-
-def all_cores() -> None:
-    for thread in os.listdir("/proc/self/task"):
-        os.sched_setaffinity(int(thread), range(os.cpu_count() or 1))
 
 
 def swept_to(work):
@@ -108,50 +103,87 @@ def kept(repeats: int, side: int) -> None:
 
 def idle_slots(call) -> float:
     """Part of the attempts that the compiled loop made without a lane in the slot."""
-    slots, steps, whole = [], [], _refilled_lanes._some
+    slots, steps, compiled = [], [], _refilled_lanes.compiled_look
 
-    def counting(*arguments):
-        lane, rows = arguments[6], arguments[7]
-        made = whole(*arguments)
-        slots.append(rows * len(np.asarray(lane.status)))
-        steps.append(np.sum(np.asarray(made[0].steps) - np.asarray(lane.steps)))
-        return made
+    def counted(start, rows, row):
+        look, place = compiled(start, rows, row), start.slots.rows.steps
 
-    _refilled_lanes._some = counting
+        def looking(own, shared, numbers):
+            made, log = look(own, shared, numbers)
+            slots.append(rows * len(log))
+            steps.append(np.sum(np.asarray(made)[place] - np.asarray(numbers)[place]))
+            return made, log
+
+        return looking
+
+    _refilled_lanes.compiled_look = counted
     try:
         call()
     finally:
-        _refilled_lanes._some = whole
+        _refilled_lanes.compiled_look = compiled
     return float(1 - np.sum(steps) / np.sum(slots))
 
 
-def two_cores(side: int, repeats: int, on_cluster: bool) -> None:
-    """Wall time with one and two threads, and with one and two Dask workers."""
-    all_cores()
-    system, grid = rig(), states_at_145(side)
-
-    def run(**options):
-        basins(system, grid, 30, keep=12, reruns=0, block=8, **options)
-
-    def fastest(**options):
-        run(**options)
-        spent = []
-        for _ in range(repeats):
-            started = time.perf_counter()
-            run(**options)
-            spent.append(time.perf_counter() - started)
-        return min(spent)
-
-    one, two = fastest(workers=1), fastest(workers=2)
-    print(f"\ntwo threads: {one / two:.2f} times one ({one:.2f} s, {two:.2f} s)")
-    if not on_cluster:
-        return
+_TWO_CORES = """
+import os, sys, threading, time
+os.sched_setaffinity(0, range(os.cpu_count()))
+import numba
+from benchmarks.sweeps import rig, states_at_145
+from jaxcam.sweeps import basins, cluster
+side, repeats, on_cluster = int(sys.argv[1]), int(sys.argv[2]), sys.argv[3] == "True"
+@numba.njit(nogil=True)
+def spin(number):
+    total = 0.0
+    for k in range(number):
+        total += (k % 7) * 1e-3
+    return total
+def clock(work):
     spent = []
-    for workers in (1, 2):
-        with cluster("local", workers) as executor:
-            spent.append(fastest(executor=executor))
-    one, two = spent
-    print(f"two Dask workers: {one / two:.2f} times one ({one:.2f} s, {two:.2f} s)")
+    for _ in range(repeats + 1):
+        started = time.perf_counter()
+        work()
+        spent.append(time.perf_counter() - started)
+    return min(spent[1:])
+def threads(number):
+    some = [threading.Thread(target=spin, args=(300_000_000,)) for _ in range(number)]
+    [one.start() for one in some]
+    [one.join() for one in some]
+def swept(**options):
+    grid = states_at_145(side)
+    basins(rig(), grid, 30, keep=12, reruns=0, block=side // 4, **options)
+def say(what, one, two, work=1):
+    print(f"{what}: {work * one / two:.2f} times one ({one:.2f} s, {two:.2f} s)")
+if __name__ == "__main__":
+    one, two = clock(lambda: threads(1)), clock(lambda: threads(2))
+    say("two empty loops in two threads, the work of", one, two, 2)
+    say("two threads", *(clock(lambda: swept(workers=w)) for w in (1, 2)))
+    if on_cluster:
+        spent = []
+        for workers in (1, 2):
+            with cluster("local", workers) as executor:
+                spent.append(clock(lambda: swept(executor=executor)))
+        say("two Dask workers", *spent)
+"""
+
+
+def two_cores(side: int, repeats: int, on_cluster: bool) -> None:
+    """Wall time on one core and on two, in a process that is not pinned.
+
+    XLA makes as many threads as it finds cores when it starts. The first line is what
+    the machine itself gives at the time.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        script = Path(folder) / "two_cores.py"
+        script.write_text(_TWO_CORES)
+        numbers = [str(side), str(repeats), str(on_cluster)]
+        found = subprocess.run(
+            [sys.executable, str(script), *numbers],
+            capture_output=True,
+            text=True,
+            check=True,
+            env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+        )
+    print("\n" + found.stdout.rstrip())
 
 
 _SCALE = """
@@ -196,7 +228,7 @@ def main(
     """Print all tables; `--side 64` makes them smaller, `--largest 1000000` longer."""
     print(f"core {CORE}, jax {jax.__version__}")
     kept(repeats, side)
-    two_cores(side, repeats, cluster)
+    two_cores(2 * side, repeats, cluster)
     scale(largest)
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     print(f"\npeak of this process: {peak:.0f} MB")

@@ -271,7 +271,7 @@ def _first(batched, shared, length, states, t0, turns, settings):
     return eqx.filter_vmap(one, in_axes=(eqx.if_array(0), 0))(batched, states)
 
 
-def _row(record):
+def _row(record, _):
     head = [record.kind, record.constraint, record.t]
     flags = [jnp.asarray(c, dtype=jnp.float64) for c in record.contact]
     return [jnp.asarray(v) for v in (*head, *record.before, *record.after, *flags)]

@@ -112,6 +112,7 @@ def advance_lane(plan: Plan, lane: Lane, attempt: Attempt) -> Lane:
         status=_status(plan, lane, attempt, failures),
         steps=lane.steps + jnp.where(active, 1.0, 0.0),
         impacts=lane.impacts + jnp.where(good & attempt.lands, 1.0, 0.0),
+        chatters=lane.chatters + jnp.where(good & attempt.begins, 1.0, 0.0),
     )
 
 

@@ -33,6 +33,8 @@ class Lane(NamedTuple):
     status: Any
     steps: Any
     impacts: Any
+    # impacts after which the rest of a chatter was summed
+    chatters: Any
 
 
 def first_lane(functions: Functions, t0, x, t1) -> Lane:
@@ -80,4 +82,5 @@ def first_lane(functions: Functions, t0, x, t1) -> Lane:
         status=RUNNING * one,
         steps=0.0 * one,
         impacts=0.0 * one,
+        chatters=0.0 * one,
     )

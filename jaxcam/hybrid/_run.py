@@ -1,6 +1,6 @@
 """Running the loop: a batch-friendly while loop, or a scan that can be transposed."""
 
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import equinox.internal as eqxi
 import jax
@@ -32,16 +32,19 @@ class Log(NamedTuple):
     contact: Float[Array, "rows m"]
 
 
+#: how many lanes `vmap` will run together: no `vmap` at all, a few, or a wide batch
+Company = Literal["one", "few", "many"]
+
+
 def run(
-    functions: Functions, plan: Plan, lane: Lane, rows: int, alone: bool = False
+    functions: Functions, plan: Plan, lane: Lane, rows: int, company: Company = "few"
 ) -> tuple[Lane, Log]:
     """Iterate until the lane has finished or the log is full.
 
     Forward mode only. Under `vmap` the iterations are shared by all lanes, so that one
-    row of the log is written for all of them at once. `alone` says that there is no
-    `vmap`.
+    row of the log is written for all of them at once.
     """
-    lane, log = run_raw(functions, plan, lane, rows, _row, alone=alone)
+    lane, log = run_raw(functions, plan, lane, rows, _row, company)
     return lane, _unpack(log, functions)
 
 
@@ -51,22 +54,21 @@ def run_raw(
     lane: Lane,
     rows: int,
     row,
-    batch: bool = False,
-    alone: bool = False,
+    company: Company = "few",
 ):
-    """`run` with a log of what `row` makes of each record: a list of scalars.
+    """`run` with a log of what `row(record, lane)` makes of each attempt: scalars.
 
-    `batch` says that many lanes will be run by `vmap`, `alone` that none will.
+    It is compiled in the way that is best in this `company`.
     """
     lane = jax.tree.map(jnp.asarray, lane)
 
     def body(lane):
         lane, record = iterate(functions, plan, lane)
-        return lane, jnp.stack(row(record))
+        return lane, jnp.stack(row(record, lane))
 
     # scalars of one lane are never computed twice, and to keep them costs compile time
-    keeping, kept = (_as_it_is(body), []) if alone else with_kept(body, lane)
-    width = len(row(_empty_record(functions)))
+    keeping, kept = (_as_it_is(body), []) if company == "one" else with_kept(body, lane)
+    width = len(row(_empty_record(functions), lane))
     blocks = -(-rows // _BLOCK)
     log = jnp.zeros((blocks * _BLOCK, width))
 
@@ -82,7 +84,8 @@ def run_raw(
 
     start = (jnp.asarray(0, jnp.int32), (lane, kept), log)
     loop = one_kernel(
-        lambda start: jax.lax.while_loop(unfinished, several, start), batch
+        lambda start: jax.lax.while_loop(unfinished, several, start),
+        batch=company == "many",
     )
     _, last, log = loop(start)
     lane, kept = last
@@ -110,7 +113,7 @@ def run_reversible(
 
     def one(lane, _):
         lane, record = iterate(functions, plan, lane)
-        return lane, jnp.stack(_row(record))
+        return lane, jnp.stack(_row(record, lane))
 
     @jax.checkpoint
     def many(lane, _):
@@ -126,7 +129,7 @@ def _empty_record(functions: Functions) -> Record:
     return Record(zero, zero, zero, state, state, (zero,) * functions.m)
 
 
-def _row(record: Record) -> list:
+def _row(record: Record, _: Lane) -> list:
     flags = [jnp.asarray(c, dtype=jnp.float64) for c in record.contact]
     head = [record.kind, record.constraint, record.t]
     return [jnp.asarray(v) for v in head] + [*record.before, *record.after, *flags]

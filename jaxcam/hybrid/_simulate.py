@@ -176,14 +176,14 @@ def _whole(system, settings, t0, state, t1, rows, derivatives):
 def _begin(system, settings, t0, state, t1, rows):
     functions, plan, lane = _prepare(system, settings, t0, state, t1)
     contact = jnp.stack(lane.contact)
-    lane, log = run(functions, plan, lane, rows, alone=True)
+    lane, log = run(functions, plan, lane, rows, "one")
     return lane, log, contact
 
 
 @eqx.filter_jit
 def _go_on(system, settings, t0, state, t1, lane: Lane, rows):
     functions, plan, _ = _prepare(system, settings, t0, state, t1)
-    return run(functions, plan, lane, rows, alone=True)
+    return run(functions, plan, lane, rows, "one")
 
 
 def _assemble(system, t0, state, contact, log: Log) -> Parts:

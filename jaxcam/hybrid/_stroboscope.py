@@ -10,14 +10,15 @@ import numpy as np
 
 from ._check import check_start
 from ._normal import gaps
-from ._refilled_lanes import run_refilled, split_lanes
+from ._refilled_lanes import run_refilled
 from ._settings import Settings
+from ._slots import split_lanes
 from ._system import HybridSystem, with_array_parameters
 from ._turn_samples import TurnSamples
 
 
 # lanes of a group over lanes of a block
-_GROUP = 16
+_GROUP = 64
 
 
 class Stroboscope(eqx.Module):
@@ -47,7 +48,7 @@ def stroboscope(
     period: float | None = None,
     settings: Settings | None = None,
     block: int = 128,
-    rows: int = 96,
+    rows: int = 64,
     max_steps: int = 1_000_000,
     workers: int = 1,
     progress: Callable[[float], None] | None = None,
@@ -118,7 +119,7 @@ def stroboscope(
         seen = TurnSamples(len(states[some]), turns, skip, states.shape[1])
         shape = (start, length, turns, settings, width, rows, max_steps)
         ends = run_refilled(system, where, part, states[some], *shape, seen)
-        return seen.states[:-1], *ends, *seen.counts()
+        return seen.states, *ends, *seen.counts()
 
     pieces = []
     with ThreadPoolExecutor(workers) as pool:

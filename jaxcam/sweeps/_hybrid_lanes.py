@@ -9,8 +9,8 @@ import numpy as np
 
 from ..hybrid import HybridSystem
 from ..hybrid._normal import gaps
-from ..hybrid._refilled_lanes import split_lanes
 from ..hybrid._release_point import contact_state
+from ..hybrid._slots import split_lanes
 from ..hybrid._system import with_array_parameters
 from ._samples import BEHIND
 
@@ -19,12 +19,10 @@ from ._samples import BEHIND
 _WIDTHS = ((32, 16), (512, 64), (sys.maxsize, 1 << 16))
 
 
-def rows_between_looks(width: int, turns: int) -> int:
+def rows_between_looks(width: int) -> int:
     """Attempts between two looks at the lanes: few are wasted, and looks are rare."""
     # few lanes gain from fewer looks at them
-    if width < 16:
-        return 1024
-    return 64 if turns < 64 else 128
+    return 1024 if width < 16 else 64
 
 
 def smallest_gaps(system: HybridSystem, t0, states, where=None, values=None):

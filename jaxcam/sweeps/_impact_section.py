@@ -53,7 +53,7 @@ class ImpactSection(AbstractSystemSection):
 
         def run(states, values, width):
             seen = _Impacts(len(states), keep, n)
-            rows = rows_between_looks(width, turns)
+            rows = rows_between_looks(width)
             shape = (t0, period, turns, settings, width, rows, self.max_steps, seen)
             _, _, code = run_refilled(system, where, values, states, *shape)
             return *seen.found(), code
@@ -76,13 +76,12 @@ class _Impacts:
     """The last impacts of each lane, in a ring, and its state at the last stop."""
 
     def __init__(self, lanes: int, keep: int, n: int):
-        # one more than there are lanes, for slots that have none
-        self._ring = np.full((lanes + 1, keep, 2 + n), np.nan)
-        self._number = np.zeros(lanes + 1, dtype=int)
-        self._final = np.full((lanes + 1, n), np.nan)
+        self._ring = np.full((lanes, keep, 2 + n), np.nan)
+        self._number = np.zeros(lanes, dtype=int)
+        self._final = np.full((lanes, n), np.nan)
 
     @staticmethod
-    def row(record):
+    def row(record, _):
         return [jnp.asarray(v) for v in (record.kind, record.t, *record.after)]
 
     def take(self, work, log) -> None:
@@ -93,15 +92,16 @@ class _Impacts:
         # row by row, so that the latest is what stays in a place
         place = work[who], rank[who, row] % self._ring.shape[1]
         self._ring[place] = log[who, row]
-        self._number[work] += hit.sum(axis=1)
+        # slots that do not run show a lane of another slot
+        np.add.at(self._number, work, hit.sum(axis=1))
         who, row = np.nonzero(kind == Row.STOP)
         self._final[work[who]] = log[who, row, 2:]
 
     def found(self):
         keep = self._ring.shape[1]
-        number = self._number[:-1]
+        number = self._number
         # the newest impact goes last; a ring that is not full starts with NaN
         order = (number[:, None] + np.arange(keep)) % keep
-        rows = np.take_along_axis(self._ring[:-1], order[..., None], axis=1)
+        rows = np.take_along_axis(self._ring, order[..., None], axis=1)
         rests = (rows[..., 0] == float(Row.LAST_IMPACT)).astype(float)
-        return rows[..., 2:], rows[..., 1], rests, self._final[:-1]
+        return rows[..., 2:], rows[..., 1], rests, self._final

@@ -48,7 +48,7 @@ class Stroboscopic(AbstractSystemSection):
                 period=self.period,
                 settings=self.settings,
                 block=width,
-                rows=rows_between_looks(width, turns),
+                rows=rows_between_looks(width),
                 max_steps=self.max_steps,
             )
             return made.states, made.hits, made.rests, made.code

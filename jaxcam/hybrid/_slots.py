@@ -1,0 +1,172 @@
+"""Many lanes as one matrix of numbers, and the compiled loop that works on it.
+
+A look at the lanes is a call with few arrays, which costs a tenth of one with a whole
+system and fifty leaves of a lane: with 64 lanes, as much as the loop itself.
+"""
+
+import functools
+from collections.abc import Callable, Hashable
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from ._advance import Plan
+from ._functions import Functions
+from ._lane import first_lane, Lane
+from ._run import run_raw
+
+
+# starts that are computed at once, over lanes that run at once
+_AT_ONCE = 16
+
+
+class Slots(NamedTuple):
+    """Where the numbers of a lane stand among the rows of a matrix, and their types."""
+
+    rows: Lane
+    dtypes: tuple
+
+    def unpacked(self, numbers) -> Lane:
+        """The lane whose numbers these are."""
+        leaves = [
+            number.astype(dtype)
+            for number, dtype in zip(numbers, self.dtypes, strict=True)
+        ]
+        return jax.tree.unflatten(jax.tree.structure(self.rows), leaves)
+
+
+def packed(lane: Lane):
+    """All numbers of a lane (or of many) as rows of 64-bit floats."""
+    return jnp.stack([jnp.asarray(leaf, jnp.float64) for leaf in jax.tree.leaves(lane)])
+
+
+def slots_of(lane: Lane) -> Slots:
+    leaves, structure = jax.tree.flatten(lane)
+    rows = jax.tree.unflatten(structure, range(len(leaves)))
+    return Slots(rows, tuple(leaf.dtype for leaf in leaves))
+
+
+class Start(NamedTuple):
+    """Lanes as they start, one column each, and what they are run with."""
+
+    slots: Slots
+    numbers: np.ndarray
+    #: parts of system and plan that differ from lane to lane, one row each
+    own: Any
+    shared: Any
+    static: Any
+
+
+def start_lanes(
+    system, where, values, states, t0, period, turns, settings, width
+) -> Start:
+    """The start of lanes; `width` of them will run at a time."""
+    pieces, count = [], len(states)
+    # filled up, so that two compiled programs serve all numbers of lanes
+    part_size = width if count <= 2 * width else _AT_ONCE * width
+    for first in range(0, count, part_size):
+        some = np.minimum(np.arange(first, first + part_size), count - 1)
+        part = None if values is None else values[some]
+        batched, shared = split_lanes(system, where, part)
+        state = jnp.asarray(states[some])
+        pieces.append(_start(batched, shared, period, t0, turns, settings, state))
+    slots, _, _, rest = pieces[0]
+    shared, static = eqx.partition(rest, eqx.is_array)
+    joined = functools.partial(_joined, [own for _, _, own, _ in pieces])
+    numbers = np.concatenate([numbers for _, numbers, _, _ in pieces], axis=1)
+    return Start(slots, numbers[:, :count], joined(), shared, static)
+
+
+def _joined(trees):
+    return jax.tree.map(lambda *parts: np.concatenate(parts), *trees)
+
+
+def compiled_look(start: Start, rows: int, row: Callable):
+    """The compiled loop: `(own, shared, numbers)` to numbers and log.
+
+    It makes `rows` attempts in each slot; `row` is that of `run_raw`.
+    """
+    leaves, structure = jax.tree.flatten(start.static)
+    # 1, 1.0 and True are equal, and different programs
+    key = tuple((type(leaf), leaf) for leaf in leaves)
+    flat, lane = jax.tree.flatten(start.slots.rows)
+    return _look(key, structure, lane, tuple(flat), start.slots.dtypes, rows, row)
+
+
+@functools.lru_cache(maxsize=256)
+def _look(
+    key: tuple[tuple[type, Hashable], ...], structure, lane, flat, dtypes, rows, row
+):
+    static = jax.tree.unflatten(structure, [leaf for _, leaf in key])
+    slots = Slots(jax.tree.unflatten(lane, flat), dtypes)
+
+    def one(own, shared, numbers):
+        system, plan = eqx.combine(own, shared, static)
+        lane = slots.unpacked(numbers)
+        functions = Functions(system, len(lane.x))
+        lane, log = run_raw(functions, plan, lane, rows, row, "many")
+        return packed(lane), log
+
+    mapped = jax.vmap(one, in_axes=(0, None, 1), out_axes=(1, 0))
+    # the widest vectors that the machine has; XLA is shy of them by default
+    return jax.jit(mapped, compiler_options={"xla_cpu_prefer_vector_width": 512})
+
+
+def split_lanes(system, where, values):
+    """The system as a batched and a shared part for `filter_vmap`."""
+    if where is None:
+        return None, system
+    nothing = jax.tree.map(lambda _: False, system)
+    picked = eqx.tree_at(where, nothing, replace_fn=lambda _: True)
+    values = jnp.asarray(values)
+    several = isinstance(where(system), tuple)
+    full = eqx.tree_at(where, system, tuple(values.T) if several else values)
+    return eqx.partition(full, picked)
+
+
+@eqx.filter_jit
+def _start(batched, shared, period, t0, turns, settings, states):
+    """Slots and numbers; system and plan, by whether a leaf has a row for each lane."""
+
+    def prepared(batched):
+        system = eqx.combine(batched, shared).prepared()
+        length = system.period if period is None else period
+        t1 = t0 + turns * length
+        plan = Plan.of(system, settings, t0, t1, period=length, stop_period=length)
+        return system, plan
+
+    if batched is None:
+        rest = prepared(None)
+        own = jax.tree.map(lambda _: None, rest)
+    else:
+        ready = eqx.filter_vmap(prepared, in_axes=(eqx.if_array(0),))(batched)
+        differs = _depends(prepared, jax.tree.map(lambda p: p[0], batched))
+        own, rest = eqx.partition(ready, differs)
+        rest = jax.tree.map(lambda p: p[0] if eqx.is_array(p) else p, rest)
+    found = []
+
+    def first(own, state):
+        system, plan = eqx.combine(own, rest)
+        x = tuple(state[i] for i in range(state.shape[0]))
+        lane = first_lane(Functions(system, len(x)), t0, x, plan.t1)
+        found.append(slots_of(lane))
+        return packed(lane)
+
+    numbers = jax.vmap(first, in_axes=(0, 0), out_axes=1)(own, states)
+    return found[0], numbers, own, rest
+
+
+def _depends(function: Callable, argument):
+    """Of each leaf of the result, whether it depends on the argument."""
+    result = eqx.filter_eval_shape(function, argument)
+    closed = jax.make_jaxpr(lambda a: eqx.filter(function(a), eqx.is_array))(argument)
+    known = {id(v) for v in closed.jaxpr.invars}
+    for equation in closed.jaxpr.eqns:
+        if any(id(v) in known for v in equation.invars):
+            known |= {id(v) for v in equation.outvars}
+    found = iter([id(v) in known for v in closed.jaxpr.outvars])
+    is_array = lambda leaf: isinstance(leaf, jax.ShapeDtypeStruct)  # noqa: E731
+    return jax.tree.map(lambda leaf: next(found) if is_array(leaf) else False, result)
