@@ -1,11 +1,13 @@
 """The report of a diagnosis: complete in itself, the sentence first."""
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
-from jaxcam.cli._diagnose_page import diagnosis_page, draw
+from jaxcam.cli._diagnose_page import _shapes, _UNITS, diagnosis_page, draw
 from jaxcam.cli._output import to_text
 from jaxcam.discrepancy import Diagnosis, Effect, Structure, Value
+from jaxcam.discrepancy._shapes import shapes
 from jaxcam.fitting import Residuals
 
 
@@ -85,3 +87,16 @@ def test_the_page_is_complete(tmp_path, verdict, effects):
     assert "One caveat." in page
     assert ("viscous damping" in page) == bool(effects)
     assert '"verdict"' in to_text(found.to_json())
+
+
+def test_shapes_are_drawn_with_units_on_both_axes():
+    figure = _shapes(plt, _diagnosis("none", ()))
+    axes = figure.axes[0]
+    assert axes.get_xlabel() == "position (rad)"
+    assert axes.get_ylabel() == "force (rad/s²)"
+    plt.close(figure)
+
+
+def test_every_shape_has_a_quantity_whose_unit_is_known():
+    offered = shapes((0.2, 0.4), (-1.0, 1.0), (0.0, 2.0), 4.0)
+    assert {one.variable for one in offered} == set(_UNITS)

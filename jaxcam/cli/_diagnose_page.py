@@ -17,10 +17,19 @@ from ._page import _figure, _split, _STYLE, _table
 matplotlib.use("Agg")
 
 from ..plotting import save_figure, style
+from ..plotting._labels import labelled
 from ..plotting._style import CONTACT, FLIGHT, IMPACT, RECORDED
 
 
 _BINS = 36
+# of what shapes depend on
+_UNITS = {
+    "position": "rad",
+    "velocity": "rad/s",
+    "approach speed": "rad/s",
+    "phase": "rad",
+    "time": "s",
+}
 
 
 def draw(folder: Path, found: Diagnosis) -> list[tuple[Path, str]]:
@@ -140,10 +149,15 @@ def _shapes(plt, found: Diagnosis):
         _band(axis, before[name], RECORDED, "textbook")
         _band(axis, after[name], IMPACT, "found")
         axis.axhline(0.0, color="k", lw=0.6)
-        axis.set_title(name.replace("_", " "), fontsize=9)
-        axis.set_xlabel(before[name].variable, fontsize=8)
-        axis.set_ylabel(before[name].unit, fontsize=8)
-    axes.flat[0].legend(fontsize=7)
+        one, what = before[name], name.split("_")[0]
+        axis.set_title(name.replace("_", " "), fontsize=11)
+        axis.set_xlabel(labelled(one.variable, _UNITS.get(one.variable, "-")))
+        axis.set_ylabel(labelled(what, one.unit.replace("^2", "²")))
+        axis.xaxis.label.set_size(10)
+        axis.yaxis.label.set_size(10)
+        axis.tick_params(labelsize=10)
+    handles, labels = axes.flat[0].get_legend_handles_labels()
+    figure.legend(handles, labels, ncols=2, loc="outside upper right")
     return figure
 
 
@@ -165,6 +179,8 @@ def _ranking(plt, found: Diagnosis):
     names = [name.replace("_", " ").replace("+", " + ") for name, _ in pairs]
     axis.barh(names, [max(delta, 0.1) for _, delta in pairs], color=FLIGHT)
     axis.set_xscale("log")
+    # from the same value in every report, so that a single bar has a scale too
+    axis.set_xlim(0.05, max(1e2, 2 * max(delta for _, delta in pairs)))
     axis.invert_yaxis()
     axis.set_xlabel("BIC above that of the verdict")
     return figure
