@@ -64,5 +64,10 @@ assert min(abs(np.array(found) - fold)) < 1e-9
 # Stable parts are drawn solid, unstable ones dashed.
 
 fig, ax = plt.subplots()
-branch_diagram(branch, ax, x_label=("position of the wall", "-"), y_label=("y", "-"))
+branch_diagram(
+    branch,
+    ax,
+    x_label=("position of the wall", "-"),
+    y_label=("position once a period", "-"),
+)
 plt.show()

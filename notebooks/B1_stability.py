@@ -85,7 +85,12 @@ with style():
     figure, (left, right) = plt.subplots(
         1, 2, figsize=(10, 4), width_ratios=(3, 2), layout="constrained"
     )
-branch_diagram(branch, left, x_label=("position of the wall", "-"), y_label=("y", "-"))
+branch_diagram(
+    branch,
+    left,
+    x_label=("position of the wall", "-"),
+    y_label=("position once a period", "-"),
+)
 drawn = multipliers(along, right, reach=2.0)
 # -
 
@@ -129,10 +134,12 @@ with style():
         points = np.array([p.parameters for p in curve.points])
         ax.plot(points[:, 1], points[:, 0], label=kind)
         exact = np.array([closed_form(w)[kind] for w in points[:, 1]])
-        ax.plot(points[:, 1], exact, "k.", markersize=3)
+        name = "closed forms" if kind == "flip" else None
+        ax.plot(points[:, 1], exact, "k.", markersize=3, label=name)
         print(f"{kind}: largest error {abs(points[:, 0] - exact).max():.1e}")
         assert abs(points[:, 0] - exact).max() < 1e-8
     ax.set_xlabel("frequency of the forcing (-)")
     ax.set_ylabel("position of the wall (-)")
-    ax.legend()
+    ax.text(2.55, -0.7, "stable")
+    ax.legend(loc="center right")
 plt.show()

@@ -8,7 +8,7 @@
 
 # # B5. Fit a rig
 #
-# Three recordings ship with the package: two seconds each of a cam-follower rig at
+# Three recordings ship with the package: four seconds each of a cam-follower rig at
 # three speeds, through noisy encoders. We fit its spring, its cam and its restitution,
 # ask what the recordings cannot tell, and what the error of a number is worth when the
 # model lacks something. (The recordings were simulated, by code that shares nothing
@@ -95,10 +95,10 @@ again = fitting.bootstrap(found, 12)
 print("times the noise left before and after:", left(before), left(found))
 # -
 
-# Two to four times the noise: something is missing. The standard errors know only the
-# noise, so they are too small. The bootstrap, which weights flights at random, says so
-# for some; but no error bar tells of parameters that have taken over the part of what
-# is missing, as the spring has here.
+# More than the noise in every record, and four times it in one: something is missing.
+# The standard errors know only the noise, so they are too small. The bootstrap, which
+# weights flights at random, says so for some; but no error bar tells of parameters that
+# have taken over the part of what is missing, as the spring has here.
 
 # ## With friction in the hinge
 
@@ -151,6 +151,6 @@ with style():
     ax.plot(curve.values, curve.cost, "o", label="profile")
     ax.axvline(real.damping, color="black", lw=0.8, label="truth")
     ax.axhline(3.84, color="black", lw=0.8, ls=":", label="95 %")
-    ax.set(xlabel="damping of the hinge (1/s)", ylabel="cost above the best fit")
+    ax.set(xlabel="damping of the hinge (1/s)", ylabel="cost above the best fit (-)")
     ax.legend()
 plt.show()

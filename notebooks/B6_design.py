@@ -154,12 +154,15 @@ with style():
         2, 1, figsize=(6.4, 5.2), sharex=True, layout="constrained"
     )
     degrees = np.rad2deg(fine)
-    above.plot(degrees, before, label="circle")
-    above.plot(degrees, after, label="new cam")
+    lines = {
+        name: panel.plot(degrees, torque, label=name)[0]
+        for name, torque in torques.items()
+    }
+    # a cam has one colour in both panels
+    for name, lifted in (("circle", before), ("new cam", after)):
+        above.plot(degrees, lifted, color=lines[name].get_color(), label=name)
     above.set_ylabel("follower angle (rad)")
     above.legend()
-    for name, torque in torques.items():
-        panel.plot(degrees, torque, label=name)
     panel.axhline(0.0, color="black", lw=0.8)
     panel.set(xlabel="angle of the cam (deg)", ylabel="torque at 135 rpm (N m)")
     panel.set_xticks(np.arange(0, 361, 60))
