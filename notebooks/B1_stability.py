@@ -21,7 +21,7 @@ import numpy as np
 import continuation
 import variational
 from jaxcam.models import ImpactOscillator
-from jaxcam.plotting import branch_diagram, multipliers, style
+from jaxcam.plotting import branch_diagram, multipliers, special_curves, style
 
 
 # -
@@ -130,16 +130,18 @@ def closed_form(w, r=0.8):
 
 with style():
     figure, ax = plt.subplots(layout="constrained")
-    for kind, curve in curves.items():
-        points = np.array([p.parameters for p in curve.points])
-        ax.plot(points[:, 1], points[:, 0], label=kind)
-        exact = np.array([closed_form(w)[kind] for w in points[:, 1]])
-        name = "closed forms" if kind == "flip" else None
-        ax.plot(points[:, 1], exact, "k.", markersize=3, label=name)
-        print(f"{kind}: largest error {abs(points[:, 0] - exact).max():.1e}")
-        assert abs(points[:, 0] - exact).max() < 1e-8
-    ax.set_xlabel("frequency of the forcing (-)")
-    ax.set_ylabel("position of the wall (-)")
-    ax.text(2.55, -0.7, "stable")
-    ax.legend(loc="center right")
+for kind, curve in curves.items():
+    points = np.array([p.parameters for p in curve.points])
+    exact = np.array([closed_form(w)[kind] for w in points[:, 1]])
+    name = "closed forms" if kind == "flip" else None
+    ax.plot(exact, points[:, 1], "k.", markersize=3, zorder=3, label=name)
+    print(f"{kind}: largest error {abs(points[:, 0] - exact).max():.1e}")
+    assert abs(points[:, 0] - exact).max() < 1e-8
+ax.text(-0.9, 2.6, "stable")
+drawn = special_curves(
+    curves.values(),
+    ax,
+    x_label=("position of the wall", "-"),
+    y_label=("frequency of the forcing", "-"),
+)
 plt.show()
