@@ -27,6 +27,9 @@ from ._rig import Rig
 # What remains of a cam besides its geometry: run-out, bearings, a bent shaft (rad)
 _HARMONICS = (2, 3)
 _HARMONIC_SIZE = 2e-4
+# What the zero of the cam's angle may be off, and what a sensor that lags by half a
+# millisecond makes of it (rad)
+_PHASE_SIZE = 1e-2
 # Least tolerance given to a length (m): a rig file may state none.
 _LEAST_TOLERANCE = 2e-4
 # Half-widths (rad) of the band around the surface in which samples count as contact,
@@ -38,12 +41,14 @@ class Surface(eqx.Module):
     """Contact angle (rad) as a function of the cam's angle: geometry and harmonics.
 
     - `profile`: the eccentric circle that fits best.
+    - `phase`: how far ahead of its measured angle the cam seems to be (rad).
     - `cosines`, `sines`: amplitudes of harmonics 2 and 3 on top of it (rad).
-    - `covariance`: of radius, eccentricity, centre and amplitudes together.
+    - `covariance`: of radius, eccentricity, centre, phase and amplitudes together.
     - `sense`: -1 for a clockwise cam; the angle given is counted as it turns.
     """
 
     profile: EccentricCircle
+    phase: Float[Array, ""]
     cosines: Float[Array, " harmonics"]
     sines: Float[Array, " harmonics"]
     covariance: Float[Array, " p p"]
@@ -51,7 +56,7 @@ class Surface(eqx.Module):
 
     def __call__(self, turned: Float[Array, "*k"]) -> Float[Array, "*k"]:
         order = jnp.asarray(_HARMONICS, dtype=float)
-        angle = self.sense * jnp.asarray(turned)
+        angle = self.sense * (jnp.asarray(turned) + self.phase)
         phases = jnp.multiply.outer(angle, order)
         extra = jnp.cos(phases) @ self.cosines + jnp.sin(phases) @ self.sines
         return self.profile(angle) + extra
@@ -79,7 +84,7 @@ def nominal_surface(rig: Rig) -> Surface:
     zero = jnp.zeros(len(_HARMONICS))
     sense = -1.0 if rig.cam_rotation == "clockwise" else 1.0
     covariance = jnp.diag(jnp.asarray(_prior_sizes(rig)) ** 2)
-    return Surface(rig.profile(), zero, zero, covariance, sense)
+    return Surface(rig.profile(), jnp.zeros(()), zero, zero, covariance, sense)
 
 
 def fit_surface(
@@ -220,30 +225,33 @@ def _prior_sizes(rig: Rig) -> np.ndarray:
         rig.cam_center_y.tolerance,
     ]
     harmonics = np.full(2 * len(_HARMONICS), _HARMONIC_SIZE)
-    return np.concatenate([np.maximum(geometry, _LEAST_TOLERANCE), harmonics])
+    geometry = np.maximum(geometry, _LEAST_TOLERANCE)
+    return np.concatenate([geometry, [_PHASE_SIZE], harmonics])
 
 
 def _vector(surface: Surface) -> np.ndarray:
     p = surface.profile
     geometry = [p.radius + p.half_height, p.eccentricity, p.center_x, p.center_y]
-    return np.concatenate([np.array(geometry), surface.cosines, surface.sines])
+    parts = [np.array([*geometry, surface.phase]), surface.cosines, surface.sines]
+    return np.concatenate(parts)
 
 
 def _with_vector(surface: Surface, vector) -> Surface:
     # only the sum of radius and half height is seen; the radius takes it
     radius = vector[0] - surface.profile.half_height
-    cosines, sines = jnp.split(vector[4:], 2)
+    cosines, sines = jnp.split(vector[5:], 2)
     return eqx.tree_at(
         lambda s: (
             s.profile.radius,
             s.profile.eccentricity,
             s.profile.center_x,
             s.profile.center_y,
+            s.phase,
             s.cosines,
             s.sines,
         ),
         surface,
-        (radius, vector[1], vector[2], vector[3], cosines, sines),
+        (radius, vector[1], vector[2], vector[3], vector[4], cosines, sines),
     )
 
 
