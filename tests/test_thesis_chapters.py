@@ -1,13 +1,15 @@
 """Chapters 2, 3, 5 and 6 beside their printed numbers: labels, diagrams, theory."""
 
+from types import SimpleNamespace
+
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
 from jaxcam.cli._reproduce_figures import DRAWINGS
-from jaxcam.models import preset
-from jaxcam.thesis import reproduce, TARGETS
+from jaxcam.models import preset, rpm_to_rad_s
+from jaxcam.thesis import _chapter_5_diagrams, reproduce, TARGETS
 from jaxcam.thesis._chapter_2_sliding import grazing_in_closed_form, sliding_events
 from jaxcam.thesis._chapter_5_motions import CASES
 from jaxcam.thesis._frame import frame
@@ -57,6 +59,21 @@ def test_results_are_kept_by_the_values_of_the_parameters(calibrated):
     values = [slow(faster, "a"), slow(again, "a"), slow(faster, "b")]
     assert values == [20.0] * 3 and calls == ["a", "b"]
     assert slow(calibrated, "a") != 20.0
+
+
+def test_a_run_that_failed_is_no_end_of_sticking(monkeypatch):
+    """Of Figure 5.11: beside P(inf,1), its speed is neither before nor behind it."""
+    speeds = rpm_to_rad_s(np.linspace(152.6, 152.7, 6))
+    labels = ["P(inf,1)", "P(inf,1)", "failed", "P(25,1)", "aperiodic", "failed"]
+    made = SimpleNamespace(values=speeds, labels=np.array(labels)[:, None])
+    monkeypatch.setattr(_chapter_5_diagrams, "onset", lambda system, size: made)
+    end = SimpleNamespace(speed=speeds[3])
+    monkeypatch.setattr(_chapter_5_diagrams, "interruption", lambda system: end)
+    table = _chapter_5_diagrams.figure_5_11(None, "default")  # pyright: ignore
+    computed = table.set_index("quantity")["computed"]
+    assert computed["first speed without P(inf,1)"] == pytest.approx(152.66)
+    assert computed["part of the speeds behind it that repeat"] == 0.5
+    assert computed["speeds at which the run failed"] == 2
 
 
 @pytest.mark.slow

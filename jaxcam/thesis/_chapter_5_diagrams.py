@@ -107,9 +107,11 @@ def figure_5_11(system: CamFollower, size: str) -> "pd.DataFrame":
     made = onset(system, size)
     speeds = np.asarray(rad_s_to_rpm(made.values))
     labels = made.labels[:, 0]
-    sticks = labels == "P(inf,1)"
-    first = speeds[~sticks].min() if np.any(~sticks) else _NAN
-    behind = labels[speeds >= first]
+    # a run that failed says nothing of its speed
+    known = labels != "failed"
+    other = known & (labels != "P(inf,1)")
+    first = speeds[other].min() if np.any(other) else _NAN
+    behind = labels[known & (speeds >= first)]
     repeats = np.char.startswith(behind.astype(str), "P(")
     changes = int(np.count_nonzero(np.diff(repeats.astype(int))))
     exact = rad_s_to_rpm(interruption(system).speed)
@@ -119,6 +121,7 @@ def figure_5_11(system: CamFollower, size: str) -> "pd.DataFrame":
             ("interruption", INTERRUPTION, exact, "rpm"),
             ("part of the speeds behind it that repeat", _NAN, np.mean(repeats), ""),
             ("changes between windows and chaos", _NAN, changes, ""),
+            ("speeds at which the run failed", _NAN, np.count_nonzero(~known), ""),
         ]
     )
 
