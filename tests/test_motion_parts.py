@@ -282,7 +282,7 @@ def test_the_earliest_of_several():
 def contact(a0, s0, a1, s1, *, h=0.1, room=np.inf, completing=False) -> Verdict:
     """Verdict on pressures `a` at the ends of a step and their rates per step `s`."""
     ends = (jet(0, 0, a, s / h if h else s) for a, s in ((a0, s0), (a1, s1)))
-    rest = (jnp.asarray(h), jnp.asarray(1.0), jnp.asarray(room))
+    rest = map(jnp.asarray, (h, 1.0, 1e-15, room))
     return judge_contact(*ends, *rest, jnp.asarray(completing))
 
 
@@ -317,6 +317,16 @@ def test_contact_lets_go_close_to_the_root(late):
     assert float(found.offset) == pytest.approx(late, rel=1e-6)
     assert bool(contact(*before, room=5e-10).lands) == (late < 0)
     assert not contact(*before, completing=True).lands
+
+
+@pytest.mark.parametrize("top, kept", [(0.0, True), (1e-9, True), (1e-5, False)])
+def test_contact_that_only_touches_zero_is_kept(top, kept):
+    """The hop of a pull up to `top` would be some top^2 high; rounding hides 1e-15."""
+    t = Polynomial([0.0, 1.0])
+    pressure = top - 0.5 * (t - 0.07) ** 2
+    slope = 0.1 * pressure.deriv()
+    found = contact(pressure(0.0), slope(0.0), pressure(0.1), slope(0.1))
+    assert bool(found.retake) != kept and not found.lands
 
 
 def test_contact_that_is_pulled_at_once_lets_go():

@@ -176,3 +176,18 @@ def test_hops_before_a_release_do_not_sink_into_the_surface():
     made = jaxcam.simulate(system, start, time, time + 40 * period)
     assert made.successful, made.result
     assert np.min(np.asarray(made.gap(made.steps.time))) >= -1e-14
+
+
+@pytest.mark.parametrize("damping", [0.0, 0.1])
+def test_contact_whose_force_touches_zero_goes_on(damping):
+    """At rest on a wall at exactly -1 the forcing lets go for an instant, every turn.
+
+    A hop of no height once ended the run at the first of them. With a wall a millionth
+    closer there are six releases in 40 s (at pi + 2 k pi), with one a millionth further
+    away there is none.
+    """
+    for wall, releases in ((-1.0, 0), (-1.0 - 1e-6, 0), (-1.0 + 1e-6, 6)):
+        system = ImpactOscillator(1.0, 0.1, wall, damping)
+        found = jaxcam.simulate(system, jnp.array([wall, 0.0]), 0.0, 40.0)
+        assert found.successful, found.result
+        assert int(found.contacts.count) == releases + 1

@@ -153,7 +153,15 @@ def _iterate(functions: Functions, plan: Plan, lane: Lane) -> tuple[Lane, Record
         [
             _where_free(
                 lane.contact[k],
-                judge_contact(lane.jets[k], jets3[k], h, scale, room, lane.completing),
+                judge_contact(
+                    lane.jets[k],
+                    jets3[k],
+                    h,
+                    scale,
+                    rounding[k],
+                    room,
+                    lane.completing,
+                ),
             )
             for k in range(m)
         ]
@@ -168,6 +176,8 @@ def _iterate(functions: Functions, plan: Plan, lane: Lane) -> tuple[Lane, Record
 
     # the lane after the step
     went = [released & (held.constraint == k) for k in range(m)]
+    # who only touches zero still presses
+    pressing = sticking & good & ~lands & ~released & ~lane.completing
     contact4 = tuple(
         (contact[k] | (begins & hit[k])) & ~went[k] & active for k in range(m)
     )
@@ -179,7 +189,15 @@ def _iterate(functions: Functions, plan: Plan, lane: Lane) -> tuple[Lane, Record
             jnp.where(
                 went[k],
                 0.0,
-                jnp.where(begins & hit[k], chatter.acceleration, jets3[k].acceleration),
+                jnp.where(
+                    begins & hit[k],
+                    chatter.acceleration,
+                    jnp.where(
+                        pressing & lane.contact[k],
+                        jnp.minimum(jets3[k].acceleration, 0.0),
+                        jets3[k].acceleration,
+                    ),
+                ),
             ),
             jnp.where(begins & hit[k], chatter.rate, jets3[k].jerk),
         )

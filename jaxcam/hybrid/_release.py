@@ -11,13 +11,16 @@ from ._gap_polynomial import end_curvature, Jet
 _CLOSE = 1e-7
 
 
-def judge_contact(left: Jet, right: Jet, h, scale, room, completing) -> Verdict:
+def judge_contact(
+    left: Jet, right: Jet, h, scale, rounding, room, completing
+) -> Verdict:
     """Judge the step of one constraint in contact.
 
     The multiplier (the acceleration a that contact suppresses) is negative while the
     constraint presses. Inside the step it is the cubic through values and rates at
     both ends, trusted up to what the trapezoidal rule misses. `scale` is the length of
-    a step that errors alone would allow.
+    a step that errors alone would allow, `rounding` the gap that cannot be told from
+    zero.
     """
     a0, a1 = left.acceleration, right.acceleration
     s0, s1 = h * left.jerk, h * right.jerk
@@ -28,15 +31,20 @@ def judge_contact(left: Jet, right: Jet, h, scale, room, completing) -> Verdict:
     slope = jnp.where(rises, right.jerk, 1.0)
     straight = -a1 / slope
     inverse = jnp.where(h > 0, 1.0, 0.0) / jnp.where(h > 0, h, 1.0)
-    bend = straight * end_curvature(left, right, inverse) / (2 * slope)
+    curvature = end_curvature(left, right, inverse)
+    bend = straight * curvature / (2 * slope)
     # so small over the short time left that the first correction is enough
     offset = straight * (1 - jnp.where(jnp.abs(bend) < 0.01, bend, 0.0))
     now = passed & (h == 0)
     near = rises & (jnp.abs(offset) <= _CLOSE * scale)
-    lets_go = ((near & (offset <= room)) | now) & ~completing
+    # a multiplier that only touches zero: no hop would come out of rounding
+    curved = jnp.where(curvature < 0, -curvature, 1.0)
+    peak = a1 + right.jerk**2 / (2 * curved)
+    touches = (curvature < 0) & (8 * peak**2 <= rounding * curved)
+    lets_go = ((near & ~touches & (offset <= room)) | now) & ~completing
     # short of its end a step that only might have let go is halved
     suspect = inside & ~passed & (left.acceleration < 0)
-    retake = (passed | suspect) & ~lets_go & ~completing
+    retake = (passed | suspect) & ~lets_go & ~touches & ~completing
     length = jnp.where(
         retake, h * jnp.where(passed, _root(a0, s0, a1, s1), 0.5), jnp.inf
     )
