@@ -276,7 +276,7 @@ def test_no_flight_begins_before_the_one_ahead_has_landed(rpm):
 
 
 def test_a_sensor_that_lags_shifts_the_phase_of_the_cam():
-    """With a lag of one sample the profile is the true one, later by what the cam turns.
+    """With a lag of one sample the profile is the true one, later by what it turns.
 
     Known to half the noise where it was touched.
     """

@@ -40,7 +40,7 @@ def mend(recording: Recording, *, bridge: int = _BRIDGE) -> Mended:
     channels = dict(recording.channels)
     for name in channels:
         if name.endswith("_rad"):
-            channels[name] = _unslipped(recording, name, notes)
+            channels[name] = _unslipped(recording, name, bridge, notes)
         elif name.endswith("_rad_s"):
             _count_saturated(recording, name, notes)
     whole = dataclasses.replace(recording, channels=channels)
@@ -53,12 +53,16 @@ def mend(recording: Recording, *, bridge: int = _BRIDGE) -> Mended:
     return Mended(tuple(pieces), tuple(notes))
 
 
-def _unslipped(recording: Recording, name: str, notes) -> Float[np.ndarray, " k"]:
+def _unslipped(
+    recording: Recording, name: str, bridge: int, notes
+) -> Float[np.ndarray, " k"]:
     samples = recording.channels[name]
     steps = np.diff(samples)
     # what the motion itself does between two samples, by the neighbours
     usual = np.median(steps)
     turns = np.round((steps - usual) / (2 * np.pi))
+    # across a gap at which the recording is split, the drive itself turns on
+    turns[np.diff(recording.time) > (bridge + 1.5) * recording.interval] = 0
     places = np.flatnonzero(turns)
     if not len(places):
         return samples
@@ -123,7 +127,9 @@ def _bridged(recording: Recording, bridge: int, notes) -> list[Recording]:
 def _even(recording: Recording, rows, name: str, interval: float) -> Recording:
     """One piece with the dropped samples put in by cubic interpolation."""
     time = recording.time[rows]
-    places = np.round((time - time[0]) / interval).astype(int)
+    # step by step: samples that come early or late do not add up to others
+    ticks = np.maximum(np.round(np.diff(time) / interval).astype(int), 1)
+    places = np.concatenate([[0], np.cumsum(ticks)])
     count = places[-1] + 1
     if count == len(rows):
         channels = {c: v[rows] for c, v in recording.channels.items()}

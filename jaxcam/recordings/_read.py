@@ -11,6 +11,7 @@ import numpy as np
 
 from ._binary_table import read_mat, read_parquet
 from ._check import check_channels, check_drive, find_gaps
+from ._clock import unrounded
 from ._errors import RecordingError
 from ._mend import mend, Mended
 from ._recording import Case, Recording
@@ -72,7 +73,7 @@ def read_recordings(
     speed = _nominal_speed(file)
     recordings = []
     for name, rows in runs.items():
-        time = columns["time_s"][rows]
+        time = unrounded(columns["time_s"][rows])
         values = {c: v[rows] for c, v in columns.items() if c != "time_s"}
         label = f"{file}: {name}" if split else str(file)
         if gaps == "mend":
