@@ -4,6 +4,7 @@ import json
 import math
 import re
 import shlex
+from pathlib import Path
 
 import equinox as eqx
 import jax
@@ -70,6 +71,18 @@ def test_examples_in_the_help_name_options_that_exist():
         _, name, *arguments = shlex.split(line)
         context = commands[name].make_context(name, arguments)
         assert context.params
+
+
+def test_the_shipped_recordings_have_a_name(tmp_path, monkeypatch):
+    """A folder of the user's that has the same name is the user's."""
+    monkeypatch.chdir(tmp_path)
+    for command in ("fit", "diagnose"):
+        made = get_command(app).commands[command]  # pyright: ignore
+        assert made.make_context(command, ["demo"]).params["case"] == DEMO_RIG
+        other = made.make_context(command, ["./runs"]).params["case"]
+        assert other == Path("runs")
+    (tmp_path / "demo").mkdir()
+    assert made.make_context("fit", ["demo"]).params["case"] == Path("demo")
 
 
 def test_ball_as_in_closed_form(tmp_path):

@@ -42,10 +42,9 @@ def diagnose(
 
     \b
     Examples:
-      jaxcam diagnose ./case --rig rig.toml --out ./jaxcam-diagnosis
-      jaxcam diagnose ./case --json -
-      jaxcam diagnose ./case --next --out ./jaxcam-diagnosis
-      jaxcam diagnose ./case --out ./jaxcam-diagnosis --resume
+      jaxcam diagnose demo --out ./jaxcam-diagnosis
+      jaxcam diagnose demo --json -
+      jaxcam diagnose demo --next --out ./jaxcam-next
     """
     from ._choices import choose
 

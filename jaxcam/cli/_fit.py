@@ -35,7 +35,7 @@ def fit(
 
     \b
     Examples:
-      jaxcam fit ./case --rig rig.toml --json fitted.json --out ./jaxcam-fit
+      jaxcam fit demo --json fitted.json --out ./jaxcam-fit
       jaxcam simulate --system fitted.json --speed 140
     """
     from ._choices import choose

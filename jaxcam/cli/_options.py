@@ -5,6 +5,7 @@ from typing import Annotated, TypeAlias
 
 import typer
 
+from ..data import DEMO_RIG
 from ._choices import SYSTEMS
 
 
@@ -60,7 +61,12 @@ Resume: TypeAlias = Annotated[
     typer.Option("--resume", help="Go on with what a stopped run left in DIR."),
 ]
 Case: TypeAlias = Annotated[
-    Path, typer.Argument(metavar="CASE", help="A folder of recordings of one rig.")
+    Path,
+    typer.Argument(
+        metavar="CASE",
+        help="A folder of recordings of one rig; demo: the one that is shipped.",
+        callback=lambda case: _shipped(case),
+    ),
 ]
 RigFile: TypeAlias = Annotated[
     Path | None, typer.Option(metavar="FILE", help="The rig; CASE/rig.toml without.")
@@ -72,3 +78,8 @@ Gaps: TypeAlias = Annotated[
         help="Faulty runs: mend them (dropped samples, slips), refuse, or split.",
     ),
 ]
+
+
+def _shipped(case: Path) -> Path:
+    """The folder; `demo` is that of the package where there is none of that name."""
+    return DEMO_RIG if str(case) == "demo" and not case.exists() else case
