@@ -16,6 +16,8 @@ from ._problem import Problem
 
 # a combination is seen if the data narrow it to this part of the tolerance
 _SEEN = 0.5
+# Squared share of a parameter in a direction that rounding may make
+_ROUNDING = 1e-12
 # two relative changes are the same to this part
 _SAME = 0.05
 # members of a combination that are named: at least this part of the largest
@@ -146,7 +148,9 @@ def identify(
     with np.errstate(divide="ignore", invalid="ignore"):
         stderr = 1 / np.sqrt(values)
         alone = 1 / np.sqrt(np.maximum(np.diag(information), 0.0))
-        spread = np.where(directions**2 > 1e-20, directions**2, 0.0)
+        # a direction of which nothing is known is itself known to rounding only
+        dead = ~np.isfinite(stderr)[:, None]
+        spread = np.where(dead & (directions**2 < _ROUNDING), 0.0, directions**2)
         weighted = np.where(spread > 0, spread * stderr[:, None] ** 2, 0.0)
         together = np.sqrt(np.sum(weighted, axis=0))
     labels = tuple(

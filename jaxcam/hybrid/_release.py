@@ -31,16 +31,19 @@ def judge_contact(
     slope = jnp.where(rises, right.jerk, 1.0)
     straight = -a1 / slope
     inverse = jnp.where(h > 0, 1.0, 0.0) / jnp.where(h > 0, h, 1.0)
-    curvature = end_curvature(left, right, inverse)
-    bend = straight * curvature / (2 * slope)
+    bend = straight * end_curvature(left, right, inverse) / (2 * slope)
     # so small over the short time left that the first correction is enough
     offset = straight * (1 - jnp.where(jnp.abs(bend) < 0.01, bend, 0.0))
     now = passed & (h == 0)
     near = rises & (jnp.abs(offset) <= _CLOSE * scale)
-    # a multiplier that only touches zero: no hop would come out of rounding
-    curved = jnp.where(curvature < 0, -curvature, 1.0)
+    # a multiplier that only touches zero: no hop would come out of rounding. Its rate
+    # falls by a half at least, which rounding cannot make it do over a short step
+    falls = (left.jerk > 0) & (2 * right.jerk <= left.jerk) & (h > 0)
+    curved = jnp.where(falls, left.jerk - right.jerk, 1.0) * jnp.where(
+        h > 0, inverse, 1.0
+    )
     peak = a1 + right.jerk**2 / (2 * curved)
-    touches = (curvature < 0) & (8 * peak**2 <= rounding * curved)
+    touches = falls & (8 * peak**2 <= rounding * curved)
     lets_go = ((near & ~touches & (offset <= room)) | now) & ~completing
     # short of its end a step that only might have let go is halved
     suspect = inside & ~passed & (left.acceleration < 0)

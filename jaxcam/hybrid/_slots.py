@@ -75,13 +75,10 @@ def start_lanes(
         pieces.append(_start(batched, shared, period, t0, turns, settings, state))
     slots, _, _, rest = pieces[0]
     shared, static = eqx.partition(rest, eqx.is_array)
-    joined = functools.partial(_joined, [own for _, _, own, _ in pieces])
     numbers = np.concatenate([numbers for _, numbers, _, _ in pieces], axis=1)
-    return Start(slots, numbers[:, :count], joined(), shared, static)
-
-
-def _joined(trees):
-    return jax.tree.map(lambda *parts: np.concatenate(parts), *trees)
+    each = [own for _, _, own, _ in pieces]
+    own = jax.tree.map(lambda *parts: np.concatenate(parts), *each)
+    return Start(slots, numbers[:, :count], own, shared, static)
 
 
 def compiled_look(start: Start, rows: int, row: Callable):
