@@ -248,6 +248,17 @@ def test_hops_as_low_as_the_noise_are_not_contact(rpm):
     assert np.max(np.abs(cam - true)) < 0.5 * noise
 
 
+def measured(rpm, rig, rng, late: int = 0) -> Recording:
+    """Two seconds of the demonstration rig, the follower `late` by some samples."""
+    truth = simulate_rig(RIG, rpm * math.pi / 30, 2.0, settle=6.0)
+    turned = truth.turned - 2 * np.pi * np.floor(truth.turned[0] / (2 * np.pi))
+    shown = len(truth.time) - late
+    cam = measure(turned[late:], rig.sensors.cam_noise, 20000, rng)
+    angle = measure(truth.angle[:shown], rig.sensors.follower_noise, 40000, rng)
+    channels = {"cam_angle_rad": cam, "follower_angle_rad": angle}
+    return Recording(f"run at {rpm} rpm", truth.time[late:], channels)
+
+
 @pytest.mark.parametrize("rpm", [155.0, 156.25])
 def test_no_flight_begins_before_the_one_ahead_has_landed(rpm):
     """A hop of some noise may land as the cam recedes: there is no release then.
@@ -255,16 +266,8 @@ def test_no_flight_begins_before_the_one_ahead_has_landed(rpm):
     Parts follow each other in time, and a flight's samples are, within two of them, no
     earlier than its beginning.
     """
-    rng = np.random.default_rng(3)
-    rig = read_rig(DEMO_RIG / "rig.toml")
-    runs = []
-    for number, speed in enumerate((rpm, 158.0)):
-        truth = simulate_rig(RIG, speed * math.pi / 30, 2.0, settle=6.0)
-        turned = truth.turned - 2 * np.pi * np.floor(truth.turned[0] / (2 * np.pi))
-        cam = measure(turned, rig.sensors.cam_noise, 20000, rng)
-        angle = measure(truth.angle, rig.sensors.follower_noise, 40000, rng)
-        channels = {"cam_angle_rad": cam, "follower_angle_rad": angle}
-        runs.append(Recording(f"run{number}", truth.time, channels))
+    rig, rng = read_rig(DEMO_RIG / "rig.toml"), np.random.default_rng(3)
+    runs = [measured(speed, rig, rng) for speed in (rpm, 158.0)]
     part = segment_case(runs, rig)[0]
     both = sorted((*part.flights, *part.contacts), key=lambda one: one.first)
     for one, following in zip(both, both[1:]):
@@ -280,19 +283,10 @@ def test_a_sensor_that_lags_shifts_the_phase_of_the_cam():
 
     Known to half the noise where it was touched.
     """
-    rng = np.random.default_rng(5)
-    rig = read_rig(DEMO_RIG / "rig.toml")
-    noise, runs, rates = rig.sensors.follower_floor, [], []
-    for number, rpm in enumerate((136.5, 141.0)):
-        truth = simulate_rig(RIG, rpm * math.pi / 30, 2.0, settle=6.0)
-        turned = truth.turned - 2 * np.pi * np.floor(truth.turned[0] / (2 * np.pi))
-        cam = measure(turned[1:], rig.sensors.cam_noise, 20000, rng)
-        angle = measure(truth.angle[:-1], rig.sensors.follower_noise, 40000, rng)
-        channels = {"cam_angle_rad": cam, "follower_angle_rad": angle}
-        runs.append(Recording(f"run{number}", truth.time[1:], channels))
-        rates.append(rpm * math.pi / 30)
-    found = segment_case(runs, rig)
-    surface, late = found[0].surface, 5e-4 * np.mean(rates)
+    rig, rng = read_rig(DEMO_RIG / "rig.toml"), np.random.default_rng(5)
+    speeds, noise = (136.5, 141.0), rig.sensors.follower_floor
+    found = segment_case([measured(rpm, rig, rng, late=1) for rpm in speeds], rig)
+    surface, late = found[0].surface, 5e-4 * np.mean(speeds) * math.pi / 30
     touched = np.concatenate([s.drive.angle[s.resting(s.contacts[1])] for s in found])
     waves = [w * np.exp(1j * k * (touched - late)) for k, w in enumerate(RIG.profile())]
     off = surface.angle(touched) - np.sum(waves, axis=0).real

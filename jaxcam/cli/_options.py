@@ -9,6 +9,11 @@ from ..data import DEMO_RIG
 from ._choices import SYSTEMS
 
 
+def _shipped(case: Path) -> Path:
+    """The folder; `demo` is that of the package where there is none of that name."""
+    return DEMO_RIG if str(case) == "demo" and not case.exists() else case
+
+
 System: TypeAlias = Annotated[
     str, typer.Argument(metavar="SYSTEM", help=f"One of {', '.join(SYSTEMS)}.")
 ]
@@ -65,7 +70,7 @@ Case: TypeAlias = Annotated[
     typer.Argument(
         metavar="CASE",
         help="A folder of recordings of one rig; demo: the one that is shipped.",
-        callback=lambda case: _shipped(case),
+        callback=_shipped,
     ),
 ]
 RigFile: TypeAlias = Annotated[
@@ -78,8 +83,3 @@ Gaps: TypeAlias = Annotated[
         help="Faulty runs: mend them (dropped samples, slips), refuse, or split.",
     ),
 ]
-
-
-def _shipped(case: Path) -> Path:
-    """The folder; `demo` is that of the package where there is none of that name."""
-    return DEMO_RIG if str(case) == "demo" and not case.exists() else case

@@ -39,9 +39,7 @@ def judge_contact(
     # a multiplier that only touches zero: no hop would come out of rounding. Its rate
     # falls by a half at least, which rounding cannot make it do over a short step
     falls = (left.jerk > 0) & (2 * right.jerk <= left.jerk) & (h > 0)
-    curved = jnp.where(falls, left.jerk - right.jerk, 1.0) * jnp.where(
-        h > 0, inverse, 1.0
-    )
+    curved = jnp.where(falls, (left.jerk - right.jerk) * inverse, 1.0)
     peak = a1 + right.jerk**2 / (2 * curved)
     touches = falls & (8 * peak**2 <= rounding * curved)
     lets_go = ((near & ~touches & (offset <= room)) | now) & ~completing
