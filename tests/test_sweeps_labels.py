@@ -8,6 +8,7 @@ from jaxcam.models import ImpactOscillator
 from jaxcam.sweeps import label, periods, PoincareSection, return_times, Stroboscopic
 from jaxcam.sweeps._label import names
 from jaxcam.sweeps._pick import pick
+from jaxcam.sweeps._unique_rows import unique_rows
 
 
 OSCILLATOR = ImpactOscillator(omega=2.6, restitution=0.8, wall=0.0)
@@ -72,3 +73,12 @@ def test_a_pick_is_a_path_and_says_what_there_is():
     for wrong in ("size", lambda s: s.size):
         with pytest.raises(ValueError, match="omega, restitution, wall, damping"):
             pick(wrong, OSCILLATOR)
+
+
+@pytest.mark.parametrize("shape", [(0, 2), (1, 1), (300, 2), (300, 5)])
+def test_different_rows_are_those_of_numpy(shape):
+    table = np.random.default_rng(1).integers(0, 3, shape).astype(float)
+    rows, back = unique_rows(table)
+    known, places = np.unique(table, axis=0, return_inverse=True)
+    np.testing.assert_array_equal(rows, known)
+    np.testing.assert_array_equal(back, places.reshape(-1))

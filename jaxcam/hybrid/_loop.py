@@ -12,15 +12,16 @@ import jax
 import jax.numpy as jnp
 
 from ._advance import advance_lane, Attempt, Plan
-from ._chatter import completion_time
 from ._codes import Row
 from ._flight import earliest, judge, moves_in
 from ._functions import Functions
 from ._gap_polynomial import Jet
 from ._lane import Lane, RUNNING
 from ._release import judge_contact
-from ._runge_kutta import step
+from ._rest_of_chatter import rest_of_chatter
+from ._runge_kutta import error_norm, step
 from ._select import any_of, largest, pick, select
+from ._series import off_rounding, taylor, taylor_of_release
 
 
 class Record(NamedTuple):
@@ -72,7 +73,7 @@ def _iterate(functions: Functions, plan: Plan, lane: Lane) -> tuple[Lane, Record
         lane.x,
         h,
     )
-    effort = _error_norm(error, lane.x, x1, plan.tolerance)
+    effort = error_norm(error, lane.x, x1, plan.tolerance)
     if functions.planar:
         # contact is algebraic: the old state is the guess
         x1 = select(sticking, lane.x, x1)
@@ -107,7 +108,7 @@ def _iterate(functions: Functions, plan: Plan, lane: Lane) -> tuple[Lane, Record
     # landing and impact
     offset = jnp.where(lands, flown.offset, 0.0)
     rates = functions.taylor(t1, projected, lane.contact)
-    landed = _taylor(projected, rates, offset)
+    landed = taylor(projected, rates, offset)
     t2 = t1 + offset
     after_each = functions.impact(t2, landed)
     x_after = after_each[0]
@@ -125,7 +126,7 @@ def _iterate(functions: Functions, plan: Plan, lane: Lane) -> tuple[Lane, Record
     hit = [lands & (flown.constraint == k) for k in range(m)]
     rebound = jnp.maximum(pick([j.velocity for j in jets3], flown.constraint), 0.0)
     fastest = jnp.where(lands, jnp.maximum(lane.fastest, rebound), lane.fastest)
-    chatter = _chatter(
+    chatter = rest_of_chatter(
         functions,
         plan,
         lane,
@@ -169,8 +170,8 @@ def _iterate(functions: Functions, plan: Plan, lane: Lane) -> tuple[Lane, Record
     released = held.lands & good & ~lands & converged
     good = good & ~(held.retake & sticking & ~lands) & converged
     delay = jnp.where(released, held.offset, 0.0)
-    left = _taylor_of_release(functions, settled, rates, frame, jets3, delay, contact)
-    x4 = select(sticking & ~lands, left, _off_rounding(frame, jets3, x3, hit))
+    left = taylor_of_release(functions, settled, rates, frame, jets3, delay, contact)
+    x4 = select(sticking & ~lands, left, off_rounding(frame, jets3, x3, hit))
     x4 = select(begins, chatter.state, x4)
     t4 = t2 + delay
 
@@ -181,28 +182,7 @@ def _iterate(functions: Functions, plan: Plan, lane: Lane) -> tuple[Lane, Record
     contact4 = tuple(
         (contact[k] | (begins & hit[k])) & ~went[k] & active for k in range(m)
     )
-    jets4 = tuple(
-        Jet(
-            # on the surface the gap is zero, whatever rounding makes of it
-            jnp.where(went[k] | hit[k], 0.0, jets3[k].gap),
-            jnp.where(went[k], 0.0, jets3[k].velocity),
-            jnp.where(
-                went[k],
-                0.0,
-                jnp.where(
-                    begins & hit[k],
-                    chatter.acceleration,
-                    jnp.where(
-                        pressing & lane.contact[k],
-                        jnp.minimum(jets3[k].acceleration, 0.0),
-                        jets3[k].acceleration,
-                    ),
-                ),
-            ),
-            jnp.where(begins & hit[k], chatter.rate, jets3[k].jerk),
-        )
-        for k in range(m)
-    )
+    jets4 = _next_jets(lane, jets3, chatter, hit, went, begins, pressing)
     finite = jnp.isfinite(sum(x4) + t4 + sum(j.gap + j.velocity for j in jets4))
     good = good & finite
     stopped = at_stop & good & ~lands & ~released
@@ -232,19 +212,7 @@ def _iterate(functions: Functions, plan: Plan, lane: Lane) -> tuple[Lane, Record
         completion=chatter.duration,
     )
     lane4 = advance_lane(plan, lane, attempt)
-    kind = jnp.where(
-        lands,
-        jnp.where(begins, float(Row.LAST_IMPACT), float(Row.IMPACT)),
-        jnp.where(
-            released,
-            float(Row.RELEASE),
-            jnp.where(
-                lane.completing,
-                float(Row.CONTACT),
-                jnp.where(stopped, float(Row.STOP), float(Row.STEP)),
-            ),
-        ),
-    )
+    kind = _kind(lane, lands, begins, released, stopped)
     record = Record(
         kind=jnp.where(good & active, kind, float(Row.NOTHING)),
         constraint=jnp.where(released, held.constraint, flown.constraint),
@@ -256,39 +224,39 @@ def _iterate(functions: Functions, plan: Plan, lane: Lane) -> tuple[Lane, Record
     return lane4, record
 
 
-class _Chatter(NamedTuple):
-    possible: Any
-    duration: Any
-    state: tuple
-    acceleration: Any
-    rate: Any
+def _kind(lane, lands, begins, released, stopped):
+    """What an accepted attempt is in the log: see `Row`."""
+    kind = jnp.where(stopped, float(Row.STOP), float(Row.STEP))
+    kind = jnp.where(lane.completing, float(Row.CONTACT), kind)
+    kind = jnp.where(released, float(Row.RELEASE), kind)
+    impact = jnp.where(begins, float(Row.LAST_IMPACT), float(Row.IMPACT))
+    return jnp.where(lands, impact, kind)
 
 
-def _chatter(
-    functions, plan, lane, t, before, after, v_before, rebound, jets, flown, stop
-) -> _Chatter:
-    """The completion of the sequence after this impact, and whether it may be used."""
-    dampings, restitutions, states = functions.chatter(t, before, after)
-    damping = pick(dampings, flown.constraint)
-    r0 = pick(restitutions, flown.constraint)
-    state = states[0]
-    for k in range(1, functions.m):
-        state = select(flown.constraint == k, states[k], state)
-    a = pick([j.acceleration for j in jets], flown.constraint)
-    j = pick([j.jerk for j in jets], flown.constraint)
-    small = rebound * jnp.abs(j) <= plan.smallness * (1 - r0) * a * a
-    possible = (a < 0) & small & (r0 < 1)
-    # quantities of the state without normal velocity
-    a = jnp.where(possible, a - damping * rebound, -1.0)
-    rate = j - damping * a
-    r0 = jnp.where(possible, r0, 0.0)
-    incoming = jnp.where(v_before < 0, -v_before, 1.0)
-    inverse = 1 / incoming
-    softening = (rebound * inverse - r0) * inverse
-    duration = completion_time(rebound, a, rate, damping, r0, softening)
-    at_end = a + rate * duration
-    soon = (t + duration <= stop) | (duration <= 1e-13 * jnp.abs(t))
-    return _Chatter(possible & (a < 0) & (at_end < 0) & soon, duration, state, a, rate)
+def _next_jets(lane, jets, chatter, hit, went, begins, pressing):
+    """The jets a lane goes on with: what contact has decided, rounding must not undo.
+
+    On the surface the gap is zero, at a release velocity and acceleration are too; a
+    chatter that completes goes on with the acceleration of its end.
+    """
+    after = []
+    for k, jet in enumerate(jets):
+        ends = begins & hit[k]
+        held = jnp.where(
+            pressing & lane.contact[k],
+            jnp.minimum(jet.acceleration, 0.0),
+            jet.acceleration,
+        )
+        acceleration = jnp.where(ends, chatter.acceleration, held)
+        after.append(
+            Jet(
+                jnp.where(went[k] | hit[k], 0.0, jet.gap),
+                jnp.where(went[k], 0.0, jet.velocity),
+                jnp.where(went[k], 0.0, acceleration),
+                jnp.where(ends, chatter.rate, jet.jerk),
+            )
+        )
+    return tuple(after)
 
 
 def _kept_contacts(functions, lane, lands, t, x):
@@ -300,54 +268,6 @@ def _kept_contacts(functions, lane, lands, t, x):
         c & (~lands | (jnp.abs(v) <= 1e-12 * (1.0 + lane.fastest)))
         for c, v in zip(lane.contact, speeds, strict=True)
     )
-
-
-def _off_rounding(frame, jets, x, hit):
-    """The state after an impact without the gap that rounding left it.
-
-    It would add up over the impacts of a chatter, whose last hops are lower than it.
-    """
-    for direction, jet, here in zip(frame.lift, jets, hit, strict=True):
-        gap = jax.lax.stop_gradient(jnp.where(here, jet.gap, 0.0))
-        x = tuple(a - gap * b for a, b in zip(x, direction, strict=True))
-    return x
-
-
-def _taylor(x, rates, tau):
-    first, second, third = rates
-    return tuple(
-        x[i] + tau * (first[i] + tau * (second[i] / 2 + tau * third[i] / 6))
-        for i in range(len(x))
-    )
-
-
-def _taylor_of_release(functions, x, rates, frame, jets, tau, contact):
-    """The sticking motion over the short time to release, to second order."""
-    first, second, _ = rates
-    if not functions.planar:
-        return tuple(
-            x[i] + tau * (first[i] + tau * second[i] / 2) for i in range(len(x))
-        )
-    # F_s = F - a D: with a = 0 at release only its rate remains
-    a, rate = jets[0].acceleration, jets[0].jerk
-    push = frame.push[0]
-    return tuple(
-        jnp.where(
-            contact[0],
-            x[i]
-            + tau * (first[i] - a * push[i] + tau * (second[i] - rate * push[i]) / 2),
-            x[i],
-        )
-        for i in range(len(x))
-    )
-
-
-def _error_norm(error, before, after, tolerance):
-    parts = [
-        jnp.abs(e) / (tolerance * (1.0 + jnp.maximum(jnp.abs(a), jnp.abs(b))))
-        for e, a, b in zip(error, before, after, strict=True)
-    ]
-    return largest(parts)
 
 
 def _where_free(free, verdict):

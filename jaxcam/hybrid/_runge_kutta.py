@@ -4,7 +4,10 @@ import functools
 from typing import NamedTuple
 
 import diffrax
+import jax.numpy as jnp
 import numpy as np
+
+from ._select import largest
 
 
 class Tableau(NamedTuple):
@@ -114,6 +117,15 @@ def step(tableau: Tableau, field, t, x: tuple, h):
     change = [moved(i, 1.0, tableau.weights, twice.weights) for i in range(n)]
     error = [moved(i, 0.0, tableau.error, twice.error) for i in range(n)]
     return tuple(a + b for a, b in zip(x, change, strict=True)), tuple(error), stages
+
+
+def error_norm(error, before, after, tolerance):
+    """Largest error of a step over the error allowed, relative and absolute alike."""
+    parts = [
+        jnp.abs(e) / (tolerance * (1.0 + jnp.maximum(jnp.abs(a), jnp.abs(b))))
+        for e, a, b in zip(error, before, after, strict=True)
+    ]
+    return largest(parts)
 
 
 def _rates_among(x, rates) -> dict[int, int]:

@@ -6,6 +6,7 @@ import numpy as np
 
 from ._fingerprint import clusters, SharedCells
 from ._label import APERIODIC, ESCAPED, FAILED, name, OUTSIDE
+from ._unique_rows import unique_rows
 
 
 #: instead of the number of an attractor
@@ -48,7 +49,7 @@ def find_attractors(
     group = np.full(lanes, -1)
     key = np.stack([impacts, turns], axis=1)
     count = 0
-    for m, n in np.unique(key[turns > 0], axis=0):
+    for m, n in unique_rows(key[turns > 0])[0]:
         (some,) = np.nonzero((impacts == m) & (turns == n))
         group[some] = count + clusters(fingerprint[some], same)
         count = group[some].max() + 1

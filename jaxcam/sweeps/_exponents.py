@@ -10,6 +10,7 @@ import variational
 
 from ..hybrid import HybridSystem, Settings
 from ._section import AbstractSection
+from ._unique_rows import unique_rows
 
 
 class Exponents(NamedTuple):
@@ -77,8 +78,9 @@ def _together(system, where, values, lanes):
     if not isinstance(where(system), tuple):
         yield everybody, system, where, values
         return
-    for row in np.unique(values[:, 1:], axis=0):
-        (some,) = np.nonzero(np.all(values[:, 1:] == row, axis=1))
+    rows, back = unique_rows(values[:, 1:])
+    for k, row in enumerate(rows):
+        (some,) = np.nonzero(back == k)
         parts = tuple(map(jnp.asarray, (values[some[0], 0], *row)))
         own = eqx.tree_at(where, system, parts)
         yield some, own, lambda s: where(s)[0], values[some, 0]

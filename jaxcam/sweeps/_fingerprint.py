@@ -6,6 +6,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
 from ._label import APERIODIC
+from ._unique_rows import unique_rows
 
 
 #: waves whose averages tell orbits of one mean apart
@@ -59,12 +60,12 @@ def clusters(points, same: float) -> np.ndarray:
     if not len(points):
         return np.zeros(0, dtype=int)
     # many motions end at the same point; look at each place once
-    places, back = np.unique(np.round(points / (same / 4)), axis=0, return_inverse=True)
+    places, back = unique_rows(np.round(points / (same / 4)))
     tree = KDTree(places)
     pairs = tree.query_pairs(4.0, p=np.inf, output_type="ndarray")
     _, group = connected_components(_graph(pairs[:, 0], pairs[:, 1], len(places)),
                                     directed=False)  # fmt: skip
-    return group[back.reshape(-1)]
+    return group[back]
 
 
 class SharedCells:
@@ -88,7 +89,7 @@ class SharedCells:
             return np.zeros(0, dtype=cells.dtype)
         first = np.broadcast_to(cells[:, :1], cells.shape)
         edges = np.stack([first.ravel(), cells.ravel()], axis=1)
-        self._edges.append(_spanning(np.unique(edges, axis=0)))
+        self._edges.append(_spanning(edges))
         return cells[:, 0]
 
     def groups(self, cells) -> np.ndarray:
@@ -131,5 +132,6 @@ def _components(edges):
 
 
 def _graph(rows, columns, count: int):
-    ones = np.ones(len(rows), dtype=np.int8)
-    return coo_array((ones, (rows, columns)), shape=(count, count))
+    # the same edge several times is one: true and true is true
+    joined = np.ones(len(rows), dtype=bool)
+    return coo_array((joined, (rows, columns)), shape=(count, count))

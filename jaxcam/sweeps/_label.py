@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ._samples import BEHIND, Samples
+from ._unique_rows import unique_rows
 
 
 #: instead of a number of turns
@@ -124,6 +125,6 @@ def name(impacts: int, turns: int) -> str:
 def names(labels: Labels) -> np.ndarray:
     """All labels in words, in the shape of the labels."""
     pairs = np.stack([labels.impacts, labels.turns], axis=-1)
-    unique, back = np.unique(pairs.reshape(-1, 2), axis=0, return_inverse=True)
+    unique, back = unique_rows(pairs.reshape(-1, 2))
     words = np.array([name(int(m), int(n)) for m, n in unique], dtype=object)
-    return words[back.reshape(-1)].reshape(labels.turns.shape)
+    return words[back].reshape(labels.turns.shape)
