@@ -13,9 +13,7 @@ goes on.
 
 import argparse
 import dataclasses
-import json
 import math
-import sys
 import time
 from pathlib import Path
 
@@ -26,11 +24,12 @@ from jaxcam.data import DEMO_RIG
 from jaxcam.discrepancy import diagnose, Diagnosis
 from jaxcam.recordings import read_rig, Recording
 
-from ._numba_rig import Hidden, simulate
-from .coverage import random_rig, recording
+from ._numba_rig import Hidden
+from ._verdicts import close, hidden_records, Kept
+from .coverage import random_rig
 
 
-DURATION, SETTLE = 4.0, 8.0
+DURATION = 4.0
 SPANS_RPM = ((128, 140), (140, 148), (141, 149), (150, 158), (158, 173), (160, 178))
 LEVELS = (0.1, 0.2, 0.3, 0.5, 1.0)
 #: name of the effect, its number in `Hidden`, and its unit
@@ -69,12 +68,8 @@ def draw(nominal, number: int) -> Case:
         size = level * unit * rng.uniform(0.8, 1.25)
         hidden = dataclasses.replace(hidden, **{field: size})
     real = dataclasses.replace(random_rig(nominal, rng), damping=0.0)
-    records = []
-    for run, span in enumerate(SPANS_RPM, start=1):
-        speed = rng.uniform(*span) * math.pi / 30
-        truth = simulate(real, hidden, speed, DURATION, SETTLE)
-        records.append(recording(truth, nominal.sensors, f"run{run}", rng))
-    return Case(names, level, hidden, tuple(records))
+    records = hidden_records(real, hidden, nominal.sensors, SPANS_RPM, DURATION, rng)
+    return Case(names, level, hidden, records)
 
 
 def judged(nominal, number: int) -> dict:
@@ -112,11 +107,6 @@ def right(one: dict) -> bool:
     return one["verdict"] == verdict and one["names"] == one["truth"]
 
 
-def close(true: float, value: float, stderr: float) -> bool:
-    """Within 15 per cent or two standard errors."""
-    return abs(value - true) < max(0.15 * true, 2 * stderr)
-
-
 def report(cases: list[dict]) -> None:
     kinds = {0: "nothing", 1: "one term", 2: "two terms"}
     print(
@@ -143,6 +133,14 @@ def report(cases: list[dict]) -> None:
             )
 
 
+def _said(one: dict) -> str:
+    truth = " ".join(one["truth"]) or "nothing"
+    return (
+        f"{one['number']}: {truth} x {one['level']:g}: {one['verdict']} "
+        f"{' '.join(one['names'])} ({one['wall']:.0f} s, {one['cpu']:.0f} s of CPU)"
+    )
+
+
 def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--cases", type=int, default=40)
@@ -151,23 +149,9 @@ def main() -> None:
     parser.add_argument("--file", type=Path, default=Path("fresh.jsonl"))
     options = parser.parse_args()
     nominal = read_rig(options.rig)
-    lines = options.file.read_text().splitlines() if options.file.exists() else []
-    known = {one["number"]: one for one in map(json.loads, lines)}
+    kept = Kept(options.file, lambda one: one["number"])
     numbers = range(options.first, options.first + options.cases)
-    for number in numbers:
-        if number in known:
-            continue
-        one = known[number] = judged(nominal, number)
-        with options.file.open("a") as stream:
-            stream.write(json.dumps(one) + "\n")
-        print(
-            f"{number}: {' '.join(one['truth']) or 'nothing'} x {one['level']:g}: "
-            f"{one['verdict']} {' '.join(one['names'])} "
-            f"({one['wall']:.0f} s, {one['cpu']:.0f} s of CPU)",
-            file=sys.stderr,
-            flush=True,
-        )
-    report([known[number] for number in numbers])
+    report([kept.get(k, lambda k=k: judged(nominal, k), _said) for k in numbers])
 
 
 if __name__ == "__main__":

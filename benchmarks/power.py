@@ -13,9 +13,6 @@ of JSON lines, from which an interrupted run goes on.
 
 import argparse
 import dataclasses
-import json
-import math
-import sys
 import time
 from pathlib import Path
 
@@ -26,11 +23,12 @@ from jaxcam.data import DEMO_RIG
 from jaxcam.discrepancy import diagnose
 from jaxcam.recordings import read_rig, Recording
 
-from ._numba_rig import Hidden, simulate
-from .coverage import random_rig, recording
+from ._numba_rig import Hidden
+from ._verdicts import close, hidden_records, Kept
+from .coverage import random_rig
 
 
-DURATION, SETTLE = 2.0, 8.0
+DURATION = 2.0
 SPANS_RPM = ((128.0, 145.0), (146.0, 158.0), (159.0, 175.0))
 LEVELS = (0.5, 1.0, 2.0, 4.0)
 #: name of the effect, its number in `Hidden`, and a unit where no limit is stated
@@ -54,12 +52,7 @@ def case(nominal, hidden: Hidden, rng) -> tuple[Recording, ...]:
     real = dataclasses.replace(random_rig(nominal, rng), damping=0.0)
     if hidden.ext:
         hidden = dataclasses.replace(hidden, fe=rng.uniform(12.0, 40.0))
-    sensors, runs = nominal.sensors, []
-    for number, span in enumerate(SPANS_RPM, start=1):
-        speed = rng.uniform(*span) * math.pi / 30
-        truth = simulate(real, hidden, speed, DURATION, SETTLE)
-        runs.append(recording(truth, sensors, f"run{number}", rng))
-    return tuple(runs)
+    return hidden_records(real, hidden, nominal.sensors, SPANS_RPM, DURATION, rng)
 
 
 def judged(nominal, effect: str, strength: float, number: int) -> dict:
@@ -84,67 +77,61 @@ def judged(nominal, effect: str, strength: float, number: int) -> dict:
     }
 
 
-class Kept:
-    """Verdicts in a file, computed where they are not there yet."""
+class Verdicts:
+    """Verdicts by effect, strength and number of the case."""
 
     def __init__(self, file: Path):
-        self.file, self.nominal = file, read_rig(DEMO_RIG / "rig.toml")
-        lines = file.read_text().splitlines() if file.exists() else []
-        self.known = {_key(one): one for one in map(json.loads, lines)}
+        self._nominal = read_rig(DEMO_RIG / "rig.toml")
+        self._kept = Kept(file, _key)
 
     def get(self, effect: str, strength: float, number: int) -> dict:
         key = effect, float(f"{strength:.6g}"), number
-        if key not in self.known:
-            one = judged(self.nominal, *key)
-            self.known[key] = one
-            with self.file.open("a") as stream:
-                stream.write(json.dumps(one) + "\n")
-            said = " ".join(one["names"]) or one["verdict"]
-            print(*key, said, f"{one['seconds']:.0f} s", file=sys.stderr, flush=True)
-        return self.known[key]
+        return self._kept.get(key, lambda: judged(self._nominal, *key), _said)
 
 
 def _key(one: dict) -> tuple[str, float, int]:
     return one["effect"], one["strength"], one["number"]
 
 
-def nulls(kept: Kept, count: int, first: int) -> None:
+def _said(one: dict) -> str:
+    words = " ".join(one["names"]) or one["verdict"]
+    return f"{_key(one)}: {words}, {one['seconds']:.0f} s"
+
+
+def nulls(verdicts: Verdicts, count: int, first: int) -> None:
     numbers = range(first, first + count)
-    cases = [kept.get("none", 0.0, number) for number in numbers]
+    cases = [verdicts.get("none", 0.0, number) for number in numbers]
     wrong = [one for one in cases if one["verdict"] != "none"]
     print(f"nulls: {len(wrong)} of {count} are not `none`")
     for one in wrong:
         print(f"  case {one['number']}: {one['verdict']} {' '.join(one['names'])}")
 
 
-def powers(kept: Kept, draws: int, names) -> None:
-    limits = [kept.get("none", 0.0, number)["limits"] for number in range(3)]
+def powers(verdicts: Verdicts, draws: int, names) -> None:
+    limits = [verdicts.get("none", 0.0, number)["limits"] for number in range(3)]
     print("| effect | unit | " + " | ".join(f"x {x:g}" for x in LEVELS) + " | size |")
     print("| --- | --- |" + " --- |" * (len(LEVELS) + 1))
     for effect in names:
         field, unit = EFFECTS[effect]
         unit = unit or float(np.median([one[field] for one in limits]))
-        cells, off = [], []
+        cells = []
         for level in LEVELS:
-            cases = [kept.get(effect, level * unit, k) for k in range(draws)]
+            cases = [verdicts.get(effect, level * unit, k) for k in range(draws)]
             right = [one["names"] == [effect] for one in cases]
             cells.append(f"{sum(right)}/{draws}")
             if level == LEVELS[-1]:
                 found = [one["size"][0] for one in cases if one["size"]]
-                off = [abs(v - level * unit) for v, e in found]
-                good = [
-                    o < max(0.15 * level * unit, 2 * e) for o, (v, e) in zip(off, found)
-                ]
+                good = [close(level * unit, *one) for one in found]
                 cells.append(f"{sum(good)}/{len(found)}")
         print(f"| {effect} | {unit:.3g} | " + " | ".join(cells) + " |", flush=True)
 
 
-def unlisted(kept: Kept, draws: int) -> None:
+def unlisted(verdicts: Verdicts, draws: int) -> None:
     print("| not in the list | strength | unknown | where | none | named |")
     print("| --- | --- | --- | --- | --- | --- |")
     for effect, size in UNLISTED.items():
         for level in (1.0, 3.0):
-            cases = [kept.get(effect, level * size, k) for k in range(draws)]
+            cases = [verdicts.get(effect, level * size, k) for k in range(draws)]
             kinds = [one["verdict"] for one in cases]
             where = sorted({w for one in cases for w in one["where"]})
             named = sorted({n for one in cases for n in one["names"]} - {"unknown"})
@@ -165,13 +152,13 @@ def main() -> None:
     parser.add_argument("--draws", type=int, default=10)
     parser.add_argument("--file", type=Path, default=Path("power.jsonl"))
     options = parser.parse_args()
-    kept = Kept(options.file)
+    verdicts = Verdicts(options.file)
     if options.nulls:
-        nulls(kept, options.nulls, options.first)
+        nulls(verdicts, options.nulls, options.first)
     if options.effects is not None:
-        powers(kept, options.draws, options.effects or list(EFFECTS))
+        powers(verdicts, options.draws, options.effects or list(EFFECTS))
     if options.unlisted:
-        unlisted(kept, options.draws)
+        unlisted(verdicts, options.draws)
 
 
 if __name__ == "__main__":

@@ -1,0 +1,52 @@
+"""Hidden cases, and verdicts on them that outlive an interrupted run."""
+
+import json
+import math
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+from jaxcam.recordings import Recording
+
+from ._numba_rig import simulate
+from .coverage import recording
+
+
+# seconds until the motion has forgotten where it started
+SETTLE = 8.0
+
+
+def hidden_records(
+    real, hidden, sensors, spans_rpm, duration: float, rng
+) -> tuple[Recording, ...]:
+    """Records of one rig with something hidden, at a random speed of each span."""
+    records = []
+    for run, span in enumerate(spans_rpm, start=1):
+        speed = rng.uniform(*span) * math.pi / 30
+        truth = simulate(real, hidden, speed, duration, SETTLE)
+        records.append(recording(truth, sensors, f"run{run}", rng))
+    return tuple(records)
+
+
+def close(true: float, value: float, stderr: float) -> bool:
+    """Within 15 per cent or two standard errors."""
+    return abs(value - true) < max(0.15 * true, 2 * stderr)
+
+
+class Kept:
+    """Verdicts in a file of JSON lines; `key` says which case a verdict is on."""
+
+    def __init__(self, file: Path, key: Callable):
+        self._file, self._key = file, key
+        lines = file.read_text().splitlines() if file.exists() else []
+        self._known = {key(one): one for one in map(json.loads, lines)}
+
+    def get(self, case, judge: Callable, said: Callable[[dict], str]) -> dict:
+        """The verdict on a case, from `judge()` where it is not known; then said."""
+        if case not in self._known:
+            one = judge()
+            self._known[self._key(one)] = one
+            with self._file.open("a") as stream:
+                stream.write(json.dumps(one) + "\n")
+            print(said(one), file=sys.stderr, flush=True)
+        return self._known[case]
