@@ -137,32 +137,34 @@ def spin(number):
     for k in range(number):
         total += (k % 7) * 1e-3
     return total
-def clock(work):
-    spent = []
-    for _ in range(repeats + 1):
-        started = time.perf_counter()
-        work()
-        spent.append(time.perf_counter() - started)
-    return min(spent[1:])
+def pairs(one, two):
+    one(), two()
+    spent = [[], []]
+    for _ in range(repeats):
+        for work, times in zip((one, two), spent):
+            started = time.perf_counter()
+            work()
+            times.append(time.perf_counter() - started)
+    return spent
 def threads(number):
-    some = [threading.Thread(target=spin, args=(300_000_000,)) for _ in range(number)]
+    some = [threading.Thread(target=spin, args=(1_000_000_000,)) for _ in range(number)]
     [one.start() for one in some]
     [one.join() for one in some]
 def swept(**options):
     grid = states_at_145(side)
     basins(rig(), grid, 30, keep=12, reruns=0, block=side // 4, **options)
-def say(what, one, two, work=1):
-    print(f"{what}: {work * one / two:.2f} times one ({one:.2f} s, {two:.2f} s)")
+def say(what, spent, work=1):
+    ratios = [work * a / b for a, b in zip(*spent)]
+    best = work * min(spent[0]) / min(spent[1])
+    each = ", ".join(f"{ratio:.2f}" for ratio in ratios)
+    print(f"{what}: {best:.2f} times one ({each})")
 if __name__ == "__main__":
-    one, two = clock(lambda: threads(1)), clock(lambda: threads(2))
-    say("two empty loops in two threads, the work of", one, two, 2)
-    say("two threads", *(clock(lambda: swept(workers=w)) for w in (1, 2)))
+    say("empty loops in two threads", pairs(lambda: threads(1), lambda: threads(2)), 2)
+    say("two threads", pairs(lambda: swept(workers=1), lambda: swept(workers=2)))
     if on_cluster:
-        spent = []
-        for workers in (1, 2):
-            with cluster("local", workers) as executor:
-                spent.append(clock(lambda: swept(executor=executor)))
-        say("two Dask workers", *spent)
+        with cluster("local", 1) as alone, cluster("local", 2) as both:
+            calls = [lambda e=e: swept(executor=e) for e in (alone, both)]
+            say("two Dask workers", pairs(*calls))
 """
 
 
@@ -170,7 +172,7 @@ def two_cores(side: int, repeats: int, on_cluster: bool) -> None:
     """Wall time on one core and on two, in a process that is not pinned.
 
     XLA makes as many threads as it finds cores when it starts. The first line is what
-    the machine itself gives at the time.
+    the machine itself gives at the time; in brackets is each pair of runs.
     """
     with tempfile.TemporaryDirectory() as folder:
         script = Path(folder) / "two_cores.py"

@@ -75,6 +75,7 @@ class Attempt(NamedTuple):
     fastest: Any
     # duration of the rest of the impacts, where they begin
     completion: Any
+    drift: tuple
 
 
 def advance_lane(plan: Plan, lane: Lane, attempt: Attempt) -> Lane:
@@ -108,6 +109,7 @@ def advance_lane(plan: Plan, lane: Lane, attempt: Attempt) -> Lane:
             stop_gradient(jnp.where(good, jnp.maximum(s, jnp.abs(j.gap)), s))
             for s, j in zip(lane.scale, attempt.jets, strict=True)
         ),
+        drift=tuple(map(stop_gradient, select(good, attempt.drift, lane.drift))),
         failures=failures,
         status=_status(plan, lane, attempt, failures),
         steps=lane.steps + jnp.where(active, 1.0, 0.0),

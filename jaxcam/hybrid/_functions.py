@@ -76,6 +76,7 @@ class Functions:
         self._velocity = bind(normal_velocity, time, state)
         self._frame = bind(_frame, time, state)
         self._lift = bind(_lift, time, state)
+        self._drift = bind(_drift, time, state)
         self._chatter = bind(completion_coefficients, time, state, state)
 
     @contextlib.contextmanager
@@ -126,6 +127,10 @@ class Functions:
     def lift(self, t, x):
         """Directions in which the gaps grow by one."""
         return tuple(map(tuple, self._lift(t, _pack(x))))
+
+    def drift(self, t, x):
+        """How fast the gaps change by time alone, without a sign."""
+        return tuple(jnp.abs(rate) for rate in self._drift(t, _pack(x)))
 
     def chatter(self, t, before, after):
         """C, r0 and the state P of `_chatter.py` for each constraint."""
@@ -187,6 +192,10 @@ def _frame(system, t, x):
     push = normal_directions(system, t, x)
     lift = _lift(system, t, x)
     return lift, push, jnp.sum(slope * lift, axis=1), jnp.sum(curve * push, axis=1)
+
+
+def _drift(system, t, x):
+    return jax.jvp(lambda s: gaps(system, s, x), (t,), (jnp.ones_like(t),))[1]
 
 
 def _lift(system, t, x):

@@ -29,6 +29,8 @@ class Lane(NamedTuple):
     # fastest rebound since the last release; largest gap of each constraint
     fastest: Any
     scale: tuple
+    # how fast each gap changes by time alone: what the rounding of a late time does
+    drift: tuple
     failures: Any
     status: Any
     steps: Any
@@ -78,6 +80,7 @@ def first_lane(functions: Functions, t0, x, t1) -> Lane:
         stops=0.0 * one,
         fastest=0.0 * one,
         scale=tuple(jnp.abs(j.gap) for j in settled),
+        drift=tuple(map(jax.lax.stop_gradient, functions.drift(t0, x))),
         failures=0.0 * one,
         status=RUNNING * one,
         steps=0.0 * one,

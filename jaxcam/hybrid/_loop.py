@@ -50,7 +50,11 @@ def _iterate(functions: Functions, plan: Plan, lane: Lane) -> tuple[Lane, Record
     # where the step ends
     stop = jnp.minimum(plan.t0 + (lane.stops + 1) * plan.stop_period, plan.t1)
     size = largest([jnp.abs(e) for e in lane.x])
-    rounding = [1e-15 * s + 2e-15 * size for s in lane.scale]
+    late = [4e-16 * jnp.abs(lane.t) * rate for rate in lane.drift]
+    rounding = [
+        1e-15 * s + 2e-15 * size + more
+        for s, more in zip(lane.scale, late, strict=True)
+    ]
     # already in contact and moving in, or in contact and pulled away: no time passes
     now = any_of(
         [
@@ -83,7 +87,10 @@ def _iterate(functions: Functions, plan: Plan, lane: Lane) -> tuple[Lane, Record
     projected = functions.onto(frame, jets1, x1, lane.contact)
 
     # what happened in it
-    slack = [2e-12 * s + 1e-15 * size for s in lane.scale]
+    slack = [
+        2e-12 * s + 1e-15 * size + more
+        for s, more in zip(lane.scale, late, strict=True)
+    ]
     flown = earliest(
         [
             _where_free(
@@ -142,7 +149,8 @@ def _iterate(functions: Functions, plan: Plan, lane: Lane) -> tuple[Lane, Record
     # deep enough into the sequence, or so low that rounding hides the next hop
     pulled = jnp.abs(pick([j.acceleration for j in jets3], flown.constraint))
     deep = rebound <= plan.depth * fastest
-    hidden = rebound * rebound <= 1e-12 * size * pulled
+    low = 1e-12 * size + 500 * pick(late, flown.constraint)
+    hidden = rebound * rebound <= low * pulled
     begins = lands & chatter.possible & (deep | hidden)
 
     # contact: the state is put on the surface a second time, then judged
@@ -210,6 +218,7 @@ def _iterate(functions: Functions, plan: Plan, lane: Lane) -> tuple[Lane, Record
         released=released,
         fastest=fastest,
         completion=chatter.duration,
+        drift=functions.drift(t2, x3),
     )
     lane4 = advance_lane(plan, lane, attempt)
     kind = _kind(lane, lands, begins, released, stopped)
