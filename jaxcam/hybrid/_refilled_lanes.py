@@ -32,9 +32,12 @@ def run_refilled(
     start = start_lanes(system, where, values, states, *shape)
     look, place = compiled_look(start, rows, seen.row), start.slots.rows
     ends = np.zeros((lanes, 3), dtype=int)
-    # slots without a lane of their own show the last one, and do not run
-    work, used = np.minimum(np.arange(width), lanes - 1), np.zeros(width)
-    running, waiting = np.arange(width) < lanes, min(width, lanes)
+    # spread evenly, to learn what the others will cost; slots without a lane of their
+    # own show the last one, and do not run
+    first = np.linspace(0, lanes - 1, min(width, lanes)).astype(int)
+    work, used = np.full(width, lanes - 1), np.zeros(width)
+    work[: len(first)], running = first, np.arange(width) < lanes
+    waiting, sorted_yet = np.setdiff1d(np.arange(lanes), first), False
     own, structure = jax.tree.flatten(start.own)
     numbers, mine = start.numbers[:, work], [leaf[work] for leaf in own]
     numbers[place.status, ~running] = FINISHED
@@ -51,11 +54,25 @@ def run_refilled(
         ends[work[over]] = numbers[counted].T[over]
         # who has used up the budget stays where it is
         numbers[place.status, over], running[over] = FINISHED, False
-        free = np.flatnonzero(over)[: lanes - waiting]
-        fresh = np.arange(waiting, waiting + len(free))
+        if not sorted_yet:
+            waiting = costly_first(waiting, work, used, numbers[place.stops])
+            sorted_yet = True
+        free = np.flatnonzero(over)[: len(waiting)]
+        fresh, waiting = waiting[: len(free)], waiting[len(free) :]
         work[free], used[free], running[free] = fresh, 0, True
-        waiting += len(free)
         numbers[:, free] = start.numbers[:, fresh]
         mine = [leaf[work] for leaf in own]
     codes = np.array([1, 0, 2, 3])[ends[:, 0]]
     return ends[:, 1], ends[:, 2], codes
+
+
+def costly_first(waiting, work, used, stops):
+    """The waiting lanes, those first that will take most attempts.
+
+    A lane that starts last and takes long leaves the other slots empty. Lanes that are
+    neighbours cost alike, so those at work tell: attempts over turns so far.
+    """
+    order = np.argsort(work, kind="stable")
+    each = used[order] / np.maximum(stops[order], 0.5)
+    expected = np.interp(waiting, work[order], each)
+    return waiting[np.argsort(-expected, kind="stable")]

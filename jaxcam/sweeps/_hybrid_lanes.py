@@ -16,7 +16,7 @@ from ._samples import BEHIND
 
 
 #: motions that advance together, for numbers of motions up to so many
-_WIDTHS = ((32, 16), (512, 64), (sys.maxsize, 1 << 16))
+_WIDTHS = ((32, 16), (512, 48), (sys.maxsize, 1 << 16))
 
 
 def rows_between_looks(width: int) -> int:
