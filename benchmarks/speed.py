@@ -6,7 +6,6 @@ One pinned core, minimum CPU time of interleaved runs, tolerance 1e-9 on every s
 float64. Needs `pip install -e ".[bench]"`.
 """
 
-import os
 import subprocess
 import sys
 import tempfile
@@ -155,34 +154,12 @@ def first_call() -> None:
     print(f"\nfirst call: {spent[0]} s; in a second process: {spent[1]} s")
 
 
-def two_cores(repeats: int) -> None:
-    """The same batch with one and two threads, wall time."""
-    for thread in os.listdir("/proc/self/task"):
-        os.sched_setaffinity(int(thread), range(os.cpu_count() or 1))
-    workload = _workloads.grid(side=64)
-    system = CamFollower(speed=workload.speed[0])
-    spent = {1: float("inf"), 2: float("inf")}
-    for _ in range(repeats):
-        for workers in spent:
-            started = time.perf_counter()
-            stroboscope(
-                system,
-                workload.start,
-                workload.turns,
-                settings=FAST,
-                workers=workers,
-            )
-            spent[workers] = min(spent[workers], time.perf_counter() - started)
-    print(f"\ntwo threads: {spent[1] / spent[2]:.2f} times one")
-
-
 def main(repeats: int = 3, side: int = 128) -> None:
     """Print all tables; `--side 32` makes W2 smaller."""
     print(f"core {CORE}, jax {jax.__version__}")
     batches(repeats, side)
     single(repeats)
     first_call()
-    two_cores(repeats)
 
 
 if __name__ == "__main__":
