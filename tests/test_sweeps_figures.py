@@ -52,7 +52,7 @@ def test_a_picture_has_the_colours_of_its_legend(tmp_path):
     assert np.allclose(colours[:, :6], to_rgba(COLOURS[0]))
     assert np.allclose(colours[:, 6:], to_rgba(COLOURS[1]))
     words = [text.get_text() for text in ax.get_legend().get_texts()]
-    assert words == ["period 1 a  50.0%", "period 1 b  50.0%", "attractors"]
+    assert words == ["period 1 a  50.0%", "period 1 b  50.0%"]
     assert plotting.save_figure(figure, tmp_path / "a.png").stat().st_size > 5000
 
 

@@ -85,7 +85,8 @@ def basin_picture(
     ax.set_ylim(low[1], high[1])
     ax.grid(False)
     ax.legend(
-        handles=handles,
+        handles,
+        [(one[0] if isinstance(one, tuple) else one).get_label() for one in handles],
         loc="lower left",
         bbox_to_anchor=(0.0, 1.0),
         ncols=min(len(handles), 3),
@@ -98,10 +99,12 @@ def _colours(basins, orbits: bool):
     names = basins.names
     colours = [NOTHING, *COLOURS[: min(len(names), _SHOWN)]]
     shares = basins.shares
-    handles: list = [
-        Patch(color=colour, label=f"{name}  {shares[name].share:.1%}")
-        for name, colour in zip(names, colours[1:], strict=False)
-    ]
+    handles: list = []
+    for k, (name, colour) in enumerate(zip(names, colours[1:], strict=False)):
+        label = f"{name}  {shares[name].share:.1%}"
+        patch = Patch(color=colour, label=label)
+        mark = Line2D([], [], ls="", label=label, **_mark_of(basins, k))
+        handles.append((patch, mark) if orbits else patch)
     if len(names) > _SHOWN:
         rest = sum(shares[name].share for name in names[_SHOWN:])
         colours.append(_OTHERS)
@@ -110,26 +113,23 @@ def _colours(basins, orbits: bool):
     if outside.size:
         word = "cannot start" if np.all(outside == -3) else "none"
         handles.append(Patch(facecolor=NOTHING, edgecolor="0.5", label=word))
-    if orbits:
-        handles.append(
-            Line2D([], [], marker="o", ls="", mfc="white", mec=SECTION, ms=5,
-                   label="attractors")
-        )  # fmt: skip
     return colours, handles
 
 
 def _mark(ax: Axes, basins, axes) -> None:
     for k, orbit in enumerate(basins.orbits[:_SHOWN]):
-        irregular = basins.labels[k, 1] == 0
-        ax.plot(
-            orbit[:, axes[0]],
-            orbit[:, axes[1]],
-            "o" if irregular else _MARKS[k % len(_MARKS)],
-            ls="",
-            # white shows on every colour; what does not repeat has many points
-            markersize=2.8 if irregular else 6,
-            markerfacecolor="white",
-            markeredgecolor=SECTION,
-            markeredgewidth=0.4 if irregular else 0.9,
-            zorder=3,
-        )
+        x, y = orbit[:, axes[0]], orbit[:, axes[1]]
+        ax.plot(x, y, ls="", zorder=3, **_mark_of(basins, k))
+
+
+def _mark_of(basins, k: int) -> dict:
+    """How the points of attractor `k` look: white shows on every colour."""
+    # what does not repeat has many points
+    irregular = basins.labels[k, 1] == 0
+    return {
+        "marker": "o" if irregular else _MARKS[k % len(_MARKS)],
+        "markersize": 2.8 if irregular else 6,
+        "markerfacecolor": "white",
+        "markeredgecolor": SECTION,
+        "markeredgewidth": 0.4 if irregular else 0.9,
+    }
