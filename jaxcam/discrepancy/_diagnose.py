@@ -10,10 +10,11 @@ from ._diagnosis import Diagnosis, Value
 from ._effects import drive_effect, ripples, term_effect, unknown_effect
 from ._evidence import held_out, limits, redrawn, rms_of, sure
 from ._kept_trials import KeptTrials
-from ._search import Search, SURE, Trial
+from ._search import Search
 from ._stated import rig_problem, system_problem, turns
 from ._structure import Structure, structures
 from ._term import Term, terms_of
+from ._trials import SURE, Trial, Trials
 from ._words import listed, summary_of
 
 
@@ -70,16 +71,16 @@ def diagnose(
         ripple = None
     turned = isinstance(system, Rig) or turns(problem)
     kept = None if keep is None else KeptTrials(keep, problem)
-    search = Search(problem, rig, terms, report, kept)
-    best = search.run()
+    trials = Trials(problem, rig, terms, report, kept)
+    best = Search(trials).run()
     report("redrawing stretches of the records", None)
     found = best
-    best, inclusion, deviation, doubtful = sure(search, found, seed)
-    before = search.trials[frozenset()]
+    best, inclusion, deviation, doubtful = sure(trials, found, seed)
+    before = trials.known[frozenset()]
     report("looking at what is left over", None)
 
     def left(trial: Trial) -> list[Structure]:
-        response, scan = search.response(trial.names), search.scan(trial.names)
+        response, scan = trials.response(trial.names), trials.scan(trial.names)
         return structures(trial.fit, response, unlisted, scan, turned)
 
     left_before = left(before)
@@ -89,15 +90,15 @@ def diagnose(
         # that something is there is sure; what explains all of it is what it is
         with_all = left(found)
         if not any(one.significant for one in with_all):
-            whole = held_out(search, before, found, report)
+            whole = held_out(trials, before, found, report)
             # but what does not foretell data that it has not seen explains nothing
             if whole[1] < whole[0]:
                 best, left_after, doubtful, held = found, with_all, [], whole
-                inclusion, deviation = redrawn(search, best, seed)
-    held = held or held_out(search, before, best, report)
+                inclusion, deviation = redrawn(trials, best, seed)
+    held = held or held_out(trials, before, best, report)
     rms_before, rms_after, gained, unseen = held
     effects = [
-        term_effect(search, best, before, name, inclusion, deviation, gained)
+        term_effect(trials, best, before, name, inclusion, deviation, gained)
         for name in sorted(best.names)
     ]
     if ripple is not None and ripples(ripple, len(terms) + 1):
@@ -107,7 +108,7 @@ def diagnose(
     caveats += [_doubt(name, part) for name, part in doubtful]
     if verdict == "unknown":
         effects.insert(0, unknown_effect(unexplained, problem, gained))
-    alternatives = _alternatives(search, best)
+    alternatives = _alternatives(trials, best)
     for name, delta in alternatives:
         # what was found to hang on a few stretches of the records is no equal
         if abs(delta) < _TIE:
@@ -125,7 +126,7 @@ def diagnose(
     if kept is not None:
         kept.clear()
     floor = float(next(iter(problem.model.sensors.values())).floor)
-    least = limits(search, best)
+    least = limits(trials, best)
     units = {one.name: one.unit for t in terms for one in t.strengths()}
     names = [effect.name for effect in effects]
     return Diagnosis(
@@ -156,7 +157,7 @@ def diagnose(
         tuple(left_after),
         unseen,
         ripple,
-        _pulls(search, before, best),
+        _pulls(trials, before, best),
         {
             name: Value(size, stderr, units[name])
             for name, (size, stderr, _) in least.items()
@@ -202,10 +203,10 @@ def _doubt(name: str, part: float) -> str:
     )
 
 
-def _alternatives(search: Search, best: Trial) -> list[tuple[str, float]]:
+def _alternatives(trials: Trials, best: Trial) -> list[tuple[str, float]]:
     found = [
         ("+".join(sorted(names)) or "none", trial.bic - best.bic)
-        for names, trial in search.trials.items()
+        for names, trial in trials.known.items()
         # a superset is the same explanation with more
         if names != best.names and not names > best.names
     ]
@@ -236,12 +237,12 @@ def search_names(best: Trial) -> set[str]:
     return set(best.fit.free) - own
 
 
-def _pulls(search: Search, before: Trial, best: Trial):
+def _pulls(trials: Trials, before: Trial, best: Trial):
     found = {}
-    for name in search.rig:
-        parameter = search.problem.parameter(name)
-        place = search.problem.names.index(name)
-        nominal = float(search.problem.start.values[0, place])
+    for name in trials.rig:
+        parameter = trials.problem.parameter(name)
+        place = trials.problem.names.index(name)
+        nominal = float(trials.problem.start.values[0, place])
         size = parameter.size(nominal)
         found[name] = (
             (before.fit[name].value - nominal) / size,

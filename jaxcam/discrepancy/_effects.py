@@ -9,9 +9,9 @@ from ..fitting import Problem
 from ._diagnosis import Effect, Value
 from ._drive import Ripple
 from ._engine import value_of
-from ._search import FALSE_ALARMS, Search, Trial
 from ._structure import Structure
 from ._terms import DriveRipple
+from ._trials import FALSE_ALARMS, Trial, Trials
 
 
 def ripples(ripple: Ripple, tests: int) -> bool:
@@ -20,10 +20,10 @@ def ripples(ripple: Ripple, tests: int) -> bool:
 
 
 def term_effect(
-    search: Search, best: Trial, before: Trial, name, inclusion, deviation, gained
+    trials: Trials, best: Trial, before: Trial, name, inclusion, deviation, gained
 ) -> Effect:
-    term = search.term(name)
-    less = search.trials.get(best.names - {name}, before)
+    term = trials.term(name)
+    less = trials.known.get(best.names - {name}, before)
     parameters = {
         one.name: Value(
             best.fit[one.name].value,
@@ -34,7 +34,7 @@ def term_effect(
     }
     if name == "external_vibration":
         parameters = _polar(parameters)
-    records = _seen_in(search, best, [one.name for one in term.strengths()])
+    records = _seen_in(trials, best, [one.name for one in term.strengths()])
     alone = sum(gained.values())
     return Effect(
         name,
@@ -61,9 +61,9 @@ def _polar(parts: dict[str, Value]) -> dict[str, Value]:
     }
 
 
-def _seen_in(search: Search, best: Trial, names) -> tuple[str, ...]:
+def _seen_in(trials: Trials, best: Trial, names) -> tuple[str, ...]:
     """Records in which the effect is larger than three of their own errors."""
-    blocks = search.blocks(best)
+    blocks = trials.blocks(best)
     rows = blocks.rows(names)
     found = []
     for k, record in enumerate(blocks.record):

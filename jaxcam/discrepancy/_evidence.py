@@ -9,7 +9,7 @@ from scipy.stats import chi2
 
 from ..fitting import Fit, fit, Problem, Residuals, residuals
 from ._engine import blocks_of, gain, off, with_states
-from ._search import BEYOND, FALSE_ALARMS, Search, SURE, Trial, values_of
+from ._trials import BEYOND, FALSE_ALARMS, SURE, Trial, Trials, values_of
 
 
 # Stretches of a record, and pieces in each of them at least
@@ -22,7 +22,7 @@ _ITERATIONS = 15
 
 
 def held_out(
-    search: Search, before: Trial, after: Trial, progress: Callable
+    trials: Trials, before: Trial, after: Trial, progress: Callable
 ) -> tuple[float, float, dict[str, float], tuple[list[Residuals], list[Residuals]]]:
     """Two models on records that their parameters have not seen.
 
@@ -33,7 +33,7 @@ def held_out(
     what was gained in the logarithm of the likelihood, by record, and the residuals
     of both models.
     """
-    problem = search.problem
+    problem = trials.problem
     unseen_parts: tuple[list[Residuals], list[Residuals]] = ([], [])
     folds = _folds(problem)
     squares, counts = np.zeros(2), np.zeros(2)
@@ -129,7 +129,7 @@ def _parts(test: Fit, unseen) -> list[Residuals]:
 
 
 def sure(
-    search: Search, best: Trial, seed: int = 0
+    trials: Trials, best: Trial, seed: int = 0
 ) -> tuple[Trial, dict[str, float], dict[str, float], list[tuple[str, float]]]:
     """The part of a subset that does not hang on a few stretches of the records.
 
@@ -141,20 +141,20 @@ def sure(
     """
     doubtful: list[tuple[str, float]] = []
     while True:
-        inclusion, deviation = redrawn(search, best, seed)
-        sizes = {name: _size(search, best, name, deviation) for name in inclusion}
+        inclusion, deviation = redrawn(trials, best, seed)
+        sizes = {name: _size(trials, best, name, deviation) for name in inclusion}
         least = min(
             sizes, key=lambda n: (min(sizes[n], 1.0), inclusion[n]), default=None
         )
         if least is None or (sizes[least] >= 1 and inclusion[least] >= SURE):
             return best, inclusion, deviation, doubtful
         doubtful.append((least, inclusion[least]))
-        best = search.without(best, least)
+        best = trials.without(best, least)
 
 
-def _size(search: Search, best: Trial, name: str, deviation) -> float:
+def _size(trials: Trials, best: Trial, name: str, deviation) -> float:
     """Strengths of a term beside what redrawing does to them; below one, maybe zero."""
-    own = [one.name for one in search.term(name).strengths() if not one.inner]
+    own = [one.name for one in trials.term(name).strengths() if not one.inner]
     found = [best.fit[one] for one in own]
     errors = [max(one.stderr, deviation[one.name]) for one in found]
     size = sum((one.value / error) ** 2 for one, error in zip(found, errors))
@@ -162,7 +162,7 @@ def _size(search: Search, best: Trial, name: str, deviation) -> float:
 
 
 def redrawn(
-    search: Search, best: Trial, seed: int = 0
+    trials: Trials, best: Trial, seed: int = 0
 ) -> tuple[dict[str, float], dict[str, float]]:
     """Draw stretches of the records again, a second or so each.
 
@@ -170,7 +170,7 @@ def redrawn(
     because a fit without it is worse by BIC; and the standard deviation of each
     parameter.
     """
-    problem = search.problem
+    problem = trials.problem
     # what ties one stretch to the next is in neither, so they must hold many ties
     pieces = max(len(flown) for flown, _ in problem.spans)
     slices = min(_SLICES, max(1, pieces // _PIECES))
@@ -180,7 +180,7 @@ def redrawn(
     rng = np.random.default_rng(seed)
     kept = dict.fromkeys(sorted(best.names), 0)
     own = {
-        name: blocks.rows([one.name for one in search.term(name).strengths()])
+        name: blocks.rows([one.name for one in trials.term(name).strengths()])
         for name in kept
     }
     estimates = []
@@ -221,18 +221,18 @@ def _lost(information, score, value, free, gone, top: float) -> float:
     return top + lost - gain(information, moved, np.setdiff1d(free, gone))
 
 
-def limits(search: Search, trial: Trial) -> dict[str, tuple[float, float, str]]:
+def limits(trials: Trials, trial: Trial) -> dict[str, tuple[float, float, str]]:
     """Least strength of each term, beside those of a trial, that would be named.
 
     **Returns:** by the name of the parameter, that strength, its standard error, and
     the parameter of the rig that would take up most of it.
     """
-    blocks = search.blocks(trial)
+    blocks = trials.blocks(trial)
     information, score = blocks.total()
-    free = blocks.rows(search.parameters(trial.names))
-    rig = blocks.rows(search.rig)
+    free = blocks.rows(trials.parameters(trial.names))
+    rig = blocks.rows(trials.rig)
     found = {}
-    for term in search.terms:
+    for term in trials.terms:
         if term.name in trial.names:
             continue
         for one in term.strengths():
@@ -252,6 +252,6 @@ def limits(search: Search, trial: Trial) -> dict[str, tuple[float, float, str]]:
             if len(rig):
                 hidden = blocks.names[rig[int(np.argmax(np.abs(taken) / own))]]
             size = stderr * float(blocks.scale[row[0]])
-            asked = math.sqrt(search.asked(term.name)) + BEYOND
+            asked = math.sqrt(trials.asked(term.name)) + BEYOND
             found[one.name] = (size * asked, size, hidden)
     return found

@@ -12,9 +12,9 @@ from scipy.stats import chi2, norm
 from ..fitting import Fit, Problem, residuals
 from ._engine import added, Blocks, blocks_of, extended, foretold, off
 from ._local_force import force_blocks, Response
-from ._search import BEYOND, FALSE_ALARMS
 from ._shapes import Harmonics, Polynomial, Shape, shapes
 from ._term import Term, terms_of
+from ._trials import BEYOND, FALSE_ALARMS
 from ._vibration_scan import Periodogram
 
 

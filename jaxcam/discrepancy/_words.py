@@ -1,6 +1,6 @@
 """The verdict in the words of a mechanical engineer."""
 
-from ._search import Trial
+from ._trials import Trial
 
 
 # Rms in units of the noise up to which a model is as good as the sensors

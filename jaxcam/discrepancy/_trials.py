@@ -1,0 +1,207 @@
+"""Fits with subsets of terms, and what each of them says of the terms it lacks."""
+
+import dataclasses
+import math
+from collections.abc import Callable, Iterable, Sequence
+
+import numpy as np
+from scipy.stats import chi2, norm
+
+from ..fitting import Fit, fit, Problem
+from ..fitting._linearise import Point
+from ._engine import Blocks, blocks_of
+from ._kept_trials import KeptTrials
+from ._local_force import force_response, Response
+from ._term import Term
+from ._vibration_scan import Periodogram, periodogram
+
+
+#: chance that any term at all is named where nothing is missing
+FALSE_ALARMS = 0.01
+#: part of the redrawn sets of stretches in which what is named must be kept, and how
+#: many standard errors beyond what is asked it then is, where all is as it should be
+SURE = 0.9
+BEYOND = float(norm.ppf(SURE))
+#: iterations of a first look at a subset, and at most of one that may win
+QUICK, ITERATIONS = 15, 60
+# standard deviations of what is known of a rig beyond which its fit went astray
+_FAR = 3.0
+
+
+@dataclasses.dataclass(frozen=True)
+class Trial:
+    """A subset of terms, fitted."""
+
+    names: frozenset[str]
+    fit: Fit
+    bic: float
+    count: int
+
+
+class Trials:
+    """All that was tried on one problem, and what follows from it.
+
+    **Arguments:** the problem, the names of the parameters of the rig (free in every
+    fit), the terms that may be named, `progress(sentence, fraction)`, and where fits
+    are kept for a run that is interrupted.
+    """
+
+    def __init__(
+        self,
+        problem: Problem,
+        rig: Sequence[str],
+        terms: Sequence[Term],
+        progress: Callable[[str, float | None], None],
+        kept: KeptTrials | None = None,
+    ):
+        self.problem, self.rig, self.terms = problem, tuple(rig), tuple(terms)
+        self.progress = progress
+        #: the best fit of each subset
+        self.known: dict[frozenset[str], Trial] = {}
+        self._kept = kept
+        self._scans: dict[frozenset[str], Periodogram] = {}
+        self._responses: dict[frozenset[str], Response] = {}
+        self._linear: dict[frozenset[str], Blocks] = {}
+
+    @property
+    def least_cost(self) -> float:
+        """Of all fits so far; infinite without any."""
+        return min((trial.fit.cost for trial in self.known.values()), default=math.inf)
+
+    def term(self, name: str) -> Term:
+        return next(term for term in self.terms if term.name == name)
+
+    def parameters(self, names: Iterable[str]) -> list[str]:
+        """Parameters of the rig and of some terms."""
+        found = list(self.rig)
+        for term in self.terms:
+            if term.name in names:
+                found += [one.name for one in term.strengths()]
+        return found
+
+    def count(self, names: Iterable[str]) -> int:
+        return len(self.parameters(names)) - len(self.rig)
+
+    def asked(self, name: str) -> float:
+        """Gain that a term must have: the more demanding of BIC and error rate."""
+        term = self.term(name)
+        number, chance = self.count([name]), FALSE_ALARMS / len(self.terms)
+        if any(one.inner for one in term.strengths()):
+            # as many chances as there are frequencies
+            chance /= self.scan(frozenset()).cells
+        level = float(chi2.isf(chance, number))
+        return max(number * math.log(self.problem.samples), level)
+
+    def attempt(
+        self, names: frozenset[str], start: Trial | None, iterations: int = QUICK
+    ) -> Trial | None:
+        """Fit a subset from where another one ended.
+
+        A fit without the right term may end far from the rig, in a valley that leads
+        nowhere. Then the nominal parameters are a better place to start from.
+        """
+        free, places = self.parameters(names), [self.problem.start]
+        if start is not None:
+            ended = self._seeded(names, start, start.fit.point)
+            nominal = self._seeded(names, start, self.problem.start)
+            places = [ended, nominal] if self._sound(start.fit) else [nominal, ended]
+        known = self._kept.get(names) if self._kept is not None else None
+        if known is not None and names not in self.known:
+            places.insert(0, known)
+        found = fit(self.problem, free=free, start=places[0], iterations=iterations)
+        least = self.least_cost
+        for place in places[1:]:
+            if self._sound(found) or found.cost > 2 * least:
+                break
+            again = fit(self.problem, free=free, start=place, iterations=iterations)
+            found = min(found, again, key=_cost)
+        if not math.isfinite(found.cost):
+            return None
+        count = self.count(names)
+        bic = found.cost + count * math.log(self.problem.samples)
+        trial = Trial(names, found, bic, count)
+        if names not in self.known or bic < self.known[names].bic:
+            self.known[names] = trial
+            if self._kept is not None:
+                self._kept.put(names, found.point)
+            # what was said about the fit before holds no more
+            for derived in (self._scans, self._responses, self._linear):
+                derived.pop(names, None)
+        return self.known[names]
+
+    def finished(self, trial: Trial) -> Trial:
+        """A subset that may win is fitted to the end."""
+        if trial.fit.converged:
+            return trial
+        return self.attempt(trial.names, trial, ITERATIONS) or trial
+
+    def without(self, best: Trial, name: str) -> Trial:
+        """The fit of a subset with one term less."""
+        rest = best.names - {name}
+        known = self.known.get(rest) or self.attempt(rest, best, ITERATIONS)
+        assert known is not None
+        return known
+
+    def blocks(self, trial: Trial) -> Blocks:
+        if trial.names not in self._linear:
+            self._linear[trial.names] = blocks_of(self.problem, trial.fit.point)
+        return self._linear[trial.names]
+
+    def response(self, names: frozenset[str]) -> Response:
+        """What a force at any time would gain beside a fit."""
+        if names not in self._responses:
+            point = self.known[names].fit.point
+            free = self.parameters(names)
+            self._responses[names] = force_response(self.problem, point, free)
+        return self._responses[names]
+
+    def scan(self, names: frozenset[str]) -> Periodogram:
+        """Periodogram of what a fit leaves over."""
+        if names not in self._scans:
+            self.progress("looking for vibrations", None)
+            self._scans[names] = periodogram(self.problem, self.response(names))
+        return self._scans[names]
+
+    def _frequency(self, start: Trial) -> float:
+        """The best known frequency to start from."""
+        known = self._scans.get(start.names) or next(iter(self._scans.values()), None)
+        scan = known or self.scan(start.names)
+        return scan.best[0]
+
+    def _sound(self, found: Fit) -> bool:
+        """Whether a fit ended, and within a few tolerances of what the rig is."""
+        if not found.converged:
+            return False
+        start = np.asarray(self.problem.start.values)[0]
+        for name in self.rig:
+            known = self.problem.parameter(name).prior_stderr
+            nominal = start[self.problem.names.index(name)]
+            if abs(found[name].value - nominal) > _FAR * known:
+                return False
+        return True
+
+    def _seeded(self, names: frozenset[str], start: Trial, place: Point) -> Point:
+        """A place to start from; terms that another fit lacks are without effect."""
+        values = np.array(place.values)
+        everything = self.problem.names
+        for term in self.terms:
+            for one in term.strengths():
+                column = everything.index(one.name)
+                if one.inner and term.name in names - start.names:
+                    values[:, column] = self._frequency(start)
+                elif one.inner:
+                    values[:, column] = start.fit.point.values[:, column]
+                elif term.name not in names:
+                    values[:, column] = 0.0
+        return place._replace(values=values)
+
+
+def _cost(found: Fit) -> float:
+    return found.cost if math.isfinite(found.cost) else math.inf
+
+
+def values_of(found: Fit, blocks: Blocks) -> np.ndarray:
+    """Values of the parameters of some blocks at a fit, in their scales."""
+    all_names = found.problem.names
+    columns = [all_names.index(name) for name in blocks.names]
+    return np.asarray(found.point.values)[0, columns] / blocks.scale
