@@ -37,6 +37,7 @@ from jaxcam.hybrid._gap_polynomial import (
 from jaxcam.hybrid._lane import first_lane
 from jaxcam.hybrid._loop import iterate
 from jaxcam.hybrid._normal import _solve_masked
+from jaxcam.hybrid._refilled_lanes import costly_first
 from jaxcam.hybrid._release import judge_contact
 from jaxcam.hybrid._runge_kutta import step, tableau_of
 from jaxcam.models import BouncingBall
@@ -390,3 +391,10 @@ def test_a_step_is_that_of_diffrax(kind):
     found, estimate, _ = step(tableau_of(solver), field, t, start, h)
     np.testing.assert_allclose(found, wanted, rtol=0, atol=1e-14)
     np.testing.assert_allclose(estimate, error, rtol=0, atol=1e-14)
+
+
+def test_lanes_that_will_take_most_attempts_start_first():
+    """Lanes 0 and 10 are at work; lane 0 takes 30 attempts a turn, lane 10 takes 10."""
+    work, used, stops = np.array([10, 0]), np.full(2, 60.0), np.array([6.0, 2.0])
+    order = costly_first(np.array([9, 1, 5]), work, used, stops)
+    np.testing.assert_array_equal(order, [1, 5, 9])

@@ -50,6 +50,7 @@ def _iterate(functions: Functions, plan: Plan, lane: Lane) -> tuple[Lane, Record
     # where the step ends
     stop = jnp.minimum(plan.t0 + (lane.stops + 1) * plan.stop_period, plan.t1)
     size = largest([jnp.abs(e) for e in lane.x])
+    # time, and a phase made of it, are rounded by two parts in 1e16 each
     late = [4e-16 * jnp.abs(lane.t) * rate for rate in lane.drift]
     rounding = [
         1e-15 * s + 2e-15 * size + more
@@ -149,6 +150,7 @@ def _iterate(functions: Functions, plan: Plan, lane: Lane) -> tuple[Lane, Record
     # deep enough into the sequence, or so low that rounding hides the next hop
     pulled = jnp.abs(pick([j.acceleration for j in jets3], flown.constraint))
     deep = rebound <= plan.depth * fastest
+    # a hop is v^2 / 2a high: hidden below 250 times the rounding
     low = 1e-12 * size + 500 * pick(late, flown.constraint)
     hidden = rebound * rebound <= low * pulled
     begins = lands & chatter.possible & (deep | hidden)

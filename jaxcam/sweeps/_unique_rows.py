@@ -1,4 +1,4 @@
-"""Rows of a table that differ, quickly."""
+"""Rows of a table that differ."""
 
 import numpy as np
 
@@ -6,8 +6,8 @@ import numpy as np
 def unique_rows(table) -> tuple[np.ndarray, np.ndarray]:
     """The different rows of a table in order, and which of them each row is.
 
-    As `numpy.unique(table, axis=0, return_inverse=True)`, several times faster: columns
-    are sorted as numbers, not rows as strings of bytes.
+    As `numpy.unique(table, axis=0, return_inverse=True)`, but columns are sorted as
+    numbers, not rows as strings of bytes, which takes most of the time of that.
     """
     table = np.asarray(table)
     order = np.lexsort(table.T[::-1])
