@@ -5,6 +5,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from jax import monitoring
 
 import jaxcam
 from jaxcam.hybrid import contact_state, stroboscope
@@ -208,3 +209,35 @@ def test_a_late_start_costs_no_more_than_an_early_one(turns):
     assert int(early.code[0]) == int(after.code[0]) == 0
     assert int(after.steps[0]) <= 1.05 * int(early.steps[0])
     np.testing.assert_allclose(after.states, early.states, atol=1e-6)
+
+
+@pytest.fixture
+def compiled():
+    """Names of the programs that jax compiles, or takes from its cache, meanwhile."""
+    names = []
+
+    def listen(event, _, **about):
+        if event.endswith("backend_compile_duration"):
+            names.append(about.get("fun_name"))
+
+    monitoring.register_event_duration_secs_listener(listen)
+    yield names
+    monitoring.unregister_event_duration_listener(listen)
+
+
+def test_another_length_compiles_nothing(compiled):
+    # each new number of impacts once compiled a dozen copies and slices, 0.1 s in all
+    system = CamFollower()
+
+    def look(t1, samples):
+        run = jaxcam.simulate(system, None, 0.0, t1)
+        states = run.at(np.linspace(0.01, 2.0, samples))
+        return int(run.impacts.count), run.final, states
+
+    # lengths on the same side of a power of two, up to which they are padded
+    first, *_ = look(2.5, 40)
+    assert compiled, "jax no longer reports what it compiles; listen to another event"
+    compiled.clear()
+    second, *_ = look(2.9, 47)
+    assert second != first
+    assert compiled == []

@@ -21,7 +21,7 @@ def pad(array, fill):
     while length < array.shape[0]:
         length *= 2
     rest = [(0, length - array.shape[0])] + [(0, 0)] * (array.ndim - 1)
-    return jnp.asarray(np.pad(array, rest, constant_values=fill))
+    return jax.device_put(np.pad(array, rest, constant_values=fill))
 
 
 def padded(steps: Steps) -> Steps:

@@ -153,19 +153,19 @@ def _apply(equation, inputs, memory):
     outputs = [v.aval for v in equation.outvars]
     if name in _MOVES and all(_known(e) for i in inputs[1:] for e in i.ravel()):
         return [_move(equation, inputs)]
-    if all(_known(e) for i in inputs for e in i.ravel()):
-        return [split(a) for a in _compute(equation, [join_known(i) for i in inputs])]
     if name == "concatenate":
         return [np.concatenate(inputs, axis=params["dimension"])]
     if name == "stack":
         return [np.stack(inputs, axis=params["axis"])]
+    if name == "split":
+        cuts = np.cumsum(params["sizes"])[:-1]
+        return list(np.split(inputs[0], cuts, axis=params["axis"]))
+    if all(_known(e) for i in inputs for e in i.ravel()):
+        return [split(a) for a in _compute(equation, [join_known(i) for i in inputs])]
     if name in _SUMS:
         return [_reduce(_SUMS[name], inputs[0], params["axes"], outputs[0].shape)]
     if name == "dot_general" and _plain_product(params):
         return [_product(inputs, params)]
-    if name in ("split",):
-        cuts = np.cumsum(params["sizes"])[:-1]
-        return list(np.split(inputs[0], cuts, axis=params["axis"]))
     if name in _ELEMENTWISE:
         return [_elementwise(equation, inputs, outputs[0].shape, memory)]
     # a rule of the reader's, as custom derivatives are, comes among these parameters
@@ -183,6 +183,11 @@ def _compute(equation, arrays) -> list[np.ndarray]:
             made = [_NUMPY[name](*arrays)]
     elif name == "convert_element_type":
         made = arrays
+    elif name == "reduce_sum":
+        made = [np.sum(arrays[0], axis=tuple(equation.params["axes"]))]
+    elif name == "iota":
+        shape, along = equation.params["shape"], equation.params["dimension"]
+        made = [np.indices(shape)[along]]
     else:
         with jax.ensure_compile_time_eval():
             made = equation.primitive.bind(*map(jnp.asarray, arrays), **equation.params)
@@ -279,10 +284,13 @@ def _product(inputs, params):
 
 
 def _elementwise(equation, inputs, shape, memory):
+    columns = [
+        (i if i.shape == shape else np.broadcast_to(i, shape)).ravel() for i in inputs
+    ]
     out = np.empty(shape, dtype=object)
-    inputs = [np.broadcast_to(i, shape) for i in inputs]
-    for index in np.ndindex(tuple(shape)):
-        out[index] = _scalar(equation, [i[index] for i in inputs], memory)
+    flat = out.ravel()
+    for k, scalars in enumerate(zip(*columns, strict=True)):
+        flat[k] = _scalar(equation, scalars, memory)
     return out
 
 

@@ -135,24 +135,27 @@ def _released(system, t0, traced):
             "state=None needs a system with two states and one constraint; pass the "
             "state to start from"
         )
-    point = _release_point(system, t0)
-    if not traced and float(point.holds) == 2:
+    state, time, nowhere = _release_point(system, t0)
+    if not traced and bool(nowhere):
         raise ValueError(
             "there is no contact anywhere in the period, so no release point; pass the "
             "state to start from"
         )
-    nowhere = point.holds == 2
-    return jnp.where(nowhere, jnp.nan, point.state), point.time
+    return state, time
 
 
 def _constraints(system, t0) -> int:
-    gap = jax.eval_shape(system.gap, t0, jnp.zeros(2))
+    state = jax.ShapeDtypeStruct((2,), jnp.float64)
+    gap = jax.eval_shape(system.gap, t0, state)
     return gap.shape[0] if gap.shape else 1
 
 
 @eqx.filter_jit
 def _release_point(system, t0):
-    return release_point(system, t0)
+    """State (NaN where there is no release), time, and whether there is none."""
+    point = release_point(system, t0)
+    nowhere = point.holds == 2
+    return jnp.where(nowhere, jnp.nan, point.state), point.time, nowhere
 
 
 def _prepare(system, settings, t0, state, t1):
@@ -198,10 +201,11 @@ def _chunks(system, settings, t0, state, t1, budget, progress):
     size = min(_CHUNK, budget)
     lane, log, contact = _begin(system, settings, t0, state, t1, size)
     logs, used = [log], size
-    span = max(float(t1 - t0), 1e-300)
+    start = float(t0)
+    span = max(float(t1) - start, 1e-300)
     while float(lane.status) == RUNNING and used < budget:
         if progress is not None:
-            progress(float(lane.t - t0) / span)
+            progress((float(lane.t) - start) / span)
         lane, log = _go_on(system, settings, t0, state, t1, lane, size)
         logs.append(log)
         used += size
@@ -215,12 +219,13 @@ def _chunks(system, settings, t0, state, t1, budget, progress):
         padded = [
             np.pad(p, [(0, target - used)] + [(0, 0)] * (p.ndim - 1)) for p in pieces
         ]
-        log = Log(*map(jnp.asarray, padded))
+        log = Log(*jax.device_put(padded))
     else:
         log = logs[0]
     return log, contact, _code(lane)
 
 
+@jax.jit
 def _code(lane: Lane):
     """Index into `RESULTS`; a lane that still runs has used up its budget."""
     order = jnp.array([1, 0, 2, 3], dtype=jnp.int32)
@@ -230,10 +235,9 @@ def _code(lane: Lane):
 def _trim(parts: Parts) -> Parts:
     def cut(part):
         number = int(part.count)
-        # in numpy: jax would compile a slice for every new length
-        return jax.tree.map(
-            lambda a: jnp.asarray(np.asarray(a)[:number] if a.ndim else a), part
-        )
+        # in numpy, and put: jax would compile a slice, or a copy, for every new length
+        part = jax.tree.map(np.asarray, part)
+        return jax.device_put(jax.tree.map(lambda a: a[:number] if a.ndim else a, part))
 
     return Parts(
         _as(Impacts, cut(parts.impacts)),

@@ -6,6 +6,8 @@ last place for |x| < 1e6; beyond that the reduction to one quarter turn loses di
 proportion to x.
 """
 
+from functools import partial
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -44,6 +46,12 @@ def _horner(coefficients, z):
 @jax.custom_jvp
 def sincos(x):
     """Sine and cosine of `x` (rad, float64, any shape)."""
+    return _arithmetic(x)
+
+
+# traced once for each shape, then copied: a loop body holds dozens of these
+@partial(jax.jit, inline=True)
+def _arithmetic(x):
     turns = jnp.round(x * (2 / np.pi))
     r = ((x - turns * _PART_1) - turns * _PART_2) - turns * _PART_3
     z = r * r

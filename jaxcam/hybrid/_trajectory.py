@@ -42,8 +42,10 @@ class Trajectory(eqx.Module):
     @property
     def final(self) -> Float[Array, " n"]:
         """State at the end of the run; NaN under a transformation if it failed."""
+        if not is_traced(self):
+            return jax.device_put(np.asarray(self.steps.state)[self.steps.count - 1])
         last = self.steps.state[self.steps.count - 1]
-        return jnp.where(self.code == 0, last, jnp.nan) if is_traced(self) else last
+        return jnp.where(self.code == 0, last, jnp.nan)
 
     def at(self, times) -> Float[Array, "times n"]:
         """State at each of `times` (s, shape `(times,)`), after any impact there.
@@ -53,16 +55,18 @@ class Trajectory(eqx.Module):
 
         **Raises:** `ValueError` for times outside [t0, t1].
         """
-        times = jnp.asarray(times, dtype=jnp.float64)
+        known = not is_traced((self, times))
+        # in numpy where it can be: jax would compile something for every new length
+        xp = np if known else jnp
+        times = xp.asarray(times, dtype=xp.float64)
         if times.ndim != 1:
             raise ValueError(
                 f"times has shape {times.shape}; pass a vector, such as "
                 "jnp.linspace(t0, t1, 100) or jnp.array([t])"
             )
-        known = not is_traced((self, times))
         if known and times.size:
             low, high = float(times.min()), float(times.max())
-            end = float(self.steps.time[self.steps.count - 1])
+            end = float(np.asarray(self.steps.time)[self.steps.count - 1])
             room = 1e-12 * (1.0 + abs(end))
             if not (low >= float(self.t0) - room and high <= end + room):
                 raise ValueError(
@@ -71,10 +75,9 @@ class Trajectory(eqx.Module):
                 )
         if not known:
             return sample(self.system, self.settings, self.steps, times)
-        # a few lengths only, so that few programs are compiled
         steps, longer = padded(self.steps), pad(times, np.nan)
         found = sample(self.system, self.settings, steps, longer)
-        return jnp.asarray(np.asarray(found)[: times.shape[0]])
+        return jax.device_put(np.asarray(found)[: times.shape[0]])
 
     def gap(self, times):
         """Gap at each of `times`: shape `(times,)`, or `(times, m)` for m > 1."""
