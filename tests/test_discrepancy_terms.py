@@ -1,5 +1,7 @@
 """Terms change what they say, and nothing while their strengths are zero."""
 
+from types import SimpleNamespace
+
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
@@ -7,7 +9,7 @@ import pytest
 
 from jaxcam.cli._choices import make_system, saved_name
 from jaxcam.cli._parameters import parameters, set_parameters
-from jaxcam.discrepancy import library, saved_classes, WithTerms
+from jaxcam.discrepancy import _search, library, saved_classes, WithTerms
 from jaxcam.discrepancy._engine import added
 from jaxcam.discrepancy._terms import (
     CamProfileError,
@@ -128,3 +130,42 @@ def test_a_diagnosed_system_is_saved_and_read_again(tmp_path):
     assert float(changed.terms[0].c1) == 0.3
     with pytest.raises(ValueError, match="WithTerms"):
         load_system(tmp_path / "model.json")
+
+
+def test_the_most_promising_exchanges_are_tried(monkeypatch):
+    """Of nine terms the six whose scores are highest, whatever order they stand in.
+
+    They once were the first six in the library, and of two terms by their hashes.
+    """
+    numbers = {f"term {k}": float(10 + k) for k in range(9)}
+
+    class Blocks:
+        names = tuple(numbers)
+        scale = np.ones(9)
+
+        def total(self):
+            return np.eye(9), np.array(list(numbers.values()))
+
+        def rows(self, wanted):
+            return np.array([k for k, n in enumerate(self.names) if n in wanted], int)
+
+    class Named:
+        def __init__(self, name, inner=False):
+            self.name, self.inner = name, inner
+
+        def strengths(self):
+            return [Named(self.name)]
+
+    best = SimpleNamespace(names=frozenset(["term 0", "term 1"]), fit=None)
+    trials = SimpleNamespace(
+        terms=[Named(name) for name in numbers],
+        term=Named,
+        blocks=lambda trial: Blocks(),
+        parameters=lambda names: list(names),
+        count=len,
+        problem=SimpleNamespace(samples=100),
+    )
+    monkeypatch.setattr(_search, "values_of", lambda fit, blocks: np.zeros(9))
+    tried = _search.Search(trials)._exchanges(best)
+    wanted = [{kept, f"term {k}"} for k in (8, 7, 6) for kept in ("term 1", "term 0")]
+    assert tried == wanted

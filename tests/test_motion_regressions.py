@@ -221,6 +221,9 @@ def compiled():
             names.append(about.get("fun_name"))
 
     monitoring.register_event_duration_secs_listener(listen)
+    jax.jit(lambda x: x + 1.0)(0.0)
+    assert names, "jax no longer reports what it compiles; listen to another event"
+    names.clear()
     yield names
     monitoring.unregister_event_duration_listener(listen)
 
@@ -231,13 +234,81 @@ def test_another_length_compiles_nothing(compiled):
 
     def look(t1, samples):
         run = jaxcam.simulate(system, None, 0.0, t1)
-        states = run.at(np.linspace(0.01, 2.0, samples))
-        return int(run.impacts.count), run.final, states
+        times = np.linspace(0.01, 2.0, samples)
+        return int(run.impacts.count), run.final, run.at(times), run.gap(times)
 
     # lengths on the same side of a power of two, up to which they are padded
     first, *_ = look(2.5, 40)
-    assert compiled, "jax no longer reports what it compiles; listen to another event"
     compiled.clear()
     second, *_ = look(2.9, 47)
     assert second != first
     assert compiled == []
+
+
+def test_a_finished_run_is_read_inside_a_program():
+    run = jaxcam.simulate(CamFollower(), None, 0.0, 2.5)
+    times = np.array([1.0, 2.0])
+    for read in (lambda: run.final, lambda: run.at(times), lambda: run.gap(times)):
+        plain, inside = read(), jax.jit(lambda c, read=read: c * read())(1.0)
+        np.testing.assert_allclose(inside, plain, rtol=1e-13)
+
+
+class Spring(jaxcam.HybridSystem):
+    """A mass that falls on a floor, on a spring whose force is stated in many ways."""
+
+    stiffness: float = 30.0
+    way: str = eqx.field(static=True, default="plain")
+
+    def force(self, height):
+        if self.way == "rule":
+            # a rule that needs the parameter of the moment
+            @jax.custom_jvp
+            def pull(z):
+                return jax.lax.stop_gradient(self.stiffness * jnp.sin(z))
+
+            @pull.defjvp
+            def _(primals, tangents):
+                (z,), (dz,) = primals, tangents
+                return pull(z), self.stiffness * jnp.cos(z) * dz
+
+            return -pull(height)
+        if self.way == "rule of a number":
+            return -jax.nn.relu(jnp.asarray(1.0)) * self.stiffness * jnp.sin(height)
+        if self.way == "scan":
+            # what a checkpoint leaves behind when it is differentiated
+            def sine(z):
+                return jax.lax.scan(lambda s, _: (jnp.sin(z), s), 0.0, length=2)[0]
+
+            keep = jax.checkpoint_policies.everything_saveable
+            return -self.stiffness * jax.checkpoint(sine, policy=keep)(height)
+        if self.way == "mass matrix":
+            mass = jnp.array([[2.0, 0.0], [0.0, 1.0]])
+            pull = jnp.stack([2 * self.stiffness * jnp.sin(height), 0.0])
+            return -jnp.linalg.solve(mass, pull)[0]
+        return -self.stiffness * jnp.sin(height)
+
+    def vector_field(self, t, state):
+        return jnp.stack([state[1], self.force(state[0]) - 9.81])
+
+    def gap(self, t, state):
+        return state[0] + 0.2
+
+    def impact(self, t, state):
+        return state * jnp.array([1.0, -0.8])
+
+
+@pytest.mark.parametrize("way", ["rule", "rule of a number", "scan", "mass matrix"])
+def test_functions_may_be_written_in_any_way(way):
+    plain, other = (
+        jaxcam.simulate(Spring(way=w), [0.5, 0.0], 0.0, 3.0) for w in ("plain", way)
+    )
+    assert int(plain.impacts.count) == int(other.impacts.count) > 5
+    np.testing.assert_allclose(other.impacts.time, plain.impacts.time, atol=1e-11)
+
+
+def test_a_batch_may_need_a_library():
+    plain = jaxcam.simulate(Spring(), [0.5, 0.0], 0.0, 3.0)
+    system, starts = Spring(way="mass matrix"), np.array([[0.5, 0.0]] * 3)
+    batch = stroboscope(system, starts, 3, period=1.0)
+    for state in batch.states[:, -1]:
+        np.testing.assert_allclose(state, plain.final, atol=1e-9)

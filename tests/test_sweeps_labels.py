@@ -75,7 +75,7 @@ def test_a_pick_is_a_path_and_says_what_there_is():
             pick(wrong, OSCILLATOR)
 
 
-@pytest.mark.parametrize("shape", [(0, 2), (1, 1), (300, 2), (300, 5)])
+@pytest.mark.parametrize("shape", [(0, 2), (1, 1), (3, 0), (300, 2), (300, 5)])
 def test_different_rows_are_those_of_numpy(shape):
     table = np.random.default_rng(1).integers(0, 3, shape).astype(float)
     rows, back = unique_rows(table)

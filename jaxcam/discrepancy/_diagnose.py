@@ -15,11 +15,12 @@ from ._stated import rig_problem, system_problem, turns
 from ._structure import Structure, structures
 from ._term import Term, terms_of
 from ._trials import SURE, Trial, Trials
-from ._words import listed, summary_of
+from ._words import listed, NOISE, summary_of
 
 
 # What is left over is part of a named effect where it is less than this part of it: a
-# force that is 15 % off leaves the square of that in the likelihood
+# force that is 15 % off leaves the square of that in the likelihood. Of a large effect
+# that may still be plain to see; then it is none of what is known
 _SHARE = 0.15**2
 # Subsets within this BIC of the best one are as good
 _TIE = 10.0
@@ -91,8 +92,9 @@ def diagnose(
         with_all = left(found)
         if not any(one.significant for one in with_all):
             whole = held_out(trials, before, found, report)
-            # but what does not foretell data that it has not seen explains nothing
-            if whole[1] < whole[0]:
+            # but what does not foretell data that it has not seen explains nothing; it
+            # is asked for no more than a shape would be
+            if whole[1] < whole[0] or trials.foretells(best, found):
                 best, left_after, doubtful, held = found, with_all, [], whole
                 inclusion, deviation = redrawn(trials, best, seed)
     held = held or held_out(trials, before, best, report)
@@ -123,6 +125,12 @@ def diagnose(
         for one in left_after
         if one.gain > one.asked and one.foretold <= 0
     ][:1]
+    if effects and rms_after > max(rms_before, NOISE):
+        caveats.append(
+            "A part of the records does not pin the parameters down well enough to "
+            f"predict the others: it misses by {rms_after:.2g} times the noise, the "
+            f"textbook model by {rms_before:.2g}. Record at more speeds."
+        )
     if kept is not None:
         kept.clear()
     floor = float(next(iter(problem.model.sensors.values())).floor)
@@ -182,7 +190,7 @@ def _verdict(effects, unexplained: list[Structure], before: Trial, best: Trial):
         return ("effect" if effects else "none"), caveats
     left = max(one.gain for one in unexplained)
     explained = before.fit.cost - best.fit.cost
-    if best.names and left < _SHARE * explained:
+    if best.names and left < _SHARE * explained and rms_of(best.fit) < NOISE:
         caveats.append(
             f"Something small is left over ({unexplained[0].sentence}, "
             f"{unexplained[0].place}): {left / explained:.1%} of what was explained. "

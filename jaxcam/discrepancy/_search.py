@@ -131,7 +131,7 @@ class Search:
         value = values_of(best.fit, blocks)
         top = gain(information, score, free)
         found = []
-        for out in best.names:
+        for out in sorted(best.names):
             gone = blocks.rows([one.name for one in self.trials.term(out).strengths()])
             rest = np.setdiff1d(free, gone)
             step = np.zeros(len(blocks.names))
@@ -145,9 +145,12 @@ class Search:
                 rows = np.union1d(rest, blocks.rows(new))
                 change = top + cost - gain(information, moved, rows)
                 extra = self.trials.count([term.name]) - self.trials.count([out])
-                if change + extra * math.log(self.trials.problem.samples) < worse:
-                    found.append((best.names - {out}) | {term.name})
-        return found[:_TRIED]
+                change = change + extra * math.log(self.trials.problem.samples)
+                if change < worse:
+                    found.append((change, (best.names - {out}) | {term.name}))
+        # the most promising ones; of equals, the first
+        found.sort(key=lambda one: one[0])
+        return [names for _, names in found[:_TRIED]]
 
     def _promises(self, trial: Trial, scan: Periodogram) -> dict[frozenset[str], float]:
         """What the scores say of each further term: the BIC it would lead to."""

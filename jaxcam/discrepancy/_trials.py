@@ -9,7 +9,7 @@ from scipy.stats import chi2, norm
 
 from ..fitting import Fit, fit, Problem
 from ..fitting._linearise import Point
-from ._engine import Blocks, blocks_of
+from ._engine import Blocks, blocks_of, foretold
 from ._kept_trials import KeptTrials
 from ._local_force import force_response, Response
 from ._term import Term
@@ -146,6 +146,21 @@ class Trials:
         if trial.names not in self._linear:
             self._linear[trial.names] = blocks_of(self.problem, trial.fit.point)
         return self._linear[trial.names]
+
+    def foretells(self, less: Trial, more: Trial) -> bool:
+        """Whether the terms that a fit has more than another hold across the records.
+
+        Either half of them is asked what the strengths found in the other half gain.
+        """
+        blocks = self.blocks(less)
+        added = [
+            one.name
+            for name in more.names - less.names
+            for one in self.term(name).strengths()
+            if not one.inner
+        ]
+        free = blocks.rows(self.parameters(less.names))
+        return foretold(blocks, free, blocks.rows(added)) > 0
 
     def response(self, names: frozenset[str]) -> Response:
         """What a force at any time would gain beside a fit."""

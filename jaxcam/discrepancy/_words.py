@@ -4,7 +4,7 @@ from ._trials import Trial
 
 
 # Rms in units of the noise up to which a model is as good as the sensors
-_NOISE = 1.2
+NOISE = 1.2
 
 
 def listed(names) -> str:
@@ -44,13 +44,13 @@ def summary_of(
             name, (size, _, _) = first
             unit = "" if units[name] == "-" else f" {units[name]}"
             tail = f" A {name} of {size:.2g}{unit} would have been seen."
-        if fitted > _NOISE:
+        if fitted > NOISE:
             return (
                 "Nothing that the records share is missing. They are not explained "
                 "down to the noise of the sensors, though: what is left is "
                 f"{fitted:.2g} times that, and differs from record to record.{tail}"
             )
-        if unseen > _NOISE:
+        if unseen > NOISE:
             tail = (
                 f"{tail} A part of the records does not pin the parameters down well "
                 f"enough to predict the others, though: it misses by {unseen:.2g} "

@@ -17,6 +17,11 @@ def is_traced(tree) -> bool:
     return any(isinstance(leaf, Tracer) for leaf in jax.tree.leaves(tree))
 
 
+def is_tracing() -> bool:
+    """Whether what is computed here becomes part of a program, as inside `jit`."""
+    return isinstance(jnp.asarray(0.0), Tracer)
+
+
 def check_start(system: HybridSystem, settings: Settings, t0, state, t1) -> None:
     """Raise `ValueError` for a start that cannot be simulated."""
     settings.check()

@@ -3,6 +3,7 @@
 import contextlib
 from typing import NamedTuple
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -22,7 +23,7 @@ from ._normal import (
 )
 from ._scalarise import scalarise, split
 from ._system import HybridSystem
-from ._traced import Traced, traced
+from ._traced import traced
 
 
 class Frame(NamedTuple):
@@ -42,22 +43,22 @@ class Functions:
     """
 
     def __init__(self, system: HybridSystem, n: int):
-        stated = traced(system, n)
+        parameters, static = eqx.partition(traced(system, n), eqx.is_inexact_array)
         time = jax.ShapeDtypeStruct((), jnp.float64)
         state = jax.ShapeDtypeStruct((n,), jnp.float64)
-        m = jax.eval_shape(lambda t, x: gaps(stated, t, x), time, state).shape[0]
+        m = jax.eval_shape(lambda t, x: gaps(system, t, x), time, state).shape[0]
         flags = jax.ShapeDtypeStruct((m,), jnp.bool_)
         shapes = jax.tree.map(
-            lambda p: jax.ShapeDtypeStruct(p.shape, p.dtype), stated.parameters
+            lambda p: jax.ShapeDtypeStruct(p.shape, p.dtype), parameters
         )
         self.n, self.m = n, m
         self.planar = n == 2 and m == 1
-        self._parameters = jax.tree.map(split, stated.parameters)
+        self._parameters = jax.tree.map(split, parameters)
         self._memory: dict | None = None
 
         def bind(function, *example):
             def whole(p, *arguments):
-                return function(Traced(p, stated.programs), *arguments)
+                return function(eqx.combine(p, static), *arguments)
 
             scalar = scalarise(whole, shapes, *example)
             return lambda *a: scalar(self._parameters, *a, memory=self._memory)

@@ -7,38 +7,38 @@ loop alone; a version of XLA that does not know it ignores it. Results are the s
 """
 
 from collections.abc import Callable
+from contextlib import nullcontext
 
 import jax
 from jax.experimental.xla_metadata import set_xla_metadata
 from jax.extend.core import jaxpr_as_fun
+
+from ._jaxprs import calls_library
 
 
 def one_kernel(function: Callable, batch: bool = False) -> Callable:
     """`function` of one pytree, as a call that the CPU backend keeps in one piece.
 
     With `batch` the calls inside are inlined: better for wide vectors, worse for single
-    trajectories and their derivatives.
+    trajectories and their derivatives. A function that needs a library is called as it
+    is: such calls cannot be part of a kernel.
     """
 
     def call(argument):
         if jax.default_backend() != "cpu":
             return function(argument)
-        chosen = _inlined(function, argument) if batch else function
+        with set_xla_metadata(inlineable="true") if batch else nullcontext():
+            closed, shape = jax.make_jaxpr(function, return_shape=True)(argument)
+
+        def flat(argument):
+            leaves = jaxpr_as_fun(closed)(*jax.tree.leaves(argument))
+            return jax.tree.unflatten(jax.tree.structure(shape), leaves)
+
+        if calls_library(closed.jaxpr):
+            return flat(argument)
         with set_xla_metadata(inlineable="false", xla_cpu_small_call="true"):
-            result = jax.jit(chosen)(argument)
+            result = jax.jit(flat)(argument)
         # XLA aborts on such a call if some of its results are dropped
         return jax.lax.optimization_barrier(result)
 
     return call
-
-
-def _inlined(function, argument):
-    """The same function, whose own inner calls are not kept apart."""
-    with set_xla_metadata(inlineable="true"):
-        closed, shape = jax.make_jaxpr(function, return_shape=True)(argument)
-
-    def flat(argument):
-        leaves = jaxpr_as_fun(closed)(*jax.tree.leaves(argument))
-        return jax.tree.unflatten(jax.tree.structure(shape), leaves)
-
-    return flat

@@ -17,6 +17,8 @@ import numpy as np
 from jax.core import Tracer
 from jax.extend.core import Literal
 
+from ._jaxprs import is_series, opened
+from ._known import compute, is_known, join_known
 from ._sincos import sincos
 
 
@@ -43,26 +45,6 @@ _ELEMENTWISE = frozenset(
     not or pow rem round rsqrt select_n sign sin sinh sqrt square sub tan tanh xor
     """.split()
 )
-# the same on numbers known while tracing
-_NUMPY = {
-    "add": np.add,
-    "add_any": np.add,
-    "and": np.bitwise_and,
-    "div": np.divide,
-    "eq": np.equal,
-    "ge": np.greater_equal,
-    "gt": np.greater,
-    "le": np.less_equal,
-    "lt": np.less,
-    "max": np.maximum,
-    "min": np.minimum,
-    "mul": np.multiply,
-    "ne": np.not_equal,
-    "neg": np.negative,
-    "sub": np.subtract,
-}
-_CALLS = frozenset({"jit", "pjit", "closed_call", "core_call", "remat", "checkpoint"})
-_CUSTOM = frozenset({"custom_jvp_call", "custom_vjp_call"})
 _SUMS = {"reduce_sum": jnp.add, "reduce_max": jnp.maximum, "reduce_min": jnp.minimum}
 
 
@@ -138,20 +120,16 @@ def _evaluate(jaxpr, consts, arguments, memory):
 def _apply(equation, inputs, memory):
     name = equation.primitive.name
     params = equation.params
-    if name in _CALLS:
-        inner = params["jaxpr"]
-        body, consts = (
-            (inner.jaxpr, _constants(inner.consts))
-            if hasattr(inner, "consts")
-            else (inner, [])
-        )
-        return _evaluate(body, consts, inputs, memory)
-    if name in _CUSTOM and _is_plain(equation):
-        inner = params["call_jaxpr"]
-        consts = _constants(inner.consts)
-        return _evaluate(inner.jaxpr, consts, inputs, memory)
+    # differentiating the body gives what the rule of a series gives, and of a rule of
+    # reverse mode alone there is only the body
+    if is_series(equation) or name == "custom_vjp_call":
+        inside = params["call_jaxpr"].jaxpr, params["call_jaxpr"].consts
+    else:
+        inside = opened(equation)
+    if inside is not None:
+        return _evaluate(inside[0], _constants(inside[1]), inputs, memory)
     outputs = [v.aval for v in equation.outvars]
-    if name in _MOVES and all(_known(e) for i in inputs[1:] for e in i.ravel()):
+    if name in _MOVES and all(is_known(e) for i in inputs[1:] for e in i.ravel()):
         return [_move(equation, inputs)]
     if name == "concatenate":
         return [np.concatenate(inputs, axis=params["dimension"])]
@@ -160,8 +138,8 @@ def _apply(equation, inputs, memory):
     if name == "split":
         cuts = np.cumsum(params["sizes"])[:-1]
         return list(np.split(inputs[0], cuts, axis=params["axis"]))
-    if all(_known(e) for i in inputs for e in i.ravel()):
-        return [split(a) for a in _compute(equation, [join_known(i) for i in inputs])]
+    if all(is_known(e) for i in inputs for e in i.ravel()):
+        return [split(a) for a in compute(equation, [join_known(i) for i in inputs])]
     if name in _SUMS:
         return [_reduce(_SUMS[name], inputs[0], params["axes"], outputs[0].shape)]
     if name == "dot_general" and _plain_product(params):
@@ -173,50 +151,6 @@ def _apply(equation, inputs, memory):
     made = equation.primitive.bind(*[join(i) for i in inputs], **params)
     made = made if equation.primitive.multiple_results else [made]
     return [split(m) for m in made]
-
-
-def _compute(equation, arrays) -> list[np.ndarray]:
-    """An operation on known numbers, done while tracing."""
-    name, outputs = equation.primitive.name, equation.outvars
-    if name in _NUMPY:
-        with np.errstate(all="ignore"):
-            made = [_NUMPY[name](*arrays)]
-    elif name == "convert_element_type":
-        made = arrays
-    elif name == "reduce_sum":
-        made = [np.sum(arrays[0], axis=tuple(equation.params["axes"]))]
-    elif name == "iota":
-        shape, along = equation.params["shape"], equation.params["dimension"]
-        made = [np.indices(shape)[along]]
-    else:
-        with jax.ensure_compile_time_eval():
-            made = equation.primitive.bind(*map(jnp.asarray, arrays), **equation.params)
-        made = made if equation.primitive.multiple_results else [made]
-    return [
-        np.asarray(m, dtype=o.aval.dtype) for m, o in zip(made, outputs, strict=True)
-    ]
-
-
-def _is_plain(equation) -> bool:
-    """Whether differentiating the body of a custom rule gives what the rule gives.
-
-    So it is for our own Fourier series. A reader's rule (of an implicit function, say)
-    must be kept; for a rule of reverse mode alone there is only the body.
-    """
-    if equation.primitive.name == "custom_vjp_call":
-        return True
-    equations = equation.params["call_jaxpr"].jaxpr.eqns
-    return [e.params.get("name") for e in equations] == ["fourier_sum"]
-
-
-def _known(element) -> bool:
-    return isinstance(element, (np.generic, bool, int, float))
-
-
-def join_known(elements: np.ndarray):
-    """`join` for numbers that are known while tracing."""
-    flat = [np.asarray(e) for e in elements.ravel()]
-    return np.stack(flat).reshape(elements.shape) if flat else np.zeros(elements.shape)
 
 
 def _move(equation, inputs):
@@ -299,14 +233,14 @@ def _scalar(equation, scalars, memory):
     name, params = equation.primitive.name, equation.params
     if name == "convert_element_type":
         kind = params["new_dtype"]
-        if not _known(scalars[0]) and scalars[0].dtype == kind:
+        if not is_known(scalars[0]) and scalars[0].dtype == kind:
             return scalars[0]
     shortcut = _identity(name, scalars)
     if shortcut is not None:
         return shortcut
     operands = tuple(
         ("known", s.item() if isinstance(s, np.generic) else s, str(np.result_type(s)))
-        if _known(s)
+        if is_known(s)
         else id(s)
         for s in scalars
     )
@@ -331,14 +265,14 @@ def _identity(name, scalars):
     a, b = scalars
     if name == "mul":
         for known, other in ((a, b), (b, a)):
-            if _known(known) and isinstance(known, np.floating):
+            if is_known(known) and isinstance(known, np.floating):
                 if known == 1.0:
                     return other
                 if known == 0.0:
                     return known
         return None
-    if _known(b) and isinstance(b, np.floating) and b == 0.0:
+    if is_known(b) and isinstance(b, np.floating) and b == 0.0:
         return a
-    if name != "sub" and _known(a) and isinstance(a, np.floating) and a == 0.0:
+    if name != "sub" and is_known(a) and isinstance(a, np.floating) and a == 0.0:
         return b
     return None

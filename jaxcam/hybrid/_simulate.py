@@ -235,9 +235,11 @@ def _code(lane: Lane):
 def _trim(parts: Parts) -> Parts:
     def cut(part):
         number = int(part.count)
-        # in numpy, and put: jax would compile a slice, or a copy, for every new length
-        part = jax.tree.map(np.asarray, part)
-        return jax.device_put(jax.tree.map(lambda a: a[:number] if a.ndim else a, part))
+        # in numpy: jax would compile a slice for every new length; copied, or the whole
+        # log would stay in memory with it
+        return jax.device_put(
+            jax.tree.map(lambda a: np.asarray(a)[:number].copy() if a.ndim else a, part)
+        )
 
     return Parts(
         _as(Impacts, cut(parts.impacts)),

@@ -1,8 +1,7 @@
 """A system whose three functions are traced once, to be differentiated many times.
 
 Velocity, acceleration and jerk of the gap and what follows from them differentiate
-gap and vector field some thirty times. Each time the functions would run as Python
-again, in which most of a first call would be spent.
+gap and vector field some thirty times, each of which would run them as Python again.
 """
 
 from typing import Any
@@ -10,13 +9,10 @@ from typing import Any
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jax.extend.core import Literal
+from jax.extend.core import jaxpr_as_fun
 
+from ._jaxprs import equations, has_rule
 from ._system import HybridSystem
-
-
-# calls that only group operations
-_GROUPS = frozenset({"jit", "pjit", "closed_call", "core_call"})
 
 
 class Traced(HybridSystem):
@@ -35,14 +31,17 @@ class Traced(HybridSystem):
         return self._run("impact", t, state)
 
     def _run(self, name, t, state) -> Any:
-        program = self.programs[name]
         arguments = (*jax.tree.leaves(self.parameters), t, state)
-        (result,) = _evaluate(program.jaxpr, program.consts, arguments)
+        (result,) = jaxpr_as_fun(self.programs[name])(*arguments)
         return result
 
 
-def traced(system: HybridSystem, n: int) -> Traced:
-    """The same system, traced for states of `n` numbers."""
+def traced(system: HybridSystem, n: int) -> HybridSystem:
+    """The same system, traced for states of `n` numbers.
+
+    One with a rule of differentiation of its own is left as it is: the rule may use
+    what is known only while its function runs.
+    """
     parameters, static = eqx.partition(system, eqx.is_inexact_array)
     time = jax.ShapeDtypeStruct((), jnp.float64)
     state = jax.ShapeDtypeStruct((n,), jnp.float64)
@@ -53,24 +52,7 @@ def traced(system: HybridSystem, n: int) -> Traced:
 
         return jax.make_jaxpr(function)(parameters, time, state)
 
-    names = ("vector_field", "gap", "impact")
-    return Traced(parameters, {name: program(name) for name in names})
-
-
-def _evaluate(jaxpr, constants, arguments):
-    values = dict(zip(jaxpr.constvars, constants, strict=True))
-    values.update(zip(jaxpr.invars, arguments, strict=True))
-
-    def read(v):
-        return v.val if isinstance(v, Literal) else values[v]
-
-    for equation in jaxpr.eqns:
-        primitive, inputs = equation.primitive, [read(v) for v in equation.invars]
-        if primitive.name in _GROUPS:
-            inner = equation.params["jaxpr"]
-            made = _evaluate(inner.jaxpr, inner.consts, inputs)
-        else:
-            made = primitive.bind(*inputs, **primitive.get_bind_params(equation.params))
-            made = made if primitive.multiple_results else [made]
-        values.update(zip(equation.outvars, made, strict=True))
-    return [read(v) for v in jaxpr.outvars]
+    programs = {name: program(name) for name in ("vector_field", "gap", "impact")}
+    if any(has_rule(e) for p in programs.values() for e in equations(p.jaxpr)):
+        return system
+    return Traced(parameters, programs)

@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
 
-from ._check import is_traced
+from ._check import is_traced, is_tracing
 from ._codes import RESULTS
 from ._events import Contacts, Impacts, Steps
 from ._normal import gaps
@@ -43,7 +43,8 @@ class Trajectory(eqx.Module):
     def final(self) -> Float[Array, " n"]:
         """State at the end of the run; NaN under a transformation if it failed."""
         if not is_traced(self):
-            return jax.device_put(np.asarray(self.steps.state)[self.steps.count - 1])
+            last = np.asarray(self.steps.state)[int(self.steps.count) - 1]
+            return jax.device_put(last)
         last = self.steps.state[self.steps.count - 1]
         return jnp.where(self.code == 0, last, jnp.nan)
 
@@ -55,7 +56,7 @@ class Trajectory(eqx.Module):
 
         **Raises:** `ValueError` for times outside [t0, t1].
         """
-        known = not is_traced((self, times))
+        known = not (is_traced((self, times)) or is_tracing())
         # in numpy where it can be: jax would compile something for every new length
         xp = np if known else jnp
         times = xp.asarray(times, dtype=xp.float64)
@@ -66,7 +67,7 @@ class Trajectory(eqx.Module):
             )
         if known and times.size:
             low, high = float(times.min()), float(times.max())
-            end = float(np.asarray(self.steps.time)[self.steps.count - 1])
+            end = float(np.asarray(self.steps.time)[int(self.steps.count) - 1])
             room = 1e-12 * (1.0 + abs(end))
             if not (low >= float(self.t0) - room and high <= end + room):
                 raise ValueError(
@@ -77,12 +78,16 @@ class Trajectory(eqx.Module):
             return sample(self.system, self.settings, self.steps, times)
         steps, longer = padded(self.steps), pad(times, np.nan)
         found = sample(self.system, self.settings, steps, longer)
-        return jax.device_put(np.asarray(found)[: times.shape[0]])
+        return jax.device_put(np.asarray(found)[: times.shape[0]].copy())
 
     def gap(self, times):
         """Gap at each of `times`: shape `(times,)`, or `(times, m)` for m > 1."""
-        times = jnp.asarray(times, dtype=jnp.float64)
-        return _gaps(self.system, times, self.at(times))
+        states = self.at(times)
+        if is_traced((self, times)) or is_tracing():
+            return _gaps(self.system, jnp.asarray(times, dtype=jnp.float64), states)
+        times, states = np.asarray(times), np.asarray(states)
+        found = _gaps(self.system, pad(times, np.nan), pad(states, np.nan))
+        return jax.device_put(np.asarray(found)[: len(times)].copy())
 
     def stroboscopic(self, period=None, phase=0.0) -> Float[Array, "k n"]:
         """States at t0 + phase + k period, for a period (s) or the forcing's own.

@@ -6,11 +6,16 @@ import numpy as np
 def unique_rows(table) -> tuple[np.ndarray, np.ndarray]:
     """The different rows of a table in order, and which of them each row is.
 
-    As `numpy.unique(table, axis=0, return_inverse=True)`, but columns are sorted as
-    numbers, not rows as strings of bytes, which takes most of the time of that.
+    **Arguments:** a table of numbers, shape `(rows, columns)`; without columns all rows
+    are the same.
+
+    **Returns:** the different rows, shape `(number, columns)`, and an index into them,
+    shape `(rows,)`. As `numpy.unique(table, axis=0, return_inverse=True)`, which sorts
+    rows as records and takes several times as long.
     """
     table = np.asarray(table)
-    order = np.lexsort(table.T[::-1])
+    rows = np.arange(len(table))
+    order = np.lexsort(table.T[::-1]) if table.shape[1] else rows
     inorder = table[order]
     new = np.ones(len(table), dtype=bool)
     new[1:] = np.any(inorder[1:] != inorder[:-1], axis=1)
