@@ -19,8 +19,7 @@ from ._words import listed, NOISE, summary_of
 
 
 # What is left over is part of a named effect where it is less than this part of it: a
-# force that is 15 % off leaves the square of that in the likelihood. Of a large effect
-# that may still be plain to see; then it is none of what is known
+# force that is 15 % off leaves the square of that in the likelihood
 _SHARE = 0.15**2
 # Subsets within this BIC of the best one are as good
 _TIE = 10.0
@@ -190,7 +189,7 @@ def _verdict(effects, unexplained: list[Structure], before: Trial, best: Trial):
         return ("effect" if effects else "none"), caveats
     left = max(one.gain for one in unexplained)
     explained = before.fit.cost - best.fit.cost
-    if best.names and left < _SHARE * explained and rms_of(best.fit) < NOISE:
+    if best.names and left < _SHARE * explained:
         caveats.append(
             f"Something small is left over ({unexplained[0].sentence}, "
             f"{unexplained[0].place}): {left / explained:.1%} of what was explained. "

@@ -30,6 +30,9 @@ _HARMONIC_SIZE = 2e-4
 # What the zero of the cam's angle may be off, and what a sensor that lags by half a
 # millisecond makes of it (rad)
 _PHASE_SIZE = 1e-2
+# How far from the cam a follower may be where its bounces are too low to be seen, in
+# units of the noise
+_NEAR = 3.0
 # Least tolerance given to a length (m): a rig file may state none.
 _LEAST_TOLERANCE = 2e-4
 # Half-widths (rad) of the band around the surface in which samples count as contact,
@@ -124,7 +127,8 @@ def refine_surface(surface: Surface, rig: Rig, segments: Sequence) -> Surface:
     """Fit the profile again, to what `Segments` found to be impacts and contacts.
 
     Contacts count from where the bounces that cannot be seen have died out: before,
-    the follower is above the cam on average.
+    the follower is above the cam on average. It is near it, though, which counts for
+    one rough point: where a cam is seen there alone, it would else be anywhere.
     """
     turned, angle, error = [], [], []
     for part in segments:
@@ -139,6 +143,11 @@ def refine_surface(surface: Surface, rig: Rig, segments: Sequence) -> Surface:
             turned.append(drive.angle[rows])
             angle.append(part.recording[part.channel][rows])
             error.append(np.full(rows.sum(), part.noise))
+            bouncing = slice(contact.first, np.searchsorted(time, contact.settled))
+            number = len(time[bouncing])
+            turned.append(drive.angle[bouncing])
+            angle.append(part.recording[part.channel][bouncing])
+            error.append(np.full(number, _NEAR * np.sqrt(number) * part.noise))
     joined = (np.concatenate([*column, []]) for column in (turned, angle, error))
     return _solve(surface, rig, *joined)
 
