@@ -25,7 +25,14 @@ def run_refilled(
     """Run some lanes, `width` at a time; a lane that ends makes room for the next.
 
     Lanes do not know of each other, so their order and company change no result.
+
+    **Arguments:** the system, with `values` `(lanes,)` or `(lanes, k)` of what `where`
+    picks, or neither; `states` `(lanes, n)` at `t0` (s); the number of `turns` of a
+    `period` (s).
+    `rows` attempts are made between two looks at who has ended, `max_steps` at most.
     `seen` takes the log, one `seen.row` an attempt, as it comes.
+
+    **Returns:** impacts, attempts and result codes, each `(lanes,)`.
     """
     lanes = len(states)
     shape = t0, period, jnp.asarray(float(turns)), settings, width

@@ -21,7 +21,13 @@ class Rest(NamedTuple):
 def rest_of_chatter(
     functions, plan, lane, t, before, after, v_before, rebound, jets, flown, stop
 ) -> Rest:
-    """The completion of the sequence after this impact, and whether it may be used."""
+    """The completion of the sequence after this impact, and whether it may be used.
+
+    **Arguments:** time (s) and states `before` and `after` the impact; the normal
+    velocities `v_before` and `rebound`; the `jets` of all gaps after it; the verdict
+    `flown`, which names the constraint; and where the run has to `stop` (s). Scalars
+    and tuples of them.
+    """
     dampings, restitutions, states = functions.chatter(t, before, after)
     damping = pick(dampings, flown.constraint)
     r0 = pick(restitutions, flown.constraint)

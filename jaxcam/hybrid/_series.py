@@ -5,6 +5,7 @@ import jax.numpy as jnp
 
 
 def taylor(x, rates, tau):
+    """The state a time `tau` (s) after `x`, to third order, by its `rates`."""
     first, second, third = rates
     return tuple(
         x[i] + tau * (first[i] + tau * (second[i] / 2 + tau * third[i] / 6))
@@ -13,7 +14,10 @@ def taylor(x, rates, tau):
 
 
 def taylor_of_release(functions, x, rates, frame, jets, tau, contact):
-    """The sticking motion over the short time to release, to second order."""
+    """The sticking motion over the short time `tau` (s) to release, to second order.
+
+    `rates` of the free flight from `x`, its `frame` and `jets`, and what is in contact.
+    """
     first, second, _ = rates
     if not functions.planar:
         return tuple(

@@ -99,10 +99,10 @@ class Trajectory(eqx.Module):
             raise ValueError(
                 "this system has no forcing period; pass one: stroboscopic(period=...)"
             )
-        span = float(self.t1 - self.t0 - phase)
-        number = int(span / float(period) * (1 + 1e-12)) + 1
-        times = self.t0 + phase + jnp.arange(number, dtype=float) * period
-        return self.at(jnp.minimum(times, self.t1))
+        start, end = float(self.t0) + float(phase), float(self.t1)
+        number = int((end - start) / float(period) * (1 + 1e-12)) + 1
+        times = start + np.arange(number) * float(period)
+        return self.at(np.minimum(times, end))
 
     def section(self, function, direction: int = 0):
         """Crossings of a Poincare section `function(t, state) = 0`.
