@@ -3,7 +3,6 @@
 from typing import NamedTuple
 
 import numpy as np
-from scipy.stats import linregress
 
 
 class BasinEntropy(NamedTuple):
@@ -102,6 +101,9 @@ def uncertainty_exponent(attractor, distances=(1, 2, 4, 8, 16)) -> Uncertainty:
             "fewer than two distances have states that end elsewhere; use a finer "
             "grid, or one with a boundary in it"
         )
+    # slow to import, and needed for this one line
+    from scipy.stats import linregress
+
     distance, fraction = map(np.array, zip(*found, strict=True))
     fit = linregress(np.log(distance), np.log(fraction))
     exponent = float(fit.slope)  # pyright: ignore
