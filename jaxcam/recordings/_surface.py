@@ -13,6 +13,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
+from scipy.ndimage import uniform_filter1d
 
 from ..models import EccentricCircle
 from ._drive import Drive, read_drive
@@ -33,6 +34,8 @@ _PHASE_SIZE = 1e-2
 # How far from the cam a follower may be where its bounces are too low to be seen, in
 # units of the noise
 _NEAR = 3.0
+# Samples whose mean is looked at, and how far behind the cam it may seem to be
+_TOGETHER, _BEHIND = 9, 1.5
 # Least tolerance given to a length (m): a rig file may state none.
 _LEAST_TOLERANCE = 2e-4
 # Half-widths (rad) of the band around the surface in which samples count as contact,
@@ -128,11 +131,16 @@ def refine_surface(surface: Surface, rig: Rig, segments: Sequence) -> Surface:
 
     Contacts count from where the bounces that cannot be seen have died out: before,
     the follower is above the cam on average. It is near it, though, which counts for
-    one rough point: where a cam is seen there alone, it would else be anywhere.
+    one rough point, and it is never behind: where a cam is seen there alone, it would
+    else be anywhere.
     """
-    turned, angle, error = [], [], []
+    turned, angle, error, above = [], [], [], []
     for part in segments:
         time, drive = part.recording.time, part.drive
+        samples = part.recording[part.channel]
+        seen = slice(None, None, _TOGETHER)
+        mean = uniform_filter1d(samples, _TOGETHER)[seen]
+        above.append((drive.angle[seen], mean + _BEHIND * part.noise, part.noise))
         impacts, sure = part.impacts, pressed(rig, drive)
         sharp = impacts.time_stderr < 2 * part.recording.interval
         turned.append(np.interp(impacts.time[sharp], time, drive.angle))
@@ -141,15 +149,20 @@ def refine_surface(surface: Surface, rig: Rig, segments: Sequence) -> Surface:
         for contact in part.contacts:
             rows = part.resting(contact) & sure
             turned.append(drive.angle[rows])
-            angle.append(part.recording[part.channel][rows])
+            angle.append(samples[rows])
             error.append(np.full(rows.sum(), part.noise))
             bouncing = slice(contact.first, np.searchsorted(time, contact.settled))
             number = len(time[bouncing])
             turned.append(drive.angle[bouncing])
-            angle.append(part.recording[part.channel][bouncing])
+            angle.append(samples[bouncing])
             error.append(np.full(number, _NEAR * np.sqrt(number) * part.noise))
+    count = sum(map(len, turned))
+    for place, least, noise in above:
+        turned.append(place)
+        angle.append(least)
+        error.append(np.full(len(place), noise))
     joined = (np.concatenate([*column, []]) for column in (turned, angle, error))
-    return _solve(surface, rig, *joined)
+    return _solve(surface, rig, *joined, equal=count)
 
 
 def _impact_points(recording, drive, channel, noise, sure):
@@ -198,8 +211,13 @@ def stretches(mask: np.ndarray) -> list[tuple[int, int]]:
     return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2])]
 
 
-def _solve(surface: Surface, rig: Rig, turned, angle, error) -> Surface:
-    """Gauss-Newton with the tolerances as prior and Huber weights on the points."""
+def _solve(
+    surface: Surface, rig: Rig, turned, angle, error, *, equal: int | None = None
+) -> Surface:
+    """Gauss-Newton with the tolerances as prior and Huber weights on the points.
+
+    The first `equal` points lie on the profile, the others on it or above.
+    """
     nominal = _vector(nominal_surface(rig))
     sizes = _prior_sizes(rig)
     count = len(turned)
@@ -209,8 +227,11 @@ def _solve(surface: Surface, rig: Rig, turned, angle, error) -> Surface:
     for _ in range(8):
         fitted, jacobian = _linearise(surface, vector, places)
         misfit = (angle - np.asarray(fitted)[:count]) / error
-        scale = max(1.0, np.median(np.abs(misfit)) / 0.6745) if count else 1.0
+        on = np.abs(misfit[:equal])
+        scale = max(1.0, np.median(on) / 0.6745) if len(on) else 1.0
         weight = 1 / np.maximum(1.0, np.abs(misfit) / (2 * scale))
+        if equal is not None:
+            weight[equal:] *= misfit[equal:] < 0
         rows = np.asarray(jacobian)[:count] / error[:, None]
         normal = rows.T @ (weight[:, None] * rows) + np.diag(sizes**-2.0)
         target = rows.T @ (weight * misfit) + (nominal - vector) / sizes**2
