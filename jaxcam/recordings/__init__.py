@@ -32,10 +32,9 @@ from ._segments import (
     Impacts as Impacts,
     Segments as Segments,
 )
-from ._surface import (
+from ._surface import nominal_surface as nominal_surface, Surface as Surface
+from ._surface_fit import (
     fit_surface as fit_surface,
-    nominal_surface as nominal_surface,
     refine_surface as refine_surface,
-    Surface as Surface,
 )
 from ._synthetic import record as record, Wandering as Wandering

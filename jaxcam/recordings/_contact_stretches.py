@@ -11,7 +11,6 @@ import numpy as np
 from scipy.ndimage import binary_closing
 
 from ._motion import Motion
-from ._surface import stretches
 
 
 # First sample of a stretch, and one past its last
@@ -56,6 +55,12 @@ def contact_stretches(motion: Motion) -> tuple[list[Span], list[Span]]:
     if joined and len(near) - joined[-1][1] < SHORTEST_FLIGHT:
         joined[-1] = (joined[-1][0], len(near))
     return joined, doubtful
+
+
+def stretches(mask: np.ndarray) -> list[tuple[int, int]]:
+    """Start and end (one past the last) of each run of true values."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(int), [0]])))
+    return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2])]
 
 
 def overlap(one: Span, other: Span) -> bool:

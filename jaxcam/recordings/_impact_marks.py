@@ -5,10 +5,16 @@ A jump in velocity cuts a flight in two, however fast the impact is over.
 
 import numpy as np
 
-from ._contact_stretches import LOW, overlap, SHORTEST_FLIGHT, SIGNIFICANT, Span
+from ._contact_stretches import (
+    LOW,
+    overlap,
+    SHORTEST_FLIGHT,
+    SIGNIFICANT,
+    Span,
+    stretches,
+)
 from ._kinks import find_kinks
 from ._motion import Motion
-from ._surface import stretches
 
 
 def impact_marks(motion: Motion, resting) -> list[int]:

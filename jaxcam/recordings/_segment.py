@@ -14,7 +14,8 @@ from ._polynomial import measured_noise
 from ._recording import Recording
 from ._rig import Rig
 from ._segments import Boundary, Flight, no_impacts, Segments
-from ._surface import fit_surface, refine_surface, Surface
+from ._surface import Surface
+from ._surface_fit import fit_surface, refine_surface
 
 
 def segment_case(
