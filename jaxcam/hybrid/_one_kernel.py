@@ -7,13 +7,16 @@ loop alone; a version of XLA that does not know it ignores it. Results are the s
 """
 
 from collections.abc import Callable
-from contextlib import nullcontext
 
 import jax
 from jax.experimental.xla_metadata import set_xla_metadata
 from jax.extend.core import jaxpr_as_fun
 
 from ._jaxprs import calls_library
+
+
+_KEPT = {"inlineable": "false", "xla_cpu_small_call": "true"}
+_INLINED = {"inlineable": "true"}
 
 
 def one_kernel(function: Callable, batch: bool = False) -> Callable:
@@ -27,7 +30,8 @@ def one_kernel(function: Callable, batch: bool = False) -> Callable:
     def call(argument):
         if jax.default_backend() != "cpu":
             return function(argument)
-        with set_xla_metadata(inlineable="true") if batch else nullcontext():
+        # the calls inside take the tag of the moment they are traced at
+        with set_xla_metadata(**(_INLINED if batch else _KEPT)):
             closed, shape = jax.make_jaxpr(function, return_shape=True)(argument)
 
         def flat(argument):
@@ -35,8 +39,8 @@ def one_kernel(function: Callable, batch: bool = False) -> Callable:
             return jax.tree.unflatten(jax.tree.structure(shape), leaves)
 
         if calls_library(closed.jaxpr):
-            return flat(argument)
-        with set_xla_metadata(inlineable="false", xla_cpu_small_call="true"):
+            return function(argument)
+        with set_xla_metadata(**_KEPT):
             result = jax.jit(flat)(argument)
         # XLA aborts on such a call if some of its results are dropped
         return jax.lax.optimization_barrier(result)
