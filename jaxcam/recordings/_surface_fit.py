@@ -32,7 +32,8 @@ from ._surface import (
 # How far from the cam a follower may be where its bounces are too low to be seen, in
 # units of the noise
 _NEAR = 3.0
-# Samples whose mean is looked at, and how far behind the cam it may seem to be
+# Samples whose mean is looked at, and how far behind the cam it may seem to be, in
+# units of the noise: 4.5 standard errors of the mean, which noise hardly reaches
 _TOGETHER, _BEHIND = 9, 1.5
 # Half-widths (rad) of the band around the surface in which samples count as contact,
 # from the accuracy of the impacts alone to the noise of the encoder.
