@@ -1,50 +1,43 @@
 """A group of lanes in fewer slots: one that ends makes room for the next."""
 
+from typing import NamedTuple
+
 import jax
-import jax.numpy as jnp
 import numpy as np
 
 from ._lane import FINISHED, RUNNING
-from ._slots import compiled_look, start_lanes
+from ._slots import compiled_look, Lanes, start_lanes, Turns
 
 
-def run_refilled(
-    system,
-    where,
-    values,
-    states,
-    t0,
-    period,
-    turns,
-    settings,
-    width,
-    rows,
-    max_steps,
-    seen,
-):
-    """Run some lanes, `width` at a time; a lane that ends makes room for the next.
+class Pace(NamedTuple):
+    """How lanes are run; it changes no result, but for the budget."""
+
+    #: lanes that run at a time
+    width: int
+    #: attempts between two looks at who has ended
+    rows: int
+    #: attempts of one lane, at most
+    max_steps: int
+
+
+def run_refilled(lanes: Lanes, turns: Turns, settings, pace: Pace, seen):
+    """Run some lanes; one that ends makes room for the next.
 
     Lanes do not know of each other, so their order and company change no result.
-
-    **Arguments:** the system, with `values` `(lanes,)` or `(lanes, k)` of what `where`
-    picks, or neither; `states` `(lanes, n)` at `t0` (s); the number of `turns` of a
-    `period` (s).
-    `rows` attempts are made between two looks at who has ended, `max_steps` at most.
     `seen` takes the log, one `seen.row` an attempt, as it comes.
 
     **Returns:** impacts, attempts and result codes, each `(lanes,)`.
     """
-    lanes = len(states)
-    shape = t0, period, jnp.asarray(float(turns)), settings, width
-    start = start_lanes(system, where, values, states, *shape)
+    count, (width, rows, max_steps) = len(lanes.states), pace
+    start = start_lanes(lanes, turns, settings, width)
     look, place = compiled_look(start, rows, seen.row), start.slots.rows
-    ends = np.zeros((lanes, 3), dtype=int)
+    ends = np.zeros((count, 3), dtype=int)
     # spread evenly, to learn what the others will cost; slots without a lane of their
     # own show the last one, and do not run
-    first = np.linspace(0, lanes - 1, min(width, lanes)).astype(int)
-    work, used = np.full(width, lanes - 1), np.zeros(width)
-    work[: len(first)], running = first, np.arange(width) < lanes
-    waiting, sorted_yet = np.setdiff1d(np.arange(lanes), first), False
+    first = np.linspace(0, count - 1, min(width, count)).astype(int)
+    work, used = np.full(width, count - 1), np.zeros(width)
+    work[: len(first)], running = first, np.arange(width) < count
+    waiting, sorted_yet = np.setdiff1d(np.arange(count), first), False
     own, structure = jax.tree.flatten(start.own)
     numbers, mine = start.numbers[:, work], [leaf[work] for leaf in own]
     numbers[place.status, ~running] = FINISHED

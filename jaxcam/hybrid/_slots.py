@@ -17,6 +17,7 @@ from ._advance import Plan
 from ._functions import Functions
 from ._lane import first_lane, Lane
 from ._run import run_raw
+from ._system import HybridSystem
 
 
 # starts that are computed at once, over lanes that run at once
@@ -49,6 +50,32 @@ def slots_of(lane: Lane) -> Slots:
     return Slots(rows, tuple(leaf.dtype for leaf in leaves))
 
 
+class Lanes(NamedTuple):
+    """What is run: a system, what of it differs from lane to lane, and where from."""
+
+    system: HybridSystem
+    #: what `where(system)` picks takes `values`, `(lanes,)` or `(lanes, k)`; or neither
+    where: Callable | None
+    values: np.ndarray | None
+    #: (lanes, n)
+    states: np.ndarray
+
+    def some(self, which: slice) -> "Lanes":
+        values = None if self.values is None else self.values[which]
+        return self._replace(values=values, states=self.states[which])
+
+
+class Turns(NamedTuple):
+    """When it is run: `number` turns of a `period` (s) from `t0` (s) on.
+
+    Without a period the system's own is taken, lane by lane.
+    """
+
+    t0: Any
+    period: Any
+    number: int
+
+
 class Start(NamedTuple):
     """Lanes as they start, one column each, and what they are run with."""
 
@@ -60,19 +87,19 @@ class Start(NamedTuple):
     static: Any
 
 
-def start_lanes(
-    system, where, values, states, t0, period, turns, settings, width
-) -> Start:
+def start_lanes(lanes: Lanes, turns: Turns, settings, width: int) -> Start:
     """The start of lanes; `width` of them will run at a time."""
-    pieces, count = [], len(states)
+    pieces, count = [], len(lanes.states)
+    whole = jnp.asarray(float(turns.number))
     # filled up, so that two compiled programs serve all numbers of lanes
     part_size = width if count <= 2 * width else _AT_ONCE * width
     for first in range(0, count, part_size):
         some = np.minimum(np.arange(first, first + part_size), count - 1)
-        part = None if values is None else values[some]
-        batched, shared = split_lanes(system, where, part)
-        state = jnp.asarray(states[some])
-        pieces.append(_start(batched, shared, period, t0, turns, settings, state))
+        part = None if lanes.values is None else lanes.values[some]
+        batched, shared = split_lanes(lanes.system, lanes.where, part)
+        state = jnp.asarray(lanes.states[some])
+        shape = turns.period, turns.t0, whole, settings, state
+        pieces.append(_start(batched, shared, *shape))
     slots, _, _, rest = pieces[0]
     shared, static = eqx.partition(rest, eqx.is_array)
     numbers = np.concatenate([numbers for _, numbers, _, _ in pieces], axis=1)

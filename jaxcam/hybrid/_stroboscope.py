@@ -10,9 +10,9 @@ import numpy as np
 
 from ._check import check_start
 from ._normal import gaps
-from ._refilled_lanes import run_refilled
+from ._refilled_lanes import Pace, run_refilled
 from ._settings import Settings
-from ._slots import split_lanes
+from ._slots import Lanes, split_lanes, Turns
 from ._system import HybridSystem, with_array_parameters
 from ._turn_samples import TurnSamples
 
@@ -113,12 +113,13 @@ def stroboscope(
     shares = -(-lanes // (workers * width))
     group = width * min(_GROUP, shares)
 
+    all_lanes = Lanes(system, where, values, states)
+
     def work(first):
-        some = slice(first, first + group)
-        part = None if values is None else values[some]
-        seen = TurnSamples(len(states[some]), turns, skip, states.shape[1])
-        shape = (start, length, turns, settings, width, rows, max_steps)
-        ends = run_refilled(system, where, part, states[some], *shape, seen)
+        some = all_lanes.some(slice(first, first + group))
+        seen = TurnSamples(len(some.states), turns, skip, states.shape[1])
+        pace = Pace(width, rows, max_steps)
+        ends = run_refilled(some, Turns(start, length, turns), settings, pace, seen)
         return seen.states, *ends, *seen.counts()
 
     pieces = []

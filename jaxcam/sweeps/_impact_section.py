@@ -6,7 +6,8 @@ import numpy as np
 
 from ..hybrid import HybridSystem, Settings
 from ..hybrid._codes import Row
-from ..hybrid._refilled_lanes import run_refilled
+from ..hybrid._refilled_lanes import Pace, run_refilled
+from ..hybrid._slots import Lanes, Turns
 from ..hybrid._system import with_array_parameters
 from ._hybrid_lanes import rows_between_looks, run_lanes
 from ._samples import Samples
@@ -53,9 +54,10 @@ class ImpactSection(AbstractSystemSection):
 
         def run(states, values, width):
             seen = _Impacts(len(states), keep, n)
-            rows = rows_between_looks(width)
-            shape = (t0, period, turns, settings, width, rows, self.max_steps, seen)
-            _, _, code = run_refilled(system, where, values, states, *shape)
+            pace = Pace(width, rows_between_looks(width), self.max_steps)
+            lanes = Lanes(system, where, values, states)
+            when = Turns(t0, period, turns)
+            _, _, code = run_refilled(lanes, when, settings, pace, seen)
             return *seen.found(), code
 
         lanes = (self.system, self.t0, states, where, values, self.lanes)
