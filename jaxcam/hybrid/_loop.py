@@ -18,7 +18,7 @@ from ._functions import Functions
 from ._gap_polynomial import Jet
 from ._lane import Lane, RUNNING
 from ._release import judge_contact
-from ._rest_of_chatter import rest_of_chatter
+from ._rest_of_chatter import Impact, rest_of_chatter
 from ._runge_kutta import error_norm, step
 from ._select import any_of, largest, pick, select
 from ._series import off_rounding, taylor, taylor_of_release
@@ -122,7 +122,7 @@ def _iterate(functions: Functions, plan: Plan, lane: Lane) -> tuple[Lane, Record
     x_after = after_each[0]
     for k in range(1, m):
         x_after = select(flown.constraint == k, after_each[k], x_after)
-    v_before = pick(
+    approach = pick(
         [j.velocity + offset * (j.acceleration + offset * j.jerk / 2) for j in jets1],
         flown.constraint,
     )
@@ -134,19 +134,8 @@ def _iterate(functions: Functions, plan: Plan, lane: Lane) -> tuple[Lane, Record
     hit = [lands & (flown.constraint == k) for k in range(m)]
     rebound = jnp.maximum(pick([j.velocity for j in jets3], flown.constraint), 0.0)
     fastest = jnp.where(lands, jnp.maximum(lane.fastest, rebound), lane.fastest)
-    chatter = rest_of_chatter(
-        functions,
-        plan,
-        lane,
-        t2,
-        landed,
-        x_after,
-        v_before,
-        rebound,
-        jets3,
-        flown,
-        stop,
-    )
+    impact = Impact(t2, landed, x_after, approach, rebound, flown.constraint)
+    chatter = rest_of_chatter(functions, plan, impact, jets3, stop)
     # deep enough into the sequence, or so low that rounding hides the next hop
     pulled = jnp.abs(pick([j.acceleration for j in jets3], flown.constraint))
     deep = rebound <= plan.depth * fastest

@@ -18,31 +18,40 @@ class Rest(NamedTuple):
     rate: Any
 
 
-def rest_of_chatter(
-    functions, plan, lane, t, before, after, v_before, rebound, jets, flown, stop
-) -> Rest:
-    """The completion of the sequence after this impact, and whether it may be used.
+class Impact(NamedTuple):
+    """An impact: scalars, and states as tuples of them."""
 
-    **Arguments:** time (s) and states `before` and `after` the impact; the normal
-    velocities `v_before` and `rebound`; the `jets` of all gaps after it; the verdict
-    `flown`, which names the constraint; and where the run has to `stop` (s). Scalars
-    and tuples of them.
+    t: Any
+    before: tuple
+    after: tuple
+    # normal velocity before it, negative, and after it
+    approach: Any
+    rebound: Any
+    constraint: Any
+
+
+def rest_of_chatter(functions, plan, impact: Impact, jets, stop) -> Rest:
+    """The completion of the sequence after an impact, and whether it may be used.
+
+    **Arguments:** the `jets` of all gaps after the impact, and where the run has to
+    `stop` (s).
     """
+    t, before, after, approach, rebound, constraint = impact
     dampings, restitutions, states = functions.chatter(t, before, after)
-    damping = pick(dampings, flown.constraint)
-    r0 = pick(restitutions, flown.constraint)
+    damping = pick(dampings, constraint)
+    r0 = pick(restitutions, constraint)
     state = states[0]
     for k in range(1, functions.m):
-        state = select(flown.constraint == k, states[k], state)
-    a = pick([j.acceleration for j in jets], flown.constraint)
-    j = pick([j.jerk for j in jets], flown.constraint)
+        state = select(constraint == k, states[k], state)
+    a = pick([j.acceleration for j in jets], constraint)
+    j = pick([j.jerk for j in jets], constraint)
     small = rebound * jnp.abs(j) <= plan.smallness * (1 - r0) * a * a
     possible = (a < 0) & small & (r0 < 1)
     # quantities of the state without normal velocity
     a = jnp.where(possible, a - damping * rebound, -1.0)
     rate = j - damping * a
     r0 = jnp.where(possible, r0, 0.0)
-    incoming = jnp.where(v_before < 0, -v_before, 1.0)
+    incoming = jnp.where(approach < 0, -approach, 1.0)
     inverse = 1 / incoming
     softening = (rebound * inverse - r0) * inverse
     duration = completion_time(rebound, a, rate, damping, r0, softening)
