@@ -1,6 +1,6 @@
 """Path following of smooth problems and of periodic orbits; their special points."""
 
-import jaxcam as jaxcam  # 64-bit floats
+import jaxcam as _jaxcam  # noqa: F401  64-bit floats
 from variational._interruption import chatter_interruption as chatter_interruption
 
 from ._algorithms import (

@@ -245,6 +245,16 @@ def test_another_length_compiles_nothing(compiled):
     assert compiled == []
 
 
+def test_a_run_is_printed_in_a_line():
+    run = jaxcam.simulate(BouncingBall(), jnp.array([1.0, 0.0]), 0.0, 1.0)
+    said = f"impacts: {int(run.impacts.count)}, contacts: 0"
+    assert str(run) == f"BouncingBall from 0 to 1 s, {said}"
+    short = jaxcam.simulate(
+        BouncingBall(), jnp.array([1.0, 0.0]), 0.0, 100.0, max_steps=16
+    )
+    assert str(short).endswith(short.result) and short.result
+
+
 def test_a_finished_run_is_read_inside_a_program():
     run = jaxcam.simulate(CamFollower(), None, 0.0, 2.5)
     times = np.array([1.0, 2.0])

@@ -75,6 +75,14 @@ class Orbit(eqx.Module):
         turn = (impacts, contacts, state, t0, t0 + float(period))
         self.pieces, self.sticks = cut(*turn)
 
+    def __str__(self) -> str:
+        sizes = ", ".join(f"{abs(m):.3g}" for m in self.multipliers)
+        return (
+            f"{'stable' if self.stable else 'unstable'} orbit of period "
+            f"{float(self.period):.6g} s, impacts: {int(self.impacts.count)}, "
+            f"contacts: {int(self.contacts.count)}, multipliers of modulus {sizes}"
+        )
+
     @property
     def multipliers(self) -> Complex[Array, " n"]:
         """Floquet multipliers, the largest modulus first."""

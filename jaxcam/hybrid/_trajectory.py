@@ -29,6 +29,16 @@ class Trajectory(eqx.Module):
     #: index into `RESULTS`: 0 successful
     code: Int[Array, ""]
 
+    def __str__(self) -> str:
+        if is_traced(self):
+            return repr(self)
+        end = float(np.asarray(self.steps.time)[int(self.steps.count) - 1])
+        said = (
+            f"{type(self.system).__name__} from {float(self.t0):g} to {end:g} s, "
+            f"impacts: {int(self.impacts.count)}, contacts: {int(self.contacts.count)}"
+        )
+        return f"{said}. {self.result}" if self.result else said
+
     @property
     def successful(self):
         """Whether the trajectory reached t1."""
