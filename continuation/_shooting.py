@@ -22,15 +22,16 @@ from jaxtyping import Array, Float
 
 from jaxcam.hybrid import HybridSystem
 from jaxcam.hybrid._normal import gaps, impacts, normal_velocity
-from variational import saltation_matrix
 
 from ._admissible import DIP, IMPACT, inadmissible
-from ._lowest_gap import dips, gap_or_speed, lowest_times, nodes_of
+from ._lowest_gap import dips, gap_or_speed
 from ._orbit_grazing import orbit_grazing
 from ._problem import AbstractProblem, Monitor, Stability, Start
 from ._run_twice import run_twice
-from ._shooting_flight import flight_end, flight_nodes
+from ._shooting_flight import flight_end
+from ._shooting_linear import antiperiodic, monodromy, return_map
 from ._shooting_map import around_the_period, equations_and_monodromy
+from ._shooting_seen import monitors_and_observed
 
 
 class ImpactingOrbits(AbstractProblem):
@@ -73,7 +74,7 @@ class ImpactingOrbits(AbstractProblem):
             end = self.period(u, parameters)
             start = jnp.zeros_like(end)
             return flight_end(parameters, start, u, end, steps=self.steps) - u
-        return self._defects(parameters, *self.segments(u, parameters))
+        return self.defects(parameters, *self.segments(u, parameters))
 
     def linearisation(self, u, parameters, jacobian) -> Float[Array, "k k"]:
         """The monodromy matrix, of the state just after the first impact.
@@ -82,18 +83,8 @@ class ImpactingOrbits(AbstractProblem):
         """
         if not self.constraints:
             return jacobian + jnp.eye(self.dimension)
-        matrix = self.monodromy(u, parameters)
-        if self.periods:
-            return matrix
-        starts, _ = self.segments(u, parameters)
-        t, x = starts[0, 0], starts[0, 1:]
-        which = self.constraints[0]
-        normal = jax.grad(lambda y: gaps(parameters, t, y)[which])(x)
-        along = parameters.vector_field(t, x)
-        along = along / jnp.dot(normal, along)
-        basis = jnp.linalg.qr(normal[:, None], mode="complete")[0][:, 1:]
-        moved = matrix @ basis
-        return basis.T @ (moved - along[:, None] * (normal @ moved)[None, :])
+        matrix = monodromy(self, u, parameters)
+        return matrix if self.periods else return_map(self, u, parameters, matrix)
 
     def local_jacobian(self, u, parameters):
         """Of the map from the first impact to the one a period later.
@@ -123,16 +114,16 @@ class ImpactingOrbits(AbstractProblem):
         starts = u.reshape(len(self.constraints), 1 + self.dimension)
         if self.periods == 0:
             starts = starts.at[0, 0].set(0.0)
-        ends = self._next(starts).at[-1, 0].add(max(self.periods, 1))
+        ends = self.next_rows(starts).at[-1, 0].add(max(self.periods, 1))
         unit = self.period(u, parameters) / max(self.periods, 1)
         scale = jnp.ones(1 + self.dimension).at[0].set(unit)
         return starts * scale[None, :], ends * scale[None, :]
 
-    def _next(self, rows, last=1.0):
+    def next_rows(self, rows, last=1.0):
         """Each row replaced by the next; `last` multiplies the one that wraps."""
         return jnp.concatenate([rows[1:], last * rows[:1]])
 
-    def _arrivals(self, parameters, starts, ends):
+    def arrivals(self, parameters, starts, ends):
         """States before the impacts, shape `(m, n)`."""
         return jax.vmap(
             lambda a, b: flight_end(parameters, a[0], a[1:], b[0], steps=self.steps)
@@ -142,8 +133,9 @@ class ImpactingOrbits(AbstractProblem):
         """Index of the constraint that ends each flight."""
         return jnp.asarray(self.constraints[1:] + self.constraints[:1])
 
-    def _defects(self, parameters, starts, ends):
-        before = self._arrivals(parameters, starts, ends)
+    def defects(self, parameters, starts, ends):
+        """Gap at each impact, and what its law misses, shape `(m (1 + n),)`."""
+        before = self.arrivals(parameters, starts, ends)
 
         def one(end, x, which):
             gap = gaps(parameters, end[0], x)[which]
@@ -152,61 +144,16 @@ class ImpactingOrbits(AbstractProblem):
 
         return jax.vmap(one)(ends, before, self.hit()).reshape(-1)
 
-    def monodromy(self, u, parameters, first: int = 0) -> Float[Array, "n n"]:
-        """Derivative of the state one period after impact `first` by that there."""
-        matrix = jnp.eye(self.dimension)
-        factors = self._factors(u, parameters)
-        for k in range(len(self.constraints)):
-            matrix = factors[(first + k) % len(self.constraints)] @ matrix
-        return matrix
-
-    def _factors(self, u, parameters) -> Float[Array, "m n n"]:
-        """Saltation after flight, for each segment."""
-        starts, ends = self.segments(u, parameters)
-
-        def one(start, end, which):
-            def fly(x):
-                y = flight_end(parameters, start[0], x, end[0], steps=self.steps)
-                return y, y
-
-            flown, before = jax.jacfwd(fly, has_aux=True)(start[1:])
-            return saltation_matrix(parameters, end[0], before, which) @ flown
-
-        return jax.vmap(one)(starts, ends, self.hit())
-
-    def antiperiodic(self, u, parameters) -> Float[Array, "u u"]:
-        """Derivative of the equations for a deviation that changes sign each period.
-
-        It is singular at a flip, where its null vector is the deviation of the doubled
-        orbit. The first column belongs to the first phase, also without forcing.
-        """
-        if not self.constraints:
-            return self.linearisation(u, parameters, self.jacobian(u, parameters)) + (
-                jnp.eye(self.dimension)
-            )
-        starts, ends = self.segments(u, parameters)
-        unit = self.period(u, parameters) / max(self.periods, 1)
-        scale = jnp.ones(1 + self.dimension).at[0].set(unit)[None, :]
-
-        def along(flat):
-            rows = flat.reshape(starts.shape) * scale
-            return jax.jvp(
-                lambda a, b: self._defects(parameters, a, b),
-                (starts, ends),
-                (rows, self._next(rows, last=-1.0)),
-            )[1]
-
-        return jax.jacfwd(along)(jnp.zeros_like(u))
-
     # -- what to watch
 
     def speeds(self, u, parameters) -> Float[Array, " m"]:
         """Approach speed of each impact, positive where it is physical."""
         starts, ends = self.segments(u, parameters)
-        before = self._arrivals(parameters, starts, ends)
-        return self._speeds(parameters, ends[:, 0], before)
+        before = self.arrivals(parameters, starts, ends)
+        return self.speeds_at(parameters, ends[:, 0], before)
 
-    def _speeds(self, parameters, ends, before):
+    def speeds_at(self, parameters, ends, before):
+        """Approach speeds from the states `before` the impacts at times `ends` (s)."""
         found = jax.vmap(
             lambda end, x, which: -normal_velocity(parameters, end, x)[which]
         )(ends, before, self.hit())
@@ -265,46 +212,7 @@ class ImpactingOrbits(AbstractProblem):
         return self.seen(u, parameters)[1]
 
     def seen(self, u, parameters):
-        starts, ends = self.flights(u, parameters)
-        whole = not self.constraints
-
-        def one(start, end):
-            nodes = nodes_of(parameters, start, end, self.steps)
-            gap = lowest_times(parameters, start, end, self.steps, whole, nodes)[1]
-            return *nodes, jnp.min(gap)
-
-        times, states, wrong, lowest = jax.vmap(one)(starts, ends)
-        monitors = {f"{DIP} {k}": lowest[k] for k in range(lowest.shape[0])}
-        if self.constraints:
-            speeds = self._speeds(parameters, ends, states[:, -1])
-            monitors |= {f"{IMPACT} {k}": speeds[k] for k in range(len(speeds))}
-        found = {
-            "period": self.period(u, parameters),
-            "time": starts[0, 0],
-            "state": starts[0, 1:],
-            "integration error": jnp.max(wrong),
-        }
-        if self.periods:
-            found["stroboscopic"] = self._stroboscopic(parameters, times, states)
-        return monitors, found
-
-    def _stroboscopic(self, parameters, times, states) -> Float[Array, "periods n"]:
-        """States at time zero and each forcing period after it, from those at the ends
-        of all Runge-Kutta steps."""
-        base = parameters.period
-        length = self.periods * base
-
-        def at(time):
-            ago = jnp.mod(time - times[:, 0], length)
-            last = jnp.argmin(ago)
-            when = times[last, 0] + ago[last]
-            k = jnp.searchsorted(times[last], when, side="right") - 1
-            k = jnp.clip(k, 0, self.steps - 1)
-            return flight_nodes(parameters, times[last, k], states[last, k], when, 1)[
-                1
-            ][-1]
-
-        return jax.vmap(at)(base * jnp.arange(self.periods, dtype=jnp.float64))
+        return monitors_and_observed(self, u, parameters)
 
     # -- between compiled programs
 
@@ -318,7 +226,7 @@ class ImpactingOrbits(AbstractProblem):
         del direction
         u = jnp.asarray(point.state)
         parameters = point.problem.parameters
-        matrix = np.asarray(_antiperiodic(self, u, parameters))
+        matrix = np.asarray(antiperiodic(self, u, parameters))
         deviation = np.linalg.svd(matrix)[2][-1]
         state, tangent = run_twice(self, np.asarray(point.state), deviation)
         twice = ImpactingOrbits(
@@ -345,8 +253,3 @@ class ImpactingOrbits(AbstractProblem):
         hits = () if words[1] == "-" else tuple(map(int, words[1].split(".")))
         periods, steps = int(words[3]), int(words[5])
         return ImpactingOrbits(self.parameters, hits, periods, self.dimension, steps)
-
-
-@eqx.filter_jit
-def _antiperiodic(problem: ImpactingOrbits, u, parameters):
-    return problem.antiperiodic(u, parameters)
