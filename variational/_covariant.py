@@ -10,7 +10,7 @@ from jaxtyping import Array, Float
 from jaxcam.hybrid import flow, HybridSystem, Settings
 from jaxcam.hybrid._system import with_array_parameters
 
-from ._lyapunov import orthonormal
+from ._tangent_lanes import orthonormal
 
 
 class CovariantVectors(eqx.Module):

@@ -5,7 +5,6 @@ afterwards, all at once, and multiplied in order.
 """
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
@@ -14,15 +13,11 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from jaxcam.hybrid import HybridSystem, Settings
-from jaxcam.hybrid._advance import Plan
 from jaxcam.hybrid._codes import Row
-from jaxcam.hybrid._functions import Functions
-from jaxcam.hybrid._lane import first_lane, RUNNING
-from jaxcam.hybrid._run import run_raw
+from jaxcam.hybrid._lane import RUNNING
 from jaxcam.hybrid._system import with_array_parameters
 
-from ._event_law import completed_law
-from ._step_matrix import LogRow, Point, step_matrix
+from ._tangent_lanes import Carried, first_frames, next_rows, ROWS
 
 
 class LyapunovSpectrum(eqx.Module):
@@ -113,13 +108,15 @@ def lyapunov_spectrum(
     end = jnp.asarray(float(transient + turns))
 
     def some(batched, states):
-        carry = _first(batched, shared, length, states, begin, end, settings)
+        carry = first_frames(batched, shared, length, states, begin, end, settings)
         seen = _Seen(states.shape[0], transient + turns + 1, states.shape[1])
         used = 0
         while used < max_steps and np.any(np.asarray(carry.lane.status) == RUNNING):
-            carry, rows = _some(batched, shared, length, begin, end, settings, carry)
+            carry, rows = next_rows(
+                batched, shared, length, begin, end, settings, carry
+            )
             seen.take(*map(np.asarray, rows))
-            used += _ROWS
+            used += ROWS
         return _summary(seen, carry, _turn(batched, shared, length), transient, blocks)
 
     made = _in_turn(some, batched, states)
@@ -144,15 +141,6 @@ def _in_turn(some: Callable, batched, states):
     alike = parts[0].turn.shape[0] == 1
     whole = jax.tree.map(lambda *leaves: jnp.concatenate(leaves)[:lanes], *parts)
     return eqx.tree_at(lambda m: m.turn, whole, parts[0].turn) if alike else whole
-
-
-class _Carry(NamedTuple):
-    """What a lane takes from one chunk of rows to the next."""
-
-    lane: Any
-    point: Point
-    frame: Float[Array, "n n"]
-    logs: Float[Array, " n"]
 
 
 class _Seen:
@@ -182,7 +170,7 @@ class _Seen:
         self._hits = hits[:, -1]
 
 
-def _summary(seen: _Seen, carry: _Carry, length, transient, blocks):
+def _summary(seen: _Seen, carry: Carried, length, transient, blocks):
     length = np.asarray(length)
     with np.errstate(invalid="ignore"):
         # the difference of two infinities: it stuck before, and this turn as well
@@ -227,20 +215,8 @@ def _lanes(system, state, where, values):
     return batched, shared, state
 
 
-# rows of the log between two looks from Python
-_ROWS = 256
 # lanes in one program: their logs stay in the cache, and they wait less for each other
 _BLOCK = 128
-# the widest vectors that the machine has; XLA is shy of them by default
-_WIDE: dict[str, Any] = {"compiler_options": {"xla_cpu_prefer_vector_width": 512}}
-
-
-def _plan(system, length, t0, turns, settings) -> Plan:
-    length = system.period if length is None else length
-    end = t0 + turns * length
-    # shorter in contact, where the tangent is carried along
-    plan = Plan.of(system, settings, t0, end, period=length, stop_period=length)
-    return plan._replace(longest_step=length / 8)
 
 
 @eqx.filter_jit
@@ -254,97 +230,3 @@ def _turn(batched, shared, length):
     if batched is None:
         return one(None)[None]
     return eqx.filter_vmap(one, in_axes=eqx.if_array(0))(batched)
-
-
-@eqx.filter_jit
-def _first(batched, shared, length, states, t0, turns, settings):
-    def one(batched, state):
-        system = eqx.combine(batched, shared).prepared()
-        x = tuple(state[i] for i in range(state.shape[0]))
-        plan = _plan(system, length, t0, turns, settings)
-        lane = first_lane(Functions(system, len(x)), t0, x, plan.t1)
-        lane = jax.tree.map(jnp.asarray, lane)
-        point = Point(lane.t, lane.x, lane.contact)
-        n = len(x)
-        return _Carry(lane, point, jnp.eye(n), jnp.zeros(n))
-
-    return eqx.filter_vmap(one, in_axes=(eqx.if_array(0), 0))(batched, states)
-
-
-def _row(record, _):
-    head = [record.kind, record.constraint, record.t]
-    flags = [jnp.asarray(c, dtype=jnp.float64) for c in record.contact]
-    return [jnp.asarray(v) for v in (*head, *record.before, *record.after, *flags)]
-
-
-@eqx.filter_jit(**_WIDE)
-def _some(batched, shared, length, t0, turns, settings, carry: _Carry):
-    def one(batched, carry):
-        system = eqx.combine(batched, shared).prepared()
-        n = len(carry.lane.x)
-        functions = Functions(system, n)
-        plan = _plan(system, length, t0, turns, settings)
-        lane, log = run_raw(functions, plan, carry.lane, _ROWS, _row)
-        kind, side, t = log[:, 0], log[:, 1].astype(jnp.int32), log[:, 2]
-        before, after = log[:, 3 : 3 + n], log[:, 3 + n : 3 + 2 * n]
-        contact = log[:, 3 + 2 * n :] > 0.5
-        taken = kind != float(Row.NOTHING)
-        started = after
-        if not functions.planar:
-            # what follows a chatter starts without normal velocity
-            rest = jax.vmap(lambda s, y, k: completed_law(system, k)(s, y))
-            at_rest = (kind == float(Row.LAST_IMPACT))[:, None]
-            started = jnp.where(at_rest, rest(t, before, side), after)
-
-        def first_and(old, new):
-            return jnp.concatenate([jnp.asarray(old)[None], new])
-
-        # the latest row that was taken, counted from the one before the first
-        latest = jax.lax.cummax(jnp.where(taken, jnp.arange(1, kind.shape[0] + 1), 0))
-        previous = jnp.concatenate([jnp.zeros_like(latest[:1]), latest[:-1]])
-        times = first_and(carry.point.t, t)
-        states = first_and(jnp.stack(carry.point.x), started)
-        flags = first_and(jnp.stack(carry.point.contact), contact)
-
-        def point_at(k):
-            return Point(times[k], tuple(states[k].T), tuple(flags[k].T))
-
-        rows = LogRow(kind, side, t, tuple(before.T), tuple(after.T), tuple(contact.T))
-        matrices = jax.vmap(
-            lambda p, r: step_matrix(system, functions, plan.tableau, p, r)
-        )(point_at(previous), rows)
-
-        def extend(carry, matrix):
-            frame, logs = carry
-            frame, growth = orthonormal(_times(matrix, frame))
-            logs = logs + jnp.log(growth)
-            return (frame, logs), logs
-
-        (frame, logs), sums = jax.lax.scan(extend, (carry.frame, carry.logs), matrices)
-        at = point_at(latest[-1])
-        return _Carry(lane, at, frame, logs), (kind, sums, after)
-
-    return eqx.filter_vmap(one, in_axes=(eqx.if_array(0), 0))(batched, carry)
-
-
-def _times(a, b):
-    """A matrix product that stays elementwise in a batch."""
-    return jnp.sum(a[:, :, None] * b[None, :, :], axis=1)
-
-
-def orthonormal(matrix: Float[Array, "n n"]):
-    """Orthonormal columns that span the same, and the lengths they had (Gram-Schmidt).
-
-    A column of zeros stays one.
-    """
-    columns, lengths = [], []
-    for k in range(matrix.shape[0]):
-        column = matrix[:, k]
-        # twice is enough
-        for _ in range(2):
-            for earlier in columns:
-                column = column - jnp.sum(earlier * column) * earlier
-        length = jnp.sqrt(jnp.sum(column * column))
-        columns.append(column / jnp.where(length > 0, length, 1.0))
-        lengths.append(length)
-    return jnp.stack(columns, axis=1), jnp.stack(lengths)

@@ -16,11 +16,11 @@ from ._read import (
     read_recording as read_recording,
     read_recordings as read_recordings,
 )
+from ._read_rig import read_rig as read_rig
 from ._recording import Case as Case, Recording as Recording
 from ._rig import (
     Gyro as Gyro,
     Quantity as Quantity,
-    read_rig as read_rig,
     Rig as Rig,
     Sensors as Sensors,
 )
