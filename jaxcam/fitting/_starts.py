@@ -7,15 +7,13 @@ import jax.numpy as jnp
 import numpy as np
 
 from ..recordings import Segments
-from ..recordings._flight_fit import state_at
+from ..recordings._flight_fit import size_of, state_at
 from ..recordings._polynomial import fit_local
 from ._model import filtered_channels, Model
 from ._pieces import Pieces, Span
 
 
 def _size(model: Model) -> int:
-    from ..recordings._compare import _size as size_of
-
     return size_of(model.system, {n: s.observe for n, s in model.sensors.items()})
 
 

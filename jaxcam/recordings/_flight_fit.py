@@ -14,6 +14,7 @@ import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from ..hybrid import HybridSystem
+from ._errors import RecordingError
 from ._padding import padded
 from ._polynomial import fit_local
 
@@ -221,3 +222,25 @@ def _match(system, picks, clock, values, rates, guess):
 
     arrays = (jnp.asarray(a) for a in (clock, values, rates, guess))
     return jax.vmap(one)(*arrays)
+
+
+def size_of(system: HybridSystem, observe: Observe) -> int:
+    """Number of components of the state."""
+    if system.state_names:
+        return len(system.state_names)
+    picks = [pick for pick in observe.values() if isinstance(pick, int)]
+    for size in range(max(picks, default=0) + 1, 64):
+        # a field that unpacks its state accepts one size only
+        try:
+            shape = jax.eval_shape(
+                lambda state: system.vector_field(jnp.asarray(0.0), state),
+                jax.ShapeDtypeStruct((size,), float),
+            ).shape
+        except (ValueError, TypeError, IndexError):
+            continue
+        if shape == (size,):
+            return size
+    raise RecordingError(
+        f"The number of states of {type(system).__name__} cannot be told; declare its "
+        f"`state_names`."
+    )
