@@ -123,6 +123,18 @@ def test_damping_is_named_with_its_strength():
     assert float(field[1]) == pytest.approx(-one.value)
 
 
+def test_a_term_in_doubt_is_named_where_nothing_else_explains_what_is_left(monkeypatch):
+    def doubting(trials, best, seed):
+        names = [(name, 0.6) for name in best.names]
+        return trials.known[frozenset()], {}, {}, names
+
+    monkeypatch.setattr("jaxcam.discrepancy._diagnose.sure", doubting)
+    found = _diagnosed([_free(0.3, 0.1), _free(0.2, 0.1)])
+    assert (found.verdict, found.names) == ("effect", ("viscous_damping",))
+    (said,) = (one for one in found.caveats if "viscous damping" in one)
+    assert "nothing is left over with it" in said and "60%" in said
+
+
 class Rubbed(Swing):
     """A swing whose textbook has a damping, which cannot be negative."""
 

@@ -85,7 +85,7 @@ def diagnose(
 
     left_before = left(before)
     left_after = left(best) if best.names else left_before
-    held = None
+    held, named_anyway = None, []
     if doubtful and any(one.significant for one in left_after):
         # that something is there is sure; what explains all of it is what it is
         with_all = left(found)
@@ -94,7 +94,8 @@ def diagnose(
             # but what does not foretell data that it has not seen explains nothing; it
             # is asked for no more than a shape would be
             if whole[1] < whole[0] or trials.foretells(best, found):
-                best, left_after, doubtful, held = found, with_all, [], whole
+                best, left_after, held = found, with_all, whole
+                named_anyway, doubtful = doubtful, []
                 inclusion, deviation = redrawn(trials, best, seed)
     held = held or held_out(trials, before, best, report)
     rms_before, rms_after, gained, unseen = held
@@ -107,6 +108,7 @@ def diagnose(
     unexplained = [one for one in left_after if one.significant]
     verdict, caveats = _verdict(effects, unexplained, before, best)
     caveats += [_doubt(name, part) for name, part in doubtful]
+    caveats += [_needed(name, part) for name, part in named_anyway]
     if verdict == "unknown":
         effects.insert(0, unknown_effect(unexplained, problem, gained))
     alternatives = _alternatives(trials, best)
@@ -201,13 +203,25 @@ def _verdict(effects, unexplained: list[Structure], before: Trial, best: Trial):
 
 def _doubt(name: str, part: float) -> str:
     """Why a term that gains something was not named."""
-    but = f"in {part:.0%} of the redrawn sets of stretches only"
-    if part >= SURE:
-        but = "its strength varies so much between stretches that it might be zero"
     return (
-        f"A term for {name.replace('_', ' ')} gains something, but {but}; record more "
-        f"before you believe it."
+        f"A term for {name.replace('_', ' ')} gains something, but {_but(part)}; "
+        f"record more before you believe it."
     )
+
+
+def _needed(name: str, part: float) -> str:
+    """Why a term was named that is in doubt."""
+    return (
+        f"The term for {name.replace('_', ' ')} is named because nothing is left over "
+        f"with it, but {_but(part)}; record more to know its strength."
+    )
+
+
+def _but(part: float) -> str:
+    """What speaks against a term: in how many redrawn sets of stretches it gains."""
+    if part >= SURE:
+        return "its strength varies so much between stretches that it might be zero"
+    return f"it gains in {part:.0%} of the redrawn sets of stretches only"
 
 
 def _alternatives(trials: Trials, best: Trial) -> list[tuple[str, float]]:
