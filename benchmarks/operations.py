@@ -1,0 +1,95 @@
+"""What an attempt at a step is made of: operations on scalars, by what they are for.
+
+    python -m benchmarks.operations
+
+Counts the program of one attempt on the cam-follower, before the compiler fuses it.
+Divisions and square roots cost several additions each.
+"""
+
+import collections
+
+import jax
+import jax.numpy as jnp
+from jax.interpreters import partial_eval
+
+import jaxcam  # noqa: F401  64-bit floats
+from jaxcam.hybrid import Settings
+from jaxcam.hybrid._advance import Plan
+from jaxcam.hybrid._functions import Functions
+from jaxcam.hybrid._lane import first_lane
+from jaxcam.hybrid._loop import iterate
+from jaxcam.models import CamFollower
+
+
+#: function of the loop that an operation is called from, the innermost first
+PARTS = {
+    "step": "stages of the step",
+    "error_norm": "stages of the step",
+    "jets": "gap, velocity, acceleration, jerk at two places",
+    "judge": "judging the flight",
+    "judge_contact": "judging the contact",
+    "rest_of_chatter": "completing a chatter",
+    "taylor": "landing and impact",
+    "velocity": "landing and impact",
+    "impact": "landing and impact",
+    "frame": "projection onto the surface",
+    "onto": "projection onto the surface",
+    "taylor_of_release": "projection onto the surface",
+    "advance_lane": "choosing the next step",
+}
+OTHER = "everything else"
+
+
+def program():
+    """The operations of one attempt, those of unused results left out."""
+    system = CamFollower().prepared()
+    zero, one = jnp.asarray(0.0), jnp.asarray(1.0)
+    plan = Plan.of(system, Settings(), zero, one, stop_period=system.period)
+    functions = Functions(system, 2)
+    lane = first_lane(functions, zero, (jnp.asarray(0.3), zero), one)
+    leaves, structure = jax.tree.flatten(jax.tree.map(jnp.asarray, lane))
+
+    def attempt(*leaves):
+        after, record = iterate(functions, plan, jax.tree.unflatten(structure, leaves))
+        return [*jax.tree.leaves(after), record.kind, record.t, *record.after]
+
+    jaxpr = jax.make_jaxpr(attempt)(*leaves).jaxpr
+    wanted = [True] * len(jaxpr.outvars)
+    return partial_eval.dce_jaxpr(jaxpr, wanted, instantiate=True)[0]
+
+
+def operations(jaxpr):
+    """Names of the operations, those of calls included, and who asked for them."""
+    for equation in jaxpr.eqns:
+        inner = [p for p in equation.params.values() if hasattr(p, "jaxpr")]
+        if inner:
+            for call in inner:
+                for name, _ in operations(call.jaxpr):
+                    yield name, equation
+        else:
+            yield equation.primitive.name, equation
+
+
+def part_of(equation) -> str:
+    frames = equation.source_info.traceback.frames
+    # a name within a class, without what is within it
+    names = [f.function_name.split(".<")[0].rpartition(".")[2] for f in frames]
+    return next((PARTS[name] for name in names if name in PARTS), OTHER)
+
+
+def main() -> None:
+    counts, slow = collections.Counter(), collections.Counter()
+    for name, equation in operations(program()):
+        part = part_of(equation)
+        counts[part] += 1
+        slow[part] += name in ("div", "sqrt")
+    total = counts.total()
+    print("| part | operations | share | divisions, roots |")
+    print("| --- | --- | --- | --- |")
+    for part, number in counts.most_common():
+        print(f"| {part} | {number} | {number / total:.0%} | {slow[part]} |")
+    print(f"| all | {total} | | {slow.total()} |")
+
+
+if __name__ == "__main__":
+    main()
