@@ -6,6 +6,7 @@ from pathlib import Path
 
 import jax
 import matplotlib
+import pytest
 from hypothesis import settings
 
 import jaxcam  # noqa: F401  64-bit floats, and everything it does on import is allowed
@@ -35,3 +36,16 @@ def _cache_folder() -> Path:
 jax.config.update("jax_compilation_cache_dir", str(_cache_folder()))
 jax.config.update("jax_persistent_cache_min_compile_time_secs", 0)
 jax.config.update("jax_persistent_cache_min_entry_size_bytes", 0)
+
+
+# Linux gives a process 65530 memory mappings and a compiled program takes dozens: all
+# tests in one process would end in a segmentation fault
+_MAPPINGS = 40_000
+
+
+@pytest.fixture(autouse=True, scope="module")
+def programs_are_given_back():
+    yield
+    mappings = Path("/proc/self/maps")
+    if mappings.exists() and len(mappings.read_text().splitlines()) > _MAPPINGS:
+        jax.clear_caches()
