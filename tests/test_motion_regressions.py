@@ -253,6 +253,11 @@ def test_a_run_is_printed_in_a_line():
         BouncingBall(), jnp.array([1.0, 0.0]), 0.0, 100.0, max_steps=16
     )
     assert str(short).endswith(short.result) and short.result
+    heights = jnp.array([[1.0, 0.0], [2.0, 0.0]])
+    many = jax.vmap(
+        lambda x: jaxcam.simulate(BouncingBall(), x, 0.0, 1.0, max_steps=16)
+    )(heights)
+    assert str(many) == repr(many)
 
 
 def test_a_finished_run_is_read_inside_a_program():

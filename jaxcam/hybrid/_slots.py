@@ -61,6 +61,7 @@ class Lanes(NamedTuple):
     states: np.ndarray
 
     def some(self, which: slice) -> "Lanes":
+        """A part of the lanes."""
         values = None if self.values is None else self.values[which]
         return self._replace(values=values, states=self.states[which])
 

@@ -30,7 +30,8 @@ class Trajectory(eqx.Module):
     code: Int[Array, ""]
 
     def __str__(self) -> str:
-        if is_traced(self):
+        # of a batch there is no one line
+        if is_traced(self) or np.ndim(self.code):
             return repr(self)
         end = float(np.asarray(self.steps.time)[int(self.steps.count) - 1])
         said = (
