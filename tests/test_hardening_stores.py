@@ -8,6 +8,7 @@ from pathlib import Path
 import hostile_files as hostile
 import numpy as np
 import pytest
+import zarr
 from continuation_examples import fold_field, mu
 from hypothesis import example, given, HealthCheck, settings, strategies as st
 from sweep_maps import SQUARE_ROOT
@@ -94,6 +95,23 @@ def test_any_store(stored, tmp_path_factory, data):
         assert np.array_equal(found.attractor, attractor)
     except ValueError as error:
         assert "\n" not in str(error)
+
+
+@pytest.mark.parametrize("axis", ["x1", "x2"])
+@pytest.mark.parametrize("how", ["lost", "moved"])
+def test_a_store_without_its_axes_is_damaged(stored, tmp_path, axis, how):
+    # an axis that is lost was once read as 0, 1, 2, ...
+    folder = tmp_path / "sweep"
+    shutil.copytree(stored[0], folder)
+    if how == "lost":
+        (folder / axis / "zarr.json").unlink()
+    else:
+        group = zarr.open_group(str(folder), mode="r+")
+        group[axis][:1] = 0.5
+    with pytest.raises(ValueError, match="coordinates"):
+        load(folder)
+    with pytest.raises(ValueError, match="coordinates"):
+        basins(SQUARE_ROOT, GRID, out=folder, resume=True, **OPTIONS)
 
 
 @FEW

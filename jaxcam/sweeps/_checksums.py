@@ -16,8 +16,9 @@ from ._store import FORMAT, SWEEP, VERSION
 
 UNFINISHED = -1
 CHECKSUM = "checksum"
-# attribute with the checksums of what was made of all blocks together
-TOGETHER = "together"
+# attributes with the checksums of what was made of all blocks together, and of the
+# coordinates: of one that is lost xarray would make 0, 1, 2, ...
+TOGETHER, AXES = "together", "axes"
 # what zarr and its codecs raise for chunks and descriptions that were damaged
 UNREADABLE = (OSError, ValueError, RuntimeError, TypeError, LookupError, AttributeError)
 
@@ -61,11 +62,16 @@ def opened(path: str | Path) -> xarray.Dataset:
         with warnings.catch_warnings():
             # a folder without a description; what it lacks is said by who needs it
             warnings.simplefilter("ignore", zarr.errors.ZarrUserWarning)
-            return xarray.open_dataset(
+            dataset = xarray.open_dataset(
                 path, engine="zarr", consolidated=False, chunks=None, decode_times=False
             )
+        wanted = dataset.attrs.get(AXES, {})
+        whole = checksums(dataset, wanted) == dict(wanted)
     except UNREADABLE:
-        raise damaged(path) from None
+        whole = False
+    if not whole:
+        raise damaged(path)
+    return dataset
 
 
 def damaged(path: str | Path) -> ValueError:
@@ -120,7 +126,14 @@ def _check_together(path, dataset: xarray.Dataset) -> None:
 
 
 def checksums(dataset: xarray.Dataset, names) -> dict[str, int]:
-    return {str(n): checksum({"": dataset[n].values}) for n in names}
+    return {str(n): checksum({"": _plain(dataset[n].values)}) for n in names}
+
+
+def _plain(values: np.ndarray) -> np.ndarray:
+    """Text as bytes, in whatever way it is kept in memory."""
+    if values.dtype.kind in "biufc":
+        return values
+    return np.frombuffer("\n".join(map(str, values.ravel())).encode(), dtype=np.uint8)
 
 
 def stored_identity(path: Path) -> dict | None:

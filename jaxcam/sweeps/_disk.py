@@ -14,6 +14,7 @@ import xarray
 import zarr
 
 from ._checksums import (
+    AXES,
     CHECKSUM,
     checksum,
     checksums,
@@ -73,7 +74,7 @@ class OnDisk:
         extra.to_zarr(self.path, mode="a", consolidated=False, zarr_format=3)
         # last, so that what is half written is known to be so
         group = zarr.open_group(str(self.path), mode="r+")
-        group.attrs[TOGETHER] = checksums(extra, extra.data_vars)
+        group.attrs[TOGETHER] = checksums(extra, extra.variables)
 
     def _create(self) -> None:
         layout = self.layout
@@ -84,6 +85,7 @@ class OnDisk:
         made = template(layout, {})
         made.to_zarr(fresh, mode="w", consolidated=False, zarr_format=3)
         group = zarr.open_group(str(fresh), mode="r+")
+        group.attrs[AXES] = checksums(made, made.coords)
         for name, v in layout.variables.items():
             group.create_array(
                 name,
