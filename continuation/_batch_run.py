@@ -40,6 +40,8 @@ class Axes(eqx.Module):
 
 
 class Numbers(NamedTuple):
+    """The settings that may differ between calls of one compiled program."""
+
     tolerance: Any
     iterations: Any
     step: Any
@@ -50,6 +52,7 @@ class Numbers(NamedTuple):
 
 
 def numbers_of(s: Settings) -> Numbers:
+    """The numbers among the settings."""
     return Numbers(
         s.tolerance, float(s.iterations), s.step, s.min_step, s.max_step, s.angle,
         s.max_angle,
