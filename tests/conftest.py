@@ -38,8 +38,8 @@ jax.config.update("jax_persistent_cache_min_compile_time_secs", 0)
 jax.config.update("jax_persistent_cache_min_entry_size_bytes", 0)
 
 
-# Linux gives a process 65530 memory mappings and a compiled program takes dozens: all
-# tests in one process would end in a segmentation fault
+# Linux gives a process 65530 memory mappings, and a large compiled program takes
+# dozens: a process that runs out of them ends in a segmentation fault
 _MAPPINGS = 40_000
 
 
