@@ -9,7 +9,13 @@ import pytest
 
 from jaxcam.cli._choices import make_system, saved_name
 from jaxcam.cli._parameters import parameters, set_parameters
-from jaxcam.discrepancy import _search, library, saved_classes, WithTerms
+from jaxcam.discrepancy import (
+    _search,
+    _trials as _trials_module,
+    library,
+    saved_classes,
+    WithTerms,
+)
 from jaxcam.discrepancy._engine import added
 from jaxcam.discrepancy._terms import (
     CamProfileError,
@@ -20,6 +26,7 @@ from jaxcam.discrepancy._terms import (
     RestitutionVelocity,
     ViscousDamping,
 )
+from jaxcam.discrepancy._trials import Trials
 from jaxcam.models import (
     CamFollower,
     ConstantRestitution,
@@ -169,3 +176,42 @@ def test_the_most_promising_exchanges_are_tried(monkeypatch):
     tried = _search.Search(trials)._exchanges(best)
     wanted = [{kept, f"term {k}"} for k in (8, 7, 6) for kept in ("term 1", "term 0")]
     assert tried == wanted
+
+
+def _trials(samples: int) -> Trials:
+    return Trials(SimpleNamespace(samples=samples), (), (), print)  # pyright: ignore
+
+
+@pytest.mark.parametrize(
+    "costs, crawls",
+    [
+        # what explains the data is fitted to the end, however slowly
+        ([9e3, 119.0, 118.9, 118.8, 118.7, 118.6, 118.5], False),
+        # so is what converges: its last steps are small, and each is taken at once
+        ([9e5, 1040.0, 775.0, 774.0, 774.0 - 1e-3], False),
+        # attempts that fail at first lead somewhere after all
+        ([5e4, 5e4, 5e4, 5e4, 5e4, 5e4, 350.0, 350.0, 334.0], False),
+        # every other attempt gains next to nothing
+        ([9e5, 14000.0, 13950.0, 13950.0, 13900.0, 13900.0], True),
+    ],
+)
+def test_a_fit_that_crawls_far_from_the_data_is_given_up(costs, crawls):
+    assert _trials(100).crawls(costs) is crawls
+
+
+def test_a_start_that_is_late_to_beat_a_smaller_subset_is_given_up(monkeypatch):
+    """After eight attempts, and not where a subset is fitted from a larger one."""
+    asked = []
+
+    def fit(problem, free, start, iterations, stop):
+        # costs that always fall, and stay above those of the subset it starts from
+        costs = [2000.0 * 0.9**k for k in range(iterations + 1)]
+        ended = next((k for k in range(1, iterations) if stop(costs[: k + 1])), None)
+        asked.append(ended)
+        return SimpleNamespace(cost=costs[ended or -1], converged=False, point=start)
+
+    monkeypatch.setattr(_trials_module, "fit", fit)
+    trials = _trials(100)
+    trials._fit([], None, 15, beaten=100.0)
+    trials._fit([], None, 15, beaten=np.inf)
+    assert asked == [8, None]

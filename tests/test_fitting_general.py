@@ -84,11 +84,26 @@ def test_short_flights_start_with_the_velocity_that_gravity_allows():
 
 def test_freeing_another_parameter_compiles_nothing(balls):
     fitting.fit(balls, free=["gravity"])
-    from jaxcam.fitting._linearise import assemble
+    from jaxcam.fitting._linearise import assemble_one
 
-    before = assemble._cached._cache_size()
+    before = assemble_one._cached._cache_size()
     fitting.fit(balls, free=["drag", "restitution"])
-    assert assemble._cached._cache_size() == before
+    assert assemble_one._cached._cache_size() == before
+
+
+def test_a_fit_that_is_stopped_says_so_and_keeps_what_it_has(balls):
+    seen = []
+
+    def stop(costs):
+        seen.append(list(costs))
+        return len(costs) > 2
+
+    found = fitting.fit(balls, stop=stop)
+    assert found.iterations == 2 and not found.converged
+    assert "stopped after 2 iterations" in found.message
+    # the start and one cost after each iteration, never rising
+    assert [len(costs) for costs in seen] == [2, 3]
+    assert found.cost == seen[-1][-1] <= seen[-1][1] <= seen[-1][0]
 
 
 def test_the_optimum_is_that_of_optimistix(balls):

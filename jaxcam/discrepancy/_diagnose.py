@@ -111,6 +111,8 @@ def diagnose(
     caveats += [_needed(name, part) for name, part in named_anyway]
     if verdict == "unknown":
         effects.insert(0, unknown_effect(unexplained, problem, gained))
+    if not trials.near(best):
+        caveats.append(_far(trials))
     alternatives = _alternatives(trials, best)
     for name, delta in alternatives:
         # what was found to hang on a few stretches of the records is no equal
@@ -214,6 +216,17 @@ def _needed(name: str, part: float) -> str:
     return (
         f"The term for {name.replace('_', ' ')} is named because nothing is left over "
         f"with it, but {_but(part)}; record more to know its strength."
+    )
+
+
+def _far(trials: Trials) -> str:
+    """That no subset comes near the data, and how near the best one comes."""
+    least = min(trials.known.values(), key=lambda trial: trial.fit.cost)
+    named = listed(sorted(least.names)) if least.names else "the model as it is"
+    return (
+        f"No subset of the known effects comes near these records: {named} misses by "
+        f"{rms_of(least.fit):.2g} times the noise, which is the best of them. What is "
+        f"said of shape and place is rough."
     )
 
 

@@ -49,6 +49,7 @@ def held_out(
                 start=trial.fit.point,
                 weights=seen,
                 iterations=_ITERATIONS,
+                stop=trials.crawls,
             )
             test = with_states(problem, known, unseen)
             parts = _parts(test, unseen)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ._engine import added, gain
-from ._trials import ITERATIONS, Trial, Trials, values_of
+from ._trials import EXPLAINED, ITERATIONS, Trial, Trials, values_of
 from ._vibration_scan import Periodogram
 
 
@@ -16,8 +16,8 @@ MOST_TERMS = 3
 _KEPT, _TRIED = 3, 6
 # Subsets within this BIC of the best one may lead to a better one than it does
 _RIVAL = 50.0
-# Cost a sample, one where nothing but noise is left, of a fit that explains the data
-_EXPLAINED = 1.2
+# Part of the cost that a term leaves at most where the fits are far from the data
+_HELPED = 0.7
 
 
 class Search:
@@ -27,10 +27,14 @@ class Search:
         self.trials = trials
 
     def run(self) -> Trial:
-        """The best subset; empty where no term is worth its parameters."""
-        best = self.trials.attempt(frozenset(), None, ITERATIONS)
-        assert best is not None
-        kept = [best]
+        """The best subset; empty where no term is worth its parameters.
+
+        It is empty too where no subset comes near the data: what is least bad is no
+        physics.
+        """
+        bare = self.trials.attempt(frozenset(), None, ITERATIONS)
+        assert bare is not None
+        best, kept = bare, [bare]
         for size in range(1, MOST_TERMS + 1):
             promised = self._promised(kept, best)
             most = len(self.trials.terms) if size == 1 else _TRIED
@@ -48,8 +52,17 @@ class Search:
             kept = sorted((t for t in kept if t.bic < best.bic), key=_bic)
             if not kept:
                 break
-            best = self._better(best, kept[0])
+            before, best = best, self._better(best, kept[0])
+            if not self._leads(before, best):
+                break
+        if not self.trials.near(best):
+            return bare
         return self._swapped(self._smallest(best))
+
+    def _leads(self, before: Trial, best: Trial) -> bool:
+        """Whether to look for more; far from the data only where terms help a lot."""
+        part = best.fit.cost / before.fit.cost
+        return self.trials.near(best) or part < _HELPED
 
     def _settles(self, start: Trial, trial: Trial | None) -> bool:
         """Whether a subset explains what the one that promised it could not.
@@ -57,7 +70,7 @@ class Search:
         What the other one promises of further subsets is then worth little; this one's
         own quadratic model tells which of them are as good, and these are fitted.
         """
-        enough = _EXPLAINED * self.trials.problem.samples
+        enough = EXPLAINED * self.trials.problem.samples
         if trial is None or not trial.fit.cost < enough < start.fit.cost:
             return False
         for names in self._exchanges(trial, _RIVAL):

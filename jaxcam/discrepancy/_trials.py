@@ -24,6 +24,15 @@ SURE = 0.9
 BEYOND = float(norm.ppf(SURE))
 #: iterations of a first look at a subset, and at most of one that may win
 QUICK, ITERATIONS = 15, 60
+#: cost a sample, one where nothing but noise is left, of a fit that explains the data
+EXPLAINED = 1.2
+# and of one that comes near them: twice the noise
+_NEAR = 4.0
+# A fit that explains little crawls, where so many steps took so many attempts or more
+# and gained less than this part of what is left to explain
+_STEPS, _ATTEMPTS, _CRAWL = 2, 4, 0.01
+# and is late, where after so many attempts it is worse than another one with less
+_LATE = 8
 # standard deviations of what is known of a rig beyond which its fit went astray
 _FAR = 3.0
 
@@ -100,20 +109,24 @@ class Trials:
         A fit without the right term may end far from the rig, in a valley that leads
         nowhere. Then the nominal parameters are a better place to start from.
         """
-        free, places = self.parameters(names), [self.problem.start]
+        free, places, beaten = self.parameters(names), [self.problem.start], math.inf
+        astray = start is not None and not self._sound(start.fit)
         if start is not None:
             ended = self._seeded(names, start, start.fit.point)
             nominal = self._seeded(names, start, self.problem.start)
-            places = [ended, nominal] if self._sound(start.fit) else [nominal, ended]
+            places = [nominal, ended] if astray else [ended, nominal]
+            beaten = start.fit.cost if names > start.names else math.inf
         known = self._kept.get(names) if self._kept is not None else None
         if known is not None and names not in self.known:
             places.insert(0, known)
-        found = fit(self.problem, free=free, start=places[0], iterations=iterations)
+        found = self._fit(free, places[0], iterations, beaten)
         least = self.least_cost
         for place in places[1:]:
             if self._sound(found) or found.cost > 2 * least:
                 break
-            again = fit(self.problem, free=free, start=place, iterations=iterations)
+            if astray and found.cost < beaten < math.inf:
+                break
+            again = self._fit(free, place, iterations, found.cost)
             found = min(found, again, key=_cost)
         if not math.isfinite(found.cost):
             return None
@@ -129,11 +142,41 @@ class Trials:
                 derived.pop(names, None)
         return self.known[names]
 
+    def _fit(
+        self, free: Sequence[str], start: Point, iterations: int, beaten: float
+    ) -> Fit:
+        """A fit, given up where it leads nowhere or is late to beat a cost."""
+
+        def stop(costs: Sequence[float]) -> bool:
+            late = len(costs) > _LATE and costs[-1] > beaten
+            return late or self.crawls(costs)
+
+        return fit(
+            self.problem, free=free, start=start, iterations=iterations, stop=stop
+        )
+
+    def crawls(self, costs: Sequence[float]) -> bool:
+        """Whether a fit explains so little, and so slowly, that it leads nowhere.
+
+        The right term needs a few steps; a wrong one has no end of small ones.
+        """
+        left = costs[-1] - EXPLAINED * self.problem.samples
+        steps = list(dict.fromkeys(costs))
+        if left < 0 or len(steps) <= _STEPS:
+            return False
+        before = steps[-1 - _STEPS]
+        attempts = costs[::-1].index(before)
+        return attempts >= _ATTEMPTS and before - costs[-1] < _CRAWL * left
+
     def finished(self, trial: Trial) -> Trial:
         """A subset that may win is fitted to the end."""
-        if trial.fit.converged:
+        if trial.fit.converged or not self.near(trial):
             return trial
         return self.attempt(trial.names, trial, ITERATIONS) or trial
+
+    def near(self, trial: Trial) -> bool:
+        """Whether a fit is so near the data that its quadratic model holds."""
+        return trial.fit.cost < _NEAR * self.problem.samples
 
     def without(self, best: Trial, name: str) -> Trial:
         """The fit of a subset with one term less."""

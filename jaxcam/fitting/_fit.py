@@ -1,6 +1,6 @@
 """Levenberg-Marquardt on the parameters of a `Problem`, its states eliminated."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import jax.numpy as jnp
 import numpy as np
@@ -32,6 +32,7 @@ def fit(
     weights: Weights | None = None,
     prior: bool = True,
     iterations: int = _ITERATIONS,
+    stop: Callable[[Sequence[float]], bool] | None = None,
     progress: Callable[[int, float], None] | None = None,
 ) -> Fit:
     """Fit the free parameters of a problem.
@@ -43,6 +44,8 @@ def fit(
     - `start`: another fit, or values of some parameters; by default the nominal ones.
     - `weights`: how much each piece of the data counts.
     - `prior`: whether the tolerances count as knowledge; bounds always hold.
+    - `stop`: called after each iteration with the cost at the start and after every
+        one so far; where it says so, the fit ends, not converged.
     - `progress`: called with the number of the iteration and the cost.
 
     **Raises:** `ValueError` for a name that is not a parameter.
@@ -54,15 +57,17 @@ def fit(
     if problem.longest_flight > _LONG and point.states is problem.start.states:
         loose = loosened(extras)
         most = max(iterations, _ITERATIONS)
-        point = _descend(problem, columns, loose, point, prior, most, None)[0]
-    found = _descend(problem, columns, extras, point, prior, iterations, progress)
+        point = _descend(problem, columns, loose, point, prior, most)[0]
+    found = _descend(problem, columns, extras, point, prior, iterations, stop, progress)
     point, blocks, costs, cost, converged, count, message = found
     return finish(
         problem, columns, point, blocks, costs, cost, prior, converged, count, message
     )
 
 
-def _descend(problem, columns, extras, point, prior, iterations, progress):
+def _descend(
+    problem, columns, extras, point, prior, iterations, stop=None, progress=None
+):
     """Damped scoring from a point to an optimum near it."""
     local, scales = jnp.asarray(columns.local), jnp.asarray(columns.scales)
 
@@ -75,6 +80,7 @@ def _descend(problem, columns, extras, point, prior, iterations, progress):
     blocks, costs = linearise(point)
     cost = total(costs, point)
     damping, message, converged, count = _FIRST_DAMPING, "", False, 0
+    so_far = [cost]
     while count < iterations:
         count += 1
         step, promise = damped_step(problem, columns, blocks, point, damping, prior)
@@ -108,6 +114,10 @@ def _descend(problem, columns, extras, point, prior, iterations, progress):
                     "optimum; look at the residuals, or start elsewhere."
                 )
                 break
+        so_far.append(cost)
+        if stop is not None and stop(so_far):
+            message = f"The fit was stopped after {count} iterations."
+            break
     else:
         message = (
             f"The optimum was not reached in {iterations} iterations; allow more of "

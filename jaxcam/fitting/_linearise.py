@@ -7,6 +7,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
+from ._each_record import each_record
 from ._likelihood import score_all
 from ._linear import (
     Extras,
@@ -69,7 +70,6 @@ class Costs(NamedTuple):
     rested: Float[Array, "r kc"]
 
 
-@eqx.filter_jit
 def assemble(
     layout: Layout,
     pieces: Pieces,
@@ -78,16 +78,24 @@ def assemble(
     columns: Int[Array, "r m"],
     scales: Float[Array, "r m"],
 ) -> tuple[Blocks, Costs]:
-    """Linearise about a point.
+    """Linearise about a point; records are shared out to the cores.
 
     **Arguments:** `columns` of the parameters that are free in each record and the
     `scales` that the normal equations are in; a scale of zero fills up the width.
     """
 
-    def record(pieces, extras, values, states, columns, scales):
-        return _record(layout, pieces, extras, values, states, columns, scales)
+    def record(row):
+        row = jnp.asarray(row)
+        return assemble_one(layout, pieces, extras, point, columns, scales, row)
 
-    return jax.vmap(record)(pieces, extras, *point, columns, scales)
+    return each_record(record, columns.shape[0])
+
+
+@eqx.filter_jit
+def assemble_one(layout, pieces, extras, point, columns, scales, row):
+    """`assemble` of one record: its number is not part of the program."""
+    one = pieces, extras, point.values, point.states, columns, scales
+    return _record(layout, *jax.tree.map(lambda leaf: leaf[row], one))
 
 
 @eqx.filter_jit

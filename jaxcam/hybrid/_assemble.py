@@ -14,6 +14,10 @@ from ._normal import normal_velocity
 from ._run import kinds, Log
 
 
+# Numbers of velocities that programs are compiled for: the least, and by what they grow
+_FEWEST, _LONGER = 1024, 4
+
+
 class Parts(NamedTuple):
     """The padded pieces of a trajectory."""
 
@@ -51,15 +55,10 @@ def assemble(
     before = xp.where(real[:, None], log.before[index], xp.nan)
     after = xp.where(real[:, None], log.after[index], xp.nan)
     which = xp.where(real, log.constraint[index], 0.0).astype(xp.int32)
-    impacts = Impacts(
-        t_hit,
-        before,
-        after,
-        which,
-        _speeds(system, log.t[index], log.before[index], which, real),
-        _speeds(system, log.t[index], log.after[index], which, real),
-        number,
-    )
+    sides = log.before[index], log.after[index]
+    speeds = _speeds(xp, system, log.t[index], sides, which)
+    speeds = (xp.where(real, speed, xp.nan) for speed in speeds)
+    impacts = Impacts(t_hit, before, after, which, *speeds, number)
 
     # a contact begins at the row after its last impact, and ends where its flag falls
     began = xp.concatenate([kept[:1], kept[1:] & ~kept[:-1]])
@@ -100,8 +99,25 @@ def _least_to_come(xp: ModuleType, values):
     return np.minimum.accumulate(values[::-1])[::-1]
 
 
+def _speeds(xp: ModuleType, system, times, sides, which):
+    """Normal velocities at the constraints that were hit, on either side of impacts."""
+    count = times.shape[0]
+    times, which = xp.concatenate([times, times]), xp.concatenate([which, which])
+    states = xp.concatenate(sides)
+    if xp is np:
+        # a few lengths only, as each is compiled
+        size = _FEWEST
+        while size < 2 * count:
+            size *= _LONGER
+        rest = size - 2 * count
+        times, which = np.pad(times, (0, rest)), np.pad(which, (0, rest))
+        states = np.pad(states, ((0, rest), (0, 0)))
+    speeds = _normal_velocities(system, times, states, which)
+    speeds = xp.asarray(speeds)
+    return speeds[:count], speeds[count : 2 * count]
+
+
 @eqx.filter_jit
-def _speeds(system, times, states, which, real):
+def _normal_velocities(system, times, states, which):
     speeds = jax.vmap(lambda t, x: normal_velocity(system, t, x))(times, states)
-    picked = jnp.take_along_axis(speeds, which[:, None], axis=1)[:, 0]
-    return jnp.where(real, picked, jnp.nan)
+    return jnp.take_along_axis(speeds, which[:, None], axis=1)[:, 0]

@@ -192,7 +192,8 @@ def _go_on(system, settings, t0, state, t1, lane: Lane, rows):
 def _assemble(system, t0, state, contact, log: Log) -> Parts:
     """The parts of a run that is not traced."""
     t0, state, contact, log = jax.tree.map(np.asarray, (t0, state, contact, log))
-    rows = log.kind.shape[0]
+    log = Log(*(part[log.kind > 0] for part in log))
+    rows = len(log.kind)
     return assemble(system, t0, state, contact, log, (rows, rows), np)
 
 
@@ -237,14 +238,15 @@ def _trim(parts: Parts) -> Parts:
         number = int(part.count)
         # in numpy: jax would compile a slice for every new length; copied, or the whole
         # log would stay in memory with it
-        return jax.device_put(
-            jax.tree.map(lambda a: np.asarray(a)[:number].copy() if a.ndim else a, part)
+        return jax.tree.map(
+            lambda a: np.asarray(a)[:number].copy() if a.ndim else a, part
         )
 
+    impacts, contacts, steps = jax.device_put([cut(part) for part in parts])
     return Parts(
-        _as(Impacts, cut(parts.impacts)),
-        _as(Contacts, cut(parts.contacts)),
-        _as(Steps, cut(parts.steps)),
+        _as(Impacts, impacts),
+        _as(Contacts, contacts),
+        _as(Steps, steps),
     )
 
 
