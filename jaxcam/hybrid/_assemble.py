@@ -57,8 +57,8 @@ def assemble(
     which = xp.where(real, log.constraint[index], 0.0).astype(xp.int32)
     sides = log.before[index], log.after[index]
     speeds = _speeds(xp, system, log.t[index], sides, which)
-    speeds = (xp.where(real, speed, xp.nan) for speed in speeds)
-    impacts = Impacts(t_hit, before, after, which, *speeds, number)
+    hit, left = (xp.where(real, speed, xp.nan) for speed in speeds)
+    impacts = Impacts(t_hit, before, after, which, hit, left, number)
 
     # a contact begins at the row after its last impact, and ends where its flag falls
     began = xp.concatenate([kept[:1], kept[1:] & ~kept[:-1]])

@@ -6,12 +6,9 @@ implicit solvers, and a check on the loop, with which it shares only the derivat
 the gap and the formula for the duration of a chatter.
 
 diffrax looks at the sign of an event at the ends of its steps and locates it on an
-interpolant. That is where a piece ends at the latest. Each step is then looked through
-at points inside it, made by steps of their own, for anything earlier; and what is found
-is located by Newton's method on the length of such a step.
+interpolant. That is where a piece ends at the latest; `_segment_events` looks through
+its steps for anything earlier.
 """
-
-from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -19,7 +16,8 @@ import numpy as np
 
 from ._codes import Row
 from ._run import Log
-from ._segment_motion import FRACTIONS, Motion, prepared
+from ._segment_events import Flown, TOO_LONG
+from ._segment_motion import Motion, prepared
 
 
 # a hop whose lambda = v |j| / a^2 is smaller is one step, not a call of diffrax
@@ -52,18 +50,6 @@ def simulate_segments(
     if progress is not None:
         progress(1.0)
     return engine.log(), jnp.asarray(contact), jnp.asarray(engine.code, jnp.int32)
-
-
-class _Event(NamedTuple):
-    """What ends a piece: the constraint, the last point before, the way from there."""
-
-    constraint: int
-    row: int
-    length: float
-
-
-# the step after an event was longer than the flight: try again with a shorter one
-_TOO_LONG = _Event(-1, 0, 0.0)
 
 
 class _Engine:
@@ -137,8 +123,9 @@ class _Engine:
             bad = not np.all(np.isfinite(jets))
             self.code = _NOT_FINITE if bad else _STEP_FAILED
             return
-        event = self._find(times, states, int(count), bool(fired), level, rate)
-        if event is _TOO_LONG:
+        flown = Flown(self.motion, self.contact, times, states, self.tiny)
+        event = flown.first_event(int(count), bool(fired), level, rate, self.t1)
+        if event is TOO_LONG:
             self.first = first / 10
             if first <= 1e-16 * (1.0 + abs(self.t)):
                 self.code = _STEP_FAILED
@@ -157,91 +144,16 @@ class _Engine:
             i = points - 1
             self.t, self.x = float(times[i]), states[i]
             if np.any(self.contact):
-                self.x = self._probe(i, times, states, 0.0).state
+                self.x = flown.probe(i, 0.0).state
             if self.t >= self.t1:
                 self.rows[-1] = (Row.STOP, *self.rows[-1][1:])
             return
-        there = self._probe(event.row, times, states, event.length)
+        there = flown.probe(event.row, event.length)
         t = float(times[event.row]) + event.length
         if self.contact[event.constraint]:
             self._release(event.constraint, t, there.state)
         else:
             self._impact(event.constraint, t, there.state)
-
-    def _find(self, times, states, count, fired, first, first_rate):
-        """The first event among the steps; `_TOO_LONG` where the first step hid one."""
-        scan = self.motion.scan(times, states, self.contact, count - 1)
-        level, rate = np.asarray(scan.level), np.asarray(scan.rate)
-        found: list[_Event] = []
-        for k in range(len(self.contact)):
-            curve = level[: count - 1, :, k], rate[: count - 1, :, k]
-            event = self._crossing(k, times, states, curve, first[k], first_rate[k])
-            if event is _TOO_LONG:
-                return event
-            if event is None and fired:
-                # the piece ends at the event, behind which nothing was looked at
-                end, slope, i = curve[0][-1, -1], curve[1][-1, -1], count - 2
-                h = float(times[i + 1] - times[i])
-                # how far from zero the interpolant may put an event
-                if abs(end) <= abs(slope) * 1e-2 * h + 10 * self.tiny:
-                    event = self._locate(k, i, times, states, 0.0, None, h)
-            if event is not None:
-                # no step ends behind t1, so only rounding can put an event there
-                length = min(event.length, self.t1 - times[event.row])
-                found.append(event._replace(length=float(length)))
-        return min(found, key=lambda e: times[e.row] + e.length, default=None)
-
-    def _crossing(self, k, times, states, curve, before, slope):
-        """Where a level first goes below zero, seen from points in the steps."""
-        if before <= self.tiny:
-            # leaves the surface: its rate may be zero up to rounding
-            slope = max(slope, 0.0)
-        started_on_surface = before <= self.tiny
-        for i, (levels, rates) in enumerate(zip(*curve, strict=True)):
-            lengths = FRACTIONS * float(times[i + 1] - times[i])
-            low = 0.0
-            for p, high in enumerate(lengths):
-                bottom, lowest = high, levels[p]
-                steepest = max(-slope, rates[p])
-                if slope < 0 < rates[p] and (
-                    min(before, levels[p]) < (high - low) * steepest
-                ):
-                    bottom = self._bottom(k, i, times, states, low, high)
-                    lowest = float(self._probe(i, times, states, bottom).level[k])
-                if lowest < -self.tiny / 10:
-                    if i == 0 and p == 0 and started_on_surface:
-                        return _TOO_LONG
-                    return self._locate(k, i, times, states, low, bottom)
-                before, slope, low = levels[p], rates[p], high
-        return None
-
-    def _locate(self, k, i, times, states, low, high, start=None) -> _Event:
-        """Newton on the length from point `i`, kept between `low` and `high`."""
-        h = high if start is None else start
-        change = np.inf
-        for _ in range(60):
-            there = self._probe(i, times, states, h)
-            level, slope = float(there.level[k]), float(there.rate[k])
-            if high is not None:
-                low, high = (h, high) if level > 0 else (low, h)
-            moved = h - level / slope if slope < 0 else -np.inf
-            if high is not None and not low <= moved <= high:
-                moved = (low + high) / 2
-            if not np.isfinite(moved):
-                break
-            smaller = abs(moved - h) < 0.5 * change
-            change, h = abs(moved - h), moved
-            if change <= 1e-15 * h or (not smaller and change < 1e-12 * (1.0 + h)):
-                break
-        return _Event(k, i, float(h))
-
-    def _bottom(self, k, i, times, states, low, high):
-        """Where the level is lowest between two lengths, by halving its rate."""
-        for _ in range(50):
-            middle = (low + high) / 2
-            falls = self._probe(i, times, states, middle).rate[k] < 0
-            low, high = (middle, high) if falls else (low, middle)
-        return high
 
     def _hop(self, jets) -> bool:
         """A hop too low for its gap to rise above rounding; whether there was one.
@@ -308,9 +220,6 @@ class _Engine:
 
     def _probe_here(self):
         return self.motion.probe(self.t, self.x, self.contact, 0.0)
-
-    def _probe(self, i, times, states, h):
-        return self.motion.probe(times[i], states[i], self.contact, h)
 
 
 def _time_to_contact(jet) -> float:
