@@ -36,6 +36,7 @@ from ._floquet import (
     stability as stability,
     test_functions as test_functions,
 )
+from ._free_flight import fly as fly
 from ._grazing import grazing_form as grazing_form, GrazingForm as GrazingForm
 from ._grazing_manifold import (
     chattering_region as chattering_region,
@@ -44,7 +45,6 @@ from ._grazing_manifold import (
     ImpactCurve as ImpactCurve,
 )
 from ._impact_map import (
-    fly as fly,
     impact_jacobian as impact_jacobian,
     impact_map as impact_map,
     ImpactPoint as ImpactPoint,

@@ -25,7 +25,8 @@ from jaxcam.hybrid import normal_directions
 
 from ._beta_map import beta_parts
 from ._chatter_frame import ChatterFrame, prepared_frame
-from ._impact_map import fly, ImpactPoint, surface_state
+from ._free_flight import fly
+from ._impact_map import ImpactPoint, surface_state
 from ._interruption import line
 from ._scalar import as_arrays, check_chatter_system
 from ._scaling_law import scaling_law

@@ -1,12 +1,5 @@
-"""From one impact to the next, exact to rounding however low the impact.
+"""From one impact to the next, exact to rounding however low the impact."""
 
-Gap and normal velocity are integrated on their own from the surface, beside the state:
-z' = u + w, w' = a, where u is the speed that the impact leaves and a the normal
-acceleration of free flight. They keep their relative accuracy where the gap computed
-from the state has lost it, so impacts 1e-12 high are as good as high ones.
-"""
-
-import diffrax
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -21,23 +14,12 @@ from jaxcam.hybrid import (
     normal_velocity,
 )
 
+from ._free_flight import flight_rates, MOST_STEPS, runge_kutta_step, TOLERANCE
 from ._scalar import as_arrays, one_constraint
 
 
-_TABLE = diffrax.Dopri8.tableau
-_LAST = len(_TABLE.b_sol) - 1  # the last stage serves only dense output
-_LOWER = np.zeros((_LAST, _LAST))
-for _i, _row in enumerate(_TABLE.a_lower[: _LAST - 1]):
-    _LOWER[_i + 1, : len(_row)] = _row
-_NODES = np.concatenate([[0.0], np.asarray(_TABLE.c, dtype=float)])[:_LAST]
-_WEIGHTS = np.asarray(_TABLE.b_sol, dtype=float)[:_LAST]
-_ERROR = np.asarray(_TABLE.b_error, dtype=float)[:_LAST]
-
-# error of a step, relative to one plus the state
-_TOLERANCE = 1e-14
 # a dip of the gap is looked for within one step: it must not hold two of them
 _STEPS_PER_PERIOD = 16
-_MAX_STEPS = 4096
 _GAUSS, _GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(8)
 _GAUSS, _GAUSS_WEIGHTS = (_GAUSS + 1) / 2, _GAUSS_WEIGHTS / 2
 
@@ -55,26 +37,6 @@ class ImpactPoint(eqx.Module):
     approach: Float[Array, "..."]
     #: whether there was one before the horizon
     found: Bool[Array, "..."]
-
-
-def runge_kutta_step(rates, s, y, h):
-    """One step of length `h`: the state after it and the error estimate."""
-
-    def stage(stages, row):
-        i, lower, node = row
-        k = rates(s + node * h, y + h * _combined(lower, stages))
-        return stages.at[i].set(k), None
-
-    rows = (jnp.arange(_LAST), jnp.asarray(_LOWER), jnp.asarray(_NODES))
-    start = jnp.zeros((_LAST, y.shape[0]))
-    stages, _ = jax.lax.scan(stage, start, rows)
-    weights, wrong = jnp.asarray(_WEIGHTS), jnp.asarray(_ERROR)
-    return y + h * _combined(weights, stages), h * _combined(wrong, stages)
-
-
-def _combined(weights, stages):
-    """Weighted sum of the stages; with derivatives a product of matrices is slower."""
-    return jnp.sum(weights[:, None] * stages, axis=0)
 
 
 def next_impact(
@@ -99,7 +61,7 @@ def next_impact(
     time = jnp.asarray(time, jnp.float64)
     frozen = jax.lax.stop_gradient
 
-    rates = _rates(system, time, speed, n)
+    rates = flight_rates(system, time, speed, n)
 
     def velocity(y):
         return speed + y[n]
@@ -128,7 +90,7 @@ def next_impact(
     def look(carry):
         s, y, h, _, count = carry
         end, error = runge_kutta_step(rates, s, y, h)
-        size = jnp.max(jnp.abs(error) / (_TOLERANCE * (1 + jnp.abs(end))))
+        size = jnp.max(jnp.abs(error) / (TOLERANCE * (1 + jnp.abs(end))))
         good = size <= 1
         dips = good & (velocity(y) < 0) & (velocity(end) > 0) & (end[-1] > 0)
         fall, rise = velocity(y), velocity(end)
@@ -150,7 +112,7 @@ def next_impact(
 
     def searching(carry):
         s, _, _, hit, count = carry
-        return ~hit & (s < horizon) & (count < _MAX_STEPS)
+        return ~hit & (s < horizon) & (count < MOST_STEPS)
 
     y = jnp.concatenate([state, jnp.zeros(1), jnp.asarray(height, jnp.float64)[None]])
     begin = (jnp.zeros(()), y, first, jnp.asarray(False), 0)
@@ -197,57 +159,6 @@ def next_impact(
         approach=approach,
         found=found,
     )
-
-
-def _rates(system, time, speed, n):
-    """Rates of the state, of w and of z along free flight."""
-
-    def rates(s, y):
-        t, x = time + s, y[:n]
-        acceleration = normal_acceleration(system, t, x)
-        return jnp.concatenate(
-            [system.vector_field(t, x), acceleration, (speed + y[n])[None]]
-        )
-
-    return rates
-
-
-def fly(system: HybridSystem, time, state, speed, duration, height: ArrayLike = 0.0):
-    """Free flight for a given time, without a look at the constraint.
-
-    **Arguments:** as in [`variational.next_impact`][]; `duration` >= 0.
-
-    **Returns:** state `(n,)`, gap and normal velocity at the end; the gap keeps its
-    relative accuracy if the flight starts on the surface.
-    """
-    n = state.shape[0]
-    time = jnp.asarray(time, jnp.float64)
-    rates = _rates(system, time, speed, n)
-    frozen = jax.lax.stop_gradient
-
-    def goes_on(carry):
-        share, _, _, count = carry
-        return (share < 1) & (count < _MAX_STEPS)
-
-    def advance(carry):
-        share, part, y, count = carry
-        part = jnp.minimum(part, 1 - share)
-        end, error = runge_kutta_step(rates, share * duration, y, part * duration)
-        size = frozen(jnp.max(jnp.abs(error) / (_TOLERANCE * (1 + jnp.abs(end)))))
-        good = size <= 1
-        factor = 0.9 * jnp.maximum(size, 1e-12) ** -0.125
-        share = jnp.where(good, share + part, share)
-        return (
-            share,
-            part * jnp.clip(factor, 0.2, 2.0),
-            jnp.where(good, end, y),
-            count + 1,
-        )
-
-    y = jnp.concatenate([state, jnp.zeros(1), jnp.asarray(height, jnp.float64)[None]])
-    start = (jnp.zeros(()), jnp.asarray(1 / 8), y, 0)
-    _, _, y, _ = jax.lax.while_loop(goes_on, advance, start)
-    return y[:n], y[-1], speed + y[n]
 
 
 def rebound_speed(system: HybridSystem, time, before, approach):

@@ -15,12 +15,11 @@ from jaxtyping import Array, Bool, Float, Int
 from jaxcam import HybridSystem
 from jaxcam.hybrid import normal_acceleration
 
-from ._impact_map import rebound_speed, runge_kutta_step
+from ._free_flight import runge_kutta_step, TOLERANCE
+from ._impact_map import rebound_speed
 from ._scalar import one_constraint
 
 
-# error of a step, relative to one plus the state
-_TOLERANCE = 1e-14
 # a dip of the gap is looked for within one step: it must not hold two of them
 _STEPS_PER_PERIOD = 16
 # change of a landing step, over the flight and over the time in which the
@@ -111,7 +110,7 @@ def step(system: HybridSystem, f: Flight) -> tuple[Flight, Bool[Array, ""]]:
 
 def _next(system, f: Flight, end, wrong, rate) -> tuple[Flight, Bool[Array, ""]]:
     """What the next step is for, and how long; whether this one is taken."""
-    size = jnp.max(jnp.abs(wrong) / (_TOLERANCE * (1 + jnp.abs(end))))
+    size = jnp.max(jnp.abs(wrong) / (TOLERANCE * (1 + jnp.abs(end))))
     fall, rise, gap, pull = frozen(f.y[-2]), end[-2], end[-1], rate[-2]
     searches, bottoms = f.mode == _SEARCH, f.mode == _BOTTOM
     good = ~searches | (size <= 1)

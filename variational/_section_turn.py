@@ -11,7 +11,8 @@ from jaxcam import HybridSystem
 from jaxcam.hybrid import normal_velocity
 
 from ._chatter_frame import ChatterFrame, prepared_frame
-from ._impact_map import fly, ImpactPoint, next_impact
+from ._free_flight import fly
+from ._impact_map import ImpactPoint, next_impact
 from ._scalar import as_arrays, check_chatter_system, gap_of
 
 
