@@ -119,7 +119,9 @@ class Trials:
         known = self._kept.get(names) if self._kept is not None else None
         if known is not None and names not in self.known:
             places.insert(0, known)
-        found = self._fit(free, places[0], iterations, beaten)
+        # single terms decide which pairs are tried, so they have their time
+        bound = beaten if len(names) > 1 else math.inf
+        found = self._fit(free, places[0], iterations, bound)
         least = self.least_cost
         for place in places[1:]:
             if self._sound(found) or found.cost > 2 * least:
