@@ -18,6 +18,8 @@ _KEPT, _TRIED = 3, 6
 _RIVAL = 50.0
 # Part of the cost that a term leaves at most where the fits are far from the data
 _HELPED = 0.7
+# and that the best of them leaves at most, if it is to be named
+_HALF = 0.5
 
 
 class Search:
@@ -29,8 +31,8 @@ class Search:
     def run(self) -> Trial:
         """The best subset; empty where no term is worth its parameters.
 
-        It is empty too where no subset comes near the data: what is least bad is no
-        physics.
+        It is empty too where the best one ended nowhere near the data and explains less
+        than half of what is off: what is least bad is no physics.
         """
         bare = self.trials.attempt(frozenset(), None, ITERATIONS)
         assert bare is not None
@@ -55,9 +57,9 @@ class Search:
             before, best = best, self._better(best, kept[0])
             if not self._leads(before, best):
                 break
-        if not self.trials.near(best):
-            return bare
-        return self._swapped(self._smallest(best))
+        if self.trials.near(best):
+            return self._swapped(self._smallest(best))
+        return best if best.fit.cost < _HALF * bare.fit.cost else bare
 
     def _leads(self, before: Trial, best: Trial) -> bool:
         """Whether to look for more; far from the data only where terms help a lot."""

@@ -39,12 +39,13 @@ _FAR = 3.0
 
 @dataclasses.dataclass(frozen=True)
 class Trial:
-    """A subset of terms, fitted."""
+    """A subset of terms, fitted; `cut` where only the number of iterations ended it."""
 
     names: frozenset[str]
     fit: Fit
     bic: float
     count: int
+    cut: bool
 
 
 class Trials:
@@ -115,6 +116,8 @@ class Trials:
             ended = self._seeded(names, start, start.fit.point)
             nominal = self._seeded(names, start, self.problem.start)
             places = [nominal, ended] if astray else [ended, nominal]
+            if names == start.names:
+                places = [ended]
             beaten = start.fit.cost if names > start.names else math.inf
         known = self._kept.get(names) if self._kept is not None else None
         if known is not None and names not in self.known:
@@ -134,7 +137,8 @@ class Trials:
             return None
         count = self.count(names)
         bic = found.cost + count * math.log(self.problem.samples)
-        trial = Trial(names, found, bic, count)
+        cut = not found.converged and found.iterations == iterations
+        trial = Trial(names, found, bic, count, cut)
         if names not in self.known or bic < self.known[names].bic:
             self.known[names] = trial
             if self._kept is not None:
@@ -172,13 +176,17 @@ class Trials:
 
     def finished(self, trial: Trial) -> Trial:
         """A subset that may win is fitted to the end."""
-        if trial.fit.converged or not self.near(trial):
+        if not trial.cut:
             return trial
         return self.attempt(trial.names, trial, ITERATIONS) or trial
 
     def near(self, trial: Trial) -> bool:
-        """Whether a fit is so near the data that its quadratic model holds."""
-        return trial.fit.cost < _NEAR * self.problem.samples
+        """Whether the quadratic model about a fit holds.
+
+        It does at an optimum, and elsewhere near the data.
+        """
+        close = trial.fit.cost < _NEAR * self.problem.samples
+        return trial.fit.converged or close
 
     def without(self, best: Trial, name: str) -> Trial:
         """The fit of a subset with one term less."""
