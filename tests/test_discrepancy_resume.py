@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 from jaxcam.cli import app
 from jaxcam.data import DEMO_RIG
 from jaxcam.discrepancy import diagnose
-from jaxcam.discrepancy._kept_trials import KeptTrials
+from jaxcam.discrepancy._kept_trials import Ended, KeptTrials
 from jaxcam.fitting import cam_follower_model, cam_follower_parameters, Problem
 from jaxcam.recordings import segment_case
 
@@ -27,11 +27,12 @@ def problem():
 def test_what_is_kept_comes_back_for_the_same_problem_only(problem, tmp_path):
     kept = KeptTrials(tmp_path, problem)
     assert kept.get({"viscous_damping"}) is None
-    kept.put({"viscous_damping", "sensor_lag"}, problem.start)
+    kept.put({"viscous_damping", "sensor_lag"}, Ended(problem.start, True, 7))
     found = kept.get(["sensor_lag", "viscous_damping"])
     assert found is not None
-    np.testing.assert_array_equal(found.values, problem.start.values)
-    np.testing.assert_array_equal(found.states, problem.start.states)
+    np.testing.assert_array_equal(found.point.values, problem.start.values)
+    np.testing.assert_array_equal(found.point.states, problem.start.states)
+    assert (found.converged, found.iterations) == (True, 7)
     moved = dataclasses.replace(
         problem, start=problem.start._replace(values=problem.start.values + 1e-9)
     )
@@ -41,7 +42,7 @@ def test_what_is_kept_comes_back_for_the_same_problem_only(problem, tmp_path):
 @pytest.mark.slow
 def test_a_file_that_was_cut_off_is_passed_over(problem, tmp_path):
     kept = KeptTrials(tmp_path, problem)
-    kept.put((), problem.start)
+    kept.put((), Ended(problem.start, False, 15))
     file = tmp_path / "none.npz"
     whole = file.read_bytes()
     for length in (0, 1, 40, len(whole) // 2, len(whole) - 1):

@@ -11,12 +11,13 @@ from jaxcam.cli._choices import make_system, saved_name
 from jaxcam.cli._parameters import parameters, set_parameters
 from jaxcam.discrepancy import (
     _search,
-    _trials as _trials_module,
+    _trials,
     library,
     saved_classes,
     WithTerms,
 )
 from jaxcam.discrepancy._engine import added
+from jaxcam.discrepancy._given_up import given_up
 from jaxcam.discrepancy._terms import (
     CamProfileError,
     CoulombFriction,
@@ -26,7 +27,7 @@ from jaxcam.discrepancy._terms import (
     RestitutionVelocity,
     ViscousDamping,
 )
-from jaxcam.discrepancy._trials import Trials
+from jaxcam.fitting._linearise import Point
 from jaxcam.models import (
     CamFollower,
     ConstantRestitution,
@@ -178,10 +179,6 @@ def test_the_most_promising_exchanges_are_tried(monkeypatch):
     assert tried == wanted
 
 
-def _trials(samples: int) -> Trials:
-    return Trials(SimpleNamespace(samples=samples), (), (), print)  # pyright: ignore
-
-
 @pytest.mark.parametrize(
     "costs, crawls",
     [
@@ -196,22 +193,38 @@ def _trials(samples: int) -> Trials:
     ],
 )
 def test_a_fit_that_crawls_far_from_the_data_is_given_up(costs, crawls):
-    assert _trials(100).crawls(costs) is crawls
+    assert given_up(100)(costs) is crawls
 
 
-def test_a_start_that_is_late_to_beat_a_smaller_subset_is_given_up(monkeypatch):
-    """After eight attempts, and not where a subset is fitted from a larger one."""
-    asked = []
+def test_a_fit_that_crawls_goes_on_where_its_cost_decides():
+    costs = [9e5, 14000.0, 13950.0, 13950.0, 13900.0, 13900.0]
+    assert given_up(100, decides=13800.0)(costs)
+    assert not given_up(100, decides=14100.0)(costs)
+
+
+def test_a_fit_that_is_late_to_beat_another_is_given_up():
+    """After eight attempts that always gain, and never enough."""
+    costs = [2000.0 * 0.9**k for k in range(16)]
+    stop = given_up(100, beaten=100.0)
+    assert [stop(costs[: k + 1]) for k in range(1, 10)] == [False] * 7 + [True] * 2
+    assert not any(given_up(100)(costs[: k + 1]) for k in range(1, 16))
+
+
+def test_a_fit_that_goes_on_to_an_optimum_at_the_same_cost_is_kept(monkeypatch):
+    ends = iter([(False, 15), (True, 3)])
 
     def fit(problem, free, start, iterations, stop):
-        # costs that always fall, and stay above those of the subset it starts from
-        costs = [2000.0 * 0.9**k for k in range(iterations + 1)]
-        ended = next((k for k in range(1, iterations) if stop(costs[: k + 1])), None)
-        asked.append(ended)
-        return SimpleNamespace(cost=costs[ended or -1], converged=False, point=start)
+        converged, count = next(ends)
+        return SimpleNamespace(
+            cost=500.0, converged=converged, iterations=count, point=start
+        )
 
-    monkeypatch.setattr(_trials_module, "fit", fit)
-    trials = _trials(100)
-    trials._fit([], None, 15, beaten=100.0)
-    trials._fit([], None, 15, beaten=np.inf)
-    assert asked == [8, None]
+    monkeypatch.setattr(_trials, "fit", fit)
+    nominal = Point(np.zeros((1, 0)), np.zeros((1, 1, 2)))  # pyright: ignore
+    problem = SimpleNamespace(samples=100, start=nominal, names=())
+    trials = _trials.Trials(problem, (), (), print)  # pyright: ignore
+    first = trials.attempt(frozenset(), None)
+    assert first is not None and first.cut and not trials.settled(first)
+    last = trials.finished(first)
+    assert last.fit.converged and trials.settled(last)
+    assert trials.known[frozenset()] is last

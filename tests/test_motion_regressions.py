@@ -8,7 +8,7 @@ import pytest
 from jax import monitoring
 
 import jaxcam
-from jaxcam.hybrid import contact_state, stroboscope
+from jaxcam.hybrid import contact_state, HybridSystem, stroboscope
 from jaxcam.hybrid._scalarise import scalarise, split
 from jaxcam.models import (
     BouncingBall,
@@ -327,3 +327,40 @@ def test_a_batch_may_need_a_library():
     batch = stroboscope(system, starts, 3, period=1.0)
     for state in batch.states[:, -1]:
         np.testing.assert_allclose(state, plain.final, atol=1e-9)
+
+
+class Cornered(HybridSystem):
+    """A point that leans on two walls, pressed into the corner between them."""
+
+    label: jax.Array | None = None
+
+    def vector_field(self, t, state):
+        return jnp.concatenate([state[2:], -jnp.ones(2)])
+
+    def gap(self, t, state):
+        return state[:2]
+
+    def impact(self, t, state):
+        return jnp.stack([state.at[2].multiply(-0.5), state.at[3].multiply(-0.5)])
+
+
+def test_contacts_that_hold_at_the_start_are_not_lost_in_an_empty_run():
+    """They belong to no row of the log: two contacts, one row."""
+    run = jaxcam.simulate(Cornered(), jnp.zeros(4), 0.0, 0.0)
+    assert int(run.contacts.count) == 2
+    np.testing.assert_array_equal(run.contacts.constraint, [0, 1])
+    np.testing.assert_array_equal(run.contacts.start, [0.0, 0.0])
+
+
+def test_a_system_may_hold_a_random_key():
+    run = jaxcam.simulate(Cornered(jax.random.key(0)), jnp.ones(4), 0.0, 0.1)
+    assert run.successful
+
+
+def test_what_passed_once_is_checked_again_with_other_numbers():
+    """What is remembered is a system with all its numbers, not its kind."""
+    system = CamFollower()
+    jaxcam.simulate(system, None, 0.0, 0.01)
+    wrong = eqx.tree_at(lambda s: s.inertia, system, jnp.asarray(-1.0))
+    with pytest.raises(ValueError, match="inertia"):
+        jaxcam.simulate(wrong, None, 0.0, 0.01)

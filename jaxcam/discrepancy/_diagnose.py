@@ -111,8 +111,8 @@ def diagnose(
     caveats += [_needed(name, part) for name, part in named_anyway]
     if verdict == "unknown":
         effects.insert(0, unknown_effect(unexplained, problem, gained))
-    if not trials.near(best):
-        caveats.append(_far(trials))
+    if not trials.settled(found):
+        caveats.append(_astray(trials))
     alternatives = _alternatives(trials, best)
     for name, delta in alternatives:
         # what was found to hang on a few stretches of the records is no equal
@@ -219,14 +219,14 @@ def _needed(name: str, part: float) -> str:
     )
 
 
-def _far(trials: Trials) -> str:
-    """That no subset comes near the data, and how near the best one comes."""
+def _astray(trials: Trials) -> str:
+    """That no fit comes near the data, and how near the best one comes."""
     least = min(trials.known.values(), key=lambda trial: trial.fit.cost)
-    named = listed(sorted(least.names)) if least.names else "the model as it is"
+    named = listed(sorted(least.names)) if least.names else "none of them"
     return (
-        f"No subset of the known effects comes near these records: {named} misses by "
-        f"{rms_of(least.fit):.2g} times the noise, which is the best of them. What is "
-        f"said of shape and place is rough."
+        f"No subset of the known effects comes near these records: the best fit, with "
+        f"{named}, misses by {rms_of(least.fit):.2g} times the noise. What is said of "
+        f"shape and place is rough."
     )
 
 

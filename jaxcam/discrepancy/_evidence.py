@@ -9,6 +9,7 @@ from scipy.stats import chi2
 
 from ..fitting import Fit, fit, Problem, Residuals, residuals
 from ._engine import blocks_of, gain, off, with_states
+from ._given_up import given_up
 from ._trials import BEYOND, FALSE_ALARMS, SURE, Trial, Trials, values_of
 
 
@@ -49,7 +50,7 @@ def held_out(
                 start=trial.fit.point,
                 weights=seen,
                 iterations=_ITERATIONS,
-                stop=trials.crawls,
+                stop=given_up(problem.samples),
             )
             test = with_states(problem, known, unseen)
             parts = _parts(test, unseen)

@@ -7,6 +7,7 @@ import zipfile
 import zlib
 from collections.abc import Iterable
 from pathlib import Path
+from typing import NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
@@ -28,6 +29,14 @@ _BROKEN = (
 )
 
 
+class Ended(NamedTuple):
+    """Where a fit ended, whether at an optimum, and after how many iterations."""
+
+    point: Point
+    converged: bool
+    iterations: int
+
+
 class KeptTrials:
     """Where the fit of each subset of terms ended, one small file a subset.
 
@@ -40,7 +49,7 @@ class KeptTrials:
     def __init__(self, folder: Path, problem: Problem):
         self.folder, self.mark = folder, _mark_of(problem)
 
-    def get(self, names: Iterable[str]) -> Point | None:
+    def get(self, names: Iterable[str]) -> Ended | None:
         """Where a fit ended, or `None`."""
         try:
             with (
@@ -50,11 +59,14 @@ class KeptTrials:
                 if str(found["mark"]) != self.mark:
                     return None
                 values, states = found["values"], found["states"]
+                converged, iterations = bool(found["converged"]), found["iterations"]
+                iterations = int(iterations)
         except _BROKEN:
             return None
-        return Point(jnp.asarray(values), jnp.asarray(states))
+        point = Point(jnp.asarray(values), jnp.asarray(states))
+        return Ended(point, converged, iterations)
 
-    def put(self, names: Iterable[str], point: Point) -> None:
+    def put(self, names: Iterable[str], ended: Ended) -> None:
         """Keep where a fit ended; the file is whole or absent."""
         self.folder.mkdir(parents=True, exist_ok=True)
         file = self._file(names)
@@ -63,8 +75,10 @@ class KeptTrials:
             np.savez(
                 stream,
                 mark=np.array(self.mark),
-                values=np.asarray(point.values),
-                states=np.asarray(point.states),
+                values=np.asarray(ended.point.values),
+                states=np.asarray(ended.point.states),
+                converged=np.array(ended.converged),
+                iterations=np.array(ended.iterations),
             )
         os.replace(part, file)
 

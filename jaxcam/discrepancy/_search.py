@@ -7,7 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from ._engine import added, gain
-from ._trials import EXPLAINED, ITERATIONS, Trial, Trials, values_of
+from ._given_up import EXPLAINED
+from ._trials import ITERATIONS, Trial, Trials, values_of
 from ._vibration_scan import Periodogram
 
 
@@ -57,14 +58,14 @@ class Search:
             before, best = best, self._better(best, kept[0])
             if not self._leads(before, best):
                 break
-        if self.trials.near(best):
+        if self.trials.settled(best):
             return self._swapped(self._smallest(best))
         return best if best.fit.cost < _HALF * bare.fit.cost else bare
 
     def _leads(self, before: Trial, best: Trial) -> bool:
         """Whether to look for more; far from the data only where terms help a lot."""
         part = best.fit.cost / before.fit.cost
-        return self.trials.near(best) or part < _HELPED
+        return self.trials.settled(best) or part < _HELPED
 
     def _settles(self, start: Trial, trial: Trial | None) -> bool:
         """Whether a subset explains what the one that promised it could not.

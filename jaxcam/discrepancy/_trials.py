@@ -10,7 +10,8 @@ from scipy.stats import chi2, norm
 from ..fitting import Fit, fit, Problem
 from ..fitting._linearise import Point
 from ._engine import Blocks, blocks_of, foretold
-from ._kept_trials import KeptTrials
+from ._given_up import given_up
+from ._kept_trials import Ended, KeptTrials
 from ._local_force import force_response, Response
 from ._term import Term
 from ._vibration_scan import Periodogram, periodogram
@@ -24,15 +25,10 @@ SURE = 0.9
 BEYOND = float(norm.ppf(SURE))
 #: iterations of a first look at a subset, and at most of one that may win
 QUICK, ITERATIONS = 15, 60
-#: cost a sample, one where nothing but noise is left, of a fit that explains the data
-EXPLAINED = 1.2
-# and of one that comes near them: twice the noise
+# Cost a sample, one where nothing but noise is left, of a fit that comes near the data
 _NEAR = 4.0
-# A fit that explains little crawls, where so many steps took so many attempts or more
-# and gained less than this part of what is left to explain
-_STEPS, _ATTEMPTS, _CRAWL = 2, 4, 0.01
-# and is late, where after so many attempts it is worse than another one with less
-_LATE = 8
+# Times what is asked of a term, beyond which its loss need not be known exactly
+_CLEAR = 10.0
 # standard deviations of what is known of a rig beyond which its fit went astray
 _FAR = 3.0
 
@@ -105,74 +101,84 @@ class Trials:
     def attempt(
         self, names: frozenset[str], start: Trial | None, iterations: int = QUICK
     ) -> Trial | None:
-        """Fit a subset from where another one ended.
-
-        A fit without the right term may end far from the rig, in a valley that leads
-        nowhere. Then the nominal parameters are a better place to start from.
-        """
-        free, places, beaten = self.parameters(names), [self.problem.start], math.inf
-        astray = start is not None and not self._sound(start.fit)
-        if start is not None:
-            ended = self._seeded(names, start, start.fit.point)
-            nominal = self._seeded(names, start, self.problem.start)
-            places = [nominal, ended] if astray else [ended, nominal]
-            if names == start.names:
-                places = [ended]
-            beaten = start.fit.cost if names > start.names else math.inf
-        known = self._kept.get(names) if self._kept is not None else None
-        if known is not None and names not in self.known:
-            places.insert(0, known)
-        # single terms decide which pairs are tried, so they have their time
-        bound = beaten if len(names) > 1 else math.inf
-        found = self._fit(free, places[0], iterations, bound)
-        least = self.least_cost
-        for place in places[1:]:
-            if self._sound(found) or found.cost > 2 * least:
-                break
-            if astray and found.cost < beaten < math.inf:
-                break
-            again = self._fit(free, place, iterations, found.cost)
-            found = min(found, again, key=_cost)
+        """Fit a subset from where another one ended; the best fit of it so far."""
+        found = self._left(names) or self._fitted(names, start, iterations)
         if not math.isfinite(found.cost):
             return None
         count = self.count(names)
         bic = found.cost + count * math.log(self.problem.samples)
         cut = not found.converged and found.iterations == iterations
         trial = Trial(names, found, bic, count, cut)
-        if names not in self.known or bic < self.known[names].bic:
+        before = self.known.get(names)
+        if before is None or _order(trial) < _order(before):
             self.known[names] = trial
             if self._kept is not None:
-                self._kept.put(names, found.point)
+                ended = Ended(found.point, found.converged, found.iterations)
+                self._kept.put(names, ended)
             # what was said about the fit before holds no more
             for derived in (self._scans, self._responses, self._linear):
                 derived.pop(names, None)
         return self.known[names]
 
-    def _fit(
-        self, free: Sequence[str], start: Point, iterations: int, beaten: float
+    def _left(self, names: frozenset[str]) -> Fit | None:
+        """The fit of a subset that an interrupted run left, as it was."""
+        if self._kept is None or names in self.known:
+            return None
+        ended = self._kept.get(names)
+        if ended is None:
+            return None
+        free = self.parameters(names)
+        found = fit(self.problem, free=free, start=ended.point, iterations=0)
+        return dataclasses.replace(
+            found, converged=ended.converged, iterations=ended.iterations
+        )
+
+    def _fitted(
+        self, names: frozenset[str], start: Trial | None, iterations: int
     ) -> Fit:
-        """A fit, given up where it leads nowhere or is late to beat a cost."""
+        """A fit from one place, and from another one where that led nowhere.
 
-        def stop(costs: Sequence[float]) -> bool:
-            late = len(costs) > _LATE and costs[-1] > beaten
-            return late or self.crawls(costs)
+        A fit without the right term may end far from the rig, in a valley that leads
+        nowhere. Then the nominal parameters are a better place to start from.
+        """
+        free = self.parameters(names)
+        if start is None:
+            return self._fit(free, self.problem.start, iterations)
+        ended = self._seeded(names, start, start.fit.point)
+        if names == start.names:
+            return self._fit(free, ended, iterations)
+        nominal = self._seeded(names, start, self.problem.start)
+        astray = not self._sound(start.fit)
+        first, second = (nominal, ended) if astray else (ended, nominal)
+        grown = names > start.names
+        # single terms decide which pairs are tried, so they have their time
+        beaten = start.fit.cost if grown and len(names) > 1 else math.inf
+        # what is lost without a term must be known where it decides whether to keep it
+        decides = -math.inf
+        if names < start.names:
+            asked = sum(self.asked(name) for name in start.names - names)
+            decides = start.fit.cost + _CLEAR * asked
+        found = self._fit(free, first, iterations, beaten, decides)
+        if self._sound(found) or found.cost > 2 * self.least_cost:
+            return found
+        if astray and grown and found.cost < start.fit.cost:
+            # the nominal rig led further than the smaller subset went
+            return found
+        again = self._fit(free, second, iterations, found.cost, decides)
+        return min(found, again, key=_cost)
 
+    def _fit(
+        self,
+        free: Sequence[str],
+        start: Point,
+        iterations: int,
+        beaten: float = math.inf,
+        decides: float = -math.inf,
+    ) -> Fit:
+        stop = given_up(self.problem.samples, beaten, decides)
         return fit(
             self.problem, free=free, start=start, iterations=iterations, stop=stop
         )
-
-    def crawls(self, costs: Sequence[float]) -> bool:
-        """Whether a fit explains so little, and so slowly, that it leads nowhere.
-
-        The right term needs a few steps; a wrong one has no end of small ones.
-        """
-        left = costs[-1] - EXPLAINED * self.problem.samples
-        steps = list(dict.fromkeys(costs))
-        if left < 0 or len(steps) <= _STEPS:
-            return False
-        before = steps[-1 - _STEPS]
-        attempts = costs[::-1].index(before)
-        return attempts >= _ATTEMPTS and before - costs[-1] < _CRAWL * left
 
     def finished(self, trial: Trial) -> Trial:
         """A subset that may win is fitted to the end."""
@@ -180,7 +186,7 @@ class Trials:
             return trial
         return self.attempt(trial.names, trial, ITERATIONS) or trial
 
-    def near(self, trial: Trial) -> bool:
+    def settled(self, trial: Trial) -> bool:
         """Whether the quadratic model about a fit holds.
 
         It does at an optimum, and elsewhere near the data.
@@ -262,6 +268,11 @@ class Trials:
                 elif term.name not in names:
                     values[:, column] = 0.0
         return place._replace(values=values)
+
+
+def _order(trial: Trial) -> tuple[float, bool]:
+    """The better of two fits of a subset is smaller; of equals, one at an optimum."""
+    return trial.bic, not trial.fit.converged
 
 
 def _cost(found: Fit) -> float:

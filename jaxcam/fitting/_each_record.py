@@ -14,7 +14,8 @@ T = TypeVar("T")
 def each_record(function: Callable[[int], T], records: int) -> T:
     """What `function` makes of each number below `records`, stacked along a new axis.
 
-    The result does not depend on the number of cores.
+    Calls run in threads, so nothing may be traced here. The result does not depend on
+    the number of cores.
     """
     # the first call may compile, which two threads would do twice
     parts = [function(0)]

@@ -45,7 +45,8 @@ def fit(
     - `weights`: how much each piece of the data counts.
     - `prior`: whether the tolerances count as knowledge; bounds always hold.
     - `stop`: called after each iteration with the cost at the start and after every
-        one so far; where it says so, the fit ends, not converged.
+        one so far; where it says so, the fit ends, not converged. Long flights are
+        first fitted with loose joints, to the end; the costs are those that follow.
     - `progress`: called with the number of the iteration and the cost.
 
     **Raises:** `ValueError` for a name that is not a parameter.

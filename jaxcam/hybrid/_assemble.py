@@ -102,6 +102,8 @@ def _least_to_come(xp: ModuleType, values):
 def _speeds(xp: ModuleType, system, times, sides, which):
     """Normal velocities at the constraints that were hit, on either side of impacts."""
     count = times.shape[0]
+    if xp is np and not count:
+        return times, times
     times, which = xp.concatenate([times, times]), xp.concatenate([which, which])
     states = xp.concatenate(sides)
     if xp is np:
@@ -109,9 +111,9 @@ def _speeds(xp: ModuleType, system, times, sides, which):
         size = _FEWEST
         while size < 2 * count:
             size *= _LONGER
-        rest = size - 2 * count
-        times, which = np.pad(times, (0, rest)), np.pad(which, (0, rest))
-        states = np.pad(states, ((0, rest), (0, 0)))
+        # the last one again: a system may not be defined at zero
+        rows = np.minimum(np.arange(size), 2 * count - 1)
+        times, states, which = times[rows], states[rows], which[rows]
     speeds = _normal_velocities(system, times, states, which)
     speeds = xp.asarray(speeds)
     return speeds[:count], speeds[count : 2 * count]

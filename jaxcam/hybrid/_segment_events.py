@@ -13,7 +13,8 @@ from ._segment_motion import FRACTIONS, Motion
 
 
 class Event(NamedTuple):
-    """What ends a piece: the constraint, the last point before, the way from there."""
+    """What ends a piece: the constraint, the row of the last point before, and the
+    time from there (s)."""
 
     constraint: int
     row: int
@@ -25,7 +26,8 @@ TOO_LONG = Event(-1, 0, 0.0)
 
 
 class Flown(NamedTuple):
-    """Points of a piece of motion, and which constraints are in contact all along.
+    """Points of a piece of motion: `k` times (s) and states of size `n`; and which of
+    the `m` constraints are in contact all along.
 
     A level is a gap in flight, and what holds the contact in contact; `tiny` is what
     rounding can tell of it.
@@ -90,7 +92,7 @@ class Flown(NamedTuple):
         return None
 
     def _locate(self, k, i, low, high, start=None) -> Event:
-        """Newton on the length from point `i`, kept between `low` and `high`."""
+        """Newton on the length (s) from point `i`, kept between `low` and `high`."""
         h = high if start is None else start
         change = np.inf
         for _ in range(60):

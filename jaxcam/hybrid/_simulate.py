@@ -193,12 +193,14 @@ def _assemble(system, t0, state, contact, log: Log) -> Parts:
     """The parts of a run that is not traced."""
     t0, state, contact, log = jax.tree.map(np.asarray, (t0, state, contact, log))
     log = Log(*(part[log.kind > 0] for part in log))
-    rows = len(log.kind)
-    return assemble(system, t0, state, contact, log, (rows, rows), np)
+    rows, width = log.contact.shape
+    # contacts that hold at the start belong to no row
+    sizes = rows, width * (rows + 1)
+    return assemble(system, t0, state, contact, log, sizes, np)
 
 
 def _chunks(system, settings, t0, state, t1, budget, progress):
-    """Run chunk by chunk; the log is padded to a power of two times the chunk."""
+    """Run chunk by chunk, as far as the budget goes."""
     size = min(_CHUNK, budget)
     lane, log, contact = _begin(system, settings, t0, state, t1, size)
     logs, used = [log], size
@@ -212,18 +214,8 @@ def _chunks(system, settings, t0, state, t1, budget, progress):
         used += size
     if progress is not None:
         progress(1.0)
-    if len(logs) > 1:
-        target = size
-        while target < used:
-            target *= 2
-        pieces = [np.concatenate(part) for part in zip(*logs, strict=True)]
-        padded = [
-            np.pad(p, [(0, target - used)] + [(0, 0)] * (p.ndim - 1)) for p in pieces
-        ]
-        log = Log(*jax.device_put(padded))
-    else:
-        log = logs[0]
-    return log, contact, _code(lane)
+    whole = jax.tree.map(lambda *parts: np.concatenate(parts), *logs)
+    return whole, contact, _code(lane)
 
 
 @jax.jit
