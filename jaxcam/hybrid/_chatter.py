@@ -47,7 +47,7 @@ def completion_time(
     small = speed * inverse / rest
     series = 1 + softening * speed / (1 - restitution * restitution)
     return -2 * small * series + small * small * (
-        (2 * damping - 4 * rate * inverse) / 3
+        (2 / 3) * (damping - 2 * rate * inverse)
     )
 
 

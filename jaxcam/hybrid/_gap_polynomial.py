@@ -28,28 +28,36 @@ class Bernstein(NamedTuple):
     error: Any
 
 
+def _scaled(jet: Jet, h) -> tuple:
+    """Coefficients of the cubic through a jet, in time over `h`."""
+    h2 = h * h
+    return (
+        jet.gap,
+        h * jet.velocity,
+        h2 * jet.acceleration * 0.5,
+        h2 * h * jet.jerk * (1 / 6),
+    )
+
+
+def _remainders(left: tuple, right: tuple) -> tuple:
+    """What the parabola from the left misses at the right, and its two derivatives."""
+    c0, c1, c2, _ = left
+    e0, e1, e2, _ = right
+    return e0 - (c0 + c1 + c2), e1 - (c1 + 2 * c2), e2 - c2
+
+
 def bernstein(left: Jet, right: Jet, h) -> Bernstein:
     """Bernstein coefficients of the gap over a step of length `h`."""
-    h2, h3 = h * h, h * h * h
-    v0, a0, j0 = (
-        h * left.velocity / 7,
-        h2 * left.acceleration / 42,
-        h3 * left.jerk / 210,
-    )
-    v1, a1, j1 = (
-        h * right.velocity / 7,
-        h2 * right.acceleration / 42,
-        h3 * right.jerk / 210,
-    )
+    (c0, c1, c2, c3), (e0, e1, e2, e3) = _scaled(left, h), _scaled(right, h)
     b = (
-        left.gap,
-        left.gap + v0,
-        left.gap + 2 * v0 + a0,
-        left.gap + 3 * v0 + 3 * a0 + j0,
-        right.gap - 3 * v1 + 3 * a1 - j1,
-        right.gap - 2 * v1 + a1,
-        right.gap - v1,
-        right.gap,
+        c0,
+        c0 + c1 * (1 / 7),
+        c0 + c1 * (2 / 7) + c2 * (1 / 21),
+        c0 + c1 * (3 / 7) + c2 * (1 / 7) + c3 * (1 / 35),
+        e0 - e1 * (3 / 7) + e2 * (1 / 7) - e3 * (1 / 35),
+        e0 - e1 * (2 / 7) + e2 * (1 / 21),
+        e0 - e1 * (1 / 7),
+        e0,
     )
     return Bernstein(b, _mistrust(left, right, h))
 
@@ -60,17 +68,11 @@ def _mistrust(left: Jet, right: Jet, h):
     The difference is s^3 (1-s)^3 (p + q (2s - 1)); its third coefficients at the ends
     are what the jerks differ by there.
     """
-    c1, c2 = h * left.velocity, h * h * left.acceleration / 2
-    r0 = right.gap - (left.gap + c1 + c2)
-    r1 = h * right.velocity - (c1 + 2 * c2)
-    r2 = h * h * right.acceleration / 2 - c2
-    d3 = 10 * r0 - 4 * r1 + r2
-    d4 = -15 * r0 + 7 * r1 - 2 * r2
-    d5 = 6 * r0 - 3 * r1 + r2
-    sixth = h * h * h / 6
-    at_left = sixth * left.jerk - d3
-    at_right = sixth * right.jerk - (d3 + 4 * d4 + 10 * d5)
-    return jnp.maximum(jnp.abs(at_left), jnp.abs(at_right)) / 64
+    at_left, at_right = _scaled(left, h), _scaled(right, h)
+    r0, r1, r2 = _remainders(at_left, at_right)
+    first = at_left[3] - (10 * r0 - 4 * r1 + r2)
+    last = at_right[3] - (10 * r0 - 6 * r1 + 3 * r2)
+    return jnp.maximum(jnp.abs(first), jnp.abs(last)) * (1 / 64)
 
 
 def lowest(polynomial: Bernstein):
@@ -87,21 +89,15 @@ def lowest(polynomial: Bernstein):
 
 def power_coefficients(left: Jet, right: Jet, h) -> tuple:
     """Coefficients c0..c7 of the same polynomial in s = time/h."""
-    c0, c1 = left.gap, h * left.velocity
-    c2, c3 = h * h * left.acceleration / 2, h * h * h * left.jerk / 6
-    r0 = right.gap - (c0 + c1 + c2 + c3)
-    r1 = h * right.velocity - (c1 + 2 * c2 + 3 * c3)
-    r2 = h * h * right.acceleration / 2 - (c2 + 3 * c3)
-    r3 = h * h * h * right.jerk / 6 - c3
+    at_left, at_right = _scaled(left, h), _scaled(right, h)
+    r0, r1, r2 = _remainders(at_left, at_right)
+    c3, e3 = at_left[3], at_right[3]
     return (
-        c0,
-        c1,
-        c2,
-        c3,
-        35 * r0 - 15 * r1 + 5 * r2 - r3,
-        -84 * r0 + 39 * r1 - 14 * r2 + 3 * r3,
-        70 * r0 - 34 * r1 + 13 * r2 - 3 * r3,
-        -20 * r0 + 10 * r1 - 4 * r2 + r3,
+        *at_left,
+        35 * r0 - 15 * r1 + 5 * r2 - e3 - 4 * c3,
+        -84 * r0 + 39 * r1 - 14 * r2 + 3 * e3 + 6 * c3,
+        70 * r0 - 34 * r1 + 13 * r2 - 3 * e3 - 4 * c3,
+        -20 * r0 + 10 * r1 - 4 * r2 + e3 + c3,
     )
 
 
@@ -157,17 +153,17 @@ def time_to_contact(jet: Jet, snap):
     """
     g, v, a, j = jet
     leaving = (v > 0) & (jnp.abs(g * a) < 1e-3 * v * v)
-    square = jnp.where(leaving, a * a / 4 - 2 * v * j / 3, v * v - 2 * a * g)
+    square = jnp.where(leaving, a * a * 0.25 - v * j * (2 / 3), v * v - 2 * a * g)
     possible = square > 0
     root = jnp.sqrt(jnp.where(possible, square, 1.0))
     below = root - jnp.where(leaving, a / 2, v)
     possible = possible & (below > 0)
     time = 2 * jnp.where(leaving, v, g) / jnp.where(possible, below, 1.0)
-    value = g + time * (v + time * (a / 2 + time * j / 6))
-    slope = v + time * (a + time * j / 2)
+    value = g + time * (v + time * (a * 0.5 + time * j * (1 / 6)))
+    slope = v + time * (a + time * j * 0.5)
     bend = snap * time * time * time
     more = jnp.where(jnp.abs(bend) <= 2 * jnp.abs(slope), bend, 0.0)
-    value, slope = value + time * more / 24, slope + more / 6
+    value, slope = value + time * more * (1 / 24), slope + more * (1 / 6)
     refined = time - value / jnp.where(slope < 0, slope, -1.0)
     refined = jnp.where((slope < 0) & (refined > 0), refined, time)
     return jnp.where(possible, refined, jnp.inf)
@@ -189,7 +185,7 @@ def time_to_release(left: Jet, right: Jet, inverse):
         6 * inverse * inverse * (left.jerk + j + 2 * inverse * (left.acceleration - a))
     )
     for _ in range(2):
-        value = a + time * (j + time * (bend / 2 + time * third / 6))
+        value = a + time * (j + time * (bend * 0.5 + time * third * (1 / 6)))
         slope = j + time * (bend + time * third / 2)
         step = time - value / jnp.where(slope > 0, slope, 1.0)
         time = jnp.where((slope > 0) & (step > 0), step, time)
@@ -212,5 +208,5 @@ def time_to_root(jet: Jet):
     """
     g, v, a, j = jet
     inverse = 1.0 / jnp.where(v == 0, 1.0, v)
-    w, p, q = -g * inverse, a * inverse / 2, j * inverse / 6
+    w, p, q = -g * inverse, a * inverse * 0.5, j * inverse * (1 / 6)
     return w * (1 - w * (p - w * (2 * p * p - q - 5 * w * p * (p * p - q))))

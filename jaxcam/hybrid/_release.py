@@ -25,7 +25,7 @@ def judge_contact(
     a0, a1 = left.acceleration, right.acceleration
     s0, s1 = h * left.jerk, h * right.jerk
     trust = jnp.abs(a1 - a0 - (s0 + s1) / 2)
-    inside = jnp.maximum(a0 + s0 / 3, a1 - s1 / 3) + trust > 0
+    inside = jnp.maximum(a0 + s0 * (1 / 3), a1 - s1 * (1 / 3)) + trust > 0
     passed = a1 > 0
     rises = right.jerk > 0
     slope = jnp.where(rises, right.jerk, 1.0)

@@ -8,7 +8,7 @@ def taylor(x, rates, tau):
     """The state a time `tau` (s) after `x`, to third order, by its `rates`."""
     first, second, third = rates
     return tuple(
-        x[i] + tau * (first[i] + tau * (second[i] / 2 + tau * third[i] / 6))
+        x[i] + tau * (first[i] + tau * (second[i] * 0.5 + tau * third[i] * (1 / 6)))
         for i in range(len(x))
     )
 

@@ -43,17 +43,17 @@ class FourierProfile(CamProfile):
 
 
 def fourier_sum(angle, mean, cosines, sines):
-    # Clenshaw's recurrence, for the cosine and the sine sum side by side. The loop is
-    # unrolled in Python: inside a simulation's loop it must fuse into plain arithmetic.
-    # It starts at the last coefficients, since the compiler would keep products with 0.
+    # Waves by their recurrence, unrolled in Python: inside a simulation's loop it must
+    # fuse into plain arithmetic, and the derivatives of a gap share the waves.
     cosine, sine = jnp.cos(angle), jnp.sin(angle)
     twice = 2 * cosine
-    c1, s1 = cosines[-1], sines[-1]
-    c2 = s2 = jnp.zeros_like(c1)
-    for k in reversed(range(cosines.shape[-1] - 1)):
-        c1, c2 = cosines[k] + twice * c1 - c2, c1
-        s1, s2 = sines[k] + twice * s1 - s2, s1
-    return mean + (cosine * c1 - c2) + sine * s1
+    total = mean + cosines[0] * cosine + sines[0] * sine
+    before, now = (jnp.ones_like(cosine), jnp.zeros_like(sine)), (cosine, sine)
+    for k in range(1, cosines.shape[-1]):
+        after = tuple(twice * b - a for a, b in zip(before, now, strict=True))
+        before, now = now, after
+        total = total + cosines[k] * now[0] + sines[k] * now[1]
+    return total
 
 
 # The derivative of a series is again a series. Saying so halves the work of gap,
