@@ -79,32 +79,33 @@ def with_kept(body: Callable, carry):
     """A loop body that also carries its shared scalars.
 
     **Arguments:** `body(carry) -> (carry, row)` and an example of the carry, scalars.
+    The row may be a pytree.
 
     **Returns:** the new body, on `(carry, kept)`, and the first `kept`.
     """
     leaves, treedef = jax.tree.flatten(carry)
 
     def flat_body(*arguments):
-        after, row = body(jax.tree.unflatten(treedef, arguments))
-        return [*jax.tree.leaves(after), row]
+        return body(jax.tree.unflatten(treedef, arguments))
 
-    closed = jax.make_jaxpr(flat_body)(*leaves)
+    closed, shape = jax.make_jaxpr(flat_body, return_shape=True)(*leaves)
+    outputs = jax.tree.structure(shape)
     # without this, unused values would be kept too
     pruned, _ = partial_eval.dce_jaxpr(
-        closed.jaxpr, [True] * (len(leaves) + 1), instantiate=True
+        closed.jaxpr, [True] * outputs.num_leaves, instantiate=True
     )
     rest, constants = _hoisted(pruned, closed.consts)
     kept = _chosen(rest)
     shown = closed.replace(
         jaxpr=rest.replace(outvars=[*rest.outvars, *kept]), consts=constants
     )
-    number = len(leaves)
+    number = outputs.num_leaves
 
     def whole(arguments):
         state, _ = arguments
-        outputs = jaxpr_as_fun(shown)(*jax.tree.leaves(state))
-        after = jax.tree.unflatten(treedef, outputs[:number])
-        return (after, outputs[number + 1 :]), outputs[number]
+        made = jaxpr_as_fun(shown)(*jax.tree.leaves(state))
+        after, row = jax.tree.unflatten(outputs, made[:number])
+        return (after, made[number:]), row
 
     return whole, [jnp.zeros((), v.aval.dtype) for v in kept]
 

@@ -24,7 +24,8 @@ def run_refilled(lanes: Lanes, turns: Turns, settings, pace: Pace, seen):
     """Run some lanes; one that ends makes room for the next.
 
     Lanes do not know of each other, so their order and company change no result.
-    `seen` takes the log, one `seen.row` an attempt, as it comes.
+    `seen` takes the log as it comes: of each number in `seen.row` one array, an attempt
+    after the other.
 
     **Returns:** impacts, attempts and result codes, each `(lanes,)`.
     """
@@ -43,7 +44,7 @@ def run_refilled(lanes: Lanes, turns: Turns, settings, pace: Pace, seen):
     numbers[place.status, ~running] = FINISHED
     while np.any(running):
         numbers, log = look(structure.unflatten(mine), start.shared, numbers)
-        seen.take(work, np.asarray(log))
+        seen.take(work, [np.asarray(part) for part in log])
         used += rows
         status = np.asarray(numbers)[place.status]
         over = running & ((status != RUNNING) | (used >= max_steps))

@@ -1,5 +1,6 @@
 """Running the loop: a batch-friendly while loop, or a scan that can be transposed."""
 
+from collections.abc import Callable
 from typing import Literal, NamedTuple
 
 import equinox.internal as eqxi
@@ -32,8 +33,8 @@ class Log(NamedTuple):
     contact: Float[Array, "rows m"]
 
 
-#: how many lanes `vmap` will run together: no `vmap` at all, a few, or a wide batch
-Company = Literal["one", "few", "many"]
+#: how many lanes `vmap` will run together: no `vmap` at all, or a few
+Company = Literal["one", "few"]
 
 
 def run(
@@ -83,13 +84,61 @@ def run_raw(
         return count + 1, state, jax.lax.dynamic_update_slice(log, some, start)
 
     start = (jnp.asarray(0, jnp.int32), (lane, kept), log)
-    loop = one_kernel(
-        lambda start: jax.lax.while_loop(unfinished, several, start),
-        batch=company == "many",
-    )
+    loop = one_kernel(lambda start: jax.lax.while_loop(unfinished, several, start))
     _, last, log = loop(start)
     lane, kept = last
     return lane._replace(steps=depend_on(lane.steps, kept)), log
+
+
+def attempts(functions: Functions, plan: Plan, lane: Lane, row):
+    """A few attempts of one lane, to be mapped over many.
+
+    **Returns:** the lane, and of each number in `row` an array, one for each attempt.
+    """
+
+    def body(lane):
+        lane, record = iterate(functions, plan, lane)
+        return lane, tuple(row(record, lane))
+
+    keeping, kept = with_kept(body, lane)
+    start = lane, kept
+    (lane, kept), log = jax.lax.scan(
+        lambda state, _: keeping(state), start, None, length=_BLOCK
+    )
+    return lane._replace(steps=depend_on(lane.steps, kept)), log
+
+
+def run_many(some: Callable, lanes: Lane, rows: int):
+    """Iterate until no lane runs or the log is full.
+
+    **Arguments:** `some(lanes)`, which is `attempts` of all lanes, the lanes on the last
+    axis of the log; the lanes, `(lanes,)` each; the rows of the log.
+
+    **Returns:** the lanes and the log, `(rows, lanes)` for each number in a row.
+    """
+    # the log is written as it will lie: under `vmap` each write would move all of it
+    parts = jax.eval_shape(some, lanes)[1]
+    blocks = -(-rows // _BLOCK)
+    log = [jnp.zeros((blocks * _BLOCK, p.shape[-1]), p.dtype) for p in parts]
+
+    def unfinished(carry):
+        count, lanes, _ = carry
+        return (count < blocks) & jnp.any(lanes.status == RUNNING)
+
+    def several(carry):
+        count, lanes, log = carry
+        lanes, made = some(lanes)
+        at = count * _BLOCK, jnp.zeros_like(count)
+        log = [
+            jax.lax.dynamic_update_slice(whole, part, at)
+            for whole, part in zip(log, made, strict=True)
+        ]
+        return count + 1, lanes, log
+
+    _, lanes, log = jax.lax.while_loop(
+        unfinished, several, (jnp.asarray(0, jnp.int32), lanes, log)
+    )
+    return lanes, log
 
 
 def _as_it_is(body):

@@ -16,7 +16,8 @@ import numpy as np
 from ._advance import Plan
 from ._functions import Functions
 from ._lane import first_lane, Lane
-from ._run import run_raw
+from ._one_kernel import one_kernel
+from ._run import attempts, run_many
 from ._system import HybridSystem
 
 
@@ -112,7 +113,8 @@ def start_lanes(lanes: Lanes, turns: Turns, settings, width: int) -> Start:
 def compiled_look(start: Start, rows: int, row: Callable):
     """The compiled loop: `(own, shared, numbers)` to numbers and log.
 
-    It makes `rows` attempts in each slot; `row` is that of `run_raw`.
+    It makes `rows` attempts in each slot; `row` is that of `run_raw`. Of each number in
+    a row the log has one array, `(rows, slots)`.
     """
     leaves, structure = jax.tree.flatten(start.static)
     # 1, 1.0 and True are equal, and different programs
@@ -128,16 +130,23 @@ def _look(
     static = jax.tree.unflatten(structure, [leaf for _, leaf in key])
     slots = Slots(jax.tree.unflatten(lane, flat), dtypes)
 
-    def one(own, shared, numbers):
+    def one(own, shared, lane):
         system, plan = eqx.combine(own, shared, static)
-        lane = slots.unpacked(numbers)
-        functions = Functions(system, len(lane.x))
-        lane, log = run_raw(functions, plan, lane, rows, row, "many")
-        return packed(lane), log
+        return attempts(Functions(system, len(lane.x)), plan, lane, row)
 
-    mapped = jax.vmap(one, in_axes=(0, None, 1), out_axes=(1, 0))
+    mapped = jax.vmap(one, in_axes=(0, None, 0), out_axes=(0, -1))
+
+    def loop(arguments):
+        own, shared, lanes = arguments
+        return run_many(lambda some: mapped(own, shared, some), lanes, rows)
+
+    def whole(own, shared, numbers):
+        lanes = slots.unpacked(numbers)
+        lanes, log = one_kernel(loop, batch=True)((own, shared, lanes))
+        return packed(lanes), log
+
     # the widest vectors that the machine has; XLA is shy of them by default
-    return jax.jit(mapped, compiler_options={"xla_cpu_prefer_vector_width": 512})
+    return jax.jit(whole, compiler_options={"xla_cpu_prefer_vector_width": 512})
 
 
 def split_lanes(system, where, values):

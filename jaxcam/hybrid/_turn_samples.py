@@ -23,14 +23,17 @@ class TurnSamples:
 
     def take(self, work, log) -> None:
         """Put what one stretch of the slots' log shows into its places."""
-        who, row = np.nonzero(log[..., 0])
-        found = log[who, row]
-        lane, place = work[who], found[:, 0].astype(int) - self._skip
+        stop, impacts, chatters, *state = log
+        at = np.nonzero(stop)
+        lane, place = work[at[1]], stop[at].astype(int) - self._skip
         # rounding may set the end of the run apart from its last stop
         real = (place >= 0) & (place < self._so_far.shape[1])
-        self._so_far[lane[real], place[real]] = found[real, 1:3]
-        real &= place > 0
-        self.states[lane[real], place[real] - 1] = found[real, 3:]
+        at, lane, place = tuple(i[real] for i in at), lane[real], place[real]
+        self._so_far[lane, place] = np.stack([impacts[at], chatters[at]], axis=1)
+        at, lane, place = tuple(i[place > 0] for i in at), lane[place > 0], place
+        place = place[place > 0] - 1
+        for k, part in enumerate(state):
+            self.states[lane, place, k] = part[at]
 
     def counts(self):
         """Impacts and completed chatters in each turn; 0 where a lane failed."""

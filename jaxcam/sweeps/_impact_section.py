@@ -87,17 +87,17 @@ class _Impacts:
         return [jnp.asarray(v) for v in (record.kind, record.t, *record.after)]
 
     def take(self, work, log) -> None:
-        kind = log[..., 0].astype(np.int8)
+        kind = log[0].astype(np.int8)
         hit = (kind == Row.IMPACT) | (kind == Row.LAST_IMPACT)
-        rank = self._number[work][:, None] + np.cumsum(hit, axis=1) - 1
-        who, row = np.nonzero(hit)
-        # row by row, so that the latest is what stays in a place
-        place = work[who], rank[who, row] % self._ring.shape[1]
-        self._ring[place] = log[who, row]
+        rank = self._number[work] + np.cumsum(hit, axis=0) - 1
+        # attempt by attempt, so that the latest is what stays in a place
+        at = np.nonzero(hit)
+        place = work[at[1]], rank[at] % self._ring.shape[1]
+        self._ring[place] = np.stack([part[at] for part in log], axis=1)
         # slots that do not run show a lane of another slot
-        np.add.at(self._number, work, hit.sum(axis=1))
-        who, row = np.nonzero(kind == Row.STOP)
-        self._final[work[who]] = log[who, row, 2:]
+        np.add.at(self._number, work, hit.sum(axis=0))
+        at = np.nonzero(kind == Row.STOP)
+        self._final[work[at[1]]] = np.stack([part[at] for part in log[2:]], axis=1)
 
     def found(self):
         keep = self._ring.shape[1]
