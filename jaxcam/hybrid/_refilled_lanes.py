@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-import jax
+import jax.numpy as jnp
 import numpy as np
 
 from ._lane import FINISHED, RUNNING
@@ -39,11 +39,11 @@ def run_refilled(lanes: Lanes, turns: Turns, settings, pace: Pace, seen):
     work, used = np.full(width, count - 1), np.zeros(width)
     work[: len(first)], running = first, np.arange(width) < count
     waiting, sorted_yet = np.setdiff1d(np.arange(count), first), False
-    own, structure = jax.tree.flatten(start.own)
-    numbers, mine = start.numbers[:, work], [leaf[work] for leaf in own]
+    shared = jnp.asarray(start.shared.numbers), start.shared.apart
+    numbers, mine = start.numbers[:, work], start.own.some(work)
     numbers[place.status, ~running] = FINISHED
     while np.any(running):
-        numbers, log = look(structure.unflatten(mine), start.shared, numbers)
+        numbers, log = look(mine, shared, numbers)
         seen.take(work, [np.asarray(part) for part in log])
         used += rows
         status = np.asarray(numbers)[place.status]
@@ -62,7 +62,7 @@ def run_refilled(lanes: Lanes, turns: Turns, settings, pace: Pace, seen):
         fresh, waiting = waiting[: len(free)], waiting[len(free) :]
         work[free], used[free], running[free] = fresh, 0, True
         numbers[:, free] = start.numbers[:, fresh]
-        mine = [leaf[work] for leaf in own]
+        mine = start.own.some(work)
     codes = np.array([1, 0, 2, 3])[ends[:, 0]]
     return ends[:, 1], ends[:, 2], codes
 

@@ -17,6 +17,7 @@ from ._advance import Plan
 from ._functions import Functions
 from ._lane import first_lane, Lane
 from ._one_kernel import one_kernel
+from ._packing import pack, Packed
 from ._run import attempts, run_many
 from ._system import HybridSystem
 
@@ -83,9 +84,9 @@ class Start(NamedTuple):
 
     slots: Slots
     numbers: np.ndarray
-    #: parts of system and plan that differ from lane to lane, one row each
-    own: Any
-    shared: Any
+    #: parts of system and plan that differ from lane to lane, and that do not
+    own: Packed
+    shared: Packed
     static: Any
 
 
@@ -106,12 +107,13 @@ def start_lanes(lanes: Lanes, turns: Turns, settings, width: int) -> Start:
     shared, static = eqx.partition(rest, eqx.is_array)
     numbers = np.concatenate([numbers for _, numbers, _, _ in pieces], axis=1)
     each = [own for _, _, own, _ in pieces]
-    own = jax.tree.map(lambda *parts: np.concatenate(parts), *each)
-    return Start(slots, numbers[:, :count], own, shared, static)
+    own = jax.tree.map(lambda *parts: np.concatenate(parts)[:count], *each)
+    return Start(slots, numbers[:, :count], pack(own, count), pack(shared), static)
 
 
 def compiled_look(start: Start, rows: int, row: Callable):
-    """The compiled loop: `(own, shared, numbers)` to numbers and log.
+    """The compiled loop: own and shared parts, each as numbers and what is apart, and
+    the numbers of the lanes, to numbers and log.
 
     It makes `rows` attempts in each slot; `row` is that of `run_raw`. Of each number in
     a row the log has one array, `(rows, slots)`.
@@ -120,30 +122,34 @@ def compiled_look(start: Start, rows: int, row: Callable):
     # 1, 1.0 and True are equal, and different programs
     key = tuple((type(leaf), leaf) for leaf in leaves)
     flat, lane = jax.tree.flatten(start.slots.rows)
-    return _look(key, structure, lane, tuple(flat), start.slots.dtypes, rows, row)
+    packings = start.own.packing, start.shared.packing
+    lane = lane, tuple(flat), start.slots.dtypes
+    return _look(key, structure, packings, lane, rows, row)
 
 
 @functools.lru_cache(maxsize=256)
 def _look(
-    key: tuple[tuple[type, Hashable], ...], structure, lane, flat, dtypes, rows, row
+    key: tuple[tuple[type, Hashable], ...], structure, packings, lane, rows, row
 ):
     static = jax.tree.unflatten(structure, [leaf for _, leaf in key])
-    slots = Slots(jax.tree.unflatten(lane, flat), dtypes)
+    slots = Slots(jax.tree.unflatten(*lane[:2]), lane[2])
 
     def one(own, shared, lane):
-        system, plan = eqx.combine(own, shared, static)
+        parts = [p.unpacked(*q) for p, q in zip(packings, (own, shared), strict=True)]
+        system, plan = eqx.combine(*parts, static)
         return attempts(Functions(system, len(lane.x)), plan, lane, row)
 
-    mapped = jax.vmap(one, in_axes=(0, None, 0), out_axes=(0, -1))
+    mapped = jax.vmap(one, in_axes=((1, 0), None, 0), out_axes=(0, -1))
 
     def loop(arguments):
-        own, shared, lanes = arguments
-        return run_many(lambda some: mapped(own, shared, some), lanes, rows)
+        own, shared, numbers = arguments
+        lanes, log = run_many(
+            lambda some: mapped(own, shared, some), slots.unpacked(numbers), rows
+        )
+        return packed(lanes), log
 
     def whole(own, shared, numbers):
-        lanes = slots.unpacked(numbers)
-        lanes, log = one_kernel(loop, batch=True)((own, shared, lanes))
-        return packed(lanes), log
+        return one_kernel(loop, batch=True)((own, shared, numbers))
 
     # the widest vectors that the machine has; XLA is shy of them by default
     return jax.jit(whole, compiler_options={"xla_cpu_prefer_vector_width": 512})

@@ -23,17 +23,20 @@ class TurnSamples:
 
     def take(self, work, log) -> None:
         """Put what one stretch of the slots' log shows into its places."""
-        stop, impacts, chatters, *state = log
-        at = np.nonzero(stop)
-        lane, place = work[at[1]], stop[at].astype(int) - self._skip
+        stop, impacts, chatters, *state = [part.ravel() for part in log]
+        at = np.flatnonzero(stop)
+        lane, place = work[at % len(work)], stop[at].astype(int) - self._skip
         # rounding may set the end of the run apart from its last stop
-        real = (place >= 0) & (place < self._so_far.shape[1])
-        at, lane, place = tuple(i[real] for i in at), lane[real], place[real]
-        self._so_far[lane, place] = np.stack([impacts[at], chatters[at]], axis=1)
-        at, lane, place = tuple(i[place > 0] for i in at), lane[place > 0], place
-        place = place[place > 0] - 1
-        for k, part in enumerate(state):
-            self.states[lane, place, k] = part[at]
+        turns = self._so_far.shape[1]
+        real = (place >= 0) & (place < turns)
+        at, lane, place = at[real], lane[real], place[real]
+        # one index into all lanes and turns is quicker than two
+        counts = self._so_far.reshape(-1, 2)
+        counts[lane * turns + place] = np.stack([impacts[at], chatters[at]], axis=1)
+        kept = place > 0
+        samples = self.states.reshape(-1, len(state))
+        found = np.stack([part[at[kept]] for part in state], axis=1)
+        samples[lane[kept] * (turns - 1) + place[kept] - 1] = found
 
     def counts(self):
         """Impacts and completed chatters in each turn; 0 where a lane failed."""

@@ -1,0 +1,60 @@
+"""The arrays of a pytree as one array of numbers: a call takes time for each it gets."""
+
+import math
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+
+class Packing(NamedTuple):
+    """Where the leaves of a pytree are: hashable, so that programs are found by it."""
+
+    structure: Any
+    #: shape of each leaf; `None` for one that is not of 64-bit floats and stays apart
+    shapes: tuple
+
+    def unpacked(self, numbers, apart):
+        """The pytree of these numbers, `(k,)`, and of the leaves that stayed apart."""
+        leaves, first, rest = [], 0, iter(apart)
+        for shape in self.shapes:
+            if shape is None:
+                leaves.append(next(rest))
+                continue
+            last = first + math.prod(shape)
+            leaves.append(numbers[first:last].reshape(shape))
+            first = last
+        return jax.tree.unflatten(self.structure, leaves)
+
+
+class Packed(NamedTuple):
+    """The arrays of a pytree, of all lanes or one row each."""
+
+    #: (k,) or (k, lanes)
+    numbers: np.ndarray
+    #: leaves that are no 64-bit floats
+    apart: list
+    packing: Packing
+
+    def some(self, lanes) -> tuple:
+        """Numbers and other leaves of these lanes."""
+        return self.numbers[:, lanes], [leaf[lanes] for leaf in self.apart]
+
+
+def pack(tree, lanes: int | None = None) -> Packed:
+    """The arrays of a pytree packed; with `lanes` each has a row for each lane."""
+    leaves, structure = jax.tree.flatten(tree)
+    plain = [leaf.dtype == jnp.float64 for leaf in leaves]
+    floats = [np.asarray(leaf) for leaf, fits in zip(leaves, plain) if fits]
+    if lanes is None:
+        shapes = iter([f.shape for f in floats])
+        rows = [f.ravel() for f in floats]
+        numbers = np.concatenate(rows) if rows else np.zeros(0)
+    else:
+        shapes = iter([f.shape[1:] for f in floats])
+        rows = [f.reshape(lanes, -1).T for f in floats]
+        numbers = np.concatenate(rows) if rows else np.zeros((0, lanes))
+    packing = Packing(structure, tuple(next(shapes) if f else None for f in plain))
+    apart = [leaf for leaf, fits in zip(leaves, plain) if not fits]
+    return Packed(numbers, apart, packing)
