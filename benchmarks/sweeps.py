@@ -110,7 +110,7 @@ def idle_slots(call) -> float:
 
         def looking(own, shared, numbers):
             made, log = look(own, shared, numbers)
-            slots.append(rows * len(log))
+            slots.append(log[0].size)
             steps.append(np.sum(np.asarray(made)[place] - np.asarray(numbers)[place]))
             return made, log
 
