@@ -37,9 +37,11 @@ from jaxcam.hybrid._gap_polynomial import (
 from jaxcam.hybrid._lane import first_lane
 from jaxcam.hybrid._loop import iterate
 from jaxcam.hybrid._normal import _solve_masked
+from jaxcam.hybrid._packing import pack
 from jaxcam.hybrid._refilled_lanes import costly_first
 from jaxcam.hybrid._release import judge_contact
 from jaxcam.hybrid._runge_kutta import step, tableau_of
+from jaxcam.hybrid._sincos import sincos
 from jaxcam.models import BouncingBall
 
 
@@ -398,3 +400,45 @@ def test_lanes_that_will_take_most_attempts_start_first():
     work, used, stops = np.array([10, 0]), np.full(2, 60.0), np.array([6.0, 2.0])
     order = costly_first(np.array([9, 1, 5]), work, used, stops)
     np.testing.assert_array_equal(order, [1, 5, 9])
+
+
+# --- sine and cosine, and what a batch is called with
+
+
+@pytest.mark.parametrize("reach", [0.8, 3.2, 100.0, 1e6])
+def test_sine_and_cosine_err_by_some_rounding(reach):
+    x = np.random.default_rng(0).uniform(-reach, reach, 4000)
+    sine, cosine = map(np.asarray, jax.jit(sincos)(x))
+    assert np.abs(sine - np.sin(x)).max() <= 4e-16
+    assert np.abs(cosine - np.cos(x)).max() <= 4e-16
+
+
+def test_sine_keeps_the_digits_of_a_small_angle():
+    x = np.array([-1e-3, 1e-9, 1e-300, 0.0])
+    np.testing.assert_allclose(sincos(jnp.asarray(x))[0], np.sin(x), rtol=4e-16, atol=0)
+    assert np.all(np.isnan(sincos(jnp.asarray(np.nan))))
+
+
+def test_packed_arrays_come_back_as_they_were():
+    tree = {"a": jnp.asarray(2.0), "b": jnp.arange(6.0).reshape(2, 3), "n": jnp.ones(4)}
+    tree |= {"key": jax.random.key(3), "count": jnp.arange(2), "none": None}
+    numbers, apart, packing = pack(tree)
+    assert numbers.shape == (11,)
+    back = packing.unpacked(jnp.asarray(numbers), apart)
+    assert jax.tree.structure(back) == jax.tree.structure(tree)
+    for one, other in zip(jax.tree.leaves(back), jax.tree.leaves(tree), strict=True):
+        assert one.dtype == other.dtype and jnp.all(one == other)
+
+
+def test_packed_rows_are_those_of_the_lanes():
+    tree = {
+        "a": jnp.arange(3.0),
+        "b": jnp.arange(6.0).reshape(3, 2),
+        "n": jnp.arange(3),
+    }
+    packed = pack(tree, lanes=3)
+    numbers, apart = packed.some(np.array([2, 0]))
+    back = packed.packing.unpacked(numbers[:, 0], [leaf[0] for leaf in apart])
+    assert back["a"] == 2.0 and back["n"] == 2
+    np.testing.assert_array_equal(back["b"], [4.0, 5.0])
+    assert pack({}, lanes=3).numbers.shape == (0, 3)

@@ -1,4 +1,4 @@
-"""The arrays of a pytree as one array of numbers: a call takes time for each it gets."""
+"""The arrays of a pytree as one array: a compiled call takes time for each it gets."""
 
 import math
 from typing import Any, NamedTuple
@@ -47,14 +47,13 @@ def pack(tree, lanes: int | None = None) -> Packed:
     leaves, structure = jax.tree.flatten(tree)
     plain = [leaf.dtype == jnp.float64 for leaf in leaves]
     floats = [np.asarray(leaf) for leaf, fits in zip(leaves, plain) if fits]
-    if lanes is None:
-        shapes = iter([f.shape for f in floats])
-        rows = [f.ravel() for f in floats]
-        numbers = np.concatenate(rows) if rows else np.zeros(0)
-    else:
-        shapes = iter([f.shape[1:] for f in floats])
-        rows = [f.reshape(lanes, -1).T for f in floats]
-        numbers = np.concatenate(rows) if rows else np.zeros((0, lanes))
-    packing = Packing(structure, tuple(next(shapes) if f else None for f in plain))
+    number, head = (1, 0) if lanes is None else (lanes, 1)
+    shapes = iter([array.shape[head:] for array in floats])
+    rows = [array.reshape(number, -1).T for array in floats]
+    numbers = np.concatenate([np.zeros((0, number)), *rows])
+    numbers = numbers[:, 0] if lanes is None else numbers
+    packing = Packing(
+        structure, tuple(next(shapes) if fits else None for fits in plain)
+    )
     apart = [leaf for leaf, fits in zip(leaves, plain) if not fits]
     return Packed(numbers, apart, packing)

@@ -128,9 +128,7 @@ def compiled_look(start: Start, rows: int, row: Callable):
 
 
 @functools.lru_cache(maxsize=256)
-def _look(
-    key: tuple[tuple[type, Hashable], ...], structure, packings, lane, rows, row
-):
+def _look(key: tuple[tuple[type, Hashable], ...], structure, packings, lane, rows, row):
     static = jax.tree.unflatten(structure, [leaf for _, leaf in key])
     slots = Slots(jax.tree.unflatten(*lane[:2]), lane[2])
 
