@@ -111,8 +111,8 @@ def attempts(functions: Functions, plan: Plan, lane: Lane, row):
 def run_many(some: Callable, lanes: Lane, rows: int):
     """Iterate until no lane runs or the log is full.
 
-    **Arguments:** `some(lanes)`, which is `attempts` of all lanes, `(lanes,)` each, with
-    the lanes last in the log; the rows of the log.
+    **Arguments:** `some(lanes)`, the `attempts` of all lanes with the lanes last in the
+    log; the lanes, `(lanes,)` each; the rows of the log.
 
     **Returns:** the lanes and the log, `(rows, lanes)` for each number in a row.
     """
