@@ -69,7 +69,7 @@ def run_raw(
 
     # scalars of one lane are never computed twice, and to keep them costs compile time
     keeping, kept = (_as_it_is(body), []) if company == "one" else with_kept(body, lane)
-    width = len(row(_empty_record(functions), lane))
+    width = len(row(_empty_record(functions.n, functions.m), lane))
     blocks = -(-rows // _BLOCK)
     log = jnp.zeros((blocks * _BLOCK, width))
 
@@ -108,18 +108,18 @@ def attempts(functions: Functions, plan: Plan, lane: Lane, row):
     return lane._replace(steps=depend_on(lane.steps, kept)), log
 
 
-def run_many(some: Callable, lanes: Lane, rows: int):
+def run_many(some: Callable, lanes: Lane, rows: int, row):
     """Iterate until no lane runs or the log is full.
 
     **Arguments:** `some(lanes)`, the `attempts` of all lanes with the lanes last in the
-    log; the lanes, `(lanes,)` each; the rows of the log.
+    log; the lanes, `(lanes,)` each; the rows of the log, and `row`.
 
     **Returns:** the lanes and the log, `(rows, lanes)` for each number in a row.
     """
     # the log is written as it will lie: under `vmap` each write would move all of it
-    parts = jax.eval_shape(some, lanes)[1]
-    blocks = -(-rows // _BLOCK)
-    log = [jnp.zeros((blocks * _BLOCK, p.shape[-1]), p.dtype) for p in parts]
+    blocks, width = -(-rows // _BLOCK), len(lanes.status)
+    parts = row(_empty_record(len(lanes.x), len(lanes.jets)), lanes)
+    log = [jnp.zeros((blocks * _BLOCK, width)) for _ in parts]
 
     def unfinished(carry):
         count, lanes, _ = carry
@@ -130,7 +130,7 @@ def run_many(some: Callable, lanes: Lane, rows: int):
         lanes, made = some(lanes)
         at = count * _BLOCK, jnp.zeros_like(count)
         log = [
-            jax.lax.dynamic_update_slice(whole, part, at)
+            jax.lax.dynamic_update_slice(whole, part.astype(whole.dtype), at)
             for whole, part in zip(log, made, strict=True)
         ]
         return count + 1, lanes, log
@@ -172,10 +172,10 @@ def run_reversible(
     return lane, _unpack(log.reshape(blocks * block, -1), functions)
 
 
-def _empty_record(functions: Functions) -> Record:
+def _empty_record(n: int, m: int) -> Record:
     zero = 0.0
-    state = (zero,) * functions.n
-    return Record(zero, zero, zero, state, state, (zero,) * functions.m)
+    state = (zero,) * n
+    return Record(zero, zero, zero, state, state, (zero,) * m)
 
 
 def _row(record: Record, _: Lane) -> list:

@@ -141,9 +141,8 @@ def _look(key: tuple[tuple[type, Hashable], ...], structure, packings, lane, row
 
     def loop(arguments):
         own, shared, numbers = arguments
-        lanes, log = run_many(
-            lambda some: mapped(own, shared, some), slots.unpacked(numbers), rows
-        )
+        lanes = slots.unpacked(numbers)
+        lanes, log = run_many(lambda l: mapped(own, shared, l), lanes, rows, row)
         return packed(lanes), log
 
     def whole(own, shared, numbers):
