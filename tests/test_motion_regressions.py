@@ -265,7 +265,8 @@ def test_a_finished_run_is_read_inside_a_program():
     times = np.array([1.0, 2.0])
     for read in (lambda: run.final, lambda: run.at(times), lambda: run.gap(times)):
         plain, inside = read(), jax.jit(lambda c, read=read: c * read())(1.0)
-        np.testing.assert_allclose(inside, plain, rtol=1e-13)
+        # a gap in contact is a difference of angles of 0.3 rad
+        np.testing.assert_allclose(inside, plain, rtol=1e-13, atol=2e-16)
 
 
 class Spring(jaxcam.HybridSystem):
