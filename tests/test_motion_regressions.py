@@ -266,7 +266,7 @@ def test_a_finished_run_is_read_inside_a_program():
     for read in (lambda: run.final, lambda: run.at(times), lambda: run.gap(times)):
         plain, inside = read(), jax.jit(lambda c, read=read: c * read())(1.0)
         # a gap in contact is a difference of angles of 0.3 rad
-        np.testing.assert_allclose(inside, plain, rtol=1e-13, atol=2e-16)
+        np.testing.assert_allclose(inside, plain, rtol=1e-13, atol=1e-15)
 
 
 class Spring(jaxcam.HybridSystem):
