@@ -34,8 +34,10 @@ from jaxcam.hybrid._gap_polynomial import (
     time_to_release,
     time_to_root,
 )
+from jaxcam.hybrid._jaxprs import calls_library
 from jaxcam.hybrid._lane import first_lane
 from jaxcam.hybrid._loop import iterate
+from jaxcam.hybrid._materialise import without_library
 from jaxcam.hybrid._normal import _solve_masked
 from jaxcam.hybrid._packing import pack
 from jaxcam.hybrid._refilled_lanes import costly_first
@@ -442,3 +444,23 @@ def test_packed_rows_are_those_of_the_lanes():
     assert back["a"] == 2.0 and back["n"] == 2
     np.testing.assert_array_equal(back["b"], [4.0, 5.0])
     assert pack({}, lanes=3).numbers.shape == (0, 3)
+
+
+@pytest.mark.parametrize("of_state", [False, True])
+def test_a_library_call_on_parameters_alone_is_done_before_the_loop(of_state):
+    found = []
+
+    @jax.jit
+    def outer(mass, x):
+        def step(x):
+            whole = mass + x[0] * jnp.eye(2) if of_state else mass
+            return jnp.linalg.inv(whole) @ x
+
+        made = without_library(step, x)
+        found.append(calls_library(jax.make_jaxpr(made)(x).jaxpr))
+        return made(x)
+
+    mass, x = jnp.array([[2.0, 0.5], [0.5, 1.0]]), jnp.array([1.0, -3.0])
+    whole = mass + jnp.eye(2) if of_state else mass
+    np.testing.assert_allclose(outer(mass, x), np.linalg.solve(whole, x), rtol=1e-14)
+    assert found == [of_state]

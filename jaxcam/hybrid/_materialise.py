@@ -15,6 +15,8 @@ from jax.core import eval_jaxpr
 from jax.extend.core import jaxpr_as_fun, Literal
 from jax.interpreters import partial_eval
 
+from ._jaxprs import calls_library
+
 
 # a value is kept when computing it again in its users would cost more operations
 _THRESHOLD = 100
@@ -52,7 +54,7 @@ def _chosen(jaxpr) -> list:
 
 
 def _hoisted(jaxpr, constants):
-    """The body without the operations on constants alone, which are done here, once."""
+    """A program without the operations on constants alone, which are done here."""
     known = set(jaxpr.constvars)
     early, late = [], []
     for equation in jaxpr.eqns:
@@ -108,6 +110,30 @@ def with_kept(body: Callable, carry):
         return (after, made[number:]), row
 
     return whole, [jnp.zeros((), v.aval.dtype) for v in kept]
+
+
+def without_library(function: Callable, argument):
+    """`function` with its calls of a library done here, if they need no argument.
+
+    A loop that calls one cannot be a single kernel. Other operations stay where they
+    are: within the kernel they cost less than as its arguments.
+    """
+    leaves, treedef = jax.tree.flatten(argument)
+
+    def flat(*leaves):
+        return function(jax.tree.unflatten(treedef, leaves))
+
+    closed, shape = jax.make_jaxpr(flat, return_shape=True)(*leaves)
+    program = closed
+    if calls_library(closed.jaxpr):
+        rest, constants = _hoisted(closed.jaxpr, closed.consts)
+        program = closed.replace(jaxpr=rest, consts=constants)
+
+    def called(argument):
+        made = jaxpr_as_fun(program)(*jax.tree.leaves(argument))
+        return jax.tree.unflatten(jax.tree.structure(shape), made)
+
+    return called
 
 
 def depend_on(value, kept):

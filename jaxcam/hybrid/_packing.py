@@ -29,11 +29,11 @@ class Packing(NamedTuple):
 
 
 class Packed(NamedTuple):
-    """The arrays of a pytree, of all lanes or one row each."""
+    """The arrays of a pytree; where lanes differ, a column of `numbers` for each."""
 
     #: (k,) or (k, lanes)
     numbers: np.ndarray
-    #: leaves that are no 64-bit floats
+    #: leaves that are no 64-bit floats, a row for each lane
     apart: list
     packing: Packing
 

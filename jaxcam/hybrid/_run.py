@@ -91,7 +91,7 @@ def run_raw(
 
 
 def attempts(functions: Functions, plan: Plan, lane: Lane, row):
-    """A few attempts of one lane, to be mapped over many.
+    """A block of attempts of one lane, to be mapped over many.
 
     **Returns:** the lane, and of each number in `row` an array, one for each attempt.
     """

@@ -1,8 +1,8 @@
 """Sine and cosine in plain arithmetic.
 
 A library call inside a vectorised loop stops the compiler from keeping the loop in
-registers. These few multiplications do not, and err by some 2e-16 for |x| < 1e6; beyond
-that the reduction to half a turn loses digits in proportion to x.
+registers. These few multiplications do not, and err by some 2e-16 (absolutely) for
+|x| < 1e6; beyond that the reduction to half a turn loses digits in proportion to x.
 """
 
 from functools import partial
@@ -40,7 +40,7 @@ _COSINE = (
 
 
 def _eight(c, z, z2, z4):
-    """A polynomial of eight coefficients in `z`, in few steps that wait for another."""
+    """A polynomial of eight coefficients in `z`; few of its steps wait for another."""
     low = (c[0] + c[1] * z) + (c[2] + c[3] * z) * z2
     high = (c[4] + c[5] * z) + (c[6] + c[7] * z) * z2
     return low + high * z4

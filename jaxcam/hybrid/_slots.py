@@ -16,6 +16,7 @@ import numpy as np
 from ._advance import Plan
 from ._functions import Functions
 from ._lane import first_lane, Lane
+from ._materialise import without_library
 from ._one_kernel import one_kernel
 from ._packing import pack, Packed
 from ._run import attempts, run_many
@@ -115,8 +116,9 @@ def compiled_look(start: Start, rows: int, row: Callable):
     """The compiled loop: own and shared parts, each as numbers and what is apart, and
     the numbers of the lanes, to numbers and log.
 
-    It makes `rows` attempts in each slot; `row` is that of `run_raw`. Of each number in
-    a row the log has one array, `(rows, slots)`.
+    It makes `rows` attempts in each slot, in whole blocks. `row` makes numbers of what
+    an attempt did and the lane after it, as in `run_raw`; of each the log has one
+    array, `(rows, slots)`.
     """
     leaves, structure = jax.tree.flatten(start.static)
     # 1, 1.0 and True are equal, and different programs
@@ -139,14 +141,16 @@ def _look(key: tuple[tuple[type, Hashable], ...], structure, packings, lane, row
 
     mapped = jax.vmap(one, in_axes=((1, 0), None, 0), out_axes=(0, -1))
 
-    def loop(arguments):
-        own, shared, numbers = arguments
-        lanes = slots.unpacked(numbers)
-        lanes, log = run_many(lambda l: mapped(own, shared, l), lanes, rows, row)
-        return packed(lanes), log
-
     def whole(own, shared, numbers):
-        return one_kernel(loop, batch=True)((own, shared, numbers))
+        some = without_library(
+            lambda lanes: mapped(own, shared, lanes), slots.unpacked(numbers)
+        )
+
+        def loop(numbers):
+            lanes, log = run_many(some, slots.unpacked(numbers), rows, row)
+            return packed(lanes), log
+
+        return one_kernel(loop, batch=True)(numbers)
 
     # the widest vectors that the machine has; XLA is shy of them by default
     return jax.jit(whole, compiler_options={"xla_cpu_prefer_vector_width": 512})

@@ -27,16 +27,16 @@ class TurnSamples:
         at = np.flatnonzero(stop)
         lane, place = work[at % len(work)], stop[at].astype(int) - self._skip
         # rounding may set the end of the run apart from its last stop
-        turns = self._so_far.shape[1]
-        real = (place >= 0) & (place < turns)
+        places = self._so_far.shape[1]
+        real = (place >= 0) & (place < places)
         at, lane, place = at[real], lane[real], place[real]
         # one index into all lanes and turns is quicker than two
         counts = self._so_far.reshape(-1, 2)
-        counts[lane * turns + place] = np.stack([impacts[at], chatters[at]], axis=1)
+        counts[lane * places + place] = np.stack([impacts[at], chatters[at]], axis=1)
         kept = place > 0
         samples = self.states.reshape(-1, len(state))
         found = np.stack([part[at[kept]] for part in state], axis=1)
-        samples[lane[kept] * (turns - 1) + place[kept] - 1] = found
+        samples[lane[kept] * (places - 1) + place[kept] - 1] = found
 
     def counts(self):
         """Impacts and completed chatters in each turn; 0 where a lane failed."""

@@ -47,13 +47,14 @@ def fourier_sum(angle, mean, cosines, sines):
     # fuse into plain arithmetic, and the derivatives of a gap share the waves.
     cosine, sine = jnp.cos(angle), jnp.sin(angle)
     twice = 2 * cosine
-    total = mean + cosines[0] * cosine + sines[0] * sine
+    # the mean is added last: it is the largest, and would round each of the others
+    total = cosines[0] * cosine + sines[0] * sine
     before, now = (jnp.ones_like(cosine), jnp.zeros_like(sine)), (cosine, sine)
     for k in range(1, cosines.shape[-1]):
         after = tuple(twice * b - a for a, b in zip(before, now, strict=True))
         before, now = now, after
         total = total + cosines[k] * now[0] + sines[k] * now[1]
-    return total
+    return mean + total
 
 
 # The derivative of a series is again a series. Saying so halves the work of gap,
