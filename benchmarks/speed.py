@@ -45,7 +45,7 @@ def batches(repeats: int, side: int) -> None:
     """W1 and W2 on every side, and how far the samples agree."""
     for workload, block in (
         (_workloads.sweep(), 64),
-        (_workloads.grid(side=side), 128),
+        (_workloads.grid(side=side), 256),
     ):
         run = ours(workload, block)
         calls = {
