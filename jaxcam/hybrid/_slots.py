@@ -125,14 +125,17 @@ def compiled_look(start: Start, rows: int, row: Callable):
     key = tuple((type(leaf), leaf) for leaf in leaves)
     flat, lane = jax.tree.flatten(start.slots.rows)
     packings = start.own.packing, start.shared.packing
-    lane = lane, tuple(flat), start.slots.dtypes
-    return _look(key, structure, packings, lane, rows, row)
+    layout = lane, tuple(flat), start.slots.dtypes
+    return _look(key, structure, packings, layout, rows, row)
 
 
 @functools.lru_cache(maxsize=256)
-def _look(key: tuple[tuple[type, Hashable], ...], structure, packings, lane, rows, row):
+def _look(
+    key: tuple[tuple[type, Hashable], ...], structure, packings, layout, rows, row
+):
     static = jax.tree.unflatten(structure, [leaf for _, leaf in key])
-    slots = Slots(jax.tree.unflatten(*lane[:2]), lane[2])
+    lane, flat, dtypes = layout
+    slots = Slots(jax.tree.unflatten(lane, flat), dtypes)
 
     def one(own, shared, lane):
         parts = [p.unpacked(*q) for p, q in zip(packings, (own, shared), strict=True)]
