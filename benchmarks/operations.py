@@ -14,10 +14,10 @@ from jax.interpreters import partial_eval
 
 import jaxcam  # noqa: F401  64-bit floats
 from jaxcam.hybrid import Settings
-from jaxcam.hybrid._advance import Plan
-from jaxcam.hybrid._functions import Functions
-from jaxcam.hybrid._lane import first_lane
-from jaxcam.hybrid._loop import iterate
+from jaxcam.hybrid.loop._advance import Plan
+from jaxcam.hybrid.loop._functions import Functions
+from jaxcam.hybrid.loop._iterate import iterate
+from jaxcam.hybrid.loop._loop_state import first_state
 from jaxcam.models import CamFollower
 
 
@@ -35,7 +35,7 @@ PARTS = {
     "frame": "projection onto the surface",
     "onto": "projection onto the surface",
     "taylor_of_release": "projection onto the surface",
-    "advance_lane": "choosing the next step",
+    "after_attempt": "choosing the next step",
 }
 OTHER = "everything else"
 
@@ -46,7 +46,7 @@ def program():
     zero, one = jnp.asarray(0.0), jnp.asarray(1.0)
     plan = Plan.of(system, Settings(), zero, one, stop_period=system.period)
     functions = Functions(system, 2)
-    lane = first_lane(functions, zero, (jnp.asarray(0.3), zero), one)
+    lane = first_state(functions, zero, (jnp.asarray(0.3), zero), one)
     leaves, structure = jax.tree.flatten(jax.tree.map(jnp.asarray, lane))
 
     def attempt(*leaves):
@@ -83,6 +83,9 @@ def main() -> None:
         part = part_of(equation)
         counts[part] += 1
         slow[part] += name in ("div", "sqrt")
+    lost = set(PARTS.values()) - set(counts)
+    if lost:
+        raise SystemExit(f"no operation is counted as {lost}: mend PARTS")
     total = counts.total()
     print("| part | operations | share | divisions, roots |")
     print("| --- | --- | --- | --- |")

@@ -29,7 +29,8 @@ import numpy as np
 import typer
 
 from benchmarks import _workloads
-from jaxcam.hybrid import _refilled_lanes, stroboscope
+from jaxcam.hybrid import stroboscope
+from jaxcam.hybrid.batch import _refilled_lanes
 from jaxcam.models import CamFollower, rpm_to_rad_s
 from jaxcam.sweeps import basins, diagram, Grid
 
@@ -103,24 +104,24 @@ def kept(repeats: int, side: int) -> None:
 
 def idle_slots(call) -> float:
     """Part of the attempts that the compiled loop made without a lane in the slot."""
-    slots, steps, compiled = [], [], _refilled_lanes.compiled_look
+    slots, steps, compiled = [], [], _refilled_lanes.compiled_chunk
 
     def counted(start, rows, row):
-        look, place = compiled(start, rows, row), start.slots.rows.steps
+        chunk, place = compiled(start, rows, row), start.slots.rows.steps
 
         def looking(own, shared, numbers):
-            made, log = look(own, shared, numbers)
+            made, log = chunk(own, shared, numbers)
             slots.append(log[0].size)
             steps.append(np.sum(np.asarray(made)[place] - np.asarray(numbers)[place]))
             return made, log
 
         return looking
 
-    _refilled_lanes.compiled_look = counted
+    _refilled_lanes.compiled_chunk = counted
     try:
         call()
     finally:
-        _refilled_lanes.compiled_look = compiled
+        _refilled_lanes.compiled_chunk = compiled
     return float(1 - np.sum(steps) / np.sum(slots))
 
 

@@ -1,7 +1,7 @@
 """Path following of smooth problems and of periodic orbits; their special points."""
 
 import jaxcam as _jaxcam  # noqa: F401  64-bit floats
-from variational._interruption import chatter_interruption as chatter_interruption
+from variational import chatter_interruption as chatter_interruption
 
 from ._algorithms import (
     AbstractAlgorithm as AbstractAlgorithm,
@@ -16,10 +16,6 @@ from ._curve import curve as curve
 from ._deflate import deflate as deflate
 from ._follow import follow as follow
 from ._limit_cycle import LimitCycle as LimitCycle
-from ._periodic import periodic_orbits as periodic_orbits
-from ._periodic_orbit import periodic_orbit as periodic_orbit
-from ._periodic_seeds import orbits_near as orbits_near
-from ._periodic_sticking import StickingOrbits as StickingOrbits
 from ._point import Branch as Branch, Point as Point
 from ._predictors import (
     AbstractPredictor as AbstractPredictor,
@@ -41,6 +37,12 @@ from ._problems import (
 from ._record import load as load, Recorder as Recorder, save as save
 from ._sensitivity import sensitivity as sensitivity, special_point as special_point
 from ._settings import Settings as Settings
-from ._shooting import ImpactingOrbits as ImpactingOrbits
 from ._switch import emanating as emanating, switch as switch
 from ._table import Progress as Progress, table as table
+from .orbits import (
+    ImpactingOrbits as ImpactingOrbits,
+    orbits_near as orbits_near,
+    periodic_orbit as periodic_orbit,
+    periodic_orbits as periodic_orbits,
+    StickingOrbits as StickingOrbits,
+)

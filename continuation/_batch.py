@@ -2,21 +2,21 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import jax
 import numpy as np
 from jaxtyping import ArrayLike, PyTree
 
+from jaxcam.parameters import Where
+
 from ._batch_run import Axes, numbers_of, REASONS, run_lanes
 from ._follow import checked_bounds
-from ._locate import locate, Walk
 from ._parameter import as_arrays, leaf_of, pick, with_leaf
 from ._point import Branch, Point, set_parameters, with_field
 from ._problem import AbstractProblem
 from ._program import Corrected
 from ._settings import Settings
-from ._test_functions import eigenvalues_of, is_stable, test_values
+from .special import Context, eigenvalues_at, is_stable, locate, test_values
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +36,7 @@ class Batch:
     name: str
     _passed: Corrected
     _problems: Callable[[int], AbstractProblem]
-    _walk: Walk
+    _context: Context
 
     def lane(self, index: int) -> Branch:
         """One branch, with its special points located."""
@@ -44,7 +44,7 @@ class Batch:
             raise ValueError(
                 f"there is no lane {index}; lanes run from 0 to {self.count.size - 1}"
             )
-        problem, walk = self._problems(index), self._walk
+        problem, context = self._problems(index), self._context
         rows = [
             jax.tree.map(lambda x: x[index, i], self._passed)
             for i in range(int(self.count[index]))
@@ -52,36 +52,36 @@ class Batch:
         points, before = [], None
         arclength = 0.0
         for i, at in enumerate(rows):
-            tests = test_values(problem, at)
+            tests = test_values(problem, context.leaf, at)
             if before is not None:
                 old, old_tests = before
                 arclength += float(np.linalg.norm((at.z - old.z) / old.scale))
                 for name in tests:
                     if tests[name] * old_tests[name] < 0:
                         values = (old_tests[name], tests[name])
-                        found = locate(problem, name, walk, old, at, values)
+                        found = locate(problem, name, context, old, at, values)
                         monitors = problem.monitors()
                         kind = monitors[name].kind if name in monitors else name
                         special = with_field(at, "z", found.z)
                         points.append(
                             _point(
                                 problem, special, kind, arclength, {},
-                                found.converged, found.reason, walk.leaf,
+                                found.converged, found.reason, context.leaf,
                             )
                         )  # fmt: skip
             last = i == len(rows) - 1
             kind = "start" if i == 0 else "end" if last else "regular"
             reason = self.reasons[index] if last else ""
             points.append(
-                _point(problem, at, kind, arclength, tests, True, reason, walk.leaf)
+                _point(problem, at, kind, arclength, tests, True, reason, context.leaf)
             )
             before = at, tests
         numbered = tuple(with_field(p, "label", i + 1) for i, p in enumerate(points))
-        return Branch(numbered, self.name, walk.bounds, walk.leaf, (self.name,))
+        return Branch(numbered, self.name, context.bounds, context.leaf, (self.name,))
 
 
 def _point(problem, at, kind, arclength, tests, converged, reason, leaf) -> Point:
-    multipliers = eigenvalues_of(at.linearisation)
+    multipliers, why = eigenvalues_at(problem, leaf, at)
     parameters = with_leaf(problem.parameters, leaf, np.asarray(at.z[-1]))
     return Point(
         label=0,
@@ -96,7 +96,7 @@ def _point(problem, at, kind, arclength, tests, converged, reason, leaf) -> Poin
         arclength=arclength,
         iterations=int(at.iterations),
         converged=converged,
-        reason=reason,
+        reason=reason or why,
         observed={k: np.asarray(v) for k, v in at.observed.items()},
         tests=tests,
         signature=problem.signature,
@@ -108,7 +108,7 @@ def _point(problem, at, kind, arclength, tests, converged, reason, leaf) -> Poin
 def follow_batch(
     problem: AbstractProblem,
     states: ArrayLike,
-    where: Callable[[Any], Any],
+    where: Where,
     bounds: tuple[float, float],
     *,
     parameters: PyTree | None = None,
@@ -192,7 +192,7 @@ def follow_batch(
         name=name,
         _passed=passed,
         _problems=at_lane,
-        _walk=Walk(leaf, high - low, (low, high), settings),
+        _context=Context(leaf, high - low, (low, high), settings),
     )
 
 

@@ -74,9 +74,9 @@ def run_lanes(
     width = high - low
 
     def begin(parameters, z, sign):
-        here = set_parameters(problem, parameters)
+        current = set_parameters(problem, parameters)
         across = jnp.zeros_like(z).at[-1].set(1.0)
-        at = correct_(here, leaf, z, across, across, width, s.tolerance, 30, False)
+        at = correct_(current, leaf, z, across, across, width, s.tolerance, 30, False)
         turn = jnp.where(at.tangent[-1] * sign < 0, -1.0, 1.0)
         tangent = turn * at.tangent
         at = with_field(at, "tangent", tangent)
@@ -95,9 +95,9 @@ def run_lanes(
         )
 
     def advance(parameters, lane: Lane) -> Lane:
-        here = set_parameters(problem, parameters)
+        current = set_parameters(problem, parameters)
         a = lane.at
-        scale = scale_at(here, leaf, a.z, width)
+        scale = scale_at(current, leaf, a.z, width)
         change = lane.step * a.tangent
         target = a.z[-1] + change[-1]
         bound = jnp.where(change[-1] > 0, high, low)
@@ -108,7 +108,7 @@ def run_lanes(
         across = jnp.zeros_like(scale).at[-1].set(1.0 / width)
         normal = jnp.where(lands, across, a.tangent / scale**2)
         b = correct_(
-            here, leaf, guess, normal, a.tangent, width, s.tolerance, max_iterations,
+            current, leaf, guess, normal, a.tangent, width, s.tolerance, max_iterations,
             False,
         )  # fmt: skip
         z = b.z.at[-1].set(jnp.where(lands, bound, b.z[-1]))

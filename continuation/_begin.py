@@ -3,60 +3,66 @@
 import jax.numpy as jnp
 import numpy as np
 
-from ._locate import Walk
 from ._point import with_field, with_parameter
 from ._problem import AbstractProblem, Start
 from ._program import correct, Corrected, evaluate
+from .special import Context
 
 
 def settle(
-    problem: AbstractProblem, walk: Walk, z: np.ndarray, name: str, direction: int
+    problem: AbstractProblem, context: Context, z: np.ndarray, name: str, direction: int
 ) -> Corrected:
     """Solve at the parameter of the start, and find the direction there."""
     across = np.zeros_like(z)
     across[-1] = 1.0
-    at = correct(problem, walk.leaf, z, across, across, walk.width, walk.settings)
+    at = correct(
+        problem, context.leaf, z, across, across, context.width, context.settings
+    )
     if not at.success:
         # more iterations are another program: compiled only where they are needed
-        patient = with_field(walk.settings, "max_iterations", 30)
-        at = correct(problem, walk.leaf, z, across, across, walk.width, patient)
+        patient = with_field(context.settings, "max_iterations", 30)
+        at = correct(problem, context.leaf, z, across, across, context.width, patient)
     if not at.success:
         # Newton has no answer where the derivative is singular; the start may
         # still be one
-        given = evaluate(problem, walk.leaf, z, across, walk.width, walk.settings)
-        size = np.abs(_residual(problem, z, walk.leaf)) / given.scale[:-1]
-        if not np.all(size <= walk.settings.tolerance):
+        given = evaluate(
+            problem, context.leaf, z, across, context.width, context.settings
+        )
+        size = np.abs(_residual(problem, z, context.leaf)) / given.scale[:-1]
+        if not np.all(size <= context.settings.tolerance):
             raise ValueError(
                 f"the start is no solution at {name} = {z[-1]:g}, and "
                 "Newton's method finds none near it; start from a better guess "
                 f"(largest residual {_largest(size)})"
             )
         at = given
-    return _oriented(problem, walk, at, direction)
+    return _oriented(problem, context, at, direction)
 
 
 def leave(
-    problem: AbstractProblem, walk: Walk, z: np.ndarray, start: Start
+    problem: AbstractProblem, context: Context, z: np.ndarray, start: Start
 ) -> tuple[Corrected, float]:
     """The first point of a branch that leaves z along a tangent."""
-    settings = walk.settings
+    settings = context.settings
     zero = np.zeros_like(z)
-    scale = evaluate(problem, walk.leaf, z, zero + 1.0, walk.width, walk.settings).scale
+    scale = evaluate(
+        problem, context.leaf, z, zero + 1.0, context.width, context.settings
+    ).scale
     tangent = np.asarray(start.tangent, float)
     tangent = tangent / np.linalg.norm(tangent / scale)
     step = settings.step if start.step is None else start.step
-    low, high = walk.bounds
+    low, high = context.bounds
     while step >= settings.min_step:
         guess = z + step * tangent
         at = correct(
-            problem, walk.leaf, guess, tangent / scale**2, tangent, walk.width,
+            problem, context.leaf, guess, tangent / scale**2, tangent, context.width,
             settings,
         )  # fmt: skip
         moved = np.linalg.norm((at.z - guess) / scale)
         if at.success and moved <= step and low <= at.z[-1] <= high:
             # the tangent has turned since the start: continue outwards
             outwards = evaluate(
-                problem, walk.leaf, at.z, at.z - z, walk.width, walk.settings
+                problem, context.leaf, at.z, at.z - z, context.width, context.settings
             )
             if np.all(np.isfinite(outwards.tangent)):
                 return outwards, step
@@ -67,7 +73,7 @@ def leave(
 
 
 def _oriented(
-    problem: AbstractProblem, walk: Walk, at: Corrected, direction: int
+    problem: AbstractProblem, context: Context, at: Corrected, direction: int
 ) -> Corrected:
     """The same point with its tangent in the direction asked for."""
     _, sizes, rows = np.linalg.svd(at.jacobian * at.scale[None, :])
@@ -80,15 +86,20 @@ def _oriented(
     tangent = direction * tangent / np.linalg.norm(tangent)
     if len(null) == 1:
         return evaluate(
-            problem, walk.leaf, at.z, tangent * at.scale, walk.width, walk.settings
+            problem,
+            context.leaf,
+            at.z,
+            tangent * at.scale,
+            context.width,
+            context.settings,
         )
     at = with_field(at, "determinant", np.zeros(()))
     return with_field(at, "tangent", tangent * at.scale)
 
 
 def _residual(problem: AbstractProblem, z: np.ndarray, leaf: int) -> np.ndarray:
-    here = with_parameter(problem, leaf, z[-1])
-    return np.asarray(here.residual(jnp.asarray(z[:-1]), here.parameters))
+    current = with_parameter(problem, leaf, z[-1])
+    return np.asarray(current.residual(jnp.asarray(z[:-1]), current.parameters))
 
 
 def _largest(size: np.ndarray) -> str:

@@ -6,6 +6,8 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
+from jaxcam.parameters import Where
+
 from ._algorithms import AbstractAlgorithm, PseudoArclength
 from ._follow import checked_bounds, follow
 from ._parameter import pick
@@ -19,7 +21,7 @@ from ._stated import stated
 def branch(
     problem: AbstractProblem,
     start: Any,
-    where: Callable[[Any], Any],
+    where: Where,
     bounds: tuple[float, float],
     algorithm: AbstractAlgorithm | None = None,
     *,

@@ -1,10 +1,11 @@
 """Cascades of flips."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+
+from jaxcam.parameters import Where
 
 from ._algorithms import AbstractAlgorithm
 from ._follow import checked_bounds, follow
@@ -13,7 +14,7 @@ from ._point import Branch, Point, with_field
 from ._problem import AbstractProblem, Start
 from ._settings import Settings
 from ._switch import emanating
-from ._test_functions import FLIP
+from .special import FLIP
 
 
 # ordinary points that a branch of the cascade gets at least, if its length shrinks
@@ -52,7 +53,7 @@ class Cascade:
 def cascade(
     problem: AbstractProblem,
     start: Any,
-    where: Callable[[Any], Any],
+    where: Where,
     bounds: tuple[float, float],
     algorithm: AbstractAlgorithm | None = None,
     *,

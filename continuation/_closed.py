@@ -1,42 +1,145 @@
-"""Whether a branch has come back to its start."""
+"""Whether a branch has come back to where it has been."""
+
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ._here import Here, stand
-from ._locate import Walk
-from ._program import correct, Corrected, evaluate
+from ._point import Point, with_parameter
+from ._problem import AbstractProblem
+from ._program import correct, evaluate
+from ._solution import Solution, solution_at
+from .special import between, Context
+
+
+# an earlier point is met where the branch is this close to it, in lengths of steps, for
+# tolerances from 1e-11 to 1e-8: errors of both points, and what is lost near a branch
+# point, where the equations are nearly singular
+_MISS, _LEAST, _MOST = 1e3, 1e-8, 1e-5
+# steps that must lie between a point and the return to it
+_AWAY = 3.0
+# cosine between the directions in which a point is passed twice
+_ALIGNED = 0.9
+
+
+class Passed(NamedTuple):
+    """A point that the branch has passed, in one of its descriptions."""
+
+    z: np.ndarray
+    tangent: np.ndarray
+    arclength: float
+    label: int
+
+
+class Past:
+    """The points of a branch so far, by the family of problems that they solve."""
+
+    def __init__(self, leaf: int):
+        self.leaf = leaf
+        self.families: dict[str, list[Passed]] = {}
+
+    def add(self, problem: AbstractProblem, point: Point) -> None:
+        """Keep a point that is no special one, with all its descriptions."""
+        problem = with_parameter(problem, self.leaf, point.parameter)
+        u, v = point.state, point.tangent[:-1]
+        for family, state, along in problem.copies(u, v):
+            passed = Passed(
+                np.append(state, point.parameter),
+                np.append(along, point.tangent[-1]),
+                point.arclength,
+                point.label,
+            )
+            self.families.setdefault(family, []).append(passed)
+
+    def near(
+        self, current: Solution, following: Solution
+    ) -> list[tuple[float, Passed]]:
+        """Points beside the step, and which share of it lies before each."""
+        known = self.families.get(current.problem.family, [])
+        known = [p for p in known if p.z.shape == current.at.z.shape]
+        if not known:
+            return []
+        scale = current.at.scale
+        chord = (following.at.z - current.at.z) / scale
+        length = float(np.linalg.norm(chord))
+        states = np.stack([p.z for p in known])
+        states[:, :-1] = current.problem.brought_near(states[:, :-1], current.at.z[:-1])
+        ago = current.arclength - np.array([p.arclength for p in known])
+        way = (states - current.at.z) / scale
+        share = way @ chord / length**2
+        aside = np.linalg.norm(way - share[:, None] * chord, axis=1)
+        met = (ago >= _AWAY * length) & (share > 0) & (share <= 1) & (aside <= length)
+        found = [
+            (float(share[k]), known[k]._replace(z=states[k]))
+            for k in np.flatnonzero(met)
+        ]
+        return sorted(found, key=lambda item: item[0])
 
 
 def closed(
-    walk: Walk, origin: Corrected | None, here: Here, there: Here
-) -> Here | None:
-    """The start of the branch, where this step came back to it."""
-    if origin is None or origin.z.shape != here.at.z.shape:
-        return None
-    scale = here.at.scale
-    start, a, b = origin.z / scale, here.at.z / scale, there.at.z / scale
-    chord = b - a
-    length = np.linalg.norm(chord)
-    along = float((start - a) @ chord) / length
-    aside = np.linalg.norm(start - a - along / length * chord)
-    if here.arclength < 3 * length or not 0 < along <= length or aside > length:
-        return None
-    tangent = origin.tangent / scale
-    if float(tangent @ chord) < 0.5 * length * np.linalg.norm(tangent):
-        return None
-    guess = (a + along / length * chord) * scale
-    at = correct(
-        here.problem, walk.leaf, guess, chord / length / scale, chord * scale,
-        walk.width, walk.settings,
-    )  # fmt: skip
-    miss = np.linalg.norm(at.z / scale - start)
-    # points of a branch are a square root of the tolerance apart at most, where
-    # they are the same
-    if not at.success or miss > np.sqrt(walk.settings.tolerance) + 1e-6:
-        return None
-    back = evaluate(
-        here.problem, walk.leaf, origin.z, origin.tangent, walk.width, walk.settings
+    context: Context, past: Past, current: Solution, following: Solution
+) -> tuple[Solution, str] | None:
+    """The earlier point that this step came back to, and what that means.
+
+    Solutions where the equations are regular lie on one branch only, so that a branch
+    that meets one of its points again is a closed curve, or the same curve backwards.
+    """
+    for share, passed in past.near(current, following):
+        cosine = _cosine_where_met(context, current, following, share, passed)
+        if cosine is None:
+            continue
+        back = evaluate(
+            current.problem,
+            context.leaf,
+            passed.z,
+            np.sign(cosine) * passed.tangent,
+            context.width,
+            context.settings,
+        )
+        length = float(
+            np.linalg.norm((following.at.z - current.at.z) / current.at.scale)
+        )
+        arclength = current.arclength + share * length
+        met = solution_at(
+            current.problem, context.leaf, back, current.step, arclength, current.trail
+        )
+        where = "its start" if passed.label == 1 else f"its point {passed.label}"
+        if cosine > 0:
+            return met, f"the branch is closed: back at {where}"
+        return met, (
+            f"the branch turns back onto itself: at {where} it passes the same "
+            "solutions in the other direction"
+        )
+    return None
+
+
+def _cosine_where_met(
+    context: Context,
+    current: Solution,
+    following: Solution,
+    share: float,
+    passed: Passed,
+) -> float | None:
+    """Between the directions in which the point is passed; None where it is missed."""
+    scale = current.at.scale
+    chord = (following.at.z - current.at.z) / scale
+    chord = chord / np.linalg.norm(chord)
+    guess = between(current.at, following.at, share) / scale
+    target = passed.z / scale
+    # onto the plane in which the earlier point lies
+    guess = (guess + chord * float(chord @ (target - guess))) * scale
+    at: Any = correct(
+        current.problem,
+        context.leaf,
+        guess,
+        chord / scale,
+        chord * scale,
+        context.width,
+        context.settings,
     )
-    return stand(
-        here.problem, back, here.step, here.arclength + float(along), here.trail
-    )
+    allowed = min(max(_MISS * context.settings.tolerance, _LEAST), _MOST)
+    if not at.success or np.linalg.norm(at.z / scale - target) > allowed:
+        return None
+    one, other = at.tangent / scale, passed.tangent / scale
+    sizes = float(np.linalg.norm(one) * np.linalg.norm(other))
+    cosine = float(one @ other) / sizes
+    return cosine if abs(cosine) > _ALIGNED else None

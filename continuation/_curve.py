@@ -6,18 +6,26 @@ from typing import Any
 
 import numpy as np
 
+from jaxcam.parameters import Where
+
 from ._algorithms import AbstractAlgorithm
 from ._branch import branch
 from ._follow import checked_bounds
-from ._locate import singular_points, Walk
-from ._monitor_points import MonitorPoints
 from ._parameter import as_arrays, leaf_of, pick
 from ._point import Branch, Point, set_parameters
 from ._problem import Start
 from ._program import evaluate
 from ._settings import Settings
-from ._singular_points import SingularPoints
-from ._test_functions import FLIP, FOLD, HOPF, NEIMARK_SACKER
+from .special import (
+    Context,
+    FLIP,
+    FOLD,
+    HOPF,
+    MonitorPoints,
+    NEIMARK_SACKER,
+    singular_points,
+    SingularPoints,
+)
 
 
 # its `parameters` is a property, which type checkers take for an argument
@@ -28,7 +36,7 @@ _ZERO = 1e-7
 
 def extended(
     point: Point,
-    where: Callable[[Any], Any],
+    where: Where,
     bounds: tuple[float, float],
     settings: Settings | None = None,
 ) -> SingularPoints | MonitorPoints:
@@ -45,23 +53,29 @@ def extended(
     leaf, name = pick(where, problem.parameters)
     low, high = checked_bounds(bounds, name)
     problem = set_parameters(problem, as_arrays(problem.parameters, leaf))
-    walk = Walk(leaf, high - low, (low, high), settings or Settings())
+    context = Context(leaf, high - low, (low, high), settings or Settings())
     z = np.append(point.state, leaf_of(problem.parameters, leaf))
     if point.kind in (FOLD, FLIP, HOPF, NEIMARK_SACKER):
-        return singular_points(problem, point.kind, walk, z)
+        return singular_points(problem, point.kind, context, z)
     same = [
         k for k, monitor in problem.monitors().items() if monitor.kind == point.kind
     ]
     if len(same) > 1:
         # several monitors may share a kind: the one that is zero here, and the last
         # where others vanish with it, such as the gap beside an impact without speed
-        at = evaluate(problem, walk.leaf, z, np.ones_like(z), walk.width, walk.settings)
+        at = evaluate(
+            problem, context.leaf, z, np.ones_like(z), context.width, context.settings
+        )
         sizes = {k: abs(float(at.monitors[k])) for k in same}
         most = max(min(sizes.values()), _ZERO * (1.0 + float(np.max(np.abs(z)))))
         same = [k for k in same if sizes[k] <= most]
     if same:
         return _monitored(
-            problem, same[-1], leaf, np.asarray(walk.width), np.asarray(walk.bounds)
+            problem,
+            same[-1],
+            leaf,
+            np.asarray(context.width),
+            np.asarray(context.bounds),
         )
     raise ValueError(
         f"points of kind {point.kind!r} form no curve in two parameters; folds, flips, "

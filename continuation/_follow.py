@@ -1,24 +1,26 @@
 """Following a branch, point by point."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
 
+from jaxcam.parameters import real_array, Where
+
 from ._algorithms import AbstractAlgorithm, PseudoArclength
-from ._locate import Walk
 from ._parameter import as_arrays, pick
 from ._point import Point, set_parameters
 from ._problem import AbstractProblem, Start
 from ._run import Run
 from ._settings import Settings
 from ._stated import stated
+from .special import Context
 
 
 def follow(
     problem: AbstractProblem,
     start: Any,
-    where: Callable[[Any], Any],
+    where: Where,
     bounds: tuple[float, float],
     algorithm: AbstractAlgorithm | None = None,
     *,
@@ -43,7 +45,8 @@ def follow(
     - `history`: the points before `start`, where that is a point; predictors through
       several points need them.
 
-    The branch ends on a bound, where it closes, where a monitor of the problem ends it
+    The branch ends on a bound, where it meets an earlier point of its own, where
+    doubled orbits join those of half the period, where a monitor of the problem ends it
     and the problem knows no transition, where the smallest step fails, or after
     `settings.max_points`; the last point says which in `reason`.
 
@@ -58,8 +61,8 @@ def follow(
     low, high = checked_bounds(bounds, name)
     if direction not in (1, -1):
         raise ValueError(f"direction is {direction!r}; give 1 or -1")
-    walk = Walk(leaf, high - low, (low, high), settings)
-    run = Run(walk, algorithm, name, direction)
+    context = Context(leaf, high - low, (low, high), settings)
+    run = Run(context, algorithm, name, direction)
     # the first point is computed now, so that bad input is reported here
     first = run.begin(begun, at, history)
     return run.points(first)
@@ -91,7 +94,7 @@ def _begun(problem: AbstractProblem, start: Any) -> tuple[AbstractProblem, Any]:
         if start.signature != problem.signature:
             problem = problem.with_signature(start.signature)
         return problem, start
-    state = np.asarray(start, float)
+    state = np.asarray(real_array(start, "start"))
     if state.ndim == 0:
         state = state[None]
     if state.ndim != 1 or not np.all(np.isfinite(state)):

@@ -3,23 +3,15 @@
 from collections.abc import Callable
 from typing import Any, ClassVar
 
-import diffrax
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, PyTree
 
+from jaxcam.hybrid.runge_kutta import DOPRI8, fixed_steps
+
 from ._point import with_field
 from ._problem import AbstractProblem, Stability, Start
-
-
-_TABLEAU = diffrax.Dopri8.tableau
-_STAGES = _TABLEAU.num_stages
-_A = np.zeros((_STAGES, _STAGES))
-for _i, _row in enumerate(_TABLEAU.a_lower):
-    _A[_i + 1, : len(_row)] = _row
-_B, _B_ERROR = np.asarray(_TABLEAU.b_sol), np.asarray(_TABLEAU.b_error)
 
 
 class LimitCycle(AbstractProblem):
@@ -70,26 +62,15 @@ class LimitCycle(AbstractProblem):
     def _turn(self, u, parameters):
         """State after the period, and the largest error of a step."""
         x, period = u[:-1], u[-1]
-        h = period / self.steps
-
-        def step(carry, _):
-            x, worst = carry
-
-            # a loop over the stages compiles in a fraction of the time
-            def stage(slopes, row):
-                weights, i = row
-                k = self.vector_field(x + h * (weights @ slopes), parameters)
-                return slopes.at[i].set(k), None
-
-            empty = jnp.zeros((_STAGES, x.shape[0]), x.dtype)
-            slopes, _ = jax.lax.scan(stage, empty, (_A, jnp.arange(_STAGES)))
-            error = h * jnp.max(jnp.abs(_B_ERROR @ slopes))
-            return (x + h * (_B @ slopes), jnp.maximum(worst, error)), None
-
-        (x, worst), _ = jax.lax.scan(
-            step, (x, jnp.zeros_like(period)), None, length=self.steps
+        _, states, errors = fixed_steps(
+            DOPRI8,
+            lambda _, x: self.vector_field(x, parameters),
+            jnp.zeros_like(period),
+            x,
+            period,
+            self.steps,
         )
-        return x, worst
+        return states[-1], jnp.max(jnp.abs(errors))
 
     def residual(self, u: Float[Array, " n"], parameters: PyTree) -> Float[Array, " n"]:
         x = u[:-1]

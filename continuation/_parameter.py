@@ -1,6 +1,5 @@
 """Picking the parameter that varies out of any tree of parameters."""
 
-from collections.abc import Callable
 from typing import Any
 
 import jax
@@ -8,50 +7,22 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import PyTree
 
-
-class _Marker:
-    """Stands in for a leaf while `where` runs."""
-
-    def __init__(self, index: int):
-        self.index = index
+from jaxcam.parameters import pick as parameter_pick, Where
 
 
-def pick(where: Callable[[Any], Any], parameters: PyTree) -> tuple[int, str]:
+def pick(where: Where, parameters: PyTree) -> tuple[int, str]:
     """Index of the leaf that `where` picks, and its name.
 
     **Raises:** `ValueError` where it picks nothing, or not a single number.
     """
-    pairs, structure = jax.tree_util.tree_flatten_with_path(parameters)
-    names = [
-        jax.tree_util.keystr(path, simple=True, separator=".") or "parameter"
-        for path, _ in pairs
-    ]
-    numbers = [
-        name for name, (_, leaf) in zip(names, pairs, strict=True) if _is_number(leaf)
-    ]
-    known = ", ".join(numbers) or "none"
-    marked = jax.tree.unflatten(structure, [_Marker(i) for i in range(len(pairs))])
-    try:
-        marker = where(marked)
-    except (AttributeError, KeyError, IndexError, TypeError) as error:
+    # bifurcation problems are often stated with whole numbers
+    picked = parameter_pick(where, parameters, integers=True)
+    if picked.several:
         raise ValueError(
-            f"where picks a parameter that does not exist ({error}); the parameters "
-            f"are: {known}"
-        ) from error
-    if not isinstance(marker, _Marker) or not _is_number(pairs[marker.index][1]):
-        raise ValueError(
-            "where must pick one scalar parameter, as in `lambda p: p.speed`; the "
-            f"parameters are: {known}"
+            f"where picks {', '.join(picked.names)}; a branch has one parameter, as in "
+            "`lambda p: p.speed`"
         )
-    return marker.index, names[marker.index]
-
-
-def _is_number(leaf: Any) -> bool:
-    if isinstance(leaf, bool):
-        return False
-    if isinstance(leaf, int | float | np.number):
-        return True
-    return isinstance(leaf, jax.Array | np.ndarray) and leaf.shape == ()
+    return picked.leaves[0], picked.names[0]
 
 
 def as_arrays(parameters: PyTree, *leaves: int) -> PyTree:

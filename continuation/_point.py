@@ -28,7 +28,7 @@ class Point:
     state: np.ndarray
     #: (k,) eigenvalues of an equilibrium, multipliers of a map or an orbit
     multipliers: np.ndarray
-    #: None where the problem has no stability
+    #: None where the problem has no stability, or a multiplier is not finite
     stable: bool | None
     #: (n+1,) direction of the branch in (state, parameter)
     tangent: np.ndarray

@@ -43,11 +43,11 @@ class Secant(AbstractPredictor):
     stations: ClassVar[int] = 2
 
     def __call__(self, stations: Sequence[Station], step: float) -> np.ndarray:
-        here = stations[-1]
+        current = stations[-1]
         if len(stations) < 2:
-            return here.y + step * here.tangent
-        chord = here.y - stations[-2].y
-        return here.y + step * chord / np.linalg.norm(chord)
+            return current.y + step * current.tangent
+        chord = current.y - stations[-2].y
+        return current.y + step * chord / np.linalg.norm(chord)
 
 
 class Extrapolation(AbstractPredictor):
@@ -56,15 +56,15 @@ class Extrapolation(AbstractPredictor):
     stations: ClassVar[int] = 2
 
     def __call__(self, stations: Sequence[Station], step: float) -> np.ndarray:
-        here = stations[-1]
-        chord = here.tangent if len(stations) < 2 else here.y - stations[-2].y
+        current = stations[-1]
+        chord = current.tangent if len(stations) < 2 else current.y - stations[-2].y
         # next to a fold the state is no function of the parameter
         if abs(chord[-1]) < 0.1 * np.linalg.norm(chord):
-            chord = here.tangent
-            return here.y + step * chord
-        along = np.sign(here.tangent[-1]) or 1.0
+            chord = current.tangent
+            return current.y + step * chord
+        along = np.sign(current.tangent[-1]) or 1.0
         change = along * step * abs(chord[-1]) / np.linalg.norm(chord)
-        return here.y + change / chord[-1] * chord
+        return current.y + change / chord[-1] * chord
 
 
 class Polynomial(AbstractPredictor):
@@ -84,16 +84,16 @@ class Polynomial(AbstractPredictor):
 
     def __call__(self, stations: Sequence[Station], step: float) -> np.ndarray:
         used = stations[-self.order :]
-        here = used[-1]
+        current = used[-1]
         y = np.stack([station.y for station in used])
         lengths = np.linalg.norm(np.diff(y, axis=0), axis=1)
         s = -np.concatenate([np.cumsum(lengths[::-1])[::-1], [0.0]])
         # y(s) = y0 + s t0 + s^2 q(s), q through the earlier points
         past = s[:-1]
         if past.size == 0:
-            return here.y + step * here.tangent
-        q = (y[:-1] - here.y - past[:, None] * here.tangent) / past[:, None] ** 2
+            return current.y + step * current.tangent
+        q = (y[:-1] - current.y - past[:, None] * current.tangent) / past[:, None] ** 2
         weights = np.array(
             [np.prod([(step - b) / (a - b) for b in past if b != a]) for a in past]
         )
-        return here.y + step * here.tangent + step**2 * (weights @ q)
+        return current.y + step * current.tangent + step**2 * (weights @ q)

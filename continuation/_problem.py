@@ -10,6 +10,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int, PyTree
 
+from ._eigenvalues import eigenvalues_of
+
 
 #: what the eigenvalues of `linearisation` mean
 Stability = Literal["equilibrium", "map", "none"]
@@ -27,7 +29,7 @@ class Monitor(eqx.Module):
       the monitor may cease to exist, or not change sign, behind its zero. It must have
       a nonzero slope on the near side.
     - `bracket`: its zero is enclosed by points of the branch instead of solved for by
-      Newton's method; for values whose derivative is dear to compile.
+      Newton's method; for values whose derivative is costly to compile.
     """
 
     kind: str = eqx.field(static=True)
@@ -82,8 +84,9 @@ class AbstractProblem(eqx.Module):
     exist return NaN, and the step is halved.
 
     **Python** (called between compiled programs with concrete arrays): `monitors`,
-    `check`, `transition`, `refreshed`, `doubled`, `signature`, `with_signature`. They
-    may compile things of their own.
+    `check`, `transition`, `refreshed`, `doubled`, `copies`, `brought_near`, `family`,
+    `half_away`, `eigenvalues`, `signature`, `with_signature`. They may compile things
+    of their own.
 
     The order of calls for a step from point a to point b: corrector; `monitor` and
     `linearisation` and `observe` at b in the same program; if a monitor with `ends`
@@ -146,7 +149,7 @@ class AbstractProblem(eqx.Module):
         """The vector field, or the map, whose derivative is `linearisation`.
 
         Override it together with `linearisation`, or override `local_motion` (where
-        `dear`, `local_jacobian`), or set `normal_forms` to False.
+        `costly`, `local_jacobian`), or set `normal_forms` to False.
         """
         moved = self.residual(u, parameters)
         return moved + u if self.stability == "map" else moved
@@ -167,7 +170,7 @@ class AbstractProblem(eqx.Module):
     ) -> tuple[Callable[[Float[Array, " k"]], Float[Array, "k k"]], Float[Array, " k"]]:
         """The Jacobian of `local_motion` as a function, and the point where it is.
 
-        Where `dear`, normal-form coefficients come from central differences of this,
+        Where `costly`, normal-form coefficients come from central differences of this,
         and `local_motion` is not asked for.
         """
         motion, y = self.local_motion(u, parameters)
@@ -229,7 +232,7 @@ class AbstractProblem(eqx.Module):
         return jnp.broadcast_to(size, u.shape)
 
     @property
-    def dear(self) -> bool:
+    def costly(self) -> bool:
         """Whether second derivatives of `residual` take long to compile, so that its
         special points are better enclosed than solved for."""
         return False
@@ -281,6 +284,45 @@ class AbstractProblem(eqx.Module):
     def cycle(self, point: Any, matrix: np.ndarray) -> Start | None:
         """The limit cycle born at a Hopf point, whose linearisation is `matrix`."""
         del point, matrix
+        return None
+
+    def eigenvalues(
+        self, u: np.ndarray, parameters: PyTree, at: Any
+    ) -> tuple[Any, str]:
+        """Eigenvalues of `at.linearisation`, (k,) complex, the largest modulus first,
+        and what is to be known of them, else the empty string.
+
+        To be overridden where the matrix is unbounded at some points, with the limits.
+        """
+        del u, parameters
+        return eigenvalues_of(at.linearisation), ""
+
+    def copies(
+        self, u: np.ndarray, tangent: np.ndarray
+    ) -> list[tuple[str, np.ndarray, np.ndarray]]:
+        """All ways to write this solution down, the first of them as it is: family,
+        state and tangent (both (n,)). A periodic orbit has several, which begin at
+        different points of it. A branch that meets any of them again is closed.
+        """
+        return [(self.family, u, tangent)]
+
+    def brought_near(
+        self, states: Float[np.ndarray, "k n"], u: np.ndarray
+    ) -> Float[np.ndarray, "k n"]:
+        """The same solutions, written down as near `u` as can be: phases and angles
+        may differ by whole turns."""
+        del u
+        return states
+
+    @property
+    def family(self) -> str:
+        """Problems of one family have the same solutions, as states of one form."""
+        return self.signature
+
+    def half_away(self, u: np.ndarray, parameters: PyTree) -> float | None:
+        """How far a periodic orbit is from one of half the period run through twice,
+        in lengths of steps; None where the problem has no such solutions."""
+        del u, parameters
         return None
 
     @property

@@ -82,6 +82,20 @@ class FixedPoint(AbstractProblem):
         twice = eqx.tree_at(lambda p: p.period, self, 2 * self.period)
         return Start(twice, point.state, point.parameter, np.append(direction, 0.0))
 
+    def copies(self, u, tangent):
+        found = [(self.family, u, tangent)]
+        for _ in range(int(self.period) - 1):
+            u, tangent = _mapped(self, u, tangent)
+            found.append((self.family, np.asarray(u), np.asarray(tangent)))
+        return found
+
+    def half_away(self, u, parameters):
+        if int(self.period) % 2:
+            return None
+        half = eqx.tree_at(lambda p: p.period, self, self.period // 2)
+        moved, scale = _moved(half, jnp.asarray(u), parameters)
+        return float(np.linalg.norm(np.asarray(moved) / np.asarray(scale)))
+
     @property
     def signature(self) -> str:
         return f"period {int(self.period)}"
@@ -94,3 +108,14 @@ class FixedPoint(AbstractProblem):
                 "a map; take it up with the problem it was made with"
             )
         return FixedPoint(self.map, self.parameters, int(number))
+
+
+@eqx.filter_jit
+def _mapped(problem: FixedPoint, u, tangent):
+    """The next point of an orbit, and a deviation there."""
+    return jax.jvp(lambda u: problem.map(u, problem.parameters), (u,), (tangent,))
+
+
+@eqx.filter_jit
+def _moved(problem: FixedPoint, u, parameters):
+    return problem.residual(u, parameters), problem.scale(u, parameters)

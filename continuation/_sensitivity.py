@@ -1,14 +1,13 @@
 """Special points as differentiable functions of all other parameters."""
 
-from collections.abc import Callable
-from typing import Any
-
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-import optimistix as optx
 from jaxtyping import Array, Float, PyTree
+
+from jaxcam.parameters import Where
+from variational.orbits import implicit_root
 
 from ._curve import extended
 from ._parameter import as_arrays, leaf_of, with_leaf
@@ -16,7 +15,7 @@ from ._point import Point
 
 
 def special_point(
-    point: Point, where: Callable[[Any], Any], parameters: PyTree
+    point: Point, where: Where, parameters: PyTree
 ) -> tuple[Float[Array, " n"], Float[Array, ""]]:
     """Where a special point is at other parameters; for use inside `jit` and `jvp`.
 
@@ -38,20 +37,10 @@ def special_point(
     parameters = as_arrays(parameters, problem.leaf)
     scale = problem.scale(u, problem.parameters)
 
-    def equations(y, parameters):
+    def equations(y):
         return problem.residual(y * scale, parameters) / scale
 
-    solution = optx.root_find(
-        equations,
-        optx.Newton(rtol=1e-10, atol=1e-10),
-        u / scale,
-        args=parameters,
-        max_steps=30,
-        throw=False,
-    )
-    found = jnp.where(
-        solution.result == optx.RESULTS.successful, solution.value * scale, jnp.nan
-    )
+    found = implicit_root(equations, u / scale) * scale
     return found[:-1], found[-1]
 
 
@@ -67,7 +56,7 @@ def _derivatives(problem, u, moving, fixed):
     return jax.tree.map(lambda d: -jnp.tensordot(inverse[-1], d, 1), by_leaf)
 
 
-def sensitivity(point: Point, where: Callable[[Any], Any]) -> PyTree:
+def sensitivity(point: Point, where: Where) -> PyTree:
     """Derivative of the parameter value of a special point by all other parameters.
 
     By the implicit function theorem on the extended system: d(speed at the flip) /

@@ -22,7 +22,7 @@ class Settings(eqx.Module):
     - `special`: locate and report special points.
     - `localise`: `"newton"` on the extended system, which takes second derivatives of
       the residual; or `"bracket"`, which takes none and encloses the point between
-      points of the branch; or `"auto"`, the second where `problem.dear` says so.
+      points of the branch; or `"auto"`, the second where `problem.costly` says so.
     """
 
     tolerance: float = 1e-10

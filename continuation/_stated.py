@@ -10,7 +10,7 @@ def stated(problem: Any, start: Any) -> tuple[AbstractProblem, Any]:
     if isinstance(problem, AbstractProblem):
         return problem, start
     # the core knows nothing of impacts unless it is given a system that has them
-    from ._periodic import start_of
+    from .orbits import start_of
 
     begun = start_of(problem, start)
     return begun.problem, begun

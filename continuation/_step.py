@@ -6,12 +6,12 @@ from typing import NamedTuple
 import numpy as np
 
 from ._algorithms import AbstractAlgorithm
-from ._locate import Walk
 from ._point import with_field
 from ._predictors import Station
 from ._problem import AbstractProblem
 from ._program import correct, Corrected
 from ._settings import Settings
+from .special import Context
 
 
 class Attempt(NamedTuple):
@@ -34,7 +34,7 @@ class StepControl:
     def attempt(
         self,
         problem: AbstractProblem,
-        walk: Walk,
+        context: Context,
         algorithm: AbstractAlgorithm,
         a: Corrected,
         stations: Sequence[Station],
@@ -42,18 +42,18 @@ class StepControl:
         name: str,
     ) -> Attempt:
         """Predict and correct; never past a bound, but onto it."""
-        here = stations[-1]
+        current = stations[-1]
         scale = a.scale
         predicted = algorithm.predictor(stations, step) * scale
-        k, value = _first_bound(problem, walk, a.z, predicted)
+        k, value = _first_bound(problem, context, a.z, predicted)
         if k is None:
-            normal = algorithm.normal(here.tangent) / scale
+            normal = algorithm.normal(current.tangent) / scale
             b = correct(
-                problem, walk.leaf, predicted, normal, a.tangent, walk.width,
+                problem, context.leaf, predicted, normal, a.tangent, context.width,
                 self.settings, algorithm.least_norm,
             )  # fmt: skip
             if b.success:
-                k, value = _first_bound(problem, walk, a.z, b.z)
+                k, value = _first_bound(problem, context, a.z, b.z)
                 predicted = b.z
             if k is None:
                 return self._judged(a, b, predicted, step, "")
@@ -63,7 +63,13 @@ class StepControl:
         normal = np.zeros_like(guess)
         normal[k] = 1.0 / scale[k]
         b = correct(
-            problem, walk.leaf, guess, normal, a.tangent, walk.width, self.settings
+            problem,
+            context.leaf,
+            guess,
+            normal,
+            a.tangent,
+            context.width,
+            self.settings,
         )
         if b.success:
             # rounding of the corrector
@@ -108,10 +114,10 @@ class StepControl:
 
 
 def _first_bound(
-    problem: AbstractProblem, walk: Walk, z: np.ndarray, target: np.ndarray
+    problem: AbstractProblem, context: Context, z: np.ndarray, target: np.ndarray
 ) -> tuple[int | None, float]:
     """The component that leaves its bounds first on the way, and the bound."""
-    limits = {z.size - 1: walk.bounds}
+    limits = {z.size - 1: context.bounds}
     for k, pair in problem.limits().items():
         limits[k if k >= 0 else z.size - 1 + k] = pair
     first, which = np.inf, (None, 0.0)

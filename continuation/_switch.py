@@ -1,28 +1,23 @@
 """Branches that leave a special point."""
 
-from collections.abc import Callable
-from typing import Any
-
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 
+from jaxcam.parameters import Where
+
 from ._algorithms import AbstractAlgorithm
 from ._branch import branch
-from ._multilinear import second
-from ._normal_forms import null_vectors
 from ._parameter import pick, with_leaf
 from ._point import Branch, Point
 from ._problem import AbstractProblem, Start
 from ._program import evaluate
 from ._settings import Settings
-from ._test_functions import BRANCH_POINT, FLIP, HOPF
+from .special import BRANCH_POINT, FLIP, HOPF, null_vectors, second
 
 
-def emanating(
-    point: Point, where: Callable[[Any], Any], width: float = 1.0
-) -> tuple[Start, ...]:
+def emanating(point: Point, where: Where, width: float = 1.0) -> tuple[Start, ...]:
     """Where to begin the branches that leave a special point, besides its own.
 
     From a branch point: both halves of the other branch, whose direction solves the
@@ -65,7 +60,7 @@ def emanating(
 
 def switch(
     point: Point,
-    where: Callable[[Any], Any],
+    where: Where,
     bounds: tuple[float, float],
     algorithm: AbstractAlgorithm | None = None,
     *,
@@ -76,7 +71,8 @@ def switch(
     **Arguments:** `point`: a branch point, a flip or a Hopf point of a branch; the rest
     as of [`continuation.follow`][].
 
-    **Returns:** two branches from a branch point, one from a flip or a Hopf point.
+    **Returns:** two branches from a branch point, one from a flip or a Hopf point. The
+    two are the same closed curve in both directions where they meet again.
 
     **Raises:** `ValueError` for a point from which no branch is known to leave.
     """

@@ -38,7 +38,7 @@ import numpy as np
 import jaxcam
 from jaxcam.discrepancy import diagnose, Diagnosis, library
 from jaxcam.fitting import fit, held_out_cost, Input, Parameter, Sensor
-from jaxcam.recordings import read_case, Recording, segment
+from jaxcam.recordings import read_case, Recording, References, segment
 
 
 # ten minutes of work: not without being asked
@@ -54,13 +54,14 @@ found: dict[str, Diagnosis] = {}
 moved: dict[str, tuple[float, float]] = {}
 
 
-def terms(*without: str, **options):
+def terms(*without: str, center: float = References.spring_center, **options):
     """The library, without what the textbook model has or what cannot be there.
 
     No two of these records were started by one clock, so that a vibration could not
     have the same phase in both.
     """
-    every = library(turned=False, **options)
+    forms = References(spring_center=center)
+    every = library(turned=False, references=forms, **options)
     return [t for t in every if t.name not in ("external_vibration", *without)]
 
 

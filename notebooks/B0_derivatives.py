@@ -70,9 +70,10 @@ print("d rest / d (gravity, restitution):  ", forward[1], "formula:", exact[1])
 assert jnp.allclose(forward, exact, rtol=1e-9)
 # -
 
-# One direction alone, `jax.jvp`, costs less; the batch at the end uses it. Where there
-# is one number at the end and many parameters, take reverse mode: say so to `simulate`,
-# and keep `max_steps` small, for it always runs that many.
+# One direction alone, `jax.jvp`, costs less; the batch at the end uses it. `jax.grad`
+# and `jax.hessian` work as well, by forward derivatives. Where there is one number at
+# the end and hundreds of parameters, take reverse mode: say so to `simulate`, and keep
+# `max_steps` small, for it always runs that many.
 
 # +
 

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from typer.main import get_command
 from typer.testing import CliRunner
 
-import continuation._periodic  # noqa: F401  what is patched below
+import continuation.orbits._periodic  # noqa: F401  what is patched below
 import jaxcam.discrepancy
 import jaxcam.fitting
 import jaxcam.recordings
@@ -32,11 +32,11 @@ class Reached(BaseException):
 FIRST_WORK = (
     "jaxcam.hybrid._simulate._begin",
     "jaxcam.hybrid._simulate.simulate_segments",
-    "jaxcam.sweeps._run._drive",
+    "jaxcam.sweeps.blocks._run._drive",
     "jaxcam.sweeps.cluster",
-    "continuation._periodic.periodic_orbit",
+    "continuation.orbits._periodic.periodic_orbit",
     "jaxcam.fitting.Problem.build",
-    "jaxcam.recordings.compare_case",
+    "jaxcam.recordings.against_model.compare_case",
     "jaxcam.cli._reproduce_record.reproduce",
 )
 

@@ -13,9 +13,10 @@ from hypothesis import strategies as st
 
 from jaxcam import models
 from jaxcam.data import DEMO_RIG
-from jaxcam.discrepancy import saved_classes
+from jaxcam.discrepancy.terms import saved_classes
 from jaxcam.models import load_system
-from jaxcam.recordings import read_recordings, read_rig, RecordingError, RigError
+from jaxcam.recordings import read_rig, RecordingError, RigError
+from jaxcam.recordings.files import read_recordings
 
 
 SPEED = 150 * math.pi / 30

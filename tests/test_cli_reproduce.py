@@ -1,5 +1,6 @@
 """`jaxcam reproduce`, as a reader types it."""
 
+import dataclasses
 import json
 
 import pandas as pd
@@ -77,7 +78,7 @@ def few(monkeypatch):
             computed.append(name)
             return compute(system)
 
-        return TARGETS[name]._replace(compute=wrapped)
+        return dataclasses.replace(TARGETS[name], compute=wrapped)
 
     def fails(system):
         computed.append("figure-5.99")

@@ -12,7 +12,7 @@ from continuation_examples import (
 )
 
 import continuation
-from continuation._differences import along
+from continuation.special._differences import along
 
 
 BOUNDS = (-1.5, 1.5)

@@ -213,7 +213,7 @@ def test_an_inadmissible_point_is_reported_and_not_returned():
     ("start", "where", "bounds", "words"),
     [
         ([0.5], lambda p: p["speed"], (1.0, 4.0), "does not exist"),
-        ([0.5], lambda p: p, (1.0, 4.0), "one scalar parameter"),
+        ([0.5], lambda p: p, (1.0, 4.0), "parameters as they are"),
         ([0.5], mu, (4.0, 1.0), "wrong way round"),
         ([0.5], mu, (1.0, np.inf), "finite"),
         ([0.5], mu, 4.0, "two numbers"),

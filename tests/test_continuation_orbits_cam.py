@@ -7,7 +7,8 @@ import pytest
 from scipy.optimize import brentq
 
 import continuation
-from jaxcam.hybrid import contact_acceleration, stroboscope
+from jaxcam.hybrid import stroboscope
+from jaxcam.hybrid.surface import contact_acceleration
 from jaxcam.models import preset, rad_s_to_rpm, rpm_to_rad_s
 
 

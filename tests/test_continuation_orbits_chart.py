@@ -14,9 +14,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import continuation
-from jaxcam.hybrid import contact_acceleration
-from jaxcam.hybrid._system import with_array_parameters
+from jaxcam.hybrid.surface import contact_acceleration
 from jaxcam.models import preset, rad_s_to_rpm, rpm_to_rad_s
+from jaxcam.parameters import as_arrays
 from jaxcam.plotting import special_curves
 from variational import chatter_frame
 
@@ -53,7 +53,7 @@ def rig(rpm, offset=None):
     system = eqx.tree_at(speed, preset("calibrated"), jnp.asarray(rpm_to_rad_s(rpm)))
     if offset is not None:
         system = eqx.tree_at(intercept, system, jnp.asarray(offset))
-    return with_array_parameters(system)
+    return as_arrays(system)
 
 
 def impacting(rpm, rows):

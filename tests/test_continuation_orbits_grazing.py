@@ -11,8 +11,8 @@ from scipy.optimize import minimize_scalar
 from textbook_systems import DampedImpactOscillator, parameters
 
 import continuation
-from continuation._lowest_gap import lowest_times
 from jaxcam.models import BouncingBall, ImpactOscillator
+from variational.orbits import lowest_times
 
 
 C, D, E, W = 0.1, 1.0, 0.8, 1.0

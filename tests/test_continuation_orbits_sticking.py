@@ -9,8 +9,8 @@ import pytest
 
 import continuation
 import jaxcam
-from jaxcam.hybrid._system import with_array_parameters
 from jaxcam.models import ImpactOscillator, preset, rad_s_to_rpm, rpm_to_rad_s
+from jaxcam.parameters import as_arrays
 
 
 # compiling takes most of the time
@@ -26,12 +26,12 @@ def speed(system):
 
 
 def oscillator(w, r):
-    return with_array_parameters(ImpactOscillator(omega=w, restitution=r))
+    return as_arrays(ImpactOscillator(omega=w, restitution=r))
 
 
 def rig(rpm):
     system = eqx.tree_at(speed, preset("calibrated"), jnp.asarray(rpm_to_rad_s(rpm)))
-    return with_array_parameters(system)
+    return as_arrays(system)
 
 
 def simulated_periods(system, turns):

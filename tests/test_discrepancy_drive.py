@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from jaxcam.discrepancy import ripple_of
+from jaxcam.discrepancy.evidence import ripple_of
 from jaxcam.recordings import Recording
 
 

@@ -12,11 +12,14 @@ from jaxcam.discrepancy import (
     compare_experiments,
     diagnose,
     library,
+    Policy,
     strength,
     Term,
+    Verdict,
 )
+from jaxcam.discrepancy.report import Reason
 from jaxcam.fitting import Parameter, Sensor
-from jaxcam.recordings import Recording, segment
+from jaxcam.recordings import Recording, References, segment
 
 
 # the first one compiles the engine for this system, which takes minutes
@@ -128,11 +131,11 @@ def test_a_term_in_doubt_is_named_where_nothing_else_explains_what_is_left(monke
         names = [(name, 0.6) for name in best.names]
         return trials.known[frozenset()], {}, {}, names
 
-    monkeypatch.setattr("jaxcam.discrepancy._diagnose.sure", doubting)
+    monkeypatch.setattr("jaxcam.discrepancy.evidence._choice.sure", doubting)
     found = _diagnosed([_free(0.3, 0.1), _free(0.2, 0.1)])
     assert (found.verdict, found.names) == ("effect", ("viscous_damping",))
-    (said,) = (one for one in found.caveats if "viscous damping" in one)
-    assert "nothing is left over with it" in said and "60%" in said
+    (said,) = (c for c in found.caveats if c.reason is Reason.NAMED_IN_DOUBT)
+    assert said.terms == ("viscous_damping",) and "60%" in said.sentence
 
 
 class Rubbed(Swing):
@@ -211,7 +214,11 @@ def test_one_more_record_says_what_its_energy_says():
     Beside two records of amplitude 0.3, one of 0.3 brings the error of the damping to
     sqrt(2/3) of what it was, and one of 0.6 to sqrt(1/3), within 5 %.
     """
-    damping = next(t for t in library(False, 0.0) if t.name == "viscous_damping")
+    damping = next(
+        t
+        for t in library(False, References(spring_center=0.0))
+        if t.name == "viscous_damping"
+    )
     motions = [_free(0.3, 0.1), _free(0.3, 0.1)]
     found = _diagnosed(motions, candidates=[damping])
     assert found.names == ("viscous_damping",)
@@ -228,3 +235,27 @@ def test_one_more_record_says_what_its_energy_says():
     assert best.factor == pytest.approx(np.sqrt(1 / 3), rel=0.05)
     assert other.factor == pytest.approx(np.sqrt(2 / 3), rel=0.05)
     assert best.now["c1"] == pytest.approx(found.after["c1"].stderr, rel=0.05)
+
+
+def test_the_error_rate_decides_and_budgets_do_not():
+    """Damping at six standard errors is named at 1e-2 and not at 1e-12.
+
+    The gain is about 36 in twice the log-likelihood; chi-squared with one degree of
+    freedom asks for 11 and for 56 of twelve terms. A search with other budgets names
+    the same with the same strength, to a hundredth of its error.
+    """
+    nothing = _diagnosed([_free(0.3), _free(0.2)])
+    c = 6 * nothing.limits["c1"].stderr
+    motions = [_free(0.3, c), _free(0.2, c)]
+    found = _diagnosed(motions)
+    assert found.names == ("viscous_damping",)
+    strict = _diagnosed(motions, policy=Policy(false_alarms=1e-12))
+    assert (strict.verdict, strict.names) == (Verdict.NONE, ())
+    assert strict.policy.false_alarms == 1e-12
+    narrow = Policy(quick_iterations=30, kept=1, tried=2, leads=5.0, bootstrap=400)
+    wide = Policy(iterations=120, kept=6, tried=12, late=16, crawl_attempts=8)
+    for policy in (narrow, wide):
+        other = _diagnosed(motions, policy=policy)
+        assert (other.verdict, other.names) == (found.verdict, found.names)
+        mine, theirs = (one.effects[0].parameters["c1"] for one in (found, other))
+        assert theirs.value == pytest.approx(mine.value, abs=0.01 * mine.stderr)

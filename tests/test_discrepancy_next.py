@@ -1,4 +1,4 @@
-"""The record that is proposed, made and fitted: did it say what was foretold?"""
+"""The record that is proposed, made and fitted: did it say what was predicted?"""
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ from jaxcam.recordings import read_case, read_rig, Recording, segment_case
 
 
 @pytest.mark.slow
-def test_the_proposed_record_says_what_was_foretold():
+def test_the_proposed_record_says_what_was_predicted():
     """Standard error of the damping with the record made after all, within 15 %.
 
     It is made by the simulator of the demonstration, which shares nothing with ours.

@@ -6,8 +6,10 @@ import pytest
 
 from jaxcam.cli._diagnose_page import _shapes, _UNITS, diagnosis_page, draw
 from jaxcam.cli._output import to_text
-from jaxcam.discrepancy import Diagnosis, Effect, Structure, Value
-from jaxcam.discrepancy._shapes import shapes
+from jaxcam.discrepancy import Diagnosis, Verdict
+from jaxcam.discrepancy.evidence import Structure
+from jaxcam.discrepancy.report import Alternative, Caveat, Effect, Reason
+from jaxcam.discrepancy.terms import shapes, Value, Variable
 from jaxcam.fitting import Residuals
 
 
@@ -34,13 +36,17 @@ def _diagnosis(verdict, effects):
         grid,
         0.1 * grid,
         0.1 + 0 * grid,
+        quantity="force",
     )
     parts = [_residuals("run1"), _residuals("run2")]
     return Diagnosis(
         "case",
-        verdict,
+        Verdict(verdict),
         effects,
-        (("coulomb_friction", 55.0), ("none", 2000.0)),
+        (
+            Alternative("coulomb_friction", 55.0, ("coulomb_friction",)),
+            Alternative("none", 2000.0, ()),
+        ),
         2e-4,
         1e-4,
         1e-4,
@@ -56,7 +62,7 @@ def _diagnosis(verdict, effects):
         {"stiffness": (1.3, 0.2)},
         {"fc": Value(0.01, 0.003, "rad/s^2")},
         {"fc": "restitution"},
-        ("One caveat.",),
+        (Caveat(Reason.TIE, "One caveat."),),
     )
 
 
@@ -99,4 +105,4 @@ def test_shapes_are_drawn_with_units_on_both_axes():
 
 def test_every_shape_has_a_quantity_whose_unit_is_known():
     offered = shapes((0.2, 0.4), (-1.0, 1.0), (0.0, 2.0), 4.0)
-    assert {one.variable for one in offered} == set(_UNITS)
+    assert {one.variable for one in offered} == set(_UNITS) == set(Variable)

@@ -9,8 +9,8 @@ from typer.testing import CliRunner
 
 from jaxcam.cli import app
 from jaxcam.data import DEMO_RIG
-from jaxcam.discrepancy import diagnose
-from jaxcam.discrepancy._kept_trials import Ended, KeptTrials
+from jaxcam.discrepancy import diagnose, Policy
+from jaxcam.discrepancy.search._kept_trials import Ended, KeptTrials
 from jaxcam.fitting import cam_follower_model, cam_follower_parameters, Problem
 from jaxcam.recordings import segment_case
 
@@ -37,6 +37,8 @@ def test_what_is_kept_comes_back_for_the_same_problem_only(problem, tmp_path):
         problem, start=problem.start._replace(values=problem.start.values + 1e-9)
     )
     assert KeptTrials(tmp_path, moved).get({"viscous_damping", "sensor_lag"}) is None
+    other = KeptTrials(tmp_path, problem, Policy(iterations=61))
+    assert other.get({"viscous_damping", "sensor_lag"}) is None
 
 
 @pytest.mark.slow

@@ -6,12 +6,13 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from jaxcam import HybridSystem
-from jaxcam.discrepancy import WithTerms
-from jaxcam.discrepancy._engine import blocks_of, extended
-from jaxcam.discrepancy._local_force import force_blocks, force_response
-from jaxcam.discrepancy._shapes import ForceOfTime, ForceOfVelocity
-from jaxcam.discrepancy._terms import ExternalVibration
-from jaxcam.discrepancy._vibration_scan import periodogram
+from jaxcam.discrepancy import Policy
+from jaxcam.discrepancy.search import blocks_of, extended, force_blocks
+from jaxcam.discrepancy.search._local_force import force_response
+from jaxcam.discrepancy.search._vibration_scan import periodogram
+from jaxcam.discrepancy.terms import WithTerms
+from jaxcam.discrepancy.terms._library import ExternalVibration
+from jaxcam.discrepancy.terms._shapes import ForceOfTime, ForceOfVelocity
 from jaxcam.fitting import fit, Model, Parameter, Problem, Sensor
 from jaxcam.recordings import Recording, segment
 
@@ -91,7 +92,9 @@ def build():
 
 
 def _scan(problem, found):
-    return periodogram(problem, force_response(problem, found.point, found.free))
+    return periodogram(
+        problem, force_response(problem, found.point, found.free), Policy()
+    )
 
 
 def test_the_scan_promises_what_a_fit_gains(build):

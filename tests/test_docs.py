@@ -23,6 +23,7 @@ def _exported(package: str) -> set[str]:
     [
         "jaxcam.hybrid",
         "jaxcam.models",
+        "jaxcam.parameters",
         "jaxcam.recordings",
         "jaxcam.sweeps",
         "jaxcam.fitting",

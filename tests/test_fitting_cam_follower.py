@@ -9,7 +9,7 @@ import scipy.stats
 from fitting_rigs import assert_inside, cam_problem, NOMINAL, recorded, TRUTH
 
 from jaxcam import fitting
-from jaxcam.fitting._linearise import assemble, cost_of
+from jaxcam.fitting.engine._linearise import assemble, cost_of
 from jaxcam.recordings import mend, RecordingError, segment, segment_case
 
 
@@ -212,7 +212,7 @@ def test_missing_samples_a_gap_and_a_slip():
 def test_first_bounce_of_each_turn(problem, found, record):
     """The thesis' procedure finds r within what its two numbers a turn can tell."""
     part = problem.segments[record]
-    drive = fitting.cam_follower_drive()
+    drive = fitting.engine.cam_follower_drive()
     measured = fitting.first_bounce(found.model().system, part, drive)
     impacts, flights = part.impacts, part.flights
     first = [
@@ -237,7 +237,9 @@ def test_first_bounce_needs_the_drive(found):
     run = recorded()[0]
     part = segment(run, "follower_angle_rad", noise=NOMINAL.sensors.follower_floor)
     with pytest.raises(RecordingError, match="segment_case"):
-        fitting.first_bounce(found.model().system, part, fitting.cam_follower_drive())
+        fitting.first_bounce(
+            found.model().system, part, fitting.engine.cam_follower_drive()
+        )
 
 
 def test_profile_at_chosen_values(problem, found):

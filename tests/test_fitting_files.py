@@ -13,7 +13,8 @@ from typer.testing import CliRunner
 from jaxcam import models
 from jaxcam.cli._app import app
 from jaxcam.data import DEMO_RIG
-from jaxcam.recordings import mend, read_recordings, Recording, RecordingError
+from jaxcam.recordings import mend, Recording, RecordingError
+from jaxcam.recordings.files import read_recordings
 
 
 def columns():

@@ -8,8 +8,8 @@ import pytest
 from fitting_rigs import DraggedBall
 
 from jaxcam import fitting
-from jaxcam.fitting._likelihood import score
-from jaxcam.fitting._linearise import cost_of
+from jaxcam.fitting.engine._likelihood import score
+from jaxcam.fitting.engine._linearise import cost_of
 from jaxcam.hybrid import HybridSystem
 from jaxcam.models import BouncingBall, PowerLawRestitution
 from jaxcam.recordings import mend, record, Recording, RecordingError, segment
@@ -84,7 +84,7 @@ def test_short_flights_start_with_the_velocity_that_gravity_allows():
 
 def test_freeing_another_parameter_compiles_nothing(balls):
     fitting.fit(balls, free=["gravity"])
-    from jaxcam.fitting._linearise import assemble_one
+    from jaxcam.fitting.engine._linearise import assemble_one
 
     before = assemble_one._cached._cache_size()
     fitting.fit(balls, free=["drag", "restitution"])

@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 
-from jaxcam.fitting._pieces import _PIECE, spans
+from jaxcam.fitting.engine._pieces import _PIECE, spans
 from jaxcam.recordings import Recording, segment
 
 

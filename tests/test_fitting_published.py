@@ -19,24 +19,20 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 
-from jaxcam.fitting import (
+from jaxcam.fitting import fit_published, Published
+from jaxcam.fitting.published import fit_free_fall, rounding_error
+from jaxcam.models import BouncingBall, CamFollower, TripleIntegrator
+from variational import (
     clearance,
     detachment,
-    fit_free_fall,
-    fit_published,
     flip_of_orbit,
     fold_of_orbit,
     impact_orbit,
-    ImpactOrbit,
-    implicit_root,
-    one_impact_orbits,
     orbit_determinant,
     orbit_trace,
-    Published,
     release_near,
-    rounding_error,
 )
-from jaxcam.models import BouncingBall, CamFollower, TripleIntegrator
+from variational.orbits import ImpactOrbit, implicit_root, one_impact_orbits
 
 
 G, R, W = 9.81, 0.5, 20.0

@@ -7,7 +7,8 @@ import hostile_files as hostile
 import pytest
 from hypothesis import given, HealthCheck, settings, strategies as st
 
-from jaxcam.recordings import read_recordings, RecordingError
+from jaxcam.recordings import RecordingError
+from jaxcam.recordings.files import read_recordings
 
 
 FEW = settings(max_examples=60, suppress_health_check=list(HealthCheck))

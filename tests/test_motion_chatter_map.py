@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from jaxcam import HybridSystem, simulate
-from jaxcam.hybrid import chatter_completion, completion_time
+from jaxcam.hybrid.surface import chatter_completion, completion_time
 from jaxcam.models import TripleIntegrator
 
 

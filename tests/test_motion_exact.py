@@ -126,6 +126,20 @@ def test_samples_are_the_closed_form():
     assert float(jnp.min(trajectory.gap(times))) >= -1e-12
 
 
+def test_traced_samples_outside_the_run_are_nan():
+    """Where times are known they are refused; nothing is made up where they are not."""
+
+    @jax.jit
+    def height(times):
+        start = jnp.array([0.0, LAUNCH])
+        trajectory = simulate(ball(0.5), start, 0.0, 0.1, max_steps=64)
+        return trajectory.at(times)[:, 0]
+
+    found = height(jnp.array([-0.01, 0.05, 0.11, 10.0]))
+    assert np.isnan(found).tolist() == [True, False, True, True]
+    assert abs(found[1] - 0.05 * (LAUNCH - GRAVITY * 0.05 / 2)) < 1e-12
+
+
 # --- starting on the surface
 
 

@@ -17,11 +17,12 @@ from numpy.polynomial import Polynomial
 from scipy.interpolate import BPoly
 
 from jaxcam import Settings
-from jaxcam.hybrid._advance import Plan
-from jaxcam.hybrid._codes import Row
-from jaxcam.hybrid._flight import earliest, judge, moves_in, Verdict
-from jaxcam.hybrid._functions import Functions
-from jaxcam.hybrid._gap_polynomial import (
+from jaxcam.hybrid.batch._refilled_lanes import costly_first
+from jaxcam.hybrid.codes import Row
+from jaxcam.hybrid.loop._advance import Plan
+from jaxcam.hybrid.loop._flight import earliest, judge, moves_in, Verdict
+from jaxcam.hybrid.loop._functions import Functions
+from jaxcam.hybrid.loop._gap_polynomial import (
     Bernstein,
     bernstein,
     crossing,
@@ -34,16 +35,15 @@ from jaxcam.hybrid._gap_polynomial import (
     time_to_release,
     time_to_root,
 )
-from jaxcam.hybrid._jaxprs import calls_library
-from jaxcam.hybrid._lane import first_lane
-from jaxcam.hybrid._loop import iterate
-from jaxcam.hybrid._materialise import without_library
-from jaxcam.hybrid._normal import _solve_masked
-from jaxcam.hybrid._packing import pack
-from jaxcam.hybrid._refilled_lanes import costly_first
-from jaxcam.hybrid._release import judge_contact
-from jaxcam.hybrid._runge_kutta import step, tableau_of
-from jaxcam.hybrid._sincos import sincos
+from jaxcam.hybrid.loop._iterate import iterate
+from jaxcam.hybrid.loop._loop_state import first_state
+from jaxcam.hybrid.loop._release import judge_contact
+from jaxcam.hybrid.lowering._jaxprs import calls_library
+from jaxcam.hybrid.lowering._materialise import without_library
+from jaxcam.hybrid.lowering._packing import pack
+from jaxcam.hybrid.lowering._sincos import sincos
+from jaxcam.hybrid.runge_kutta import step, tableau_of
+from jaxcam.hybrid.surface._normal import _solve_masked
 from jaxcam.models import BouncingBall
 
 
@@ -193,6 +193,13 @@ def test_no_release_while_the_pressure_grows():
     assert time_to_release(*ends, jnp.asarray(2.0)) == np.inf
 
 
+def test_no_release_ahead_where_the_pressure_turns_back():
+    """-1 + 0.1 t - 0.15 t^2 comes no nearer to zero than -0.98."""
+    h, pressure = 0.4, Polynomial([-1.0, 0.1, -0.15])
+    ends = [jet(0, 0, pressure(s), pressure.deriv()(s)) for s in (-h, 0.0)]
+    assert time_to_release(*ends, jnp.asarray(1 / h)) == np.inf
+
+
 @pytest.mark.parametrize("g", [1e-2, -1e-2, 1e-3])
 def test_time_to_root_errs_by_the_fifth_power(g):
     cubic = Polynomial([g, -1.0, 0.4, -0.25])
@@ -207,7 +214,7 @@ H, ROOM = jnp.asarray(0.1), jnp.asarray(np.inf)
 
 def flight(path, h=0.1, room=np.inf) -> Verdict:
     ends = jet_of(path, 0.0), jet_of(path, h)
-    rest = (1e-12, 1e-15, 1.0, room)
+    rest = (1e-12, 1e-15, 1.0, room, h)
     return judge(*ends, *(jnp.asarray(float(v)) for v in (h, *rest)))
 
 
@@ -243,9 +250,18 @@ def test_a_dip_between_positive_ends_is_retaken_to_its_bottom():
 
 def test_a_gap_that_no_polynomial_follows_is_halved():
     ends = jet(0.01, 0.0, 0.0, 0.0), jet(0.01, 0.0, 0.0, 6000.0)
-    rest = (jnp.asarray(v) for v in (0.1, 1e-12, 1e-15, 0.01, np.inf))
+    rest = (jnp.asarray(v) for v in (0.1, 1e-12, 1e-15, 0.01, np.inf, 0.1))
     verdict = judge(*ends, *rest)
     assert verdict.retake and float(verdict.length) == pytest.approx(0.05)
+
+
+def test_rounding_of_a_gap_that_has_been_closed_so_far_is_no_dip():
+    """An attempt without length, where another constraint is hit: 2e-16 is no gap."""
+    left, right = jet(0.0, 0.087, -1.4, 0.2), jet(-2.2e-16, 0.087, -1.4, 0.2)
+    # largest gap so far 1.6e-16, of positions known to 2e-15
+    rest = (jnp.asarray(v) for v in (0.0, 2e-15, 4e-15, 1.6e-16, np.inf, 0.1))
+    verdict = judge(left, right, *rest)
+    assert not verdict.retake and not verdict.lands
 
 
 @pytest.mark.parametrize(
@@ -264,7 +280,8 @@ def test_moves_in(gap, velocity, acceleration, wanted):
     one = jet(gap, velocity, acceleration, 0.0)
     assert bool(moves_in(one, jnp.asarray(1e-15))) == wanted
     if gap == 0.0:
-        at_once = judge(one, one, *map(jnp.asarray, (0.0, 1e-12, 1e-15, 1.0, np.inf)))
+        rest = map(jnp.asarray, (0.0, 1e-12, 1e-15, 1.0, np.inf, 0.1))
+        at_once = judge(one, one, *rest)
         assert bool(at_once.lands) == wanted and at_once.offset == 0.0
 
 
@@ -284,11 +301,14 @@ def test_the_earliest_of_several():
     assert best.retake and not best.lands and best.length == 0.5
 
 
-def contact(a0, s0, a1, s1, *, h=0.1, room=np.inf, completing=False) -> Verdict:
+def contact(
+    a0, s0, a1, s1, *, h=0.1, room=np.inf, completing=False, locating=False
+) -> Verdict:
     """Verdict on pressures `a` at the ends of a step and their rates per step `s`."""
     ends = (jet(0, 0, a, s / h if h else s) for a, s in ((a0, s0), (a1, s1)))
     rest = map(jnp.asarray, (h, 1.0, 1e-15, room))
-    return judge_contact(*ends, *rest, jnp.asarray(completing))
+    flags = jnp.asarray(completing), jnp.asarray(locating)
+    return judge_contact(*ends, *rest, *flags)
 
 
 def test_contact_that_presses_goes_on():
@@ -352,7 +372,7 @@ def test_an_impact_beyond_the_end_is_left_out(room, kind):
 
     @jax.jit
     def attempt(t1):
-        lane = first_lane(functions, t0, (jnp.asarray(1.0), jnp.asarray(0.0)), t1)
+        lane = first_state(functions, t0, (jnp.asarray(1.0), jnp.asarray(0.0)), t1)
         lane = lane._replace(step=jnp.asarray(length), longest=jnp.asarray(1.0))
         return iterate(functions, Plan.of(ball, Settings(), t0, t1), lane)[1]
 

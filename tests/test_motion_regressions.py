@@ -9,7 +9,7 @@ from jax import monitoring
 
 import jaxcam
 from jaxcam.hybrid import contact_state, HybridSystem, stroboscope
-from jaxcam.hybrid._scalarise import scalarise, split
+from jaxcam.hybrid.lowering._scalarise import scalarise, split
 from jaxcam.models import (
     BouncingBall,
     CamFollower,

@@ -23,7 +23,8 @@ from jaxcam.hybrid import (
 from jaxcam.models import BouncingBall
 from jaxcam.plotting._curve import curve
 from jaxcam.plotting._prefix import scaled
-from jaxcam.recordings import Comparison, Recording, Residuals
+from jaxcam.recordings import Recording, Residuals
+from jaxcam.recordings.against_model import Comparison
 
 
 pytestmark = pytest.mark.filterwarnings("error")

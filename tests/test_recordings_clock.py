@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from jaxcam.recordings import Recording
-from jaxcam.recordings._clock import unrounded
-from jaxcam.recordings._mend import mend
+from jaxcam.recordings.files._clock import unrounded
+from jaxcam.recordings.files._mend import mend
 
 
 @pytest.mark.parametrize(

@@ -13,17 +13,17 @@ from jaxcam.data import DEMO_RIG
 from jaxcam.data.make_demo import DEMO_SENSORS, RealRig, recording_text, simulate_rig
 from jaxcam.recordings import (
     compare,
-    compare_case,
     merge,
     read_case,
     read_recording,
-    read_recordings,
     read_rig,
     Recording,
     RecordingError,
     segment,
     segment_case,
 )
+from jaxcam.recordings.against_model import compare_case
+from jaxcam.recordings.files import read_recordings
 
 
 SHARED = Path(__file__).parents[2] / "shared" / "recordings"

@@ -9,10 +9,10 @@ import pytest
 from jaxcam.data import DEMO_RIG
 from jaxcam.models import float_speed
 from jaxcam.recordings import read_rig
-from jaxcam.recordings._cut import settling_time
-from jaxcam.recordings._hidden_hops import before_release, hop_phases, sure_contact
-from jaxcam.recordings._record_ends import settled_alike
-from jaxcam.recordings._segments import Boundary, Contact, Flight
+from jaxcam.recordings.cut._cut import settling_time
+from jaxcam.recordings.cut._hidden_hops import before_release, hop_phases, sure_contact
+from jaxcam.recordings.cut._record_ends import settled_alike
+from jaxcam.recordings.cut._segments import Boundary, Contact, Flight
 
 
 @pytest.fixture(scope="module")

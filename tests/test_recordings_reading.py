@@ -9,12 +9,8 @@ import numpy as np
 import pytest
 
 from jaxcam.data import DEMO_RIG
-from jaxcam.recordings import (
-    read_case,
-    read_recording,
-    read_recordings,
-    RecordingError,
-)
+from jaxcam.recordings import read_case, read_recording, RecordingError
+from jaxcam.recordings.files import read_recordings
 
 
 SPEED = 150.0 * math.pi / 30

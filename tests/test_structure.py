@@ -1,6 +1,7 @@
 """Arrows between the rooms point down, file by file, and no module is too long."""
 
 import ast
+import graphlib
 from pathlib import Path
 
 import pytest
@@ -8,6 +9,7 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 FLOOR = {
+    "parameters": set(),
     "hybrid": set(),
     "filippov": {"hybrid"},
     "models": {"hybrid", "filippov"},
@@ -20,10 +22,13 @@ FLOOR = {
     "sweeps": {"hybrid", "models", "variational"},
     "discrepancy": {"hybrid", "models", "recordings", "fitting", "variational"},
 }
-#: what may be imported from everywhere below, and from nowhere above
+#: the rooms above all of these, of which `thesis` draws its figures with `plotting`
 _LAST = {"thesis", "plotting", "cli", "data"}
 #: what names everything
 _DOORS = {"", "_citation", "__main__"}
+
+
+ROOMS = [*FLOOR, *sorted(_LAST)]
 
 
 def _room(module: str) -> str:
@@ -61,7 +66,7 @@ def test_arrows_point_down(room):
             if module.split(".")[0] not in ("jaxcam", "variational", "continuation"):
                 continue
             seen = _room(module)
-            allowed = FLOOR[room] | _DOORS | {room}
+            allowed = FLOOR[room] | _DOORS | {room, "parameters"}
             assert seen in allowed, f"{file.relative_to(ROOT)} imports {module}"
 
 
@@ -70,8 +75,56 @@ def test_nobody_below_imports_the_command_line(room):
     for file in _files(room):
         rooms = {_room(m) for m in _imports(file) if m.startswith("jaxcam")}
         assert "cli" not in rooms, file
-        if room != "plotting":
+        if room not in ("plotting", "thesis"):
             assert "plotting" not in rooms, file
+
+
+def test_the_command_line_asks_the_thesis_by_its_public_names():
+    """No file of `cli` looks behind `jaxcam.thesis`, to a module or a private name."""
+    asked = set()
+    for file in _files("cli"):
+        for module in _imports(file):
+            assert not module.startswith("jaxcam.thesis."), f"{file} imports {module}"
+        for node in ast.walk(ast.parse(file.read_text())):
+            if isinstance(node, ast.ImportFrom) and node.module == "thesis":
+                asked |= {one.name for one in node.names}
+    assert asked == {"reproduce", "TARGETS"}
+
+
+def test_a_target_of_the_thesis_is_one_file_in_the_folder_of_its_chapter():
+    """And every such file is a target, by the name of the file."""
+    from jaxcam.thesis import TARGETS
+
+    files = [f for f in _files("thesis") if f.stem.startswith(("table_", "figure_"))]
+    names = set()
+    for file in files:
+        kind, chapter, number = file.stem.split("_")
+        assert file.parent.name.startswith(f"chapter_{chapter}_"), file
+        names.add(f"{kind}-{chapter}.{number}")
+    assert len(names) == len(files) and names == set(TARGETS)
+
+
+def _private_imports():
+    """Imports of private modules, or private names, by files that are not inside."""
+    for file in (f for room in ROOMS for f in _files(room)):
+        package = file.relative_to(ROOT).parts[:-1]
+        for node in ast.walk(ast.parse(file.read_text())):
+            if not isinstance(node, ast.ImportFrom):
+                continue
+            base = package[: len(package) - node.level + 1] if node.level else ()
+            path = [*base, *(node.module or "").split(".")]
+            if path[0] not in ("jaxcam", "variational", "continuation"):
+                continue
+            hidden = [k for k, name in enumerate(path) if name.startswith("_")]
+            inside = not hidden or package[: hidden[0]] == tuple(path[: hidden[0]])
+            names = [n.name for n in node.names if n.name.startswith("_")]
+            if not inside or (names and node.module):
+                yield f"{file.relative_to(ROOT)} imports {'.'.join(path)}: {names}"
+
+
+def test_rooms_meet_at_their_public_names():
+    """A private module is imported by files of its own folder, and of those inside."""
+    assert not list(_private_imports())
 
 
 def test_every_room_has_its_place():
@@ -86,3 +139,47 @@ def test_modules_can_be_read_at_one_go():
     for folder in ("jaxcam", "variational", "continuation"):
         for file in (ROOT / folder).rglob("*.py"):
             assert len(file.read_text().splitlines()) <= 360, file
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_functions_fit_on_a_screen_or_two(room):
+    """At most 100 lines, signature and docstring included."""
+    for file in _files(room):
+        for node in ast.walk(ast.parse(file.read_text())):
+            if isinstance(node, ast.FunctionDef):
+                length = (node.end_lineno or 0) - node.lineno + 1
+                assert length <= 100, f"{file}: {node.name} has {length} lines"
+
+
+def _file_of(module: str) -> Path | None:
+    path = ROOT / module.replace(".", "/")
+    files = path.with_suffix(".py"), path / "__init__.py"
+    return next((f for f in files if f.exists()), None)
+
+
+def _needs(file: Path) -> set[Path]:
+    """The files that a file imports, its own package's door excepted."""
+    found = set()
+    package = file.relative_to(ROOT).parts[:-1]
+    for node in ast.walk(ast.parse(file.read_text())):
+        if not isinstance(node, ast.ImportFrom):
+            continue
+        base = package[: len(package) - node.level + 1] if node.level else ()
+        module = ".".join([*base, *filter(None, [node.module])])
+        for name in node.names:
+            found.add(_file_of(f"{module}.{name.name}") or _file_of(module))
+    return found - {None, file}
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_no_file_needs_itself(room):
+    """Not by a chain of imports either, those for types alone included."""
+    graph = {file: _needs(file) for file in _files(room)}
+    order = graphlib.TopologicalSorter(
+        {file: needed & set(graph) for file, needed in graph.items()}
+    )
+    try:
+        order.prepare()
+    except graphlib.CycleError as found:
+        circle = [str(f.relative_to(ROOT)) for f in found.args[1]]
+        pytest.fail(f"a circle of imports: {circle}")

@@ -17,11 +17,11 @@ from jaxcam.sweeps import (
     match,
     Stroboscopic,
 )
-from jaxcam.sweeps._attractors import find_attractors
 from jaxcam.sweeps._basins_job import default_scale
-from jaxcam.sweeps._fingerprint import cell_codes, fingerprints
-from jaxcam.sweeps._label import names
-from jaxcam.sweeps._settle import settle
+from jaxcam.sweeps.attractors._attractors import find_attractors
+from jaxcam.sweeps.attractors._fingerprint import cell_codes, fingerprints
+from jaxcam.sweeps.attractors._label import label_names
+from jaxcam.sweeps.attractors._settle import settle
 
 
 OSCILLATOR = ImpactOscillator(omega=2.6, restitution=0.8, wall=0.0)
@@ -166,7 +166,7 @@ def test_chart_of_two_parameters():
     for (j, i), word in np.ndenumerate(found.labels[..., 0]):
         own = Stroboscopic(ImpactOscillator(omega[i], r[j], 0.0), lanes=16)
         _, labels = settle(own, np.tile([-0.66, 0.02], (16, 1)), 400, 32)
-        assert names(labels)[0] == word
+        assert label_names(labels)[0] == word
 
 
 @pytest.mark.slow
@@ -226,7 +226,7 @@ def test_printed_starts_end_where_the_thesis_says():
         where=lambda s: s.speed,
         values=rpm_to_rad_s(np.array(rpm)),
     )
-    assert names(labels).tolist() == list(words)
+    assert label_names(labels).tolist() == list(words)
 
 
 @pytest.mark.slow

@@ -5,10 +5,10 @@ import pytest
 
 import jaxcam
 from jaxcam.models import ImpactOscillator
+from jaxcam.parameters import pick
 from jaxcam.sweeps import label, periods, PoincareSection, return_times, Stroboscopic
-from jaxcam.sweeps._label import names
-from jaxcam.sweeps._pick import pick
-from jaxcam.sweeps._unique_rows import unique_rows
+from jaxcam.sweeps.attractors._label import label_names
+from jaxcam.sweeps.attractors._unique_rows import unique_rows
 
 
 OSCILLATOR = ImpactOscillator(omega=2.6, restitution=0.8, wall=0.0)
@@ -43,7 +43,7 @@ def test_a_motion_that_spirals_in_is_not_of_a_multiple_period(multiplier):
 
 
 def test_labels_of_an_oscillator(settled):
-    assert names(label(settled)).tolist() == ["P(1,1)", "P(6,6)"]
+    assert label_names(label(settled)).tolist() == ["P(1,1)", "P(6,6)"]
 
 
 def test_samples_are_those_of_a_trajectory(settled):

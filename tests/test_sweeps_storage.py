@@ -17,7 +17,7 @@ import zarr
 from sweep_maps import LOGISTIC, SQUARE_ROOT
 
 from jaxcam.sweeps import basins, diagram, Grid, load
-from jaxcam.sweeps._disk import OnDisk
+from jaxcam.sweeps.blocks._disk import OnDisk
 
 
 GRID = Grid((-2, -2), (2, 2), (24, 10))

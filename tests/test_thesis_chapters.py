@@ -7,13 +7,16 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxcam.cli._reproduce_figures import DRAWINGS
 from jaxcam.models import preset, rpm_to_rad_s
-from jaxcam.thesis import _chapter_5_diagrams, reproduce, TARGETS
-from jaxcam.thesis._chapter_2_sliding import grazing_in_closed_form, sliding_events
-from jaxcam.thesis._chapter_5_motions import CASES
-from jaxcam.thesis._frame import frame
-from jaxcam.thesis._remember import remembered
+from jaxcam.thesis import reproduce, TARGETS
+from jaxcam.thesis.chapter_2_dynamical_systems.figure_2_14 import (
+    grazing_in_closed_form,
+    sliding_events,
+)
+from jaxcam.thesis.chapter_5_bifurcations import figure_5_11
+from jaxcam.thesis.motions import MotionTarget
+from jaxcam.thesis.remember import remembered
+from jaxcam.thesis.target import frame
 
 
 @pytest.fixture(scope="module")
@@ -38,7 +41,8 @@ def test_every_figure_of_the_list_is_a_target():
     tables = {f"table-{n}" for n in ("4.4", "5.1", "5.2", "5.3")}
     tables |= {f"table-6.{k}" for k in range(1, 5)}
     assert wanted | tables <= set(TARGETS)
-    assert {name for name in TARGETS if name.startswith("figure")} == set(DRAWINGS)
+    for name, target in TARGETS.items():
+        assert (target.draw is not None) == name.startswith("figure"), name
 
 
 def test_relative_difference_is_over_what_is_printed():
@@ -66,10 +70,10 @@ def test_a_run_that_failed_is_no_end_of_sticking(monkeypatch):
     speeds = rpm_to_rad_s(np.linspace(152.6, 152.7, 6))
     labels = ["P(inf,1)", "P(inf,1)", "failed", "P(25,1)", "aperiodic", "failed"]
     made = SimpleNamespace(values=speeds, labels=np.array(labels)[:, None])
-    monkeypatch.setattr(_chapter_5_diagrams, "onset", lambda system, size: made)
+    monkeypatch.setattr(figure_5_11, "onset", lambda system, size: made)
     end = SimpleNamespace(speed=speeds[3])
-    monkeypatch.setattr(_chapter_5_diagrams, "interruption", lambda system: end)
-    table = _chapter_5_diagrams.figure_5_11(None, "default")  # pyright: ignore
+    monkeypatch.setattr(figure_5_11, "interruption", lambda system: end)
+    table = figure_5_11.TARGET.table(None, "default")  # pyright: ignore
     computed = table.set_index("quantity")["computed"]
     assert computed["first speed without P(inf,1)"] == pytest.approx(152.66)
     assert computed["part of the speeds behind it that repeat"] == 0.5
@@ -79,7 +83,11 @@ def test_a_run_that_failed_is_no_end_of_sticking(monkeypatch):
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "target",
-    [name for name in CASES if name.startswith("figure-5")],
+    [
+        name
+        for name, target in TARGETS.items()
+        if isinstance(target, MotionTarget) and name.startswith("figure-5")
+    ],
 )
 def test_motions_are_what_the_thesis_names(target, calibrated):
     """Turns, impacts and rests of each; chaos at 154.1 rpm may be one of its windows.

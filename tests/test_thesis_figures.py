@@ -5,9 +5,8 @@ import pytest
 from typer.testing import CliRunner
 
 from jaxcam.cli import app
-from jaxcam.cli._reproduce_figures import DRAWINGS
 from jaxcam.models import preset
-from jaxcam.thesis import reproduce, TARGETS
+from jaxcam.thesis import reproduce
 
 
 @pytest.fixture(scope="module")
@@ -83,8 +82,7 @@ def test_orbit_of_figures_3_8_and_3_11(calibrated):
     assert 151.8 < branch["first flip"] < 151.9
 
 
-def test_every_drawing_is_a_target_and_is_written(tmp_path):
-    assert set(DRAWINGS) <= set(TARGETS)
+def test_a_drawing_is_written(tmp_path):
     command = ["reproduce", "figure-2.7", "--out", str(tmp_path)]
     found = CliRunner().invoke(app, command)
     assert found.exit_code == 0, found.output

@@ -10,9 +10,9 @@ from scipy.optimize import fsolve
 
 from jaxcam.hybrid import flow, release_point
 from jaxcam.models import preset, rad_s_to_rpm, rpm_to_rad_s
-from jaxcam.thesis import reproduce, table_4_4, table_5_2
-from jaxcam.thesis._orbits import at_speed
+from jaxcam.thesis import reproduce
 from jaxcam.thesis.make_calibrated import fit_rig, free, Observed, restitution_law
+from jaxcam.thesis.speeds import at_rpm
 
 
 @pytest.fixture(scope="module")
@@ -22,11 +22,13 @@ def calibrated():
 
 @pytest.fixture(scope="module")
 def multipliers(calibrated):
-    return table_5_2(calibrated).set_index("quantity")
+    return reproduce("table-5.2", calibrated).set_index("quantity")
 
 
 def test_table_4_4_is_the_default():
-    assert np.max(np.abs(table_4_4(preset("table-4.4"))["difference"])) == 0
+    assert (
+        np.max(np.abs(reproduce("table-4.4", preset("table-4.4"))["difference"])) == 0
+    )
 
 
 def test_restitution_lies_on_a_line():
@@ -128,7 +130,7 @@ def test_multipliers_by_another_integrator(calibrated, multipliers):
 @eqx.filter_jit
 def _lasts(system, rpm):
     """Whether the follower is in contact again one turn after its release."""
-    moved = at_speed(system, rpm)
+    moved = at_rpm(system, rpm)
     start = release_point(moved, 0.0)
     end = start.time + (1 - 1e-10) * moved.period
     arrival = flow(moved, start.state, start.time, end)
@@ -164,7 +166,9 @@ def test_interruption_of_chattering_comes_out(calibrated):
     assert low > 152.5 and high < 152.9
 
 
-def test_unknown_target_is_refused(calibrated):
+def test_unknown_target_or_size_is_refused(calibrated):
     with pytest.raises(ValueError, match="table-5.2"):
         reproduce("table-9.9", calibrated)
+    with pytest.raises(ValueError, match="default or full"):
+        reproduce("table-4.4", calibrated, "fine")
     assert rad_s_to_rpm(rpm_to_rad_s(1.0)) == pytest.approx(1.0)

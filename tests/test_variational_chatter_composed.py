@@ -16,13 +16,8 @@ import pytest
 import jaxcam
 from jaxcam.hybrid import Settings
 from jaxcam.models import ImpactOscillator
-from variational import (
-    chatter_interruption,
-    composed_map,
-    lambda_inverse,
-    scaling_law,
-    simulated_by_parameter,
-)
+from variational import chatter_interruption, composed_map, lambda_inverse, scaling_law
+from variational.chatter import simulated_by_parameter
 
 
 # compiling takes most of the time

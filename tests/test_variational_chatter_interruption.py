@@ -23,13 +23,13 @@ from jaxcam.models import (
 from variational import (
     adding_thresholds,
     chatter_accumulation,
+    chatter_frame,
     chatter_interruption,
     impact_jacobian,
     impact_map,
     scaling_law,
 )
-from variational._chatter_frame import chatter_frame
-from variational._interruption_margin import interruption_margin
+from variational.chatter import interruption_margin
 
 
 def omega(system):

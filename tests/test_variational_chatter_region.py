@@ -15,8 +15,8 @@ from variational import (
     grazing_manifold,
     Reversed,
     scaling_law,
-    surface_state,
 )
+from variational.chatter import surface_state
 
 
 W, R = 0.6, 0.5

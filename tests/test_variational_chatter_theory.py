@@ -6,10 +6,10 @@ import mpmath
 import numpy as np
 import pytest
 
+from jaxcam.hybrid import HybridSystem
 from jaxcam.models import TripleIntegrator
 from variational import (
     beta_map,
-    beta_parts,
     chatter_interruption,
     hop_ratio,
     koenigs,
@@ -17,6 +17,7 @@ from variational import (
     lambda_map,
     scaling_law,
 )
+from variational.chatter import beta_parts, next_impact
 
 
 RESTITUTIONS = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95]
@@ -64,6 +65,37 @@ def test_lambda_map_is_one_flight_of_the_triple_integrator(r):
         assert abs(float(hop_ratio(lam)) - ratio) < close
         assert abs(float(lambda_map(lam, r)) / after - 1) < 100 * close
     assert np.isnan(float(lambda_map(0.376, r)))
+
+
+class Rising(HybridSystem):
+    """x'' = t - 1 above a wall at zero: a flight whose pull turns into a push."""
+
+    def vector_field(self, t, state):
+        return jnp.stack([state[1], t - 1.0])
+
+    def gap(self, t, state):
+        return state[0]
+
+    def impact(self, t, state):
+        return jnp.stack([state[0], -0.5 * state[1]])
+
+
+def test_flights_that_almost_miss_the_wall_are_seen_to_hit_it():
+    """For a speed below 3/8 the wall is met, at 3/8 grazed: then the gap is negative
+    for a moment only. Time of impact against the root of the cubic."""
+    found = jax.jit(
+        jax.vmap(lambda v: next_impact(Rising(), 0.0, v * jnp.eye(2)[1], v, 20.0))
+    )
+    missing = np.concatenate([np.logspace(-9, -0.5, 60), np.linspace(0.3, 0.99, 40)])
+    speeds = 0.375 * (1 - missing)
+    points = found(jnp.asarray(speeds))
+    assert np.all(points.found)
+    for v, time in zip(speeds, np.asarray(points.time), strict=True):
+        with mpmath.workdps(40):
+            exact = float(flight(mpmath.mpf(float(v)), mpmath.mpf(-1))[0])
+        # near the graze rounding moves the root by about its square root
+        assert abs(time - exact) < 1e-13 / abs(1 - v / 0.375) ** 0.5 + 1e-14
+    assert not np.any(found(jnp.asarray([0.3751, 0.4])).found)
 
 
 @pytest.mark.parametrize("r", [0.2, 0.6, 0.9])

@@ -77,6 +77,7 @@ def test_trace_and_determinant_of_one_impact_orbits(omega, r, n):
                 system, [wall, -r * speed], period, phase / omega
             )
             assert [e.kind for e in orbit.signature] == ["impact"]
+            assert abs(float(orbit.impacts.before[0, 1]) - speed) < 1e-11
             assert ("unstable" in str(orbit)) == (not orbit.stable)
             matrix = variational.monodromy(system, orbit)
             size = 1 + abs(trace)

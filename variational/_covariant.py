@@ -8,7 +8,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from jaxcam.hybrid import flow, HybridSystem, Settings
-from jaxcam.hybrid._system import with_array_parameters
+from jaxcam.parameters import as_arrays
 
 from ._tangent_lanes import orthonormal
 
@@ -82,13 +82,13 @@ def covariant_vectors(
         raise ValueError(
             f"turns is {turns} and transient {transient}; give 1 or more of each"
         )
-    system = with_array_parameters(system)
+    system = as_arrays(system)
     settings = Settings(tolerance=1e-12) if settings is None else settings
     return _vectors(
         system,
         jnp.asarray(state, jnp.float64),
         jnp.asarray(t0, jnp.float64),
-        with_array_parameters(settings),
+        as_arrays(settings),
         turns,
         transient,
     )

@@ -3,10 +3,11 @@
 from collections.abc import Callable
 from typing import NamedTuple
 
-import diffrax
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
+
+from jaxcam.hybrid.runge_kutta import adaptive_steps, DOPRI8
 
 
 # of the end state and of the entries of the matrix, relative and absolute
@@ -30,37 +31,17 @@ def fly(field: Callable, parameters: Float[Array, " q"], t0, x, t1) -> Flight:
     **Arguments:** `field(parameters, t, x)`, smooth on the way: no event is looked for.
     """
     n, q = x.shape[0], parameters.shape[0]
-    length = t1 - t0
 
-    def rates(share, y, args):
-        del args
-        state, matrix, _ = y
-        t = t0 + share * length
-        rate = field(parameters, t, state)
+    def rates(t, y):
+        state, matrix = y[:n], y[n:-1].reshape(n, n + q)
         by_state = jax.jacfwd(lambda s: field(parameters, t, s))(state)
-        forced = jnp.zeros((n, n + q))
+        change = by_state @ matrix
         if q:
             by_parameter = jax.jacfwd(lambda p: field(p, t, state))(parameters)
-            forced = forced.at[:, n:].set(by_parameter)
-        return (
-            length * rate,
-            length * (by_state @ matrix + forced),
-            length * jnp.trace(by_state),
-        )
+            change = change.at[:, n:].add(by_parameter)
+        rate, volume = field(parameters, t, state), jnp.trace(by_state)
+        return jnp.concatenate([rate, change.ravel(), volume[None]])
 
-    solution = diffrax.diffeqsolve(
-        diffrax.ODETerm(rates),
-        diffrax.Dopri8(scan_kind="lax"),
-        0.0,
-        1.0,
-        None,
-        (x, jnp.eye(n, n + q), jnp.zeros(())),
-        stepsize_controller=diffrax.PIDController(rtol=TOLERANCE, atol=TOLERANCE),
-        adjoint=diffrax.ForwardMode(),
-        throw=False,
-        max_steps=4096,
-    )
-    assert solution.ys is not None
-    done = solution.result == diffrax.RESULTS.successful
-    ends = jax.tree.map(lambda a: jnp.where(done, a[0], jnp.nan), solution.ys)
-    return Flight(*ends)
+    start = jnp.concatenate([x, jnp.eye(n, n + q).ravel(), jnp.zeros(1)])
+    end = adaptive_steps(DOPRI8, rates, t0, start, t1, TOLERANCE)
+    return Flight(end[:n], end[n:-1].reshape(n, n + q), end[-1])

@@ -12,12 +12,9 @@ from jaxcam.hybrid import (
     normal_velocity,
     Settings,
 )
-from jaxcam.hybrid._system import with_array_parameters
+from jaxcam.parameters import as_arrays
 
-from ._monodromy import Method, turn_derivative
-from ._multipliers import eigenvalues
-from ._orbit import Orbit
-from ._turn_derivative import by_product
+from .orbits import by_product, eigenvalues, Method, Orbit, turn_derivative
 
 
 class Stability(eqx.Module):
@@ -59,9 +56,7 @@ def floquet_multipliers(
     and normal velocity, whatever they were.
     """
     if method == "product":
-        return _multipliers(
-            with_array_parameters(system), orbit.state, orbit.pieces, orbit.sticks
-        )
+        return _multipliers(as_arrays(system), orbit.state, orbit.pieces, orbit.sticks)
     made = turn_derivative(system, orbit, method=method, settings=settings)
     return eigenvalues(made.state, made.determinant)
 
@@ -79,7 +74,7 @@ def stability(system: HybridSystem, orbit: Orbit) -> Stability:
     Bifurcation Theory, section 10.2) and multiplied by the impact speed, so that they
     stay bounded where an impact becomes a graze, and change sign only at a bifurcation.
     """
-    system = with_array_parameters(system)
+    system = as_arrays(system)
     made = turn_derivative(system, orbit)
     multipliers = eigenvalues(made.state, made.determinant)
     scale = impact_scale(system, orbit)

@@ -12,28 +12,27 @@ It is the zero-time discontinuity mapping of di Bernardo, Budd and Champneys (Ph
 derivative N of one period it is the local map z -> N (z + b sqrt(d)) + N_mu mu.
 """
 
-from collections.abc import Callable
-from typing import Any
-
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Complex, Float
 
-from jaxcam.hybrid import (
-    HybridSystem,
-    normal_acceleration,
-    normal_directions,
-    normal_velocity,
-    restitution_coefficients,
-    simulate,
-)
-from jaxcam.hybrid._system import with_array_parameters
+from jaxcam.hybrid import HybridSystem, normal_acceleration, simulate
+from jaxcam.hybrid.surface import normal_directions, restitution_coefficients
+from jaxcam.parameters import as_arrays, pick, Where
 
-from ._multipliers import eigenvalues
-from ._orbit import Orbit, orbit_of
-from ._turn_derivative import builder, by_product, picked
+from .orbits import (
+    builder,
+    by_product,
+    eigenvalues,
+    flight_end,
+    lowest_times,
+    Orbit,
+    orbit_of,
+    picked,
+    steps_for,
+)
 
 
 class GrazingForm(eqx.Module):
@@ -106,7 +105,7 @@ class GrazingForm(eqx.Module):
 def grazing_form(
     system: HybridSystem,
     orbit: Orbit,
-    where: Callable[[Any], Any] | None = None,
+    where: Where | None = None,
     constraint: int = 0,
 ) -> GrazingForm:
     """The square-root map of an orbit that grazes a constraint, or almost does.
@@ -120,8 +119,9 @@ def grazing_form(
 
     **Raises:** `ValueError` where the smallest gap is at an impact or in contact.
     """
-    system = with_array_parameters(system)
+    system = as_arrays(system)
     time, state = _lowest(system, orbit, constraint)
+    where = None if where is None else pick(where, system)
     values = picked(system, where)
     near = _local(system, values, where, time, state, constraint)
     at = orbit_of(system, state, orbit.period, time)
@@ -139,62 +139,32 @@ def _lowest(system, orbit: Orbit, constraint):
     """Time and state at which the gap has its smallest smooth minimum."""
     t0, t1 = float(orbit.time), float(orbit.time + orbit.period)
     turn = simulate(system, orbit.state, t0, t1, tolerance=1e-12)
-    count = int(turn.steps.count)
-    times = np.sort(np.append(np.linspace(t0, t1, 513), turn.steps.time[:count]))
-    times = np.unique(times)
-    states = turn.at(times)
-    speeds = np.asarray(_speeds(system, jnp.asarray(times), states)[:, constraint])
-    heights = np.asarray(turn.gap(times)).reshape(len(times), -1)[:, constraint]
-    jumps = np.asarray(turn.impacts.time)
-    # speed from below to above zero without an impact in between
-    turns = np.flatnonzero((speeds[:-1] < 0) & (speeds[1:] >= 0))
-    smooth = [
-        k
-        for k in turns
-        if not np.any((jumps >= times[k]) & (jumps <= times[k + 1])) and heights[k] > 0
-    ]
-    if not smooth:
+    pieces = orbit.pieces
+    flies = (pieces.end > pieces.start) & ~np.any(pieces.contact, axis=1)
+    begin, ends = pieces.start[flies], pieces.end[flies]
+    starts = np.concatenate([begin[:, None], np.asarray(turn.at(begin))], axis=1)
+    steps = steps_for(system, starts, ends)
+    found = _minima(system, starts, ends, constraint, steps)
+    times, heights, states = map(np.asarray, found)
+    heights = np.where((times < ends) & (heights > 0), heights, np.inf)
+    best = int(np.argmin(heights))
+    if not np.isfinite(heights[best]):
         raise ValueError(
             "the gap of this orbit has no smooth minimum; give an orbit that grazes, "
             "or one just short of it"
         )
-    best = min(smooth, key=lambda k: min(heights[k], heights[k + 1]))
-    low, high = times[best], times[best + 1]
-    share = -speeds[best] / (speeds[best + 1] - speeds[best])
-    start = low + share * (high - low)
-    time, state = _minimum(
-        system, jnp.asarray(start), turn.at(start[None])[0], constraint
-    )
-    return time, state
+    return jnp.asarray(times[best]), jnp.asarray(states[best])
 
 
 @eqx.filter_jit
-def _speeds(system, times, states):
-    system = system.prepared()
-    return jax.vmap(lambda t, x: normal_velocity(system, t, x))(times, states)
+def _minima(system, starts, ends, constraint, steps: int):
+    def one(start, end):
+        times, heights = lowest_times(system, start, end, steps)
+        time = times[constraint]
+        state = flight_end(system, start[0], start[1:], time, steps=steps)
+        return time, heights[constraint], state
 
-
-@eqx.filter_jit
-def _minimum(system, t, x, constraint):
-    """Newton's method for v = 0 along the flow; the state goes along."""
-    system = system.prepared()
-
-    def newton(_, carry):
-        s, y = carry
-        speed = normal_velocity(system, s, y)[constraint]
-        pulled = normal_acceleration(system, s, y)[constraint]
-        h = -speed / pulled
-
-        def field(tau, z):
-            return system.vector_field(s + tau, z)
-
-        one = field(0.0 * h, y)
-        two = field(h / 2, y + h / 2 * one)
-        three = field(h / 2, y + h / 2 * two)
-        four = field(h, y + h * three)
-        return s + h, y + h / 6 * (one + 2 * two + 2 * three + four)
-
-    return jax.lax.fori_loop(0, 6, newton, (t, x))
+    return jax.vmap(one)(jnp.asarray(starts), jnp.asarray(ends))
 
 
 @eqx.filter_jit

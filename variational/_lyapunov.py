@@ -13,9 +13,10 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from jaxcam.hybrid import HybridSystem, Settings
-from jaxcam.hybrid._codes import Row
-from jaxcam.hybrid._lane import RUNNING
-from jaxcam.hybrid._system import with_array_parameters
+from jaxcam.hybrid.checks import refuse_tracers
+from jaxcam.hybrid.codes import Row, RUNNING
+from jaxcam.hybrid.surface import check_restitution, restitutions
+from jaxcam.parameters import as_arrays, pick, real_array, Where
 
 from ._tangent_lanes import Carried, first_frames, next_rows, ROWS
 
@@ -57,7 +58,7 @@ def lyapunov_spectrum(
     t0: float = 0.0,
     transient: int = 100,
     turn: float | None = None,
-    where: Callable | None = None,
+    where: Where | None = None,
     values=None,
     settings: Settings | None = None,
     blocks: int = 16,
@@ -87,6 +88,15 @@ def lyapunov_spectrum(
 
     **Raises:** `ValueError` where shapes do not fit, or there is no period.
     """
+    refuse_tracers(
+        "lyapunov_spectrum",
+        "jax.jacfwd of jaxcam.hybrid.flow",
+        system,
+        state,
+        values,
+        t0,
+        turn,
+    )
     settings = Settings(tolerance=1e-12) if settings is None else settings
     settings.check()
     if turn is None and system.period is None:
@@ -98,14 +108,16 @@ def lyapunov_spectrum(
         )
     if (where is None) != (values is None):
         raise ValueError("give where and values together, one value for each lane")
-    system = with_array_parameters(system)
-    settings = with_array_parameters(settings)
-    state = jnp.asarray(state, dtype=jnp.float64)
+    system = as_arrays(system)
+    settings = as_arrays(settings)
+    state = real_array(state)
     single = state.ndim == 1 and values is None
     batched, shared, states = _lanes(system, state, where, values)
     length = None if turn is None else jnp.asarray(float(turn))
     begin = jnp.asarray(float(t0))
     end = jnp.asarray(float(transient + turns))
+    returned = _restitutions(batched, shared, begin, states)
+    check_restitution(system, returned[0] if single else returned)
 
     def some(batched, states):
         carry = first_frames(batched, shared, length, states, begin, end, settings)
@@ -192,7 +204,7 @@ def _summary(seen: _Seen, carry: Carried, length, transient, blocks):
         local=jnp.asarray(local),
         state=jnp.asarray(seen.states),
         turn=jnp.asarray(length),
-        code=jnp.asarray(np.array([1, 0, 2, 3])[status]),
+        code=jnp.asarray(status),
     )
 
 
@@ -210,8 +222,9 @@ def _lanes(system, state, where, values):
             f"{state.shape[0]} states and {values.shape[0]} values; give one of each "
             "for every lane"
         )
-    picked = eqx.tree_at(where, jax.tree.map(lambda _: False, system), True)
-    batched, shared = eqx.partition(eqx.tree_at(where, system, values), picked)
+    one = pick(where, system)
+    picked = one.replaced(jax.tree.map(lambda _: False, system), True)
+    batched, shared = eqx.partition(one.replaced(system, values), picked)
     return batched, shared, state
 
 
@@ -230,3 +243,13 @@ def _turn(batched, shared, length):
     if batched is None:
         return one(None)[None]
     return eqx.filter_vmap(one, in_axes=eqx.if_array(0))(batched)
+
+
+@eqx.filter_jit
+def _restitutions(batched, shared, t0, states):
+    """Coefficients of restitution, (lanes, m)."""
+
+    def one(batched, state):
+        return restitutions(eqx.combine(batched, shared), t0, state)
+
+    return eqx.filter_vmap(one, in_axes=(eqx.if_array(0), 0))(batched, states)

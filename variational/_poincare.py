@@ -2,10 +2,11 @@
 
 from collections.abc import Callable
 
-import diffrax
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
+
+from jaxcam.hybrid.runge_kutta import adaptive_steps, DOPRI8
 
 
 def poincare_derivative(
@@ -26,19 +27,10 @@ def poincare_derivative(
     """
 
     def flow(x):
-        solution = diffrax.diffeqsolve(
-            diffrax.ODETerm(lambda t, y, args: field(y)),
-            diffrax.Dopri8(),
-            0.0,
-            period,
-            None,
-            x,
-            stepsize_controller=diffrax.PIDController(rtol=tolerance, atol=tolerance),
-            adjoint=diffrax.ForwardMode(),
-            max_steps=100_000,
+        start, end = jnp.zeros(()), jnp.asarray(period, dtype=float)
+        return adaptive_steps(
+            DOPRI8, lambda _, y: field(y), start, x, end, tolerance, 100_000
         )
-        assert solution.ys is not None
-        return solution.ys[-1]
 
     monodromy = jax.jacfwd(flow)(state)
     along, normal = field(state), jax.grad(section)(state)

@@ -7,9 +7,10 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from jaxcam.hybrid import HybridSystem
-from jaxcam.hybrid._codes import Row
-from jaxcam.hybrid._functions import Functions
-from jaxcam.hybrid._runge_kutta import step, Tableau
+from jaxcam.hybrid.breakpoints import between
+from jaxcam.hybrid.codes import Row
+from jaxcam.hybrid.loop import Functions
+from jaxcam.hybrid.runge_kutta import step, Tableau
 
 from ._event_law import (
     completed_law,
@@ -55,10 +56,14 @@ def step_matrix(
     taken = row.kind != float(Row.NOTHING)
     h = jnp.where(taken, row.t - point.t, 0.0)
 
+    def inside(t):
+        # steps end at breakpoints, and see the field on one side of them
+        return t if system.breakpoints is None else between(t, point.t, row.t, h)
+
     def end(*x):
         return step(
             tableau,
-            lambda t, y: functions.field(t, y, point.contact),
+            lambda t, y: functions.field(inside(t), y, point.contact),
             point.t,
             x,
             h,

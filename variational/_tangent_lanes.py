@@ -7,11 +7,8 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from jaxcam.hybrid._advance import Plan
-from jaxcam.hybrid._codes import Row
-from jaxcam.hybrid._functions import Functions
-from jaxcam.hybrid._lane import first_lane
-from jaxcam.hybrid._run import run_raw
+from jaxcam.hybrid.codes import Row
+from jaxcam.hybrid.loop import first_state, Functions, Plan, run_raw
 
 from ._event_law import completed_law
 from ._step_matrix import LogRow, Point, step_matrix
@@ -37,7 +34,7 @@ def _plan(system, length, t0, turns, settings) -> Plan:
     end = t0 + turns * length
     # shorter in contact, where the tangent is carried along
     plan = Plan.of(system, settings, t0, end, period=length, stop_period=length)
-    return plan._replace(longest_step=length / 8)
+    return plan._replace(longest_step=jnp.minimum(plan.longest_step, length / 8))
 
 
 @eqx.filter_jit
@@ -48,7 +45,9 @@ def first_frames(batched, shared, length, states, t0, turns, settings):
         system = eqx.combine(batched, shared).prepared()
         x = tuple(state[i] for i in range(state.shape[0]))
         plan = _plan(system, length, t0, turns, settings)
-        lane = first_lane(Functions(system, len(x)), t0, x, plan.t1)
+        functions = Functions(system, len(x), settings.plain)
+        limits = plan.t1, plan.longest_step, plan.repeat
+        lane = first_state(functions, t0, x, *limits)
         lane = jax.tree.map(jnp.asarray, lane)
         point = Point(lane.t, lane.x, lane.contact)
         n = len(x)
@@ -73,7 +72,7 @@ def next_rows(batched, shared, length, t0, turns, settings, carry: Carried):
     def one(batched, carry):
         system = eqx.combine(batched, shared).prepared()
         n = len(carry.lane.x)
-        functions = Functions(system, n)
+        functions = Functions(system, n, settings.plain)
         plan = _plan(system, length, t0, turns, settings)
         lane, log = run_raw(functions, plan, carry.lane, ROWS, _row)
         kind, side, t = log[:, 0], log[:, 1].astype(jnp.int32), log[:, 2]

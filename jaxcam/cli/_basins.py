@@ -5,59 +5,26 @@ from typing import Annotated
 
 import typer
 
-from ._choices import CAM, choose, make_system, saved_name, SYSTEMS
-from ._options import (
-    Cluster,
-    JsonFile,
-    Preset,
-    Resume,
-    SavedSystem,
-    Settings,
-    Speed,
-    System,
-    Workers,
-)
+from ._basins_options import Cells
+from ._checks import check_resume
+from ._choices import CAM, system_name
+from ._grouped import grouped
+from ._options import JsonFile, Preset, Resume, SavedSystem, Settings, Speed, System
+from ._sweep import show, Where
 
 
 _FILE = "basins.zarr"
-# where something happens, for systems where nothing is said
-_BOXES = {
-    CAM: ((0.33, -3.0), (0.55, 3.0)),
-    "impact-oscillator": ((-1.0, -2.0), (0.0, 2.0)),
-}
 
 
+@grouped
 def basins(
     system: System = CAM,
-    low: Annotated[
-        str | None, typer.Option(metavar="A,B", help="Lowest state of the grid.")
-    ] = None,
-    high: Annotated[
-        str | None, typer.Option(metavar="A,B", help="Highest state of the grid.")
-    ] = None,
-    shape: Annotated[
-        str, typer.Option(metavar="K,L", help="Cells along each component.")
-    ] = "128,128",
-    turns: Annotated[
-        int, typer.Option(metavar="N", help="Forcing periods of each motion.")
-    ] = 100,
-    keep: Annotated[
-        int, typer.Option(metavar="N", help="Of these, the last N are compared.")
-    ] = 24,
-    reruns: Annotated[
-        int,
-        typer.Option(
-            metavar="N",
-            help="How often motions that do not repeat yet go on, each time for twice "
-            "as many turns.",
-        ),
-    ] = 1,
+    cells: Cells = Cells(),
     speed: Speed = None,
     saved: SavedSystem = None,
     preset: Preset = None,
     set_: Settings = None,
-    workers: Workers = None,
-    cluster: Cluster = None,
+    where: Where = Where(),
     json_file: JsonFile = None,
     out: Annotated[
         Path | None,
@@ -74,59 +41,33 @@ def basins(
       jaxcam basins --speed 152.3 --low 0.33,0 --high 0.45,2 --shape 256,256
       jaxcam basins impact-oscillator --set omega=2.6 --turns 500 --reruns 4
     """
-    if saved is not None:
-        system = saved_name(saved)
-    choose("SYSTEM", system, SYSTEMS)
-
-    from ._sweep import at_least, check_cluster, check_size, numbers, running, show
-
-    box = _BOXES.get(system)
-    if box is None and (low is None or high is None):
-        raise ValueError(
-            f"{system} needs the corners of the grid: --low A,B --high A,B."
-        )
-    corners = [
-        numbers(option, text, "0.34,-2") if text is not None else default
-        for option, text, default in zip(
-            ("--low", "--high"), (low, high), box or ((), ()), strict=True
-        )
-    ]
-    cells = numbers("--shape", shape, "128,128")
-    if any(cell != int(cell) for cell in cells):
-        raise ValueError(f"--shape is {shape!r}; give whole numbers.")
-    at_least("--keep", keep, 2)
-    at_least("--turns", turns, keep)
-    at_least("--reruns", reruns, 0)
-    at_least("--workers", workers, 1)
-    check_size("--shape and --keep", *(max(1, int(k)) for k in cells), keep)
-    check_cluster(cluster)
-    if resume and out is None:
-        raise ValueError("--resume needs the folder of the interrupted run: --out DIR.")
+    system = system_name(system, saved)
+    cells.check(system)
+    where.check()
+    check_resume(resume, out)
 
     from .. import sweeps
     from ._cache import keep_compiled_programs
     from ._output import Output
-    from ._parameters import parameters, set_parameters
-    from ._progress import progress
+    from ._parameters import make_model, parameters
+    from ._progress import COMPILING, progress
 
     keep_compiled_programs()
-    grid = sweeps.Grid(corners[0], corners[1], tuple(map(int, cells)))
-    model = set_parameters(make_system(system, preset, speed, saved), set_ or ())
+    low, high = cells.corners(system)
+    grid = sweeps.Grid(low, high, cells.counts)
+    model = make_model(system, preset, speed, saved, set_)
     output = Output(json_file, out)
-    with (
-        running(cluster, workers) as where,
-        progress("compiling (the first run of a system takes longest)") as report,
-    ):
+    with where.running() as running, progress(COMPILING) as report:
         made = sweeps.basins(
             model,
             grid,
-            turns,
-            keep=keep,
-            reruns=reruns,
+            cells.turns,
+            keep=cells.keep,
+            reruns=cells.reruns,
             out=None if out is None else out / _FILE,
             resume=resume,
             progress=show(report),
-            **where,
+            **running,
         )
         figures = []
         drawable = len(grid.shape) == 2 and min(grid.shape) > 1
@@ -135,35 +76,22 @@ def basins(
             figures = [_draw(made, out)]
     shares = made.shares
     output.print(_table(shares))
-    entropy = None
-    if min(k for k in grid.shape if k > 1 or max(grid.shape) == 1) >= 5:
-        entropy = sweeps.basin_entropy(_flat(made))
     listed = ", ".join(f"{name} {share.share:.2%}" for name, share in shares.items())
     sentence = f"{system}: of {_count(made)} states that can start, {listed}."
     output.print(sentence)
-    if figures:
-        output.print(f"Figures: {', '.join(map(str, figures))}")
-    orbits = dict(zip(made.names, made.orbits, strict=True))
+    output.print_figures(figures)
     output.write_json(
         {
             "command": "basins",
             "system": system,
             "parameters": parameters(model),
             "grid": {"low": grid.low, "high": grid.high, "shape": grid.shape},
-            "turns": turns,
-            "keep": keep,
-            "reruns": reruns,
-            "attractors": [
-                {
-                    "name": name,
-                    "share": share.share,
-                    "stderr": share.stderr,
-                    "orbit": _points(orbits.get(name)),
-                }
-                for name, share in shares.items()
-            ],
+            "turns": cells.turns,
+            "keep": cells.keep,
+            "reruns": cells.reruns,
+            "attractors": _attractors(made, shares),
             "attractor": made.attractor,
-            "entropy": None if entropy is None else entropy._asdict(),
+            "entropy": _entropy(made, grid.shape),
             "data": None if out is None else out / _FILE,
             "sentence": sentence,
             "figures": figures,
@@ -175,9 +103,27 @@ def _count(made) -> int:
     return int((made.attractor != -3).sum())
 
 
-def _flat(made):
-    """Attractors without the components that do not vary."""
-    return made.attractor.squeeze() if made.attractor.size > 1 else made.attractor
+def _entropy(made, shape) -> dict | None:
+    """Of the boundary, along the components that vary; None on a coarse grid."""
+    from ..sweeps import basin_entropy
+
+    if min(k for k in shape if k > 1 or max(shape) == 1) < 5:
+        return None
+    flat = made.attractor.squeeze() if made.attractor.size > 1 else made.attractor
+    return basin_entropy(flat)._asdict()
+
+
+def _attractors(made, shares) -> list[dict]:
+    orbits = dict(zip(made.names, made.orbits, strict=True))
+    return [
+        {
+            "name": name,
+            "share": share.share,
+            "stderr": share.stderr,
+            "orbit": _points(orbits.get(name)),
+        }
+        for name, share in shares.items()
+    ]
 
 
 def _points(orbit):

@@ -55,7 +55,7 @@ def load(file: Path) -> HybridSystem:
 
     **Raises:** `ValueError` that says what is wrong with it.
     """
-    from ..discrepancy import saved_classes
+    from ..discrepancy.terms import saved_classes
     from ..models import load_system
 
     return load_system(file, classes=saved_classes())
@@ -63,7 +63,7 @@ def load(file: Path) -> HybridSystem:
 
 def saved_name(file: Path) -> str:
     """The name of the system in a file. **Raises:** `ValueError` for another one."""
-    from ..discrepancy import WithTerms
+    from ..discrepancy.terms import WithTerms
 
     system = load(file)
     model = type(system.base if isinstance(system, WithTerms) else system).__name__
@@ -71,6 +71,11 @@ def saved_name(file: Path) -> str:
         if ready.model == model:
             return name
     raise ValueError(f"{file}: it holds a {model}, which no command line knows.")
+
+
+def system_name(name: str, saved: Path | None) -> str:
+    """The name of a ready system, or of that in a file, which goes first."""
+    return choose("SYSTEM", name if saved is None else saved_name(saved), SYSTEMS)
 
 
 def make_system(

@@ -7,7 +7,8 @@ import matplotlib
 
 from ..hybrid import Trajectory
 from ..models import rad_s_to_rpm
-from ..recordings import Comparison, Segments
+from ..recordings import Segments
+from ..recordings.against_model import Comparison
 from ._trajectory import last
 
 

@@ -21,8 +21,7 @@ def diagnose(
         ),
     ] = True,
     propose: Annotated[
-        bool,
-        typer.Option("--next", help="Which record to make next, by its speed."),
+        bool, typer.Option("--next", help="Which record to make next, by its speed.")
     ] = False,
     resume: Resume = False,
     json_file: Annotated[
@@ -32,8 +31,7 @@ def diagnose(
     out: Annotated[
         Path | None,
         typer.Option(
-            metavar="DIR",
-            help="Write verdict.json, model.json and index.html here.",
+            metavar="DIR", help="Write verdict.json, model.json and index.html here."
         ),
     ] = None,
 ) -> None:
@@ -51,18 +49,38 @@ def diagnose(
     choose("--gaps", gaps, ("mend", "refuse", "split"))
 
     from .. import discrepancy
-    from ..recordings import read_case, read_rig
     from ._cache import keep_compiled_programs
-    from ._demo import _rig_file
+    from ._case import notes_of, read
     from ._diagnose_files import write_diagnosis, write_verdict
-    from ._outlook import Outlook, terminal_table
     from ._output import Output
     from ._progress import progress
 
     keep_compiled_programs()
-    runs = read_case(case, gaps=gaps)  # pyright: ignore
-    nominal = read_rig(_rig_file(case, rig))
+    runs, nominal = read(case, rig, gaps)
     output = Output(json_file, out)
+    keep = _kept_fits(out, resume)
+    notes = notes_of(runs)
+    with progress("finding impacts and contacts") as report:
+        found = discrepancy.diagnose(
+            nominal, tuple(runs), case=runs.name, seed=seed, progress=report, keep=keep
+        )
+        figures = []
+        if out is not None:
+            report("drawing", None)
+            figures = write_diagnosis(out, found, notes)
+        outlook = _outlook(found, nominal, predict, propose, seed, report)
+        if out is not None:
+            write_verdict(out, found, figures, notes, outlook)
+    _print(output, found, notes, outlook)
+    output.write_json({**found.to_json(), **outlook.data()})
+
+
+def _kept_fits(out: Path | None, resume: bool) -> Path | None:
+    """The folder of fits that a run which is stopped leaves.
+
+    **Raises:** `ValueError` where there is nothing to go on with, or something in the
+    way.
+    """
     keep = None if out is None else out / "fits"
     if resume and (keep is None or not keep.is_dir()):
         raise ValueError(
@@ -74,42 +92,39 @@ def diagnose(
             f"{keep} holds the fits of a run that was stopped; add --resume to go on "
             f"with it, or give another folder to --out."
         )
-    notes = dict.fromkeys(n for run in runs for n in run.meta.get("notes", ()))
-    with progress("finding impacts and contacts") as report:
-        found = discrepancy.diagnose(
-            nominal,
-            tuple(runs),
-            case=runs.name,
-            seed=seed,
-            progress=report,
-            keep=keep,
+    return keep
+
+
+def _outlook(found, nominal, predict: bool, propose: bool, seed: int, report):
+    """Speeds with and without what was found, and what to record next."""
+    from .. import discrepancy
+    from ._outlook import Outlook
+
+    outlook = Outlook()
+    if predict and found.verdict != discrepancy.Verdict.UNKNOWN:
+        report("predicting with and without", None)
+        outlook = Outlook(discrepancy.predictions(found))
+    if propose:
+        proposed = discrepancy.next_experiments(
+            found, nominal, seed=seed, progress=report
         )
-        outlook, figures = Outlook(), []
-        if out is not None:
-            report("drawing", None)
-            figures = write_diagnosis(out, found, tuple(notes))
-        if predict and found.verdict != "unknown":
-            report("predicting with and without", None)
-            outlook = Outlook(discrepancy.predictions(found))
-        if propose:
-            proposed = discrepancy.next_experiments(
-                found, nominal, seed=seed, progress=report
-            )
-            outlook = dataclasses.replace(outlook, experiments=proposed)
-        if out is not None:
-            write_verdict(out, found, figures, tuple(notes), outlook)
-    for note in notes:
-        output.print(note)
-    output.print(found.summary)
-    for caveat in found.caveats:
-        output.print(caveat)
+        outlook = dataclasses.replace(outlook, experiments=proposed)
+    return outlook
+
+
+def _print(output, found, notes, outlook) -> None:
+    from ._outlook import terminal_table
+
+    caveats = (caveat.sentence for caveat in found.caveats)
+    for sentence in (*notes, found.summary, *caveats):
+        output.print(sentence)
     output.print(
         f"On records not seen: {found.heldout_before:.3e} {found.unit} before, "
         f"{found.heldout_after:.3e} after, noise {found.noise_floor:.3e}."
     )
     for table in outlook.tables():
         output.print(terminal_table(table))
-    if out is not None:
-        output.print(f"Report: {out / 'index.html'}")
-        output.print(f"Model: {out / 'model.json'}, for --system of other commands")
-    output.write_json({**found.to_json(), **outlook.data()})
+    if output.folder is not None:
+        output.print(f"Report: {output.folder / 'index.html'}")
+        model = output.folder / "model.json"
+        output.print(f"Model: {model}, for --system of other commands")

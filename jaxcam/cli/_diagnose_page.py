@@ -7,28 +7,29 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 
-from ..discrepancy import Diagnosis, Structure
-from ..discrepancy._words import listed, number
+from ..discrepancy import Diagnosis, Verdict
+from ..discrepancy.evidence import Structure
+from ..discrepancy.report import listed, number
+from ..discrepancy.terms import Variable
 from ..fitting import Residuals
 from ._outlook import Outlook
-from ._page import _figure, _split, _STYLE, _table
+from ._page import figure_html, sentences, STYLE, table_html
 
 
 matplotlib.use("Agg")
 
-from ..plotting import save_figure, style
-from ..plotting._labels import labelled
-from ..plotting._style import CONTACT, FLIGHT, IMPACT, RECORDED
+from ..plotting import labelled, save_figure, style
+from ..plotting.colours import CONTACT, FLIGHT, IMPACT, RECORDED
 
 
 _BINS = 36
 # of what shapes depend on
 _UNITS = {
-    "position": "rad",
-    "velocity": "rad/s",
-    "approach speed": "rad/s",
-    "phase": "rad",
-    "time": "s",
+    Variable.POSITION: "rad",
+    Variable.VELOCITY: "rad/s",
+    Variable.APPROACH: "rad/s",
+    Variable.PHASE: "rad",
+    Variable.TIME: "s",
 }
 
 
@@ -149,10 +150,10 @@ def _shapes(plt, found: Diagnosis):
         _band(axis, before[name], RECORDED, "textbook")
         _band(axis, after[name], IMPACT, "found")
         axis.axhline(0.0, color="k", lw=0.6)
-        one, what = before[name], name.split("_")[0]
+        one = before[name]
         axis.set_title(name.replace("_", " "), fontsize=11)
-        axis.set_xlabel(labelled(one.variable, _UNITS.get(one.variable, "-")))
-        axis.set_ylabel(labelled(what, one.unit.replace("^2", "²")))
+        axis.set_xlabel(labelled(one.variable, _UNITS[Variable(one.variable)]))
+        axis.set_ylabel(labelled(one.quantity, one.unit.replace("^2", "²")))
         axis.xaxis.label.set_size(10)
         axis.yaxis.label.set_size(10)
         axis.tick_params(labelsize=10)
@@ -174,7 +175,7 @@ def _band(axis, one: Structure, color, label) -> None:
 
 
 def _ranking(plt, found: Diagnosis):
-    pairs = found.alternatives or (("none", 0.0),)
+    pairs = [(name, delta) for name, delta, _ in found.alternatives] or [("none", 0.0)]
     figure, axis = plt.subplots(figsize=(8, 0.35 * len(pairs) + 1.0))
     names = [name.replace("_", " ").replace("+", " + ") for name, _ in pairs]
     axis.barh(names, [max(delta, 0.1) for _, delta in pairs], color=FLIGHT)
@@ -222,58 +223,66 @@ def diagnosis_page(
             one.name.replace("_", " "),
             one.where,
             f"{one.gain:.1f}",
-            f"{one.asked:.1f}",
+            f"{one.threshold:.1f}",
             "yes" if one.significant else "no",
         )
         for one in found.left_after
     ]
     parts = [
         f"<h1>{escape(title)}</h1>",
-        *(f'<p class="sentence">{escape(s)}</p>' for s in _split(found.summary)),
+        *(f'<p class="sentence">{escape(s)}</p>' for s in sentences(found.summary)),
         *(f'<p class="note">{escape(note)}</p>' for note in notes),
     ]
     if effects:
         headings = ("effect", "parameters", "where", "BIC", "unseen (nats)", "redrawn")
-        parts += ["<h2>What is missing</h2>", _table(headings, effects, text=(0, 1, 2))]
+        parts += [
+            "<h2>What is missing</h2>",
+            table_html(headings, effects, text=(0, 1, 2)),
+        ]
     parts += [
         "<h2>Before and after, on records not seen</h2>",
         f"<p>{found.heldout_before:.3e} {found.unit} before, "
         f"{found.heldout_after:.3e} after; noise and rounding of the sensor are "
         f"{found.noise_floor:.3e}.</p>",
-        *(_figure(file, caption) for file, caption in figures),
+        *(figure_html(file, caption) for file, caption in figures),
     ]
     if found.caveats:
-        items = "".join(f"<li>{escape(caveat)}</li>" for caveat in found.caveats)
+        items = "".join(
+            f"<li>{escape(caveat.sentence)}</li>" for caveat in found.caveats
+        )
         parts += ["<h2>Caveats</h2>", f"<ul>{items}</ul>"]
     for one in outlook.tables():
         parts += [
             f"<h2>{one.title}</h2>",
-            _table(one.headings, one.rows, text=(0,)),
+            table_html(one.headings, one.rows, text=(0,)),
             f'<p class="note">{one.note}</p>',
         ]
     parts += [
         "<h2>Is anything left over?</h2>",
-        _table(("form", "where", "gain", "asked", "left"), left, text=(0, 1)),
+        table_html(("form", "where", "gain", "threshold", "left"), left, text=(0, 1)),
         '<p class="note">Growth of twice the log-likelihood if the model were allowed '
         "each of these free functions, and what chance and the number of their "
         "coefficients ask for.</p>",
         "<h2>Parameters of the rig</h2>",
-        _table(("parameter", "textbook", "with what was found"), rows, text=(0,)),
+        table_html(("parameter", "textbook", "with what was found"), rows, text=(0,)),
         '<p class="note">Distance from the rig file in units of the tolerance stated '
         "there. A parameter that moves far in the first column and not in the second "
         "was hiding what is missing.</p>",
         "<h2>What would have been seen</h2>",
-        _table(("parameter", "least strength", "would hide in"), limits, text=(0, 2)),
+        table_html(
+            ("parameter", "least strength", "would hide in"), limits, text=(0, 2)
+        ),
     ]
     return (
         '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        f"<title>{escape(title)}</title>\n<style>{_STYLE}</style>\n</head>\n"
+        f"<title>{escape(title)}</title>\n<style>{STYLE}</style>\n</head>\n"
         "<body>\n" + "\n".join(parts) + "\n</body>\n</html>\n"
     )
 
 
 def _title(found: Diagnosis) -> str:
-    if found.verdict == "effect":
+    if found.verdict == Verdict.EFFECT:
         return listed(found.names)
-    return {"none": "nothing is missing", "unknown": "something unknown"}[found.verdict]
+    unknown = found.verdict == Verdict.UNKNOWN
+    return "something unknown" if unknown else "nothing is missing"

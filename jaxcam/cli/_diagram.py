@@ -1,91 +1,31 @@
 """`jaxcam diagram`: a bifurcation diagram by brute force."""
 
-import math
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from ._choices import CAM, choose, make_system, saved_name, SYSTEMS
-from ._options import (
-    Cluster,
-    Highest,
-    JsonFile,
-    Lowest,
-    Preset,
-    Resume,
-    SavedSystem,
-    Settings,
-    System,
-    Workers,
-)
+from ._axis import Axis
+from ._checks import check_resume
+from ._choices import CAM, system_name
+from ._diagram_options import Starts, Sweep
+from ._grouped import grouped
+from ._options import JsonFile, Preset, Resume, SavedSystem, Settings, System
+from ._sweep import show, Where
 
 
-DIRECTIONS = ("each", "up", "down", "both")
-SECTIONS = ("stroboscope", "impacts")
 _FILE = "diagram.zarr"
 
 
+@grouped
 def diagram(
     system: System = CAM,
-    parameter: Annotated[
-        str,
-        typer.Option(
-            metavar="NAME", help="The parameter that varies, such as speed or omega."
-        ),
-    ] = "speed",
-    low: Lowest = None,
-    high: Highest = None,
-    points: Annotated[int, typer.Option(metavar="N", help="How many values.")] = 200,
-    turns: Annotated[
-        int, typer.Option(metavar="N", help="Forcing periods at each value.")
-    ] = 300,
-    keep: Annotated[
-        int, typer.Option(metavar="N", help="Of these, the last N are drawn.")
-    ] = 100,
-    direction: Annotated[
-        str,
-        typer.Option(
-            metavar="NAME",
-            help="up, down or both ways with the state carried on, or each value from "
-            "the same start.",
-        ),
-    ] = "both",
-    dwell: Annotated[
-        str | None,
-        typer.Option(
-            metavar="A,B",
-            help="Seconds to wait and to store at each value, as a rig is driven, in "
-            "place of --turns and --keep.",
-        ),
-    ] = None,
-    section: Annotated[
-        str, typer.Option(metavar="NAME", help=f"One of {', '.join(SECTIONS)}.")
-    ] = "stroboscope",
-    state: Annotated[
-        str | None,
-        typer.Option(metavar="A,B", help="Start; without, in contact at rest."),
-    ] = None,
-    starts: Annotated[
-        int | None,
-        typer.Option(
-            metavar="N", help="Or N random starts of each value, between --low, --high."
-        ),
-    ] = None,
-    corner: Annotated[
-        str | None,
-        typer.Option("--low", metavar="A,B", help="Lowest state of random starts."),
-    ] = None,
-    opposite: Annotated[
-        str | None,
-        typer.Option("--high", metavar="A,B", help="Highest state of random starts."),
-    ] = None,
-    seed: Annotated[int, typer.Option(metavar="N", help="Of random starts.")] = 0,
+    sweep: Sweep = Sweep(),
+    starts: Starts = Starts(),
     saved: SavedSystem = None,
     preset: Preset = None,
     set_: Settings = None,
-    workers: Workers = None,
-    cluster: Cluster = None,
+    where: Where = Where(),
     json_file: JsonFile = None,
     out: Annotated[
         Path | None,
@@ -104,114 +44,59 @@ def diagram(
       jaxcam diagram --from 150 --to 154 --section impacts --direction each
       jaxcam diagram --from 120 --to 200 --direction up --dwell 60,10
     """
-    if saved is not None:
-        system = saved_name(saved)
-    choose("SYSTEM", system, SYSTEMS)
-    choose("--direction", direction, DIRECTIONS)
-    choose("--section", section, SECTIONS)
-
-    from ._continue import _bounds
-    from ._sweep import at_least, check_cluster, check_size, numbers, running, show
-
-    low, high = _bounds(low, high)
-    for option, value in (
-        ("--points", points),
-        ("--keep", keep),
-        ("--starts", starts),
-        ("--workers", workers),
-    ):
-        at_least(option, value, 1)
-    at_least("--turns", turns, keep)
-    at_least("--seed", seed, 0)
-    check_size("--points, --starts and --keep", points, starts or 1, keep)
-    check_cluster(cluster)
-    if resume and out is None:
-        raise ValueError("--resume needs the folder of the interrupted run: --out DIR.")
-    if starts is not None and (corner is None or opposite is None):
-        raise ValueError(
-            "--starts needs the box to draw them from: --low A,B --high A,B."
-        )
-    if starts is not None and state is not None:
-        raise ValueError("Give --state or --starts, not both.")
-    seconds = None if dwell is None else numbers("--dwell", dwell, "60,10")
-    if seconds is not None and len(seconds) != 2:
-        raise ValueError(
-            f"--dwell is {dwell!r}; give the seconds to wait and to store, such as "
-            "60,10."
-        )
-    given = None if state is None else numbers("--state", state, "0.4,1.8")
-    box = None
-    if starts is not None:
-        box = (
-            numbers("--low", str(corner), "0.34,-2"),
-            numbers("--high", str(opposite), "0.5,3"),
-        )
+    system = system_name(system, saved)
+    sweep.check()
+    starts.check(sweep)
+    where.check()
+    check_resume(resume, out)
+    seconds = sweep.seconds
 
     import numpy as np
 
     from .. import sweeps
     from ._cache import keep_compiled_programs
     from ._output import Output
-    from ._parameters import parameters, set_parameters
-    from ._progress import progress
+    from ._parameters import make_model, parameters
+    from ._progress import COMPILING, progress
 
     keep_compiled_programs()
-    model = set_parameters(make_system(system, preset, None, saved), set_ or ())
-    # speeds are rpm at the command line and rad/s inside
-    unit = math.pi / 30 if parameter == "speed" and system == CAM else 1.0
-    values = unit * np.linspace(low, high, points)
-    states = given
-    if box is not None:
-        each = points if direction == "each" else None
-        states = sweeps.monte_carlo(*box, starts or 1, seed, each)
-    looked = sweeps.ImpactSection(model) if section == "impacts" else model
+    model = make_model(system, preset, None, saved, set_)
+    axis = Axis.of(sweep.parameter, system)
+    states = starts.states(sweep)
+    looked = sweeps.ImpactSection(model) if sweep.section == "impacts" else model
     output = Output(json_file, out)
-    with (
-        running(cluster, workers) as where,
-        progress("compiling (the first run of a system takes longest)") as report,
-    ):
+    with where.running() as running, progress(COMPILING) as report:
         made = sweeps.diagram(
             looked,
-            parameter,
-            values,
+            sweep.parameter,
+            axis.unit * np.linspace(*sweep.bounds, sweep.points),
             states,
-            turns=turns,
-            keep=keep,
-            direction=direction,  # pyright: ignore
+            turns=sweep.turns,
+            keep=sweep.keep,
+            direction=sweep.direction,  # pyright: ignore
             dwell=seconds,  # pyright: ignore
             out=None if out is None else out / _FILE,
             resume=resume,
             progress=show(report),
-            **where,
+            **running,
         )
         figures = []
         if out is not None:
             report("drawing", None)
-            figures = [_draw(made, parameter, unit, section, out)]
+            figures = [_draw(made, axis, sweep.section, out)]
     ranges = made.ranges()
-    name = "speed in rpm" if unit != 1.0 else parameter
-    output.print(_table(ranges, name, unit))
-    # with --dwell fewer turns fit into the seconds of slow values
-    total = int(np.prod(made.states.shape[:3]))
-    if seconds is not None:
-        total = int(np.isfinite(made.states[..., 0]).sum())
-    failed = int(np.count_nonzero(made.dataset["code"].values))
-    sentence = (
-        f"{system}: {total} samples, {name} from {low:g} to {high:g}; "
-        f"{len(ranges)} ranges of labels"
-        + (f", {failed} motions failed or could not start." if failed else ".")
-    )
+    output.print(_table(ranges, axis))
+    sentence = _sentence(system, made, axis, sweep)
     output.print(sentence)
-    if figures:
-        output.print(f"Figures: {', '.join(map(str, figures))}")
+    output.print_figures(figures)
     output.write_json(
         {
             "command": "diagram",
             "system": system,
             "parameters": parameters(model),
-            "parameter": parameter,
-            "turns": turns,
-            "keep": keep,
+            "parameter": sweep.parameter,
+            "turns": sweep.turns,
+            "keep": sweep.keep,
             "dwell": seconds,
             "direction": made.direction,
             "values": made.values,
@@ -224,30 +109,43 @@ def diagram(
     )
 
 
-def _table(ranges, name: str, unit: float):
+def _sentence(system: str, made, axis: Axis, sweep: Sweep) -> str:
+    import numpy as np
+
+    # with --dwell fewer turns fit into the seconds of slow values
+    total = int(np.prod(made.states.shape[:3]))
+    if sweep.dwell is not None:
+        total = int(np.isfinite(made.states[..., 0]).sum())
+    failed = int(np.count_nonzero(made.dataset["code"].values))
+    low, high = sweep.bounds
+    return (
+        f"{system}: {total} samples, {axis.name} from {low:g} to {high:g}; "
+        f"{len(made.ranges())} ranges of labels"
+        + (f", {failed} motions failed or could not start." if failed else ".")
+    )
+
+
+def _table(ranges, axis: Axis):
     """The labels in the order in which they were met, not more than a screenful."""
     from rich.table import Table
 
-    table = Table(title=f"what motions settle on, by {name}")
+    table = Table(title=f"what motions settle on, by {axis.name}")
     for column in ("way", "from", "to", "label"):
         table.add_column(column)
     words = {0: "each", 1: "up", -1: "down"}
     for r in ranges[:40]:
         ends = (r.low, r.high) if r.direction >= 0 else (r.high, r.low)
-        cells = (f"{end / unit:.6g}" for end in ends)
+        cells = (f"{end / axis.unit:.6g}" for end in ends)
         table.add_row(words[r.direction], *cells, r.label)
     if len(ranges) > 40:
         table.add_row("...", "", "", f"{len(ranges) - 40} more")
     return table
 
 
-def _draw(made, parameter: str, unit: float, section: str, folder: Path) -> Path:
+def _draw(made, axis: Axis, section: str, folder: Path) -> Path:
     from ..plotting import save_figure, sweep_diagram
 
     figure = sweep_diagram(
-        made,
-        phase=section == "impacts",
-        x_label=("speed", "rpm") if unit != 1.0 else (parameter, "-"),
-        x_scale=1 / unit,
+        made, phase=section == "impacts", x_label=axis.label, x_scale=1 / axis.unit
     )
     return save_figure(figure, folder / "diagram.png")

@@ -10,7 +10,7 @@ from rich.table import Table
 matplotlib.use("Agg")
 
 from ..fitting import Bootstrap, Fit, Problem, residuals
-from ..plotting._style import CONTACT, FLIGHT
+from ..plotting.colours import CONTACT, FLIGHT
 
 
 def parameter_table(problem: Problem, found: Fit, again: Bootstrap | None) -> Table:

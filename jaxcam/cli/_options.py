@@ -62,8 +62,7 @@ JsonFile: TypeAlias = Annotated[
     typer.Option("--json", metavar="FILE", help="Write the result; - to print it."),
 ]
 Resume: TypeAlias = Annotated[
-    bool,
-    typer.Option("--resume", help="Go on with what a stopped run left in DIR."),
+    bool, typer.Option("--resume", help="Go on with what a stopped run left in DIR.")
 ]
 Case: TypeAlias = Annotated[
     Path,

@@ -7,7 +7,8 @@ from typing import Any, NamedTuple
 
 from rich.table import Table
 
-from ..discrepancy import Experiment, Prediction, Value
+from ..discrepancy import Experiment, Prediction
+from ..discrepancy.terms import Value
 
 
 class Rows(NamedTuple):

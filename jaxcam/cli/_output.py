@@ -3,6 +3,7 @@
 import json
 import math
 import os
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -47,6 +48,11 @@ class Output:
     def print(self, *what) -> None:
         """Tables as tables, and sentences word by word as they are."""
         self.console.print(*what, markup=False)
+
+    def print_figures(self, files: Sequence[Path]) -> None:
+        """Say where figures are, if there are any."""
+        if files:
+            self.print(f"Figures: {', '.join(map(str, files))}")
 
     def write_json(self, found: dict[str, Any]) -> None:
         """Write what was found, where `--json` says so."""

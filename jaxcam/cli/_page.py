@@ -26,7 +26,7 @@ class Report:
     next_steps: Sequence[tuple[str, str]]
 
 
-_STYLE = """
+STYLE = """
 :root { color-scheme: light dark; --ink: #1b1f24; --paper: #ffffff; --quiet: #57606a;
   --line: #d0d7de; --shade: #f3f5f7; }
 @media (prefers-color-scheme: dark) {
@@ -61,7 +61,7 @@ def _lacks(summary: str | None) -> list[str]:
         return []
     return [
         "<h2>What the model lacks</h2>",
-        *(f'<p class="sentence">{escape(s)}</p>' for s in _split(summary)),
+        *(f'<p class="sentence">{escape(s)}</p>' for s in sentences(summary)),
         '<p class="note"><a href="diagnosis/index.html">How that was found</a>: '
         "the fit before and after, what else was tried, and what could not be seen."
         "</p>",
@@ -74,8 +74,8 @@ def _branches(found: Branches | None) -> list[str]:
         return []
     return [
         "<h2>Orbits of the thesis' rig</h2>",
-        _figure(found.figure, found.caption),
-        _table(HEADINGS_OF_BRANCHES, found.rows, text=(0, 1)),
+        figure_html(found.figure, found.caption),
+        table_html(HEADINGS_OF_BRANCHES, found.rows, text=(0, 1)),
     ]
 
 
@@ -86,16 +86,16 @@ def page(report: Report) -> str:
         *_lacks(report.lacks),
         "<h2>Recording beside simulation</h2>",
         # one idea a line is easier to take in than a paragraph of numbers
-        *(f'<p class="sentence">{escape(s)}</p>' for s in _split(report.sentence)),
+        *(f'<p class="sentence">{escape(s)}</p>' for s in sentences(report.sentence)),
         *_branches(report.branches),
         "<h2>Residuals by mode</h2>",
-        _table(_MODES, [_cells(row) for row in report.comparison], text=(0, 6)),
+        table_html(_MODES, [_cells(row) for row in report.comparison], text=(0, 6)),
         '<p class="note">Each flight is started where the recording says it started, '
         "so that what is left over is what the model lacks in that mode. The ratio is "
         "what is left in units of the noise of the sensors: 1 where nothing is "
         "missing.</p>",
         "<h2>Rests of the follower on the cam</h2>",
-        _table(
+        table_html(
             HEADINGS, [row for one in report.rests for row in rest_rows(one)], (0, 1)
         ),
         '<p class="note">Simulated: the rig as its file states it, at the mean speed '
@@ -104,7 +104,7 @@ def page(report: Report) -> str:
         "nothing in common, the rig may follow another motion that exists at the same "
         "speed.</p>",
         "<h2>Figures</h2>",
-        *(_figure(file, caption) for file, caption in report.figures),
+        *(figure_html(file, caption) for file, caption in report.figures),
         "<h2>The runs</h2>",
         f"<ul>{''.join(f'<li>{escape(run)}</li>' for run in report.runs)}</ul>",
         "<h2>To go on from here</h2>",
@@ -116,7 +116,7 @@ def page(report: Report) -> str:
     return (
         '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        f"<title>{escape(report.title)}</title>\n<style>{_STYLE}</style>\n</head>\n"
+        f"<title>{escape(report.title)}</title>\n<style>{STYLE}</style>\n</head>\n"
         "<body>\n" + "\n".join(parts) + "\n</body>\n</html>\n"
     )
 
@@ -132,7 +132,7 @@ def _cells(row: Row) -> tuple[str, ...]:
     return (row.mode, *numbers, row.unit, str(row.count), place)
 
 
-def _table(
+def table_html(
     headings: Sequence[str], rows: Sequence[Sequence[str]], text: Sequence[int]
 ) -> str:
     def line(tag: str, cells: Sequence[str]) -> str:
@@ -147,7 +147,7 @@ def _table(
     return f'<div class="wide"><table>{head}<tbody>{body}</tbody></table></div>'
 
 
-def _figure(file: Path, caption: str) -> str:
+def figure_html(file: Path, caption: str) -> str:
     data = base64.b64encode(file.read_bytes()).decode("ascii")
     caption = escape(caption)
     return (
@@ -156,7 +156,7 @@ def _figure(file: Path, caption: str) -> str:
     )
 
 
-def _split(sentence: str) -> list[str]:
+def sentences(sentence: str) -> list[str]:
     """The sentences of a text, where a full stop comes before a capital letter."""
     lines, begin = [], 0
     for k in range(len(sentence) - 2):

@@ -3,6 +3,7 @@
 import math
 import re
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any
 
 import equinox as eqx
@@ -12,11 +13,26 @@ import numpy as np
 
 from ..hybrid import HybridSystem
 from ..models import CamFollower, ConstantRestitution
+from ._choices import make_system
 
 
 # in rad/s, while speeds are rpm at the command line: it has an option of its own
 _SPEED = "speed"
 _CONSTANT = "restitution.r"
+
+
+def make_model(
+    name: str,
+    preset: str | None,
+    rpm: float | None,
+    saved: Path | None,
+    assignments: Sequence[str] | None,
+) -> HybridSystem:
+    """A ready system with parameters of its own, as a command line names it.
+
+    **Raises:** `ValueError` that names the fix.
+    """
+    return set_parameters(make_system(name, preset, rpm, saved), assignments or ())
 
 
 def parameters(system: HybridSystem) -> dict[str, float]:

@@ -13,6 +13,10 @@ from rich.progress import (
 )
 
 
+#: the first words of commands that compile before they compute
+COMPILING = "compiling (the first run of a system takes longest)"
+
+
 @contextmanager
 def progress(first: str) -> Iterator[Callable[[str, float | None], None]]:
     """Yields `report(what, fraction)`; a fraction of None is a time nobody knows.

@@ -25,8 +25,7 @@ def reproduce(
         ),
     ] = None,
     preset: Annotated[
-        str,
-        typer.Option(metavar="NAME", help=f"The rig: {' or '.join(_PRESETS)}."),
+        str, typer.Option(metavar="NAME", help=f"The rig: {' or '.join(_PRESETS)}.")
     ] = _PRESETS[0],
     size: Annotated[
         str,
@@ -91,7 +90,7 @@ def _compute(names, preset, size, output, resume, several: bool) -> None:
 
     keep_compiled_programs()
     system = models.preset(preset)
-    settings = Settings.of(preset, size)  # pyright: ignore
+    settings = Settings.of(preset, size)
     out = output.folder
     if resume and out is not None:
         changed = by_other_code(out, names, settings)

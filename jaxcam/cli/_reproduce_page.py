@@ -7,7 +7,7 @@ from html import escape
 from pathlib import Path
 
 from ..thesis import TARGETS
-from ._page import _figure, _STYLE, _table
+from ._page import figure_html, STYLE, table_html
 from ._reproduce_record import Record, Settings
 
 
@@ -78,12 +78,12 @@ def _page(folder, records, settings, of) -> str:
             links = " ".join(f'<a href="#{r.name}">{r.name}</a>' for r in own)
             parts.append(f"<nav><strong>{chapter} {words}</strong><br>{links}</nav>")
     rows = [_overview(record) for record in records]
-    parts += ["<h2>Overview</h2>", _table(_OVERVIEW, rows, text=(0, 1))]
+    parts += ["<h2>Overview</h2>", table_html(_OVERVIEW, rows, text=(0, 1))]
     parts += [_section(folder, record) for record in records]
     return (
         '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        f"<title>{title}</title>\n<style>{_STYLE}{_MORE}</style>\n</head>\n"
+        f"<title>{title}</title>\n<style>{STYLE}{_MORE}</style>\n</head>\n"
         "<body>\n" + "\n".join(parts) + "\n</body>\n</html>\n"
     )
 
@@ -106,9 +106,9 @@ def _section(folder: Path, record: Record) -> str:
         parts.append(f'<p class="sentence">Failed: {escape(record.error)}</p>')
     if record.rows:
         rows = [cells(row) for row in record.table.itertuples(index=False)]
-        parts.append(_table(HEADINGS, rows, text=(0,)))
+        parts.append(table_html(HEADINGS, rows, text=(0,)))
     if record.figure:
-        parts.append(_figure(folder / f"{record.name}.png", target.title))
+        parts.append(figure_html(folder / f"{record.name}.png", target.title))
     if target.note:
         parts.append(f'<p class="note">{escape(target.note)}</p>')
     return f'<section id="{record.name}">' + "\n".join(parts) + "</section>"

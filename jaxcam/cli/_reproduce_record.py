@@ -11,7 +11,6 @@ from typing import Any
 
 from ..models import CamFollower
 from ..thesis import reproduce, TARGETS
-from ..thesis._registry import Size
 from ._output import to_text
 from ._source_mark import source_mark
 
@@ -26,12 +25,12 @@ class Settings:
 
     version: str
     preset: str
-    size: Size
+    size: str
     #: of the code that computed it; see `source_mark`
     code: str
 
     @staticmethod
-    def of(preset: str, size: Size) -> "Settings":
+    def of(preset: str, size: str) -> "Settings":
         from importlib.metadata import version
 
         return Settings(version("jaxcam"), preset, size, source_mark())
@@ -88,14 +87,12 @@ def make(
 def _draw(name: str, system, size: str, out: Path) -> bool:
     """The figure of a target, where it has one."""
     from ..plotting import save_figure, style
-    from ._reproduce_figures import DRAWINGS
 
-    if name not in DRAWINGS:
-        return False
-    sized = (size,) if TARGETS[name].sized else ()
     with style():
-        save_figure(DRAWINGS[name](system, *sized), out / f"{name}.png")
-    return True
+        figure = TARGETS[name].figure(system, size)
+        if figure is not None:
+            save_figure(figure, out / f"{name}.png")
+    return figure is not None
 
 
 def write(record: Record, out: Path | None) -> None:

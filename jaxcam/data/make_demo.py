@@ -8,7 +8,7 @@ which the textbook model lacks, a drive that wanders, and encoders with noise.
 import dataclasses
 import gzip
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -71,38 +71,77 @@ class Truth:
     contacts: tuple[tuple[float, float], ...]
 
 
-def simulate_rig(
-    rig: RealRig,
-    speed: float,
-    duration: float,
-    *,
-    settle: float = 20.0,
-    interval: float = 5e-4,
-    phase: float = 0.0,
-) -> Truth:
-    """Run the rig at `speed` (rad/s) and keep the last `duration` (s)."""
-    coefficients = rig.profile()
-    order = 1j * np.arange(len(coefficients))
-    first, second = coefficients * order, coefficients * order**2
+class _Cam:
+    """The drive, and the angle of contact over time."""
 
-    def drive(t):
-        angle, rate, change = speed * t + phase, speed, 0.0
+    def __init__(self, rig: RealRig, speed: float, phase: float):
+        self.rig, self.speed, self.phase = rig, speed, phase
+        self.coefficients = rig.profile()
+        self.order = 1j * np.arange(len(self.coefficients))
+        self.first = self.coefficients * self.order
+        self.second = self.coefficients * self.order**2
+
+    def drive(self, t):
+        """Angle of the cam, its rate and the rate of that."""
+        angle, rate, change = self.speed * t + self.phase, self.speed, 0.0
         for share, frequency in ((0.7, 0.31), (0.3, 0.87)):
-            w, a = 2 * math.pi * frequency, rig.wander * speed * share
+            w, a = 2 * math.pi * frequency, self.rig.wander * self.speed * share
             angle += a / w * math.sin(w * t)
             rate += a * math.cos(w * t)
             change -= a * w * math.sin(w * t)
         return angle, rate, change
 
-    def surface(t):
-        angle, rate, change = drive(t)
-        turn = np.exp(order * angle)
-        slope, bend = (first @ turn).real, (second @ turn).real
+    def surface(self, t):
+        """Angle, velocity and acceleration of a follower in contact."""
+        angle, rate, change = self.drive(t)
+        turn = np.exp(self.order * angle)
+        slope, bend = (self.first @ turn).real, (self.second @ turn).real
         acceleration = bend * rate**2 + slope * change
-        return float((coefficients @ turn).real), slope * rate, acceleration
+        return float((self.coefficients @ turn).real), slope * rate, acceleration
 
-    def fly(x, v, h):
-        f = rig.acceleration
+
+class _Follower:
+    """The follower as it flies, hits and rests, from a little above the cam."""
+
+    def __init__(self, rig: RealRig, cam: _Cam, interval: float):
+        self.rig, self.cam, self.interval = rig, cam, interval
+        self.t, (self.x, self.v, _) = 0.0, cam.surface(0.0)
+        self.x += 0.01
+        self.resting, self.landed = False, 0.0
+        #: of a step; the next bounce must not end inside its own first one
+        self.longest = interval
+        self.impacts: list[tuple[float, float]] = []
+        self.contacts: list[tuple[float, float]] = []
+
+    def advance(self, target: float) -> None:
+        while self.t < target:
+            h = min(target - self.t, self.longest)
+            if self.resting:
+                self._rest(h, target)
+                continue
+            ahead, later = self._fly(h)
+            if not self._inside(ahead, self.t + h):
+                self.x, self.v, self.longest = ahead, later, self.interval
+                self._step(h, target)
+                continue
+            self._hit(
+                _bisect(h, lambda part: self._inside(self._fly(part)[0], self.t + part))
+            )
+
+    def _step(self, h: float, target: float) -> None:
+        self.t = target if h == target - self.t else self.t + h
+
+    def _inside(self, x: float, t: float) -> bool:
+        return x < self.cam.surface(t)[0] - _ROUNDING
+
+    def _lifts(self, t: float) -> bool:
+        """Whether a follower that rests is pulled off the cam."""
+        x, v, a = self.cam.surface(t)
+        return self.rig.acceleration(x, v) > a
+
+    def _fly(self, h: float) -> tuple[float, float]:
+        """Angle and velocity after a flight of length h, by one Runge-Kutta step."""
+        x, v, f = self.x, self.v, self.rig.acceleration
         a1 = f(x, v)
         v2 = v + h / 2 * a1
         a2 = f(x + h / 2 * v, v2)
@@ -115,67 +154,67 @@ def simulate_rig(
             v + h / 6 * (a1 + 2 * a2 + 2 * a3 + a4),
         )
 
-    def bisect(h, crossed):
-        low, high = 0.0, h
-        for _ in range(45):
-            middle = (low + high) / 2
-            low, high = (low, middle) if crossed(middle) else (middle, high)
-        return high
+    def _rest(self, h: float, target: float) -> None:
+        if self._lifts(self.t + h):
+            self.t += _bisect(h, lambda part: self._lifts(self.t + part))
+            self.resting = False
+            self.contacts.append((self.landed, self.t))
+        else:
+            self._step(h, target)
+        self.x, self.v, _ = self.cam.surface(self.t)
 
-    def lifts(t):
-        x, v, a = surface(t)
-        return rig.acceleration(x, v) > a
+    def _hit(self, h: float) -> None:
+        """An impact after a flight of length h, or rest where bounces are short."""
+        r = self.rig.restitution
+        _, before = self._fly(h)
+        self.t += h
+        self.x, rate, acceleration = self.cam.surface(self.t)
+        approach = rate - before
+        self.v = rate + r * approach
+        self.impacts.append((self.t, approach))
+        pull = acceleration - self.rig.acceleration(self.x, self.v)
+        flight = 2 * r * approach / pull if pull > 0 else self.interval
+        # the bounces left take this long together
+        if 0 < flight < 1e-6 * (1 - r):
+            self.resting, self.landed = True, self.t
+            self.v, self.longest = rate, self.interval
+        else:
+            self.longest = min(self.interval, max(flight / 2, 1e-8))
 
-    t, (x, v, _) = 0.0, surface(0.0)
-    x += 0.01
-    resting, landed = False, 0.0
-    rows, impacts, contacts = [], [], []
+
+def _bisect(h: float, crossed: Callable[[float], bool]) -> float:
+    """Where in (0, h] something comes true, which is true at h."""
+    low, high = 0.0, h
+    for _ in range(45):
+        middle = (low + high) / 2
+        low, high = (low, middle) if crossed(middle) else (middle, high)
+    return high
+
+
+def simulate_rig(
+    rig: RealRig,
+    speed: float,
+    duration: float,
+    *,
+    settle: float = 20.0,
+    interval: float = 5e-4,
+    phase: float = 0.0,
+) -> Truth:
+    """Run the rig at `speed` (rad/s) and keep the last `duration` (s)."""
+    cam = _Cam(rig, speed, phase)
+    follower = _Follower(rig, cam, interval)
     total = round((settle + duration) / interval)
-    longest = interval
+    rows = []
     for sample in range(total):
-        rows.append((t, drive(t)[0], x, v))
-        target = (sample + 1) * interval
-        while t < target:
-            h = min(target - t, longest)
-            if resting:
-                if lifts(t + h):
-                    t += bisect(h, lambda part, t=t: lifts(t + part))
-                    resting = False
-                    contacts.append((landed, t))
-                else:
-                    t = target if h == target - t else t + h
-                x, v, _ = surface(t)
-                continue
-            ahead, later = fly(x, v, h)
-            if ahead >= surface(t + h)[0] - _ROUNDING:
-                x, v, longest = ahead, later, interval
-                t = target if h == target - t else t + h
-                continue
-
-            def hit(part, x=x, v=v, t=t):
-                return fly(x, v, part)[0] < surface(t + part)[0] - _ROUNDING
-
-            h = bisect(h, hit)
-            _, v = fly(x, v, h)
-            t += h
-            x, rate, acceleration = surface(t)
-            approach = rate - v
-            v = rate + rig.restitution * approach
-            impacts.append((t, approach))
-            pull = acceleration - rig.acceleration(x, v)
-            flight = 2 * rig.restitution * approach / pull if pull > 0 else interval
-            # the bounces left take this long together
-            if 0 < flight < 1e-6 * (1 - rig.restitution):
-                resting, landed, v, longest = True, t, rate, interval
-                continue
-            # the next bounce must not end inside its own first step
-            longest = min(interval, max(flight / 2, 1e-8))
+        t = follower.t
+        rows.append((t, cam.drive(t)[0], follower.x, follower.v))
+        follower.advance((sample + 1) * interval)
     start = total - round(duration / interval)
     time, turned, angle, velocity = np.array(rows[start:]).T
     begin = time[0]
-    hits = np.array(impacts).reshape(-1, 2)
+    hits = np.array(follower.impacts).reshape(-1, 2)
     hits = hits[hits[:, 0] >= begin]
-    kept = tuple((a - begin, b - begin) for a, b in contacts if b > begin)
+    kept = tuple((a - begin, b - begin) for a, b in follower.contacts if b > begin)
     return Truth(
         time - begin, turned, angle, velocity, hits[:, 0] - begin, hits[:, 1], kept
     )

@@ -1,8 +1,6 @@
 """What physics a model leaves out: where it acts, its name, its strength."""
 
 from ._diagnose import diagnose as diagnose
-from ._diagnosis import Diagnosis as Diagnosis, Effect as Effect, Value as Value
-from ._drive import Ripple as Ripple, ripple_of as ripple_of
 from ._event_causes import event_causes as event_causes, EventCause as EventCause
 from ._event_speeds import event_speeds as event_speeds, EventSpeeds as EventSpeeds
 from ._next_experiment import (
@@ -11,13 +9,12 @@ from ._next_experiment import (
     next_experiments as next_experiments,
 )
 from ._predictions import Prediction as Prediction, predictions as predictions
-from ._structure import Structure as Structure
-from ._term import (
-    Motion as Motion,
-    SensorTerm as SensorTerm,
-    Strength as Strength,
+from .evidence import Ripple as Ripple
+from .policy import Policy as Policy
+from .report import Diagnosis as Diagnosis, Verdict as Verdict
+from .terms import (
+    library as library,
     strength as strength,
     Term as Term,
+    Where as Where,
 )
-from ._terms import library as library, saved_classes as saved_classes
-from ._with_terms import WithTerms as WithTerms

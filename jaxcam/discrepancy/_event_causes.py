@@ -18,19 +18,8 @@ from scipy.optimize import least_squares
 
 from ..models import CamFollower
 from ._event_speeds import event_speeds, EventSpeeds
-from ._term import Term
-from ._with_terms import WithTerms
-
-
-# Strengths on the way to large ones: the first, in units of the term's size, their
-# ratio, and how many; each is found from the one before it
-_FIRST, _RATIO, _MOST = 0.1, 1.5, 24
-# The way ends where the misfit is so many times the least one on it
-_WORSE = 4.0
-# What a speed that no longer exists counts, in errors of the observation
-_ABSENT = 10.0
-# Relative step of differences, and fits at most
-_DIFFERENCE, _FITS = 1e-3, 40
+from .policy import Policy
+from .terms import Term, WithTerms
 
 
 @dataclasses.dataclass(frozen=True)
@@ -60,6 +49,8 @@ def event_causes(
     terms: Sequence[Term],
     where: Callable,
     tolerance: float,
+    *,
+    policy: Policy = Policy(),
 ) -> tuple[EventCause, ...]:
     """Rank terms by how near they bring a rig to the speeds that were observed.
 
@@ -74,6 +65,7 @@ def event_causes(
     - `terms`: candidates, of one strength each.
     - `where`, `tolerance`: a parameter of the rig that is fitted beside each term, and
         how far it may be off; `lambda rig: rig.restitution.intercept`, say.
+    - `policy`: how far strengths are searched.
 
     **Returns:** explanations, the best first; one of them is no term at all.
 
@@ -91,7 +83,7 @@ def event_causes(
                 f"The term {term.name!r} has {len(term.strengths())} strengths; only "
                 f"terms of one strength can be told apart by so few numbers."
             )
-    goal = _Goal(np.asarray(observed), np.asarray(errors), where, tolerance)
+    goal = _Goal(np.asarray(observed), np.asarray(errors), where, tolerance, policy)
     paths, here = [], None
     for term in terms or (None,):
         system = WithTerms(rig, () if term is None else (term,))
@@ -109,11 +101,14 @@ class _Goal:
     errors: Float[np.ndarray, "4"]
     where: Callable
     tolerance: float
+    policy: Policy
 
     def left(self, speeds, pull: float) -> Float[np.ndarray, " m"]:
         """What is left of each speed and of the parameter, in their errors."""
         off = ((speeds - self.observed) / self.errors)[np.isfinite(self.observed)]
-        return np.append(np.where(np.isfinite(off), off, _ABSENT), pull)
+        return np.append(
+            np.where(np.isfinite(off), off, self.policy.absent_errors), pull
+        )
 
 
 class _Path:
@@ -122,7 +117,9 @@ class _Path:
     def __init__(self, goal: _Goal, system: WithTerms, here: EventSpeeds | None):
         self.goal, self.system = goal, system
         self.nominal = float(goal.where(system.base))
-        self.here = event_speeds(self.changed(0.0, 0.0)) if here is None else here
+        if here is None:
+            here = event_speeds(self.changed(0.0, 0.0), goal.policy)
+        self.here = here
 
     def changed(self, strength: float, pull: float) -> WithTerms:
         value = jnp.asarray(self.parameter(pull))
@@ -153,9 +150,12 @@ class _Path:
 
 
 def _none(path: _Path) -> EventCause:
-    start = path.here
+    start, policy = path.here, path.goal.policy
     found = least_squares(
-        lambda x: path.left(0.0, x[0]), [0.0], diff_step=_DIFFERENCE, max_nfev=_FITS
+        lambda x: path.left(0.0, x[0]),
+        [0.0],
+        diff_step=policy.cause_difference,
+        max_nfev=policy.cause_fits,
     )
     cause = path.cause("none", 0.0, "", float(found.x[0]))
     path.here = start
@@ -174,8 +174,8 @@ def _best(path: _Path, term: Term) -> EventCause:
         lambda x: path.left(size * x[0], x[1]),
         [first / size, 0.0],
         bounds=([strength.lower / size, -np.inf], [strength.upper / size, np.inf]),
-        diff_step=_DIFFERENCE,
-        max_nfev=_FITS,
+        diff_step=path.goal.policy.cause_difference,
+        max_nfev=path.goal.policy.cause_fits,
     )
     return path.cause(
         term.name, size * float(found.x[0]), strength.unit, float(found.x[1])
@@ -184,12 +184,13 @@ def _best(path: _Path, term: Term) -> EventCause:
 
 def _along(path: _Path, size: float) -> tuple[float, float, EventSpeeds]:
     """Least misfit on the way from nothing to large strengths, and where it is."""
-    best = (math.inf, 0.0, path.here)
-    for k in range(_MOST):
-        strength = size * _FIRST * _RATIO**k
+    best, policy = (math.inf, 0.0, path.here), path.goal.policy
+    first, ratio, most = policy.cause_strengths
+    for k in range(most):
+        strength = size * first * ratio**k
         misfit = float(np.sum(path.left(strength, 0.0) ** 2))
         if misfit < best[0]:
             best = misfit, strength, path.here
-        if misfit > _WORSE * best[0]:
+        if misfit > policy.cause_worse * best[0]:
             break
     return best

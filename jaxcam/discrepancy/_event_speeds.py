@@ -12,18 +12,12 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from variational import chatter_interruption
+from variational import chatter_interruption, detachment, orbit_monodromy, orbit_where
+from variational.orbits import ImpactOrbit, one_impact_orbits, SpecialPoint
 
-from ..fitting import (
-    detachment,
-    ImpactOrbit,
-    one_impact_orbits,
-    orbit_monodromy,
-    orbit_where,
-    SpecialPoint,
-)
 from ..models import float_speed
-from ._with_terms import WithTerms
+from .policy import Policy
+from .terms import WithTerms
 
 
 #: what happens at each of the speeds, in their order
@@ -33,11 +27,6 @@ EVENTS = (
     "P(1,1) doubles its period (flip)",
     "chattering is interrupted",
 )
-# Stride of the sum of multipliers on the way along the branch
-_STRIDE = 0.1
-# Where the branch is looked for, and the interruption, as multiples of valve float
-_SEARCH = (1.18, 1.14, 1.22, 1.1, 1.26, 1.32, 1.4)
-_BRACKET = (1.1, 1.4)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -51,6 +40,7 @@ class EventSpeeds:
     lift: SpecialPoint | None
     fold: SpecialPoint | None
     flip: SpecialPoint | None
+    policy: Policy = Policy()
 
     def near(self, system: WithTerms) -> "EventSpeeds":
         """Those of a system that differs a little."""
@@ -71,31 +61,34 @@ class EventSpeeds:
             if point is not None:
                 values[k] = float(point.parameter)
         if np.isfinite(values[0]):
-            values[3] = _interruption(system, values[0])
+            values[3] = _interruption(system, values[0], self.policy)
         kept = [
             p if p is not None and np.isfinite(p.parameter) else None for p in found
         ]
-        return EventSpeeds(values, *kept)
+        return EventSpeeds(values, *kept, policy=self.policy)
 
 
-def event_speeds(system: WithTerms) -> EventSpeeds:
+def event_speeds(system: WithTerms, policy: Policy = Policy()) -> EventSpeeds:
     """Find the four speeds of a rig, at whatever speed it now turns.
 
     The base is a [`jaxcam.models.CamFollower`][]; terms must not depend on time other
-    than through the phase of the cam.
+    than through the phase of the cam. The policy says where orbits are looked for.
     """
     lift = _float_of(system)
     if lift is None:
-        return EventSpeeds(np.full(4, np.nan), None, None, None)
+        return EventSpeeds(np.full(4, np.nan), None, None, None, policy)
     speed = float(lift.parameter)
     fold = flip = None
-    for share in _SEARCH:
+    for share in policy.orbit_speeds:
         orbits = one_impact_orbits(_at(system, share * speed), lift.orbit.states[0])
         if orbits:
             start = SpecialPoint(jnp.asarray(share * speed), orbits[0])
-            fold, flip = (_towards(system, start, sign) for sign in (1.0, -1.0))
+            fold, flip = (
+                _towards(system, start, sign, policy.trace_stride)
+                for sign in (1.0, -1.0)
+            )
             break
-    return EventSpeeds(np.full(4, np.nan), lift, fold, flip).near(system)
+    return EventSpeeds(np.full(4, np.nan), lift, fold, flip, policy).near(system)
 
 
 def _speed(system):
@@ -120,7 +113,9 @@ def _float_of(system: WithTerms) -> SpecialPoint | None:
     return found if found.parameter > 0 else None
 
 
-def _towards(system, start: SpecialPoint, sign: float) -> SpecialPoint | None:
+def _towards(
+    system, start: SpecialPoint, sign: float, stride: float
+) -> SpecialPoint | None:
     """The fold (+1) or the flip (-1) of the branch through an orbit.
 
     The sum of the multipliers is monotonic along the branch, also around the fold,
@@ -130,15 +125,16 @@ def _towards(system, start: SpecialPoint, sign: float) -> SpecialPoint | None:
     matrix = np.asarray(_monodromy(moved, start.orbit))
     trace, goal = float(np.trace(matrix)), sign * (1 + float(np.linalg.det(matrix)))
     point = start
-    for value in np.linspace(trace, goal, 2 + int(abs(goal - trace) / _STRIDE))[1:]:
+    for value in np.linspace(trace, goal, 2 + int(abs(goal - trace) / stride))[1:]:
         moved = _at(system, point.parameter)
         point = _on_line(moved, point.orbit, float(value), 0.0)
     point = _on_line(_at(system, point.parameter), point.orbit, sign, sign)
     return point if np.isfinite(point.parameter) else None
 
 
-def _interruption(system, lifted: float) -> float:
-    bracket = _BRACKET[0] * lifted, _BRACKET[1] * lifted
+def _interruption(system, lifted: float, policy: Policy) -> float:
+    low, high = policy.chatter_speeds
+    bracket = low * lifted, high * lifted
     try:
         return float(chatter_interruption(system, _speed, bracket))
     except ValueError:

@@ -10,18 +10,9 @@ import numpy as np
 
 from ..fitting import Problem
 from ..recordings import record, RecordingError, Rig, segment_case, Segments, Wandering
-from ._diagnosis import Diagnosis
-from ._engine import Blocks, blocks_of, off
-from ._term import Term
-from ._with_terms import WithTerms
-
-
-# What is worse by less than this in BIC is to be told from what was named
-_RIVAL = 30.0
-# Speeds that are tried, and how far beyond those recorded
-_SPEEDS, _BEYOND = 7, 0.05
-# Seconds that a simulated rig is given to forget how it was started
-_SETTLE = 6.0
+from .report import Diagnosis
+from .search import Blocks, blocks_of, newton_step
+from .terms import Term, WithTerms
 
 
 @dataclasses.dataclass(frozen=True)
@@ -120,7 +111,8 @@ def next_experiments(
     if speeds is None:
         known = [drive.speed for drive in drives]
         low, high = min(known), max(known)
-        grid = np.linspace((1 - _BEYOND) * low, (1 + _BEYOND) * high, _SPEEDS)
+        beyond, count = found.policy.next_beyond, found.policy.next_speeds
+        grid = np.linspace((1 - beyond) * low, (1 + beyond) * high, count)
         speeds = [float(speed) for speed in grid]
     length = parts[0].recording.duration if duration is None else duration
     report = progress or (lambda sentence, fraction: None)
@@ -141,7 +133,7 @@ def next_experiments(
                 model.sensors,
                 length,
                 rng=rng,
-                settle=_SETTLE,
+                settle=found.policy.next_settle,
                 interval=parts[0].recording.interval,
                 drive=encoder,
                 name=f"{float(speed) * 30 / math.pi:.1f} rpm",
@@ -180,9 +172,9 @@ def _questions(found: Diagnosis, asked) -> dict[str, list[str]]:
     named = [name for name in found.names if name in own]
     rivals = {
         part
-        for names, delta in found.alternatives
-        if delta < _RIVAL
-        for part in names.split("+")
+        for other in found.alternatives
+        if other.delta_bic < found.policy.rival
+        for part in other.terms
         if part in own
     }
     beside = [one for name in {*named, *rivals} for one in own[name]]
@@ -200,6 +192,6 @@ def _stderr(known: Blocks, more, names: Sequence[str], one: str) -> float:
     if more is not None:
         information = information + more
     rows = known.rows(names)
-    _, covariance = off(information, score, rows)
+    _, covariance = newton_step(information, score, rows)
     place = int(np.flatnonzero([known.names[k] == one for k in rows])[0])
     return float(np.sqrt(covariance[place, place]) * known.scale[rows[place]])

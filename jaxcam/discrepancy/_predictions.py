@@ -9,13 +9,14 @@ import numpy as np
 
 from ..fitting import Fit
 from ..models import CamFollower
-from ._diagnosis import Diagnosis, Value
 from ._event_speeds import event_speeds, EVENTS
-from ._with_terms import WithTerms
+from .policy import Policy
+from .report import Diagnosis
+from .terms import Value, WithTerms
 
 
-# Rigs drawn from the errors of a fit
-_DRAWS = 12
+# Part of a unit variance that keeps a covariance definite against rounding
+_DEFINITE = 1e-12
 
 
 @dataclasses.dataclass(frozen=True)
@@ -47,24 +48,27 @@ def predictions(found: Diagnosis, seed: int = 0) -> tuple[Prediction, ...]:
         return ()
     sides = []
     for fit, present in ((found.before, False), (found.after, True)):
-        sides.append(_speeds(fit, found.names, present, np.random.default_rng(seed)))
+        rng = np.random.default_rng(seed)
+        sides.append(_speeds(fit, found.names, present, rng, found.policy))
     return tuple(
         Prediction(name, *(Value(float(v), float(e), "rad/s") for v, e in pair))
         for name, *pair in zip(EVENTS, *sides)
     )
 
 
-def _speeds(fit: Fit, names, present: bool, rng) -> list[tuple[float, float]]:
+def _speeds(
+    fit: Fit, names, present: bool, rng, policy: Policy
+) -> list[tuple[float, float]]:
     """The speeds and their standard errors."""
     row = np.asarray(fit.point.values[0])
     free = [fit.problem.names.index(one.name) for one in fit.estimates]
-    best = event_speeds(_system(fit, row, names, present))
+    best = event_speeds(_system(fit, row, names, present), policy)
     scale = np.sqrt(np.diag(fit.covariance))
     root = np.linalg.cholesky(
-        fit.covariance / np.outer(scale, scale) + 1e-12 * np.eye(len(scale))
+        fit.covariance / np.outer(scale, scale) + _DEFINITE * np.eye(len(scale))
     )
     drawn = []
-    for _ in range(_DRAWS):
+    for _ in range(policy.drawn_rigs):
         moved = row.copy()
         moved[free] += scale * (root @ rng.standard_normal(len(free)))
         drawn.append(best.near(_system(fit, moved, names, present)).values)

@@ -6,8 +6,9 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from ..hybrid.lowering import while_loop
 from ._modes import first_mode
-from ._step import attempt, DONE, in_mode, Lane, RUNNING
+from ._step import attempt, DONE, in_mode, LoopState, RUNNING
 from ._system import FilippovSystem
 
 
@@ -15,28 +16,28 @@ from ._system import FilippovSystem
 CHUNK = 256
 
 
-def first_lane(system: FilippovSystem, state, t0, t1) -> Lane:
+def first_state(system: FilippovSystem, state, t0, t1) -> LoopState:
     whole = t1 - t0
     step = jax.lax.stop_gradient(whole / 64)
     zero = jnp.zeros_like(t0)
-    return Lane(
+    return LoopState(
         t0, state, first_mode(system, t0, state), step, step, zero, zero + RUNNING
     )
 
 
 @eqx.filter_jit
-def start(system, state, t0, t1) -> Lane:
-    return first_lane(system, state, t0, t1)
+def start(system, state, t0, t1) -> LoopState:
+    return first_state(system, state, t0, t1)
 
 
 @eqx.filter_jit
-def chunk(system, tolerance, t1, lane: Lane):
+def chunk(system, tolerance, t1, carried: LoopState):
     """Many attempts, with a row for each."""
 
-    def one(lane, _):
-        return attempt(system, tolerance, t1, lane)
+    def one(carried, _):
+        return attempt(system, tolerance, t1, carried)
 
-    return jax.lax.scan(one, lane, length=CHUNK)
+    return jax.lax.scan(one, carried, length=CHUNK)
 
 
 def filippov_flow(
@@ -50,24 +51,24 @@ def filippov_flow(
 ) -> Float[Array, " n"]:
     """Where the motion from `state` at `t0` is at `t1`; for use inside `jit`.
 
-    Can be batched and differentiated forward in state, times and parameters: crossing,
+    Can be batched and differentiated in state, times and parameters: crossing,
     entering and leaving a sliding mode carry their derivatives. NaN where `t1` is not
     reached within `max_steps` attempted steps.
     """
     t0, t1 = jnp.asarray(t0, dtype=float), jnp.asarray(t1, dtype=float)
-    lane = first_lane(system, state, t0, t1)
-    lane = jax.tree.map(jnp.asarray, lane)
+    carried = first_state(system, state, t0, t1)
+    carried = jax.tree.map(jnp.asarray, carried)
 
     def running(carry):
-        lane, count = carry
-        return (count < max_steps) & eqxi.unvmap_any(lane.status == RUNNING)
+        carried, count = carry
+        return (count < max_steps) & eqxi.unvmap_any(carried.status == RUNNING)
 
     def one(carry):
-        lane, count = carry
-        return attempt(system, tolerance, t1, lane)[0], count + 1
+        carried, count = carry
+        return attempt(system, tolerance, t1, carried)[0], count + 1
 
-    lane, _ = jax.lax.while_loop(running, one, (lane, 0))
-    return jnp.where(lane.status == DONE, lane.x, jnp.nan)
+    carried, _ = while_loop(running, one, (carried, 0))
+    return jnp.where(carried.status == DONE, carried.x, jnp.nan)
 
 
 def leg_flow(

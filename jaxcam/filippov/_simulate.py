@@ -5,7 +5,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import ArrayLike, Float
 
-from ..hybrid._system import with_array_parameters
+from ..hybrid.checks import refuse_tracers
+from ..parameters import as_arrays, real_array
 from ._modes import region
 from ._run import CHUNK, chunk, start
 from ._step import EVENT, NOT_FINITE, NOTHING, RUNNING
@@ -46,16 +47,19 @@ def simulate_filippov(
     **Raises:** `ValueError` for a start that is not finite, or on the part of the
     surface that both fields point away from, where the motion is not unique.
     """
-    system = with_array_parameters(system)
-    state = jnp.asarray(state, dtype=jnp.float64)
+    refuse_tracers(
+        "simulate_filippov", "jaxcam.filippov.filippov_flow", system, state, t0, t1
+    )
+    system = as_arrays(system)
+    state = real_array(state)
     t0, t1 = jnp.asarray(t0, dtype=jnp.float64), jnp.asarray(t1, dtype=jnp.float64)
     _check(system, state, t0, t1)
     error = jnp.asarray(tolerance, dtype=jnp.float64)
-    lane = start(system, state, t0, t1)
+    carried = start(system, state, t0, t1)
     rows, used = [], 0
-    first = float(lane.mode)
-    while int(lane.status) == RUNNING and used < max_steps:
-        lane, found = chunk(system, error, t1, lane)
+    first = float(carried.mode)
+    while int(carried.status) == RUNNING and used < max_steps:
+        carried, found = chunk(system, error, t1, carried)
         rows.append(jax.tree.map(np.asarray, found))
         used += CHUNK
     kind, time, states, mode, _ = (
@@ -79,7 +83,7 @@ def simulate_filippov(
             jnp.asarray(mode[event]),
             jnp.asarray(mode[event + 1]),
         ),
-        _WHY.get(int(lane.status), ""),
+        _WHY.get(int(carried.status), ""),
     )
 
 

@@ -1,18 +1,19 @@
-"""One attempted step: accept it, retake it shorter, or end it at the surface."""
+"""One attempted step: accept it, retake it shorter, or end it at the surface.
+
+Apart from the event loop of `jaxcam.hybrid`, because a switch changes the field and not
+the state: nothing bounces, and a step ends on the surface.
+"""
 
 from typing import Any, NamedTuple
 
-import diffrax
 import jax
 import jax.numpy as jnp
 
-from ..hybrid._runge_kutta import tableau_of
+from ..hybrid.runge_kutta import array_step, DOPRI5
 from ._modes import levels, mode_after, mode_field, onto_surface
 from ._system import FilippovSystem
 
 
-# of order five: over its steps a level is a cubic, nearly, and dips of it are seen
-TABLEAU = tableau_of(diffrax.Dopri5())
 NOTHING, STEP, EVENT = 0, 1, 2
 RUNNING, DONE, FAILED, NOT_FINITE = 0, 1, 2, 3
 
@@ -22,7 +23,7 @@ _CLOSE = 1e-5
 _RETAKES = 80
 
 
-class Lane(NamedTuple):
+class LoopState(NamedTuple):
     """A motion on its way."""
 
     t: Any
@@ -45,53 +46,42 @@ class Row(NamedTuple):
     level: Any
 
 
-def rk_step(field, t, x, h):
-    """One step of the tableau from `(t, x)`: state and error estimate."""
-    stages = [field(t, x)]
-    for node, row in zip(TABLEAU.nodes[1:], TABLEAU.lower, strict=True):
-        point = x
-        for weight, stage in zip(row, stages, strict=False):
-            if weight != 0.0:
-                point = point + (h * weight) * stage
-        stages.append(field(t + node * h, point))
-    pairs = list(zip(TABLEAU.weights, TABLEAU.error, stages, strict=True))
-    after = x + h * sum(w * s for w, _, s in pairs if w != 0.0)
-    return after, h * sum(e * s for _, e, s in pairs if e != 0.0)
-
-
 def in_mode(system: FilippovSystem, mode, t, x, h):
     """A step of the field in force; sliding stays on the surface."""
 
     def field(s, y):
         return mode_field(system, mode, s, y)
 
-    after, error = rk_step(field, t, x, h)
+    # of order five: over its steps a level is a cubic, nearly, and its dips are seen
+    after, error, _ = array_step(DOPRI5, field, t, x, h, unrolled=True)
     held = onto_surface(system, t + h, after)
     return jnp.where(mode == 0, held, after), error
 
 
-def attempt(system: FilippovSystem, tolerance, t1, lane: Lane) -> tuple[Lane, Row]:
-    """Try one step towards `t1`; a lane that has ended stays as it is."""
-    active = lane.status == RUNNING
-    wanted = jax.lax.stop_gradient(lane.step)
-    last = lane.t + wanted >= t1
-    h = jnp.where(last, t1 - lane.t, wanted)
-    end = jnp.where(last, t1, lane.t + h)
-    after, error = in_mode(system, lane.mode, lane.t, lane.x, h)
-    scale = tolerance * (1 + jnp.maximum(jnp.abs(lane.x), jnp.abs(after)))
+def attempt(
+    system: FilippovSystem, tolerance, t1, carried: LoopState
+) -> tuple[LoopState, Row]:
+    """Try one step towards `t1`; a motion that has ended stays as it is."""
+    active = carried.status == RUNNING
+    wanted = jax.lax.stop_gradient(carried.step)
+    last = carried.t + wanted >= t1
+    h = jnp.where(last, t1 - carried.t, wanted)
+    end = jnp.where(last, t1, carried.t + h)
+    after, error = in_mode(system, carried.mode, carried.t, carried.x, h)
+    scale = tolerance * (1 + jnp.maximum(jnp.abs(carried.x), jnp.abs(after)))
     effort = jnp.sqrt(jnp.mean((error / scale) ** 2))
     finite = jnp.all(jnp.isfinite(after)) & jnp.isfinite(effort)
     fits = finite & (effort <= 1)
 
     def rates(t, x):
-        field = mode_field(system, lane.mode, t, x)
+        field = mode_field(system, carried.mode, t, x)
         return jax.jvp(
-            lambda s, y: levels(system, lane.mode, s, y),
+            lambda s, y: levels(system, carried.mode, s, y),
             (t, x),
             (jnp.ones_like(t), field),
         )
 
-    level0, rate0 = rates(lane.t, lane.x)
+    level0, rate0 = rates(carried.t, carried.x)
     level1, rate1 = rates(end, after)
     fall = rate1 < 0
     offset = jnp.where(fall, -level1 / jnp.where(fall, rate1, 1.0), 0.0)
@@ -115,7 +105,7 @@ def attempt(system: FilippovSystem, tolerance, t1, lane: Lane) -> tuple[Lane, Ro
     delta = jnp.where(lands, offset[which], 0.0)
 
     def field(t, x):
-        return mode_field(system, lane.mode, t, x)
+        return mode_field(system, carried.mode, t, x)
 
     first = field(end, after)
     _, second = jax.jvp(field, (end, after), (jnp.ones_like(end), first))
@@ -123,15 +113,15 @@ def attempt(system: FilippovSystem, tolerance, t1, lane: Lane) -> tuple[Lane, Ro
     t2 = end + delta
     landed = jnp.where(lands, onto_surface(system, t2, landed), after)
     mode2 = jnp.where(
-        lands, mode_after(system, lane.mode, which, t2, landed), lane.mode
+        lands, mode_after(system, carried.mode, which, t2, landed), carried.mode
     )
 
-    grown = 0.9 * jnp.maximum(effort, 1e-10) ** (-1 / TABLEAU.order)
+    grown = 0.9 * jnp.maximum(effort, 1e-10) ** (-1 / DOPRI5.order)
     factor = jnp.where(finite, jnp.clip(grown, 0.2, 5.0), 0.2)
     cut = jnp.clip(part, 0.02, 0.98)
-    natural = jnp.where(good & ~lands & ~last, h * factor, lane.natural)
+    natural = jnp.where(good & ~lands & ~last, h * factor, carried.natural)
     step = jnp.where(fits, jnp.where(retake, h * cut, natural), h * factor)
-    failures = jnp.where(good, 0.0, lane.failures + 1)
+    failures = jnp.where(good, 0.0, carried.failures + 1)
     stuck = failures > _RETAKES
     done = good & ~lands & last
     status = jnp.where(
@@ -144,14 +134,14 @@ def attempt(system: FilippovSystem, tolerance, t1, lane: Lane) -> tuple[Lane, Ro
     def keep(new, old):
         return jnp.where(good, new, old)
 
-    moved = Lane(
-        t=keep(t2, lane.t),
-        x=keep(landed, lane.x),
-        mode=keep(mode2, lane.mode),
-        step=jax.lax.stop_gradient(jnp.where(active, step, lane.step)),
-        natural=jax.lax.stop_gradient(jnp.where(active, natural, lane.natural)),
-        failures=jnp.where(active, failures, lane.failures),
-        status=jnp.where(active, status, lane.status),
+    moved = LoopState(
+        t=keep(t2, carried.t),
+        x=keep(landed, carried.x),
+        mode=keep(mode2, carried.mode),
+        step=jax.lax.stop_gradient(jnp.where(active, step, carried.step)),
+        natural=jax.lax.stop_gradient(jnp.where(active, natural, carried.natural)),
+        failures=jnp.where(active, failures, carried.failures),
+        status=jnp.where(active, status, carried.status),
     )
     return moved, Row(kind, moved.t, moved.x, moved.mode, which)
 

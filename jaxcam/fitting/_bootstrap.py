@@ -8,7 +8,7 @@ from jaxtyping import Float
 
 from ._fit import fit
 from ._fit_result import Fit
-from ._problem import Weights
+from .engine import Weights
 
 
 @dataclasses.dataclass(frozen=True)

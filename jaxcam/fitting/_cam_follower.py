@@ -4,8 +4,7 @@ import math
 from collections.abc import Sequence
 
 from ..recordings import Rig
-from ._model import cam_follower_drive, Model, Sensor
-from ._parameter import Parameter
+from .engine import cam_follower_drive, Model, Parameter, Sensor
 
 
 def cam_follower_model(

@@ -1,25 +1,42 @@
 """Levenberg-Marquardt on the parameters of a `Problem`, its states eliminated."""
 
+import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import NamedTuple
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 
-from ._columns import free_columns, inside, prior_cost
-from ._damped_step import damped_step
+from ._doubts import far_from_data
 from ._fit_result import finish, Fit
-from ._linearise import assemble, Costs, Point
-from ._problem import Problem, Weights
-from ._sharpness import loosened
+from .engine import (
+    assemble,
+    Blocks,
+    Costs,
+    damped_step,
+    free_columns,
+    inside,
+    loosened,
+    own_states,
+    Point,
+    prior_cost,
+    Problem,
+    Weights,
+)
 
 
 _ITERATIONS = 60
 #: a step that promises less than this (twice the log-likelihood) is the last
 PROMISE = 1e-3
+# and so must an undamped step: less than a tenth of a standard error
+_GRADIENT = 1e-2
 # Steps that may follow before the first one is judged
 _CORRECTIONS = 3
 # A flight of more pieces than this is not foretold from its start at once
 _LONG = 16
+# What parameters without a tolerance are multiplied by, where a fit ended far off
+_FACTORS = (0.7, 1.4, 0.5, 2.0)
 # in units of the parameters' scales, over which a model may bend
 _FIRST_DAMPING, _LEAST_DAMPING, _MOST_DAMPING = 1.0, 1e-6, 1e12
 
@@ -49,21 +66,83 @@ def fit(
         first fitted with loose joints, to the end; the costs are those that follow.
     - `progress`: called with the number of the iteration and the cost.
 
+    Where a fit from the problem's own start ends far above the noise, and neither
+    `start` nor `stop` was given, it is tried again from other places, and the one that
+    fits best is returned.
+
+    **Returns:** a [`jaxcam.fitting.Fit`][]. It has `converged` only at an optimum that
+    the noise explains, away from all bounds, with every error known; its `reasons` say
+    why not.
+
     **Raises:** `ValueError` for a name that is not a parameter.
     """
     columns = free_columns(problem, free)
     point = start_point(problem, start)
     point = inside(problem, columns, point)
     extras = problem.weighted(weights)
-    if problem.longest_flight > _LONG and point.states is problem.start.states:
+    fresh = point.states is problem.start.states
+
+    def loosely():
         loose = loosened(extras)
         most = max(iterations, _ITERATIONS)
-        point = _descend(problem, columns, loose, point, prior, most)[0]
-    found = _descend(problem, columns, extras, point, prior, iterations, stop, progress)
-    point, blocks, costs, cost, converged, count, message = found
-    return finish(
-        problem, columns, point, blocks, costs, cost, prior, converged, count, message
-    )
+        return _descend(problem, columns, loose, point, prior, most).point
+
+    long = problem.longest_flight > _LONG and fresh
+    first = loosely() if long else point
+    found = _descend(problem, columns, extras, first, prior, iterations, stop, progress)
+    # elsewhere than at the noise there may be a better optimum; a caller who stops
+    # fits or names a start looks after that
+    if fresh and stop is None and iterations > 0 and _far(problem, found, weights):
+        for other in _other_starts(problem, columns, extras, point, prior, loosely):
+            again = _descend(problem, columns, extras, other, prior, iterations)
+            if np.isfinite(again.cost) and not again.cost >= found.cost:
+                found = again
+            if not _far(problem, found, weights):
+                break
+    return finish(problem, columns, *found, prior=prior, weights=weights)
+
+
+class _Descent(NamedTuple):
+    """Where an iteration ended, and how."""
+
+    point: Point
+    blocks: Blocks
+    costs: Costs
+    cost: float
+    optimal: bool
+    count: int
+    ended: str
+
+
+def _far(problem, found: _Descent, weights) -> bool:
+    costs = jax.device_get(found.costs)
+    return not np.isfinite(found.cost) or bool(far_from_data(problem, costs, weights))
+
+
+def _other_starts(problem, columns, extras, point, prior, loosely):
+    """Starts for a fit that ended far from the data, the cheapest first.
+
+    With joints that give, and parameters that differ by a few of their scales: the
+    cost of an oscillation that is followed over many periods has many valleys.
+    """
+    yield loosely()
+    loose = loosened(extras)
+    values = np.asarray(point.values)
+    for factor in _FACTORS:
+        moved = np.array(values)
+        for p in set(columns.parameter.tolist()):
+            one = problem.parameters[p]
+            if math.isfinite(one.tolerance):
+                continue
+            moved[:, p] = np.clip(factor * values[:, p], one.lower, one.upper)
+        if not np.array_equal(moved, values):
+            start = own_states(
+                problem.layout,
+                problem.pieces,
+                extras,
+                Point(jnp.asarray(moved), point.states),
+            )
+            yield _descend(problem, columns, loose, start, prior, _ITERATIONS).point
 
 
 def _descend(
@@ -80,15 +159,21 @@ def _descend(
 
     blocks, costs = linearise(point)
     cost = total(costs, point)
-    damping, message, converged, count = _FIRST_DAMPING, "", False, 0
+    damping, message, optimal, count = _FIRST_DAMPING, "", False, 0
     so_far = [cost]
     while count < iterations:
         count += 1
         step, promise = damped_step(problem, columns, blocks, point, damping, prior)
         fine = np.isfinite(promise)
         if fine and promise < PROMISE and damping <= 1e-1:
-            converged, message = True, "The optimum was reached."
-            break
+            # a damped step promises little along a valley; the whole one must as well
+            _, whole = damped_step(
+                problem, columns, blocks, point, _LEAST_DAMPING, prior
+            )
+            if not whole > _GRADIENT or damping <= _LEAST_DAMPING:
+                optimal, message = True, "The optimum was reached."
+                break
+            damping = max(0.1 * damping, _LEAST_DAMPING)
         found, changed, value = blocks, costs, np.inf
         if fine:
             found, changed = linearise(step)
@@ -124,7 +209,7 @@ def _descend(
             f"The optimum was not reached in {iterations} iterations; allow more of "
             f"them, or start closer."
         )
-    return point, blocks, costs, cost, converged, count, message
+    return _Descent(point, blocks, costs, cost, optimal, count, message)
 
 
 def held_out_cost(problem: Problem, found: Fit, weights: Weights) -> float:

@@ -1,6 +1,7 @@
 """What a fit found: estimates, their covariance, and how it ended."""
 
 import dataclasses
+import functools
 from collections.abc import Sequence
 from typing import Any
 
@@ -8,16 +9,29 @@ import jax
 import numpy as np
 from jaxtyping import Float
 
-from ._columns import invert, prior_information, reduced
+from ._doubts import Doubt, far_from_data, not_finite, on_a_bound, Reason
 from ._ellipse import Ellipse, ellipse_of, most_correlated
-from ._linearise import Costs, Point
-from ._model import Model
-from ._problem import Problem
+from ._unconstrained import Unconstrained, unconstrained
+from .engine import (
+    Costs,
+    held_firmer,
+    invert_information,
+    Model,
+    Point,
+    prior_information,
+    Problem,
+    reduced,
+    Weights,
+)
 
 
 @dataclasses.dataclass(frozen=True)
 class Estimate:
-    """A fitted number and its standard error; of a record where each has its own."""
+    """A fitted number and its standard error; of a record where each has its own.
+
+    The error is infinite where the data do not constrain the value; the fit then says
+    so and has not converged.
+    """
 
     name: str
     value: float
@@ -46,7 +60,10 @@ class Fit:
     - `covariance`: from the Fisher information, what was known beforehand included.
     - `cost`: minus twice the log-likelihood (less a constant) with the prior; `costs`:
         of each piece, without it.
-    - `converged`, `iterations`, `message`: how it ended.
+    - `optimal`, `iterations`, `ended`: whether the iteration met its tolerance at an
+        optimum, after how many steps, and how it ended in words.
+    - `weights`: how much each piece of the data counted; `None`: all alike.
+    - `unconstrained`: combinations of parameters that the data say nothing of.
     """
 
     problem: Problem
@@ -56,9 +73,50 @@ class Fit:
     covariance: Float[np.ndarray, "g g"]
     cost: float
     costs: Costs
-    converged: bool
+    optimal: bool
     iterations: int
-    message: str
+    ended: str
+    weights: Weights | None = None
+    unconstrained: tuple[Unconstrained, ...] = ()
+
+    @functools.cached_property
+    def reasons(self) -> tuple[Reason, ...]:
+        """Why the fit is not to be trusted; empty where it has converged.
+
+        Found from what the fit holds, so that it cannot disagree with it.
+        """
+        found = []
+        if not self.optimal:
+            found.append(Reason(Doubt.NO_OPTIMUM, self.ended))
+        wrong = not_finite(self.problem, self.point, self.cost, self.costs)
+        if wrong:
+            found.append(Reason(Doubt.NOT_FINITE, wrong))
+        else:
+            far = far_from_data(self.problem, self.costs, self.weights)
+            found += [Reason(Doubt.FAR_FROM_DATA, far)] if far else []
+        bounds = on_a_bound(self.problem, self.free, self.point)
+        found += [Reason(Doubt.ON_A_BOUND, one) for one in bounds]
+        found += [
+            Reason(Doubt.NOT_CONSTRAINED, one.sentence()) for one in self.unconstrained
+        ]
+        named = {name for one in self.unconstrained for name in one.names}
+        found += [
+            Reason(Doubt.NOT_FINITE, f"The error of {one.label} is {one.stderr}.")
+            for one in self.estimates
+            if not np.isfinite(one.stderr) and one.label not in named
+        ]
+        return tuple(found)
+
+    @property
+    def converged(self) -> bool:
+        """Whether the fit is at an optimum that the noise explains, with all errors
+        known; `reasons` says why not."""
+        return not self.reasons
+
+    @property
+    def message(self) -> str:
+        """How the fit ended, and every reason to doubt it."""
+        return " ".join(one.sentence for one in self.reasons) or self.ended
 
     def __getitem__(self, name: str) -> Estimate:
         """The estimate of a parameter, by name or `name@record`.
@@ -111,18 +169,56 @@ class Fit:
             "samples": self.problem.samples,
             "records": list(self.problem.records),
             "converged": self.converged,
+            "reasons": [
+                {"doubt": one.doubt.name.lower(), "sentence": one.sentence}
+                for one in self.reasons
+            ],
             "iterations": self.iterations,
             "message": self.message,
         }
 
 
 def finish(
-    problem, columns, point, blocks, costs, cost, prior, converged, count, message
+    problem,
+    columns,
+    point,
+    blocks,
+    costs,
+    cost,
+    optimal,
+    count,
+    ended,
+    *,
+    prior,
+    weights=None,
 ):
     """Standard errors, and everything in one place."""
     information, _ = reduced(columns, blocks)
-    information = information + np.diag(prior_information(problem, columns, prior))
-    covariance = invert(information) * np.outer(columns.scale, columns.scale)
+    known = np.diag(prior_information(problem, columns, prior))
+    information = information + known
+    size = len(columns.scale)
+    labels = [
+        problem.names[p] if r < 0 else f"{problem.names[p]}@{problem.records[r]}"
+        for p, r in zip(columns.parameter, columns.record)
+    ]
+    blind: tuple[Unconstrained, ...] = ()
+    covariance = np.full((size, size), np.nan)
+    if np.all(np.isfinite(information)):
+        covariance = invert_information(information) * np.outer(
+            columns.scale, columns.scale
+        )
+        blind = unconstrained(
+            labels,
+            information,
+            columns.scale,
+            lambda: held_firmer(columns, blocks) + known,
+        )
+        # what is not known has no error that a number could state
+        unknown = {name for one in blind for name in one.names}
+        rows = [k for k, label in enumerate(labels) if label in unknown]
+        covariance[rows, :] = 0.0
+        covariance[:, rows] = 0.0
+        covariance[rows, rows] = np.inf
     stderr = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     values = np.asarray(point.values)
     estimates = []
@@ -143,7 +239,9 @@ def finish(
         covariance,
         float(cost),
         costs,
-        converged,
+        optimal,
         count,
-        message,
+        ended,
+        weights,
+        blind,
     )

@@ -7,11 +7,9 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from ._columns import free_columns, reduced
 from ._fit import fit
 from ._fit_result import Fit
-from ._linearise import assemble
-from ._problem import Problem
+from .engine import assemble, free_columns, Problem, reduced
 
 
 # a combination is seen if the data narrow it to this part of the tolerance
@@ -140,6 +138,11 @@ def identify(
         jnp.asarray(columns.scales),
     )
     information, _ = reduced(columns, blocks)
+    if not np.all(np.isfinite(information)):
+        raise ValueError(
+            "The sensitivities of the model to its parameters are not finite; check "
+            "its vector field, gap and impact at the nominal parameters for NaN."
+        )
     values, vectors = np.linalg.eigh(information)
     # what rounding makes of zero is zero
     floor = np.finfo(float).eps * len(values) * max(np.max(values, initial=0.0), 0.0)

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from ._fit_result import Fit
-from ._linearise import predict
+from .engine import predict
 
 
 @dataclasses.dataclass(frozen=True)

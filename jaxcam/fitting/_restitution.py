@@ -13,7 +13,7 @@ from jaxtyping import Array, Float
 from ..hybrid import HybridSystem
 from ..models import ConstantRestitution, LinearInSpeed, PowerLawRestitution
 from ..recordings import RecordingError, Segments
-from ._model import Turning
+from .engine import Turning
 
 
 # Errors beyond this many standard errors count by their size, not its square (Huber)

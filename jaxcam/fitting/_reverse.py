@@ -11,9 +11,7 @@ import scipy.optimize
 from jax.flatten_util import ravel_pytree
 
 from ._fit import fit
-from ._linearise import cost_of, Layout, Point
-from ._model import Model
-from ._problem import Problem
+from .engine import cost_of, Layout, Model, Point, Problem
 
 
 def cost_and_gradient(

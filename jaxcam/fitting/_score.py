@@ -7,17 +7,18 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from ._columns import (
+from ._fit_result import Fit
+from .engine import (
+    assemble,
     Columns,
     free_columns,
-    invert,
+    invert_information,
     off_nominal,
     prior_information,
+    Problem,
     reduced,
+    Weights,
 )
-from ._fit_result import Fit
-from ._linearise import assemble
-from ._problem import Problem, Weights
 
 
 @dataclasses.dataclass(frozen=True)
@@ -52,7 +53,7 @@ class Linearised:
         record are named `name@record`.
         """
         rows = self._rows(names)
-        inverse = invert(self._block(rows))
+        inverse = invert_information(self._block(rows))
         change = inverse @ self.score[rows] * self.columns.scale[rows]
         stderr = np.sqrt(np.abs(np.diag(inverse))) * self.columns.scale[rows]
         return {
@@ -64,7 +65,9 @@ class Linearised:
         rows = self._rows(names)
         if not len(rows):
             return 0.0
-        return float(self.score[rows] @ invert(self._block(rows)) @ self.score[rows])
+        return float(
+            self.score[rows] @ invert_information(self._block(rows)) @ self.score[rows]
+        )
 
     def _block(self, rows):
         return self.information[np.ix_(rows, rows)] + np.diag(self.prior[rows])

@@ -2,6 +2,8 @@
 
 import diffrax
 import equinox as eqx
+import numpy as np
+from jaxtyping import ArrayLike, Float
 
 
 class Settings(eqx.Module):
@@ -9,7 +11,20 @@ class Settings(eqx.Module):
 
     **Arguments:**
 
-    - `tolerance`: relative and absolute error allowed in a step, in units of the state.
+    - `tolerance`: error allowed in a step, in each component relative to how far it has
+      moved since the start of the run; at first, to the distance from the constraint
+      where a gap depends on the component, and to its own size where none does. So no
+      choice of units, nor of the origin of a coordinate, changes the accuracy; but a
+      coordinate is never known better than 1e-15 of itself, which limits what can be
+      told of a small gap far from the origin.
+    - `absolute`: absolute error allowed instead, in units of the state: a number, or
+      one for each component, shape `(n,)`. The error allowed is then
+      `absolute + tolerance * |state|`.
+    - `max_step`: longest step (s). What is narrower than a step, and not seen at its
+      stages, is stepped over: state it where forces or barriers are brief, or declare
+      them as [`jaxcam.hybrid.HybridSystem.breakpoints`][]. Steps are a quarter of the
+      system's period at most; with neither, they are a 64th of the run at most where
+      the estimate of their error says nothing (at rest, or in a uniform field).
     - `chatter_smallness`: chatter is completed analytically only where
       lambda/(1 - r) is below this, lambda = v |j| / a^2; the completed time is then
       wrong by about its square, relatively.
@@ -17,6 +32,9 @@ class Settings(eqx.Module):
       fastest rebound since the last release (or hops have become lower than rounding
       can tell). 1 completes as soon as theory allows
       (fast, for sweeps); small values list more impacts of each sequence.
+    - `plain`: run the loop as written, without the passes of `jaxcam.hybrid.lowering`
+      that make it fast. Slower by an order of magnitude, equal to the tolerance, and
+      without reverse mode: a check on these passes, and a way on where one fails.
     - `solver`: any explicit Runge-Kutta solver of diffrax with an error estimate.
     """
 
@@ -26,6 +44,9 @@ class Settings(eqx.Module):
     solver: diffrax.AbstractSolver = eqx.field(
         default_factory=diffrax.Dopri8, static=True
     )
+    absolute: float | Float[ArrayLike, " n"] | None = None
+    max_step: float | None = None
+    plain: bool = eqx.field(default=False, static=True)
 
     def check(self) -> None:
         """Raise `ValueError` for a setting outside its range."""
@@ -43,4 +64,16 @@ class Settings(eqx.Module):
             raise ValueError(
                 f"chatter_depth is {float(self.chatter_depth):g}; give a value in "
                 "(0, 1]"
+            )
+        if self.absolute is not None and not np.all(
+            np.isfinite(self.absolute) & (np.asarray(self.absolute) > 0)
+        ):
+            raise ValueError(
+                f"absolute is {self.absolute}; give positive numbers in units of the "
+                "state, or leave it out"
+            )
+        if self.max_step is not None and not float(np.asarray(self.max_step)) > 0:
+            raise ValueError(
+                f"max_step is {float(np.asarray(self.max_step)):g}; give a positive "
+                "length in seconds"
             )

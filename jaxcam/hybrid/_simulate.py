@@ -1,32 +1,30 @@
 """The front door: `simulate`."""
 
 from collections.abc import Callable
-from typing import Literal
+from typing import Any, Literal
 
 import diffrax
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import ArrayLike, Float
+from jaxtyping import Array, ArrayLike, Float, Int
 
-from ._advance import Plan
-from ._assemble import assemble, Parts
-from ._check import check_start, is_traced
-from ._events import Contacts, Impacts, Steps
-from ._functions import Functions
-from ._lane import first_lane, Lane, RUNNING
-from ._release_point import release_point
-from ._run import Log, run, run_reversible
-from ._runge_kutta import tableau_of
-from ._segments import simulate_segments
+from ..parameters import as_arrays, real_array
 from ._settings import Settings
-from ._system import HybridSystem, with_array_parameters
-from ._trajectory import Trajectory
+from ._system import HybridSystem
 from ._types import RealScalar
+from .checks import check_start, is_traced
+from .codes import RUNNING
+from .loop import first_state, Functions, Log, LoopState, Plan, run, run_reversible
+from .lowering import whole
+from .record import assemble, Contacts, Impacts, Parts, Steps, Trajectory
+from .runge_kutta import tableau_of
+from .segments import simulate_segments
+from .surface import release_point
 
 
-# rows run before Python looks again: for progress, interruption and growing logs
+# rows of a chunk: for progress, interruption and growing logs
 _CHUNK = 2048
 
 
@@ -39,6 +37,7 @@ def simulate(
     tolerance: float = 1e-10,
     solver: diffrax.AbstractSolver | None = None,
     settings: Settings | None = None,
+    max_step: float | None = None,
     max_steps: int | None = None,
     derivatives: Literal["forward", "reverse"] = "forward",
     engine: Literal["loop", "diffeqsolve"] = "loop",
@@ -53,14 +52,17 @@ def simulate(
       from contact (systems with a period, two states and one constraint): in contact at
       `t0` where contact holds then, else from the last release before `t0` on.
     - `t0`, `t1`: s, t1 >= t0.
-    - `tolerance`: error allowed in a step, relative and absolute.
+    - `tolerance`: error allowed in a step, relative to how far each component moves.
     - `solver`: any explicit Runge-Kutta solver of diffrax, `Dopri8` by default.
     - `settings`: everything else about accuracy; overrides `tolerance` and `solver`.
+    - `max_step`: longest step (s). A force or a barrier that is narrower than the steps
+      may be stepped over: give this, or the system's `breakpoints`.
     - `max_steps`: budget of attempted steps. Without it a run outside of any
       transformation grows as needed, up to a million; inside `jit`, `vmap`, `jvp` or
       `grad`, where sizes must be known, it is 4096 and arrays are padded.
-    - `derivatives`: "forward" (jvp, jacfwd) or "reverse" (grad): the latter always runs
-      `max_steps` attempts.
+    - `derivatives`: "forward", or "reverse" for gradients by hundreds of numbers. Both
+      serve jvp, linearize, grad and hessian; the cost of the former grows with how many
+      numbers are differentiated by, the latter always runs `max_steps` attempts.
     - `engine`: "loop", or "diffeqsolve" for one diffrax call a flight (implicit
       solvers, an independent check).
     - `progress`: called with the fraction done, now and then.
@@ -73,7 +75,11 @@ def simulate(
     """
     if settings is None:
         chosen = diffrax.Dopri8() if solver is None else solver
-        settings = Settings(tolerance=tolerance, solver=chosen)
+        settings = Settings(tolerance=tolerance, solver=chosen, max_step=max_step)
+    elif max_step is not None:
+        raise ValueError(
+            "max_step and settings are both given; pass Settings(max_step=...)"
+        )
     if engine not in ("loop", "diffeqsolve"):
         raise ValueError(f'engine is {engine!r}; choose "loop" or "diffeqsolve"')
     if derivatives not in ("forward", "reverse"):
@@ -81,13 +87,13 @@ def simulate(
             f'derivatives is {derivatives!r}; choose "forward" or "reverse"'
         )
     t0, t1 = jnp.asarray(t0, dtype=jnp.float64), jnp.asarray(t1, dtype=jnp.float64)
-    system = with_array_parameters(system)
-    settings = with_array_parameters(settings)
+    system = as_arrays(system)
+    settings = as_arrays(settings)
     traced = is_traced((system, state, t0, t1, settings))
     if state is None:
         state, t_start = _released(system, t0, traced)
     else:
-        state, t_start = jnp.asarray(state, dtype=jnp.float64), t0
+        state, t_start = real_array(state), t0
     if not traced:
         check_start(system, settings, t_start, state, t1)
     if engine == "diffeqsolve":
@@ -105,10 +111,12 @@ def simulate(
     tableau_of(settings.solver)
     if traced or derivatives == "reverse":
         rows = 4096 if max_steps is None else max_steps
-        log, contact, code = _whole(
-            system, settings, t_start, state, t1, rows, derivatives
+        # a scan is run backward step by step, a loop only as a whole
+        forward = _forward if settings.plain else whole(_forward)
+        of_rows: Callable[..., tuple[Parts, Any]] = (
+            _reversible if derivatives == "reverse" else forward
         )
-        parts = assemble(system, t_start, state, contact, log, (rows, rows))
+        parts, code = of_rows(system, settings, t_start, state, t1, rows)
         if traced:
             return Trajectory(system, settings, t0, t1, *parts, code)
     else:
@@ -160,33 +168,46 @@ def _release_point(system, t0):
 
 def _prepare(system, settings, t0, state, t1):
     system = system.prepared()
-    functions = Functions(system, state.shape[0])
+    functions = Functions(system, state.shape[0], settings.plain)
     plan = Plan.of(system, settings, t0, t1)
     x = tuple(state[i] for i in range(state.shape[0]))
-    lane = first_lane(functions, t0, x, t1)
-    return functions, plan, lane
+    carried = first_state(functions, t0, x, t1, plan.longest_step, plan.repeat)
+    return functions, plan, carried
 
 
-def _whole(system, settings, t0, state, t1, rows, derivatives):
-    functions, plan, lane = _prepare(system, settings, t0, state, t1)
-    contact = jnp.stack(lane.contact)
-    runner = run if derivatives == "forward" else run_reversible
-    lane, log = runner(functions, plan, lane, rows)
-    return log, contact, _code(lane)
+def _forward(
+    system, settings, t0, state, t1, rows: int
+) -> tuple[Parts, Int[Array, ""]]:
+    """Parts and result code of a run whose arrays have fixed lengths."""
+    return _of_rows(run, system, settings, t0, state, t1, rows)
+
+
+def _reversible(system, settings, t0, state, t1, rows: int):
+    """The same as a scan."""
+    return _of_rows(run_reversible, system, settings, t0, state, t1, rows)
+
+
+def _of_rows(runner, system, settings, t0, state, t1, rows):
+    functions, plan, carried = _prepare(system, settings, t0, state, t1)
+    contact = jnp.stack(carried.contact)
+    # a start that is refused leads nowhere
+    state = jnp.where(carried.status == RUNNING, state, jnp.nan)
+    carried, log = runner(functions, plan, carried, rows)
+    return assemble(system, t0, state, contact, log, (rows, rows)), _code(carried)
 
 
 @eqx.filter_jit
 def _begin(system, settings, t0, state, t1, rows):
-    functions, plan, lane = _prepare(system, settings, t0, state, t1)
-    contact = jnp.stack(lane.contact)
-    lane, log = run(functions, plan, lane, rows, "one")
-    return lane, log, contact
+    functions, plan, carried = _prepare(system, settings, t0, state, t1)
+    contact = jnp.stack(carried.contact)
+    carried, log = run(functions, plan, carried, rows, "one")
+    return carried, log, contact
 
 
 @eqx.filter_jit
-def _go_on(system, settings, t0, state, t1, lane: Lane, rows):
+def _go_on(system, settings, t0, state, t1, carried: LoopState, rows):
     functions, plan, _ = _prepare(system, settings, t0, state, t1)
-    return run(functions, plan, lane, rows, "one")
+    return run(functions, plan, carried, rows, "one")
 
 
 def _assemble(system, t0, state, contact, log: Log) -> Parts:
@@ -202,27 +223,26 @@ def _assemble(system, t0, state, contact, log: Log) -> Parts:
 def _chunks(system, settings, t0, state, t1, budget, progress):
     """Run chunk by chunk, as far as the budget goes."""
     size = min(_CHUNK, budget)
-    lane, log, contact = _begin(system, settings, t0, state, t1, size)
+    carried, log, contact = _begin(system, settings, t0, state, t1, size)
     logs, used = [log], size
     start = float(t0)
     span = max(float(t1) - start, 1e-300)
-    while float(lane.status) == RUNNING and used < budget:
+    while float(carried.status) == RUNNING and used < budget:
         if progress is not None:
-            progress((float(lane.t) - start) / span)
-        lane, log = _go_on(system, settings, t0, state, t1, lane, size)
+            progress((float(carried.t) - start) / span)
+        carried, log = _go_on(system, settings, t0, state, t1, carried, size)
         logs.append(log)
         used += size
     if progress is not None:
         progress(1.0)
     whole = jax.tree.map(lambda *parts: np.concatenate(parts), *logs)
-    return whole, contact, _code(lane)
+    return whole, contact, _code(carried)
 
 
 @jax.jit
-def _code(lane: Lane):
-    """Index into `RESULTS`; a lane that still runs has used up its budget."""
-    order = jnp.array([1, 0, 2, 3], dtype=jnp.int32)
-    return order[lane.status.astype(jnp.int32)]
+def _code(carried: LoopState):
+    """Index into `RESULTS`; a run that goes on has used up its budget."""
+    return carried.status.astype(jnp.int32)
 
 
 def _trim(parts: Parts) -> Parts:

@@ -8,13 +8,13 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from ._check import check_start
-from ._normal import gaps
-from ._refilled_lanes import Pace, run_refilled
+from ..parameters import as_arrays, pick, real_array, Where
 from ._settings import Settings
-from ._slots import Lanes, split_lanes, Turns
-from ._system import HybridSystem, with_array_parameters
-from ._turn_samples import TurnSamples
+from ._system import HybridSystem
+from .batch import Chunking, Horizon, Lanes, run_refilled, split_lanes, TurnSamples
+from .checks import check_start, refuse_tracers
+from .loop import starts_behind
+from .surface import check_restitution, restitutions
 
 
 # lanes of a group over lanes of a block
@@ -43,7 +43,7 @@ def stroboscope(
     *,
     skip: int = 0,
     t0: float = 0.0,
-    where: Callable | None = None,
+    where: Where | None = None,
     values=None,
     period: float | None = None,
     settings: Settings | None = None,
@@ -74,21 +74,24 @@ def stroboscope(
 
     **Raises:** `ValueError` where shapes do not fit, or there is no period.
     """
+    refuse_tracers(
+        "stroboscope", "jaxcam.hybrid.flow", system, states, values, t0, period
+    )
     settings = (
         Settings(tolerance=1e-9, chatter_depth=1.0) if settings is None else settings
     )
     settings.check()
-    system = with_array_parameters(system)
-    settings = with_array_parameters(settings)
-    states = np.asarray(states, dtype=float)
+    system = as_arrays(system)
+    settings = as_arrays(settings)
+    states = np.asarray(real_array(states, "states"))
     values = None if values is None else np.asarray(values, dtype=float)
     lanes = (
         states.shape[0] if states.ndim == 2 else (1 if values is None else len(values))
     )
     if states.ndim == 1:
         states = np.broadcast_to(states, (lanes, states.shape[0]))
-    picked = None if where is None else where(system)
-    several = (len(picked),) if isinstance(picked, tuple) else ()
+    where = None if where is None else pick(where, system)
+    several = (len(where.leaves),) if where is not None and where.several else ()
     if (where is None) != (values is None) or (
         values is not None and values.shape != (lanes, *several)
     ):
@@ -118,8 +121,10 @@ def stroboscope(
     def work(first):
         some = all_lanes.some(slice(first, first + group))
         seen = TurnSamples(len(some.states), turns, skip, states.shape[1])
-        pace = Pace(width, rows, max_steps)
-        ends = run_refilled(some, Turns(start, length, turns), settings, pace, seen)
+        chunking = Chunking(width, rows, max_steps)
+        ends = run_refilled(
+            some, Horizon(start, length, turns), settings, chunking, seen
+        )
         return seen.states, *ends, *seen.counts()
 
     pieces = []
@@ -139,26 +144,32 @@ def _check(batched, shared, settings, t0, period, states) -> None:
     if not np.all(np.isfinite(states)):
         raise ValueError("a state is not finite; every component of each must be")
 
-    nearest, lengths = _look(batched, shared, period, t0, jnp.asarray(states))
-    if not bool(jnp.all(lengths > 0)):
+    seen = _starts(batched, shared, period, t0, jnp.asarray(states))
+    nearest, behind, lengths, returned = map(np.asarray, seen)
+    if not np.all(lengths > 0):
         raise ValueError(
             "the period of a lane is not positive; check values and period"
         )
-    low = float(jnp.min(nearest))
-    if not low >= -1e-12 * (1.0 + float(np.max(np.abs(states)))):
+    check_restitution(first, returned)
+    if not np.all(np.isfinite(nearest)):
+        raise ValueError("the gap is not finite at t0; check states and parameters")
+    if np.any(behind):
+        lane = int(np.argmin(np.where(behind, nearest, np.inf)))
         raise ValueError(
-            f"gap is negative ({low:.1e}) at t0 in lane {int(jnp.argmin(nearest))}; "
+            f"gap is negative ({float(nearest[lane]):.1e}) at t0 in lane {lane}; "
             "start outside the constraint"
         )
 
 
 @eqx.filter_jit
-def _look(batched, shared, period, t0, states):
-    """Smallest gap and period of each lane."""
+def _starts(batched, shared, period, t0, states):
+    """Of each lane: smallest gap, whether it is behind, period, restitution."""
 
     def one(batched, state):
         system = eqx.combine(batched, shared)
         length = system.period if period is None else period
-        return jnp.min(gaps(system, t0, state)), jnp.asarray(length, dtype=jnp.float64)
+        behind, values = starts_behind(system, t0, state)
+        length = jnp.asarray(length, dtype=jnp.float64)
+        return jnp.min(values), behind, length, restitutions(system, t0, state)
 
     return eqx.filter_vmap(one, in_axes=(eqx.if_array(0), 0))(batched, states)

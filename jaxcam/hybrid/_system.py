@@ -1,11 +1,9 @@
 """What a hybrid system is: three functions of time and state, and parameters."""
 
 import abc
-from typing import Any, ClassVar, TypeVar
+from typing import Any, ClassVar
 
 import equinox as eqx
-import jax
-import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ._types import RealScalar
@@ -31,6 +29,9 @@ class HybridSystem(eqx.Module):
     #: names and units of the state's components, for tables and axes
     state_names: ClassVar[tuple[str, ...]] = ()
     state_units: ClassVar[tuple[str, ...]] = ()
+    #: whether impacts may give speed, as at a driven bumper or where time runs
+    #: backwards; otherwise a coefficient of restitution above one is refused
+    active: ClassVar[bool] = False
 
     @abc.abstractmethod
     def vector_field(
@@ -60,6 +61,18 @@ class HybridSystem(eqx.Module):
         """Period of the forcing (s), or `None` for a system without one."""
         return None
 
+    @property
+    def breakpoints(self) -> Any:
+        """Times at which a function may change abruptly (s), shape `(k,)`, or `None`.
+
+        Steps end exactly there, and the field, gap and impact law are evaluated on
+        either side only, so that a switch may be written with `jnp.where(t < b, ...)`.
+        A system with a `period` has them in every period, at `b + k * period`; without
+        one they are times of the run. State a brief force by the times at which it
+        begins and ends; a few, as each costs some operations in every step.
+        """
+        return None
+
     def prepared(self) -> "HybridSystem":
         """An equal system that is cheaper to evaluate many times.
 
@@ -74,16 +87,3 @@ class HybridSystem(eqx.Module):
         Called with concrete parameters, before a simulation starts.
         """
         return None
-
-
-_Module = TypeVar("_Module", bound=eqx.Module)
-
-
-def with_array_parameters(system: _Module) -> _Module:
-    """The system (or settings) with Python floats turned into arrays.
-
-    A field declared as `stiffness: float = 3.0` is a parameter like any other.
-    """
-    return jax.tree.map(
-        lambda leaf: jnp.asarray(leaf) if type(leaf) is float else leaf, system
-    )

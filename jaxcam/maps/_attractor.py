@@ -7,6 +7,8 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 
+from ..parameters import real_array
+
 
 class Attractor(NamedTuple):
     """The end of one orbit."""
@@ -43,7 +45,7 @@ def map_attractor(
     **Arguments:** the map, differentiable except on borders; a start; numbers of
     iterates dropped and used; the longest period that is looked for.
     """
-    start = jnp.asarray(start, dtype=float)
+    start = real_array(start, "start")
     last, rate, bounded, period = _settle(system, start, transient, count, longest)
     del last
     return Attractor(int(period), float(rate), bool(bounded))

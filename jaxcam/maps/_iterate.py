@@ -7,10 +7,12 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Float
 
+from ..parameters import real_array
+
 
 def iterate(system: Callable, start: ArrayLike, count: int) -> jax.Array:
     """The orbit of `start`, with it: shape `(count + 1, ...)`."""
-    start = jnp.asarray(start, dtype=float)
+    start = real_array(start, "start")
     return jnp.concatenate([start[None], _orbit(system, start, count)])
 
 
@@ -28,8 +30,8 @@ def map_diagram(
     **Arguments:** a map as a Module, `where` that picks the parameter, its values, the
     start, and the numbers of iterates that are dropped and kept.
     """
-    values = jnp.asarray(values, dtype=float)
-    start = jnp.asarray(start, dtype=float)
+    values = real_array(values, "values")
+    start = real_array(start, "start")
     return _diagram(system, where, values, start, transient, keep)
 
 

@@ -9,6 +9,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
+from ..parameters import real_array
+
 
 _NEWTON = 50
 _MOST_POINTS = 20_000
@@ -28,7 +30,7 @@ def saddle_at(system: Callable, guess: Float[ArrayLike, " 2"]) -> Saddle:
 
     **Raises:** `ValueError` where there is no fixed point, or it is no saddle.
     """
-    point = jnp.asarray(guess, dtype=float)
+    point = real_array(guess, "guess")
     step = jnp.full(2, jnp.inf)
     for _ in range(_NEWTON):
         image, matrix = _linearised(system, point)

@@ -5,6 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax.custom_derivatives import SymbolicZero
 
+from ..hybrid.lowering import saving_jvp
 from ._parameters import parameter, require_finite
 from ._profile import CamProfile
 
@@ -42,7 +43,7 @@ class FourierProfile(CamProfile):
         require_finite(mean=self.mean, cosines=self.cosines, sines=self.sines)
 
 
-def fourier_sum(angle, mean, cosines, sines):
+def _sum(angle, mean, cosines, sines):
     # Waves by their recurrence, unrolled in Python: inside a simulation's loop it must
     # fuse into plain arithmetic, and the derivatives of a gap share the waves.
     cosine, sine = jnp.cos(angle), jnp.sin(angle)
@@ -60,7 +61,7 @@ def fourier_sum(angle, mean, cosines, sines):
 # The derivative of a series is again a series. Saying so halves the work of gap,
 # velocity, acceleration and jerk together, against differentiating the recurrence.
 # Traced once for each number of harmonics, since a simulation asks for it many times.
-_series = jax.custom_jvp(jax.jit(fourier_sum))
+_series = saving_jvp(_sum)
 
 
 def _series_jvp(primals, tangents):

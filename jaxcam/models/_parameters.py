@@ -2,14 +2,15 @@
 
 import equinox as eqx
 import jax
-import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
+
+from ..parameters import real_array
 
 
 def as_parameter(value) -> jax.Array:
     """A number, list or traced value as a floating-point array."""
-    return jnp.asarray(value, dtype=float)
+    return real_array(value, "a parameter")
 
 
 def parameter(default=None):

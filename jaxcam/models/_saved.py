@@ -71,7 +71,7 @@ def load_system(file: str | Path, *, classes: Iterable[type] = ()) -> HybridSyst
     """Read a system that `save_system` wrote.
 
     **Arguments:** `classes` beside those of `jaxcam.models` that may occur in it, such
-    as a system of your own, or `jaxcam.discrepancy.saved_classes()`.
+    as a system of your own, or `jaxcam.discrepancy.terms.saved_classes()`.
 
     **Raises:** `ValueError` for a file that is not one, or names another class.
     """
@@ -178,7 +178,9 @@ def _decode(found: Any, known: dict[str, type], place: str) -> Any:
     cls = known[name]
     fields = {field.name: field for field in dataclasses.fields(cls)}
     given = found["fields"] if isinstance(found["fields"], dict) else {}
-    for wrong in sorted(set(given) ^ set(fields)):
+    # what a class has only since a file was written is as it was then
+    spare = {name for name, field in fields.items() if field.metadata.get("spare")}
+    for wrong in sorted((set(given) ^ set(fields)) - spare):
         what = "lacks" if wrong in fields else "has an unknown field"
         raise ValueError(
             f"`{place}` {what} {_short(wrong)}; the fields of {name} are "
@@ -186,6 +188,9 @@ def _decode(found: Any, known: dict[str, type], place: str) -> Any:
         )
     made = object.__new__(cls)
     for key, field in fields.items():
+        if key not in given:
+            object.__setattr__(made, key, field.default)
+            continue
         value = _decode(given[key], known, f"{place}.{key}")
         dynamic = not field.metadata.get("static", False)
         if dynamic and isinstance(value, int | float) and not isinstance(value, bool):

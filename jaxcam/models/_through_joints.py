@@ -8,6 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from ..hybrid import Contacts, Impacts, simulate, Steps, Trajectory
+from ..hybrid.checks import refuse_tracers
 from ._cam_follower import CamFollower
 from ._desmodromic import DesmodromicCam
 from ._motion_program import MotionPieces, MotionProgram
@@ -53,12 +54,13 @@ def simulate_through_joints(
     are those of the impacts alone.
 
     **Arguments:** a system whose `profile` is a [`jaxcam.models.MotionProgram`][], and
-    everything else as for [`jaxcam.simulate`][].
+    everything else as for [`jaxcam.simulate`][jaxcam.hybrid.simulate].
 
     **Returns:** one trajectory; a contact that lasts through a joint is listed once.
 
     **Raises:** `ValueError` for another profile, and whatever `simulate` raises.
     """
+    refuse_tracers("simulate_through_joints", "jaxcam.simulate", system, state, t0, t1)
     program = system.profile
     if not isinstance(program, MotionProgram):
         raise ValueError(

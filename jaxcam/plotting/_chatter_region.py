@@ -3,7 +3,7 @@
 import numpy as np
 from matplotlib.axes import Axes
 
-from variational import ChatterFrame, GrazingManifold, ImpactCurve
+from variational.chatter import ChatterFrame, GrazingManifold, ImpactCurve
 
 from ._axes import legend_above, one_axes
 from ._style import BAND, FLIGHT, IMPACT, SECTION, styled

@@ -8,7 +8,8 @@ from jaxtyping import ArrayLike
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ..recordings import Comparison, Recording
+from ..recordings import Recording
+from ..recordings.against_model import Comparison
 from ._axes import legend_above, several_axes
 from ._channels import channel_label, name_and_unit
 from ._labels import labelled

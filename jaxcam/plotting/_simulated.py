@@ -3,7 +3,8 @@
 import numpy as np
 from jaxtyping import Float
 
-from ..recordings import Comparison, Recording
+from ..recordings import Recording
+from ..recordings.against_model import Comparison
 
 
 def simulated_channel(

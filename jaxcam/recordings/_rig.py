@@ -57,6 +57,29 @@ class Sensors:
 
 
 @dataclasses.dataclass(frozen=True)
+class References:
+    """Constants in the forms of the physics that a rig's model may lack.
+
+    They fix what a strength means and are not fitted; by default, those of the thesis'
+    cam-follower.
+
+    - `spring_center`: angle (rad) about which a nonlinear spring is symmetric.
+    - `impact_speed`: approach speed (rad/s) in a restitution that falls with it.
+    - `profile_lead`: phase (rad) of an error of the cam's profile twice per turn.
+    - `stribeck_speed`: speed (rad/s) up to which friction is larger.
+    - `slip_speed`: speed (rad/s) within which dry friction changes sign, far below the
+        speeds of the motion; `free_slip_speed` in friction that varies with position.
+    """
+
+    spring_center: float = 0.27
+    impact_speed: float = 0.3
+    profile_lead: float = 0.7
+    stribeck_speed: float = 0.1
+    slip_speed: float = 0.015
+    free_slip_speed: float = 0.01
+
+
+@dataclasses.dataclass(frozen=True)
 class Rig:
     """What `rig.toml` says, typed and checked; `system` turns it into a model.
 
@@ -76,6 +99,7 @@ class Rig:
     spring_elongation: Quantity
     restitution: Quantity
     sensors: Sensors
+    references: References = References()
 
     def replace(self, **values: float) -> "Rig":
         """The rig with other nominal values; tolerances stay.

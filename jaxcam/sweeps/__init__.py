@@ -11,7 +11,6 @@ from ._boundary import (
 from ._cell_mapping import cell_mapping as cell_mapping, CellMapping as CellMapping
 from ._chart import chart as chart
 from ._chart_result import Chart as Chart
-from ._cluster import cluster as cluster
 from ._diagram import diagram as diagram
 from ._diagram_result import Diagram as Diagram, Range as Range
 from ._exponents import Exponents as Exponents, largest_exponents as largest_exponents
@@ -21,21 +20,16 @@ from ._follow import (
     match as match,
 )
 from ._grid import Grid as Grid
-from ._impact_section import ImpactSection as ImpactSection
-from ._label import label as label, Labels as Labels, periods as periods
 from ._load import load as load
-from ._map import Map as Map
-from ._poincare_section import (
+from ._starts import monte_carlo as monte_carlo
+from .attractors import label as label, periods as periods, settle as settle
+from .blocks import cluster as cluster, Progress as Progress
+from .sections import (
+    AbstractSection as AbstractSection,
+    ImpactSection as ImpactSection,
+    Map as Map,
     PoincareSection as PoincareSection,
     return_times as return_times,
+    Samples as Samples,
+    Stroboscopic as Stroboscopic,
 )
-from ._run import (
-    AbstractJob as AbstractJob,
-    Progress as Progress,
-    run_blocks as run_blocks,
-)
-from ._samples import Samples as Samples
-from ._section import AbstractSection as AbstractSection
-from ._starts import monte_carlo as monte_carlo
-from ._store import Layout as Layout, Variable as Variable
-from ._stroboscopic import Stroboscopic as Stroboscopic

@@ -10,8 +10,8 @@ from ._basins_job import BasinsJob, default_scale
 from ._basins_result import Basins
 from ._grid import Grid
 from ._inputs import as_section, check_turns
-from ._run import Progress, run_blocks
 from ._together import together
+from .blocks import Progress, run_blocks
 
 
 def basins(
@@ -55,7 +55,7 @@ def basins(
     - `known`: basins of the same system whose attractors keep their numbers here, for
         example when zooming in.
     - `out`, `resume`, `executor`, `workers`, `progress`: as for
-        [`jaxcam.sweeps.run_blocks`][].
+        [`jaxcam.sweeps.blocks.run_blocks`][].
     - `block`: rows of the grid's first component that are computed together.
 
     **Returns:** [`jaxcam.sweeps.Basins`][].

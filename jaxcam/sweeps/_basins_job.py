@@ -5,15 +5,11 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ._fingerprint import cell_codes, fingerprint_size, fingerprints
 from ._grid import Grid
-from ._identity import about_section
 from ._inputs import LANES
-from ._label import APERIODIC
-from ._run import AbstractJob, Arrays
-from ._section import AbstractSection
-from ._settle import settle
-from ._store import Layout, Variable
+from .attractors import APERIODIC, cell_codes, fingerprint_size, fingerprints, settle
+from .blocks import about_section, AbstractJob, Arrays, Layout, Variable
+from .sections import AbstractSection
 
 
 #: extent of the cells by which motions that do not repeat are told apart

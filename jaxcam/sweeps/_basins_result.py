@@ -7,7 +7,7 @@ import numpy as np
 import xarray
 
 from ._grid import Grid
-from ._store import SWEEP
+from .blocks import SWEEP
 
 
 class Share(NamedTuple):
@@ -23,7 +23,8 @@ class Basins:
     `dataset` has one dimension for each component of the state, and `attractor` (the
     number of the one that each state ends on, -1 if it escapes to infinity, -2 if it
     failed, -3 if it cannot start), `impacts` and `turns` (see
-    [`jaxcam.sweeps.Labels`][]); along `number`, the attractors: `name` and `orbit`.
+    [`jaxcam.sweeps.attractors.Labels`][]); along `number`, the attractors: `name` and
+    `orbit`.
     """
 
     def __init__(self, dataset: xarray.Dataset, grid: Grid):

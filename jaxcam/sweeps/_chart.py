@@ -7,15 +7,22 @@ from pathlib import Path
 
 import numpy as np
 
+from ..parameters import Pick, pick
 from ._chart_result import Chart
 from ._exponents import largest_exponents
-from ._identity import about_section, digest
 from ._inputs import as_section, as_starts, as_values, check_turns
-from ._pick import Pick, pick
-from ._run import AbstractJob, Arrays, Progress, run_blocks
-from ._section import AbstractSection
-from ._settle import settle
-from ._store import Layout, Variable
+from .attractors import settle
+from .blocks import (
+    about_section,
+    AbstractJob,
+    Arrays,
+    digest,
+    Layout,
+    Progress,
+    run_blocks,
+    Variable,
+)
+from .sections import AbstractSection
 
 
 #: motions in a block; fewer than elsewhere, as exponents take long
@@ -53,7 +60,7 @@ def chart(
     - `turns`, `keep`, `tolerance`, `reruns`: as for [`jaxcam.sweeps.basins`][].
     - `exponents`: with it, the largest Lyapunov exponent over so many further turns.
     - `out`, `resume`, `executor`, `workers`, `progress`: as for
-        [`jaxcam.sweeps.run_blocks`][].
+        [`jaxcam.sweeps.blocks.run_blocks`][].
     - `block`: values of the second parameter that are computed together.
 
     **Returns:** a [`jaxcam.sweeps.Chart`][].

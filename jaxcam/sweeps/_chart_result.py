@@ -3,7 +3,7 @@
 import numpy as np
 import xarray
 
-from ._label import APERIODIC, Labels, names
+from .attractors import APERIODIC, label_names, Labels
 
 
 class Chart:
@@ -37,7 +37,7 @@ class Chart:
     def labels(self) -> np.ndarray:
         """(l, k, starts) labels in words; chaotic where an exponent says so."""
         numbers = Labels(self.dataset["impacts"].values, self.dataset["turns"].values)
-        found = names(numbers)
+        found = label_names(numbers)
         if "exponent" in self.dataset:
             largest = self.dataset["exponent"].values
             error = self.dataset["exponent_stderr"].values

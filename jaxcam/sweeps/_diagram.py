@@ -7,13 +7,13 @@ from typing import Literal
 
 import numpy as np
 
+from ..parameters import pick
 from ._diagram_job import CarriedJob, DiagramJob
 from ._diagram_result import Diagram
 from ._dwell import dwell_turns, DwellJob
 from ._inputs import as_section, as_starts, as_values, check_turns
-from ._pick import pick
-from ._run import Progress, run_blocks
-from ._samples import BEHIND
+from .blocks import Progress, run_blocks
+from .sections import BEHIND
 
 
 Direction = Literal["each", "up", "down", "both"]
@@ -57,7 +57,7 @@ def diagram(
         place of `turns` and `keep`. Samples that a value has no turns for are NaN.
     - `tolerance`: for finding periods, up to `keep / 2`.
     - `out`, `resume`, `executor`, `workers`, `progress`: as for
-        [`jaxcam.sweeps.run_blocks`][].
+        [`jaxcam.sweeps.blocks.run_blocks`][].
     - `block`: values that are computed together and stored at once.
 
     **Returns:** a [`jaxcam.sweeps.Diagram`][].

@@ -5,15 +5,11 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ._identity import about_section, digest
+from ..parameters import Pick
 from ._inputs import LANES
-from ._label import label
-from ._pick import Pick
-from ._run import AbstractJob, Arrays
-from ._samples import filled
-from ._section import AbstractSection, component_coordinates
-from ._settle import settle
-from ._store import Layout, Variable
+from .attractors import label, settle
+from .blocks import about_section, AbstractJob, Arrays, digest, Layout, Variable
+from .sections import AbstractSection, component_coordinates, filled
 
 
 #: values of a block where the state is carried from one to the next

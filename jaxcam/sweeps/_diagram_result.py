@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 import xarray
 
-from ._label import Labels, names
+from .attractors import label_names, Labels
 
 
 class Range(NamedTuple):
@@ -24,8 +24,8 @@ class Diagram:
     `dataset` has the dimensions point (a value of the parameter, in the order in which
     they were gone through), start, sample and component, and the variables `state`,
     `hits` (impacts since the sample before), `impacts` and `turns` (the label, see
-    [`jaxcam.sweeps.Labels`][]), `code` (0, or why a motion failed), and, where samples
-    are not a turn apart, `time` (s) and `phase` (turns, from 0 to 1).
+    [`jaxcam.sweeps.attractors.Labels`][]), `code` (0, or why a motion failed), and,
+    where samples are not a turn apart, `time` (s) and `phase` (turns, from 0 to 1).
     """
 
     def __init__(self, dataset: xarray.Dataset):
@@ -56,7 +56,7 @@ class Diagram:
     def labels(self) -> np.ndarray:
         """(points, starts) labels in words, such as P(1,1) or P(inf,1)."""
         numbers = Labels(self.dataset["impacts"].values, self.dataset["turns"].values)
-        return names(numbers)
+        return label_names(numbers)
 
     def ranges(self, start: int = 0) -> list[Range]:
         """The labels in order, each with the values over which it was met.

@@ -6,10 +6,10 @@ from collections.abc import Callable
 
 import numpy as np
 
+from ..parameters import Pick
 from ._diagram_job import CarriedJob, one_after_the_other
-from ._pick import Pick
-from ._run import Arrays
-from ._section import AbstractSection
+from .blocks import Arrays
+from .sections import AbstractSection
 
 
 #: of a turn, so that rounding costs none

@@ -9,8 +9,8 @@ import numpy as np
 import variational
 
 from ..hybrid import HybridSystem, Settings
-from ._section import AbstractSection
-from ._unique_rows import unique_rows
+from .attractors import unique_rows
+from .sections import AbstractSection
 
 
 class Exponents(NamedTuple):

@@ -8,13 +8,13 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
+from ..parameters import pick
 from ._basins import basins
 from ._basins_result import Basins
 from ._grid import Grid
 from ._inputs import as_section, as_values
-from ._match import match_orbits
-from ._pick import pick
-from ._run import Progress
+from .attractors import match_orbits
+from .blocks import Progress
 
 
 class FollowedBasins(NamedTuple):

@@ -3,8 +3,7 @@
 import numpy as np
 
 from ..hybrid import HybridSystem
-from ._section import AbstractSection
-from ._stroboscopic import Stroboscopic
+from .sections import AbstractSection, Stroboscopic
 
 
 #: motions in a block, unless something else is asked for

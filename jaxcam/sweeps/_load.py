@@ -5,10 +5,9 @@ from pathlib import Path
 
 from ._basins_result import Basins
 from ._chart_result import Chart
-from ._checksums import checked
 from ._diagram_result import Diagram
 from ._grid import Grid
-from ._store import SWEEP
+from .blocks import checked, SWEEP
 
 
 def load(path: str | Path) -> Diagram | Basins | Chart:

@@ -3,14 +3,19 @@
 import numpy as np
 import xarray
 
-from ._attractors import attractor_names, Attractors, find_attractors
 from ._basins_job import BasinsJob
 from ._basins_result import Basins
-from ._label import APERIODIC, OUTSIDE
-from ._match import match_orbits
-from ._section import AbstractSection, component_coordinates
-from ._settle import settle
-from ._store import Store
+from .attractors import (
+    APERIODIC,
+    attractor_names,
+    Attractors,
+    find_attractors,
+    match_orbits,
+    OUTSIDE,
+    settle,
+)
+from .blocks import Store
+from .sections import AbstractSection, component_coordinates
 
 
 #: points of an orbit that are kept of each attractor

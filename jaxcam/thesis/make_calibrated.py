@@ -21,20 +21,17 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ..fitting import (
-    fit_published,
-    fly,
-    impact_orbit,
-    orbit_trace,
-    Published,
-    PublishedFit,
-    release_near,
-    rounding_error,
-)
+from variational import impact_orbit, orbit_trace, release_near
+from variational.orbits import flight_end
+
+from ..fitting import fit_published, Published, PublishedFit
+from ..fitting.published import rounding_error
 from ..hybrid import contact_state, release_point
 from ..models import CamFollower, LinearInSpeed, rad_s_to_rpm, rpm_to_rad_s
-from . import _printed as printed
-from ._orbits import at_speed, first_orbit, NEAR_CAM
+from .chapter_5_bifurcations import table_5_2
+from .chapter_6_chattering import table_6_1
+from .orbits import first_orbit, NEAR_CAM
+from .speeds import at_rpm, speed_of
 
 
 #: relative tolerance of what Table 4.4 prints
@@ -76,10 +73,10 @@ class Law(NamedTuple):
 
 def restitution_law() -> Law:
     """The line through the roots of the products of the multipliers."""
-    r = np.sqrt(printed.PRODUCTS)
-    slope, intercept = np.polyfit(printed.SPEEDS, r, 1)
+    r = np.sqrt(table_5_2.PRODUCTS)
+    slope, intercept = np.polyfit(table_5_2.SPEEDS, r, 1)
     law = LinearInSpeed(slope=rad_s_to_rpm(slope), intercept=intercept)
-    return Law(law, r - np.polyval([slope, intercept], printed.SPEEDS))
+    return Law(law, r - np.polyval([slope, intercept], table_5_2.SPEEDS))
 
 
 def nominal_rig(rotation: str = "clockwise") -> CamFollower:
@@ -138,21 +135,21 @@ def published(system: CamFollower) -> list[Published]:
     guess = first_orbit(system)
     if guess is None:
         raise ValueError("The rig has no orbit with one impact a turn at 148 rpm.")
-    far = ~printed.NEAR_FOLD
-    speeds = jnp.asarray(rpm_to_rad_s(printed.SPEEDS[far]))
+    far = ~table_5_2.NEAR_FOLD
+    speeds = jnp.asarray(rpm_to_rad_s(table_5_2.SPEEDS[far]))
     point = release_point(
-        at_speed(system, printed.CHATTER_SPEED), 60 / printed.CHATTER_SPEED
+        at_rpm(system, table_6_1.CHATTER_SPEED), 60 / table_6_1.CHATTER_SPEED
     )
 
     def traces(model: Observed):
         def one(speed):
-            moved = eqx.tree_at(lambda s: s.speed, model.system, speed)
+            moved = eqx.tree_at(speed_of, model.system, speed)
             return orbit_trace(moved, impact_orbit(moved, guess))
 
         return jax.vmap(one)(speeds)
 
     def released(model):
-        moved = at_speed(model.system, printed.CHATTER_SPEED)
+        moved = at_rpm(model.system, table_6_1.CHATTER_SPEED)
         return moved, *release_near(moved, point.time, point.state)
 
     def release(model):
@@ -160,7 +157,7 @@ def published(system: CamFollower) -> list[Published]:
         return jnp.append(time, state)
 
     def accumulation(model):
-        moved = at_speed(model.system, printed.CHATTER_SPEED)
+        moved = at_rpm(model.system, table_6_1.CHATTER_SPEED)
         time = model.accumulation
         state = contact_state(moved, time[None], jnp.array(NEAR_CAM))[0]
         return jnp.append(time, state)
@@ -168,16 +165,16 @@ def published(system: CamFollower) -> list[Published]:
     def section(model):
         moved, time, state = released(model)
         end = moved.period
-        follower = fly(moved, time, state, end - time)
+        follower = flight_end(moved, time, state, end, steps=32)
         cam = contact_state(moved, end[None], jnp.array(NEAR_CAM))[0]
         return jnp.concatenate([follower, follower - cam])
 
-    error = rounding_error(printed.DECIMALS)
-    relative = [*printed.SECTION, *printed.SECTION_RELATIVE]
+    error = rounding_error(table_6_1.DECIMALS)
+    relative = [*table_6_1.SECTION_STATE, *table_6_1.SECTION_RELATIVE]
     return [
-        Published("sum of multipliers", traces, printed.TRACES[far], TRACE_ERROR),
-        Published("release", release, printed.RELEASE, error),
-        Published("accumulation", accumulation, printed.ACCUMULATION, error),
+        Published("sum of multipliers", traces, table_5_2.TRACES[far], TRACE_ERROR),
+        Published("release", release, table_6_1.RELEASE, error),
+        Published("accumulation", accumulation, table_6_1.ACCUMULATION, error),
         Published("section", section, relative, error),
     ]
 
@@ -185,7 +182,7 @@ def published(system: CamFollower) -> list[Published]:
 def fit_rig(rotation: str = "clockwise", max_steps: int = 512) -> PublishedFit:
     """Seven parameters of the rig, and two phases, from Tables 5.2 and 6.1."""
     nominal = nominal_rig(rotation)
-    start = Observed(nominal, jnp.asarray(printed.ACCUMULATION[0]))
+    start = Observed(nominal, jnp.asarray(table_6_1.ACCUMULATION[0]))
     return fit_published(
         start,
         free,

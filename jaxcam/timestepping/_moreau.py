@@ -8,9 +8,10 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
-from ..hybrid import HybridSystem, normal_directions, normal_velocity
-from ..hybrid._normal import gaps, impacts
-from ..hybrid._system import with_array_parameters
+from ..hybrid import HybridSystem, normal_velocity
+from ..hybrid.checks import check_system
+from ..hybrid.surface import gaps, impacts, normal_directions
+from ..parameters import as_arrays, real_array
 from ._chunks import CHUNK, in_chunks
 from ._lemke import explain, lemke
 
@@ -58,12 +59,12 @@ def moreau(
 
     **Raises:** `ValueError` where a step has no solution, or the motion is not finite.
     """
-    state = jnp.asarray(state, dtype=jnp.float64)
+    state = real_array(state)
     t0, t1 = float(t0), float(t1)
     if not (steps >= 1 and t1 > t0):
         raise ValueError("Give a `t1` after `t0` and at least one step.")
-    system.check()
-    system = with_array_parameters(system)
+    system = as_arrays(system)
+    check_system(system, jnp.asarray(t0), state)
     h = jnp.asarray((t1 - t0) / steps)
     start = jnp.asarray(t0)
     states, pushes, distances, codes = in_chunks(

@@ -8,6 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
+from ..parameters import real_array
 from ._chunks import CHUNK, in_chunks
 from ._lemke import explain
 from ._relay import is_p_matrix, relay_problem, RelaySystem
@@ -38,7 +39,7 @@ def relay_steps(
     **Raises:** `ValueError` where a step has no solution or more than one: I - h A is
     singular, or C (I/h - A)^-1 B + D is no P-matrix.
     """
-    state = jnp.asarray(state, dtype=jnp.float64)
+    state = real_array(state)
     n = system.A.shape[0]
     if state.shape != (n,):
         raise ValueError(f"Give a state of shape {(n,)}; it has shape {state.shape}.")

@@ -1,0 +1,125 @@
+"""The first thing that happens within one step of an integrator, found on a fine grid.
+
+Between two points of the grid a gap is taken to turn at most once. A turn from falling
+to rising is found as the root of the normal velocity, so a dip below zero between two
+points is not missed.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.optimize import brentq, minimize_scalar
+
+
+#: a flight after a release is not judged up to this gap
+CLEAR = 1e-9
+# parts of a step in which it is searched
+_PARTS = 24
+_ROOT = dict(xtol=1e-15, rtol=4 * np.finfo(float).eps, maxiter=300)
+
+
+class Event(NamedTuple):
+    """An impact (the gap closes) or a release (the contact force vanishes)."""
+
+    time: float
+    kind: str
+    constraint: int
+
+
+def first_event(dynamics, dense, begin, end, held, fresh, blind) -> Event | None:
+    """The first event in (begin, end], or `None`.
+
+    **Arguments:** `dense(times)`, states in columns; the gaps `held` in contact; the
+    gaps `fresh` that have left their surface at `begin` itself by an impact; the gaps
+    `blind` that a release has opened and that are not yet clear of the surface.
+    """
+    times = np.linspace(begin, end, _PARTS + 1)
+    states = dense(times)
+    gaps, speeds = dynamics.gaps(times, states)
+    found = []
+    for k in range(dynamics.m):
+        if k not in held:
+            # the part of the step in which a gap after a release is not yet clear
+            clear = np.flatnonzero(gaps[:, k] > CLEAR) if k in blind else [0]
+            if not len(clear):
+                continue
+            rest = slice(clear[0], None)
+            parts = times[rest], gaps[rest, k], speeds[rest, k]
+            root = _closing(dynamics, dense, *parts, k, k in fresh)
+            if root is not None:
+                found.append(Event(root, "impact", k))
+    for k in held:
+        root = _letting_go(dynamics, dense, times, held, k)
+        if root is not None:
+            found.append(Event(root, "release", k))
+    return min(found, default=None)
+
+
+def _closing(dynamics, dense, times, gaps, speeds, k, fresh):
+    """The first root of gap `k`; the one that a fresh flight begins at is left out."""
+
+    def gap(t):
+        return dynamics.gaps(np.array([t]), dense(np.array([t])))[0][0, k]
+
+    def speed(t):
+        return dynamics.gaps(np.array([t]), dense(np.array([t])))[1][0, k]
+
+    for i in range(len(times) - 1):
+        a, b = times[i], times[i + 1]
+        first = fresh and i == 0
+        if gaps[i + 1] < 0:
+            if not first:
+                return _root(gap, a, b)
+            # it rises first: the root lies behind the top
+            if speeds[i] <= 0 or speeds[i + 1] >= 0:
+                return a
+            top = brentq(speed, a, b, **_ROOT)
+            return _root(gap, top, b)
+        if speeds[i] < 0 < speeds[i + 1]:
+            bottom = brentq(speed, a, b, **_ROOT)
+            if gap(bottom) < 0:
+                return _root(gap, a, bottom)
+    return None
+
+
+def _letting_go(dynamics, dense, times, held, k):
+    """Where the contact force at gap `k` first vanishes."""
+    place = list(held).index(k)
+
+    def force(t):
+        return dynamics.pressure(t, dense(t), held)[place]
+
+    forces = np.array([force(t) for t in times])
+    if np.min(forces[1:]) >= 0 and not _turns_low(forces):
+        return None
+    for i in range(len(times) - 1):
+        a, b = times[max(i - 1, 0)], times[i + 1]
+        if forces[i + 1] < 0:
+            start = times[i]
+            return _root(force, start, b)
+        if _turns_low(forces[max(i - 1, 0) : i + 2]):
+            lowest = minimize_scalar(
+                force, (a, b), method="bounded", options={"xatol": 1e-9}
+            )
+            if lowest.fun < 0:
+                return _root(force, a, lowest.x)
+    return None
+
+
+def _root(function, a, b):
+    """Where a function falls through zero in [a, b]; an end that rounding puts there.
+
+    Many points at once are rounded otherwise than one, so a sign is looked at again.
+    """
+    if function(a) <= 0:
+        return a
+    return brentq(function, a, b, **_ROOT) if function(b) < 0 else b
+
+
+def _turns_low(values) -> bool:
+    """Whether a minimum is so near zero that it may lie below between the points."""
+    if len(values) < 3:
+        return False
+    before, middle, after = values[:-2], values[1:-1], values[2:]
+    turn = (before > middle) & (middle < after)
+    return bool(np.any(turn & (middle < np.maximum(before, after) - middle)))

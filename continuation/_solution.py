@@ -1,0 +1,75 @@
+"""The solution that a run along a branch has reached, and the point made of it."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ._point import Point, with_parameter
+from ._problem import AbstractProblem
+from ._program import Corrected
+from .special import Context, eigenvalues_at, is_stable, test_values
+
+
+class Solution(NamedTuple):
+    """The solution that a run has reached."""
+
+    problem: AbstractProblem
+    at: Corrected
+    tests: dict[str, float]
+    step: float
+    arclength: float
+    #: points passed, oldest first, as states with their tangents
+    trail: tuple
+    #: whether its point has been yielded
+    yielded: bool = False
+
+
+def solution_at(
+    problem: AbstractProblem,
+    leaf: int,
+    at: Corrected,
+    step: float,
+    arclength: float,
+    trail=(),
+) -> Solution:
+    """The solution with its test functions."""
+    return Solution(problem, at, test_values(problem, leaf, at), step, arclength, trail)
+
+
+def point_of(
+    context: Context,
+    current: Solution,
+    label: int,
+    kind: str,
+    reason: str = "",
+    converged: bool = True,
+    coefficient: float | None = None,
+    criticality: str = "",
+) -> Point:
+    """The solution as a point of the branch."""
+    at, problem = current.at, current.problem
+    multipliers, why = eigenvalues_at(problem, context.leaf, at)
+    z = np.asarray(at.z)
+    return Point(
+        label=label,
+        kind=kind,
+        parameter=float(z[-1]),
+        state=z[:-1],
+        multipliers=multipliers,
+        stable=is_stable(problem, multipliers),
+        tangent=np.asarray(at.tangent),
+        scale=np.asarray(at.scale),
+        step=float(current.step),
+        arclength=float(current.arclength),
+        iterations=int(at.iterations),
+        converged=bool(converged),
+        reason=reason or why,
+        coefficient=coefficient,
+        criticality=criticality,
+        observed={k: np.asarray(v) for k, v in at.observed.items()},
+        tests=dict(current.tests),
+        signature=problem.signature,
+        parameters=(*problem.free(z[:-1]), float(z[-1])),
+        problem=with_parameter(problem, context.leaf, z[-1]),
+        leaf=context.leaf,
+    )

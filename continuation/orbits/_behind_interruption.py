@@ -1,0 +1,134 @@
+"""Behind the interruption of chattering: the orbits with finitely many impacts.
+
+Their deviation from the orbit that sticks, as it leaves the impacts near release, is
+one number x > 0, and the parameter at which they are periodic is a continuous function
+of it that ends at the interruption for x = 0. So they are one branch, which begins
+there; but on the way to it they have more and more impacts, by a grazing each. The
+branch is therefore taken up a little behind its end, and followed away from it.
+"""
+
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jaxcam.hybrid import HybridSystem
+from variational.chatter import next_impact, orbit_from, prepared_frame
+from variational.orbits import steps_for
+
+from .._parameter import with_leaf
+from .._problem import Start
+from .._program import correct
+from .._settings import Settings
+from ._shooting import ImpactingOrbits
+
+
+# impacts from release to release, of the orbit that is taken up
+_MOST = 48
+# its slowest rebound, over the fastest; slower impacts would be lost in the tolerance
+_SLOWEST = 1e-3
+# distances that are looked at, as powers of 2 of the width of the bounds
+_NEAREST, _TRIALS = -40, 4
+
+
+def orbit_behind(point: Any, periods: int) -> Start | None:
+    """The orbit with finitely many impacts behind an interruption, or None.
+
+    `point` is the interruption, its tangent pointing to where the branch goes; the
+    orbit repeats after so many `periods` of the forcing.
+    """
+    width = np.asarray(point.scale[-1])
+    sense = 1.0 if point.tangent[-1] >= 0 else -1.0
+    distances = float(width) * 2.0 ** np.arange(_NEAREST, 1)
+    values = point.parameter + sense * distances
+    rows, counts, slowest = (
+        np.asarray(found)
+        for found in _from_release(
+            point.problem.parameters, point.leaf, jnp.asarray(values), periods
+        )
+    )
+    trials = np.flatnonzero((counts >= 2) & (counts <= _MOST) & (slowest > _SLOWEST))
+    for k in trials[:_TRIALS]:
+        start = _closed_up(
+            periods, point, float(values[k]), rows[k, : counts[k]], sense, width
+        )
+        if start is not None:
+            step = float(distances[k] / width) / 2
+            return eqx.tree_at(lambda s: s.step, start, step, is_leaf=_is_none)
+    return None
+
+
+def _is_none(leaf):
+    return leaf is None
+
+
+@eqx.filter_jit
+def _from_release(parameters: HybridSystem, leaf: int, values, periods: int):
+    """Impacts of the motion that starts at release, at each value of the parameter.
+
+    **Returns:** phases and states `(k, _MOST, 3)`, how many of them belong to the orbit
+    (0 where it sticks), and the slowest rebound over the fastest.
+    """
+
+    def one(value):
+        system = with_leaf(parameters, leaf, value).prepared()
+        frame = prepared_frame(system, jnp.zeros(()))
+        orbit = orbit_from(system, frame, periods)
+
+        def hop(carry, _):
+            time, state, speed = carry
+            point = next_impact(system, time, state, speed, 2 * system.period)
+            row = jnp.concatenate([point.time[None] / system.period, point.state])
+            return (point.time, point.state, point.speed), (row, point.speed)
+
+        start = (frame.release, frame.state, jnp.zeros(()))
+        rows, speeds = jax.lax.scan(hop, start, length=_MOST)[1]
+        mine = jnp.arange(_MOST) < orbit.impacts
+        fastest = jnp.max(jnp.where(mine, speeds, 0.0))
+        slowest = jnp.min(jnp.where(mine, speeds, jnp.inf)) / fastest
+        # margin is NaN where contact comes earlier
+        finite = jnp.isfinite(orbit.margin) & (orbit.margin > 0)
+        return rows, jnp.where(finite, orbit.impacts, 0), slowest
+
+    return jax.lax.map(one, values)
+
+
+def _closed_up(
+    periods: int, point: Any, value: float, rows, sense: float, width
+) -> Start | None:
+    """The periodic orbit near the motion from release, and where the branch leaves."""
+    parameters = with_leaf(point.problem.parameters, point.leaf, np.asarray(value))
+    count = len(rows)
+    length = float(parameters.period)
+    starts = rows * np.array([length, 1.0, 1.0])
+    ends = np.append(starts[1:, 0], starts[0, 0] + periods * length)
+    try:
+        steps = steps_for(parameters, starts, ends)
+    except ValueError:
+        return None
+    orbits = ImpactingOrbits(parameters, (0,) * count, periods, 2, steps)
+    z = np.append(rows.ravel(), value)
+    across = np.zeros_like(z)
+    across[-1] = 1.0
+    at = correct(orbits, point.leaf, z, across, across, width, Settings())
+    if not at.success or orbits.refused(at.monitors, at.observed):
+        return None
+    if not np.all(np.isfinite(at.tangent)):
+        return None
+    # x grows where the parameter does for multipliers below one, and where it falls for
+    # those above: the others are next to zero
+    one = np.eye(at.linearisation.shape[0])
+    away = sense * float(np.sign(np.linalg.det(one - at.linearisation)))
+    tangent = at.tangent * (away or 1.0)
+    return Start(
+        orbits,
+        at.z[:-1],
+        float(at.z[-1]),
+        tangent,
+        reason=(
+            f"taken up with {count} impacts; between here and the interruption lie "
+            "infinitely many grazings, each with one impact more"
+        ),
+    )

@@ -1,0 +1,97 @@
+"""How an orbit goes on behind a grazing: with one impact less, or one more."""
+
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from variational.orbits import lowest_times
+
+from .._parameter import as_arrays
+from .._point import set_parameters
+from .._problem import Start
+from .._program import evaluate
+from .._settings import Settings
+from ._signature import with_impact, without_impact
+from ._watched import Watched, watched_of
+
+
+# distance at which the sign of a slope is taken, of unknowns of size one
+_NUDGE = 1e-6
+
+
+@eqx.filter_jit
+def _lowest(problem, u, parameters):
+    starts, ends = problem.equations.flights(u, parameters)
+    whole = not problem.constraints
+    return jax.vmap(
+        lambda a, b: lowest_times(parameters, a, b, problem.steps, whole_turn=whole)
+    )(starts, ends)
+
+
+def orbit_grazing(problem: Any, point: Any) -> Start | None:
+    """The orbit at a grazing, with the impact of speed zero taken out or put in.
+
+    `problem` is one of `ImpactingOrbits`, and so is that of the start.
+
+    The branch goes on with the new sequence of impacts in the direction in which the
+    gap that was zero opens, or the new impact gains speed.
+    """
+    u = jnp.asarray(point.state)
+    parameters = point.problem.parameters
+    z = np.append(point.state, point.parameter)
+    at = evaluate(
+        problem, point.leaf, z, np.ones_like(z), np.asarray(point.scale[-1]), Settings()
+    )
+    m = len(problem.constraints)
+    values = {w: abs(float(at.monitors[name])) for name, w in watched_of(m).items()}
+    zero = min(values, key=values.__getitem__)
+    speeds = [w for w in values if w.what == "speed"]
+    slowest = min(speeds, key=values.__getitem__, default=zero)
+    # next to an impact without speed the gap has its minimum too: the impact goes
+    if values[slowest] <= 1e-7 * (1.0 + float(jnp.max(jnp.abs(u)))):
+        zero = slowest
+    number = zero.number
+    if zero.what == "speed":
+        equations, state = without_impact(problem.equations, u, parameters, number)
+        watched = Watched("gap", (number - 1) % max(m - 1, 1))
+    else:
+        times, heights = _lowest(problem, u, parameters)
+        which = int(np.argmin(np.asarray(heights)[number]))
+        time = float(times[number, which])
+        equations, state = with_impact(
+            problem.equations, u, parameters, number, time, which
+        )
+        watched = Watched("speed", number + 1 if m else 0)
+    changed = problem.of(parameters, equations)
+    changed = set_parameters(changed, as_arrays(changed.parameters, point.leaf))
+    tangent = _direction(changed, np.asarray(state), point, watched.name)
+    if tangent is None:
+        return None
+    return Start(changed, state, float(point.parameter), tangent)
+
+
+def _direction(problem, u, point: Any, watched: str) -> np.ndarray | None:
+    """The direction of the branch in which a monitor grows.
+
+    By the program that the branch goes on with; only the sign of the slope is wanted,
+    for which differences do.
+    """
+    z = np.append(u, point.parameter)
+    one, width, settings = np.ones_like(z), np.asarray(point.scale[-1]), Settings()
+    at = evaluate(problem, point.leaf, z, one, width, settings)
+    if not np.all(np.isfinite(at.jacobian)):
+        return None
+    tangent = np.linalg.svd(at.jacobian)[2][-1]
+    ahead, behind = (
+        evaluate(
+            problem, point.leaf, z + sign * _NUDGE * tangent, one, width, settings
+        ).monitors[watched]
+        for sign in (1, -1)
+    )
+    slope = float(ahead - behind)
+    if not np.isfinite(slope):
+        return None
+    return tangent if slope >= 0 else -tangent

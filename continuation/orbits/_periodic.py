@@ -1,0 +1,70 @@
+"""From an orbit to the problem whose solutions it is one of."""
+
+from typing import Any
+
+from jaxtyping import ArrayLike, Float
+
+from jaxcam.hybrid import HybridSystem
+from jaxcam.parameters import as_arrays
+from variational import Orbit
+from variational.orbits import seed
+
+from .._problem import Start
+from ._periodic_orbit import periodic_orbit
+from ._periodic_sticking import on_release
+from ._shooting import ImpactingOrbits
+
+
+def periodic_orbits(
+    system: HybridSystem,
+    orbit: Orbit | Float[ArrayLike, " n"] | None = None,
+    period: float | int | None = None,
+    *,
+    beyond: bool = False,
+) -> Start:
+    """The family of periodic orbits that an orbit belongs to, and where it is on it.
+
+    The problem is chosen by the motion: [`continuation.ImpactingOrbits`][] with the
+    impacts that the orbit has, or [`continuation.StickingOrbits`][] where it sticks.
+
+    **Arguments:**
+
+    - `orbit`: from [`continuation.periodic_orbit`][]; or a guess of its state, or None,
+      with `period`, as taken there.
+
+    - `beyond`: for an orbit that sticks, whether to go on behind the interruption of
+      its chattering with the orbits that have finitely many impacts.
+
+    **Returns:** a [`continuation.Start`][], for [`continuation.follow`][].
+
+    **Raises:** `ValueError` as `periodic_orbit`; and for an orbit that sticks without
+    forcing.
+    """
+    system = as_arrays(system)
+    if not isinstance(orbit, Orbit):
+        orbit = periodic_orbit(system, orbit, period)
+    base = None if system.period is None else float(system.period)
+    length = float(orbit.period)
+    number = 0 if base is None else round(length / base)
+    if orbit.sticks:
+        if number == 0:
+            raise ValueError(
+                "this orbit sticks without forcing; only orbits that stick once in "
+                "some forcing periods can be followed"
+            )
+        problem, state = on_release(system, number, beyond)
+        return Start(problem, state)
+    equations, u = seed(system, orbit, number)
+    return Start(ImpactingOrbits.of(system, equations), u)
+
+
+def start_of(system: Any, start: Any) -> Start:
+    """`follow(system, orbit, ...)` in terms of a problem."""
+    if isinstance(start, Start):
+        return start
+    if isinstance(start, Orbit) or start is None:
+        return periodic_orbits(system, start)
+    raise ValueError(
+        "give the orbit to start from, found with continuation.periodic_orbit(system, "
+        "guess, period), or None for the one that the motion settles on"
+    )

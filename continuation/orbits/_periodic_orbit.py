@@ -1,0 +1,280 @@
+"""Finding one periodic orbit: from a guess, or from where the motion settles."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import optimistix as optx
+from jaxtyping import ArrayLike, Float
+
+from jaxcam.hybrid import flow, HybridSystem, Settings, simulate, stroboscope
+from jaxcam.hybrid.checks import check_start
+from jaxcam.parameters import as_arrays, real_array
+from variational import Orbit, orbit_of
+from variational.orbits import flown, refuse, seed, Shooting
+
+from .._program import solve
+from .._settings import Settings as Context
+from ._shooting import ImpactingOrbits
+
+
+#: turns after which a motion is expected to have settled, and looked at after that
+_TURNS, _LOOKED = 400, 64
+#: motions are called equal when they differ by less than this, relative to 1 + |x|
+_SAME = 1e-7
+
+
+def periodic_orbit(
+    system: HybridSystem,
+    guess: Float[ArrayLike, " n"] | None = None,
+    period: float | int | None = None,
+    *,
+    t0: float = 0.0,
+    settings: Settings | None = None,
+) -> Orbit:
+    """A periodic orbit near a guess, stable or not, with any number of impacts.
+
+    The impacts of the motion from the guess give the equations of multiple shooting;
+    where that leads nowhere, or the motion sticks, Newton's method is applied to the
+    motion over one period itself. What is found is run once more through the event
+    loop, which must return to it.
+
+    **Arguments:**
+
+    - `system`: a [`jaxcam.hybrid.HybridSystem`][], forced or not.
+    - `guess`: shape `(n,)`, the state at `t0`. Without: where the motion has settled
+        after some hundred forcing periods (a stable orbit).
+    - `period`: of the orbit, in s, or as an `int` the number of forcing periods.
+        Without: one forcing period, or with no guess either the one that is seen. For a
+        system without forcing a guess of it in s.
+    - `t0`: s.
+    - `settings`: accuracy of the runs; a tolerance of 1e-12 by default.
+
+    **Returns:** a [`variational.Orbit`][]: `.state` at `.time` (t0, unless that is the
+    time of an impact), `.period` (s), `.impacts`, `.contacts`, `.multipliers`.
+
+    **Raises:** `ValueError` where the period is not one of the forcing's, the motion
+    does not settle on a periodic orbit, or no orbit is found near the guess, with the
+    reason.
+    """
+    settings = Settings(tolerance=1e-12) if settings is None else settings
+    system = as_arrays(system)
+    system.check()
+    base = None if system.period is None else float(system.period)
+    number = _periods(base, period)
+    if guess is None:
+        guess, number = _settled(system, base, number, period is None, t0)
+    guess = real_array(guess, "guess")
+    check_start(system, settings, jnp.asarray(float(t0)), guess, jnp.asarray(float(t0)))
+    length = float(period) if base is None else number * base  # pyright: ignore
+    orbit, why = _by_shooting(system, guess, length, number, t0, settings)
+    if orbit is None:
+        orbit, later = _by_flow(system, guess, length, number, t0, settings)
+        if orbit is None:
+            raise ValueError(
+                f"no periodic orbit of period {length:g} s was found near the guess: "
+                f"{why}; and by Newton's method on the motion: {later}. Try a guess "
+                "closer to it (one from a simulation), or another period"
+            )
+    return orbit
+
+
+def _periods(base: float | None, period) -> int:
+    """The number of forcing periods; 0 without forcing."""
+    if period is not None and not (np.ndim(period) == 0 and float(period) > 0):
+        raise ValueError(f"period is {period}; give a positive number of seconds")
+    if base is None:
+        if period is None:
+            raise ValueError(
+                "this system has no forcing period; give a guess of the orbit's period "
+                "in seconds"
+            )
+        return 0
+    if period is None:
+        return 1
+    if isinstance(period, int | np.integer):
+        return int(period)
+    number = round(float(period) / base)
+    if number < 1 or abs(float(period) / base - number) > 1e-6 * number:
+        raise ValueError(
+            f"period is {float(period):g} s, which is {float(period) / base:.6g} "
+            f"forcing periods of {base:g} s; an orbit lasts a whole number of them. "
+            "Give that number as an int"
+        )
+    return number
+
+
+def _settled(system, base, number: int, free: bool, t0):
+    """State and period of the motion after many turns."""
+    if base is None:
+        raise ValueError(
+            "without forcing there is nothing to settle on in steps; give a guess of "
+            "the state"
+        )
+    start = _somewhere(system, t0)
+    run = stroboscope(system, start, _TURNS + _LOOKED, t0=float(t0))
+    states = run.states[0, _TURNS:]
+    if run.code[0] or not np.all(np.isfinite(states)):
+        raise ValueError(
+            "the run that should settle on an orbit did not end; give a guess of the "
+            "state"
+        )
+    size = 1 + np.max(np.abs(states), axis=0)
+    for n in range(1, _LOOKED // 2 + 1) if free else (number,):
+        if np.all(np.abs(states[n:] - states[:-n]) <= _SAME * size):
+            return states[-1], n
+    sought = (
+        f"{number} forcing periods" if not free else f"up to {_LOOKED // 2} of them"
+    )
+    raise ValueError(
+        f"the motion has not settled on an orbit of {sought} after {_TURNS} turns (it "
+        "is chaotic, or slow, or another one); give a guess of the state"
+    )
+
+
+def _somewhere(system, t0):
+    """A state outside the constraints: the release point where there is one."""
+    names = system.state_names
+    n = len(names) or _dimension(system)
+    try:
+        run = simulate(system, None, t0, float(t0) + 1e-9 * float(system.period))
+        return np.asarray(run.at([float(t0)])[0])
+    except ValueError:
+        pass
+    state = jnp.zeros(n)
+    time = jnp.asarray(float(t0))
+    for _ in range(20):
+        gap = jnp.atleast_1d(system.gap(time, state))
+        which = int(jnp.argmin(gap))
+        if float(gap[which]) >= 0:
+            return np.asarray(state)
+        slope = jax.grad(lambda x, w=which: jnp.atleast_1d(system.gap(time, x))[w])
+        normal = slope(state)
+        state = state - 1.001 * gap[which] * normal / jnp.sum(normal * normal)
+    raise ValueError("no state outside the constraints was found; give a guess")
+
+
+def _dimension(system) -> int:
+    """The number of states of a system that does not name them."""
+    for n in range(1, 65):
+        try:
+            shape = jax.eval_shape(
+                system.vector_field, jnp.zeros(()), jnp.zeros(n)
+            ).shape
+        except (ValueError, IndexError, TypeError):
+            continue
+        if shape == (n,):
+            return n
+    raise ValueError("the number of states is not known; give a guess of the state")
+
+
+def _by_shooting(system, guess, length, number, t0, settings):
+    """The orbit with the impacts that the motion from the guess has, and why not."""
+    turn = simulate(system, guess, t0, float(t0) + length, settings=settings)
+    if not bool(turn.successful):
+        return None, turn.result
+    if int(turn.contacts.count):
+        # contact forgets what came before: the next turn is the orbit or none is near
+        state = turn.final
+        for _ in range(3):
+            orbit, why = _confirmed(system, state, float(t0), length, settings)
+            if orbit is not None:
+                return orbit, None
+            turn = simulate(system, state, t0, float(t0) + length, settings=settings)
+            state = turn.final
+        return None, f"the motion from the guess sticks, and {why}"
+    start, count, why = float(t0), int(turn.impacts.count), None
+    if not count or not _touches(system, guess, start):
+        orbit, why = _with_impacts_of(system, turn, number, start, settings)
+        if orbit is not None:
+            return orbit, None
+    # an impact at the ends is counted twice, or not at all: begin within a flight
+    if not count:
+        turn = simulate(system, guess, t0, start + 2 * length, settings=settings)
+        if not bool(turn.successful) or not int(turn.impacts.count):
+            return None, why
+    start += (float(turn.impacts.time[0]) - start) / 2
+    between = turn.at([start])[0]
+    turn = simulate(system, between, start, start + length, settings=settings)
+    if not bool(turn.successful):
+        return None, turn.result
+    return _with_impacts_of(system, turn, number, float(t0), settings)
+
+
+def _with_impacts_of(system, turn, number, t0, settings):
+    """The orbit with the impacts of one turn, at `t0`, and why there is none."""
+    try:
+        equations, u = seed(system, turn, number)
+    except ValueError as error:
+        return None, str(error)
+    problem = ImpactingOrbits.of(system, equations)
+    u, success, _ = solve(problem, u, Context(tolerance=1e-11))
+    if not success:
+        return None, (
+            f"Newton's method on the {len(problem.constraints)} impacts of the motion "
+            "from the guess did not converge"
+        )
+    why = refuse(equations, u, system)
+    if why is not None:
+        return None, f"what it converged to is no orbit: {why}"
+    state, time, length = _at(equations, u, system, t0)
+    return _confirmed(system, state, time, length, settings)
+
+
+def _touches(system, state, t0) -> bool:
+    """Whether a gap is closed, up to rounding."""
+    gap = float(jnp.min(jnp.atleast_1d(system.gap(jnp.asarray(t0), state))))
+    return gap <= 1e-9 * (1 + float(jnp.max(jnp.abs(state))))
+
+
+def _by_flow(system, guess, length, number, t0, settings):
+    """Newton's method on the motion over one period, by the event loop."""
+    if number == 0:
+        return None, "it needs a forcing period"
+    state, success = _root(
+        system, guess, jnp.asarray(float(t0)), jnp.asarray(length), settings
+    )
+    if not bool(success):
+        return None, "it did not converge"
+    return _confirmed(system, state, float(t0), length, settings)
+
+
+@eqx.filter_jit
+def _root(system, guess, t0, length, settings):
+    def moved(x, _):
+        return flow(system, x, t0, t0 + length, settings=settings).state - x
+
+    found = optx.root_find(
+        moved, optx.Newton(rtol=1e-9, atol=1e-9), guess, max_steps=30, throw=False
+    )
+    good = found.result == optx.RESULTS.successful
+    return found.value, good & jnp.all(jnp.isfinite(found.value))
+
+
+def _at(equations: Shooting, u, system, t0):
+    """State of an orbit at `t0` (in the first flight without forcing), time, period."""
+    u = jnp.asarray(u)
+    starts, ends = map(np.asarray, equations.flights(u, system))
+    length = float(equations.period(u, system))
+    if equations.periods == 0:
+        t0 = starts[0, 0] + (ends[0] - starts[0, 0]) / 2
+    # the latest start of a flight at or before t0, some periods away
+    ago = np.mod(t0 - starts[:, 0], length)
+    last = int(np.argmin(ago))
+    begin = starts[last, 0]
+    if ago[last] < 1e-9 * length:
+        # t0 is the time of an impact: half a flight later
+        time = begin + (ends[last] - begin) / 2
+        t0 = t0 + (time - begin)
+    else:
+        time = begin + ago[last]
+    x = flown(system, *map(jnp.asarray, (begin, starts[last, 1:], time)))
+    return x, float(t0), length
+
+
+def _confirmed(system, state, time, length, settings):
+    """The orbit through a state, once the event loop has returned to it."""
+    try:
+        return orbit_of(system, state, length, time, settings=settings), None
+    except ValueError as error:
+        return None, str(error)

@@ -1,0 +1,60 @@
+"""Orbits to start from: out of many states that a sweep or a recording has seen."""
+
+import numpy as np
+from jaxtyping import ArrayLike, Float
+
+from jaxcam.hybrid import HybridSystem, Settings
+from variational import Orbit
+
+from ._periodic_orbit import periodic_orbit
+
+
+def orbits_near(
+    system: HybridSystem,
+    states: Float[ArrayLike, "k n"],
+    period: float | int | None = None,
+    *,
+    t0: float = 0.0,
+    settings: Settings | None = None,
+    same: float = 1e-6,
+) -> tuple[Orbit, ...]:
+    """The different periodic orbits that are found from many guesses.
+
+    The guesses are states at one phase of the forcing: the last points of a sweep, the
+    attractors of a basin, or the samples of a recording (angles and their derivatives)
+    taken once a period.
+
+    **Arguments:**
+
+    - `states`: shape `(k, n)`, states at `t0`.
+    - `period`, `t0`, `settings`: as for [`continuation.periodic_orbit`][].
+    - `same`: orbits are one where their states at `t0` differ by less than this,
+      relative to 1 + |state|.
+
+    **Returns:** the orbits in the order in which they were found; guesses from which
+    Newton's method leads nowhere are left out, so there may be none.
+
+    **Raises:** `ValueError` for states of another shape.
+    """
+    states = np.asarray(states, dtype=float)
+    if states.ndim != 2:
+        raise ValueError(
+            f"states has shape {states.shape}; pass one row for each guess, (k, n)"
+        )
+    found: list[Orbit] = []
+    for state in states:
+        if any(_passes(orbit, state, same) for orbit in found):
+            continue
+        try:
+            orbit = periodic_orbit(system, state, period, t0=t0, settings=settings)
+        except ValueError:
+            continue
+        if not any(_passes(o, np.asarray(orbit.state), same) for o in found):
+            found.append(orbit)
+    return tuple(found)
+
+
+def _passes(orbit: Orbit, state, same: float) -> bool:
+    """Whether an orbit has this state where it starts."""
+    current = np.asarray(orbit.state)
+    return bool(np.all(np.abs(current - state) <= same * (1 + np.abs(current))))

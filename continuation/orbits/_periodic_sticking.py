@@ -1,0 +1,226 @@
+"""Orbits that stick once in some periods: explicit, because sticking forgets."""
+
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from jaxcam.hybrid import (
+    contact_state,
+    HybridSystem,
+    normal_acceleration,
+    normal_velocity,
+)
+from jaxcam.hybrid.surface import gaps
+from variational import chatter_frame
+from variational.chatter import (
+    ChatterFrame,
+    ChatterOrbit,
+    frame_at,
+    interruption_margin,
+    next_impact,
+    orbit_from,
+)
+from variational.orbits import flight_end
+
+from .._problem import AbstractProblem, Monitor, Stability, Start
+from ._behind_interruption import orbit_behind
+from ._shooting import ImpactingOrbits
+
+
+#: names of the monitors
+CHATTER = "chatter margin"
+DETACHMENT = "jerk at release"
+# Runge-Kutta steps of order eight in a part of one forcing period
+_STEPS = 64
+
+
+class StickingOrbits(AbstractProblem):
+    """P(inf, n): the orbit that leaves contact, chatters, and sticks every n periods.
+
+    While it sticks it follows the constraint, so it starts anew at the release point:
+    the time t and the state x at which gap, normal velocity and normal acceleration are
+    zero. Those are the equations; the unknowns, shape `(3,)`, are the phase of release
+    (time in forcing periods) and the state there. All multipliers are zero. Where the
+    orbit exists depends on two monitors:
+
+    - the margin of [`variational.chatter_accumulation`][], zero where the impacts
+      accumulate at the very moment of the n-th release. The sticking time itself falls
+      to zero there like a power and does not change sign (the thesis, 3.5.1); the
+      margin is smooth.
+    - the rate of change of the contact acceleration at release, relative to the forcing
+      period. It is zero where release and the next return to contact fall together:
+      beyond, contact never ends, so impacts begin there.
+
+    Behind the first a branch goes on with [`continuation.ImpactingOrbits`][] where
+    `beyond` says so; each number of impacts is then a program to compile.
+
+    **Arguments:**
+
+    - `parameters`: a system with a period, two states and one constraint.
+    - `periods`: n, of the forcing, from release to the release after contact.
+    - `beyond`: whether to go on behind an interruption; else it ends the branch.
+    """
+
+    stability: ClassVar[Stability] = "map"
+
+    parameters: HybridSystem
+    periods: int = eqx.field(static=True, default=1)
+    beyond: bool = eqx.field(static=True, default=False)
+
+    def residual(self, u, parameters) -> Float[Array, "3"]:
+        system = parameters.prepared()
+        period = system.period
+        time, state = u[0] * period, u[1:]
+        rows = [
+            gaps(system, time, state),
+            period * normal_velocity(system, time, state),
+            period**2 * normal_acceleration(system, time, state),
+        ]
+        return jnp.concatenate(rows)
+
+    def linearisation(self, u, parameters, jacobian) -> Float[Array, "2 2"]:
+        """Zero: nothing of a deviation survives sticking."""
+        del parameters, jacobian
+        return jnp.zeros((u.shape[0] - 1, u.shape[0] - 1))
+
+    @property
+    def normal_forms(self) -> bool:
+        return False
+
+    @property
+    def detects(self) -> bool:
+        return False
+
+    def _frame(self, u, system) -> ChatterFrame:
+        return frame_at(system, u[0] * system.period, u[1:])
+
+    def watched(self, name: str, u, parameters) -> Float[Array, ""]:
+        system = parameters.prepared()
+        frame = self._frame(u, system)
+        if name == DETACHMENT:
+            return frame.jerk * system.period**3
+        return -interruption_margin(system, frame, self.periods)
+
+    def monitor(self, u, parameters) -> dict[str, Float[Array, ""]]:
+        return self.seen(u, parameters)[0]
+
+    def monitors(self) -> Mapping[str, Monitor]:
+        return {
+            CHATTER: Monitor("interruption of chattering", ends=True, bracket=True),
+            DETACHMENT: Monitor("beginning of impacts", ends=True),
+        }
+
+    def observe(self, u, parameters) -> dict[str, Array]:
+        """Period, release, accumulation and sticking time (s), impacts listed; the
+        states at whole forcing periods, `(periods, 2)`."""
+        return self.seen(u, parameters)[1]
+
+    def seen(self, u, parameters):
+        system = parameters.prepared()
+        period = jnp.asarray(system.period, dtype=jnp.float64)
+        turn = orbit_from(system, self._frame(u, system), self.periods)
+        length = self.periods * period
+        monitors = {
+            CHATTER: -turn.margin,
+            DETACHMENT: turn.frame.jerk * period**3,
+        }
+        observed = {
+            "period": length,
+            "time": turn.frame.release,
+            "state": turn.frame.state,
+            "accumulation": turn.accumulation,
+            "sticking time": turn.frame.release + length - turn.accumulation,
+            "impacts": turn.impacts,
+            "stroboscopic": _stroboscopic(system, turn, self.periods),
+        }
+        return monitors, observed
+
+    def check(self, point: Any) -> str | None:
+        value = point.tests.get(CHATTER, np.nan)
+        if np.isfinite(value) and value < 0:
+            return "chattering does not come to its end before contact is released"
+        if np.isnan(value) and self.periods > 1:
+            return f"the motion comes to contact before period {self.periods}, or never"
+        if point.tests.get(DETACHMENT, 1.0) < 0:
+            return "contact is made, not released, at this zero of its acceleration"
+        return None
+
+    def transition(self, point: Any) -> Start | None:
+        if self.beyond and point.kind == self.monitors()[CHATTER].kind:
+            return orbit_behind(point, self.periods)
+        return None
+
+    @property
+    def signature(self) -> str:
+        if self.periods == 1:
+            return "sticks once a period"
+        return f"sticks once in {self.periods} periods"
+
+    def with_signature(self, signature: str) -> AbstractProblem:
+        if signature == self.signature:
+            return self
+        if signature.startswith("impacts"):
+            # a branch that has gone on behind the interruption
+            orbits = ImpactingOrbits(self.parameters, (), self.periods, 2)
+            return orbits.with_signature(signature)
+        raise ValueError(
+            f"the saved branch has signature {signature!r}, this problem "
+            f"{self.signature!r}; take it up with the problem it was made with"
+        )
+
+
+def _stroboscopic(system, turn: ChatterOrbit, periods: int) -> Float[Array, "m n"]:
+    """States at the first whole periods after release."""
+    period = system.period
+    first = jnp.ceil(turn.frame.release / period)
+
+    def hop(carry):
+        _, (time, state, speed), _ = carry
+        point = next_impact(system, time, state, speed, 2 * period)
+        return (time, state), (point.time, point.state, point.speed), point.found
+
+    # a complete sequence has no end, but then `end` comes before it accumulates
+    begin = (turn.frame.release, turn.frame.state)
+    start = (begin, (*begin, jnp.zeros(())), jnp.asarray(True))
+
+    def at(end):
+        sticks = end >= turn.accumulation
+
+        def goes_on(carry):
+            _, (time, _, _), found = carry
+            return ~sticks & found & (time < end)
+
+        (time, state), _, _ = jax.lax.while_loop(goes_on, hop, start)
+        flown = flight_end(system, time, state, end, steps=_STEPS)
+        in_contact = contact_state(system, end[None], turn.frame.state)[0]
+        return jnp.where(sticks, in_contact, flown)
+
+    return jax.lax.map(at, (first + jnp.arange(periods, dtype=jnp.float64)) * period)
+
+
+def on_release(
+    system: HybridSystem, periods: int = 1, beyond: bool = False
+) -> tuple[StickingOrbits, np.ndarray]:
+    """The problem of the orbit that sticks once in so many periods, and its unknowns.
+
+    **Raises:** `ValueError` where contact never ends, or is never made.
+    """
+    frame = _frame(system)
+    if not bool(jnp.isfinite(frame.release)):
+        raise ValueError(
+            "this system has no release from contact in its period, so no orbit sticks "
+            "for a part of it; check the parameters"
+        )
+    phase = float(frame.release) / float(system.period)  # pyright: ignore
+    problem = StickingOrbits(system, periods, beyond)
+    return problem, np.append(phase, np.asarray(frame.state))
+
+
+@eqx.filter_jit
+def _frame(system):
+    return chatter_frame(system)

@@ -1,0 +1,67 @@
+"""An orbit written down from another impact on, and one run through twice."""
+
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+
+def run_twice(problem: Any, u, deviation) -> tuple[np.ndarray, np.ndarray]:
+    """State and tangent of the orbit run through twice, deviating with each sign."""
+    if not problem.constraints:
+        # the state at time zero only
+        return u, deviation
+    shape = (len(problem.constraints), 1 + problem.dimension)
+    first, moved = u.reshape(shape).copy(), deviation.reshape(shape).copy()
+    change = np.concatenate([moved, -moved])
+    if problem.periods:
+        second = first + np.eye(1, shape[1]) * problem.periods
+        return np.concatenate([first, second]).ravel(), change.ravel()
+    period, first[0, 0] = first[0, 0], 0.0
+    second = first + np.eye(1, shape[1])
+    rows = np.concatenate([first, second])
+    # time counts from the first impact, which must not move
+    change[:, 0] -= change[0, 0]
+    rows[:, 0] /= 2
+    change[:, 0] /= 2
+    rows[0, 0] = 2 * period
+    return rows.ravel(), change.ravel()
+
+
+def rotations(
+    problem: Any, u: Float[np.ndarray, " u"], rate: bool = False
+) -> Float[np.ndarray, "m u"]:
+    """The same orbit, beginning with each of its m impacts in turn.
+
+    **Arguments:** `rate`: `u` is a derivative of the unknowns along a branch.
+    """
+    m = len(problem.constraints)
+    turn = 0.0 if rate else float(max(problem.periods, 1))
+    found = []
+    for k in range(m):
+        rows = np.array(u, float).reshape(m, 1 + problem.dimension)
+        length = rows[0, 0]
+        if not problem.periods:
+            # the place of the first phase is taken by the period
+            rows[0, 0] = 0.0
+        rows = np.roll(rows, -k, axis=0)
+        rows[m - k :, 0] += turn
+        if not problem.periods:
+            rows[:, 0] -= rows[0, 0]
+            rows[0, 0] = length
+        found.append(rows.ravel())
+    return np.stack(found)
+
+
+def away_from_half(problem: Any, u, parameters) -> float | None:
+    """How far the second half of an orbit is from its first, in lengths of steps; None
+    where it cannot be the same."""
+    m, periods = len(problem.constraints), problem.periods
+    hits = problem.constraints
+    if m == 0 or m % 2 or periods % 2 or hits[: m // 2] != hits[m // 2 :]:
+        return None
+    other = rotations(problem, np.asarray(u))[m // 2]
+    if periods:
+        other.reshape(m, -1)[:, 0] -= periods // 2
+    scale = np.asarray(problem.scale(np.asarray(u), parameters))
+    return float(np.linalg.norm((other - u) / scale) / np.sqrt(scale.size))

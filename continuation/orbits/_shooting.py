@@ -1,0 +1,243 @@
+"""Periodic orbits with impacts as a problem to follow: their equations, and events."""
+
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from jaxcam.hybrid import HybridSystem
+from variational import orbits
+from variational.orbits import inadmissible, Shooting
+
+from .._problem import AbstractProblem, Monitor, Stability, Start
+from ._orbit_grazing import orbit_grazing
+from ._run_twice import away_from_half, rotations, run_twice
+from ._shooting_graze import multipliers_of
+from ._watched import Watched, watched_of
+
+
+class ImpactingOrbits(AbstractProblem):
+    """Periodic orbits of a hybrid system with a known sequence of impacts.
+
+    The unknowns and equations are those of [`variational.orbits.Shooting`][]: for each
+    impact its phase (time in forcing periods) and the state after it, shape
+    `(m (1 + n),)`. Without impacts they are the state at time zero, shape `(n,)`. For a
+    system without forcing the first phase is zero, its place taken by the period (s),
+    and phases count periods of the orbit.
+
+    **Arguments:**
+
+    - `parameters`: the [`jaxcam.hybrid.HybridSystem`][].
+    - `constraints`: which constraint each impact hits, in order.
+    - `periods`: forcing periods until the orbit repeats; 0 for a system without
+      forcing.
+    - `dimension`: number of states n.
+    - `steps`: Runge-Kutta steps of order eight in each flight.
+    """
+
+    stability: ClassVar[Stability] = "map"
+
+    parameters: HybridSystem
+    constraints: tuple[int, ...] = eqx.field(static=True)
+    periods: int = eqx.field(static=True)
+    dimension: int = eqx.field(static=True)
+    steps: int = eqx.field(static=True, default=32)
+
+    def __check_init__(self):
+        if self.periods == 0 and not self.constraints:
+            raise ValueError(
+                "an orbit without forcing and without impacts has no section to be "
+                "found on; follow it as a smooth boundary value problem"
+            )
+
+    @staticmethod
+    def of(system: HybridSystem, equations: Shooting) -> "ImpactingOrbits":
+        """The problem with these equations."""
+        e = equations
+        return ImpactingOrbits(system, e.constraints, e.periods, e.dimension, e.steps)
+
+    @property
+    def equations(self) -> Shooting:
+        """The equations of multiple shooting."""
+        return Shooting(self.constraints, self.periods, self.dimension, self.steps)
+
+    def residual(self, u, parameters) -> Float[Array, " n"]:
+        return self.equations.residual(u, parameters)
+
+    def linearisation(self, u, parameters, jacobian) -> Float[Array, "k k"]:
+        """The monodromy matrix, of the state just after the first impact.
+
+        Without forcing, that of the return map to the constraint.
+        """
+        if not self.constraints:
+            return jacobian + jnp.eye(self.dimension)
+        matrix = orbits.monodromy_of(self.equations, u, parameters)
+        return self._returned(u, parameters, matrix)
+
+    def _returned(self, u, parameters, matrix):
+        if self.periods:
+            return matrix
+        return orbits.return_map(self.equations, u, parameters, matrix)
+
+    def local_jacobian(self, u, parameters):
+        """Of the map from the first impact to the one a period later.
+
+        In its phase and the state after it, without forcing in the state alone.
+        """
+        return orbits.around_the_period(self.equations, u, parameters)
+
+    def derivatives(self, u, p, parameters_at):
+        """Both from one Jacobian of each flight."""
+        if not self.constraints:
+            return AbstractProblem.derivatives(self, u, p, parameters_at)
+        whole, matrix = orbits.equations_and_monodromy(
+            self.equations, u, p, parameters_at
+        )
+        return whole, self._returned(u, parameters_at(p), matrix)
+
+    @property
+    def costly(self) -> bool:
+        return True
+
+    # -- what to watch
+
+    def monitor(self, u, parameters) -> dict[str, Float[Array, ""]]:
+        names = list(self.monitors())
+        values = jax.vmap(lambda k: self.watched_by_number(k, u, parameters))(
+            jnp.arange(len(names))
+        )
+        return dict(zip(names, values, strict=True))
+
+    def monitors(self) -> Mapping[str, Monitor]:
+        names = watched_of(len(self.constraints))
+        return {name: Monitor(kind="grazing", ends=True) for name in names}
+
+    def vanishing_with(self, name: str) -> tuple[str, ...]:
+        """The gaps of the flights beside an impact without speed."""
+        m = len(self.constraints)
+        what, number = watched_of(m)[name]
+        if what == "gap":
+            return ()
+        return Watched("gap", (number - 1) % m).name, Watched("gap", number).name
+
+    def watched(self, name: str, u, parameters) -> Float[Array, ""]:
+        what, number = watched_of(len(self.constraints))[name]
+        if what == "speed":
+            return self.equations.approach(u, parameters)[number]
+        return self.watched_by_number(jnp.asarray(number), u, parameters)
+
+    def watched_by_number(self, number, u, parameters) -> Float[Array, ""]:
+        return self.equations.gap_or_speed(number, u, parameters)
+
+    def observe(self, u, parameters) -> dict[str, Array]:
+        """Period (s); time (s) and state after the first impact; integration error;
+        with forcing, the states at whole forcing periods, `(periods, n)`."""
+        return self.seen(u, parameters)[1]
+
+    def seen(self, u, parameters):
+        equations = self.equations
+        seen = equations.seen(u, parameters)
+        start = equations.flights(u, parameters)[0][0]
+        found = {
+            "period": equations.period(u, parameters),
+            "time": start[0],
+            "state": start[1:],
+            "integration error": seen.error,
+        }
+        if self.periods:
+            found["stroboscopic"] = equations.stroboscopic(u, parameters, seen)
+        rows = {"gap": seen.gaps, "speed": seen.speeds}
+        monitors = {
+            name: rows[what][k]
+            for name, (what, k) in watched_of(len(self.constraints)).items()
+        }
+        return monitors, found
+
+    # -- between compiled programs
+
+    def refused(self, monitors, observed) -> str | None:
+        """Why a solution is no orbit, from what has been seen of it, or None."""
+        known = watched_of(len(self.constraints))
+        gaps, speeds = (
+            [monitors[name] for name, watched in known.items() if watched.what == what]
+            for what in ("gap", "speed")
+        )
+        return inadmissible(gaps, speeds, observed["integration error"], self.steps)
+
+    def check(self, point: Any) -> str | None:
+        return self.refused(point.tests, point.observed)
+
+    def transition(self, point: Any) -> Start | None:
+        return orbit_grazing(self, point)
+
+    def doubled(self, point: Any, direction) -> Start | None:
+        del direction
+        u = jnp.asarray(point.state)
+        parameters = point.problem.parameters
+        matrix = np.asarray(_antiperiodic(self.equations, u, parameters))
+        deviation = np.linalg.svd(matrix)[2][-1]
+        state, tangent = run_twice(self, np.asarray(point.state), deviation)
+        twice = ImpactingOrbits(
+            parameters,
+            2 * self.constraints,
+            2 * self.periods,
+            self.dimension,
+            self.steps if self.constraints else 2 * self.steps,
+        )
+        return Start(twice, state, float(point.parameter), np.append(tangent, 0.0))
+
+    def eigenvalues(self, u, parameters, at):
+        return multipliers_of(self.equations, u, parameters, at)
+
+    def copies(self, u, tangent):
+        hits, m = self.constraints, len(self.constraints)
+        if not hits:
+            return [(self.family, u, tangent)]
+        states = rotations(self, u)
+        tangents = rotations(self, tangent, rate=True)
+        return [
+            (self._family(hits[k:] + hits[:k]), states[k], tangents[k])
+            for k in range(m)
+        ]
+
+    def brought_near(self, states, u):
+        if not (self.periods and self.constraints):
+            return states
+        # a motion repeats after whole periods of the forcing
+        phases = np.zeros(u.size)
+        phases[:: 1 + self.dimension] = 1.0
+        return states + np.round(u[0] - states[:, :1]) * phases
+
+    def half_away(self, u, parameters):
+        return away_from_half(self, u, parameters)
+
+    @property
+    def family(self) -> str:
+        return self._family(self.constraints)
+
+    def _family(self, constraints: tuple[int, ...]) -> str:
+        # two numbers of steps differ by the error of the integration
+        return f"impacts {constraints} periods {self.periods}"
+
+    @property
+    def signature(self) -> str:
+        hits = ".".join(map(str, self.constraints)) or "-"
+        return f"impacts {hits} periods {self.periods} steps {self.steps}"
+
+    def with_signature(self, signature: str) -> "ImpactingOrbits":
+        words = signature.split()
+        if words[0::2] != ["impacts", "periods", "steps"]:
+            raise ValueError(
+                f"the saved branch has signature {signature!r}, which is no sequence "
+                "of impacts; take it up with the problem it was made with"
+            )
+        hits = () if words[1] == "-" else tuple(map(int, words[1].split(".")))
+        periods, steps = int(words[3]), int(words[5])
+        return ImpactingOrbits(self.parameters, hits, periods, self.dimension, steps)
+
+
+_antiperiodic = eqx.filter_jit(orbits.antiperiodic)

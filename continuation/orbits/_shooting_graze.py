@@ -1,0 +1,63 @@
+"""Multipliers of an impacting orbit, also where one of its impacts has no speed."""
+
+from typing import Any
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+
+from variational.orbits import (
+    links_of,
+    multipliers_at_grazing,
+    product_of_links,
+    Shooting,
+)
+
+from .._eigenvalues import eigenvalues_of
+from ._watched import Watched
+
+
+# speed of an impact that is a grazing, relative to one plus the largest component of
+# the state: a located one has less, and what a matrix divided by it says is rounding
+_NO_SPEED = 1e-8
+ONE = (
+    "an impact has no speed here: one multiplier is infinite, the limit from orbits "
+    "that make this impact"
+)
+NONE = (
+    "the multipliers have no limit here: {}; those of the points next to it tell the "
+    "two sides apart"
+)
+
+
+def multipliers_of(
+    equations: Shooting, u: np.ndarray, parameters: Any, at: Any
+) -> tuple[Any, str]:
+    """Multipliers (k,), the largest modulus first, and a sentence where one is not
+    finite or not known."""
+    m = len(equations.constraints)
+    speeds = np.array([float(at.monitors[Watched("speed", k).name]) for k in range(m)])
+    least = _NO_SPEED * (1.0 + float(np.max(np.abs(u))))
+    slow = np.flatnonzero(np.abs(speeds) <= least)
+    if not slow.size:
+        return eigenvalues_of(at.linearisation), ""
+    unknown = np.full(at.linearisation.shape[0], np.nan, complex)
+    if slow.size > 1:
+        return unknown, NONE.format(f"{slow.size} impacts have no speed")
+    regular, singular = _parts(
+        equations, jnp.asarray(u), parameters, jnp.asarray(int(slow[0]))
+    )
+    found = multipliers_at_grazing(np.asarray(regular), np.asarray(singular))
+    if not np.all(np.isfinite(found[1:])):
+        return unknown, NONE.format("the graze is not a simple one")
+    if not equations.periods:
+        # without forcing a shift in time is a deviation that stays: multiplier one
+        finite = np.flatnonzero(np.isfinite(found))
+        trivial = finite[np.argmin(np.abs(found[finite] - 1.0))]
+        found = np.delete(found, trivial)
+    return found, ONE
+
+
+@eqx.filter_jit
+def _parts(equations, u, parameters, number):
+    return product_of_links(links_of(equations, u, parameters), number)

@@ -1,0 +1,59 @@
+"""The sequence of impacts of an orbit, changed by one impact."""
+
+import jax.numpy as jnp
+import numpy as np
+
+from variational.orbits import flown, Shooting
+
+
+def without_impact(equations: Shooting, u, parameters, number: int):
+    """The equations without impact `number`, and the state that leaves it out."""
+    hits, periods = equations.constraints, equations.periods
+    rows = np.array(u).reshape(len(hits), -1)
+    hits = hits[:number] + hits[number + 1 :]
+    if hits:
+        rows = _renumbered(periods, rows, number)
+        return _with(equations, hits), rows.ravel()
+    if periods == 0:
+        raise ValueError("an orbit without forcing must keep at least one impact")
+    length = float(equations.period(jnp.asarray(u), parameters))
+    start = rows[0, 0] / periods * length
+    end = np.ceil(start / length) * length
+    begin = jnp.asarray(start), jnp.asarray(rows[0, 1:])
+    state = flown(parameters, *begin, jnp.asarray(end))
+    return _with(equations, (), 2 * equations.steps), np.asarray(state)
+
+
+def with_impact(
+    equations: Shooting, u, parameters, flight: int, time: float, which: int
+):
+    """The equations with another impact, on `which`, at `time` (s) of a flight."""
+    u = jnp.asarray(u)
+    starts, _ = equations.flights(u, parameters)
+    start = starts[flight]
+    state = flown(parameters, start[0], start[1:], jnp.asarray(time))
+    length = float(equations.period(u, parameters))
+    row = np.concatenate([[time / length * max(equations.periods, 1)], state])
+    hits = equations.constraints
+    if not hits:
+        return _with(equations, (which,)), row
+    rows = np.array(u).reshape(len(hits), -1)
+    rows = np.insert(rows, flight + 1, row, axis=0)
+    hits = hits[: flight + 1] + (which,) + hits[flight + 1 :]
+    return _with(equations, hits), rows.ravel()
+
+
+def _with(equations: Shooting, constraints, steps: int | None = None) -> Shooting:
+    """The same equations for impacts on these constraints."""
+    steps = equations.steps if steps is None else steps
+    return Shooting(constraints, equations.periods, equations.dimension, steps)
+
+
+def _renumbered(periods, rows, number):
+    """Rows without one; without forcing time counts from the first that is left."""
+    if periods or number:
+        return np.delete(rows, number, axis=0)
+    period, later = rows[0, 0], rows[1:].copy()
+    later[:, 0] -= later[0, 0]
+    later[0, 0] = period
+    return later

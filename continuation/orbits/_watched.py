@@ -1,0 +1,27 @@
+"""What is watched along orbits with impacts: gaps of flights, and speeds of impacts."""
+
+from typing import Literal, NamedTuple
+
+
+class Watched(NamedTuple):
+    """The lowest gap within a flight, or the approach speed of an impact."""
+
+    what: Literal["gap", "speed"]
+    #: of the flight that begins with impact k, or of impact k
+    number: int
+
+    @property
+    def name(self) -> str:
+        """The monitor's name."""
+        kind = "gap of flight" if self.what == "gap" else "speed of impact"
+        return f"{kind} {self.number}"
+
+
+def watched_of(impacts: int) -> dict[str, Watched]:
+    """All of an orbit with so many impacts, by the names of the monitors.
+
+    In the order in which `gap_or_speed` numbers them: gaps first.
+    """
+    gaps = [Watched("gap", k) for k in range(max(impacts, 1))]
+    speeds = [Watched("speed", k) for k in range(impacts)]
+    return {one.name: one for one in (*gaps, *speeds)}

@@ -1,0 +1,25 @@
+"""Special points of a branch: seen, located, and their normal forms."""
+
+from ._locate import (
+    ahead as ahead,
+    between as between,
+    Context as Context,
+    locate as locate,
+    Located as Located,
+    pair_is_complex as pair_is_complex,
+    singular_points as singular_points,
+)
+from ._monitor_points import MonitorPoints as MonitorPoints
+from ._multilinear import second as second
+from ._normal_forms import normal_form as normal_form, null_vectors as null_vectors
+from ._singular_points import SingularPoints as SingularPoints
+from ._test_functions import (
+    BRANCH_POINT as BRANCH_POINT,
+    eigenvalues_at as eigenvalues_at,
+    FLIP as FLIP,
+    FOLD as FOLD,
+    HOPF as HOPF,
+    is_stable as is_stable,
+    NEIMARK_SACKER as NEIMARK_SACKER,
+    test_values as test_values,
+)

@@ -1,0 +1,138 @@
+"""Branch points as regular solutions of a larger problem."""
+
+from typing import Any, ClassVar
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float, PyTree
+
+from .._parameter import with_leaf
+from .._problem import AbstractProblem, Stability
+from .._program import evaluate, residual_at, solve
+from .._settings import Settings
+
+
+# displacement for the second derivatives of the correction, of unknowns of size one:
+# their error only slows the iteration, which takes the equations themselves exactly
+_DISPLACED = 2.0**-15
+# slack that the error of an integration may leave
+_SLACK = 1e-10
+# corrections that are tried
+_MOST = 30
+
+
+class BranchPoints(AbstractProblem):
+    """Simple branch points: unknowns (u, parameter, slack, left null vector).
+
+    G + slack psi = 0, psi' G_u = 0, psi' G_p = 0, psi' psi = 1: 2 n + 2 equations,
+    whose solution is regular where two branches cross at an angle (Kuznetsov, section
+    10.2).
+    """
+
+    base: AbstractProblem
+    leaf: int = eqx.field(static=True)
+    width: Array
+    stability: ClassVar[Stability] = "none"
+
+    @property
+    def parameters(self) -> PyTree:
+        return self.base.parameters
+
+    def residual(self, u: Float[Array, " n"], parameters: PyTree):
+        n = (u.shape[0] - 2) // 2
+        inner, p, slack, psi = u[:n], u[n], u[n + 1], u[n + 2 :]
+
+        def g(inner, p):
+            return self.base.residual(inner, with_leaf(parameters, self.leaf, p))
+
+        value = g(inner, p)
+        j_u = self.base.jacobian(inner, with_leaf(parameters, self.leaf, p))
+        _, j_p = jax.jvp(lambda p: g(inner, p), (p,), (jnp.ones_like(p),))
+        rest = jnp.stack([psi @ j_p, psi @ psi - 1.0])
+        return jnp.concatenate([value + slack * psi, psi @ j_u, rest])
+
+    def scale(self, u: Float[Array, " n"], parameters: PyTree):
+        n = (u.shape[0] - 2) // 2
+        sizes = self.base.scale(u[:n], with_leaf(parameters, self.leaf, u[n]))
+        ones = jnp.ones(n + 1, u.dtype)
+        return jnp.concatenate([sizes, jnp.reshape(self.width, (1,)), ones])
+
+
+# its `parameters` is a property, which type checkers take for an argument
+_crossing: Any = BranchPoints
+
+
+def solved_crossing(
+    problem: AbstractProblem, leaf: int, width: float, guess, settings: Settings
+) -> tuple[np.ndarray, bool]:
+    """The branch point near z = (u, parameter), by Newton's method with its second
+    derivatives, and whether it is one."""
+    at = _at(problem, leaf, width, guess, settings)
+    if not np.all(np.isfinite(at.jacobian)):
+        return guess, False
+    left, _, _ = np.linalg.svd(at.jacobian * at.scale[None, :])
+    extended = _crossing(problem, leaf, np.asarray(width))
+    u = np.concatenate([guess, [0.0], left[:, -1]])
+    value, success, _ = solve(extended, u, settings)
+    k = guess.size
+    return value[:k], success and _solves(value[k], settings)
+
+
+def differenced_crossing(
+    problem: AbstractProblem, leaf: int, width: float, guess, settings: Settings
+) -> tuple[np.ndarray, bool]:
+    """The same with differences of Jacobians, by the program of the corrector.
+
+    The second derivatives are taken once; the iteration is linear, and fast from next
+    to the branch point, where bracketing ends because the equations are singular.
+    """
+    guess = np.asarray(guess, float)
+    at = _at(problem, leaf, width, guess, settings)
+    if not np.all(np.isfinite(at.jacobian)):
+        return guess, False
+    # rows and columns scaled as the corrector does it
+    n, scale = guess.size - 1, np.asarray(at.scale)
+    rows = scale[:-1, None]
+
+    def jacobian(y):
+        found = _at(problem, leaf, width, y * scale, settings)
+        return found.jacobian * scale[None, :] / rows
+
+    y, psi, slack = guess / scale, np.linalg.svd(jacobian(guess / scale))[0][:, -1], 0.0
+    moves = _DISPLACED * np.eye(n + 1)
+    curvature = np.stack(
+        [(jacobian(y + m) - jacobian(y - m)).T @ psi / (2 * _DISPLACED) for m in moves]
+    ).T
+    for _ in range(_MOST):
+        j = jacobian(y)
+        g = np.asarray(_residual(problem, leaf, y * scale)) / rows[:, 0]
+        wrong = np.concatenate([g + slack * psi, j.T @ psi, [psi @ psi - 1.0]])
+        matrix = np.zeros((2 * n + 2, 2 * n + 2))
+        matrix[:n, : n + 1], matrix[:n, n + 1] = j, psi
+        matrix[:n, n + 2 :] = slack * np.eye(n)
+        matrix[n:-1, : n + 1], matrix[n:-1, n + 2 :] = curvature, j.T
+        matrix[-1, n + 2 :] = 2 * psi
+        if not np.all(np.isfinite(matrix)) or not np.all(np.isfinite(wrong)):
+            return guess, False
+        change = np.linalg.lstsq(matrix, -wrong, rcond=None)[0]
+        y, slack = y + change[: n + 1], slack + float(change[n + 1])
+        psi = psi + change[n + 2 :]
+        if np.linalg.norm(change[: n + 1]) <= settings.tolerance:
+            return y * scale, _solves(slack, settings)
+    return y * scale, False
+
+
+def _solves(slack, settings: Settings) -> bool:
+    """Whether the point solves the equations, and not only those with slack."""
+    return bool(abs(slack) <= max(settings.tolerance, _SLACK))
+
+
+def _at(problem, leaf: int, width, z, settings: Settings):
+    return evaluate(problem, leaf, z, np.ones_like(z), width, settings)
+
+
+@eqx.filter_jit
+def _residual(problem, leaf: int, z):
+    return residual_at(problem, leaf, z)

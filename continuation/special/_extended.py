@@ -1,0 +1,66 @@
+"""What problems with one more unknown, the parameter, take from the problem inside."""
+
+from typing import ClassVar
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float, PyTree
+
+from .._parameter import with_leaf
+from .._point import Point
+from .._problem import AbstractProblem, Stability
+
+
+class AbstractExtended(AbstractProblem):
+    """Unknowns (u, parameter): the equations of a problem and one condition more."""
+
+    base: eqx.AbstractVar[AbstractProblem]
+    leaf: eqx.AbstractVar[int]
+    #: width of the bounds of the parameter that is an unknown here
+    width: eqx.AbstractVar[Array]
+    bounds: eqx.AbstractVar[Array]
+    stability: ClassVar[Stability] = "none"
+
+    @property
+    def parameters(self) -> PyTree:
+        return self.base.parameters
+
+    @property
+    def detects(self) -> bool:
+        return False
+
+    @property
+    def normal_forms(self) -> bool:
+        return False
+
+    def inside(self, u, parameters):
+        """Unknowns and parameters of the problem inside."""
+        return u[:-1], with_leaf(parameters, self.leaf, u[-1])
+
+    def linearisation(self, u: Float[Array, " n"], parameters: PyTree, jacobian):
+        del jacobian
+        inner, inside = self.inside(u, parameters)
+        return self.base.linearisation(inner, inside, self.base.jacobian(inner, inside))
+
+    def monitor(self, u: Float[Array, " n"], parameters: PyTree) -> dict[str, Array]:
+        return self.seen(u, parameters)[0]
+
+    def observe(self, u: Float[Array, " n"], parameters: PyTree) -> dict[str, Array]:
+        return self.base.observe(*self.inside(u, parameters))
+
+    def scale(self, u: Float[Array, " n"], parameters: PyTree):
+        sizes = self.base.scale(*self.inside(u, parameters))
+        return jnp.concatenate([sizes, jnp.reshape(self.width, (1,))])
+
+    def free(self, u: np.ndarray) -> tuple[float, ...]:
+        return (*self.base.free(u[:-1]), float(u[-1]))
+
+    def limits(self) -> dict[int, tuple[float, float]]:
+        return {
+            **self.base.limits(),
+            -1: (float(self.bounds[0]), float(self.bounds[1])),
+        }
+
+    def check(self, point: Point) -> str | None:
+        return self.base.check(point.inner(self.base, self.leaf))

@@ -1,0 +1,235 @@
+"""Locating special points between two points of a branch."""
+
+from typing import Any, NamedTuple
+
+import jax.numpy as jnp
+import numpy as np
+
+from .._problem import AbstractProblem
+from .._program import correct, Corrected, solve
+from .._settings import Settings
+from ._bialternate import determinant_on_plane, trace_on_plane
+from ._branch_points import differenced_crossing, solved_crossing
+from ._monitor_points import monitor_level
+from ._normal_forms import null_vectors
+from ._singular_points import matrix_at, SingularPoints
+from ._test_functions import (
+    BRANCH_POINT,
+    HOPF,
+    NEIMARK_SACKER,
+    test_values,
+)
+
+
+# their `parameters` is a property, which type checkers take for an argument
+_singular: Any = SingularPoints
+
+
+class Context(NamedTuple):
+    """What stays the same along a branch."""
+
+    leaf: int
+    width: float
+    bounds: tuple[float, float]
+    settings: Settings
+
+
+class Located(NamedTuple):
+    """A special point."""
+
+    z: np.ndarray
+    converged: bool
+    reason: str
+
+
+def singular_points(
+    problem: AbstractProblem, kind: str, context: Context, z: np.ndarray
+) -> SingularPoints:
+    """The extended problem of a kind of special point, with borders from near it."""
+    m = matrix_at(problem, kind, context.leaf, z)
+    border = np.zeros(m.shape[0])
+    empty = _singular(
+        problem,
+        kind,
+        context.leaf,
+        np.asarray(context.width),
+        np.asarray(context.bounds),
+        border,
+        border,
+    )
+    return empty.refreshed(np.asarray(z), problem.parameters)
+
+
+def _newton(problem, name: str, context: Context, guess: np.ndarray):
+    """Newton on the extended system: (z, success)."""
+    if name == BRANCH_POINT:
+        return solved_crossing(
+            problem, context.leaf, context.width, guess, context.settings
+        )
+    if name in problem.monitors():
+        extended = monitor_level(problem, name, context.leaf, context.width)
+    else:
+        extended = singular_points(problem, name, context, guess)
+    value, success, _ = solve(extended, guess, context.settings)
+    return value, success
+
+
+def locate(
+    problem: AbstractProblem,
+    name: str,
+    context: Context,
+    a: Corrected,
+    b: Corrected,
+    values: tuple[float, float],
+) -> Located:
+    """The zero of a test function between points a and b of a branch.
+
+    Newton on the extended system, from the secant's estimate; where that fails or
+    leaves the bracket, the bracket is shrunk with points of the branch first.
+    """
+    low, high = (a.z, values[0]), (b.z, values[1])
+    guess = between(a, b, values[0] / (values[0] - values[1]))
+    choice = context.settings.localise
+    newton = choice == "newton" or (choice == "auto" and not problem.costly)
+    monitor = problem.monitors().get(name)
+    if monitor is not None:
+        newton = newton and not monitor.bracket
+    direct = newton or (monitor is not None and not monitor.bracket)
+    for attempt in range(60):
+        if direct:
+            z, success = _newton(problem, name, context, guess)
+            if success and _inside(z, low[0], high[0], a.scale):
+                return Located(z, True, "")
+        direct = newton and attempt < 12
+        chord = (high[0] - low[0]) / a.scale
+        length = float(np.linalg.norm(chord))
+        if length < context.settings.tolerance:
+            break
+        guess = _next_guess(low, high, attempt)
+        middle = correct(
+            problem, context.leaf, guess, chord / a.scale, a.tangent, context.width,
+            context.settings,
+        )  # fmt: skip
+        if not middle.success or not _inside(middle.z, low[0], high[0], a.scale):
+            if name == BRANCH_POINT:
+                # the equations are singular there, and the corrector fails first
+                return _between_branches(problem, context, a, b, guess)
+            reason = "the branch could not be computed between two of its points"
+            return Located(guess, False, reason)
+        value = test_values(problem, context.leaf, middle)[name]
+        if value == 0:
+            return Located(middle.z, True, "")
+        if np.sign(value) == np.sign(low[1]):
+            low = (middle.z, value)
+        else:
+            high = (middle.z, value)
+        guess = middle.z
+    if length < context.settings.tolerance:
+        if name == BRANCH_POINT:
+            return _between_branches(problem, context, a, b, guess)
+        return Located(guess, True, "")
+    return Located(guess, False, "Newton on the extended system did not converge")
+
+
+def _between_branches(
+    problem: AbstractProblem,
+    context: Context,
+    a: Corrected,
+    b: Corrected,
+    guess: np.ndarray,
+) -> Located:
+    """The branch point near where bracketing has come to its end."""
+    z, success = differenced_crossing(
+        problem, context.leaf, context.width, guess, context.settings
+    )
+    if success and _inside(z, a.z, b.z, a.scale):
+        return Located(z, True, "")
+    return Located(
+        guess,
+        False,
+        "the determinant changes sign between two points of the branch, but the "
+        "equations of a branch point have no solution there",
+    )
+
+
+def _next_guess(low, high, attempt: int) -> np.ndarray:
+    """Secant and bisection in turns."""
+    share = 0.5
+    if attempt % 3 != 2:
+        share = abs(low[1]) / (abs(low[1]) + abs(high[1]))
+        share = min(max(share, 0.01), 0.99)
+    return low[0] + share * (high[0] - low[0])
+
+
+def between(a: Corrected, b: Corrected, share: float) -> np.ndarray:
+    """Cubic through two points and their tangents."""
+    if not np.isfinite(share):
+        share = 0.5
+    chord = b.z - a.z
+    length = np.linalg.norm(chord / a.scale)
+    s = share
+    return (
+        a.z * (1 + 2 * s) * (1 - s) ** 2
+        + b.z * s * s * (3 - 2 * s)
+        + length * a.tangent * s * (1 - s) ** 2
+        + length * b.tangent * s * s * (s - 1)
+    )
+
+
+def _inside(z, low, high, scale, slack: float = 1e-6) -> bool:
+    """Whether z lies between the ends, and near the chord."""
+    chord, way = (high - low) / scale, (z - low) / scale
+    length = np.linalg.norm(chord)
+    along = float(way @ chord) / length
+    aside = float(np.linalg.norm(way - along / length * chord))
+    edge = slack * length + 1e-9
+    return bool(-edge <= along <= length + edge and aside <= length)
+
+
+def ahead(
+    problem: AbstractProblem, name: str, context: Context, a: Corrected, value: float,
+    reach: float,
+) -> Located | None:  # fmt: skip
+    """The zero of a monitor within `reach` ahead of a point of the branch, if any.
+
+    For monitors that do not change sign or end the branch: where nothing exists behind
+    the zero, or not even at it, it is approached from this side, level by level.
+    """
+    z, level, failures = a.z, value, 0
+
+    def reached(target: float):
+        extended = monitor_level(problem, name, context.leaf, context.width, target)
+        found, success, _ = solve(extended, z, context.settings)
+        way = (found - a.z) / a.scale
+        forward = float(way @ (a.tangent / a.scale)) > 0
+        near = success and forward and float(np.linalg.norm(way)) <= reach
+        return found, success, near
+
+    while failures < 4:
+        found, _, near = reached(0.0)
+        if near:
+            return Located(found, True, "")
+        target = level * (0.1 if failures == 0 else 0.5)
+        found, success, near = reached(target)
+        if near:
+            # the rest of the way, which is as short as it can be told
+            rest = target / (level - target) * (found - z)
+            z, level = found, target
+            if float(np.linalg.norm(rest / a.scale)) <= context.settings.tolerance:
+                return Located(z + rest, True, "")
+        elif success:
+            return None
+        else:
+            failures += 1
+    return None
+
+
+def pair_is_complex(problem, kind: str, context: Context, z: np.ndarray, at) -> bool:
+    """Whether a critical pair is complex; otherwise the point is a neutral saddle."""
+    if kind not in (HOPF, NEIMARK_SACKER):
+        return True
+    right, _ = null_vectors(matrix_at(problem, kind, context.leaf, z))
+    a, w = jnp.asarray(at.linearisation), jnp.asarray(right)
+    if kind == HOPF:
+        return float(determinant_on_plane(a, w)) > 0
+    return abs(float(trace_on_plane(a, w))) < 2

@@ -1,0 +1,92 @@
+"""Points at which a monitor is zero, as solutions of a larger problem."""
+
+from typing import Any, ClassVar
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float, PyTree
+
+from .._parameter import with_leaf
+from .._problem import AbstractProblem, Monitor, Stability
+from ._extended import AbstractExtended
+
+
+class MonitorPoints(AbstractExtended):
+    """Points (u, parameter) on a branch where a monitor of the problem is zero."""
+
+    base: AbstractProblem
+    name: str = eqx.field(static=True)
+    leaf: int = eqx.field(static=True)
+    width: Array
+    bounds: Array
+    stability: ClassVar[Stability] = "none"
+
+    def residual(self, u: Float[Array, " n"], parameters: PyTree):
+        inner, inside = self.inside(u, parameters)
+        value = self.base.watched(self.name, inner, inside)
+        return jnp.append(self.base.residual(inner, inside), value)
+
+    def seen(self, u: Float[Array, " n"], parameters: PyTree):
+        values, observed = self.base.seen(*self.inside(u, parameters))
+        return {name: values[name] for name in self.monitors()}, observed
+
+    def monitors(self) -> dict[str, Monitor]:
+        own = self.base.monitors()[self.name]
+        silent = (self.name, *self.base.vanishing_with(self.name))
+        return {
+            name: Monitor(f"{own.kind}-{other.kind}", ends=other.ends)
+            for name, other in self.base.monitors().items()
+            if name not in silent
+        }
+
+    @property
+    def signature(self) -> str:
+        kind = self.base.monitors()[self.name].kind
+        return f"{kind} of {self.base.signature}"
+
+
+class MonitorLevel(AbstractProblem):
+    """The point (u, parameter) on a branch where a monitor has some value.
+
+    The number of the monitor is an array where the problem can do with that, so that
+    one program finds the zeros of all.
+    """
+
+    base: AbstractProblem
+    leaf: int = eqx.field(static=True)
+    width: Array
+    which: str | Array
+    level: Array
+    stability: ClassVar[Stability] = "none"
+
+    @property
+    def parameters(self) -> PyTree:
+        return self.base.parameters
+
+    def residual(self, u: Float[Array, " n"], parameters: PyTree):
+        inner, inside = u[:-1], with_leaf(parameters, self.leaf, u[-1])
+        if isinstance(self.which, str):
+            value = self.base.watched(self.which, inner, inside)
+        else:
+            value = self.base.watched_by_number(self.which, inner, inside)
+        return jnp.append(self.base.residual(inner, inside), value - self.level)
+
+    def scale(self, u: Float[Array, " n"], parameters: PyTree):
+        inside = with_leaf(parameters, self.leaf, u[-1])
+        sizes = self.base.scale(u[:-1], inside)
+        return jnp.concatenate([sizes, jnp.reshape(self.width, (1,))])
+
+
+# its `parameters` is a property, which type checkers take for an argument
+_level: Any = MonitorLevel
+
+
+def monitor_level(
+    problem: AbstractProblem, name: str, leaf: int, width, level: float = 0.0
+) -> MonitorLevel:
+    """The problem of the point where a monitor has this value."""
+    which: Any = name
+    if type(problem).watched_by_number is not AbstractProblem.watched_by_number:
+        which = np.asarray(list(problem.monitors()).index(name))
+    return _level(problem, leaf, np.asarray(width), which, np.asarray(level))

@@ -1,0 +1,268 @@
+"""Normal-form coefficients at special points (Kuznetsov, chapters 3 to 5)."""
+
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from .._parameter import with_leaf
+from .._problem import AbstractProblem
+from .._program import Corrected, evaluate
+from .._settings import Settings
+from ._differences import along, STEPS
+from ._multilinear import second, third
+from ._test_functions import FLIP, FOLD, HOPF, NEIMARK_SACKER
+
+
+# largest displacement for differences, of a component of a state or phase
+_REACH = 2.0**-7
+
+
+@eqx.filter_jit
+def _b(problem, parameters, u, a, b, of_residual: bool):
+    if of_residual:
+        return second(problem.residual, u, parameters, a, b)
+    motion, y = problem.local_motion(u, parameters)
+    return second(lambda y, _: motion(y), y, None, a, b)
+
+
+@eqx.filter_jit
+def _c(problem, parameters, u, a, b, c):
+    motion, y = problem.local_motion(u, parameters)
+    return third(lambda y, _: motion(y), y, None, a, b, c)
+
+
+@eqx.filter_jit
+def _jacobians(problem, parameters, u, moves):
+    """The Jacobian of the local motion next to a solution, displaced by these."""
+    jacobian, y = problem.local_jacobian(u, parameters)
+    return jax.lax.map(lambda move: jacobian(y + move), moves)
+
+
+def _parts(x: Any):
+    """Real vectors and their factors that make up a complex vector."""
+    if np.isrealobj(x):
+        return [(1.0, x)]
+    return [(1.0, x.real), (1j, x.imag)]
+
+
+class _Derivatives:
+    """A, B and C of a problem at a point, for complex arguments too.
+
+    By nested differentiation, or where the problem says that this is costly by
+    differences of Jacobians.
+    """
+
+    def __init__(
+        self, problem: AbstractProblem, leaf: int, z: np.ndarray, settings: Settings
+    ):
+        self.problem = problem
+        self.leaf = leaf
+        self.settings = settings
+        self.z = z
+        self.parameters = with_leaf(problem.parameters, leaf, jnp.asarray(z[-1]))
+        self.u = jnp.asarray(z[:-1])
+
+    def a(self, at: Corrected) -> np.ndarray:
+        if not has_own_motion(self.problem):
+            return at.linearisation
+        y = jax.eval_shape(
+            lambda u: self.problem.local_jacobian(u, self.parameters)[1], self.u
+        )
+        # as many as differences take, so that it is the same program
+        return self._jacobians(np.zeros((2 * STEPS + 1, y.size)))[0]
+
+    def b(self, x, y, of_residual: bool = False):
+        total = 0.0
+        for f, a in _parts(x):
+            for g, b in _parts(y):
+                total = total + f * g * self._b(a, b, of_residual)
+        return total
+
+    def c(self, x, y, w):
+        total = 0.0
+        for f, a in _parts(x):
+            for g, b in _parts(y):
+                for h, c in _parts(w):
+                    total = total + f * g * h * self._c(a, b, c)
+        return total
+
+    def _b(self, a, b, of_residual: bool) -> np.ndarray:
+        if self.problem.costly:
+            return self._along(a, of_residual)[0] @ b
+        return np.asarray(
+            _b(
+                self.problem, self.parameters, self.u,
+                jnp.asarray(a), jnp.asarray(b), of_residual,
+            )
+        )  # fmt: skip
+
+    def _c(self, a, b, c) -> np.ndarray:
+        if self.problem.costly:
+            # polarised, as differences are along one line
+            if np.array_equal(a, b):
+                return self._along(a)[1] @ c
+            return (self._along(a + b)[1] - self._along(a - b)[1]) @ c / 4
+        return np.asarray(
+            _c(
+                self.problem, self.parameters, self.u,
+                jnp.asarray(a), jnp.asarray(b), jnp.asarray(c),
+            )
+        )  # fmt: skip
+
+    def _along(self, direction, of_residual: bool = False):
+        """First and second derivative of the Jacobian along a real direction."""
+        length = float(np.max(np.abs(direction)))
+        if length == 0:
+            n = direction.size
+            return np.zeros((n, n)), np.zeros((n, n))
+        reach = _REACH / length
+        matrices = self._residual_jacobians if of_residual else self._jacobians
+        first, again = along(matrices, reach * direction)
+        return first / reach, again / reach**2
+
+    def _jacobians(self, moves: np.ndarray) -> np.ndarray:
+        return np.asarray(_jacobians(self.problem, self.parameters, self.u, moves))
+
+    def _residual_jacobians(self, moves: np.ndarray) -> np.ndarray:
+        """By the program of the corrector, which need not be compiled again."""
+        n, one = moves.shape[1], np.ones_like(self.z)
+        return np.stack(
+            [
+                evaluate(
+                    self.problem, self.leaf, self.z + np.append(move, 0.0), one, 1.0,
+                    self.settings,
+                ).jacobian[:, :n]
+                for move in moves
+            ]
+        )  # fmt: skip
+
+
+def has_own_motion(problem: AbstractProblem) -> bool:
+    """Whether normal forms are those of another map than the linearisation is of."""
+    kind, base = type(problem), AbstractProblem
+    return (
+        kind.local_motion is not base.local_motion
+        or kind.local_jacobian is not base.local_jacobian
+    )
+
+
+def _eigen(matrix: np.ndarray) -> tuple[Any, Any]:
+    """Complex eigenvalues and eigenvectors."""
+    values, vectors = np.linalg.eig(matrix)
+    return values.astype(complex), vectors.astype(complex)
+
+
+def null_vectors(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Unit right and left null vectors of a nearly singular matrix."""
+    left, _, right = np.linalg.svd(matrix)
+    return right[-1].conj(), left[:, -1]
+
+
+def fold_form(d: _Derivatives, at: Corrected) -> tuple[float | None, str]:
+    """Coefficient a of x' = a x^2 or x -> x + a x^2, and where the branch opens."""
+    n, jacobian, problem = at.jacobian.shape[0], at.jacobian, d.problem
+    right, left = null_vectors(jacobian[:, :n])
+    bending = float(left @ d.b(right, right, True))
+    slope = float(left @ jacobian[:, n])
+    if slope == 0 or not np.isfinite(bending):
+        return None, ""
+    side = "larger" if -bending / slope > 0 else "smaller"
+    words = f"the branch lies at {side} parameters"
+    if problem.stability == "none":
+        return None, words
+    if has_own_motion(problem):
+        a = d.a(at)
+        right, left = null_vectors(a - np.eye(a.shape[0]))
+        bending = float(left @ d.b(right, right))
+    overlap = float(left @ right)
+    if abs(overlap) < 1e-12:
+        return None, words
+    return bending / 2 / overlap, words
+
+
+def flip_form(d: _Derivatives, at: Corrected) -> tuple[float | None, str]:
+    """Coefficient c of x -> -x + c x^3; positive: the doubled orbit is stable."""
+    a = d.a(at)
+    one = np.eye(a.shape[0])
+    right, left = null_vectors(a + one)
+    left = left / (left @ right)
+    inner = np.linalg.solve(a - one, d.b(right, right))
+    c = float(left @ (d.c(right, right, right) - 3 * d.b(right, inner))) / 6
+    return c, "supercritical" if c > 0 else "subcritical"
+
+
+def hopf_form(d: _Derivatives, at: Corrected) -> tuple[float | None, str]:
+    """First Lyapunov coefficient; negative: the limit cycle is stable."""
+    a = d.a(at)
+    values, vectors = _eigen(a)
+    critical = values.imag > 0
+    if not np.any(critical):
+        return None, ""
+    k = int(np.argmin(np.where(critical, np.abs(values.real), np.inf)))
+    omega = float(values[k].imag)
+    q = vectors[:, k] / np.linalg.norm(vectors[:, k])
+    _, p = null_vectors(a - 1j * omega * np.eye(a.shape[0]))
+    p = p / np.conj(np.vdot(p, q))
+    qc = q.conj()
+    one = np.eye(a.shape[0])
+    total = (
+        np.vdot(p, d.c(q, q, qc))
+        - 2 * np.vdot(p, d.b(q, np.linalg.solve(a + 0j, d.b(q, qc))))
+        + np.vdot(p, d.b(qc, np.linalg.solve(2j * omega * one - a, d.b(q, q))))
+    )
+    c = float(total.real) / (2 * omega)
+    return c, "supercritical" if c < 0 else "subcritical"
+
+
+def neimark_sacker_form(d: _Derivatives, at: Corrected) -> tuple[float | None, str]:
+    """Real part of the cubic coefficient; negative: the invariant curve is stable."""
+    a = d.a(at)
+    values, vectors = _eigen(a)
+    critical = values.imag > 0
+    if not np.any(critical):
+        return None, ""
+    k = int(np.argmin(np.where(critical, np.abs(np.abs(values) - 1), np.inf)))
+    turn = values[k] / abs(values[k])
+    q = vectors[:, k] / np.linalg.norm(vectors[:, k])
+    one = np.eye(a.shape[0])
+    _, p = null_vectors(a - turn * one)
+    p = p / np.conj(np.vdot(p, q))
+    qc = q.conj()
+    total = (
+        np.vdot(p, d.c(q, q, qc))
+        + 2 * np.vdot(p, d.b(q, np.linalg.solve(one - a + 0j, d.b(q, qc))))
+        + np.vdot(p, d.b(qc, np.linalg.solve(turn**2 * one - a, d.b(q, q))))
+    )
+    c = float((total / turn).real) / 2
+    return c, "supercritical" if c < 0 else "subcritical"
+
+
+_FORMS = {
+    FOLD: fold_form,
+    FLIP: flip_form,
+    HOPF: hopf_form,
+    NEIMARK_SACKER: neimark_sacker_form,
+}
+
+
+def normal_form(
+    kind: str,
+    problem: AbstractProblem,
+    leaf: int,
+    z: np.ndarray,
+    at: Corrected,
+    settings: Settings,
+) -> tuple[float | None, str]:
+    """Normal-form coefficient of a special point, and what its sign says."""
+    if kind not in _FORMS or (kind != FOLD and not problem.normal_forms):
+        return None, ""
+    try:
+        coefficient, words = _FORMS[kind](_Derivatives(problem, leaf, z, settings), at)
+    except np.linalg.LinAlgError:
+        return None, ""
+    if coefficient is not None and not np.isfinite(coefficient):
+        return None, ""
+    return coefficient, words

@@ -1,0 +1,54 @@
+"""The parameter along which a command goes: its unit, its bounds, its name."""
+
+import math
+from typing import NamedTuple
+
+from ._checks import check_finite
+from ._choices import CAM
+
+
+class Axis(NamedTuple):
+    """A parameter in the unit of the command line.
+
+    Speeds are rpm there and rad/s inside; all others are as they are.
+    """
+
+    parameter: str
+    #: of one of the command line's units
+    unit: float
+
+    @staticmethod
+    def of(parameter: str, system: str) -> "Axis":
+        """The axis of a parameter of a system, by their names."""
+        in_rpm = parameter == "speed" and system == CAM
+        return Axis(parameter, math.pi / 30 if in_rpm else 1.0)
+
+    @property
+    def in_rpm(self) -> bool:
+        return self.unit != 1.0
+
+    @property
+    def name(self) -> str:
+        """As sentences and headings say it."""
+        return "speed in rpm" if self.in_rpm else self.parameter
+
+    @property
+    def label(self) -> tuple[str, str]:
+        """Name and unit, for figures."""
+        return ("speed", "rpm") if self.in_rpm else (self.parameter, "-")
+
+
+def ordered(low: float | None, high: float | None) -> tuple[float, float]:
+    """`--from` and `--to`, both given and in order. **Raises:** `ValueError`."""
+    if low is None or high is None:
+        raise ValueError(
+            "Give the lowest and the highest value of the parameter: --from A --to B."
+        )
+    check_finite("--from", low)
+    check_finite("--to", high)
+    if not low < high:
+        raise ValueError(
+            f"--from {low:g} --to {high:g} is the wrong way round; give the lower "
+            "value first and choose --direction."
+        )
+    return low, high

@@ -1,0 +1,76 @@
+"""The options of `jaxcam basins`, and what is asked of their values."""
+
+import dataclasses
+from typing import Annotated
+
+import typer
+
+from ._checks import at_least, check_size, numbers
+from ._choices import CAM
+
+
+# where something happens, for systems where nothing is said
+_BOXES = {
+    CAM: ((0.33, -3.0), (0.55, 3.0)),
+    "impact-oscillator": ((-1.0, -2.0), (0.0, 2.0)),
+}
+
+
+@dataclasses.dataclass(frozen=True)
+class Cells:
+    """The grid of initial states, and how long each is followed."""
+
+    low: Annotated[
+        str | None, typer.Option(metavar="A,B", help="Lowest state of the grid.")
+    ] = None
+    high: Annotated[
+        str | None, typer.Option(metavar="A,B", help="Highest state of the grid.")
+    ] = None
+    shape: Annotated[
+        str, typer.Option(metavar="K,L", help="Cells along each component.")
+    ] = "128,128"
+    turns: Annotated[
+        int, typer.Option(metavar="N", help="Forcing periods of each motion.")
+    ] = 100
+    keep: Annotated[
+        int, typer.Option(metavar="N", help="Of these, the last N are compared.")
+    ] = 24
+    reruns: Annotated[
+        int,
+        typer.Option(
+            metavar="N",
+            help="How often motions that do not repeat yet go on, each time for twice "
+            "as many turns.",
+        ),
+    ] = 1
+
+    def check(self, system: str) -> None:
+        """**Raises:** `ValueError` that names the option at fault."""
+        self.corners(system)
+        cells = self.counts
+        at_least("--keep", self.keep, 2)
+        at_least("--turns", self.turns, self.keep)
+        at_least("--reruns", self.reruns, 0)
+        check_size("--shape and --keep", *(max(1, k) for k in cells), self.keep)
+
+    def corners(self, system: str) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Lowest and highest state, those of the system where none are given."""
+        box = _BOXES.get(system)
+        if box is None and (self.low is None or self.high is None):
+            raise ValueError(
+                f"{system} needs the corners of the grid: --low A,B --high A,B."
+            )
+        low, high = box or ((), ())
+        if self.low is not None:
+            low = numbers("--low", self.low, "0.34,-2")
+        if self.high is not None:
+            high = numbers("--high", self.high, "0.34,-2")
+        return low, high
+
+    @property
+    def counts(self) -> tuple[int, ...]:
+        """Cells along each component."""
+        cells = numbers("--shape", self.shape, "128,128")
+        if any(cell != int(cell) for cell in cells):
+            raise ValueError(f"--shape is {self.shape!r}; give whole numbers.")
+        return tuple(map(int, cells))

@@ -1,0 +1,52 @@
+"""What several commands ask of the values of their options."""
+
+import math
+from pathlib import Path
+
+
+# numbers that a sweep keeps; a few of 8 bytes each fit into the memory of a laptop
+_MOST = 2 * 10**8
+
+
+def numbers(
+    option: str, text: str, example: str, finite: bool = True
+) -> tuple[float, ...]:
+    """Numbers with commas between them. **Raises:** `ValueError`.
+
+    **Arguments:** `finite`: refuse those that are not; a system refuses them, too, in
+    words of its own.
+    """
+    try:
+        found = tuple(float(part) for part in text.split(","))
+    except ValueError:
+        found = ()
+    if not found or (finite and not all(map(math.isfinite, found))):
+        raise ValueError(
+            f"{option} is {text!r}; give numbers with commas between them, such as "
+            f"{example}."
+        )
+    return found
+
+
+def at_least(option: str, value: int | None, least: int) -> None:
+    if value is not None and value < least:
+        raise ValueError(f"{option} is {value}; give {least} or more.")
+
+
+def check_finite(option: str, value: float | None) -> None:
+    if value is not None and not math.isfinite(value):
+        raise ValueError(f"{option} is {value:g}; give a finite number.")
+
+
+def check_size(options: str, *counts: int) -> None:
+    """Refuse a sweep that would not fit into memory, before it is tried."""
+    if math.prod(counts) > _MOST:
+        raise ValueError(
+            f"{options} are {' times '.join(f'{float(c):.6g}' for c in counts)} "
+            f"numbers, more than {_MOST:.0e}; give fewer."
+        )
+
+
+def check_resume(resume: bool, out: Path | None) -> None:
+    if resume and out is None:
+        raise ValueError("--resume needs the folder of the interrupted run: --out DIR.")

@@ -1,0 +1,125 @@
+"""What `jaxcam demo` finds: computed, and as page, data and words."""
+
+import dataclasses
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from ..discrepancy import Diagnosis
+from ..recordings import merge, Rig, segment_case, Segments
+from ..recordings.against_model import compare_case, Comparison
+from ._demo_branches import Branches
+from ._demo_figures import draw
+from ._output import Output, to_text, write_text
+from ._page import page, Report
+from ._rests import rest_table, Rests, rests, simulate_run
+
+
+@dataclasses.dataclass(frozen=True)
+class Result:
+    """Recordings beside the simulation of their rig, and what that lacks."""
+
+    case: str
+    segments: Sequence[Segments]
+    comparison: Comparison
+    rests: list[Rests]
+    figures: list[tuple[Path, str]]
+    lacks: Diagnosis | None = None
+    branches: Branches | None = None
+
+
+def compared(runs, nominal: Rig, folder: Path, report) -> Result:
+    """Cut the runs, simulate their flights and the whole rig, and draw all that."""
+    segments = segment_case(tuple(runs), nominal)
+    parts, simulated = [], []
+    for k, run in enumerate(segments):
+        report(f"comparing {run.recording.name}", k / len(segments))
+        parts.append(compare_case(nominal, [run]))
+    for k, run in enumerate(segments):
+        report(f"simulating {run.recording.name}", k / len(segments))
+        simulated.append(simulate_run(nominal, run))
+    comparison = merge(parts)
+    found = [rests(run, motion) for run, motion in zip(segments, simulated)]
+    report("drawing", None)
+    figures = draw(folder, segments, comparison, simulated)
+    return Result(runs.name, segments, comparison, found, figures)
+
+
+def write_result(folder: Path, found: Result) -> dict[str, Any]:
+    """Write index.html and result.json; what is in the latter."""
+    lacks, branches = found.lacks, found.branches
+    result = {
+        "command": "demo",
+        "case": found.case,
+        "runs": [
+            {
+                "name": run.recording.name,
+                "speed": run.drive.speed if run.drive else None,
+                "sentence": run.sentence(),
+                "rests": rest.to_json(),
+            }
+            for run, rest in zip(found.segments, found.rests)
+        ],
+        "comparison": found.comparison.to_json(),
+        "figures": [file.name for file, _ in found.figures],
+        "branches": None if branches is None else [list(row) for row in branches.rows],
+        "diagnosis": None if lacks is None else lacks.to_json(),
+    }
+    report = Report(
+        title=f"{found.case}: recordings, simulation, and what lies between",
+        sentence=found.comparison.sentence(),
+        lacks=None if lacks is None else lacks.summary,
+        branches=branches,
+        runs=[run.sentence() for run in found.segments],
+        comparison=found.comparison.rows,
+        rests=found.rests,
+        figures=found.figures,
+        next_steps=_next_steps(found.rests),
+    )
+    write_text(folder / "index.html", page(report))
+    write_text(folder / "result.json", to_text(result) + "\n")
+    return result
+
+
+def print_result(output: Output, found: Result) -> None:
+    """Tables and sentences for the terminal."""
+    for run in found.segments:
+        output.print(run.sentence())
+    output.print(found.comparison.table())
+    output.print(found.comparison.sentence())
+    output.print(rest_table(found.rests))
+    if found.lacks is not None:
+        output.print(found.lacks.summary)
+    for orbit, kind, rpm, _ in found.branches.rows if found.branches else ():
+        output.print(f"{orbit}: {kind} at {rpm} rpm.")
+
+
+def _next_steps(found) -> list[tuple[str, str]]:
+    """What to type next, and what it is for."""
+    rpm = found[0].rpm if found else 140.0
+    return [
+        (
+            f"jaxcam simulate cam-follower --speed {rpm:.1f} --turns 40 "
+            f"--out ./jaxcam-{rpm:.1f}rpm",
+            "The motion of the first run with the parameters of Table 4.4.",
+        ),
+        (
+            f"jaxcam simulate cam-follower --speed {rpm:.1f} --set restitution.r=0.5",
+            "The same with another restitution.",
+        ),
+        (
+            "jaxcam simulate --system DIR/diagnosis/model.json --speed 140",
+            "The motion of the rig with what its model lacked; DIR is the folder of "
+            "this page.",
+        ),
+        (
+            "jaxcam continue --preset calibrated --from 130 --to 154 --at 145 "
+            "--state 0.4245,1.828 --out ./jaxcam-branch",
+            "The branch P(1,1) of this page, with all its points.",
+        ),
+        (
+            "jaxcam demo --case DIR --rig DIR/rig.toml",
+            "Recordings of your own: a folder DIR of CSV files with the columns "
+            "time_s, cam_angle_rad and follower_angle_rad, and a file with the rig.",
+        ),
+    ]

@@ -1,0 +1,140 @@
+"""The options of `jaxcam diagram`, and what is asked of their values."""
+
+import dataclasses
+from typing import Annotated
+
+import typer
+
+from ._axis import ordered
+from ._checks import at_least, check_size, numbers
+from ._choices import choose
+from ._options import Highest, Lowest
+
+
+DIRECTIONS = ("each", "up", "down", "both")
+SECTIONS = ("stroboscope", "impacts")
+
+
+@dataclasses.dataclass(frozen=True)
+class Sweep:
+    """What varies, and how motions are sampled at each value."""
+
+    parameter: Annotated[
+        str,
+        typer.Option(
+            metavar="NAME", help="The parameter that varies, such as speed or omega."
+        ),
+    ] = "speed"
+    low: Lowest = None
+    high: Highest = None
+    points: Annotated[int, typer.Option(metavar="N", help="How many values.")] = 200
+    turns: Annotated[
+        int, typer.Option(metavar="N", help="Forcing periods at each value.")
+    ] = 300
+    keep: Annotated[
+        int, typer.Option(metavar="N", help="Of these, the last N are drawn.")
+    ] = 100
+    direction: Annotated[
+        str,
+        typer.Option(
+            metavar="NAME",
+            help="up, down or both ways with the state carried on, or each value from "
+            "the same start.",
+        ),
+    ] = "both"
+    dwell: Annotated[
+        str | None,
+        typer.Option(
+            metavar="A,B",
+            help="Seconds to wait and to store at each value, as a rig is driven, in "
+            "place of --turns and --keep.",
+        ),
+    ] = None
+    section: Annotated[
+        str, typer.Option(metavar="NAME", help=f"One of {', '.join(SECTIONS)}.")
+    ] = "stroboscope"
+
+    def check(self) -> None:
+        """**Raises:** `ValueError` that names the option at fault."""
+        choose("--direction", self.direction, DIRECTIONS)
+        choose("--section", self.section, SECTIONS)
+        ordered(self.low, self.high)
+        at_least("--points", self.points, 1)
+        at_least("--keep", self.keep, 1)
+        at_least("--turns", self.turns, self.keep)
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """Lowest and highest value."""
+        return ordered(self.low, self.high)
+
+    @property
+    def seconds(self) -> tuple[float, ...] | None:
+        """To wait and to store."""
+        if self.dwell is None:
+            return None
+        found = numbers("--dwell", self.dwell, "60,10")
+        if len(found) != 2:
+            raise ValueError(
+                f"--dwell is {self.dwell!r}; give the seconds to wait and to store, "
+                "such as 60,10."
+            )
+        return found
+
+
+@dataclasses.dataclass(frozen=True)
+class Starts:
+    """Where motions begin."""
+
+    state: Annotated[
+        str | None,
+        typer.Option(metavar="A,B", help="Start; without, in contact at rest."),
+    ] = None
+    starts: Annotated[
+        int | None,
+        typer.Option(
+            metavar="N", help="Or N random starts of each value, between --low, --high."
+        ),
+    ] = None
+    corner: Annotated[
+        str | None,
+        typer.Option("--low", metavar="A,B", help="Lowest state of random starts."),
+    ] = None
+    opposite: Annotated[
+        str | None,
+        typer.Option("--high", metavar="A,B", help="Highest state of random starts."),
+    ] = None
+    seed: Annotated[int, typer.Option(metavar="N", help="Of random starts.")] = 0
+
+    def check(self, sweep: Sweep) -> None:
+        """**Raises:** `ValueError` that names the option at fault."""
+        at_least("--starts", self.starts, 1)
+        at_least("--seed", self.seed, 0)
+        counts = sweep.points, self.starts or 1, sweep.keep
+        check_size("--points, --starts and --keep", *counts)
+        if self.starts is not None and (self.corner is None or self.opposite is None):
+            raise ValueError(
+                "--starts needs the box to draw them from: --low A,B --high A,B."
+            )
+        if self.starts is not None and self.state is not None:
+            raise ValueError("Give --state or --starts, not both.")
+
+    @property
+    def given(self) -> tuple[float, ...] | None:
+        """The one state to start from."""
+        return None if self.state is None else numbers("--state", self.state, "0.4,1.8")
+
+    @property
+    def box(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """The corners between which random starts are drawn."""
+        low = numbers("--low", str(self.corner), "0.34,-2")
+        return low, numbers("--high", str(self.opposite), "0.5,3")
+
+    def states(self, sweep: Sweep):
+        """The states to start from, as [`jaxcam.sweeps.diagram`][] takes them."""
+        from ..sweeps import monte_carlo
+
+        if self.starts is None:
+            return self.given
+        each = sweep.points if sweep.direction == "each" else None
+        return monte_carlo(*self.box, self.starts, self.seed, each)

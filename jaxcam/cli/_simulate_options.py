@@ -1,0 +1,94 @@
+"""The options of `jaxcam simulate`, and what is asked of their values."""
+
+import dataclasses
+from typing import Annotated
+
+import typer
+
+from ._checks import check_finite, numbers
+from ._choices import choose, ENGINES, SOLVERS, SYSTEMS
+
+
+@dataclasses.dataclass(frozen=True)
+class Run:
+    """Where a motion starts, when it ends, and how it is integrated."""
+
+    state: Annotated[
+        str | None,
+        typer.Option(
+            metavar="A,B",
+            help="Start, such as 0.3,0, or the word release for the release point of "
+            "a sticking orbit. Without: release; 1,0 for the ball; 0,0.1,-2 for the "
+            "triple integrator.",
+        ),
+    ] = None
+    t0: Annotated[float, typer.Option(metavar="S", help="Start of the motion (s).")] = (
+        0.0
+    )
+    t1: Annotated[
+        float | None, typer.Option(metavar="S", help="End of the motion (s).")
+    ] = None
+    turns: Annotated[
+        float | None,
+        typer.Option(
+            metavar="N",
+            help="Or its length in periods of the forcing (turns of the cam): 10.",
+        ),
+    ] = None
+    tolerance: Annotated[
+        float, typer.Option(metavar="E", help="Error allowed in a step.")
+    ] = 1e-10
+    solver: Annotated[
+        str, typer.Option(metavar="NAME", help=f"One of {', '.join(SOLVERS)}.")
+    ] = "dopri8"
+    engine: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help="loop, or diffeqsolve: one call a flight, also for implicit solvers.",
+        ),
+    ] = None
+
+    def check(self) -> None:
+        """**Raises:** `ValueError` that names the option at fault."""
+        choose("--solver", self.solver, SOLVERS)
+        choose("--engine", self.chosen_engine, ENGINES)
+
+    @property
+    def chosen_engine(self) -> str:
+        """The engine, or the one that the solver needs."""
+        implicit = self.solver.startswith("kvaerno")
+        return self.engine or ("diffeqsolve" if implicit else "loop")
+
+    def start(self, name: str):
+        """The state to start from; None for the release point."""
+        import numpy as np
+
+        if self.state == "release":
+            return None
+        if self.state is None:
+            start = SYSTEMS[name].state
+            return None if start is None else np.array(start)
+        words = "0.3,0, or the word release"
+        return np.array(numbers("--state", self.state, words, finite=False))
+
+    def end(self, name: str, model) -> float:
+        """When to stop (s)."""
+        check_finite("--t0", self.t0)
+        check_finite("--t1", self.t1)
+        check_finite("--turns", self.turns)
+        if self.t1 is not None and self.turns is not None:
+            raise ValueError("Give --t1 or --turns, not both.")
+        if self.t1 is not None:
+            return self.t1
+        ready = SYSTEMS[name]
+        turns = ready.turns if self.turns is None else self.turns
+        if turns is None:
+            return self.t0 + ready.duration
+        if model.period is None:
+            raise ValueError(f"{name} has no forcing to count turns of; give --t1.")
+        if not turns > 0:
+            raise ValueError(f"--turns is {turns:g}; give a positive number.")
+        # a speed of zero would give an endless turn: let the system say so
+        model.check()
+        return self.t0 + turns * float(model.period)

@@ -1,0 +1,55 @@
+"""Detection limits: the least strength of each term that would be named."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from ..search import newton_step, Trial, Trials
+
+
+class Limit(NamedTuple):
+    """The least strength that would be named, its standard error and its unit.
+
+    `hidden` is the parameter of the rig that would take up most of it.
+    """
+
+    size: float
+    stderr: float
+    unit: str
+    hidden: str
+
+
+def limits(trials: Trials, trial: Trial) -> dict[str, Limit]:
+    """Least strength of each term, beside those of a trial, that would be named.
+
+    **Returns:** limits by the name of the parameter.
+    """
+    blocks = trials.blocks(trial)
+    information, score = blocks.total()
+    free = blocks.rows(trials.parameters(trial.names))
+    rig = blocks.rows(trials.rig)
+    found = {}
+    for term in trials.terms:
+        if term.name in trial.names:
+            continue
+        for one in term.strengths():
+            if one.inner:
+                continue
+            row = blocks.rows([one.name])
+            rows = np.union1d(free, row)
+            _, covariance = newton_step(information, score, rows)
+            place = np.searchsorted(rows, row[0])
+            stderr = math.sqrt(abs(covariance[place, place]))
+            # without the term, the rig moves by what its columns have in common with it
+            across = np.zeros(len(blocks.names))
+            across[rig] = information[rig, row[0]]
+            taken, spread = newton_step(information, across, rig)
+            own = np.sqrt(np.diag(spread))
+            hidden = ""
+            if len(rig):
+                hidden = blocks.names[rig[int(np.argmax(np.abs(taken) / own))]]
+            size = stderr * float(blocks.scale[row[0]])
+            threshold = math.sqrt(trials.threshold(term.name)) + trials.policy.beyond
+            found[one.name] = Limit(size * threshold, size, one.unit, hidden)
+    return found

@@ -1,0 +1,159 @@
+"""Whether the drive ripples with its own angle, from its encoder alone.
+
+`w (1 + eps cos(phi - psi))` shifts the angle by `eps sin(phi - psi)` to first order. A
+real drive also wanders slowly: everything slower than three quarters of its rate is
+fitted freely (cosines of the record's length) and no ripple. What the wandering leaks
+to the harmonic is judged by what is seen beside it, at rates that no drive has a reason
+to prefer.
+"""
+
+import dataclasses
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.stats import chi2
+
+from ...recordings import Recording
+from ..policy import Policy
+
+
+# A divisor that may be zero is at least this
+_TINY = 1e-300
+
+
+@dataclasses.dataclass(frozen=True)
+class Ripple:
+    """Ripple of the speed once a turn: `eps` and `psi` (rad) with their errors.
+
+    - `gain`: growth of twice the log-likelihood, over what leakage explains.
+    - `p_value`: of no ripple. `count`: samples. `per_record`: eps of each record.
+    """
+
+    eps: float
+    eps_stderr: float
+    psi: float
+    psi_stderr: float
+    gain: float
+    p_value: float
+    count: int
+    dispersion: float
+    per_record: dict[str, tuple[float, float]]
+    heldout_gain: float
+    inclusion: float
+
+    def significant(self, tests: int, policy: Policy) -> bool:
+        """Whether it is more than chance, in one of so many tests, and the BIC ask."""
+        chance = chi2.isf(policy.false_alarms / tests, 2)
+        return bool(self.gain > max(2 * math.log(self.count), chance))
+
+    @property
+    def delta_bic(self) -> float:
+        return 2 * math.log(max(self.count, 2)) - self.gain
+
+
+def ripple_of(
+    recordings: Sequence[Recording],
+    noise: float,
+    channel: str = "cam_angle_rad",
+    policy: Policy = Policy(),
+) -> Ripple:
+    """Fit one ripple to the drives of all records.
+
+    **Arguments:** recordings, the standard deviation of the channel's noise (rad), its
+    name, and the policy.
+    """
+    orders = (1.0, *policy.drive_orders)
+    amplitudes, errors, samples = [], [], 0
+    for recording in recordings:
+        found, error = _amplitudes(recording, channel, orders, noise, policy)
+        amplitudes.append(found)
+        errors.append(error)
+        samples += len(recording)
+    wave, error = np.array(amplitudes), np.array(errors)
+    beside = np.abs(wave[:, 1:] / error[:, 1:]) ** 2 / 2
+    dispersion = max(1.0, float(np.mean(beside)))
+    variance = error[:, 0] ** 2 * dispersion
+    weight = 1 / variance
+    mean = np.sum(weight * wave[:, 0]) / np.sum(weight)
+    stderr = 1 / math.sqrt(np.sum(weight))
+    gain = float(abs(mean) ** 2 / stderr**2)
+    eps = abs(mean)
+    psi = float(np.angle(mean)) % (2 * math.pi)
+    return Ripple(
+        float(eps),
+        stderr,
+        psi,
+        stderr / max(eps, _TINY),
+        gain,
+        float(chi2.sf(gain, 2)),
+        samples,
+        dispersion,
+        {
+            r.name: (float(abs(w)), float(math.sqrt(v)))
+            for r, w, v in zip(recordings, wave[:, 0], variance)
+        },
+        _held_out(wave[:, 0], variance),
+        _inclusion(
+            wave[:, 0], variance, 2 * math.log(max(samples, 2)), policy.bootstrap
+        ),
+    )
+
+
+def _held_out(wave, variance) -> float:
+    """Log-likelihood gained on each record with the ripple of all the others."""
+    total = 0.0
+    for k in range(len(wave)):
+        rest = np.arange(len(wave)) != k
+        if not rest.any():
+            return 0.0
+        mean = np.average(wave[rest], weights=1 / variance[rest])
+        missed = abs(wave[k]) ** 2 - abs(wave[k] - mean) ** 2
+        total += float(missed / variance[k]) / 2
+    return total
+
+
+def _inclusion(wave, variance, asked: float, repetitions: int) -> float:
+    """Part of the redrawn sets of records in which the ripple is worth it."""
+    rng = np.random.default_rng(0)
+    drawn = rng.integers(0, len(wave), (repetitions, len(wave)))
+    weight = 1 / variance[drawn]
+    mean = np.sum(weight * wave[drawn], axis=1) / np.sum(weight, axis=1)
+    return float(np.mean(np.abs(mean) ** 2 * np.sum(weight, axis=1) > asked))
+
+
+def _amplitudes(
+    recording: Recording, channel: str, orders, noise: float, policy: Policy
+):
+    """Complex amplitude eps e^{i psi} of each multiple of the rate, and its error."""
+    angle = recording[channel]
+    if np.any(np.abs(np.diff(angle)) > np.pi):
+        angle = np.unwrap(angle)
+    if angle[-1] < angle[0]:
+        angle = -angle
+    time = recording.time - recording.time[0]
+    line = np.polyfit(time, angle, 1)
+    turned = np.polyval(line, time)
+    rate = line[0] / (2 * np.pi)
+    length = time[-1] * (1 + 1 / len(time))
+    slow = np.arange(1, int(2 * length * policy.drive_wander * rate) + 1)
+    wander = np.cos(np.pi * np.outer(time / length, slow))
+    # cosines are flat at both ends, where a drive need not be
+    ends = np.polynomial.legendre.legvander(2 * time / length - 1, policy.drive_degree)
+    columns = [*ends.T, *wander.T]
+    found, errors = np.zeros(len(orders), dtype=complex), np.zeros(len(orders))
+    fixed, _ = np.linalg.qr(np.stack(columns, axis=1))
+    rest = angle - turned
+    rest = rest - fixed @ (fixed.T @ rest)
+    # the first harmonic is fitted beside the others, which it may leak into
+    for k, order in enumerate(orders):
+        pick = (order,) if order == 1 else (order, 1.0)
+        waves = [f(o * turned) for o in pick for f in (np.sin, np.cos)]
+        matrix = np.stack(waves, axis=1)
+        matrix = matrix - fixed @ (fixed.T @ matrix)
+        inverse = np.linalg.inv(matrix.T @ matrix)
+        s, c = (inverse @ (matrix.T @ rest))[:2] * order
+        # s sin + c cos = eps sin(phi - psi): s = eps cos psi, c = -eps sin psi
+        found[k] = s - 1j * c
+        errors[k] = noise * order * math.sqrt((inverse[0, 0] + inverse[1, 1]) / 2)
+    return found, errors

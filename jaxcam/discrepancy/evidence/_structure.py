@@ -1,0 +1,284 @@
+"""What a fit leaves over: shapes that would still gain, and where they live."""
+
+import dataclasses
+import enum
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import jax
+import numpy as np
+from jaxtyping import Float
+from scipy.stats import chi2, norm
+
+from ...fitting import Fit, Problem, residuals
+from ...recordings import References
+from ..policy import Policy
+from ..search import (
+    added_gain,
+    Blocks,
+    blocks_of,
+    extended,
+    force_blocks,
+    newton_step,
+    Periodogram,
+    predicted_gain,
+    Response,
+)
+from ..terms import Shape, shapes, Term, terms_of, Where
+
+
+# A standard error that may be zero is at least this
+_TINY = 1e-300
+# Approach speed at the end of a range in which there is no impact
+_SLOWEST = 1e-3
+
+
+class Form(enum.StrEnum):
+    """How a structure is looked for; equal to its name as a string."""
+
+    TERM = "term"
+    FUNCTION = "function"
+    VIBRATION = "vibration"
+    COLOURED = "coloured"
+
+
+@dataclasses.dataclass(frozen=True)
+class Structure:
+    """One way in which what is left over might not be noise.
+
+    - `gain`: growth of twice the log-likelihood; `threshold`: what chance and the
+        number of parameters would demand.
+    - `predicted_gain`: growth in half of the records with what the other half says,
+        where `gain` is above its threshold; negative for what differs from record to
+        record.
+    - `variable`, `grid`, `value`, `stderr` `(k,)`: the shape, where there is one;
+        `quantity` is what its value is.
+    - `form`: an unlisted term, a free function, a vibration, or residuals that are
+        correlated in time.
+    """
+
+    name: str
+    sentence: str
+    where: str
+    region: str
+    gain: float
+    threshold: float
+    count: int
+    unit: str = ""
+    variable: str = ""
+    grid: Float[np.ndarray, " k"] = dataclasses.field(
+        default_factory=lambda: np.zeros(0)
+    )
+    value: Float[np.ndarray, " k"] = dataclasses.field(
+        default_factory=lambda: np.zeros(0)
+    )
+    stderr: Float[np.ndarray, " k"] = dataclasses.field(
+        default_factory=lambda: np.zeros(0)
+    )
+
+    predicted_gain: float = math.inf
+    form: Form = Form.FUNCTION
+    quantity: str = ""
+
+    @property
+    def significant(self) -> bool:
+        return self.gain > self.threshold and self.predicted_gain > 0
+
+    @property
+    def place(self) -> str:
+        """Where the shape is largest in units of its error."""
+        if not len(self.grid):
+            return self.region
+        score = np.abs(self.value) / np.maximum(self.stderr, _TINY)
+        k = int(np.argmax(score))
+        return (
+            f"{self.region}; clearest at {self.variable} {self.grid[k]:.3g}, where it "
+            f"is {self.value[k]:.2g} +- {self.stderr[k]:.1g} {self.unit}"
+        )
+
+
+def structures(
+    found: Fit,
+    response: Response,
+    unlisted: Sequence[Term],
+    scan: Periodogram,
+    turned: bool,
+    references: References,
+    policy: Policy,
+) -> list[Structure]:
+    """Everything that the residuals of a fit are asked for, largest excess first.
+
+    **Arguments:** the fit, what a force would gain beside it, terms that describe but
+    are no verdicts, the periodogram of what is left, whether there is a drive, the
+    constants of forms, and the policy.
+    """
+    problem = found.problem
+    more: tuple[Term, ...] = (
+        *unlisted,
+        *shapes(*_ranges(problem, policy), turned=turned, references=references),
+    )
+    # a force needs no program of its own
+    forces = [t for t in more if t.acts == (Where.FLIGHT,)]
+    others = [t for t in more if t.acts != (Where.FLIGHT,)]
+    wide = extended(problem, others, found.point)
+    tests = len(more) + 2
+    made = []
+    for terms, blocks, place in (
+        (forces, force_blocks(problem, response, forces), 0),
+        (others, blocks_of(wide, wide.start), len(terms_of(problem.model))),
+    ):
+        information, score = blocks.total()
+        free = blocks.rows(response.free)
+        for k, term in enumerate(terms):
+            own = blocks.rows([p.name for p in term.parameters(place + k)])
+            grown = added_gain(information, score, free, own, policy.alike)
+            threshold = _threshold(len(own), problem.samples, tests, policy)
+            shape = _shape(term, blocks, information, score, free, own, policy)
+            predicted = math.inf
+            if grown > threshold:
+                predicted = predicted_gain(blocks, free, own, policy)
+            made.append(
+                Structure(
+                    term.name,
+                    term.sentence,
+                    term.where,
+                    term.region,
+                    grown,
+                    threshold,
+                    len(own),
+                    **shape,
+                    predicted_gain=predicted,
+                    form=Form.FUNCTION if isinstance(term, Shape) else Form.TERM,
+                )
+            )
+    made += [_vibration(scan, problem, tests, policy), _coloured(found, tests, policy)]
+    # a shape says more than that there is one
+    return sorted(
+        made,
+        key=lambda one: (
+            one.significant and one.form is not Form.COLOURED,
+            one.gain - one.threshold,
+        ),
+        reverse=True,
+    )
+
+
+def _shape(
+    term: Term, blocks: Blocks, information, score, free, own, policy: Policy
+) -> dict[str, Any]:
+    """What a shape looks like, once it is fitted."""
+    if not isinstance(term, Shape):
+        return {}
+    both = np.union1d(free, own)
+    step, covariance = newton_step(information, score, both)
+    pick = np.searchsorted(both, own)
+    scale = blocks.scale[own]
+    covariance = covariance[np.ix_(pick, pick)]
+    if not np.isfinite(covariance).all():
+        return {}
+    return _function(term, step[pick] * scale, covariance, scale, policy)
+
+
+def _threshold(
+    count: int, samples: int, tests: int, policy: Policy, looks: int = 1
+) -> float:
+    chance = policy.false_alarms / tests / looks
+    least = max(count * math.log(samples), float(chi2.isf(chance, count)))
+    # as sure as a term that is named
+    return (math.sqrt(least) + policy.beyond) ** 2
+
+
+def _function(
+    term: Shape, coefficients, covariance, scale, policy: Policy
+) -> dict[str, Any]:
+    grid = np.linspace(*term.ends, policy.shape_points)
+    basis = np.asarray(jax.vmap(term.basis)(grid))
+    spread = basis * scale
+    error = np.sqrt(np.maximum(np.einsum("kp,pq,kq->k", spread, covariance, spread), 0))
+    return {
+        "unit": term.unit,
+        "variable": term.variable,
+        "quantity": term.quantity,
+        "grid": grid,
+        "value": basis @ coefficients,
+        "stderr": error,
+    }
+
+
+def _vibration(
+    scan: Periodogram, problem: Problem, tests: int, policy: Policy
+) -> Structure:
+    frequency, grown = scan.best_separate
+    count = 2 * scan.records + 1
+    seen = math.inf
+    if scan.records > 1:
+        # a frequency that one record suggests must be seen in the others
+        chance = chi2.isf(policy.false_alarms, 2 * (scan.records - 1))
+        seen = scan.elsewhere - float(chance)
+    return Structure(
+        "resonance",
+        f"a force at {frequency:.4g} Hz with a phase of its own in each record",
+        "flight",
+        f"in flight, at {frequency:.4g} Hz",
+        grown,
+        _threshold(count, problem.samples, tests, policy, scan.cells),
+        count,
+        predicted_gain=seen,
+        form=Form.VIBRATION,
+    )
+
+
+def _coloured(found: Fit, tests: int, policy: Policy) -> Structure:
+    """Whether residuals that are close in time are alike, not in one stretch alone."""
+    totals, counts, cost = [], [], 0.0
+    for part in residuals(found):
+        value = part.value / part.noise
+        cost += float(np.sum(value**2))
+        for stretch in np.array_split(np.arange(len(value)), policy.residual_stretches):
+            total, count = 0.0, 0
+            for lag in range(1, policy.residual_lags + 1):
+                a, b = stretch[lag:], stretch[:-lag]
+                same = (part.flight[a] == part.flight[b]) & (
+                    part.resting[a] == part.resting[b]
+                )
+                total += float(np.sum((value[a] * value[b])[same]))
+                count += int(np.sum(same))
+            totals.append(total)
+            counts.append(count)
+    worst = int(np.argmax(totals))
+    total, count = np.sum(totals) - totals[worst], np.sum(counts) - counts[worst]
+    score = float(total) / math.sqrt(max(int(count), 1))
+    bic = math.log(found.problem.samples)
+    chance = float(norm.isf(policy.false_alarms / tests)) ** 2
+    # as the gain of one parameter, with the smoothness that states take out ignored
+    return Structure(
+        "coloured_residuals",
+        "a smooth motion of a form that no shape has",
+        "flight",
+        "in flight and at rest",
+        # no motion gains more than what is left over
+        min(max(score, 0.0) ** 2, cost),
+        (math.sqrt(max(chance, bic)) + policy.beyond) ** 2,
+        1,
+        form=Form.COLOURED,
+    )
+
+
+def _ranges(problem: Problem, policy: Policy):
+    """Least and largest position, velocity and approach speed, and the duration."""
+    states = np.asarray(problem.start.states)[np.asarray(problem.pieces.exists)]
+    position, velocity = states[:, 0], states[:, 1]
+    position = np.concatenate(
+        [part.recording[part.channel] for part in problem.segments]
+    )
+    speeds = np.concatenate([part.impacts.approach for part in problem.segments])
+    speeds = speeds[np.isfinite(speeds) & (speeds > 0)]
+    top = float(np.max(speeds, initial=_SLOWEST))
+    tail = policy.velocity_tail
+    return (
+        (float(position.min()), float(position.max())),
+        (float(np.quantile(velocity, tail)), float(np.quantile(velocity, 1 - tail))),
+        (0.0, top),
+        max(part.recording.duration for part in problem.segments),
+    )

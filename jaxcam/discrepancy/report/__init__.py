@@ -1,0 +1,11 @@
+"""A verdict as data and in words."""
+
+from ._caveats import Caveat as Caveat, Reason as Reason
+from ._diagnosis import (
+    Alternative as Alternative,
+    Diagnosis as Diagnosis,
+    Effect as Effect,
+    Verdict as Verdict,
+)
+from ._words import listed as listed, number as number
+from ._write import diagnosis_of as diagnosis_of

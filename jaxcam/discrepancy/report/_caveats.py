@@ -1,0 +1,134 @@
+"""What a reader must know of a verdict before it is believed."""
+
+import dataclasses
+import enum
+from collections.abc import Iterator
+
+from ..evidence import Choice, rms_of
+from ..search import Trial, Trials
+from ._words import listed
+
+
+class Reason(enum.StrEnum):
+    """Why there is a caveat; equal to its name as a string."""
+
+    SMALL_REMAINDER = "small remainder"
+    IN_DOUBT = "in doubt"
+    NAMED_IN_DOUBT = "named in doubt"
+    FAR_FROM_DATA = "far from the data"
+    TIE = "tie"
+    NOT_SHARED = "not shared by the records"
+    POOR_PREDICTION = "poor prediction"
+
+
+@dataclasses.dataclass(frozen=True)
+class Caveat:
+    """One reservation about a verdict.
+
+    - `reason`: a `Reason`. `terms`: names of those it is about, if any.
+    - `sentence`: in words, also by `str`.
+    """
+
+    reason: Reason
+    sentence: str
+    terms: tuple[str, ...] = ()
+
+    def __str__(self) -> str:
+        return self.sentence
+
+
+def caveats_of(
+    trials: Trials, choice: Choice, ties: list[Trial], named: bool
+) -> Iterator[Caveat]:
+    """All but that of the verdict itself.
+
+    **Arguments:** the trials, what was chosen, other subsets that are as good, and
+    whether anything is named.
+    """
+    for name, share in choice.doubtful:
+        yield _in_doubt(trials, name, share)
+    for name, share in choice.needed:
+        yield _named_in_doubt(trials, name, share)
+    if not trials.settled(choice.found):
+        yield _far(trials)
+    for trial in ties:
+        yield _tie(choice.best, trial)
+    apart = [
+        s for s in choice.left_after if s.gain > s.threshold and s.predicted_gain <= 0
+    ]
+    if apart:
+        yield Caveat(
+            Reason.NOT_SHARED,
+            f"Something that differs from record to record is left over "
+            f"({apart[0].sentence}): it is no physics that they share; look at how "
+            f"they were recorded.",
+        )
+    held = choice.held
+    if named and held.after > max(held.before, trials.policy.as_noise):
+        yield Caveat(
+            Reason.POOR_PREDICTION,
+            "A part of the records does not pin the parameters down well enough to "
+            f"predict the others: it misses by {held.after:.2g} times the noise, the "
+            f"textbook model by {held.before:.2g}. Record at more speeds.",
+        )
+
+
+def small_remainder(choice: Choice, share: float) -> Caveat:
+    """That a named effect leaves a small share of what it explains."""
+    first = choice.unexplained[0]
+    return Caveat(
+        Reason.SMALL_REMAINDER,
+        f"Something small is left over ({first.sentence}, {first.place}): {share:.1%} "
+        f"of what was explained. The effect may have a slightly different form.",
+        tuple(sorted(choice.best.names)),
+    )
+
+
+def _in_doubt(trials: Trials, name: str, share: float) -> Caveat:
+    return Caveat(
+        Reason.IN_DOUBT,
+        f"A term for {name.replace('_', ' ')} gains something, but "
+        f"{_against(trials, share)}; record more before you believe it.",
+        (name,),
+    )
+
+
+def _named_in_doubt(trials: Trials, name: str, share: float) -> Caveat:
+    return Caveat(
+        Reason.NAMED_IN_DOUBT,
+        f"The term for {name.replace('_', ' ')} is named because nothing is left over "
+        f"with it, but {_against(trials, share)}; record more to know its strength.",
+        (name,),
+    )
+
+
+def _against(trials: Trials, share: float) -> str:
+    """What speaks against a term that gains in a share of the bootstrap samples."""
+    if share >= trials.policy.sure:
+        return "its strength varies so much between stretches that it might be zero"
+    return f"it gains in {share:.0%} of the redrawn sets of stretches only"
+
+
+def _far(trials: Trials) -> Caveat:
+    """That no fit comes near the data, and how near the best one comes."""
+    least = min(trials.known.values(), key=lambda trial: trial.fit.cost)
+    named = listed(sorted(least.names)) if least.names else "none of them"
+    return Caveat(
+        Reason.FAR_FROM_DATA,
+        f"No subset of the known effects comes near these records: the best fit, with "
+        f"{named}, misses by {rms_of(least.fit):.2g} times the noise. What is said of "
+        f"shape and place is rough.",
+        tuple(sorted(least.names)),
+    )
+
+
+def _tie(best: Trial, other: Trial) -> Caveat:
+    names = tuple(sorted(other.names))
+    written = ("+".join(names) or "none").replace("_", " ")
+    return Caveat(
+        Reason.TIE,
+        f"These records cannot tell {listed(sorted(best.names))} from {written}: the "
+        f"BIC differs by {other.bic - best.bic:.1f} only. Record larger and smaller "
+        f"bounces, and speeds further apart.",
+        names,
+    )

@@ -1,0 +1,98 @@
+"""One or two sentences that a mechanical engineer would write."""
+
+from collections.abc import Mapping, Sequence
+
+from ...fitting import Fit
+from ..evidence import Choice, Limit, rms_of
+from ..policy import Policy
+from ..search import Trial
+from ._diagnosis import Effect, Verdict
+from ._words import listed, number, quantity
+
+
+# A standard error that may be zero is at least this
+_TINY = 1e-300
+
+
+def summary_of(
+    verdict: Verdict,
+    effects: Sequence[Effect],
+    choice: Choice,
+    within: Fit,
+    rig: Sequence[str],
+    least: Mapping[str, Limit],
+    policy: Policy,
+) -> str:
+    """The summary of a verdict.
+
+    **Arguments:** the verdict, its effects (the unknown first), the evidence, the fit
+    without terms within the tolerances of the rig, the names of the rig's parameters,
+    detection limits, and the policy.
+    """
+    if verdict is Verdict.NONE:
+        return _nothing(choice, least, policy)
+    named = [effect for effect in effects if effect.term]
+    parts = []
+    for effect in named:
+        values = ", ".join(
+            f"{name} = {number(v.value, v.stderr, v.unit)}"
+            for name, v in effect.parameters.items()
+        )
+        parts.append(f"{effect.sentence} ({values}; {effect.region})")
+    if verdict is Verdict.EFFECT:
+        moved = _moved(choice.best, within, rig, policy)
+        return f"The model lacks {' and '.join(parts)}.{moved}"
+    what = effects[0]
+    more = f" It resembles {listed(e.name for e in named)} in part." if named else ""
+    return (
+        "Something is missing that is none of the known effects: it acts like "
+        f"{what.sentence}, {what.region}.{more}"
+    )
+
+
+def _nothing(choice: Choice, least: Mapping[str, Limit], policy: Policy) -> str:
+    fitted, unseen = rms_of(choice.best.fit), choice.held.after
+    tail = ""
+    for name, limit in least.items():
+        size = quantity(f"{limit.size:.2g}", limit.unit)
+        tail = f" A {name} of {size} would have been seen."
+        break
+    if fitted > policy.as_noise:
+        return (
+            "Nothing that the records share is missing. They are not explained "
+            "down to the noise of the sensors, though: what is left is "
+            f"{fitted:.2g} times that, and differs from record to record.{tail}"
+        )
+    if unseen > policy.as_noise:
+        tail = (
+            f"{tail} A part of the records does not pin the parameters down well "
+            f"enough to predict the others, though: it misses by {unseen:.2g} "
+            "times the noise."
+        )
+    return (
+        "Nothing is missing: with its parameters fitted within their tolerances "
+        f"the model explains all records down to the noise of the sensors.{tail}"
+    )
+
+
+def _moved(best: Trial, within: Fit, rig: Sequence[str], policy: Policy) -> str:
+    """The parameter that went furthest to make up for what was missing.
+
+    Compared is a fit without the terms within the tolerances of the rig.
+    """
+    if not best.names:
+        return ""
+    moved = {
+        name: abs(within[name].value - best.fit[name].value)
+        / max(best.fit[name].stderr, _TINY)
+        for name in rig
+    }
+    if not moved:
+        return ""
+    name = max(moved, key=lambda one: moved[one])
+    if moved[name] < policy.moved_errors:
+        return ""
+    return (
+        f" Without it, a fit would have moved {name.replace('_', ' ')} from "
+        f"{best.fit[name].value:.5g} to {within[name].value:.5g}."
+    )

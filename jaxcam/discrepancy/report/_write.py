@@ -1,0 +1,118 @@
+"""The diagnosis of a choice: verdict, effects, alternatives, caveats, numbers."""
+
+from ...fitting import Fit
+from ..evidence import Choice, limits, Ripple
+from ..search import Question, Trial, Trials, within_tolerances
+from ..terms import Value
+from ._caveats import Caveat, caveats_of, small_remainder
+from ._diagnosis import Alternative, Diagnosis, Verdict
+from ._effects import drive_effect, term_effect, unknown_effect
+from ._summary import summary_of
+
+
+def diagnosis_of(
+    case: str,
+    question: Question,
+    trials: Trials,
+    choice: Choice,
+    ripple: Ripple | None,
+) -> Diagnosis:
+    """Put into words and numbers what was chosen, and why."""
+    policy, held, best = trials.policy, choice.held, choice.best
+    effects = [term_effect(trials, choice, name) for name in sorted(best.names)]
+    if ripple is not None and ripple.significant(len(trials.terms) + 1, policy):
+        effects.append(drive_effect(ripple, policy))
+    named = bool(effects)
+    verdict, caveats = _verdict(choice, named, policy.small)
+    if verdict is Verdict.UNKNOWN:
+        effects.insert(0, unknown_effect(trials, choice))
+    others = _others(trials, best, policy.alternatives)
+    ties = [trial for trial in others if abs(trial.bic - best.bic) < policy.tie]
+    caveats += caveats_of(trials, choice, ties, bool(effects))
+    floor = float(next(iter(question.problem.model.sensors.values())).floor)
+    least = limits(trials, best)
+    within = within_tolerances(choice.before.fit, best.fit, question.rig, policy)
+    names = [effect.name for effect in effects]
+    return Diagnosis(
+        case,
+        verdict,
+        tuple(effects),
+        tuple(_alternative(trial, best) for trial in others),
+        held.before * floor,
+        held.after * floor,
+        floor,
+        question.unit,
+        _rig_values(question, choice),
+        summary_of(verdict, effects, choice, within, question.rig, least, policy),
+        choice.before.fit,
+        best.fit,
+        tuple(choice.left_before),
+        tuple(choice.left_after),
+        held.residuals,
+        ripple,
+        _pulls(question, within, best.fit),
+        {
+            name: Value(one.size, one.stderr, one.unit)
+            for name, one in least.items()
+            if name not in names
+        },
+        {name: one.hidden for name, one in least.items()},
+        tuple(caveats),
+        policy,
+    )
+
+
+def _verdict(choice: Choice, named: bool, small: float) -> tuple[Verdict, list[Caveat]]:
+    """The verdict, and a caveat where a named effect leaves a small share."""
+    if not choice.unexplained:
+        return (Verdict.EFFECT if named else Verdict.NONE), []
+    left = max(one.gain for one in choice.unexplained)
+    explained = choice.before.fit.cost - choice.best.fit.cost
+    if choice.best.names and left < small * explained:
+        return Verdict.EFFECT, [small_remainder(choice, left / explained)]
+    return Verdict.UNKNOWN, []
+
+
+def _others(trials: Trials, best: Trial, most: int) -> list[Trial]:
+    """Other subsets, the best first; a superset is the same explanation with more."""
+    found = [
+        trial
+        for names, trial in trials.known.items()
+        if names != best.names and not names > best.names
+    ]
+    return sorted(found, key=lambda trial: trial.bic - best.bic)[:most]
+
+
+def _alternative(trial: Trial, best: Trial) -> Alternative:
+    terms = tuple(sorted(trial.names))
+    return Alternative("+".join(terms) or "none", trial.bic - best.bic, terms)
+
+
+def _rig_values(question: Question, choice: Choice) -> dict[str, Value]:
+    """Fitted parameters of the system, as they are reported."""
+    found = {}
+    for one in choice.best.fit.estimates:
+        if one.name not in question.rig:
+            continue
+        stderr = max(one.stderr, choice.deviation.get(one.name, 0.0))
+        name, value, unit = one.name, one.value, one.unit
+        if name in question.shown:
+            shown = question.shown[name]
+            name, unit = shown.name, shown.unit
+            value, stderr = value / shown.divisor, stderr / shown.divisor
+        found[name] = Value(value, stderr, unit)
+    return found
+
+
+def _pulls(
+    question: Question, within: Fit, best: Fit
+) -> dict[str, tuple[float, float]]:
+    """How far parameters went from nominal, without and with the terms."""
+    found, problem = {}, question.problem
+    for name in question.rig:
+        place = problem.names.index(name)
+        nominal = float(problem.start.values[0, place])
+        size = problem.parameter(name).size(nominal)
+        before, after = within[name].value, best[name].value
+        found[name] = (before - nominal) / size, (after - nominal) / size
+    return found

@@ -1,0 +1,27 @@
+"""Fits of subsets of terms, and what a quadratic likelihood about a fit promises."""
+
+from ._blocks import (
+    Blocks as Blocks,
+    blocks_of as blocks_of,
+    value_of as value_of,
+    values_of as values_of,
+)
+from ._extended import extended as extended, with_states as with_states
+from ._gains import (
+    added_gain as added_gain,
+    gain as gain,
+    newton_step as newton_step,
+    predicted_gain as predicted_gain,
+)
+from ._given_up import given_up as given_up
+from ._kept_trials import KeptTrials as KeptTrials
+from ._local_force import force_blocks as force_blocks, Response as Response
+from ._question import (
+    Question as Question,
+    rig_question as rig_question,
+    system_question as system_question,
+)
+from ._search import Search as Search
+from ._trials import Trial as Trial, Trials as Trials
+from ._vibration_scan import Periodogram as Periodogram
+from ._within_tolerances import within_tolerances as within_tolerances

@@ -1,0 +1,109 @@
+"""What records say of parameters about a point, block by block."""
+
+import dataclasses
+from collections.abc import Sequence
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from ...fitting import Fit, Problem
+from ...fitting.engine import (
+    assemble,
+    eliminate_states,
+    free_columns,
+    off_nominal,
+    Point,
+    prior_information,
+)
+
+
+@dataclasses.dataclass(frozen=True)
+class Blocks:
+    """The likelihood about a point as a quadratic function, block by block.
+
+    A block is a stretch of one record. In units of the parameters' scales, the states
+    eliminated: `information` `(b, g, g)`, `score` `(b, g)`; `prior` `(g,)` and
+    `pull` `(g,)` are what the tolerances add to both.
+    """
+
+    names: tuple[str, ...]
+    scale: Float[np.ndarray, " g"]
+    record: tuple[str, ...]
+    start: Float[np.ndarray, " b"]
+    information: Float[np.ndarray, "b g g"]
+    score: Float[np.ndarray, "b g"]
+    prior: Float[np.ndarray, " g"]
+    pull: Float[np.ndarray, " g"]
+
+    def rows(self, names) -> np.ndarray:
+        wanted = set(names)
+        return np.array([k for k, n in enumerate(self.names) if n in wanted], dtype=int)
+
+    def total(self, weight=None):
+        """Information and score of all blocks, weighted, with the tolerances."""
+        weight = np.ones(len(self.record)) if weight is None else weight
+        information = np.einsum("b,bij->ij", weight, self.information)
+        score = np.einsum("b,bi->i", weight, self.score)
+        return information + np.diag(self.prior), score + self.pull
+
+
+def blocks_of(
+    problem: Problem, point: Point, slices: int = 1, names: Sequence[str] | None = None
+) -> Blocks:
+    """Score and information of parameters about a point, in slices of each record."""
+    columns = free_columns(problem, names)
+    local, scales = jnp.asarray(columns.local), jnp.asarray(columns.scales)
+    longest = max(part.recording.time[-1] for part in problem.segments)
+    edges = np.linspace(0.0, longest, slices + 1)
+    edges[0], edges[-1] = -np.inf, np.inf
+    size = len(columns.scale)
+    record, start, information, score = [], [], [], []
+    for a, b in zip(edges, edges[1:]):
+        weights = problem.between(a, b)
+        found, _ = assemble(
+            problem.layout,
+            problem.pieces,
+            problem.weighted(weights),
+            point,
+            local,
+            scales,
+        )
+        found = eliminate_states(found)
+        for r, (name, place) in enumerate(zip(problem.records, columns.place)):
+            # a parameter with a value for each record has a row for each
+            used = np.flatnonzero(place >= 0)
+            rows = place[used]
+            whole, right = np.zeros((size, size)), np.zeros(size)
+            whole[np.ix_(rows, rows)] = np.asarray(found.information[r])[
+                np.ix_(used, used)
+            ]
+            right[rows] = np.asarray(found.score[r])[used]
+            record.append(name)
+            start.append(max(a, 0.0))
+            information.append(whole)
+            score.append(right)
+    prior = prior_information(problem, columns, True)
+    pull = -prior * off_nominal(problem, columns, point)
+    return Blocks(
+        tuple(problem.names[p] for p in columns.parameter),
+        columns.scale,
+        tuple(record),
+        np.array(start),
+        np.array(information),
+        np.array(score),
+        prior,
+        pull,
+    )
+
+
+def value_of(found: Fit, name: str) -> float:
+    """Value of a parameter that all records share."""
+    return float(found.point.values[0, found.problem.names.index(name)])
+
+
+def values_of(found: Fit, blocks: Blocks) -> np.ndarray:
+    """Values of the parameters of some blocks at a fit, in their scales."""
+    all_names = found.problem.names
+    columns = [all_names.index(name) for name in blocks.names]
+    return np.asarray(found.point.values)[0, columns] / blocks.scale

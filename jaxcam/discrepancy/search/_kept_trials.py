@@ -1,0 +1,102 @@
+"""Fits of a diagnosis on disk, from which one that was interrupted goes on."""
+
+import hashlib
+import os
+import shutil
+import zipfile
+import zlib
+from collections.abc import Iterable
+from pathlib import Path
+from typing import NamedTuple
+
+import jax.numpy as jnp
+import numpy as np
+
+from ...fitting import Problem
+from ...fitting.engine import Point
+from ..policy import Policy
+
+
+# what numpy raises for files that are not its own, or were
+_BROKEN = (
+    OSError,
+    ValueError,
+    LookupError,
+    EOFError,
+    MemoryError,
+    NotImplementedError,
+    zipfile.BadZipFile,
+    zlib.error,
+)
+
+
+class Ended(NamedTuple):
+    """Where a fit ended, whether at an optimum, and after how many iterations."""
+
+    point: Point
+    converged: bool
+    iterations: int
+
+
+class KeptTrials:
+    """Where the fit of each subset of terms ended, one small file a subset.
+
+    A file counts only for the same recordings, parameters, rig and policy; one that was
+    cut off while it was written, or that belongs to another problem, is passed over.
+
+    **Arguments:** the folder, made when something is kept, the problem and the policy.
+    """
+
+    def __init__(self, folder: Path, problem: Problem, policy: Policy = Policy()):
+        self.folder, self.mark = folder, _mark_of(problem, policy)
+
+    def get(self, names: Iterable[str]) -> Ended | None:
+        """Where a fit ended, or `None`."""
+        try:
+            with (
+                self._file(names).open("rb") as stream,
+                np.load(stream, allow_pickle=False) as found,
+            ):
+                if str(found["mark"]) != self.mark:
+                    return None
+                values, states = found["values"], found["states"]
+                converged, iterations = bool(found["converged"]), found["iterations"]
+                iterations = int(iterations)
+        except _BROKEN:
+            return None
+        point = Point(jnp.asarray(values), jnp.asarray(states))
+        return Ended(point, converged, iterations)
+
+    def put(self, names: Iterable[str], ended: Ended) -> None:
+        """Keep where a fit ended; the file is whole or absent."""
+        self.folder.mkdir(parents=True, exist_ok=True)
+        file = self._file(names)
+        part = file.with_suffix(f".{os.getpid()}.part")
+        with part.open("wb") as stream:
+            np.savez(
+                stream,
+                mark=np.array(self.mark),
+                values=np.asarray(ended.point.values),
+                states=np.asarray(ended.point.states),
+                converged=np.array(ended.converged),
+                iterations=np.array(ended.iterations),
+            )
+        os.replace(part, file)
+
+    def clear(self) -> None:
+        """Forget everything, once the diagnosis is done."""
+        shutil.rmtree(self.folder, ignore_errors=True)
+
+    def _file(self, names: Iterable[str]) -> Path:
+        return self.folder / f"{'+'.join(sorted(names)) or 'none'}.npz"
+
+
+def _mark_of(problem: Problem, policy: Policy) -> str:
+    """A hash of a problem and of how it is searched."""
+    found = hashlib.sha256(repr((problem.names, policy)).encode())
+    found.update(np.asarray(problem.start.values).tobytes())
+    for part in problem.segments:
+        found.update(part.recording.name.encode())
+        found.update(np.ascontiguousarray(part.recording.time).tobytes())
+        found.update(np.ascontiguousarray(part.recording[part.channel]).tobytes())
+    return found.hexdigest()

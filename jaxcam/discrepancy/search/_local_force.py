@@ -1,0 +1,226 @@
+"""A force that is free at every node of every piece of flight, and what data say of it.
+
+Whatever acts in flight is, to first order, a sum of these. So one linearisation tells
+what any number of forces would gain, without a program of their own.
+"""
+
+from collections.abc import Sequence
+from typing import ClassVar, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Bool, Float, Int
+
+from ...fitting import Problem
+from ...fitting.engine import (
+    chained,
+    eliminate_states,
+    free_columns,
+    linear_pieces,
+    LinearPieces,
+    off_nominal,
+    Point,
+    prior_information,
+    runge_kutta,
+)
+from ..terms import Motion, Term, WithTerms
+from ._blocks import Blocks
+
+
+class LocalForce(Term):
+    """A force given at times `start + k spacing`, linear between them."""
+
+    name: ClassVar[str] = "local_force"
+    sentence: ClassVar[str] = "a force at one time"
+    listed: ClassVar[bool] = False
+    force: Float[Array, " k"]
+    start: Float[Array, ""]
+    spacing: Float[Array, ""]
+
+    def acceleration(self, motion: Motion):
+        place = (motion.t - self.start) / self.spacing
+        away = jnp.abs(place - jnp.arange(self.force.shape[0], dtype=float))
+        return jnp.maximum(0.0, 1.0 - away) @ self.force
+
+
+class Response(NamedTuple):
+    """What the pieces of all records say of a force at their nodes.
+
+    - `point`: about which; `free`: names of the parameters that are free.
+    - `pieces`: `LinearPieces` with `n` columns for the state, `m` for the parameters
+        and then `l` for the force at the nodes, of each record.
+    - `place` `(r, m)`: which of the `g` free numbers each parameter of a record is.
+    - `time` `(r, k, l)`: of the nodes. `exists` `(r, k)`.
+    - `names`, `scale`, `prior`, `pull` `(g,)`: of the free numbers, and what their
+        tolerances add to information and score.
+    """
+
+    point: Point
+    free: tuple[str, ...]
+    pieces: LinearPieces
+    place: Int[np.ndarray, "r m"]
+    time: Float[np.ndarray, "r k l"]
+    exists: Bool[np.ndarray, "r k"]
+    names: tuple[str, ...]
+    scale: Float[np.ndarray, " g"]
+    prior: Float[np.ndarray, " g"]
+    pull: Float[np.ndarray, " g"]
+
+
+def force_response(problem: Problem, point: Point, free: Sequence[str]) -> Response:
+    """Linearise about a point, with some parameters free and a force at every node.
+
+    The nodes are where the steps of the flights evaluate their field.
+    """
+    columns = free_columns(problem, free)
+    nodes = 2 * problem.pieces.angle.shape[-1] + 1
+    found = _linear(
+        problem.layout,
+        problem.pieces,
+        problem.weighted(None),
+        point,
+        jnp.asarray(columns.local),
+        jnp.asarray(columns.scales),
+        nodes,
+    )
+    part = problem.pieces.flown
+    half = np.asarray(part.step)[..., None] / 2
+    prior = prior_information(problem, columns, True)
+    return Response(
+        point,
+        tuple(free),
+        jax.tree.map(np.asarray, found),
+        columns.place,
+        np.asarray(part.start)[..., None] + half * np.arange(nodes),
+        np.asarray(problem.pieces.exists),
+        tuple(problem.names[p] for p in columns.parameter),
+        columns.scale,
+        prior,
+        -prior * off_nominal(problem, columns, point),
+    )
+
+
+def force_blocks(problem: Problem, response: Response, terms: Sequence[Term]) -> Blocks:
+    """Score and information of the free parameters and of terms that act in flight.
+
+    **Arguments:** terms that are not in the problem, linear in their strengths; the
+    rows of their strengths come after those of the free parameters, in order.
+    """
+    strengths = [p for k, term in enumerate(terms) for p in term.parameters(k)]
+    scale = np.array([p.scale for p in strengths], dtype=float)
+    forces = _forces(problem.layout, problem.pieces, response.point, tuple(terms))
+    forces = np.asarray(forces) * scale
+    width, size = forces.shape[-1], len(response.prior)
+    chain = jax.vmap(chained)(_onto(response, forces))
+    found = eliminate_states(jax.tree.map(jnp.asarray, chain))
+    information, score = [], []
+    total = size + width
+    for r, place in enumerate(response.place):
+        used = np.flatnonzero(place >= 0)
+        rows = np.concatenate([place[used], size + np.arange(width)])
+        local = np.concatenate([used, len(place) + np.arange(width)])
+        whole, right = np.zeros((total, total)), np.zeros(total)
+        whole[np.ix_(rows, rows)] = np.asarray(found.information[r])[
+            np.ix_(local, local)
+        ]
+        right[rows] = np.asarray(found.score[r])[local]
+        information.append(whole)
+        score.append(right)
+    none = np.zeros(width)
+    return Blocks(
+        (*response.names, *(p.name for p in strengths)),
+        np.concatenate([response.scale, scale]),
+        problem.records,
+        np.zeros(len(problem.records)),
+        np.array(information),
+        np.array(score),
+        np.concatenate([response.prior, none]),
+        np.concatenate([response.pull, none]),
+    )
+
+
+def _onto(response: Response, forces: Float[np.ndarray, "r k l p"]) -> LinearPieces:
+    """The pieces with a few forces in the place of one at every node."""
+    found = response.pieces
+    keep = found.information.shape[-1] - forces.shape[-2]
+    m = response.place.shape[1]
+
+    def onto(rows, forces):
+        return np.concatenate([rows[..., :keep], rows[..., keep:] @ forces], axis=-1)
+
+    half = onto(found.information, forces)
+    information = onto(np.swapaxes(half, -1, -2), forces)
+    slope = onto(found.slope[:, :, None, :], forces)[:, :, 0]
+    # a joint is pushed by the piece before it
+    before = np.concatenate([np.zeros_like(forces[:, :1]), forces[:, :-1]], axis=1)
+    direct = np.zeros((*found.direct.shape[:-1], m + forces.shape[-1]))
+    direct[..., :m] = found.direct[..., :m]
+    pp = np.zeros((len(forces), direct.shape[-1], direct.shape[-1]))
+    p = np.zeros(pp.shape[:2])
+    pp[:, :m, :m], p[:, :m] = found.pp[:, :m, :m], found.p[:, :m]
+    return found._replace(
+        information=information,
+        slope=slope,
+        earlier=onto(found.earlier, before),
+        direct=direct,
+        pp=pp,
+        p=p,
+    )
+
+
+@eqx.filter_jit
+def _linear(layout, pieces, extras, point, columns, scales, nodes) -> LinearPieces:
+    def record(pieces, extras, values, states, columns, scales):
+        size = columns.shape[0]
+
+        def model_at(change, start, step):
+            model = layout.at(values.at[columns].add(change[:size] * scales))
+            force = LocalForce(change[size:], start, step / 2)
+            system = WithTerms(model.system.base, (*model.system.terms, force))
+            return eqx.tree_at(lambda m: m.system, model, system)
+
+        return linear_pieces(model_at, pieces, extras, states, size + nodes)
+
+    values, states = point
+    return jax.vmap(record)(pieces, extras, values, states, columns, scales)
+
+
+@eqx.filter_jit
+def _forces(layout, pieces, point, terms) -> Float[Array, "r k l p"]:
+    """Acceleration by a unit of each strength, at the nodes of every piece."""
+
+    def piece(model, state, start, step, angle, rate):
+        def advance(x, inputs):
+            number, a, w = inputs
+            t = start + (number + jnp.array([0.0, 0.5, 1.0])) * step
+            system = model.driven(t[1], a, w)
+            middle, _ = runge_kutta(model, system, t[0], x, step / 2)
+            end, _ = runge_kutta(model, system, t[1], middle, step / 2)
+            states = jnp.stack([x, middle, end])
+            return end, jax.vmap(lambda t, x: _slopes(terms, system, t, x))(t, states)
+
+        numbers = jnp.arange(angle.shape[0], dtype=float)
+        _, slopes = jax.lax.scan(advance, state, (numbers, angle, rate))
+        inner = slopes[:, :2].reshape(-1, slopes.shape[-1])
+        return jnp.concatenate([inner, slopes[-1, 2:]])
+
+    def record(pieces, values, states):
+        model = layout.at(values)
+        part = pieces.flown
+        inputs = states, part.start, part.step, pieces.angle, pieces.rate
+        return jax.vmap(lambda *one: piece(model, *one))(*inputs)
+
+    return jax.vmap(record)(pieces, *point)
+
+
+def _slopes(terms, system, t, state):
+    """Derivatives of the terms' accelerations to their strengths, shape `(p,)`."""
+    motion = system.motion(t, state)
+
+    def total(terms):
+        return sum(term.acceleration(motion) for term in terms)
+
+    slopes = eqx.filter_grad(total)(terms)
+    return jnp.stack([value for term in slopes for value in term.numbers()])

@@ -1,0 +1,187 @@
+"""The best subset of a few terms, each judged by a fit of whole trajectories."""
+
+import itertools
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from ._blocks import values_of
+from ._gains import added_gain, gain
+from ._trials import Trial, Trials
+from ._vibration_scan import Periodogram
+
+
+class Search:
+    """Which subsets are tried, and in what order: never by the greatest gain alone."""
+
+    def __init__(self, trials: Trials):
+        self.trials, self.policy = trials, trials.policy
+
+    def run(self) -> Trial:
+        """The best subset; empty where no term is worth its parameters.
+
+        It is empty too where the best one ends far from the data and explains too
+        little of what is off: the least-bad fit is not evidence.
+        """
+        bare = self.trials.attempt(frozenset(), None, self.policy.iterations)
+        assert bare is not None
+        best, kept = bare, [bare]
+        for size in range(1, self.policy.most_terms + 1):
+            promised = self._promised(kept, best)
+            most = len(self.trials.terms) if size == 1 else self.policy.tried
+            order = sorted(promised, key=lambda n: promised[n][0])[:most]
+            for k, names in enumerate(order):
+                said = " and ".join(sorted(names)).replace("_", " ")
+                self.trials.progress(f"fitting {said}", k / len(order))
+                start = promised[names][1]
+                if self._settles(start, self.trials.attempt(names, start)):
+                    break
+            found = [t for n, t in self.trials.known.items() if len(n) == size]
+            enough = self.policy.hopeless * self.trials.least_cost
+            kept = sorted(found, key=_bic)[: self.policy.kept]
+            kept = [self.trials.finished(t) if t.fit.cost < enough else t for t in kept]
+            kept = sorted((t for t in kept if t.bic < best.bic), key=_bic)
+            if not kept:
+                break
+            before, best = best, self._better(best, kept[0])
+            if not self._leads(before, best):
+                break
+        if self.trials.settled(best):
+            return self._swapped(self._smallest(best))
+        return best if best.fit.cost < self.policy.explains * bare.fit.cost else bare
+
+    def _leads(self, before: Trial, best: Trial) -> bool:
+        """Whether to look for more; far from the data only where terms help a lot."""
+        part = best.fit.cost / before.fit.cost
+        return self.trials.settled(best) or part < self.policy.helped
+
+    def _settles(self, start: Trial, trial: Trial | None) -> bool:
+        """Whether a subset explains what the one that promised it could not.
+
+        What the other one promises of further subsets is then worth little; this one's
+        own quadratic model tells which of them are as good, and these are fitted.
+        """
+        enough = self.policy.explained * self.trials.problem.samples
+        if trial is None or not trial.fit.cost < enough < start.fit.cost:
+            return False
+        for names in self._exchanges(trial, self.policy.leads):
+            self.trials.attempt(names, trial)
+        return True
+
+    def _promised(
+        self, kept: Sequence[Trial], best: Trial
+    ) -> dict[frozenset[str], tuple[float, Trial]]:
+        """Subsets with one term more than those kept: the BIC promised, and by whom."""
+        promised: dict[frozenset[str], tuple[float, Trial]] = {}
+        # what the best subset lacks, its own scores know best
+        own = self._promises(best, self.trials.scan(best.names))
+        for trial in kept:
+            # where the best one lacks nothing, only its equals can lead further
+            if not own and trial.bic > best.bic + self.policy.leads:
+                continue
+            for names, bic in self._promises(
+                trial, self.trials.scan(best.names)
+            ).items():
+                if names > best.names and names not in own:
+                    continue
+                if names not in promised or bic < promised[names][0]:
+                    promised[names] = bic, trial
+        return promised
+
+    def _smallest(self, best: Trial) -> Trial:
+        """Terms that the others can do without, by the error rate too, are dropped."""
+        for name in sorted(best.names):
+            # the same place with one term less: a fit of its own may have gone astray
+            self.trials.attempt(best.names - {name}, best, self.policy.iterations)
+        for size in range(len(best.names)):
+            enough = []
+            for names in itertools.combinations(sorted(best.names), size):
+                less = self.trials.known.get(frozenset(names))
+                if less is None:
+                    continue
+                threshold = sum(
+                    self.trials.threshold(name) for name in best.names - less.names
+                )
+                if less.fit.cost - best.fit.cost < threshold:
+                    enough.append(less)
+            if enough:
+                return min(enough, key=lambda trial: trial.bic)
+        return best
+
+    def _better(self, best: Trial, other: Trial) -> Trial:
+        return other if other.bic < best.bic else best
+
+    def _swapped(self, best: Trial) -> Trial:
+        """Subsets with one term exchanged, as far as the quadratic model favours it."""
+        for _ in range(self.policy.most_terms):
+            if not best.names:
+                return best
+            found = best
+            for names in self._exchanges(best):
+                if names in self.trials.known:
+                    continue
+                trial = self.trials.attempt(names, best)
+                if trial is not None:
+                    found = self._better(found, trial)
+            if found is best:
+                return best
+            best = self._smallest(found)
+        return best
+
+    def _exchanges(self, best: Trial, worse: float = 0.0) -> list[frozenset[str]]:
+        """Subsets that the quadratic model about the best fit finds as good, or `worse`
+        by that much BIC at most."""
+        blocks = self.trials.blocks(best)
+        information, score = blocks.total()
+        free = blocks.rows(self.trials.parameters(best.names))
+        value = values_of(best.fit, blocks)
+        top = gain(information, score, free)
+        found = []
+        for out in sorted(best.names):
+            gone = blocks.rows([one.name for one in self.trials.term(out).strengths()])
+            rest = np.setdiff1d(free, gone)
+            step = np.zeros(len(blocks.names))
+            step[gone] = -value[gone]
+            cost = step @ information @ step - 2 * step @ score
+            moved = score - information @ step
+            for term in self.trials.terms:
+                if term.name in best.names:
+                    continue
+                new = [one.name for one in term.strengths() if not one.inner]
+                rows = np.union1d(rest, blocks.rows(new))
+                change = top + cost - gain(information, moved, rows)
+                extra = self.trials.count([term.name]) - self.trials.count([out])
+                change = change + extra * math.log(self.trials.problem.samples)
+                if change < worse:
+                    found.append((change, (best.names - {out}) | {term.name}))
+        # the most promising ones; of equals, the first
+        found.sort(key=lambda one: one[0])
+        return [names for _, names in found[: self.policy.tried]]
+
+    def _promises(self, trial: Trial, scan: Periodogram) -> dict[frozenset[str], float]:
+        """What the scores say of each further term: the BIC it would lead to."""
+        blocks = self.trials.blocks(trial)
+        information, score = blocks.total()
+        free = blocks.rows(self.trials.parameters(trial.names))
+        found = {}
+        for term in self.trials.terms:
+            if term.name in trial.names:
+                continue
+            names = [one.name for one in term.strengths() if not one.inner]
+            grown = added_gain(
+                information, score, free, blocks.rows(names), self.policy.alike
+            )
+            if any(one.inner for one in term.strengths()):
+                grown = max(grown, scan.best[1])
+            if grown < self.trials.threshold(term.name):
+                continue
+            cost = trial.fit.cost - grown
+            count = trial.count + self.trials.count([term.name])
+            bic = cost + count * math.log(self.trials.problem.samples)
+            found[trial.names | {term.name}] = bic
+        return found
+
+
+def _bic(trial: Trial) -> float:
+    return trial.bic

@@ -1,0 +1,276 @@
+"""Fits with subsets of terms, and what each of them says of the terms it lacks."""
+
+import dataclasses
+import math
+from collections.abc import Callable, Iterable, Sequence
+
+import numpy as np
+from scipy.stats import chi2
+
+from ...fitting import Fit, fit, Problem
+from ...fitting.engine import Point
+from ..policy import Policy
+from ..terms import Term
+from ._blocks import Blocks, blocks_of
+from ._gains import predicted_gain
+from ._given_up import given_up
+from ._kept_trials import Ended, KeptTrials
+from ._local_force import force_response, Response
+from ._vibration_scan import Periodogram, periodogram
+
+
+@dataclasses.dataclass(frozen=True)
+class Trial:
+    """A subset of terms, fitted; `cut` where only the number of iterations ended it."""
+
+    names: frozenset[str]
+    fit: Fit
+    bic: float
+    count: int
+    cut: bool
+
+
+class Trials:
+    """All that was tried on one problem, and what follows from it.
+
+    **Arguments:** the problem, the names of the parameters of the rig (free in every
+    fit), the terms that may be named, `progress(sentence, fraction)`, and where fits
+    are kept for a run that is interrupted.
+    """
+
+    def __init__(
+        self,
+        problem: Problem,
+        rig: Sequence[str],
+        terms: Sequence[Term],
+        policy: Policy,
+        progress: Callable[[str, float | None], None],
+        kept: KeptTrials | None = None,
+    ):
+        self.problem, self.rig, self.terms = problem, tuple(rig), tuple(terms)
+        self.policy, self.progress = policy, progress
+        #: the best fit of each subset
+        self.known: dict[frozenset[str], Trial] = {}
+        self._kept = kept
+        self._scans: dict[frozenset[str], Periodogram] = {}
+        self._responses: dict[frozenset[str], Response] = {}
+        self._linear: dict[frozenset[str], Blocks] = {}
+
+    @property
+    def least_cost(self) -> float:
+        """Of all fits so far; infinite without any."""
+        return min((trial.fit.cost for trial in self.known.values()), default=math.inf)
+
+    def hopeless(self, cost: float) -> bool:
+        """Whether a cost is so far above the least one that it is not refined."""
+        return cost > self.policy.hopeless * self.least_cost
+
+    def term(self, name: str) -> Term:
+        return next(term for term in self.terms if term.name == name)
+
+    def parameters(self, names: Iterable[str]) -> list[str]:
+        """Parameters of the rig and of some terms."""
+        found = list(self.rig)
+        for term in self.terms:
+            if term.name in names:
+                found += [one.name for one in term.strengths()]
+        return found
+
+    def count(self, names: Iterable[str]) -> int:
+        return len(self.parameters(names)) - len(self.rig)
+
+    def threshold(self, name: str) -> float:
+        """Gain that a term must have: the more demanding of BIC and error rate."""
+        term = self.term(name)
+        number, chance = self.count([name]), self.policy.false_alarms / len(self.terms)
+        if any(one.inner for one in term.strengths()):
+            # as many chances as there are frequencies
+            chance /= self.scan(frozenset()).cells
+        level = float(chi2.isf(chance, number))
+        return max(number * math.log(self.problem.samples), level)
+
+    def attempt(
+        self, names: frozenset[str], start: Trial | None, iterations: int | None = None
+    ) -> Trial | None:
+        """Fit a subset from where another one ended; the best fit of it so far.
+
+        **Arguments:** iterations at most; by default those of a first look.
+        """
+        iterations = iterations or self.policy.quick_iterations
+        found = self._left(names) or self._fitted(names, start, iterations)
+        if not math.isfinite(found.cost):
+            return None
+        count = self.count(names)
+        bic = found.cost + count * math.log(self.problem.samples)
+        cut = not found.optimal and found.iterations == iterations
+        trial = Trial(names, found, bic, count, cut)
+        before = self.known.get(names)
+        if before is None or _order(trial) < _order(before):
+            self.known[names] = trial
+            if self._kept is not None:
+                ended = Ended(found.point, found.optimal, found.iterations)
+                self._kept.put(names, ended)
+            # what was said about the fit before holds no more
+            for derived in (self._scans, self._responses, self._linear):
+                derived.pop(names, None)
+        return self.known[names]
+
+    def _left(self, names: frozenset[str]) -> Fit | None:
+        """The fit of a subset that an interrupted run left, as it was."""
+        if self._kept is None or names in self.known:
+            return None
+        ended = self._kept.get(names)
+        if ended is None:
+            return None
+        free = self.parameters(names)
+        found = fit(self.problem, free=free, start=ended.point, iterations=0)
+        return dataclasses.replace(
+            found, optimal=ended.converged, iterations=ended.iterations
+        )
+
+    def _fitted(
+        self, names: frozenset[str], start: Trial | None, iterations: int
+    ) -> Fit:
+        """A fit from one place, and from another one where that led nowhere.
+
+        A fit without the right term may end far from the rig, in a valley that leads
+        nowhere. Then the nominal parameters are a better place to start from.
+        """
+        free = self.parameters(names)
+        if start is None:
+            return self._fit(free, self.problem.start, iterations)
+        ended = self._seeded(names, start, start.fit.point)
+        if names == start.names:
+            return self._fit(free, ended, iterations)
+        nominal = self._seeded(names, start, self.problem.start)
+        astray = not self._sound(start.fit)
+        first, second = (nominal, ended) if astray else (ended, nominal)
+        grown = names > start.names
+        # single terms decide which pairs are tried, so they have their time
+        beaten = start.fit.cost if grown and len(names) > 1 else math.inf
+        # what is lost without a term must be known where it decides whether to keep it
+        decides = -math.inf
+        if names < start.names:
+            threshold = sum(self.threshold(name) for name in start.names - names)
+            decides = start.fit.cost + self.policy.clear * threshold
+        found = self._fit(free, first, iterations, beaten, decides)
+        if self._sound(found) or self.hopeless(found.cost):
+            return found
+        if astray and grown and found.cost < start.fit.cost:
+            # the nominal rig led further than the smaller subset went
+            return found
+        again = self._fit(free, second, iterations, found.cost, decides)
+        return min(found, again, key=_cost)
+
+    def _fit(
+        self,
+        free: Sequence[str],
+        start: Point,
+        iterations: int,
+        beaten: float = math.inf,
+        decides: float = -math.inf,
+    ) -> Fit:
+        stop = given_up(self.problem.samples, self.policy, beaten, decides)
+        return fit(
+            self.problem, free=free, start=start, iterations=iterations, stop=stop
+        )
+
+    def finished(self, trial: Trial) -> Trial:
+        """A subset that may win is fitted to the end."""
+        if not trial.cut:
+            return trial
+        return self.attempt(trial.names, trial, self.policy.iterations) or trial
+
+    def settled(self, trial: Trial) -> bool:
+        """Whether the quadratic model about a fit holds.
+
+        It does at an optimum, and elsewhere near the data.
+        """
+        close = trial.fit.cost < self.policy.near * self.problem.samples
+        return trial.fit.optimal or close
+
+    def without(self, best: Trial, name: str) -> Trial:
+        """The fit of a subset with one term less."""
+        rest = best.names - {name}
+        known = self.known.get(rest) or self.attempt(rest, best, self.policy.iterations)
+        assert known is not None
+        return known
+
+    def blocks(self, trial: Trial) -> Blocks:
+        if trial.names not in self._linear:
+            self._linear[trial.names] = blocks_of(self.problem, trial.fit.point)
+        return self._linear[trial.names]
+
+    def foretells(self, less: Trial, more: Trial) -> bool:
+        """Whether the terms that a fit has more than another hold across the records.
+
+        Either half of them is asked what the strengths found in the other half gain.
+        """
+        blocks = self.blocks(less)
+        added = [
+            one.name
+            for name in more.names - less.names
+            for one in self.term(name).strengths()
+            if not one.inner
+        ]
+        free = blocks.rows(self.parameters(less.names))
+        return predicted_gain(blocks, free, blocks.rows(added), self.policy) > 0
+
+    def response(self, names: frozenset[str]) -> Response:
+        """What a force at any time would gain beside a fit."""
+        if names not in self._responses:
+            point = self.known[names].fit.point
+            free = self.parameters(names)
+            self._responses[names] = force_response(self.problem, point, free)
+        return self._responses[names]
+
+    def scan(self, names: frozenset[str]) -> Periodogram:
+        """Periodogram of what a fit leaves over."""
+        if names not in self._scans:
+            self.progress("looking for vibrations", None)
+            self._scans[names] = periodogram(
+                self.problem, self.response(names), self.policy
+            )
+        return self._scans[names]
+
+    def _frequency(self, start: Trial) -> float:
+        """The best known frequency to start from."""
+        known = self._scans.get(start.names) or next(iter(self._scans.values()), None)
+        scan = known or self.scan(start.names)
+        return scan.best[0]
+
+    def _sound(self, found: Fit) -> bool:
+        """Whether a fit ended, and within a few tolerances of what the rig is."""
+        if not found.optimal:
+            return False
+        start = np.asarray(self.problem.start.values)[0]
+        for name in self.rig:
+            known = self.problem.parameter(name).prior_stderr
+            nominal = start[self.problem.names.index(name)]
+            if abs(found[name].value - nominal) > self.policy.astray * known:
+                return False
+        return True
+
+    def _seeded(self, names: frozenset[str], start: Trial, place: Point) -> Point:
+        """A place to start from; terms that another fit lacks are without effect."""
+        values = np.array(place.values)
+        everything = self.problem.names
+        for term in self.terms:
+            for one in term.strengths():
+                column = everything.index(one.name)
+                if one.inner and term.name in names - start.names:
+                    values[:, column] = self._frequency(start)
+                elif one.inner:
+                    values[:, column] = start.fit.point.values[:, column]
+                elif term.name not in names:
+                    values[:, column] = 0.0
+        return place._replace(values=values)
+
+
+def _order(trial: Trial) -> tuple[float, bool]:
+    """The better of two fits of a subset is smaller; of equals, one at an optimum."""
+    return trial.bic, not trial.fit.optimal
+
+
+def _cost(found: Fit) -> float:
+    return found.cost if math.isfinite(found.cost) else math.inf

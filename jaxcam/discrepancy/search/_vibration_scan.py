@@ -1,0 +1,210 @@
+"""At which frequency the flights are shaken: what a force at each would gain.
+
+A vibration too weak to be seen in the samples of a flight still decides how fast it
+ends, and so the impact and the next flight. So the scan uses the whole likelihood,
+impacts included, with the states and the free parameters eliminated: exactly the gain
+that a fit with that frequency promises.
+"""
+
+import dataclasses
+from typing import Any
+
+import jax
+import numpy as np
+from jaxtyping import Complex, Float
+
+from ...fitting import Problem
+from ...fitting.engine import invert_information
+from ..policy import Policy
+from ._local_force import Response
+
+
+# Parts of a diagonal that keep a matrix definite against rounding
+_STATES, _SHAKEN = 1e-13, 1e-9
+# Divisors that may be zero are at least this
+_TINY = 1e-300
+
+
+@dataclasses.dataclass(frozen=True)
+class Periodogram:
+    """Growth of twice the log-likelihood at each `frequency` (Hz), shape `(k,)`.
+
+    `gain` with one phase for all records, `separate` with a phase for each record.
+    `records` is their number, `cells` that of frequencies that can be told apart (of
+    which each has a few neighbours on the grid);
+    `elsewhere` is what the highest separate peak gains without the record that it gains
+    most in.
+    """
+
+    frequency: Float[np.ndarray, " k"]
+    gain: Float[np.ndarray, " k"]
+    separate: Float[np.ndarray, " k"]
+    records: int
+    cells: int = 1
+    elsewhere: float = 0.0
+
+    @property
+    def best(self) -> tuple[float, float]:
+        """Frequency (Hz) and gain of the highest peak with one phase."""
+        k = int(np.argmax(self.gain))
+        return float(self.frequency[k]), float(self.gain[k])
+
+    @property
+    def best_separate(self) -> tuple[float, float]:
+        """Frequency (Hz) and gain of the highest peak with separate phases."""
+        k = int(np.argmax(self.separate))
+        return float(self.frequency[k]), float(self.separate[k])
+
+
+def periodogram(problem: Problem, response: Response, policy: Policy) -> Periodogram:
+    """Scan all frequencies that the flights can show.
+
+    **Arguments:** the problem, and its `Response` about a fit.
+    """
+    frequency = _frequencies(problem, policy)
+    if not len(frequency):
+        none = np.zeros(1)
+        return Periodogram(none, none, none, 1)
+    rate = 2 * np.pi * frequency
+    size = len(response.prior)
+    information, score = np.diag(response.prior), response.pull.copy()
+    parts = []
+    for r, place in enumerate(response.place):
+        sums = _summed(response, r, rate)
+        used = np.flatnonzero(place >= 0)
+        rows = place[used]
+        information[np.ix_(rows, rows)] += sums.pp[np.ix_(used, used)]
+        score[rows] += sums.p[used]
+        across = np.zeros((size, len(rate)), dtype=complex)
+        across[rows] = sums.pf[used]
+        parts.append((across, sums.f, sums.ff, sums.fc))
+    inside = invert_information(information)
+    inside = np.where(np.isfinite(inside), inside, 0.0)
+    whole = tuple(sum(part) for part in zip(*parts))
+    gain = _gain(inside, score, [whole])
+    separate = _gain(inside, score, parts)
+    top = [int(np.argmax(separate))]
+    peak = [tuple(one[..., top] for one in part) for part in parts]
+    rest = [_gain(inside, score, peak[:r] + peak[r + 1 :])[0] for r in range(len(peak))]
+    elsewhere = min(rest) if len(peak) > 1 else 0.0
+    cells = max(1, len(frequency) // policy.frequency_grid)
+    return Periodogram(frequency, gain, separate, len(parts), cells, float(elsewhere))
+
+
+def _frequencies(problem: Problem, policy: Policy) -> Float[np.ndarray, " k"]:
+    length = max(part.recording.duration for part in problem.segments)
+    interval = max(part.recording.interval for part in problem.segments)
+    exists = np.asarray(problem.pieces.exists)
+    step = float(np.max(np.asarray(problem.pieces.flown.step)[exists]))
+    top = min(1 / (policy.period_samples * interval), 1 / (policy.period_steps * step))
+    grid = 1 / (policy.frequency_grid * length)
+    return np.arange(policy.fewest_periods / length, top, grid)
+
+
+class _Sums:
+    """Of one record, what its pieces add up to for a force `exp(i w t)` at each rate.
+
+    `pp`, `p` of the parameters; `pf` couples them to the force; `f` is its score,
+    `ff` the sum of squares of its rows and `fc` that of their absolute squares.
+    """
+
+    def __init__(self, pp, p, rates: int):
+        self.pp, self.p = np.array(pp), np.array(p)
+        self.pf = np.zeros((len(p), rates), dtype=complex)
+        self.f, self.ff = np.zeros((2, rates), dtype=complex)
+        self.fc = np.zeros(rates)
+
+    def add_piece(self, inner, slope, waves, shaken):
+        """Information `inner` and score of parameters, then nodes of one piece."""
+        m = len(self.p)
+        self.pp += inner[:m, :m]
+        self.p += slope[:m]
+        self.pf += shaken[:m]
+        self.f += slope[m:] @ waves
+        self.ff += np.sum(waves * shaken[m:], axis=0)
+        self.fc += np.sum(np.real(np.conj(waves) * shaken[m:]), axis=0)
+
+    def add_rows(self, direct, pushed, off, sign=1.0):
+        """Rows for the parameters and the force, and what they are to explain."""
+        self.pp += sign * direct.T @ direct
+        self.p += sign * direct.T @ off
+        self.pf += sign * direct.T @ pushed
+        self.f += sign * off @ pushed
+        self.ff += sign * np.sum(pushed * pushed, axis=0)
+        self.fc += sign * np.sum(pushed.real**2 + pushed.imag**2, axis=0)
+
+
+def _summed(response: Response, r: int, rate) -> _Sums:
+    """The states of one record eliminated, from its first piece to its last."""
+    found: Any = jax.tree.map(lambda part: part[r], response.pieces)
+    n, m = found.later.shape[-1], response.place.shape[1]
+    p, l = slice(n, n + m), slice(n + m, None)
+    sums = _Sums(found.pp[:m, :m], found.p[:m], len(rate))
+    before, waves_before = [], np.zeros((0, 0))
+    for k in np.flatnonzero(response.exists[r]):
+        inner, slope = found.information[k], found.slope[k]
+        waves = _waves(response.time[r, k], rate)
+        shaken = inner[:, l] @ waves
+        sums.add_piece(inner[n:, n:], slope[n:], waves, shaken[n:])
+        # information of the state: with itself, parameters, what is off, and the force
+        here = [inner[:n, :n], inner[:n, p], slope[:n], shaken[:n]]
+        if before:
+            later, earlier, off = found.later[k], found.earlier[k], -found.tied[k]
+            direct = earlier[:, p] + found.direct[k, :, :m]
+            pushed = earlier[:, l] @ waves_before
+            sums.add_rows(direct, pushed, off)
+            rows = [direct, off, pushed]
+            here = [x + later.T @ y for x, y in zip(here, (later, *rows))]
+            earlier = earlier[:, :n]
+            before = [x + earlier.T @ y for x, y in zip(before, (earlier, *rows))]
+            (_, direct, off, pushed), coupled = _halved(before, earlier.T @ later)
+            sums.add_rows(direct, pushed, off, -1.0)
+            taken = (coupled, direct, off, pushed)
+            here = [x - coupled.T @ y for x, y in zip(here, taken)]
+        before, waves_before = here, waves
+    if before:
+        (_, direct, off, pushed), _ = _halved(before, np.zeros((n, 0)))
+        sums.add_rows(direct, pushed, off, -1.0)
+    return sums
+
+
+def _halved(blocks, coupling):
+    """Blocks of one piece, and its coupling to the next, over the root of the first."""
+    scale = 1 / np.sqrt(np.maximum(np.diag(blocks[0]), _TINY))
+    scaled = blocks[0] * np.outer(scale, scale)
+    root = np.linalg.inv(np.linalg.cholesky(scaled + _STATES * np.eye(len(scale))))
+    root = root * scale
+    return [root @ part for part in blocks], root @ coupling
+
+
+def _waves(time, rate) -> Complex[np.ndarray, "l w"]:
+    """`exp(i w t)` at evenly spaced times."""
+    found = np.empty((len(time), len(rate)), dtype=complex)
+    found[0] = np.exp(1j * rate * time[0])
+    turn = np.exp(1j * rate * (time[1] - time[0]))
+    for k in range(1, len(time)):
+        np.multiply(found[k - 1], turn, out=found[k])
+    return found
+
+
+def _gain(inside, score, parts) -> Float[np.ndarray, " w"]:
+    """Gain of a cosine and a sine for each part, the parameters eliminated."""
+    across, scores, own = [], [], []
+    for pf, f, ff, fc in parts:
+        across += [pf.real, pf.imag]
+        scores += [f.real, f.imag]
+        cc, ss, cs = (fc + ff.real) / 2, (fc - ff.real) / 2, ff.imag / 2
+        own.append(np.array([[cc, cs], [cs, ss]]))
+    c = np.moveaxis(np.array(across), -1, 0)
+    width = c.shape[1]
+    taken = c @ inside
+    left = np.array(scores).T - taken @ score
+    matrix = -taken @ np.swapaxes(c, 1, 2)
+    for k, block in enumerate(own):
+        pick = slice(2 * k, 2 * k + 2)
+        matrix[:, pick, pick] += np.moveaxis(block, -1, 0)
+    scale = 1 / np.sqrt(np.maximum(np.einsum("wii->wi", matrix), _TINY))
+    matrix = matrix * scale[:, :, None] * scale[:, None, :]
+    left = left * scale
+    solved = np.linalg.solve(matrix + _SHAKEN * np.eye(width), left[..., None])[..., 0]
+    return np.sum(left * solved, axis=-1)

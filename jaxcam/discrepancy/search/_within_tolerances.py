@@ -1,0 +1,60 @@
+"""What a fit without the missing terms makes of the rig, within its tolerances."""
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+
+from ...fitting import Fit, fit, Parameter
+from ..policy import Policy
+from ._given_up import given_up
+
+
+def within_tolerances(
+    before: Fit, best: Fit, rig: Sequence[str], policy: Policy
+) -> Fit:
+    """The fit without terms, its parameters of the rig held within their tolerances.
+
+    Where physics is missing the data outweigh what is known of the rig, and a fit ends
+    at lengths that no maker would deliver. A report compares with the rig as it may be.
+
+    **Arguments:** fits without and with the terms, and the names of the parameters of
+    the rig, and the policy. The value of the better fit is allowed in any case.
+
+    **Returns:** `before` itself where it is within the tolerances.
+    """
+    problem = before.problem
+    bounded = {name: _bounded(problem, best, name) for name in rig}
+    values = np.asarray(before.point.values)
+    inside = all(
+        np.all((column >= one.lower) & (column <= one.upper))
+        for name, one in bounded.items()
+        for column in [values[:, problem.names.index(name)]]
+    )
+    if inside:
+        return before
+    parameters = tuple(bounded.get(one.name, one) for one in problem.parameters)
+    return fit(
+        dataclasses.replace(problem, parameters=parameters),
+        free=before.free,
+        start=before.point,
+        iterations=policy.quick_iterations,
+        stop=given_up(problem.samples, policy),
+    )
+
+
+def _bounded(problem, best: Fit, name: str) -> Parameter:
+    """The parameter with its tolerance as bounds."""
+    parameter = problem.parameter(name)
+    place = problem.names.index(name)
+    nominal = parameter.nominal
+    if nominal is None:
+        nominal = float(problem.start.values[0, place])
+    known = np.asarray(best.point.values)[:, place]
+    low = min(nominal - parameter.tolerance, float(np.min(known)))
+    high = max(nominal + parameter.tolerance, float(np.max(known)))
+    return dataclasses.replace(
+        parameter,
+        lower=max(parameter.lower, low),
+        upper=min(parameter.upper, high),
+    )

@@ -1,0 +1,23 @@
+"""Physics that a model may lack, and systems that have it.
+
+A `Term` has a strength; a `Shape` is a free function that says where something is
+missing and what it looks like.
+"""
+
+from ._library import (
+    DriveRipple as DriveRipple,
+    library as library,
+    saved_classes as saved_classes,
+)
+from ._shapes import Shape as Shape, shapes as shapes, Variable as Variable
+from ._term import (
+    Motion as Motion,
+    SensorTerm as SensorTerm,
+    Strength as Strength,
+    strength as strength,
+    Term as Term,
+    terms_of as terms_of,
+)
+from ._value import Value as Value
+from ._where import Where as Where
+from ._with_terms import base_drive as base_drive, WithTerms as WithTerms

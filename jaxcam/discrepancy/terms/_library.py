@@ -1,0 +1,298 @@
+"""The library: what the dynamics of machines most often leaves out."""
+
+import math
+from collections.abc import Mapping
+from typing import ClassVar
+
+import equinox as eqx
+import jax.numpy as jnp
+
+from ...recordings import References
+from ._term import Motion, SensorTerm, strength, Term
+from ._value import Value
+from ._where import Where
+from ._with_terms import WithTerms
+
+
+def _reference(default: float):
+    """A constant of a form: not fitted, and left out of files by earlier versions."""
+    return eqx.field(default=default, static=True, metadata={"spare": True})
+
+
+class ViscousDamping(Term):
+    """Damping proportional to the velocity, `-c1 v`."""
+
+    name: ClassVar[str] = "viscous_damping"
+    sentence: ClassVar[str] = "viscous damping, a force against the velocity"
+    region: ClassVar[str] = "in flight, in proportion to the speed"
+    source: ClassVar[str] = "Rayleigh, The Theory of Sound, 1877, section 45"
+    c1: float = strength("1/s", 0.1, lower=0.0)
+
+    def acceleration(self, motion: Motion):
+        return -self.c1 * motion.velocity
+
+
+class CoulombFriction(Term):
+    """Dry friction, `-fc sign(v)`.
+
+    The sign is `tanh(v / slip)`, so that it can be integrated; `slip` (rad/s) is far
+    below the speeds that friction is told from.
+    """
+
+    name: ClassVar[str] = "coulomb_friction"
+    sentence: ClassVar[str] = "Coulomb friction, a constant force against the motion"
+    region: ClassVar[str] = "in flight, changing sign with the velocity"
+    source: ClassVar[str] = (
+        "Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica 1994"
+    )
+    fc: float = strength("rad/s^2", 0.1, lower=0.0)
+    slip: float = _reference(References.slip_speed)
+
+    def acceleration(self, motion: Motion):
+        return -self.fc * jnp.tanh(motion.velocity / self.slip)
+
+
+class QuadraticDrag(Term):
+    """Drag of a turbulent fluid, `-c2 |v| v`."""
+
+    name: ClassVar[str] = "quadratic_drag"
+    sentence: ClassVar[str] = "quadratic drag, as of moving air or oil"
+    region: ClassVar[str] = "in flight, at large speeds"
+    source: ClassVar[str] = "Batchelor, An Introduction to Fluid Dynamics, 5.11"
+    c2: float = strength("1/rad", 0.1, lower=0.0)
+
+    def acceleration(self, motion: Motion):
+        return -self.c2 * jnp.abs(motion.velocity) * motion.velocity
+
+
+class NonlinearSpring(Term):
+    """A spring that hardens (or softens) away from its middle, `-k3 (q - q0)^3`."""
+
+    name: ClassVar[str] = "nonlinear_spring"
+    sentence: ClassVar[str] = "a cubic part of the spring force"
+    region: ClassVar[str] = "in flight, at large deflections"
+    source: ClassVar[str] = "Duffing 1918; Kovacic and Brennan 2011, chapter 2"
+    k3: float = strength("1/(s^2 rad^2)", 100.0)
+    center: float = _reference(References.spring_center)
+
+    def acceleration(self, motion: Motion):
+        return -self.k3 * (motion.position - self.center) ** 3
+
+
+class RestitutionVelocity(Term):
+    """Restitution that falls with the approach speed, `r0 (1 + v / reference)^-rb`."""
+
+    name: ClassVar[str] = "restitution_velocity"
+    sentence: ClassVar[str] = "a restitution that depends on the approach speed"
+    where: ClassVar[str] = Where.IMPACT
+    region: ClassVar[str] = "at impacts, by their approach speed"
+    source: ClassVar[str] = "Goldsmith, Impact, 1960, chapter 8; Johnson 1985, 11.5"
+    rb: float = strength("-", 0.02, lower=0.0)
+    reference: float = _reference(References.impact_speed)
+
+    def restitution(self, approach, motion: Motion):
+        del motion
+        return jnp.exp(-self.rb * jnp.log1p(approach / self.reference))
+
+
+class CamProfileError(Term):
+    """A cam that is out of round, by `run cos(2 phi + lead)`."""
+
+    name: ClassVar[str] = "cam_profile_error"
+    sentence: ClassVar[str] = "an error of the cam's profile, twice a turn"
+    where: ClassVar[str] = Where.CONTACT
+    region: ClassVar[str] = "at impacts and rests, by the angle of the cam"
+    source: ClassVar[str] = "Norton, Cam Design and Manufacturing Handbook, chapter 12"
+    run: float = strength("rad", 1e-4)
+    lead: float = _reference(References.profile_lead)
+
+    def contact(self, motion: Motion):
+        return self.run * jnp.cos(2 * motion.phase + self.lead)
+
+
+class SensorLag(SensorTerm):
+    """A channel of the motion that is late."""
+
+    name: ClassVar[str] = "sensor_lag"
+    sentence: ClassVar[str] = "a lag of the follower's sensor"
+    region: ClassVar[str] = "in the measured angle, in proportion to the velocity"
+    source: ClassVar[str] = "Ljung, System Identification, 1999, section 4.2"
+    fields: ClassVar[tuple[str, ...]] = ("lag",)
+    lag: float = strength("s", 1e-4, lower=0.0)
+
+
+class ExternalVibration(Term):
+    """A foundation that shakes, `ext sin(2 pi fe t + phase)`.
+
+    Fitted as the amplitudes of sine and cosine, in which it is linear.
+    """
+
+    name: ClassVar[str] = "external_vibration"
+    sentence: ClassVar[str] = "an external vibration at a frequency of its own"
+    region: ClassVar[str] = "in flight, periodic in time and not with the cam"
+    source: ClassVar[str] = "Den Hartog, Mechanical Vibrations, 1956, section 2.9"
+    ext_sin: float = strength("rad/s^2", 0.1)
+    ext_cos: float = strength("rad/s^2", 0.1)
+    fe: float = strength("Hz", 0.05, lower=0.0, default=10.0, inner=True)
+
+    def acceleration(self, motion: Motion):
+        angle = 2 * jnp.pi * self.fe * motion.t
+        return self.ext_sin * jnp.sin(angle) + self.ext_cos * jnp.cos(angle)
+
+    def reported(self, values: Mapping[str, Value]) -> dict[str, Value]:
+        """Amplitude, frequency and phase."""
+        a, b, fe = (values[name] for name in ("ext_sin", "ext_cos", "fe"))
+        size = math.hypot(a.value, b.value)
+        error = math.hypot(a.value * a.stderr, b.value * b.stderr) / size
+        phase = math.hypot(a.value * b.stderr, b.value * a.stderr) / size**2
+        return {
+            "ext": Value(size, error, "rad/s^2"),
+            "fe": fe,
+            "phase": Value(math.atan2(b.value, a.value), phase, "rad"),
+        }
+
+
+class DriveRipple(Term):
+    """A drive whose speed varies with its own angle, `w (1 + eps cos(phi - psi))`.
+
+    Found in the channel of the drive itself; the motion is computed from that channel
+    in any case.
+    """
+
+    name: ClassVar[str] = "drive_ripple"
+    sentence: ClassVar[str] = "a ripple of the cam's speed, once a turn"
+    where: ClassVar[str] = Where.DRIVE
+    region: ClassVar[str] = "in the cam's own angle, by that angle"
+    source: ClassVar[str] = "Norton, Cam Design and Manufacturing Handbook, chapter 10"
+
+
+class StribeckFriction(Term):
+    """Dry friction that is larger near standstill, `-fs exp(-(v / vs)^2) sign(v)`."""
+
+    name: ClassVar[str] = "stribeck_friction"
+    sentence: ClassVar[str] = "friction that is larger at low speed"
+    region: ClassVar[str] = "in flight, near standstill"
+    source: ClassVar[str] = (
+        "Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica 1994"
+    )
+    listed: ClassVar[bool] = False
+    fs: float = strength("rad/s^2", 0.1, lower=0.0)
+    speed: float = _reference(References.stribeck_speed)
+    slip: float = _reference(References.slip_speed)
+
+    def acceleration(self, motion: Motion):
+        slow = jnp.exp(-((motion.velocity / self.speed) ** 2))
+        return -self.fs * slow * jnp.tanh(motion.velocity / self.slip)
+
+
+class AsymmetricFriction(Term):
+    """Dry friction that differs with the direction: a force against one of them."""
+
+    name: ClassVar[str] = "asymmetric_friction"
+    sentence: ClassVar[str] = "friction that acts in one direction only"
+    region: ClassVar[str] = "in flight, on the way up"
+    source: ClassVar[str] = "Armstrong-Helouvry 1991, Control of Machines with Friction"
+    listed: ClassVar[bool] = False
+    fa: float = strength("rad/s^2", 0.1, lower=0.0)
+    slip: float = _reference(References.slip_speed)
+
+    def acceleration(self, motion: Motion):
+        return -self.fa * (1 + jnp.tanh(motion.velocity / self.slip)) / 2
+
+
+class GravityImbalance(Term):
+    """The weight of an arm whose centre of mass is off its hinge, `-g cos(q)`."""
+
+    name: ClassVar[str] = "gravity_imbalance"
+    sentence: ClassVar[str] = "the weight of an arm that is not balanced"
+    region: ClassVar[str] = "in flight, by position"
+    source: ClassVar[str] = "Meriam and Kraige, Dynamics, chapter 6"
+    listed: ClassVar[bool] = False
+    imbalance: float = strength("rad/s^2", 0.1)
+
+    def acceleration(self, motion: Motion):
+        return -self.imbalance * jnp.cos(motion.position)
+
+
+class SpeedDependentBounce(Term):
+    """Restitution that varies with the speed of the drive, by `br` per rad/s."""
+
+    name: ClassVar[str] = "restitution_drive_speed"
+    sentence: ClassVar[str] = "a restitution that depends on the speed of the drive"
+    where: ClassVar[str] = Where.IMPACT
+    region: ClassVar[str] = "at impacts, by the speed of the drive"
+    source: ClassVar[str] = "Chong 2016, section 4.6.1 (Figure 4.15)"
+    listed: ClassVar[bool] = False
+    br: float = strength("s/rad", 1e-3)
+
+    def restitution(self, approach, motion: Motion):
+        del approach
+        return 1 + self.br * motion.rate
+
+
+class SensorGain(SensorTerm):
+    """A sensor that shows too much or too little, in proportion."""
+
+    name: ClassVar[str] = "sensor_gain"
+    sentence: ClassVar[str] = "a wrong gain of the follower's sensor"
+    region: ClassVar[str] = "in the measured angle, in proportion to it"
+    source: ClassVar[str] = "Doebelin, Measurement Systems, chapter 3"
+    listed: ClassVar[bool] = False
+    fields: ClassVar[tuple[str, ...]] = ("gain",)
+    gain: float = strength("-", 1e-3)
+
+
+class SensorOffset(SensorTerm):
+    """A sensor whose zero is off."""
+
+    name: ClassVar[str] = "sensor_offset"
+    sentence: ClassVar[str] = "a wrong zero of the follower's sensor"
+    region: ClassVar[str] = "in the measured angle, everywhere"
+    source: ClassVar[str] = "Doebelin, Measurement Systems, chapter 3"
+    listed: ClassVar[bool] = False
+    fields: ClassVar[tuple[str, ...]] = ("offset",)
+    offset: float = strength("rad", 1e-3)
+
+
+def library(
+    turned: bool = True,
+    references: References = References(),
+    clocked: bool | None = None,
+) -> tuple[Term, ...]:
+    """All terms that `diagnose` tries by default.
+
+    **Arguments:**
+
+    - `turned`: whether the system has a drive, without which no cam can be out of
+        round.
+    - `references`: constants of the forms, which belong to a rig (`rig.references`):
+        where a nonlinear spring is symmetric, at which speed a restitution is stated.
+    - `clocked`: whether anything happens at a known time, such as by a drive (the
+        default) or a measured input. Otherwise a lag is another beginning of time.
+    """
+    slip = references.slip_speed
+    found: list[Term] = [
+        ViscousDamping(),
+        CoulombFriction(slip=slip),
+        QuadraticDrag(),
+        NonlinearSpring(center=references.spring_center),
+        RestitutionVelocity(reference=references.impact_speed),
+        ExternalVibration(),
+        SensorLag(),
+        StribeckFriction(speed=references.stribeck_speed, slip=slip),
+        AsymmetricFriction(slip=slip),
+        GravityImbalance(),
+        SensorGain(),
+        SensorOffset(),
+    ]
+    if not (turned if clocked is None else clocked):
+        found = [term for term in found if not isinstance(term, SensorLag)]
+    if turned:
+        lead = references.profile_lead
+        found += [CamProfileError(lead=lead), SpeedDependentBounce()]
+    return tuple(found)
+
+
+def saved_classes() -> tuple[type, ...]:
+    """Classes that a saved system with terms may name, for `load_system`."""
+    return (WithTerms, DriveRipple, *(type(term) for term in library()))

@@ -1,0 +1,275 @@
+"""Forces, restitutions and surfaces as free functions of one variable.
+
+A shape is no verdict. Where no named term explains what is left, the shape says where
+it is and what it looks like.
+"""
+
+import abc
+import enum
+import math
+from typing import ClassVar
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array
+
+from ...fitting import Parameter
+from ...recordings import References
+from ._term import Motion, Term, terms_of
+from ._where import Where
+
+
+# Just inside the ends, where the angle of a Chebyshev polynomial can be differentiated
+_END = 1 - 1e-12
+
+
+class Variable(enum.StrEnum):
+    """What a free function depends on; equal to its name as a string."""
+
+    POSITION = "position"
+    VELOCITY = "velocity"
+    APPROACH = "approach speed"
+    PHASE = "phase"
+    TIME = "time"
+
+
+def _number(value):
+    return jnp.asarray(value, dtype=float)
+
+
+def _numbers(values):
+    return tuple(jnp.asarray(value, dtype=float) for value in values)
+
+
+class Shape(Term):
+    """A sum of functions of one variable, each with a coefficient.
+
+    `quantity` is what the sum is, `unit` that of the coefficients, `count` how many of
+    them there are, `size` a change that matters.
+    """
+
+    listed: ClassVar[bool] = False
+    unit: ClassVar[str] = "rad/s^2"
+    size: ClassVar[float] = 0.1
+    quantity: ClassVar[str] = "force"
+    variable: ClassVar[Variable]
+    count: ClassVar[int]
+    coefficients: tuple[Array, ...] = eqx.field(converter=_numbers)
+
+    @abc.abstractmethod
+    def basis(self, quantity) -> Array:
+        """The functions at one value of the quantity, shape `(k,)`."""
+
+    @property
+    @abc.abstractmethod
+    def ends(self) -> tuple[float, float]:
+        """Least and largest value of the variable."""
+
+    def value(self, quantity):
+        """The sum of the functions."""
+        return jnp.stack(self.coefficients) @ self.basis(quantity)
+
+    def numbers(self) -> tuple[Array, ...]:
+        return self.coefficients
+
+    def parameters(self, place: int) -> list[Parameter]:
+        return [
+            Parameter(
+                f"{self.name}_{k}",
+                lambda m, k=k: terms_of(m)[place].coefficients[k],  # pyright: ignore
+                scale=self.size,
+                unit=self.unit,
+            )
+            for k in range(len(self.coefficients))
+        ]
+
+
+class Polynomial(Shape):
+    """Chebyshev polynomials between two ends, `first` is the lowest degree."""
+
+    low: Array = eqx.field(converter=_number)
+    high: Array = eqx.field(converter=_number)
+    first: int = eqx.field(default=1, static=True)
+
+    def basis(self, quantity) -> Array:
+        middle, half = (self.high + self.low) / 2, (self.high - self.low) / 2
+        x = jnp.clip((quantity - middle) / half, -_END, _END)
+        # all at once: a recurrence would be compiled degree by degree
+        last = self.first + len(self.coefficients)
+        degrees = jnp.arange(self.first, last, dtype=float)
+        return jnp.cos(degrees * jnp.arccos(x))
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        return float(self.low), float(self.high)
+
+
+class Harmonics(Shape):
+    """Cosines, then sines, of multiples of the phase, `first` is the lowest order."""
+
+    first: int = eqx.field(default=1, static=True)
+
+    def basis(self, quantity) -> Array:
+        half = len(self.coefficients) // 2
+        orders = jnp.arange(self.first, self.first + half, dtype=float)
+        angles = orders * quantity
+        return jnp.concatenate([jnp.cos(angles), jnp.sin(angles)])
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        return 0.0, 2 * math.pi
+
+
+class ForceOfAngle(Polynomial):
+    name: ClassVar[str] = "force_of_angle"
+    sentence: ClassVar[str] = "a force that depends on the position"
+    region: ClassVar[str] = "in flight, by position"
+    variable: ClassVar[Variable] = Variable.POSITION
+    count: ClassVar[int] = 6
+
+    def acceleration(self, motion: Motion):
+        return self.value(motion.position)
+
+
+class ForceOfVelocity(Polynomial):
+    name: ClassVar[str] = "force_of_velocity"
+    sentence: ClassVar[str] = "a force that depends on the velocity"
+    region: ClassVar[str] = "in flight, by velocity"
+    variable: ClassVar[Variable] = Variable.VELOCITY
+    count: ClassVar[int] = 6
+
+    def acceleration(self, motion: Motion):
+        return self.value(motion.velocity)
+
+
+class ForceOfTime(Polynomial):
+    name: ClassVar[str] = "force_of_time"
+    sentence: ClassVar[str] = "a force that changes in the course of a record"
+    region: ClassVar[str] = "in flight, by time of the record"
+    variable: ClassVar[Variable] = Variable.TIME
+    count: ClassVar[int] = 5
+
+    def acceleration(self, motion: Motion):
+        return self.value(motion.t)
+
+
+class FrictionOfAngle(Polynomial):
+    name: ClassVar[str] = "friction_of_angle"
+    sentence: ClassVar[str] = "friction that depends on the position"
+    region: ClassVar[str] = "in flight, by position and direction of motion"
+    quantity: ClassVar[str] = "friction"
+    variable: ClassVar[Variable] = Variable.POSITION
+    count: ClassVar[int] = 3
+
+    slip: float = eqx.field(default=References.free_slip_speed, static=True)
+
+    def acceleration(self, motion: Motion):
+        return -self.value(motion.position) * jnp.tanh(motion.velocity / self.slip)
+
+
+class ForceOfPhase(Harmonics):
+    name: ClassVar[str] = "force_of_phase"
+    sentence: ClassVar[str] = "a force in step with the drive"
+    region: ClassVar[str] = "in flight, by phase of the drive"
+    variable: ClassVar[Variable] = Variable.PHASE
+    count: ClassVar[int] = 8
+
+    def acceleration(self, motion: Motion):
+        return self.value(motion.phase)
+
+
+class SurfaceOfPhase(Harmonics):
+    name: ClassVar[str] = "surface_of_phase"
+    sentence: ClassVar[str] = "a surface that is not where the model has it"
+    where: ClassVar[str] = Where.CONTACT
+    region: ClassVar[str] = "at impacts and rests, by phase of the drive"
+    quantity: ClassVar[str] = "surface"
+    variable: ClassVar[Variable] = Variable.PHASE
+    count: ClassVar[int] = 8
+    unit: ClassVar[str] = "rad"
+    size: ClassVar[float] = 1e-4
+
+    def contact(self, motion: Motion):
+        return self.value(motion.phase)
+
+
+class BounceOfSpeed(Polynomial):
+    name: ClassVar[str] = "bounce_of_speed"
+    sentence: ClassVar[str] = "a restitution that depends on the approach speed"
+    where: ClassVar[str] = Where.IMPACT
+    region: ClassVar[str] = "at impacts, by approach speed"
+    quantity: ClassVar[str] = "bounce"
+    variable: ClassVar[Variable] = Variable.APPROACH
+    count: ClassVar[int] = 4
+    unit: ClassVar[str] = "-"
+    size: ClassVar[float] = 0.01
+
+    def restitution(self, approach, motion: Motion):
+        return 1 + self.value(approach)
+
+
+class BounceOfTime(Polynomial):
+    name: ClassVar[str] = "bounce_of_time"
+    sentence: ClassVar[str] = "a restitution that changes in the course of a record"
+    where: ClassVar[str] = Where.IMPACT
+    region: ClassVar[str] = "at impacts, by time of the record"
+    quantity: ClassVar[str] = "bounce"
+    variable: ClassVar[Variable] = Variable.TIME
+    count: ClassVar[int] = 3
+    unit: ClassVar[str] = "-"
+    size: ClassVar[float] = 0.01
+
+    def restitution(self, approach, motion: Motion):
+        del approach
+        return 1 + self.value(motion.t)
+
+
+class BounceOfPhase(Harmonics):
+    name: ClassVar[str] = "bounce_of_phase"
+    sentence: ClassVar[str] = "a restitution that depends on where the drive is"
+    where: ClassVar[str] = Where.IMPACT
+    region: ClassVar[str] = "at impacts, by phase of the drive"
+    quantity: ClassVar[str] = "bounce"
+    variable: ClassVar[Variable] = Variable.PHASE
+    count: ClassVar[int] = 4
+    unit: ClassVar[str] = "-"
+    size: ClassVar[float] = 0.01
+
+    def restitution(self, approach, motion: Motion):
+        del approach
+        return 1 + self.value(motion.phase)
+
+
+def shapes(
+    positions: tuple[float, float],
+    velocities: tuple[float, float],
+    approach: tuple[float, float],
+    duration: float,
+    turned: bool = True,
+    references: References = References(),
+) -> tuple[Shape, ...]:
+    """All shapes, over the ranges that some recordings visit.
+
+    **Arguments:** least and largest position, velocity and approach speed, length of
+    the records (s), whether there is a drive with a phase, and the constants of forms.
+    """
+
+    def zeros(kind: type[Shape]) -> list[float]:
+        return [0.0] * kind.count
+
+    slip = references.free_slip_speed
+    found: list[Shape] = [
+        ForceOfAngle(zeros(ForceOfAngle), *positions),
+        ForceOfVelocity(zeros(ForceOfVelocity), *velocities),
+        ForceOfTime(zeros(ForceOfTime), 0.0, duration),
+        FrictionOfAngle(zeros(FrictionOfAngle), *positions, first=0, slip=slip),
+        BounceOfSpeed(zeros(BounceOfSpeed), *approach),
+        BounceOfTime(zeros(BounceOfTime), 0.0, duration),
+    ]
+    if turned:
+        found += [
+            ForceOfPhase(zeros(ForceOfPhase)),
+            SurfaceOfPhase(zeros(SurfaceOfPhase), first=2),
+            BounceOfPhase(zeros(BounceOfPhase)),
+        ]
+    return tuple(found)

@@ -1,0 +1,126 @@
+"""Why a fit is not to be trusted, found from the result itself."""
+
+import enum
+from typing import NamedTuple
+
+import numpy as np
+
+from .engine import Costs, FLIGHT, IMPACT, Point, Problem, Weights
+
+
+# Cost of a sample, or of a component of a joint, that noise does not explain: it is one
+# on average, and the usual piece of thousands is within a few per cent of that
+_PIECE, _JOINT, _MEAN = 4.0, 9.0, 9.0
+# Part of the pieces that must be that good: a bad record among many is an outlier
+_USUAL = 0.75
+# A bound is reached to this part of the parameter's scale
+_ON_BOUND = 1e-9
+
+
+class Doubt(enum.Enum):
+    """Reasons why a fit does not count as converged."""
+
+    NO_OPTIMUM = "the iteration ended before an optimum"
+    NOT_FINITE = "a parameter, a state, a cost or an error is not a finite number"
+    FAR_FROM_DATA = "the cost is far above what the noise explains"
+    ON_A_BOUND = "a parameter is at a bound"
+    NOT_CONSTRAINED = "the data do not constrain a parameter"
+
+
+class Reason(NamedTuple):
+    """One doubt, and what it is about in a sentence."""
+
+    doubt: Doubt
+    sentence: str
+
+
+def not_finite(problem: Problem, point: Point, cost: float, costs: Costs) -> str:
+    """What is not a finite number, in a sentence; empty where everything is."""
+    pieces = problem.pieces
+    flown = np.asarray(costs.flown) + np.asarray(costs.joints)
+    exists = np.asarray(pieces.exists)
+    states = np.all(np.isfinite(np.asarray(point.states)), axis=-1)
+    bad = exists & ~(np.isfinite(flown) & states)
+    for p, name in enumerate(problem.names):
+        if not np.all(np.isfinite(np.asarray(point.values)[:, p])):
+            return f"The parameter {name} is not a finite number; start elsewhere."
+    if np.any(bad):
+        r, k = np.argwhere(bad)[0]
+        when = float(np.asarray(pieces.flown.start)[r, k])
+        return (
+            f"The model gives no finite number in {problem.records[r]} from {when:.4g} "
+            f"s on; check its vector field, gap and impact there, or bound the "
+            f"parameters."
+        )
+    if not np.isfinite(cost):
+        return "The cost is not a finite number; check the model and the parameters."
+    return ""
+
+
+def far_from_data(problem: Problem, costs: Costs, weights: Weights | None) -> str:
+    """Where the cost is far above the noise, in a sentence; empty where it is not.
+
+    Compared are what three quarters of the pieces keep below, so that one bad record
+    among many is no reason, and the mean, so that no part may be far off altogether.
+    """
+    pieces = problem.pieces
+    weights = weights or problem.everything()
+    counts = np.sum(np.asarray(pieces.flown.known), axis=(-3, -2, -1))
+    rests = np.sum(np.asarray(pieces.rested.known), axis=(-3, -2, -1))
+    used = (np.asarray(weights.flown) > 0) & np.asarray(pieces.exists)
+    resting = (np.asarray(weights.rested) > 0) & (rests > 0)
+    joints, kind = np.asarray(costs.joints), np.asarray(pieces.joint)
+    flown, rested = np.asarray(costs.flown), np.nan_to_num(np.asarray(costs.rested))
+    size = problem.start.states.shape[-1]
+    one = "cost a sample is"
+    parts = (
+        ("flight", one, flown / np.maximum(counts, 1), used & (counts > 0), _PIECE),
+        ("contact", one, rested / np.maximum(rests, 1), resting, _PIECE),
+        (
+            "joints within flights",
+            "cost is",
+            joints / size,
+            used & (kind == FLIGHT),
+            _JOINT,
+        ),
+        ("impacts", "cost is", joints / (size + 1), used & (kind == IMPACT), _JOINT),
+    )
+    for name, what, cost, rows, most in parts:
+        if not np.any(rows):
+            continue
+        level = float(np.quantile(cost[rows], _USUAL))
+        if not level <= most:
+            return (
+                f"The fit is far from the data in {name}: the {what} {level:.3g} and "
+                f"more in a quarter of them where noise makes it 1; the model, the "
+                f"start or the stated noise is wrong."
+            )
+    total = np.where(used, flown + joints, 0.0)
+    rest = np.sum(np.where(resting, rested, 0.0))
+    samples = np.sum(np.where(used, counts, 0)) + np.sum(np.where(resting, rests, 0))
+    mean = float((np.sum(total) + rest) / max(samples, 1))
+    if not mean <= _MEAN:
+        r, k = np.unravel_index(np.argmax(total), total.shape)
+        when = float(np.asarray(pieces.flown.start)[r, k])
+        return (
+            f"The fit is far from the data: the cost a sample is {mean:.3g} where "
+            f"noise makes it 1, most of it in {problem.records[r]} near {when:.4g} s; "
+            f"look at the residuals there."
+        )
+    return ""
+
+
+def on_a_bound(problem: Problem, free, point: Point) -> list[str]:
+    """Free parameters that are at a bound, each in a sentence."""
+    values, found = np.asarray(point.values), []
+    for name in free:
+        parameter = problem.parameter(name)
+        column = values[:, problem.names.index(name)]
+        near = _ON_BOUND * parameter.size(float(column[0]))
+        for bound, side in ((parameter.lower, "lower"), (parameter.upper, "upper")):
+            if np.any(np.abs(column - bound) <= near):
+                found.append(
+                    f"{name} is at its {side} bound {bound:g}, where its error means "
+                    f"nothing; widen the bound or hold the parameter."
+                )
+    return found

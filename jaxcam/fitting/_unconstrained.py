@@ -1,0 +1,91 @@
+"""Combinations of parameters that the data say nothing of."""
+
+import dataclasses
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from jaxtyping import Float
+
+
+# Part of the largest singular value, in units of what each parameter does by itself,
+# below which a combination is rounding, and below which it may be
+_BLIND, _DOUBTFUL = 1e-6, 3e-3
+# Growth, where the states are held a hundred times as firmly, of what is only theirs
+_GROWS = 10.0
+# Members of a combination that are named: at least this part of the largest
+_MEMBER = 0.1
+
+
+@dataclasses.dataclass(frozen=True)
+class Unconstrained:
+    """Parameters that can change together and the data stay the same.
+
+    - `names`: of parameters, `name@record` where each record has its own.
+    - `shares`: how far each moves, in its own unit, the largest of them by its scale.
+    """
+
+    names: tuple[str, ...]
+    shares: Float[np.ndarray, " k"]
+
+    def sentence(self) -> str:
+        """The combination, and what to do, in words."""
+        if len(self.names) == 1:
+            return (
+                f"The data say nothing of {self.names[0]}; hold it or give a tolerance."
+            )
+        moves = ", ".join(
+            f"{name} by {share:+.3g}" for name, share in zip(self.names, self.shares)
+        )
+        return (
+            f"The data see no change of {moves} together; hold one of them or give it "
+            f"a tolerance."
+        )
+
+
+def unconstrained(
+    labels: Sequence[str],
+    information: Float[np.ndarray, "g g"],
+    scale: Float[np.ndarray, " g"],
+    firmer: Callable[[], Float[np.ndarray, "g g"]],
+) -> tuple[Unconstrained, ...]:
+    """Combinations that are not seen: right singular vectors of the Jacobian.
+
+    The eigenvectors of the information J^T J are those of J, and its eigenvalues are
+    the squares of the singular values, with every column of J at unit length.
+
+    **Arguments:** names and `information` of the parameters in units of their `scale`;
+    `firmer` gives the same with the eliminated states held more firmly.
+    """
+    diagonal = np.diag(information)
+    dead = ~(diagonal > 0)
+    found = [
+        Unconstrained((labels[k],), scale[k : k + 1])
+        for k in np.flatnonzero(dead).tolist()
+    ]
+    rows = np.flatnonzero(~dead)
+    if len(rows):
+        unit = 1 / np.sqrt(diagonal[rows])
+        inner = information[np.ix_(rows, rows)] * np.outer(unit, unit)
+        values, vectors = np.linalg.eigh(inner)
+        doubtful = values[0] <= _DOUBTFUL**2 * values[-1]
+        held = (
+            firmer()[np.ix_(rows, rows)] * np.outer(unit, unit) if doubtful else inner
+        )
+        for value, vector in zip(values, vectors.T):
+            rounding = value <= _BLIND**2 * len(rows) * values[-1]
+            # a state that nothing holds but rounding lends its information
+            lent = vector @ held @ vector > _GROWS * max(value, 0.0)
+            if not (rounding or (value <= _DOUBTFUL**2 * values[-1] and lent)):
+                continue
+            moves = vector * unit
+            large = np.abs(moves) >= _MEMBER * np.max(np.abs(moves))
+            order = np.flatnonzero(large)
+            order = order[np.argsort(-np.abs(moves[order]))]
+            moves = moves / np.max(np.abs(moves))
+            found.append(
+                Unconstrained(
+                    tuple(labels[int(k)] for k in rows[order]),
+                    moves[order] * scale[rows[order]],
+                )
+            )
+    return tuple(found)

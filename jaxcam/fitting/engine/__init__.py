@@ -1,0 +1,47 @@
+"""Recordings and a model as a problem, and the normal equations of its fit."""
+
+from ._columns import (
+    Columns as Columns,
+    free_columns as free_columns,
+    held_firmer as held_firmer,
+    inside as inside,
+    invert_information as invert_information,
+    off_nominal as off_nominal,
+    prior_cost as prior_cost,
+    prior_information as prior_information,
+    reduced as reduced,
+)
+from ._damped_step import damped_step as damped_step
+from ._eliminate import (
+    eliminate_states as eliminate_states,
+    Reduced as Reduced,
+    state_steps as state_steps,
+)
+from ._linear import linear_pieces as linear_pieces, LinearPieces as LinearPieces
+from ._linearise import (
+    assemble as assemble,
+    Blocks as Blocks,
+    chained as chained,
+    cost_of as cost_of,
+    Costs as Costs,
+    Layout as Layout,
+    Point as Point,
+    predict as predict,
+)
+from ._model import (
+    cam_follower_drive as cam_follower_drive,
+    Input as Input,
+    Model as Model,
+    Sensor as Sensor,
+    Turning as Turning,
+)
+from ._own_states import own_states as own_states
+from ._parameter import Parameter as Parameter
+from ._pieces import FLIGHT as FLIGHT, IMPACT as IMPACT
+from ._predict import runge_kutta as runge_kutta
+from ._problem import (
+    parameter_places as parameter_places,
+    Problem as Problem,
+    Weights as Weights,
+)
+from ._sharpness import loosened as loosened

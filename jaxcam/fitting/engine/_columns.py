@@ -1,0 +1,162 @@
+"""The free numbers of a fit: where they are, what is known of them, their equations."""
+
+import dataclasses
+from collections.abc import Iterable
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float, Int
+
+from ._eliminate import eliminate_states, LEAST
+from ._linearise import Blocks, Point
+from ._parameter import Parameter
+from ._problem import Problem
+from ._sharpness import width_of
+
+
+@dataclasses.dataclass(frozen=True)
+class Columns:
+    """The free numbers: which parameter each is, and of which record (-1: of all).
+
+    `local` `(r, m)`: which parameter each column of a record's equations is;
+    `place` `(r, m)`: where it is among the free numbers, -1 where it fills up.
+    """
+
+    parameter: Int[np.ndarray, " g"]
+    record: Int[np.ndarray, " g"]
+    local: Int[np.ndarray, "r m"]
+    place: Int[np.ndarray, "r m"]
+    scale: Float[np.ndarray, " g"]
+
+    @property
+    def scales(self) -> Float[np.ndarray, "r m"]:
+        padded = np.append(self.scale, 0.0)
+        return padded[self.place]
+
+
+def free_columns(problem: Problem, free: Iterable[str] | None) -> Columns:
+    """Which numbers of a problem are free, by the names of parameters (`None`: all).
+
+    **Raises:** `ValueError` for an unknown name.
+    """
+    wanted = problem.names if free is None else tuple(free)
+    for name in wanted:
+        problem.parameter(name)
+    records = len(problem.segments)
+    picked = [k for k, p in enumerate(problem.parameters) if p.name in wanted]
+    parameter, record, scale = [], [], []
+    # as wide for any choice of them, which is one program then
+    place = -np.ones((records, width_of(len(problem.names))), dtype=int)
+    local = np.zeros_like(place)
+    for column, k in enumerate(picked):
+        one = problem.parameters[k]
+        size = one.size(_nominal(problem, k))
+        local[:, column] = k
+        for r in range(records if one.per_record else 1):
+            parameter.append(k)
+            record.append(r if one.per_record else -1)
+            scale.append(size)
+            rows = r if one.per_record else slice(None)
+            place[rows, column] = len(parameter) - 1
+    return Columns(
+        np.array(parameter, dtype=int),
+        np.array(record, dtype=int),
+        local,
+        place,
+        np.array(scale, dtype=float),
+    )
+
+
+def reduced(columns: Columns, blocks: Blocks):
+    """Information and score of the free numbers, in units of their scales."""
+    return gathered(columns, eliminate_states(blocks))
+
+
+def held_firmer(columns: Columns, blocks: Blocks):
+    """`reduced` information where the states are held a hundred times as firmly.
+
+    What grows with it is no information of the data.
+    """
+    return gathered(columns, eliminate_states(blocks, jnp.asarray(100 * LEAST)))[0]
+
+
+def gathered(columns: Columns, found):
+    """Sums over the records, each number in its place."""
+    size = len(columns.scale)
+    information, score = np.zeros((size + 1, size + 1)), np.zeros(size + 1)
+    for r, place in enumerate(columns.place):
+        np.add.at(information, np.ix_(place, place), np.asarray(found.information[r]))
+        np.add.at(score, place, np.asarray(found.score[r]))
+    return information[:size, :size], score[:size]
+
+
+def invert_information(
+    information: Float[np.ndarray, "g g"],
+) -> Float[np.ndarray, "g g"]:
+    """Inverse of a positive semidefinite information matrix, shape `(g, g)`.
+
+    It is scaled to a unit diagonal and inverted by its eigenvalues, none of which is
+    less than rounding makes it. What cannot be seen (a zero on the diagonal) gets an
+    infinite variance.
+
+    **Raises:** `ValueError` where it is not finite, as that of a model with NaN.
+    """
+    if not np.all(np.isfinite(information)):
+        raise ValueError(
+            "The sensitivities of the model to its parameters are not finite; check "
+            "its vector field, gap and impact at the fitted states for NaN."
+        )
+    diagonal = np.diag(information)
+    dead = ~(diagonal > 0)
+    scale = np.where(dead, 1.0, np.sqrt(np.where(dead, 1.0, diagonal)))
+    values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
+    least = (
+        np.finfo(float).eps
+        * max(1, len(values))
+        * max(np.max(values, initial=0), 1e-300)
+    )
+    inverse = (vectors / np.maximum(values, least)) @ vectors.T
+    inverse = inverse / np.outer(scale, scale)
+    inverse[dead, dead] = np.inf
+    return inverse
+
+
+def off_nominal(problem: Problem, columns: Columns, point: Point):
+    """Distance of each free number from its nominal value, in scales, shape `(g,)`."""
+    values = np.asarray(point.values)
+    now = values[np.maximum(columns.record, 0), columns.parameter]
+    nominal = np.array([_nominal(problem, p) for p in columns.parameter])
+    return (now - nominal) / columns.scale
+
+
+def _nominal(problem: Problem, place: int) -> float:
+    parameter: Parameter = problem.parameters[place]
+    if parameter.nominal is not None:
+        return parameter.nominal
+    return float(problem.start.values[0, place])
+
+
+def prior_information(problem: Problem, columns: Columns, prior: bool):
+    """Information of the tolerances, `(scale / stderr)^2`, shape `(g,)`.
+
+    Zero with `prior=False`, and for a parameter of which nothing is known beforehand.
+    """
+    stderr = np.array([problem.parameters[p].prior_stderr for p in columns.parameter])
+    return (columns.scale / stderr) ** 2 if prior else np.zeros(len(columns.scale))
+
+
+def prior_cost(problem: Problem, columns: Columns, point: Point, prior: bool) -> float:
+    """Squared distance of the free numbers from what was known of them."""
+    if not prior or not len(columns.scale):
+        return 0.0
+    off = off_nominal(problem, columns, point)
+    return float(np.sum(prior_information(problem, columns, True) * off**2))
+
+
+def inside(problem: Problem, columns: Columns, point: Point) -> Point:
+    """The point, moved inside the bounds of the free parameters."""
+    values = np.array(point.values)
+    for p in set(columns.parameter.tolist()):
+        one = problem.parameters[p]
+        values[:, p] = np.clip(values[:, p], one.lower, one.upper)
+    return point._replace(values=jnp.asarray(values))

@@ -1,0 +1,69 @@
+"""One damped step of scoring, within the bounds of the parameters."""
+
+import jax.numpy as jnp
+import numpy as np
+
+from ._columns import gathered, off_nominal, prior_information
+from ._eliminate import eliminate_states, state_steps
+from ._linearise import Blocks, Point
+
+
+def damped_step(problem, columns, blocks, point, damping, prior):
+    """One damped step, within the bounds; and by how much it should lower the cost."""
+    found = eliminate_states(blocks)
+    size = len(columns.scale)
+    information, score = gathered(columns, found)
+    strength = prior_information(problem, columns, prior)
+    information = information + np.diag(strength)
+    if size:
+        score = score - strength * off_nominal(problem, columns, point)
+    change = _bounded(problem, columns, point, information, score, damping)
+    filled = np.append(change, 0.0)[columns.place]
+    states = state_steps(found, jnp.asarray(filled))
+    values = np.array(point.values)
+    for r, (place, local) in enumerate(zip(columns.place, columns.local)):
+        used = place >= 0
+        values[r, local[used]] += change[place[used]] * columns.scale[place[used]]
+    # what the quadratic model of the cost says of the whole step
+    gain = float(change @ score) + _state_gain(blocks, found)
+    moved = Point(jnp.asarray(values), point.states + states)
+    return moved, gain
+
+
+def _state_gain(blocks: Blocks, found) -> float:
+    """What the states alone would gain: scores times steps at unchanged parameters."""
+    none = jnp.zeros((found.score.shape[0], found.score.shape[1]))
+    return float(jnp.sum(blocks.s * state_steps(found, none)))
+
+
+def _bounded(problem, columns, point, information, score, damping):
+    """Newton's step with the numbers that press against a bound held at it."""
+    size = len(columns.scale)
+    change = np.zeros(size)
+    if not size:
+        return change
+    values = np.asarray(point.values)
+    now = values[np.maximum(columns.record, 0), columns.parameter]
+    low = np.array([problem.parameters[p].lower for p in columns.parameter])
+    high = np.array([problem.parameters[p].upper for p in columns.parameter])
+    low, high = (low - now) / columns.scale, (high - now) / columns.scale
+    held = np.zeros(size, dtype=bool)
+    damped = information + damping * np.eye(size)
+    if not (np.all(np.isfinite(damped)) and np.all(np.isfinite(score))):
+        return np.full(size, np.nan)
+    for _ in range(size):
+        open_ = ~held
+        if not np.any(open_):
+            break
+        right = score[open_] - damped[np.ix_(open_, held)] @ change[held]
+        try:
+            change[open_] = np.linalg.solve(damped[np.ix_(open_, open_)], right)
+        except np.linalg.LinAlgError:
+            # singular to rounding: more damping is asked for
+            return np.full(size, np.nan)
+        beyond = open_ & ((change < low) | (change > high))
+        if not np.any(beyond):
+            break
+        change = np.clip(change, low, high)
+        held |= beyond
+    return np.clip(change, low, high)

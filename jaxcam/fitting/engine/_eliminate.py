@@ -1,0 +1,117 @@
+"""Solve the normal equations of a chain of pieces: first the states, then the rest.
+
+The states of a record couple to their neighbours alone, so that they are eliminated
+from the first to the last with matrices of the size of one state (block-tridiagonal
+elimination). What is left is the reduced information of the parameters, the Schur
+complement; the states follow backwards.
+"""
+
+from typing import NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ._linearise import Blocks
+
+
+# Part of its own information that keeps a state in place of which nothing is known
+LEAST = 1e-13
+
+
+class Reduced(NamedTuple):
+    """Information and score of the parameters, states eliminated, and how to go back.
+
+    For each record: `information` `(m, m)`, `score` `(m,)`; `gain` `(k, n, m + 1 + n)`
+    gives each state from the parameters, a constant, and the state after it.
+    """
+
+    information: Float[Array, "r m m"]
+    score: Float[Array, "r m"]
+    gain: Float[Array, "r k n c"]
+
+
+@eqx.filter_jit
+def eliminate_states(blocks: Blocks, least: float | Array = LEAST) -> Reduced:
+    """Eliminate the states of every record by a block-tridiagonal Schur complement.
+
+    **Arguments:** `least` is the part of its own information that holds a state.
+    """
+    return jax.vmap(lambda one: _eliminate(one, least))(blocks)
+
+
+@eqx.filter_jit
+def state_steps(reduced: Reduced, change: Float[Array, "r m"]) -> Float[Array, "r k n"]:
+    """Steps of the states that go with one of the parameters, in their scales."""
+
+    def record(gain, change):
+        size = gain.shape[-2]
+
+        def backwards(later, gain):
+            fixed = gain[:, : change.shape[0]] @ change + gain[:, change.shape[0]]
+            here = fixed + gain[:, change.shape[0] + 1 :] @ later
+            return here, here
+
+        return jax.lax.scan(backwards, jnp.zeros(size), gain, reverse=True)[1]
+
+    return jax.vmap(record)(reduced.gain, change)
+
+
+def _eliminate(blocks: Blocks, part):
+    size, width = blocks.sp.shape[1:]
+
+    def forwards(carry, inputs):
+        # what the pieces before say about this one's state, parameters and both
+        ss, sp, s, information, score = carry
+        here_ss, here_sp, here_s, after = inputs
+        # a state that nothing is known of does not move
+        diagonal = jnp.diagonal(here_ss)
+        least = jnp.where(diagonal > 0, part * diagonal, 1.0)
+        matrix = here_ss + ss + jnp.diag(least)
+        coupled = jnp.concatenate(
+            [here_sp + sp, -(here_s + s)[:, None], after.T], axis=1
+        )
+        solved = _solve(matrix, coupled)
+        by_p, by_one, by_next = (
+            solved[:, :width],
+            solved[:, width],
+            solved[:, width + 1 :],
+        )
+        information = information - (here_sp + sp).T @ by_p
+        score = score + (here_sp + sp).T @ by_one
+        carry = (
+            -after @ by_next,
+            -after @ by_p,
+            after @ by_one,
+            information,
+            score,
+        )
+        return carry, -solved
+
+    start = (
+        jnp.zeros((size, size)),
+        jnp.zeros((size, width)),
+        jnp.zeros(size),
+        blocks.pp,
+        blocks.p,
+    )
+    # the coupling belongs to the later piece; elimination needs it at the earlier one
+    after = jnp.concatenate([blocks.before[1:], jnp.zeros_like(blocks.before[:1])])
+    inputs = (blocks.ss, blocks.sp, blocks.s, after)
+    carry, gain = jax.lax.scan(forwards, start, inputs)
+    return Reduced(carry[3], carry[4], gain)
+
+
+def _solve(matrix, right):
+    """Positive definite, scaled to a unit diagonal: states differ by their units."""
+    scale = 1 / jnp.sqrt(jnp.diagonal(matrix))
+    scaled = matrix * jnp.outer(scale, scale)
+    if matrix.shape[0] == 2:
+        # a call into LAPACK for each would take longer than everything else
+        b = scaled[0, 1]
+        det = 1 - b * b
+        x, y = right[0] * scale[0], right[1] * scale[1]
+        return jnp.stack([(x - b * y) / det * scale[0], (y - b * x) / det * scale[1]])
+    factor = jax.scipy.linalg.cho_factor(scaled, lower=True)
+    return jax.scipy.linalg.cho_solve(factor, right * scale[:, None]) * scale[:, None]

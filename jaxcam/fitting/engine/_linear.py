@@ -1,0 +1,222 @@
+"""What each piece and joint of one record says, linear about a point."""
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ._likelihood import score_all
+from ._model import Model
+from ._pieces import FLIGHT, IMPACT, Pieces
+from ._predict import flight_joint, fly, impact_joint, rest, samples
+
+
+class Sharpness(NamedTuple):
+    """Standard errors of the joints of one record, and of the usual piece's state."""
+
+    flight: Float[Array, "k n"]
+    impact: Float[Array, "k n"]
+    gap: Float[Array, " k"]
+    piece: Float[Array, "k n"]
+
+
+class Extras(NamedTuple):
+    """What else a program needs: reference states of contact and the joints' errors.
+
+    `weight` `(r, k)` and `rest_weight` `(r, kc)` of the data of each piece.
+    """
+
+    guess: Float[Array, "r kc n"]
+    sharpness: Sharpness
+    weight: Float[Array, "r k"]
+    rest_weight: Float[Array, "r kc"]
+
+
+class LinearPieces(NamedTuple):
+    """Pieces and joints of one record, before anything is added up.
+
+    The first `n` of `a = n + m` columns are the state at the beginning of the piece,
+    the others what else varies.
+
+    - `information`, `slope`: of the samples of each piece in flight.
+    - `pp`, `p`: of all samples in contact, by what else varies.
+    - `later`, `earlier`, `direct`: rows of each joint for the state after it, for the
+        columns of the piece before it, and for what else varies, in units of the
+        joint's error. `tied`: how far the joint is off.
+    - `end`: the state at the end of each piece, by its columns.
+    """
+
+    information: Float[Array, "k a a"]
+    slope: Float[Array, "k a"]
+    pp: Float[Array, "m m"]
+    p: Float[Array, " m"]
+    later: Float[Array, "k e n"]
+    earlier: Float[Array, "k e a"]
+    direct: Float[Array, "k e m"]
+    tied: Float[Array, "k e"]
+    flown_cost: Float[Array, " k"]
+    joint_cost: Float[Array, " k"]
+    rested_cost: Float[Array, " kc"]
+
+
+def linear_pieces(
+    model_at: Callable[..., Model], pieces: Pieces, extras: Extras, states, width: int
+) -> LinearPieces:
+    """Linearise one record about its states.
+
+    **Arguments:** `model_at(change, start, step)` is the model of a piece that begins
+    at `start` and has steps of length `step`, where `change` `(m,)` is zero at the
+    point; `width` is m.
+    """
+    size = states.shape[-1]
+    origin = jnp.zeros(width)
+
+    def piece(state, start, step, *inputs):
+        def predicted(both):
+            model = model_at(both[size:], start, step)
+            end, seen = flown(model, both[:size], start, step, *inputs)
+            return (end, seen), (end, seen)
+
+        both = jnp.concatenate([state, origin])
+        (end_rows, rows), (end, seen) = jax.jacfwd(predicted, has_aux=True)(both)
+        return end_rows, rows, end, seen
+
+    end_rows, rows, end, seen = jax.vmap(piece)(states, *flight_inputs(pieces))
+    part = pieces.flown
+    sensors = tuple(model_at(origin, 0.0, 1.0).sensors.values())
+    found = score_all(sensors, part.value, seen)
+    weight = jnp.where(part.known, extras.weight[:, None, None, None], 0.0)
+    information = jnp.einsum(
+        "knmca,knmc,knmcb->kab", rows, weight * found.information, rows
+    )
+    slope = jnp.einsum("knmca,knmc->ka", rows, weight * found.score)
+    flown_cost = jnp.sum(jnp.where(part.known, found.cost, 0.0), axis=(1, 2, 3))
+
+    # contact depends on the parameters alone
+    def contact(guess, start, step, *inputs):
+        def predicted(change):
+            model = model_at(change, start, step)
+            seen = rested(model, guess, start, step, *inputs)
+            return seen, seen
+
+        return jax.jacfwd(predicted, has_aux=True)(origin)
+
+    rest_rows, rest_seen = jax.vmap(contact)(*rest_inputs(pieces, extras))
+    part = pieces.rested
+    found = score_all(sensors, part.value, rest_seen)
+    weight = jnp.where(part.known, extras.rest_weight[:, None, None, None], 0.0)
+    # where the surface cannot be found, nothing can be learnt from it
+    rest_rows = jnp.where(part.known[..., None], rest_rows, 0.0)
+    pp = jnp.einsum(
+        "knmca,knmc,knmcb->ab", rest_rows, weight * found.information, rest_rows
+    )
+    p = jnp.einsum(
+        "knmca,knmc->a", rest_rows, weight * jnp.where(part.known, found.score, 0.0)
+    )
+    rested_cost = jnp.sum(jnp.where(part.known, found.cost, 0.0), axis=(1, 2, 3))
+
+    # rows for the earlier state, the later state and what else varies
+    def joint_of(before, state, t, *inputs):
+        def off(all_):
+            model = model_at(all_[2 * size :], t, jnp.ones_like(t))
+            found = joint(
+                model, pieces.reach, all_[:size], all_[size : 2 * size], t, *inputs
+            )
+            return found, found
+
+        return jax.jacfwd(off, has_aux=True)(jnp.concatenate([before, state, origin]))
+
+    before = jnp.concatenate([states[:1], end[:-1]])
+    turned = jnp.concatenate([jnp.zeros_like(end_rows[:1]), end_rows[:-1]])
+    joint_rows, off = jax.vmap(joint_of)(before, states, *joint_inputs(pieces))
+    joint_rows = joint_rows * strength(extras.sharpness, pieces.joint)[..., None]
+    shared = jnp.sqrt(jnp.minimum(extras.weight, _previous(extras.weight)))[:, None]
+    earlier, later, direct = (
+        rows * shared[..., None]
+        for rows in (
+            jnp.einsum("kei,kia->kea", joint_rows[..., :size], turned),
+            joint_rows[..., size : 2 * size],
+            joint_rows[..., 2 * size :],
+        )
+    )
+    missed = tied(off, extras.sharpness, pieces.joint)
+    joint_cost = jnp.sum(missed**2, axis=-1)
+    return LinearPieces(
+        information,
+        slope,
+        pp,
+        p,
+        later,
+        earlier,
+        direct,
+        missed * shared,
+        flown_cost,
+        joint_cost,
+        rested_cost,
+    )
+
+
+def flown(model: Model, state, start, step, angle, rate, place):
+    end, nodes = fly(model, state, start, step, angle, rate)
+    return end, samples(model, nodes, step, place)
+
+
+def rested(model: Model, guess, start, step, angle, rate, place):
+    return samples(model, rest(model, guess, start, step, angle, rate), step, place)
+
+
+def flight_inputs(pieces: Pieces):
+    part = pieces.flown
+    return part.start, part.step, pieces.angle, pieces.rate, part.place
+
+
+def rest_inputs(pieces: Pieces, extras: Extras):
+    part = pieces.rested
+    return (
+        extras.guess,
+        part.start,
+        part.step,
+        pieces.rest_angle,
+        pieces.rest_rate,
+        part.place,
+    )
+
+
+def joint_inputs(pieces: Pieces):
+    return pieces.flown.start, pieces.angle_at, pieces.rate_at, pieces.joint
+
+
+def joint(model: Model, reach, before, state, t, angle, rate, kind):
+    """State and gap in one vector `(n + 1,)`, whichever kind of joint it is."""
+    inner = jnp.concatenate([*_flat(flight_joint(before, state))])
+    # where there is no impact the search for one must not spoil the derivatives
+    hit = kind == IMPACT
+    found = impact_joint(model, before, state, t, angle, rate, reach)
+    outer = jnp.concatenate([*_flat(found)])
+    return jnp.where(hit, outer, jnp.where(kind == FLIGHT, inner, 0.0))
+
+
+def _flat(joint):
+    return joint.state, joint.gap[None]
+
+
+def strength(sharpness: Sharpness, kind):
+    """One over the error of each part of a joint, zero where there is none."""
+    error = jnp.concatenate([sharpness.impact, sharpness.gap[..., None]], axis=-1)
+    flight = jnp.concatenate(
+        [sharpness.flight, jnp.full_like(sharpness.gap[..., None], jnp.inf)], axis=-1
+    )
+    kind = kind[..., None]
+    return jnp.where(
+        kind == IMPACT, 1 / error, jnp.where(kind == FLIGHT, 1 / flight, 0.0)
+    )
+
+
+def tied(off, sharpness, kind) -> Any:
+    return off * strength(sharpness, kind)
+
+
+def _previous(array):
+    return jnp.concatenate([array[:1], array[:-1]])

@@ -1,0 +1,174 @@
+"""Scores and information of every piece and joint about a point."""
+
+from typing import NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float, Int
+
+from ._each_record import each_record
+from ._likelihood import score_all
+from ._linear import (
+    Extras,
+    flight_inputs,
+    flown,
+    joint,
+    joint_inputs,
+    linear_pieces,
+    LinearPieces,
+    rest_inputs,
+    rested,
+    tied,
+)
+from ._model import Model
+from ._pieces import Pieces
+
+
+class Point(NamedTuple):
+    """What varies: values `(r, q)` of the parameters of each record, in their units,
+    and the state `(r, k, n)` at the beginning of each piece."""
+
+    values: Float[Array, "r q"]
+    states: Float[Array, "r k n"]
+
+
+class Layout(eqx.Module):
+    """Where the parameters are in a model: its leaves, and which of them are fitted."""
+
+    model: Model
+    places: tuple[int, ...] = eqx.field(static=True)
+
+    def at(self, values: Float[Array, " q"]) -> Model:
+        """The model with the parameters at some values."""
+        leaves, tree = jax.tree.flatten(self.model)
+        for column, place in enumerate(self.places):
+            leaves[place] = values[column]
+        return jax.tree.unflatten(tree, leaves)
+
+
+class Blocks(NamedTuple):
+    """Normal equations of the pieces of one record: information and score.
+
+    `ss, sp, s` of each piece's state; `pp, p` of the parameters, over all pieces and
+    joints; `before` couples the state of a piece to that of the one before it.
+    """
+
+    ss: Float[Array, "k n n"]
+    sp: Float[Array, "k n m"]
+    s: Float[Array, "k n"]
+    before: Float[Array, "k n n"]
+    pp: Float[Array, "m m"]
+    p: Float[Array, " m"]
+
+
+class Costs(NamedTuple):
+    """Minus twice the log-likelihood of each piece, by what it is made of."""
+
+    flown: Float[Array, "r k"]
+    joints: Float[Array, "r k"]
+    rested: Float[Array, "r kc"]
+
+
+def assemble(
+    layout: Layout,
+    pieces: Pieces,
+    extras: Extras,
+    point: Point,
+    columns: Int[Array, "r m"],
+    scales: Float[Array, "r m"],
+) -> tuple[Blocks, Costs]:
+    """Linearise about a point; records are shared out to the cores.
+
+    **Arguments:** `columns` of the parameters that are free in each record and the
+    `scales` that the normal equations are in; a scale of zero fills up the width.
+    """
+
+    def record(row):
+        row = jnp.asarray(row)
+        return assemble_one(layout, pieces, extras, point, columns, scales, row)
+
+    return each_record(record, columns.shape[0])
+
+
+@eqx.filter_jit
+def assemble_one(layout, pieces, extras, point, columns, scales, row):
+    """`assemble` of one record: its number is not part of the program."""
+    one = pieces, extras, point.values, point.states, columns, scales
+    return _record(layout, *jax.tree.map(lambda leaf: leaf[row], one))
+
+
+@eqx.filter_jit
+def predict(layout: Layout, pieces: Pieces, extras: Extras, point: Point):
+    """Predicted samples in flight and in contact, and the joints, of all records."""
+
+    def record(pieces, extras, values, states):
+        model = layout.at(values)
+        end, seen = jax.vmap(lambda *a: flown(model, *a))(
+            states, *flight_inputs(pieces)
+        )
+        resting = jax.vmap(lambda *a: rested(model, *a))(*rest_inputs(pieces, extras))
+        before = jnp.concatenate([states[:1], end[:-1]])
+        joints = jax.vmap(lambda *a: joint(model, pieces.reach, *a))(
+            before, states, *joint_inputs(pieces)
+        )
+        return seen, resting, joints
+
+    return jax.vmap(record)(pieces, extras, *point)
+
+
+@eqx.filter_jit
+def cost_of(layout: Layout, pieces: Pieces, extras: Extras, point: Point) -> Costs:
+    """Costs without derivatives; can be differentiated in reverse mode."""
+    seen, resting, off = predict(layout, pieces, extras, point)
+    sensors = tuple(layout.model.sensors.values())
+
+    def total(part, predicted):
+        found = score_all(sensors, part.value, predicted)
+        return jnp.sum(jnp.where(part.known, found.cost, 0.0), axis=(-3, -2, -1))
+
+    missed = tied(off, extras.sharpness, pieces.joint)
+    return Costs(
+        total(pieces.flown, seen),
+        jnp.sum(missed**2, axis=-1),
+        total(pieces.rested, resting),
+    )
+
+
+def _record(layout, pieces: Pieces, extras, values, states, columns, scales):
+    def model_at(change, start, step):
+        del start, step
+        return layout.at(values.at[columns].add(change * scales))
+
+    found = linear_pieces(model_at, pieces, extras, states, columns.shape[0])
+    costs = Costs(found.flown_cost, found.joint_cost, found.rested_cost)
+    return chained(found), costs
+
+
+def chained(found: LinearPieces) -> Blocks:
+    """Normal equations of one record: its pieces and their joints added up."""
+    size = found.later.shape[-1]
+    information, later = found.information, found.later
+    earlier, params = (
+        found.earlier[..., :size],
+        found.direct + found.earlier[..., size:],
+    )
+
+    def into_previous(array):
+        return jnp.concatenate([array[1:], jnp.zeros_like(array[:1])])
+
+    def product(a, b):
+        return jnp.einsum("kea,keb->kab", a, b)
+
+    def times(a):
+        return -jnp.einsum("kea,ke->ka", a, found.tied)
+
+    ss = information[:, :size, :size] + product(later, later)
+    ss = ss + into_previous(product(earlier, earlier))
+    sp = information[:, :size, size:] + product(later, params)
+    sp = sp + into_previous(product(earlier, params))
+    s = found.slope[:, :size] + times(later) + into_previous(times(earlier))
+    inner = information[:, size:, size:] + product(params, params)
+    pp = found.pp + jnp.sum(inner, axis=0)
+    p = found.p + jnp.sum(found.slope[:, size:] + times(params), axis=0)
+    return Blocks(ss, sp, s, product(later, earlier), pp, p)

@@ -1,0 +1,138 @@
+"""States of single pieces by the model's own least squares, from several starts."""
+
+from collections.abc import Sequence
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from ._linear import Extras, flight_inputs, flown
+from ._linearise import Layout, Point
+from ._model import filtered_channels
+from ._pieces import FLIGHT, IMPACT, Pieces
+from ._sharpness import states_only
+
+
+# Directions of a state that its samples see less than this part of the best one stay
+_BLIND = 1e-10
+# Samples of a piece that show its curvature well enough
+_FEW = 24
+# Cost of a sample above which a start is no start: three times the noise
+_FAR = 9.0
+# Damped steps from each start
+_STEPS = 12
+_FIRST_DAMPING, _LEAST_DAMPING = 1e-3, 1e-9
+
+
+def own_states(
+    layout: Layout,
+    pieces: Pieces,
+    extras: Extras,
+    point: Point,
+    others: Sequence[Float[Array, "r k n"]] = (),
+) -> Point:
+    """States of pieces that polynomials do not tell, by the model.
+
+    Few samples do not show the curvature of a flight, and with a wrong velocity it
+    never meets the flight before it: one step of Gauss and Newton without joints.
+    Where the model stays far from the samples, as where they are few to a period,
+    damped steps from several starts: the point, `others`, and what the model makes of
+    the pieces before and after. The one that fits best is kept, piece by piece.
+    """
+    alone = eqx.tree_at(lambda p: p.joint, pieces, jnp.zeros_like(pieces.joint))
+    count = np.asarray(jnp.sum(pieces.flown.known, axis=(-3, -2, -1)))
+    blocks, costs = states_only(layout, alone, extras, point)
+    before = np.asarray(costs.flown)
+    step = _step(blocks, 0.0)
+    moved = Point(point.values, point.states + step)
+    _, costs = states_only(layout, alone, extras, moved)
+    after = np.asarray(costs.flown)
+    better = (count < _FEW) & (after < before)
+    states = np.where(better[..., None], moved.states, point.states)
+    cost = np.where(better, after, before)
+
+    def far():
+        # a cost that is no number is far as well
+        return np.asarray(pieces.exists) & (count > 0) & ~(cost <= _FAR * count)
+
+    def offer(start):
+        nonlocal states, cost
+        found, reached = _descended(layout, alone, extras, point, start)
+        wins = far() & (reached < np.where(np.isfinite(cost), cost, np.inf))
+        states = np.where(wins[..., None], found, states)
+        cost = np.where(wins, reached, cost)
+
+    for start in (states, *others):
+        if np.any(far()):
+            offer(start)
+    joint = np.asarray(pieces.joint)
+    for _ in range(2):
+        if not np.any(far()):
+            break
+        here = Point(point.values, jnp.asarray(states))
+        ends, landed = (np.asarray(x) for x in _ends(layout, pieces, here))
+        follows = np.where((joint == IMPACT)[..., None], landed, ends)
+        follows = np.concatenate([states[:, :1], follows[:, :-1]], axis=1)
+        tied = ((joint == FLIGHT) | (joint == IMPACT))[..., None]
+        offer(np.where(tied & np.isfinite(follows), follows, states))
+    return Point(point.values, jnp.asarray(states))
+
+
+def _descended(layout, alone, extras, point, start):
+    """Damped Gauss-Newton of every piece by itself: the states and their costs."""
+    start = np.where(np.isfinite(start), start, 0.0)
+    states = jnp.asarray(start)
+    blocks, costs = states_only(layout, alone, extras, Point(point.values, states))
+    cost = jnp.where(jnp.isfinite(costs.flown), costs.flown, jnp.inf)
+    damping = jnp.full(cost.shape, _FIRST_DAMPING)
+    for _ in range(_STEPS):
+        moved = states + _step(blocks, damping)
+        tried, costs = states_only(layout, alone, extras, Point(point.values, moved))
+        better = costs.flown < cost
+        states = jnp.where(better[..., None], moved, states)
+        cost = jnp.where(better, costs.flown, cost)
+        blocks = blocks._replace(
+            ss=jnp.where(better[..., None, None], tried.ss, blocks.ss),
+            s=jnp.where(better[..., None], tried.s, blocks.s),
+        )
+        damping = jnp.where(better, damping / 10, damping * 10)
+        damping = jnp.maximum(damping, _LEAST_DAMPING)
+    return np.asarray(states), np.asarray(cost)
+
+
+def _step(blocks, damping):
+    """Gauss-Newton steps of the states, in units of what the samples see of each."""
+    known = jnp.diagonal(blocks.ss, axis1=-2, axis2=-1)
+    unit = jnp.where(known > 0, 1 / jnp.sqrt(jnp.where(known > 0, known, 1.0)), 0.0)
+    scaled = blocks.ss * unit[..., :, None] * unit[..., None, :]
+    identity = jnp.broadcast_to(jnp.eye(scaled.shape[-1]), scaled.shape)
+    damping = jnp.broadcast_to(jnp.asarray(damping), known.shape[:-1])
+    scaled = jnp.nan_to_num(scaled + damping[..., None, None] * identity)
+    inverse = jnp.linalg.pinv(scaled, rtol=_BLIND)
+    return unit * jnp.einsum("rkab,rkb->rka", inverse, jnp.nan_to_num(unit * blocks.s))
+
+
+@eqx.filter_jit
+def _ends(layout: Layout, pieces: Pieces, point: Point):
+    """Each piece's state at its end, and that state after an impact there."""
+
+    def one(values, states, pieces):
+        model = layout.at(values)
+        size = states.shape[-1] - len(filtered_channels(model))
+        ends, _ = jax.vmap(lambda *a: flown(model, *a))(states, *flight_inputs(pieces))
+        part = pieces.flown
+        times = part.start + part.step * part.place.shape[-2]
+
+        def landed(t, x, angle, rate):
+            system = model.driven(t, angle, rate)
+            after = system.impact(t, x[:size])
+            if after.ndim == 2:
+                after = after[jnp.argmin(system.gap(t, x[:size]))]
+            return jnp.concatenate([after, x[size:]])
+
+        hit = jax.vmap(landed)(times, ends, pieces.angle[:, -1], pieces.rate[:, -1])
+        return ends, hit
+
+    return jax.vmap(one)(point.values, point.states, pieces)

@@ -1,0 +1,56 @@
+"""How long a piece of a flight may be: half an oscillation of what it shows."""
+
+import numpy as np
+from jaxtyping import Float
+
+
+# Shorter pieces would hardly tell their own initial states
+_SHORTEST = 12
+# A cubic must leave less than this part of what a straight line leaves: a sine passes
+# up to about half of its period
+_PART = 0.05
+# Residuals up to so many times the noise are noise, whatever the curvature
+_NOISE = 2.0
+# Part of the windows of a flight that must pass
+_MOST = 0.75
+
+
+def bearable_length(
+    samples: Float[np.ndarray, " k"], noise: float, longest: int
+) -> int:
+    """Longest piece of a flight that a cubic follows, in samples.
+
+    The state at the beginning of a piece is found from a polynomial through it, and a
+    prediction over more than half a period has more than one optimum in the frequency.
+    Tried are `longest` and shorter lengths by factors of about 0.7.
+
+    **Arguments:** samples of one flight, their noise, and the most samples of a piece.
+    """
+    values = np.asarray(samples, dtype=float)
+    values = values[np.isfinite(values)]
+    length = longest
+    while length > _SHORTEST and not _followed(values, noise, length):
+        length = max(_SHORTEST, round(0.7 * length))
+    return length
+
+
+def _followed(values, noise: float, length: int) -> bool:
+    """Whether cubics follow most windows of this length."""
+    length = min(length, len(values))
+    if length < _SHORTEST:
+        return True
+    count = len(values) // length
+    windows = values[: count * length].reshape(count, length)
+    if len(values) % length:
+        windows = np.concatenate([windows, values[None, -length:]])
+    line, cubic = (_left_over(windows, degree) for degree in (1, 3))
+    return bool(np.mean(cubic < np.maximum(_NOISE * noise, _PART * line)) >= _MOST)
+
+
+def _left_over(windows, degree: int):
+    """Rms of what a polynomial leaves of each window, `(w,)`."""
+    length = windows.shape[1]
+    place = np.linspace(-1.0, 1.0, length)
+    basis, _ = np.linalg.qr(place[:, None] ** np.arange(degree + 1))
+    off = windows - (windows @ basis) @ basis.T
+    return np.sqrt(np.sum(off**2, axis=1) / (length - degree - 1))

@@ -1,0 +1,285 @@
+"""Recordings cut into short pieces, as arrays for a compiled program."""
+
+import dataclasses
+from collections.abc import Sequence
+from typing import TypeAlias
+
+import equinox as eqx
+import numpy as np
+from jaxtyping import Array, Bool, Float, Int
+from scipy.signal import savgol_coeffs
+
+from ...recordings import RecordingError, Segments
+from ._piece_length import bearable_length
+
+
+# A piece has at most so many samples: long enough for its own initial state, short
+# beside the time over which impacts magnify an error
+_PIECE = 100
+# A flight with fewer samples than this tells nothing by itself; between two impacts, so
+# few show its velocity, and it ties the flights before and after it
+_LEAST, _TIED = 8, 3
+# what precedes a piece
+FREE, FLIGHT, IMPACT = 0, 1, 2
+# Half-width (samples) of the search for the time of an impact about the recorded one
+_REACH = 20.0
+
+
+# numpy while it is put together, JAX in the programs
+Numbers: TypeAlias = Array | np.ndarray
+
+
+class Samples(eqx.Module):
+    """Samples of `k` pieces of each of `r` records, sorted into steps.
+
+    Every piece is `n` steps of equal length; a step holds up to `m` samples of `c`
+    channels. `place` is where in its step (0 to 1) a sample is.
+    """
+
+    start: Float[Numbers, "r k"]
+    step: Float[Numbers, "r k"]
+    place: Float[Numbers, "r k n m"]
+    value: Float[Numbers, "r k n m c"]
+    known: Bool[Numbers, "r k n m c"]
+
+
+class Pieces(eqx.Module):
+    """Everything of some records that a fit needs.
+
+    - `flown`, `rested`: samples in flight and in contact.
+    - `joint`: what comes before each piece of flight: nothing, flight, or an impact.
+    - `exists`: false where padded. `angle`, `rate` `(r, k, n)`: the drive in the middle
+        of each step; `angle_at`, `rate_at` `(r, k)`: at the beginning of each piece.
+        Of a measured input, `angle` is the level and `rate` is zero.
+    - `rest_angle`, `rest_rate` `(r, kc, n + 1)`: the drive at each node of contact.
+    - `reach`: how far (s) an impact may be from its recorded time.
+    - `drive_error`: standard errors of angle and rate of the drive, per record.
+    """
+
+    flown: Samples
+    rested: Samples
+    joint: Int[Numbers, "r k"]
+    exists: Bool[Numbers, "r k"]
+    rest_exists: Bool[Numbers, "r kc"]
+    angle: Float[Numbers, "r k n"]
+    rate: Float[Numbers, "r k n"]
+    angle_at: Float[Numbers, "r k"]
+    rate_at: Float[Numbers, "r k"]
+    rest_angle: Float[Numbers, "r kc n1"]
+    rest_rate: Float[Numbers, "r kc n1"]
+    reach: Float[Numbers, " r"]
+    drive_error: Float[Numbers, "r 2"]
+
+
+@dataclasses.dataclass(frozen=True)
+class Span:
+    """One piece: from when to when, which samples, and what came before it."""
+
+    start: float
+    stop: float
+    rows: Int[np.ndarray, " k"]
+    joint: int
+    flight: int
+
+
+def spans(
+    segments: Segments, by_curvature: bool = True
+) -> tuple[list[Span], list[Span]]:
+    """The pieces of flight and of contact of one record.
+
+    **Arguments:** `by_curvature` makes pieces of an oscillation shorter.
+    """
+    record = segments.recording
+    time, interval = record.time, record.interval
+    valid = ~np.asarray(record.meta.get("filled", np.zeros(len(time), bool)))
+    flown: list[Span] = []
+    before = None
+    for number, flight in enumerate(segments.flights):
+        begin, end = flight.start.time, flight.stop.time
+        if flight.start.kind == "end of record":
+            begin = float(time[flight.first])
+        first, last = (_margin(edge, interval) for edge in (flight.start, flight.stop))
+        rows = np.arange(max(0, flight.first - 1), min(len(time), flight.last + 1))
+        rows = rows[(time[rows] >= begin + first) & (time[rows] <= end - last)]
+        joined = _sharp(flight.start, interval) and before is flight.start
+        between = joined and _sharp(flight.stop, interval)
+        if np.sum(valid[rows]) < (_TIED if between else _LEAST):
+            before = None
+            continue
+        longest = _PIECE
+        if by_curvature:
+            samples = record[segments.channel][rows[valid[rows]]]
+            longest = bearable_length(samples, segments.noise, _PIECE)
+        count = -(-round((end - begin) / interval) // longest)
+        edges = np.linspace(begin, end, max(1, count) + 1)
+        where = np.clip(np.searchsorted(edges, time[rows], "right") - 1, 0, count - 1)
+        for k, (a, b) in enumerate(zip(edges, edges[1:])):
+            joint = FLIGHT if k else IMPACT if joined else FREE
+            inside = rows[where == k]
+            flown.append(Span(a, b, inside[valid[inside]], joint, number))
+        before = flight.stop
+    rested = []
+    for number, contact in enumerate(segments.contacts):
+        rows = np.flatnonzero(segments.resting(contact) & valid)
+        # by time: where little of a contact is beyond doubt, samples lie far apart
+        whole = np.arange(rows[0], rows[-1] + 1) if len(rows) else rows
+        for stretch in np.array_split(whole, max(1, -(-len(whole) // _PIECE))):
+            block = np.intersect1d(stretch, rows, assume_unique=True)
+            if len(block):
+                a, b = float(time[block[0]]), float(time[block[-1]])
+                rested.append(Span(a, max(b, a + interval), block, FREE, number))
+    return flown, rested
+
+
+def _sharp(edge, interval: float) -> bool:
+    """Whether a boundary is an impact whose time is known well enough to join there."""
+    return edge.kind == "impact" and bool(edge.stderr < 2 * interval)
+
+
+def _margin(edge, interval: float) -> float:
+    """Samples closer to a boundary than this may be on its other side."""
+    if edge.kind == "end of record":
+        return 0.0
+    error = edge.stderr if np.isfinite(edge.stderr) else interval
+    return interval / 2 + 2 * min(error, 2 * interval)
+
+
+def gather(
+    segments: Sequence[Segments],
+    channels: Sequence[str],
+    steps: int,
+    measured: str | None = None,
+) -> tuple[Pieces, list[tuple[list[Span], list[Span]]]]:
+    """Pieces of some records, padded so that similar records share a program.
+
+    **Arguments:** `measured` is the channel of an input, in the place of a drive.
+
+    **Raises:** `RecordingError` where there is nothing to fit.
+    """
+    # the curvature that a measured input makes is known
+    cuts = [spans(part, measured is None) for part in segments]
+    if not any(flown for flown, _ in cuts):
+        names = ", ".join(part.recording.name for part in segments)
+        raise RecordingError(
+            f"{names}: there is no flight of {_LEAST} samples to be fitted; give a "
+            f"record in which the motion leaves the surface."
+        )
+    width = 64 * -(-max(len(flown) for flown, _ in cuts) // 64)
+    resting = 32 * -(-max(1, *(len(rested) for _, rested in cuts)) // 32)
+    most = max(_most_in_a_step(part, cut, steps) for part, cut in zip(segments, cuts))
+    both = [
+        [
+            _samples(part, cut[side], channels, size, steps, most)
+            for part, cut in zip(segments, cuts)
+        ]
+        for side, size in ((0, width), (1, resting))
+    ]
+    flown, rested = (
+        Samples(*(np.stack(column) for column in zip(*rows))) for rows in both
+    )
+    records = len(segments)
+    joint = np.zeros((records, width), dtype=int)
+    exists = np.zeros((records, width), dtype=bool)
+    rest_exists = np.zeros((records, resting), dtype=bool)
+    for row, (flights, contacts) in enumerate(cuts):
+        joint[row, : len(flights)] = [span.joint for span in flights]
+        exists[row, : len(flights)] = True
+        rest_exists[row, : len(contacts)] = True
+    middle = flown.start[..., None] + flown.step[..., None] * (np.arange(steps) + 0.5)
+    nodes = rested.start[..., None] + rested.step[..., None] * np.arange(steps + 1)
+    if measured is None:
+        angle, rate = _drive(segments, middle)
+        angle_at, rate_at = _drive(segments, flown.start)
+        rest_angle, rest_rate = _drive(segments, nodes)
+    else:
+        angle = _mean_input(segments, measured, flown, steps)
+        angle_at = _input(segments, measured, flown.start)
+        rest_angle = _input(segments, measured, nodes)
+        rate, rate_at, rest_rate = (
+            np.zeros(part.shape) for part in (angle, angle_at, rest_angle)
+        )
+    pieces = Pieces(
+        flown,
+        rested,
+        joint,
+        exists,
+        rest_exists,
+        angle,
+        rate,
+        angle_at,
+        rate_at,
+        rest_angle,
+        rest_rate,
+        np.array([_REACH * part.recording.interval for part in segments]),
+        np.array([_drive_error(part) for part in segments]),
+    )
+    return pieces, cuts
+
+
+def _most_in_a_step(part: Segments, cut, steps: int) -> int:
+    length = max((s.stop - s.start for side in cut for s in side), default=0.0)
+    return int(np.ceil(length / steps / part.recording.interval - 1e-9)) + 1
+
+
+def _samples(part: Segments, cut: list[Span], channels, size, steps, most):
+    time = part.recording.time
+    start, step = np.zeros(size), np.full(size, part.recording.interval)
+    shape = (size, steps, most)
+    place, value = np.zeros(shape), np.zeros((*shape, len(channels)))
+    known = np.zeros((*shape, len(channels)), dtype=bool)
+    columns = np.stack([part.recording[channel] for channel in channels], axis=-1)
+    for k, span in enumerate(cut):
+        start[k], step[k] = span.start, (span.stop - span.start) / steps
+        along = (time[span.rows] - span.start) / step[k]
+        bins = np.clip(along.astype(int), 0, steps - 1)
+        for b in np.unique(bins):
+            inside = np.flatnonzero(bins == b)
+            place[k, b, : len(inside)] = along[inside] - b
+            value[k, b, : len(inside)] = columns[span.rows[inside]]
+            known[k, b, : len(inside)] = np.isfinite(columns[span.rows[inside]])
+    return start, step, place, np.where(known, value, 0.0), known
+
+
+def _drive(segments, times):
+    """Angle and rate of each record's drive at some times, shape of `times`."""
+    angle, rate = np.zeros(times.shape), np.ones(times.shape)
+    for row, part in enumerate(segments):
+        if part.drive is not None:
+            time, at = part.recording.time, times[row]
+            angle[row] = np.interp(at, time, part.drive.angle)
+            rate[row] = np.interp(at, time, part.drive.rate)
+    return angle, rate
+
+
+def _input(segments, channel: str, times):
+    """Each record's input at some times, held since the last sample, in their shape."""
+    found = np.zeros(times.shape)
+    for row, part in enumerate(segments):
+        time = part.recording.time
+        last = np.searchsorted(time, times[row], side="right") - 1
+        found[row] = part.recording[channel][np.maximum(last, 0)]
+    return found
+
+
+def _mean_input(segments, channel: str, flown: Samples, steps: int):
+    """Mean of each record's input over every step, shape `(r, k, n)`."""
+    step = np.asarray(flown.step)[..., None]
+    edges = np.asarray(flown.start)[..., None] + step * np.arange(steps + 1)
+    found = np.zeros((*flown.start.shape, steps))
+    for row, part in enumerate(segments):
+        time, level = part.recording.time, part.recording[channel]
+        total = np.concatenate([[0.0], np.cumsum(level[:-1] * np.diff(time))])
+        found[row] = np.diff(np.interp(edges[row], time, total)) / step[row]
+    return found
+
+
+def _drive_error(part: Segments) -> tuple[float, float]:
+    """Standard errors of the smoothed angle and rate of a drive."""
+    if part.drive is None:
+        return 0.0, 0.0
+    interval = part.recording.interval
+    count = part.drive.window
+    smooth = savgol_coeffs(count, 2)
+    slope = savgol_coeffs(count, 2, deriv=1, delta=interval)
+    noise = part.drive.noise
+    return noise * float(np.linalg.norm(smooth)), noise * float(np.linalg.norm(slope))

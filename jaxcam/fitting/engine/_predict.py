@@ -1,0 +1,192 @@
+"""What a model says of one piece: its samples, its end, and its joint."""
+
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ...hybrid.runge_kutta import array_step, RK4
+from ._model import augmented_field, filtered_channels, Model
+
+
+# Steps of Newton's method
+_NEWTON = 4
+
+
+class Nodes(NamedTuple):
+    """Channels before gain, offset and lag, at both ends of each step.
+
+    `left`, `right` `(n, c)`, and their rates of change.
+    """
+
+    left: Float[Array, "n c"]
+    right: Float[Array, "n c"]
+    left_rate: Float[Array, "n c"]
+    right_rate: Float[Array, "n c"]
+
+
+def fly(model: Model, state, start, step, angle, rate):
+    """One piece of flight by classical Runge-Kutta.
+
+    **Returns:** the state at its end `(n,)`, and its `Nodes`.
+    """
+
+    def advance(x, inputs):
+        number, a, w = inputs
+        t0 = start + number * step
+        # the drive turns evenly within a step
+        system = model.driven(t0 + step / 2, a, w)
+        x1, k1 = runge_kutta(model, system, t0, x, step)
+        return x1, (x, k1)
+
+    numbers = jnp.arange(angle.shape[0], dtype=float)
+    end, (states, fields) = jax.lax.scan(advance, state, (numbers, angle, rate))
+    t1 = start + angle.shape[0] * step
+    last = augmented_field(
+        model, model.driven(t1 - step / 2, angle[-1], rate[-1]), t1, end
+    )
+    states = jnp.concatenate([states, end[None]])
+    fields = jnp.concatenate([fields, last[None]])
+    values, rates = jax.vmap(lambda x, f: _raw(model, x, f))(states, fields)
+    return end, Nodes(values[:-1], values[1:], rates[:-1], rates[1:])
+
+
+def runge_kutta(model: Model, system, t, x, h):
+    """One classical step of length `h`: the state after it, and the first slope."""
+
+    def field(t, x):
+        return augmented_field(model, system, t, x)
+
+    after, _, first = array_step(RK4, field, t, x, h)
+    return after, first
+
+
+def rest(model: Model, guess, start, step, angle, rate):
+    """`Nodes` of one piece of contact; `guess` `(n,)` is a state near the surface."""
+
+    def channel(t, a, w):
+        def at(time):
+            x = contact_state(model.driven(t, a, w), time, guess)
+            return jnp.stack([s.seen(x) for s in model.sensors.values()])
+
+        return jax.jvp(at, (t,), (jnp.ones_like(t),))
+
+    times = start + step * jnp.arange(angle.shape[0], dtype=float)
+    values, rates = jax.vmap(channel)(times, angle, rate)
+    return Nodes(values[:-1], values[1:], rates[:-1], rates[1:])
+
+
+def contact_state(system, t, guess):
+    """State with gap and normal velocity zero that is nearest to `guess`."""
+
+    def conditions(x):
+        def gap(t, x):
+            return _nearest(system, t, x)
+
+        value, speed = jax.jvp(
+            gap, (t, x), (jnp.ones_like(t), system.vector_field(t, x))
+        )
+        return jnp.stack([value, speed])
+
+    def newton(_, x):
+        jacobian = jax.jacfwd(conditions)(x)
+        (a, b), (_, d) = jacobian @ jacobian.T
+        c = conditions(x)
+        det = a * d - b * b
+        push = jnp.stack([d * c[0] - b * c[1], a * c[1] - b * c[0]]) / det
+        return x - jacobian.T @ push
+
+    return jax.lax.fori_loop(0, _NEWTON, newton, guess)
+
+
+def samples(model: Model, nodes: Nodes, step, place):
+    """Every channel at each sample, shape `(n, m, c)`, by cubic Hermite polynomials."""
+    u = place[..., None]
+    left, right = nodes.left[:, None], nodes.right[:, None]
+    a, b = step * nodes.left_rate[:, None], step * nodes.right_rate[:, None]
+    # value, slope and curvature with respect to the place in the step
+    jump = right - left
+    second = 3 * jump - 2 * a - b
+    third = a + b - 2 * jump
+    value = left + u * (a + u * (second + u * third))
+    slope = a + u * (2 * second + 3 * u * third)
+    bend = 2 * second + 6 * u * third
+    sensors = model.sensors.values()
+    lag = jnp.stack([s.lag for s in sensors]) / step
+    gain = jnp.stack([s.gain for s in sensors])
+    offset = jnp.stack([s.offset for s in sensors])
+
+    def sensed(value, slope, bend):
+        return offset + gain * (value - lag * slope + lag**2 / 2 * bend)
+
+    return jax.vmap(jax.vmap(sensed))(value, slope, bend)
+
+
+class Joint(NamedTuple):
+    """How far two pieces are from what the model makes of their joint.
+
+    `state` `(n,)`: the later piece less what follows from the earlier one. `gap`: at
+    the impact.
+    """
+
+    state: Float[Array, " n"]
+    gap: Float[Array, ""]
+
+
+def flight_joint(end, state) -> Joint:
+    """Between two pieces of the same flight."""
+    return Joint(state - end, jnp.zeros_like(end[0]))
+
+
+def impact_joint(model: Model, end, state, t, angle, rate, reach) -> Joint:
+    """Between two flights, at the instant at which they have the same gap.
+
+    Not a search for an event: both flights are known, and which impact joins them.
+    """
+    size = end.shape[0] - len(filtered_channels(model))
+    system = model.driven(t, angle, rate)
+
+    def move(x, shift):
+        return runge_kutta(model, system, t, x, shift)[0]
+
+    def gap(x, shift):
+        return _nearest(system, t + shift, move(x, shift)[:size])
+
+    def difference(shift):
+        return gap(state, shift) - gap(end, shift)
+
+    def newton(_, shift):
+        value, slope = jax.jvp(difference, (shift,), (jnp.ones_like(t),))
+        slope = jnp.where(slope == 0, jnp.inf, jax.lax.stop_gradient(slope))
+        return jnp.clip(shift - value / slope, -reach, reach)
+
+    # the last step, from a fixed start, carries the derivatives of the event
+    shift = jax.lax.fori_loop(0, _NEWTON - 1, newton, jnp.zeros_like(t))
+    shift = newton(0, jax.lax.stop_gradient(shift))
+    before, after = move(end, shift), move(state, shift)
+    landed = system.impact(t + shift, before[:size])
+    if landed.ndim == 2:
+        landed = landed[jnp.argmin(system.gap(t + shift, before[:size]))]
+    landed = jnp.concatenate([landed, before[size:]])
+    return Joint(after - landed, _nearest(system, t + shift, before[:size]))
+
+
+def _nearest(system, t, x):
+    return jnp.min(jnp.atleast_1d(system.gap(t, x)))
+
+
+def _raw(model: Model, state, field):
+    """Channels and their rates, before gain, offset and lag, shapes `(c,)`."""
+    lags = filtered_channels(model)
+    size = state.shape[0] - len(lags)
+    values, rates = [], []
+    for name, sensor in model.sensors.items():
+        if sensor.filtered:
+            place = size + lags.index(name)
+            value, slope = state[place], field[place]
+        else:
+            value, slope = jax.jvp(sensor.seen, (state[:size],), (field[:size],))
+        values.append(value)
+        rates.append(slope)
+    return jnp.stack(values), jnp.stack(rates)

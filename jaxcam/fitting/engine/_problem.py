@@ -1,0 +1,351 @@
+"""Recordings and a model, ready to be fitted: the engine's front door.
+
+**How it works.** A recording is cut (`jaxcam.recordings.segment`) into flights,
+contacts and impacts. Every flight is cut again into pieces of at most 100 samples and
+about half a period of what it shows. Each piece has an initial state of its own and is
+predicted from it alone, all pieces of all records side by side, so nothing is predicted
+over longer than it can be known; a chaotic record is as good as any other. Pieces are
+tied together by what the model says of their joints:
+
+- within a flight, a piece begins where the one before it ends;
+- at an impact, two flights meet at the instant at which their gaps agree (an event, not
+  a parameter: found by Newton and differentiated implicitly). There the gap must be
+  zero and the motion after be the impact law of the motion before;
+- contacts are predicted from the surface alone.
+
+A joint is as sharp as the drive is known, by its encoder. The initial states are
+eliminated exactly (they form a chain, hence block-tridiagonal normal equations); what
+remains are the normal equations of the few parameters. One iteration over six records
+of 4 s at 2 kHz with ten parameters takes about a tenth of a second.
+
+**Use.**
+
+```python
+model = Model(system, {"follower_angle_rad": Sensor(0, noise=8e-5)}, drive)
+parameters = [
+    Parameter("stiffness", lambda m: m.system.stiffness, tolerance=8.0),
+    Parameter("friction", lambda m: m.system.friction, lower=0.0),
+    Parameter("lag", lambda m: m.sensors["follower_angle_rad"].lag, per_record=True),
+]
+problem = Problem.build(model, segments, parameters)
+found = fit(problem)                                  # everything free
+null = fit(problem, free=["stiffness"])               # the others stay where they are
+again = fit(problem, start=null, weights=problem.only(problem.records[:4]))
+found["stiffness"].value, found["stiffness"].stderr, found.covariance, found.model(0)
+```
+
+**Many fits.** Parameters that are not free cost next to nothing and do not change the
+compiled program, as long as the number of free ones, rounded up to a multiple of four,
+is the same. So candidates for missing physics are best stated as terms of one system
+with strengths of zero, all in one problem, and freed by name. `linearise(problem, fit)`
+gives score and information of all parameters at once, free or not: what each candidate
+would gain is then linear algebra (`Linearised.gain`). `weights` (one a piece) leave
+records or blocks out without compiling anew; `held_out_cost(problem, found, weights)`
+is what a fit says of data it has not seen: the states of their pieces are fitted to
+them, the parameters are not.
+"""
+
+import dataclasses
+from collections.abc import Iterable, Sequence
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from ...recordings import RecordingError, Segments
+from ._linear import Extras
+from ._linearise import Layout, Point
+from ._model import augmented_field, Input, Model
+from ._own_states import own_states
+from ._parameter import Parameter
+from ._pieces import gather, Pieces, Span
+from ._predict import fly
+from ._sharpness import joint_sharpness
+from ._starts import suggested_starts
+
+
+# Steps of a piece to begin with, and at most
+_STEPS, _MOST_STEPS = 10, 160
+# Change (in units of the noise) that halving the steps may make
+_STEP_ERROR = 0.01
+# Pieces of a flight from which on that must be less, as errors add up along it
+_LONG = 16
+# Step over time constant of a filter: Hermite's error is then 1e-4 of a jump
+_FILTER_STEP = 0.4
+
+
+class Weights(eqx.Module):
+    """How much the data of each piece count: `(r, k)` in flight, `(r, kc)` at rest."""
+
+    flown: Float[np.ndarray, "r k"]
+    rested: Float[np.ndarray, "r kc"]
+
+
+@dataclasses.dataclass(frozen=True)
+class Problem:
+    """Recordings, a model, and the parameters of it that may be fitted.
+
+    Built by `Problem.build`.
+
+    - `model`: at its nominal parameters.
+    - `parameters`: what may be fitted.
+    - `records`: names of the recordings.
+    - `pieces`, `spans`: what the recordings were cut into.
+    - `start`: the nominal parameters and the states that the data suggest.
+    """
+
+    model: Model
+    parameters: tuple[Parameter, ...]
+    segments: tuple[Segments, ...]
+    pieces: Pieces
+    spans: tuple[tuple[list[Span], list[Span]], ...]
+    layout: Layout
+    start: Point
+    extras: Extras
+
+    @staticmethod
+    def build(
+        model: Model, segments: Sequence[Segments], parameters: Sequence[Parameter]
+    ) -> "Problem":
+        """Cut the recordings into pieces and find a state to start each of them from.
+
+        **Arguments:**
+
+        - `model`: a system with its sensors, at nominal parameters.
+        - `segments`: recordings from `jaxcam.recordings.segment_case` or `segment`.
+        - `parameters`: those that may be fitted, free or not.
+
+        **Raises:** `RecordingError` for a missing channel or a record without flight;
+        `ValueError` for a parameter that is not one number of the model, or a model
+        that gives none where the data are.
+        """
+        segments = tuple(segments)
+        if not segments:
+            raise RecordingError("There is no recording to fit; give at least one.")
+        parameters = tuple(parameters)
+        _refuse_repeated(parameters)
+        model = jax.tree.map(
+            lambda leaf: (
+                jnp.asarray(leaf, dtype=float) if isinstance(leaf, float) else leaf
+            ),
+            model,
+        )
+        layout = Layout(model, parameter_places(model, parameters))
+        nominal = np.array([float(p.where(model)) for p in parameters])
+        values = np.tile(nominal, (len(segments), 1))
+        measured = model.drive.channel if isinstance(model.drive, Input) else None
+        steps, first, extras = _STEPS, _STEPS, None
+        while True:
+            pieces, cuts = gather(segments, tuple(model.sensors), steps, measured)
+            if steps < _MOST_STEPS and not _follows(model, segments, pieces):
+                steps *= 2
+                continue
+            states, guess = suggested_starts(model, segments, cuts, pieces)
+            point = Point(jnp.asarray(values), jnp.asarray(states))
+            _refuse_not_finite(layout, segments, pieces, point)
+            if extras is None:
+                # as a scale of errors, that of the first steps will do for all
+                extras, first = joint_sharpness(layout, pieces, point, guess), steps
+            fine = _fine(layout, pieces, extras, point, _longest_flight(cuts))
+            if steps >= _MOST_STEPS or fine:
+                break
+            steps *= 2
+        if steps > first:
+            extras = joint_sharpness(layout, pieces, point, guess)
+        pieces = jax.tree.map(jnp.asarray, pieces)
+        point = own_states(layout, pieces, extras, point)
+        return Problem(
+            model,
+            parameters,
+            segments,
+            pieces,
+            tuple(cuts),
+            layout,
+            point,
+            extras,
+        )
+
+    @property
+    def records(self) -> tuple[str, ...]:
+        """Names of the recordings."""
+        return tuple(part.recording.name for part in self.segments)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the parameters."""
+        return tuple(parameter.name for parameter in self.parameters)
+
+    @property
+    def samples(self) -> int:
+        """Number of samples of all channels that are fitted."""
+        known = self.pieces.flown.known, self.pieces.rested.known
+        return int(sum(jnp.sum(part) for part in known))
+
+    @property
+    def longest_flight(self) -> int:
+        """Number of pieces of the flight that has most of them."""
+        return _longest_flight(self.spans)
+
+    def parameter(self, name: str) -> Parameter:
+        """**Raises:** `ValueError` that lists the names there are."""
+        for parameter in self.parameters:
+            if parameter.name == name:
+                return parameter
+        raise ValueError(
+            f"There is no parameter {name!r}; the parameters are "
+            f"{', '.join(self.names)}."
+        )
+
+    def everything(self) -> Weights:
+        """All data count once."""
+        exists, rests = self.pieces.exists, self.pieces.rest_exists
+        return Weights(np.asarray(exists, float), np.asarray(rests, float))
+
+    def only(self, records: Iterable[str]) -> Weights:
+        """Only some records count. **Raises:** `ValueError` for an unknown name."""
+        wanted = set(records)
+        if not wanted <= set(self.records):
+            raise ValueError(
+                f"There is no record {min(wanted - set(self.records))!r}; the records "
+                f"are {', '.join(self.records)}."
+            )
+        keep = np.array([name in wanted for name in self.records], dtype=float)
+        every = self.everything()
+        return Weights(every.flown * keep[:, None], every.rested * keep[:, None])
+
+    def between(self, start: float, stop: float) -> Weights:
+        """Only pieces that begin in some span of time (s of each record) count."""
+
+        def inside(samples):
+            begin = np.asarray(samples.start)
+            return (begin >= start) & (begin < stop)
+
+        every = self.everything()
+        return Weights(
+            every.flown * inside(self.pieces.flown),
+            every.rested * inside(self.pieces.rested),
+        )
+
+    def weighted(self, weights: Weights | None) -> Extras:
+        """What the compiled programs need, with some weights."""
+        weights = weights or self.everything()
+        return self.extras._replace(
+            weight=jnp.asarray(weights.flown), rest_weight=jnp.asarray(weights.rested)
+        )
+
+
+def _refuse_not_finite(layout: Layout, segments, pieces: Pieces, point: Point) -> None:
+    """A field that is no number where the data are cannot be fitted to them."""
+    rates = np.asarray(_rates(layout, point, pieces))
+    bad = pieces.exists & ~np.all(np.isfinite(rates), axis=-1)
+    if np.any(bad):
+        r, k = np.argwhere(bad)[0]
+        state = ", ".join(f"{x:.4g}" for x in np.asarray(point.states)[r, k])
+        raise ValueError(
+            f"The model gives no finite number in {segments[r].recording.name} at "
+            f"{pieces.flown.start[r, k]:.4g} s, where the data suggest the state "
+            f"({state}); check its vector field and the nominal parameters there."
+        )
+
+
+@eqx.filter_jit
+def _rates(layout: Layout, point: Point, pieces: Pieces):
+    """Rate of change of each state that pieces start from."""
+
+    def one(values, states, start, angle, rate):
+        model = layout.at(values)
+
+        def at(state, t, angle, rate):
+            return augmented_field(model, model.driven(t, angle, rate), t, state)
+
+        return jax.vmap(at)(states, start, angle, rate)
+
+    drive = pieces.flown.start, pieces.angle_at, pieces.rate_at
+    return jax.vmap(one)(*point, *(jnp.asarray(part) for part in drive))
+
+
+def _longest_flight(cuts) -> int:
+    pieces = (np.array([span.flight for span in side]) for side, _ in cuts)
+    counts = (np.unique(part, return_counts=True)[1] for part in pieces)
+    return max(int(np.max(count, initial=0)) for count in counts)
+
+
+def _refuse_repeated(parameters) -> None:
+    names = [parameter.name for parameter in parameters]
+    repeated = {name for name in names if names.count(name) > 1}
+    if repeated:
+        raise ValueError(
+            f"Two parameters are called {min(repeated)!r}; rename one of them."
+        )
+
+
+def parameter_places(model: Model, parameters) -> tuple[int, ...]:
+    """Index of each parameter among the leaves of a model, for a `Layout`.
+
+    **Raises:** `ValueError` for a parameter that is not one number of the model, or
+    the same one as another.
+    """
+    leaves, tree = jax.tree.flatten(model)
+    numbered = jax.tree.unflatten(tree, list(range(len(leaves))))
+    places = []
+    for parameter in parameters:
+        place = parameter.where(numbered)
+        if not isinstance(place, int) or np.shape(leaves[place]) != ():
+            raise ValueError(
+                f"The parameter {parameter.name!r} is not one number of the model; let "
+                f"`where` pick a field that holds a single number."
+            )
+        if place in places:
+            other = parameters[places.index(place)].name
+            raise ValueError(
+                f"The parameters {other!r} and {parameter.name!r} are the same number; "
+                f"leave one of them out."
+            )
+        places.append(place)
+    return tuple(places)
+
+
+def _follows(model: Model, segments, pieces: Pieces) -> bool:
+    """Whether the steps are short beside the filters of the sensors, and the input.
+
+    A filter is not at rest after an impact, which the states to begin with do not show.
+    """
+    longest = float(np.max(np.where(pieces.exists, pieces.flown.step, 0.0)))
+    interval = min(part.recording.interval for part in segments)
+    if isinstance(model.drive, Input) and longest > interval:
+        return False
+    corners = [2 * np.pi * s.bandwidth_hz for s in model.sensors.values() if s.filtered]
+    return all(longest * corner <= _FILTER_STEP for corner in corners)
+
+
+def _fine(
+    layout: Layout, pieces: Pieces, extras: Extras, point: Point, flight: int
+) -> bool:
+    """Whether half the steps would change no state by a part of its error.
+
+    **Arguments:** `flight` is the number of pieces of the longest flight.
+    """
+    part = pieces.flown
+    rate = np.repeat(pieces.rate, 2, axis=-1)
+    # a quarter of a step before and after the middle, as the drive turns evenly
+    quarter = np.asarray(part.step)[..., None] / 4
+    sign = np.tile([-1.0, 1.0], pieces.rate.shape[-1])
+    half = np.repeat(pieces.angle, 2, axis=-1) + sign * quarter * rate, rate
+    coarse = _ends(layout, point, part.start, part.step, pieces.angle, pieces.rate)
+    fine = _ends(layout, point, part.start, part.step / 2, *half)
+    change = np.abs(coarse - fine) / np.asarray(extras.sharpness.piece)
+    # errors of one sign add up to a frequency over a flight of many pieces
+    part_of_error = _STEP_ERROR / max(1.0, flight / _LONG) ** 1.5
+    return bool(np.max(np.where(pieces.exists[..., None], change, 0.0)) < part_of_error)
+
+
+@eqx.filter_jit
+def _ends(layout: Layout, point: Point, start, step, angle, rate):
+    def one(values, *piece):
+        model = layout.at(values)
+        return jax.vmap(lambda *inputs: fly(model, *inputs)[0])(*piece)
+
+    drive = (jnp.asarray(part) for part in (start, step, angle, rate))
+    return jax.vmap(one)(point.values, point.states, *drive)

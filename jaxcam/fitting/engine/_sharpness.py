@@ -1,0 +1,163 @@
+"""How sharp the joints between pieces are: as sharp as drive and samples can tell."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from ._linear import Extras, Sharpness
+from ._linearise import assemble, Layout, Point
+from ._model import filtered_channels
+from ._pieces import IMPACT, Pieces
+from ._predict import fly
+
+
+# A joint within a flight is this much sharper than what its samples say of the state
+JOINT = 1e-3
+# An impact is this much sharper than what the flights on both sides say of themselves:
+# a tenth of their variance is next to nothing to lose, and it forgets what chaos and
+# small faults of the model make of the past
+_IMPACT = 10**-0.5
+_WIDTH = 4
+
+
+def width_of(number: int) -> int:
+    """Columns that programs are compiled for: a multiple of four, to share them."""
+    return _WIDTH * max(1, -(-number // _WIDTH))
+
+
+def joint_sharpness(layout: Layout, pieces: Pieces, point: Point, guess) -> Extras:
+    """How sharp the joints are: as sharp as the drive, and as the samples can tell."""
+    records, width = pieces.joint.shape
+    size = point.states.shape[-1]
+    one = jnp.ones((records, width, size))
+    extras = Extras(
+        jnp.asarray(guess),
+        Sharpness(one, one, one[..., 0], one),
+        jnp.asarray(pieces.exists, dtype=float),
+        jnp.asarray(pieces.rest_exists, dtype=float),
+    )
+    alone = eqx.tree_at(lambda p: p.joint, pieces, jnp.zeros_like(pieces.joint))
+    blocks, _ = states_only(layout, alone, extras, point)
+    information = jnp.diagonal(blocks.ss, axis1=-2, axis2=-1)
+    usual = jnp.nanmedian(jnp.where(information > 0, information, jnp.nan), axis=(0, 1))
+    # a state that no sample sees is tied as tightly as the least visible one
+    usual = jnp.where(jnp.isnan(usual), jnp.nanmin(usual), usual)
+    floor = JOINT / jnp.sqrt(usual)
+    flight = jnp.broadcast_to(floor, one.shape)
+    piece = flight / JOINT
+    if np.any(np.asarray(pieces.drive_error) > 0):
+        # a field that the drive acts on is known as well as the drive
+        by_drive = _drive_in_flight(layout, pieces, point)
+        flight = jnp.sqrt(flight**2 + jnp.nan_to_num(by_drive) ** 2)
+    sharp = extras._replace(sharpness=Sharpness(flight, flight, one[..., 0], piece))
+    inner = jnp.where(jnp.asarray(pieces.joint) == IMPACT, 0, pieces.joint)
+    flights = eqx.tree_at(lambda p: p.joint, pieces, inner)
+    blocks, _ = states_only(layout, flights, sharp, point)
+    known = _IMPACT**2 * _variances(np.asarray(blocks.ss), np.asarray(blocks.before))
+    before = np.concatenate([known[:, :1], known[:, :-1]], axis=1)
+    known = jnp.asarray(np.minimum(known, before))
+    slope, by_drive = _drive_slopes(layout, pieces, point)
+    gap = jnp.sqrt(jnp.sum(slope**2 * known, axis=-1) + by_drive[..., -1] ** 2)
+    impact = jnp.sqrt(known + by_drive[..., :-1] ** 2)
+    return extras._replace(sharpness=Sharpness(flight, impact, gap, piece))
+
+
+def states_only(layout: Layout, pieces: Pieces, extras: Extras, point: Point):
+    """Normal equations of the states, with all parameters held, and the costs."""
+    # as wide as a fit of everything, which then is compiled already
+    none = jnp.zeros((pieces.joint.shape[0], width_of(len(layout.places))), dtype=int)
+    scales = jnp.zeros(none.shape, dtype=float)
+    return assemble(layout, pieces, extras, point, none, scales)
+
+
+def loosened(extras: Extras) -> Extras:
+    """Joints within flights that give as much as the samples of a piece allow.
+
+    States that the data suggest do not join. Where a flight has many pieces, to close
+    them all at once would be to foretell the last one from the first, with parameters
+    that are not yet known.
+    """
+    sharpness = extras.sharpness
+    return extras._replace(sharpness=sharpness._replace(flight=sharpness.piece))
+
+
+def _variances(ss, before):
+    """Variance of each state from the samples of its own flight, shape `(r, k, n)`."""
+    records, width, size, _ = ss.shape
+    found = np.zeros((records, width, size))
+    for r in range(records):
+        matrix = np.zeros((width, size, width, size))
+        for k in range(width):
+            dead = np.diagonal(ss[r, k]) <= 0
+            matrix[k, :, k] = ss[r, k] + np.diag(dead.astype(float))
+            if k:
+                matrix[k, :, k - 1] = before[r, k]
+                matrix[k - 1, :, k] = before[r, k].T
+        flat = matrix.reshape(width * size, -1)
+        scale = 1 / np.sqrt(np.diagonal(flat))
+        inverse = np.linalg.inv(flat * np.outer(scale, scale))
+        found[r] = (np.diagonal(inverse) * scale**2).reshape(width, size)
+    return np.abs(found)
+
+
+@eqx.filter_jit
+def _drive_in_flight(layout: Layout, pieces: Pieces, point: Point):
+    """Error of the state at the beginning of each piece, `(r, k, n)`, due to the drive.
+
+    Errors of the drive during the piece before it make it, independent from piece to
+    piece.
+    """
+
+    def one(values, error, states, start, step, angles, rates):
+        model = layout.at(values)
+
+        def spread(state, start, step, angle, rate):
+            def end(shift):
+                turned = angle + shift[0], rate + shift[1]
+                return fly(model, state, start, step, *turned)[0]
+
+            return jnp.sqrt(jax.jacfwd(end)(jnp.zeros(2)) ** 2 @ error**2)
+
+        found = jax.vmap(spread)(states, start, step, angles, rates)
+        return jnp.concatenate([found[:1], found[:-1]])
+
+    part = pieces.flown
+    known = point.values, pieces.drive_error, point.states, part.start, part.step
+    arrays = (jnp.asarray(x) for x in (*known, pieces.angle, pieces.rate))
+    return jax.vmap(one)(*arrays)
+
+
+@eqx.filter_jit
+def _drive_slopes(layout: Layout, pieces: Pieces, point: Point):
+    """Slope of the gap, `(r, k, n)`, and errors of an impact due to the drive."""
+
+    def one(values, state, t, angle, rate, error):
+        model = layout.at(values)
+        size = state.shape[0] - len(filtered_channels(model))
+
+        def landed(drive):
+            system = model.driven(t, drive[0], drive[1])
+            x = system.impact(t, state[:size])
+            gap = jnp.min(jnp.atleast_1d(system.gap(t, state[:size])))
+            if x.ndim == 2:
+                x = x[jnp.argmin(system.gap(t, state[:size]))]
+            return jnp.concatenate([x, state[size:], gap[None]])
+
+        def gap_of(x):
+            system = model.driven(t, angle, rate)
+            return jnp.min(jnp.atleast_1d(system.gap(t, x[:size])))
+
+        jacobian = jax.jacfwd(landed)(jnp.stack([angle, rate]))
+        spread = jnp.sqrt(jacobian**2 @ error**2)
+        return jax.grad(gap_of)(state), spread
+
+    along = jax.vmap(one, in_axes=(None, 0, 0, 0, 0, None))
+    return jax.vmap(along)(
+        point.values,
+        point.states,
+        jnp.asarray(pieces.flown.start),
+        jnp.asarray(pieces.angle_at),
+        jnp.asarray(pieces.rate_at),
+        jnp.asarray(pieces.drive_error),
+    )

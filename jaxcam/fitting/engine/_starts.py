@@ -1,0 +1,77 @@
+"""States from which the pieces of a recording are predicted at first."""
+
+import dataclasses
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from ...recordings import Segments
+from ...recordings.against_model import size_of, state_at
+from ...recordings.cut import fit_local
+from ._model import filtered_channels, Model
+from ._pieces import Pieces, Span
+
+
+def _size(model: Model) -> int:
+    return size_of(model.system, {n: s.observe for n, s in model.sensors.items()})
+
+
+def suggested_starts(model: Model, segments, cuts, pieces: Pieces):
+    """States that polynomials through the samples suggest, shape `(r, k, n)`."""
+    size = _size(model)
+    lags = filtered_channels(model)
+    sensors = model.sensors
+    direct = [name for name in sensors if name not in lags] or list(sensors)
+    states = np.zeros((*pieces.joint.shape, size + len(lags)))
+    guess = np.zeros((*pieces.rest_exists.shape, size))
+    for row, (part, sides) in enumerate(zip(segments, cuts)):
+        for side, found in zip(sides, (states, guess)):
+            if not side:
+                continue
+            clock = np.array([span.start for span in side])
+            local = [
+                [_local(part, span, name, sensors[name]) for name in direct]
+                for span in _with_samples(side)
+            ]
+            both = np.array(local)
+            picks = [sensors[name].observe for name in direct]
+            system = _still(model, part)
+            state = state_at(system, picks, clock, both[..., 0], both[..., 1], size)
+            found[row, : len(side), :size] = state
+            if found is states:
+                for place, name in enumerate(lags):
+                    seen = jax.vmap(sensors[name].seen)(jnp.asarray(state))
+                    found[row, : len(side), size + place] = seen
+    return states, guess
+
+
+def _still(model: Model, part: Segments):
+    """The system with its drive at the mean speed; its field serves as a guide only."""
+    if part.drive is None:
+        return model.system
+    # arrays: numbers would be constants of a program that is compiled for each record
+    angle, rate = (jnp.asarray(x) for x in (part.drive.phase, part.drive.speed))
+    return model.driven(0.0, angle, rate)
+
+
+def _with_samples(side: list[Span]):
+    """Pieces too short for a polynomial borrow the samples of their neighbours."""
+    for k, span in enumerate(side):
+        if len(span.rows) >= 4:
+            yield span
+            continue
+        near = [s for s in side[max(0, k - 1) : k + 2] if s.flight == span.flight]
+        rows = np.concatenate([s.rows for s in near])
+        yield dataclasses.replace(span, rows=rows)
+
+
+def _local(part: Segments, span: Span, channel: str, sensor):
+    """Value and slope of a channel at the beginning of a piece."""
+    time = part.recording.time[span.rows]
+    values = part.recording[channel][span.rows]
+    fine = np.isfinite(values)
+    if np.sum(fine) < 2:
+        return 0.0, 0.0
+    fit = fit_local(time[fine], values[fine], float(sensor.floor), span.start)
+    return fit.value(span.start), fit.slope(span.start)

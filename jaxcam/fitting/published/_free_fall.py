@@ -1,0 +1,93 @@
+"""The ratio of inertia to stiffness from a free fall, as in section 4.6."""
+
+import dataclasses
+from collections.abc import Callable
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from variational.orbits import flight_end
+
+from ...hybrid import HybridSystem
+from ._published import fit_published, Published
+from ._published_fit import PublishedFit
+
+
+class FreeFall(eqx.Module):
+    """A system, and the state in which it was let go."""
+
+    system: HybridSystem
+    state: Float[Array, " n"]
+
+
+def fit_free_fall(
+    system: HybridSystem,
+    where: Callable[[Any], Any],
+    times: Float[np.ndarray, " k"],
+    measured: Float[np.ndarray, " k"],
+    error: float,
+    *,
+    state: Float[np.ndarray, " n"],
+    observe: int = 0,
+    name: str = "stiffness",
+    steps: int = 4,
+) -> PublishedFit:
+    """Fit one parameter, and the state at the start, to a motion without contact.
+
+    The motion of the rig sees inertia and stiffness only through M = J/K (4.9): pick
+    one of them with `where` and hold the other.
+
+    **Arguments:**
+
+    - `where`: picks the parameter of the system.
+    - `times`: shape `(k,)`, increasing (s); before the first impact.
+    - `measured`: shape `(k,)`, one component of the state.
+    - `error`: standard error of a sample, in the unit of the component.
+    - `state`: guess of the state at `times[0]`, shape `(n,)`.
+    - `observe`: which component is measured.
+    - `name`: of the parameter, for the report.
+    - `steps`: Runge-Kutta steps of order 8 between two samples.
+
+    **Returns:** a [`jaxcam.fitting.PublishedFit`][] whose `model` has the fields
+    `system` and `state`.
+
+    **Raises:** `ValueError` for times that do not increase.
+    """
+    times, measured = np.asarray(times, dtype=float), np.asarray(measured, dtype=float)
+    state = np.asarray(state, dtype=float)
+    if times.shape != measured.shape or not np.all(np.diff(times) > 0):
+        raise ValueError("Give increasing `times` and one measured value for each.")
+    number = state.shape[0]
+    starts, spans = jnp.asarray(times[:-1]), jnp.asarray(np.diff(times))
+
+    def fall(model: FreeFall):
+        def one(x, interval):
+            t, span = interval
+            end = flight_end(model.system, t, x, t + span, steps=steps)
+            return end, end[observe]
+
+        _, later = jax.lax.scan(one, model.state, (starts, spans))
+        return jnp.append(model.state[observe], later)
+
+    # the state is split into scalars, so that each can be free
+    def pick(model):
+        return [where(model.system), *model.state]
+
+    split = FreeFall(system, tuple(jnp.asarray(v) for v in state))  # pyright: ignore
+
+    def joined(model):
+        return fall(FreeFall(model.system, jnp.stack(model.state)))
+
+    fit = fit_published(
+        split,
+        pick,
+        [Published("free fall", joined, measured, error)],
+        names=[name, *(f"state[{k}]" for k in range(number))],
+        tolerances=[np.inf] * (number + 1),
+    )
+    found = FreeFall(fit.model.system, jnp.stack(fit.model.state))
+    return dataclasses.replace(fit, model=found)

@@ -1,0 +1,166 @@
+"""What a fit to published numbers found, and what it could not see."""
+
+import dataclasses
+from collections.abc import Sequence
+from typing import Any, TYPE_CHECKING
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from .._ellipse import Ellipse, ellipse_of, most_correlated
+
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+@dataclasses.dataclass(frozen=True)
+class PublishedFit:
+    """Result of [`jaxcam.fitting.fit_published`][].
+
+    - `model`: with the estimates in it.
+    - `estimates`, `stderr`, `covariance`: `(p,)`, `(p,)`, `(p, p)`; priors
+        included, errors of the data as stated.
+    - `shares`, `directions`: `(p,)` and `(p, p)`; how much of what is known of each
+        combination of parameters comes from the data and not from the priors (1 all, 0
+        nothing), ascending, and the combinations, one a row, in units of the
+        tolerances.
+    - `chi_square`: of the data alone.
+    - `steps`, `converged`: iterations, and whether the last stage met its tolerance.
+    """
+
+    model: Any
+    names: tuple[str, ...]
+    nominal: Float[np.ndarray, " p"]
+    tolerances: Float[np.ndarray, " p"]
+    estimates: Float[np.ndarray, " p"]
+    covariance: Float[np.ndarray, "p p"]
+    shares: Float[np.ndarray, " p"]
+    directions: Float[np.ndarray, "p p"]
+    published: tuple[Any, ...]
+    predicted: Float[np.ndarray, " n"]
+    steps: int
+    converged: bool
+
+    @staticmethod
+    def build(
+        *,
+        jacobian,
+        tolerances,
+        model,
+        names,
+        nominal,
+        estimates,
+        published,
+        predicted,
+        steps,
+        converged,
+    ) -> "PublishedFit":
+        """From the Jacobian of the data in standard errors by the parameters."""
+        finite: Bool[np.ndarray, " p"] = np.isfinite(tolerances)
+        units = np.where(finite, tolerances, np.where(nominal == 0, 1, np.abs(nominal)))
+        scaled = jacobian * units
+        information = scaled.T @ scaled
+        # a parameter without a prior has no share of one
+        prior = np.diag(finite.astype(float))
+        inverse = np.linalg.pinv(information + prior, hermitian=True)
+        eigenvalues, vectors = np.linalg.eigh(information)
+        eigenvalues = np.maximum(eigenvalues, 0.0)
+        held = np.einsum("ij,ik,kj->j", vectors, prior, vectors)
+        total = np.where(eigenvalues + held > 0, eigenvalues + held, 1.0)
+        return PublishedFit(
+            model=model,
+            names=names,
+            nominal=nominal,
+            tolerances=tolerances,
+            estimates=estimates,
+            covariance=inverse * np.outer(units, units),
+            shares=eigenvalues / total,
+            directions=vectors.T,
+            published=published,
+            predicted=predicted,
+            steps=steps,
+            converged=converged,
+        )
+
+    @property
+    def stderr(self) -> Float[np.ndarray, " p"]:
+        return np.sqrt(np.diag(self.covariance))
+
+    @property
+    def correlation(self) -> Float[np.ndarray, "p p"]:
+        errors = self.stderr
+        return self.covariance / np.outer(errors, errors)
+
+    def ellipse(self, names: Sequence[str], level: float = 0.95) -> Ellipse:
+        """Joint confidence region of two or more parameters, the others left free.
+
+        **Raises:** as in [`jaxcam.fitting.Fit`][].
+        """
+        return ellipse_of(names, self.names, self.estimates, self.covariance, level)
+
+    def most_correlated(self) -> str:
+        """The pair of parameters that is told apart worst, in a sentence."""
+        return most_correlated(self.names, self.correlation)
+
+    @property
+    def chi_square(self) -> float:
+        return float(np.sum(self._misses() ** 2))
+
+    def parameters(self) -> "pd.DataFrame":
+        """Nominal value, tolerance, estimate and standard error of each parameter."""
+        import pandas as pd
+
+        return pd.DataFrame(
+            {
+                "parameter": self.names,
+                "nominal": self.nominal,
+                "tolerance": self.tolerances,
+                "estimate": self.estimates,
+                "standard error": self.stderr,
+            }
+        )
+
+    def numbers(self) -> "pd.DataFrame":
+        """Published and computed numbers; the last column is in standard errors."""
+        import pandas as pd
+
+        return pd.DataFrame(
+            {
+                "quantity": [
+                    p.name if p.values.size == 1 else f"{p.name} [{k}]"
+                    for p in self.published
+                    for k in range(p.values.size)
+                ],
+                "printed": np.concatenate([p.values for p in self.published]),
+                "computed": self.predicted,
+                "miss": self._misses(),
+            }
+        )
+
+    def weak(self, share: float = 0.5) -> list[str]:
+        """Combinations of parameters that rest on the priors more than on the data.
+
+        One sentence each, the weakest first; `share` is the part of the information
+        that must come from the data.
+        """
+        sentences = []
+        for part, direction in zip(self.shares, self.directions, strict=True):
+            if part >= share:
+                continue
+            order = np.argsort(-np.abs(direction))
+            main = [k for k in order if abs(direction[k]) > 0.2]
+            sign = np.sign(direction[main[0]])
+            words = ", ".join(
+                f"{sign * direction[k]:+.2f} {self.names[k]}" for k in main
+            )
+            sentences.append(
+                f"The data give {100 * part:.2g} % of what is known of the combination "
+                f"{words} (in units of the tolerances)."
+            )
+        return sentences
+
+    def _misses(self):
+        values = np.concatenate([p.values for p in self.published])
+        errors = np.concatenate([p.errors for p in self.published])
+        return (self.predicted - values) / errors

@@ -1,0 +1,217 @@
+"""Many lanes as one matrix of numbers, and the compiled loop that works on it.
+
+A chunk of attempts is a call with few arrays. With a whole system and all leaves of a
+lane it costs four times as much: as much as the work of 64 lanes in a chunk.
+"""
+
+import functools
+from collections.abc import Callable, Hashable
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from .._system import HybridSystem
+from ..loop import attempts, first_state, Functions, LoopState, Plan, run_many
+from ..lowering import one_kernel, pack, Packed, without_library
+
+
+# starts that are computed at once, over lanes that run at once
+_AT_ONCE = 16
+
+
+class LaneLayout(NamedTuple):
+    """Where the numbers of a lane stand among the rows of a matrix, and their types."""
+
+    rows: LoopState
+    dtypes: tuple
+
+    def unpacked(self, numbers) -> LoopState:
+        """The lane whose numbers these are."""
+        leaves = [
+            number.astype(dtype)
+            for number, dtype in zip(numbers, self.dtypes, strict=True)
+        ]
+        return jax.tree.unflatten(jax.tree.structure(self.rows), leaves)
+
+
+def packed(lane: LoopState):
+    """All numbers of a lane (or of many) as rows of 64-bit floats."""
+    return jnp.stack([jnp.asarray(leaf, jnp.float64) for leaf in jax.tree.leaves(lane)])
+
+
+def layout_of(lane: LoopState) -> LaneLayout:
+    leaves, structure = jax.tree.flatten(lane)
+    rows = jax.tree.unflatten(structure, range(len(leaves)))
+    return LaneLayout(rows, tuple(leaf.dtype for leaf in leaves))
+
+
+class Lanes(NamedTuple):
+    """What is run: a system, what of it differs from lane to lane, and where from."""
+
+    system: HybridSystem
+    #: what `where(system)` picks takes `values`, `(lanes,)` or `(lanes, k)`; or neither
+    where: Callable | None
+    values: np.ndarray | None
+    #: (lanes, n)
+    states: np.ndarray
+
+    def some(self, which: slice) -> "Lanes":
+        """A part of the lanes."""
+        values = None if self.values is None else self.values[which]
+        return self._replace(values=values, states=self.states[which])
+
+
+class Horizon(NamedTuple):
+    """When it is run: `number` turns of a `period` (s) from `t0` (s) on.
+
+    Without a period the system's own is taken, lane by lane.
+    """
+
+    t0: Any
+    period: Any
+    number: int
+
+
+class Start(NamedTuple):
+    """Lanes as they start, one column each, and what they are run with."""
+
+    slots: LaneLayout
+    numbers: np.ndarray
+    #: parts of system and plan that differ from lane to lane, and that do not
+    own: Packed
+    shared: Packed
+    static: Any
+
+
+def start_lanes(lanes: Lanes, horizon: Horizon, settings, width: int) -> Start:
+    """The start of lanes; `width` of them will run at a time."""
+    pieces, count = [], len(lanes.states)
+    whole = jnp.asarray(float(horizon.number))
+    # filled up, so that two compiled programs serve all numbers of lanes
+    part_size = width if count <= 2 * width else _AT_ONCE * width
+    for first in range(0, count, part_size):
+        some = np.minimum(np.arange(first, first + part_size), count - 1)
+        part = None if lanes.values is None else lanes.values[some]
+        batched, shared = split_lanes(lanes.system, lanes.where, part)
+        state = jnp.asarray(lanes.states[some])
+        shape = horizon.period, horizon.t0, whole, settings, state
+        pieces.append(_start(batched, shared, *shape))
+    slots, _, _, rest = pieces[0]
+    shared, static = eqx.partition(rest, eqx.is_array)
+    numbers = np.concatenate([numbers for _, numbers, _, _ in pieces], axis=1)
+    each = [own for _, _, own, _ in pieces]
+    own = jax.tree.map(lambda *parts: np.concatenate(parts)[:count], *each)
+    return Start(slots, numbers[:, :count], pack(own, count), pack(shared), static)
+
+
+def compiled_chunk(start: Start, rows: int, row: Callable):
+    """The compiled loop: own and shared parts, each as numbers and what is apart, and
+    the numbers of the lanes, to numbers and log.
+
+    It makes `rows` attempts in each slot, in whole blocks. `row` makes numbers of what
+    an attempt did and the lane after it, as in `run_raw`; of each the log has one
+    array, `(rows, slots)`.
+    """
+    leaves, structure = jax.tree.flatten(start.static)
+    # 1, 1.0 and True are equal, and different programs
+    key = tuple((type(leaf), leaf) for leaf in leaves)
+    flat, lane = jax.tree.flatten(start.slots.rows)
+    packings = start.own.packing, start.shared.packing
+    layout = lane, tuple(flat), start.slots.dtypes
+    return _chunk(key, structure, packings, layout, rows, row)
+
+
+@functools.lru_cache(maxsize=256)
+def _chunk(
+    key: tuple[tuple[type, Hashable], ...], structure, packings, layout, rows, row
+):
+    static = jax.tree.unflatten(structure, [leaf for _, leaf in key])
+    lane, flat, dtypes = layout
+    slots = LaneLayout(jax.tree.unflatten(lane, flat), dtypes)
+
+    def one(own, shared, lane):
+        parts = [p.unpacked(*q) for p, q in zip(packings, (own, shared), strict=True)]
+        system, plan = eqx.combine(*parts, static)
+        return attempts(Functions(system, len(lane.x), plan.plain), plan, lane, row)
+
+    mapped = jax.vmap(one, in_axes=((1, 0), None, 0), out_axes=(0, -1))
+
+    def whole(own, shared, numbers):
+        some = without_library(
+            lambda lanes: mapped(own, shared, lanes), slots.unpacked(numbers)
+        )
+
+        def loop(numbers):
+            lanes, log = run_many(some, slots.unpacked(numbers), rows, row)
+            return packed(lanes), log
+
+        _, plan = static
+        return one_kernel(loop, batch=True, on=not plan.plain)(numbers)
+
+    # the widest vectors that the machine has; XLA is shy of them by default
+    return jax.jit(whole, compiler_options={"xla_cpu_prefer_vector_width": 512})
+
+
+def split_lanes(system, where, values):
+    """The system as a batched and a shared part for `filter_vmap`."""
+    if where is None:
+        return None, system
+    nothing = jax.tree.map(lambda _: False, system)
+    picked = eqx.tree_at(where, nothing, replace_fn=lambda _: True)
+    values = jnp.asarray(values)
+    several = isinstance(where(system), tuple)
+    full = eqx.tree_at(where, system, tuple(values.T) if several else values)
+    return eqx.partition(full, picked)
+
+
+@eqx.filter_jit
+def _start(batched, shared, period, t0, turns, settings, states):
+    """Layout and numbers; system and plan, split by what differs from lane to lane."""
+
+    def prepared(batched):
+        system = eqx.combine(batched, shared).prepared()
+        length = system.period if period is None else period
+        t1 = t0 + turns * length
+        plan = Plan.of(system, settings, t0, t1, period=length, stop_period=length)
+        return system, plan
+
+    if batched is None:
+        rest = prepared(None)
+        own = jax.tree.map(lambda _: None, rest)
+    else:
+        ready = eqx.filter_vmap(prepared, in_axes=(eqx.if_array(0),))(batched)
+        differs = _depends(prepared, jax.tree.map(lambda p: p[0], batched))
+        own, rest = eqx.partition(ready, differs)
+        rest = jax.tree.map(lambda p: p[0] if eqx.is_array(p) else p, rest)
+    found = []
+
+    def first(own, state):
+        system, plan = eqx.combine(own, rest)
+        x = tuple(state[i] for i in range(state.shape[0]))
+        functions = Functions(system, len(x), plan.plain)
+        limits = plan.t1, plan.longest_step, plan.repeat
+        lane = first_state(functions, t0, x, *limits)
+        found.append(layout_of(lane))
+        return packed(lane)
+
+    numbers = jax.vmap(first, in_axes=(0, 0), out_axes=1)(own, states)
+    return found[0], numbers, own, rest
+
+
+def _depends(function: Callable, argument):
+    """Of each leaf of the result, whether it depends on the argument."""
+    result = eqx.filter_eval_shape(function, argument)
+    closed = jax.make_jaxpr(lambda a: eqx.filter(function(a), eqx.is_array))(argument)
+    known = {id(v) for v in closed.jaxpr.invars}
+    for equation in closed.jaxpr.eqns:
+        if any(id(v) in known for v in equation.invars):
+            known |= {id(v) for v in equation.outvars}
+    found = iter([id(v) in known for v in closed.jaxpr.outvars])
+
+    def said(leaf):
+        return next(found) if isinstance(leaf, jax.ShapeDtypeStruct) else False
+
+    return jax.tree.map(said, result)

@@ -1,0 +1,78 @@
+"""A group of lanes in fewer slots: one that ends makes room for the next."""
+
+from typing import NamedTuple
+
+import jax.numpy as jnp
+import numpy as np
+
+from ..codes import FINISHED, RUNNING
+from ._layout import compiled_chunk, Horizon, Lanes, start_lanes
+
+
+class Chunking(NamedTuple):
+    """How lanes are run in chunks; it changes no result, but for the budget."""
+
+    #: lanes that run at a time
+    width: int
+    #: attempts in a chunk, after which ended lanes are replaced
+    rows: int
+    #: attempts of one lane, at most
+    max_steps: int
+
+
+def run_refilled(lanes: Lanes, horizon: Horizon, settings, chunking: Chunking, seen):
+    """Run some lanes; one that ends makes room for the next.
+
+    Lanes do not know of each other, so their order and company change no result.
+    `seen` takes the log as it comes: of each number in `seen.row` one array, an attempt
+    after the other.
+
+    **Returns:** impacts, attempts and result codes, each `(lanes,)`.
+    """
+    count, (width, rows, max_steps) = len(lanes.states), chunking
+    start = start_lanes(lanes, horizon, settings, width)
+    chunk, place = compiled_chunk(start, rows, seen.row), start.slots.rows
+    ends = np.zeros((count, 3), dtype=int)
+    # spread evenly, to learn what the others will cost; slots without a lane of their
+    # own show the last one, and do not run
+    first = np.linspace(0, count - 1, min(width, count)).astype(int)
+    work, used = np.full(width, count - 1), np.zeros(width)
+    work[: len(first)], running = first, np.arange(width) < count
+    waiting, sorted_yet = np.setdiff1d(np.arange(count), first), False
+    shared = jnp.asarray(start.shared.numbers), start.shared.apart
+    numbers, mine = start.numbers[:, work], start.own.some(work)
+    numbers[place.status, ~running] = FINISHED
+    while np.any(running):
+        numbers, log = chunk(mine, shared, numbers)
+        seen.take(work, [np.asarray(part) for part in log])
+        used += rows
+        status = np.asarray(numbers)[place.status]
+        over = running & ((status != RUNNING) | (used >= max_steps))
+        if not np.any(over):
+            continue
+        numbers = np.array(numbers)
+        counted = [place.status, place.impacts, place.steps]
+        ends[work[over]] = numbers[counted].T[over]
+        # who has used up the budget stays where it is
+        numbers[place.status, over], running[over] = FINISHED, False
+        if not sorted_yet:
+            waiting = costly_first(waiting, work, used, numbers[place.stops])
+            sorted_yet = True
+        free = np.flatnonzero(over)[: len(waiting)]
+        fresh, waiting = waiting[: len(free)], waiting[len(free) :]
+        work[free], used[free], running[free] = fresh, 0, True
+        numbers[:, free] = start.numbers[:, fresh]
+        mine = start.own.some(work)
+    return ends[:, 1], ends[:, 2], ends[:, 0]
+
+
+def costly_first(waiting, work, used, stops):
+    """The waiting lanes, those first that will take most attempts.
+
+    A lane that starts last and takes long leaves the other slots empty. Lanes that are
+    neighbours cost alike, so those at work tell: attempts over turns so far.
+    """
+    order = np.argsort(work, kind="stable")
+    each = used[order] / np.maximum(stops[order], 0.5)
+    expected = np.interp(waiting, work[order], each)
+    return waiting[np.argsort(-expected, kind="stable")]

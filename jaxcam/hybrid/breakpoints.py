@@ -1,0 +1,66 @@
+"""Declared times at which a field may change abruptly: no step reaches across one.
+
+Between two of them the functions are evaluated strictly between them, so that a switch
+at the time itself may be written with `<` or `<=`. Any other time is taken as it is:
+moved by its rounding, a wall would not be where an impact has been found.
+"""
+
+import jax
+import jax.numpy as jnp
+
+
+# how far from a breakpoint functions are evaluated, relative to the time: more than
+# rounding of a phase made of it
+_SIDE = 2e-15
+
+
+def declared(system) -> tuple:
+    """The breakpoints of a system (s), one scalar each."""
+    times = system.breakpoints
+    if times is None:
+        return ()
+    times = jnp.ravel(jnp.asarray(times, dtype=jnp.float64))
+    return tuple(times[k] for k in range(times.shape[0]))
+
+
+def next_breakpoint(breaks, repeat, t):
+    """The first breakpoint after `t`; they recur every `repeat` (s), inf for never."""
+    return neighbours(breaks, repeat, t)[1]
+
+
+def neighbours(breaks, repeat, t):
+    """The last breakpoint at or before `t`, and the first after it; else -inf and inf.
+
+    They recur every `repeat` (s), inf for never.
+    """
+    behind, ahead = -jnp.inf, jnp.inf
+    recurs = jnp.isfinite(repeat)
+    again = jnp.where(recurs, repeat, 1.0)
+    for b in breaks:
+        turns = jnp.floor(jax.lax.stop_gradient((t - b) / again)) + 1
+        turns = jnp.where(recurs, turns, 0.0)
+        # rounding may have counted the turn that ends here
+        turns = jnp.where(recurs & (b + turns * again <= t), turns + 1, turns)
+        time = b + turns * again
+        past = jnp.where(recurs, b + (turns - 1) * again, b)
+        ahead = jnp.minimum(ahead, jnp.where(time > t, time, jnp.inf))
+        behind = jnp.maximum(behind, jnp.where(past <= t, past, -jnp.inf))
+    return behind, ahead
+
+
+def between(t, low, high, span):
+    """The time `t` moved inside (low, high), without a change of its derivative."""
+    inside = jnp.maximum(after(low, span), jnp.minimum(t, before(high, span)))
+    return t + jax.lax.stop_gradient(inside - t)
+
+
+def after(t, span):
+    """Just after `t`, which may be -inf; `span` (s) is the length of the run."""
+    finite = jnp.where(jnp.isfinite(t), t, 0.0)
+    return t + jax.lax.stop_gradient(_SIDE * (jnp.abs(finite) + span))
+
+
+def before(t, span):
+    """Just before `t`, which may be inf."""
+    finite = jnp.where(jnp.isfinite(t), t, 0.0)
+    return t - jax.lax.stop_gradient(_SIDE * (jnp.abs(finite) + span))

@@ -1,0 +1,179 @@
+"""Bad input, found before anything is compiled, with a sentence that names the fix."""
+
+import hashlib
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax.core import Tracer
+from jax.errors import ConcretizationTypeError, TracerArrayConversionError
+
+from ._settings import Settings
+from ._system import HybridSystem
+from .loop import starts_behind
+from .surface import check_restitution, restitutions
+
+
+def is_traced(tree) -> bool:
+    """Whether any array in `tree` is being transformed, so its value is not known."""
+    return any(isinstance(leaf, Tracer) for leaf in jax.tree.leaves(tree))
+
+
+def is_tracing() -> bool:
+    """Whether what is computed here becomes part of a program, as inside `jit`."""
+    return isinstance(jnp.asarray(0.0), Tracer)
+
+
+def refuse_tracers(name: str, instead: str, *arguments) -> None:
+    """Raise `ValueError` for a function that a transformation of JAX cannot go through.
+
+    **Arguments:** what its name is, what to use `instead`, and what it was called with.
+    """
+    if is_traced(arguments):
+        raise ValueError(
+            f"{name} is driven from Python and cannot be traced by jit, vmap, jvp or "
+            f"grad; use {instead} there"
+        )
+
+
+def check_start(system: HybridSystem, settings: Settings, t0, state, t1) -> None:
+    """Raise `ValueError` for a start that cannot be simulated."""
+    settings.check()
+    if state.ndim != 1:
+        raise ValueError(
+            f"state has shape {state.shape}; pass one vector, and jax.vmap for many"
+        )
+    if not np.all(np.isfinite(state)):
+        raise ValueError(
+            f"state is {np.asarray(state).tolist()}; every component must be finite"
+        )
+    number = np.size(settings.absolute) if settings.absolute is not None else 1
+    if number not in (1, len(state)):
+        raise ValueError(
+            f"absolute has {number} numbers and the state {len(state)} components; "
+            "give one number, or one for each component"
+        )
+    if not (np.isfinite(t0) and np.isfinite(t1)):
+        raise ValueError("t0 and t1 must be finite times in seconds")
+    if float(t1) < float(t0):
+        raise ValueError(
+            f"t1 = {float(t1):g} s lies before t0 = {float(t0):g} s; motion runs "
+            "forward, so exchange them"
+        )
+    check_system(system, t0, state)
+    behind, values = map(np.asarray, _starts_behind(system, t0, state))
+    if not np.all(np.isfinite(values)):
+        raise ValueError("the gap is not finite at t0; check the state and parameters")
+    if behind:
+        raise ValueError(
+            f"gap is negative ({np.min(values):.1e}) at t0; start outside the "
+            "constraint, or pass state=None to start at the release point"
+        )
+
+
+_starts_behind = eqx.filter_jit(starts_behind)
+_restitutions = eqx.filter_jit(restitutions)
+
+# what passed: to look again costs as much as a short run. Systems whose shapes fit, and
+# systems with all their numbers
+_WELL_SHAPED: set = set()
+_SOUND: set = set()
+_MANY = 1000
+
+
+def check_system(system, t0, state) -> None:
+    """Raise `ValueError` for a parameter or a function of the system that cannot be."""
+    signature = _signature(system, state)
+    numbers = signature, _digest(system)
+    if signature is not None and numbers in _SOUND:
+        return
+    for leaf in jax.tree.leaves(eqx.filter(system, eqx.is_inexact_array)):
+        if not np.all(np.isfinite(leaf)):
+            raise ValueError(
+                "a parameter of the system is not finite; print the system to see which"
+            )
+    if signature not in _WELL_SHAPED:
+        _check_shapes(system, t0, state)
+    system.check()
+    check_restitution(system, _restitutions(system, t0, state))
+    if signature is not None:
+        _WELL_SHAPED.add(signature)
+        if len(_SOUND) >= _MANY:
+            _SOUND.clear()
+        _SOUND.add(numbers)
+
+
+def _digest(system) -> bytes:
+    """A hash of all numbers of a system."""
+    found = hashlib.blake2b(digest_size=16)
+    for leaf in jax.tree.leaves(eqx.filter(system, eqx.is_array)):
+        if jnp.issubdtype(leaf.dtype, jax.dtypes.prng_key):
+            leaf = jax.random.key_data(leaf)
+        found.update(np.asarray(leaf).tobytes())
+    return found.digest()
+
+
+def _signature(system, state):
+    """All that the shapes of a system's functions can depend on; `None` if unknown."""
+    arrays, rest = eqx.partition(system, eqx.is_array)
+    shapes = tuple((leaf.shape, leaf.dtype) for leaf in jax.tree.leaves(arrays))
+    fixed, structure = jax.tree.flatten(rest)
+    signature = structure, tuple(fixed), shapes, state.shape
+    try:
+        hash(signature)
+    except TypeError:
+        return None
+    return signature
+
+
+def _check_shapes(system, t0, state) -> None:
+    n = state.shape[0]
+    wanted = len(system.state_names)
+    if wanted and wanted != n:
+        names = ", ".join(system.state_names)
+        raise ValueError(
+            f"state has {n} components but {type(system).__name__} has {wanted}: "
+            f"{names}"
+        )
+    rate = _shape(system, "vector_field", t0, state)
+    if rate.shape != (n,):
+        raise ValueError(
+            f"vector_field returns shape {rate.shape} for a state of shape {(n,)}; "
+            "return one rate for each component, such as jnp.stack([...])"
+        )
+    gap = _shape(system, "gap", t0, state)
+    if len(gap.shape) > 1:
+        raise ValueError(
+            f"gap returns shape {gap.shape}; return a scalar or a vector of gaps"
+        )
+    after = _shape(system, "impact", t0, state)
+    if after.shape != (*gap.shape, n):
+        raise ValueError(
+            f"impact returns shape {after.shape} but gap has shape {gap.shape} and the "
+            f"state {(n,)}; return shape {(*gap.shape, n)}, one row for each gap"
+        )
+    for name, made in (("vector_field", rate), ("gap", gap), ("impact", after)):
+        if made.dtype != jnp.float64:
+            raise ValueError(
+                f"{name} returns {made.dtype}; use 64-bit floats (importing jaxcam "
+                "turns them on)"
+            )
+
+
+def _shape(system, name, t0, state):
+    """Shape and type of what a function of the reader returns."""
+    try:
+        made = jax.eval_shape(getattr(system, name), t0, state)
+    except (ConcretizationTypeError, TracerArrayConversionError) as error:
+        raise ValueError(
+            f"{name} needs the values of time or state, which are not "
+            "known while it is compiled; write it with jax.numpy (jnp.cos, not np.cos "
+            "or math.cos), and jnp.where instead of if"
+        ) from error
+    if not isinstance(made, jax.ShapeDtypeStruct):
+        raise ValueError(
+            f"{name} returns a {type(made).__name__}; return one array, "
+            "such as jnp.stack([...])"
+        )
+    return made

@@ -1,0 +1,65 @@
+"""What a row of the log records, and how a run ended, in words."""
+
+import enum
+
+import equinox as eqx
+
+
+class Row(enum.IntEnum):
+    """The kind of one row of the log."""
+
+    NOTHING = 0
+    STEP = 1
+    IMPACT = 2
+    # the impact after which the remaining, infinitely many ones are summed
+    LAST_IMPACT = 3
+    CONTACT = 4
+    RELEASE = 5
+    STOP = 6
+
+
+class RESULTS(eqx.Enumeration):
+    """How a run ended; each item says what to do about it."""
+
+    successful = ""
+    running = (
+        "The step budget ran out before t1: raise max_steps, or loosen the tolerance."
+    )
+    step_failed = (
+        "No step was short enough: the vector field or the gap is not smooth here, or "
+        "the tolerance is below rounding; loosen the tolerance or check the functions."
+    )
+    not_finite = (
+        "The vector field, gap or impact law returned NaN or infinity: check the "
+        "parameters and the state just before this time."
+    )
+    behind = (
+        "A gap is negative at t0: start with every gap at zero or above, or pass "
+        "state=None to start at the release point."
+    )
+    backward = "t1 lies before t0, and motion runs forward: exchange them."
+    together = (
+        "Impacts on two or more constraints accumulate together, and only those on one "
+        "are summed: choose t1 before this time, or parameters with which one "
+        "constraint comes to rest before impacts on the next begin."
+    )
+
+
+_ITEMS = (
+    RESULTS.successful,
+    RESULTS.running,
+    RESULTS.step_failed,
+    RESULTS.not_finite,
+    RESULTS.behind,
+    RESULTS.backward,
+    RESULTS.together,
+)
+#: codes: the place of each item above. A lane of the loop has one of them as its status
+FINISHED, RUNNING, STEP_FAILED, NOT_FINITE, BEHIND, BACKWARD, TOGETHER = map(
+    float, range(len(_ITEMS))
+)
+
+
+def message(code: int) -> str:
+    """The sentence of a result code."""
+    return RESULTS[_ITEMS[code]]

@@ -1,0 +1,254 @@
+"""What becomes of the loop state after an attempt at a step, and what it tries next."""
+
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+
+from ..breakpoints import declared
+from ..codes import FINISHED, NOT_FINITE, RUNNING, STEP_FAILED, TOGETHER
+from ..runge_kutta import Tableau, tableau_of
+from ._gap_polynomial import end_curvature, Jet, time_to_contact, time_to_release
+from ._loop_state import LoopState
+from ._release import CLOSE
+from ._scale import moved_extents, says_nothing
+from ._select import any_of, select
+
+
+# consecutive attempts without progress in time after which a run gives up
+_PATIENCE = 80
+# impacts on two constraints in so small a part of a natural step accumulate together
+_TOGETHER = 1e-3
+# steps in a period of the forcing, at least
+_PARTS = 4
+# steps in a run where neither their errors nor a period say anything, at least
+_UNSEEN = 64
+
+
+class Plan(NamedTuple):
+    """What does not change during a run; scalars, except for the tableau."""
+
+    t0: Any
+    t1: Any
+    # the run also stops, and records, at t0 + k stop_period
+    stop_period: Any
+    # so short that no whole rise and fall of a surface fits in, where the error of a
+    # step says nothing: in contact, and at rest without a force
+    longest_step: Any
+    # the same where the error of a step says nothing, also without a period
+    unseen_step: Any
+    # one over the length of the run
+    per_run: Any
+    # times that steps must end at, and how often they recur
+    breaks: tuple
+    repeat: Any
+    tolerance: Any
+    # absolute error allowed in each component; None: by the scale of the motion
+    absolute: Any
+    smallness: Any
+    depth: Any
+    tableau: Tableau
+    # without what makes the loop fast
+    plain: bool
+
+    @staticmethod
+    def of(system, settings, t0, t1, *, period=None, stop_period=jnp.inf) -> "Plan":
+        """The plan of a run from `t0` to `t1`; `period` is the system's own without."""
+        own = system.period
+        period = own if period is None else period
+        longest = jnp.inf if period is None else period / _PARTS
+        if settings.max_step is not None:
+            longest = jnp.minimum(longest, settings.max_step)
+        whole = jax.lax.stop_gradient(t1 - t0)
+        unknown = period is None and settings.max_step is None
+        return Plan(
+            t0=t0,
+            t1=t1,
+            stop_period=stop_period,
+            longest_step=longest,
+            unseen_step=whole / _UNSEEN if unknown else longest,
+            per_run=jnp.where(whole > 0, 1.0, 0.0) / jnp.where(whole > 0, whole, 1.0),
+            breaks=declared(system),
+            repeat=jnp.inf if own is None else own,
+            tolerance=settings.tolerance,
+            absolute=_each(settings.absolute),
+            smallness=settings.chatter_smallness,
+            depth=settings.chatter_depth,
+            tableau=tableau_of(settings.solver),
+            plain=settings.plain,
+        )
+
+
+def _each(absolute) -> tuple | None:
+    """The absolute errors allowed as scalars; one alone counts for all components."""
+    if absolute is None:
+        return None
+    numbers = jnp.ravel(jnp.asarray(absolute, dtype=jnp.float64))
+    return tuple(numbers[i] for i in range(numbers.shape[0]))
+
+
+class Attempt(NamedTuple):
+    """An attempt at a step: where it led, and what was found out."""
+
+    t: Any
+    x: tuple
+    contact: tuple
+    jets: tuple
+    # the jets before what happened at the end of the step
+    arrived: tuple
+    length: Any
+    # error of the step over the error allowed
+    effort: Any
+    # how far the step itself moved each component, right or wrong
+    tried: tuple
+    # whether the motion moves on; if not: is the error small enough, are all numbers
+    # finite, is Newton on the surface still settling, and what is a better length
+    good: Any
+    fits: Any
+    finite: Any
+    settling: Any
+    shorter: Any
+    guess: tuple
+    stopped: Any
+    lands: Any
+    # which constraint was hit
+    hit: list
+    # a hop that rounding hides
+    hidden: Any
+    begins: Any
+    # a release is near: the step is retaken to it, and then ends there
+    locates: Any
+    released: Any
+    fastest: Any
+    # length of the next step where it is a physical time: to the release, or the
+    # duration of the rest of the impacts
+    fixed: Any
+    blur: tuple
+    held: tuple
+
+
+def after_attempt(plan: Plan, carried: LoopState, attempt: Attempt) -> LoopState:
+    """The loop state after an attempt."""
+    active = carried.status == RUNNING
+    good = attempt.good
+    longest = _longest(plan, carried, attempt)
+    trial = _next_length(plan, carried, attempt, longest)
+    fixed = (good & attempt.begins) | (carried.completing & ~good) | attempt.locates
+    # steps too short to move the clock lead nowhere either
+    moved = good & (attempt.t > carried.t)
+    failures = jnp.where(moved | ~active, 0.0, carried.failures + 1.0)
+    stop_gradient = jax.lax.stop_gradient
+    waiting = active & any_of(carried.contact) & attempt.finite
+    fastest = jnp.where(attempt.released, 0.0, attempt.fastest)
+    struck, crowded = _struck(carried, attempt)
+    return LoopState(
+        t=jnp.where(good, attempt.t, carried.t),
+        x=select(good, attempt.x, select(waiting, attempt.guess, carried.x)),
+        contact=select(good, attempt.contact, carried.contact),
+        jets=tuple(
+            Jet(*select(good, new, old))
+            for new, old in zip(attempt.jets, carried.jets, strict=True)
+        ),
+        # a length that is a physical time keeps its derivative
+        step=jnp.where(fixed, trial, stop_gradient(trial)),
+        longest=stop_gradient(jnp.where(active, longest, carried.longest)),
+        completing=jnp.where(good, attempt.begins, carried.completing),
+        locating=attempt.locates & active,
+        stops=carried.stops + jnp.where(attempt.stopped, 1.0, 0.0),
+        fastest=stop_gradient(jnp.where(good, fastest, carried.fastest)),
+        scale=tuple(
+            stop_gradient(jnp.where(good, jnp.maximum(s, jnp.abs(j.gap)), s))
+            for s, j in zip(carried.scale, attempt.jets, strict=True)
+        ),
+        blur=tuple(map(stop_gradient, select(good, attempt.blur, carried.blur))),
+        held=tuple(map(stop_gradient, select(good, attempt.held, carried.held))),
+        struck=struck,
+        crowded=crowded,
+        origin=carried.origin,
+        extents=moved_extents(carried.extents, carried.origin, attempt),
+        ramp=stop_gradient(jnp.where(good, 6.0 * carried.ramp, carried.ramp)),
+        failures=failures,
+        status=_status(plan, carried, attempt, failures, crowded),
+        steps=carried.steps + jnp.where(active, 1.0, 0.0),
+        impacts=carried.impacts + jnp.where(good & attempt.lands, 1.0, 0.0),
+        chatters=carried.chatters + jnp.where(good & attempt.begins, 1.0, 0.0),
+    )
+
+
+def _longest(plan, carried, attempt):
+    """The longest step that the error allows; short steps say little about it."""
+    h, effort = attempt.length, attempt.effort
+    # single precision is plenty for choosing a step, and much cheaper
+    rough = jnp.asarray(jnp.clip(effort, 1e-12, 1e12), dtype=jnp.float32)
+    rough = jnp.exp2(jnp.log2(rough) * jnp.float32(-1.0 / plan.tableau.order))
+    factor = jnp.clip(0.9 * jnp.asarray(rough, dtype=jnp.float64), 0.2, 6.0)
+    factor = jnp.where(jnp.isfinite(effort), factor, 0.1)
+    # a much shorter step says nothing about the longest
+    grown = jnp.where(h < 0.5 * carried.longest, carried.longest, h * factor)
+    grown = jnp.where(
+        h < 0.999 * carried.longest, jnp.maximum(carried.longest, grown), grown
+    )
+    grown = jnp.where(any_of(carried.contact) & (effort == 0.0), carried.longest, grown)
+    # nor does an error that is rounding
+    blind = says_nothing(effort, plan.tolerance)
+    most = jnp.maximum(carried.longest, plan.unseen_step)
+    grown = jnp.where(blind, jnp.minimum(grown, most), grown)
+    failed = jnp.where(attempt.fits, carried.longest, h * factor)
+    longest = jnp.where(attempt.good, grown, failed)
+    return jnp.minimum(jnp.minimum(longest, plan.longest_step), plan.t1 - carried.t + h)
+
+
+def _next_length(plan, carried, attempt, longest):
+    """To the next contact or release, if it is nearer than the error allows."""
+    ahead = jnp.minimum(longest, 6.0 * carried.ramp)
+    good, h = attempt.good, attempt.length
+    # the step that completes a chatter did not follow the motion
+    whole = (h > 0) & ~carried.completing
+    inverse = jnp.where(whole, 1.0, 0.0) / jnp.where(whole, h, 1.0)
+    for k, (jet, contact) in enumerate(zip(attempt.jets, attempt.contact, strict=True)):
+        ends = carried.jets[k], attempt.arrived[k]
+        flight = time_to_contact(jet, end_curvature(*ends, inverse))
+        held = jnp.minimum(time_to_release(*ends, inverse), plan.longest_step)
+        # one that was so close and did not let go only touches zero
+        held = jnp.maximum(held, CLOSE * longest)
+        limit = jnp.where(contact, held, jnp.where(flight > 0, flight, jnp.inf))
+        ahead = jnp.minimum(ahead, limit)
+    again = jnp.where(attempt.fits, jnp.minimum(attempt.shorter, h), longest)
+    again = jnp.where(attempt.settling, h, again)
+    again = jnp.where(attempt.finite, again, 0.25 * h)
+    trial = jnp.where(good, ahead, again)
+    known = (good & attempt.begins) | attempt.locates
+    trial = jnp.where(known, attempt.fixed, trial)
+    return jnp.where(carried.completing & ~good, carried.step, trial)
+
+
+def _struck(carried, attempt):
+    """When each of several constraints was hit last, and how many hops are hidden."""
+    if not carried.struck:
+        return carried.struck, carried.crowded
+    struck = tuple(
+        jax.lax.stop_gradient(jnp.where(attempt.good & now, attempt.t, before))
+        for now, before in zip(attempt.hit, carried.struck, strict=True)
+    )
+    (crowded,) = carried.crowded
+    more = jnp.where(attempt.hidden, crowded + 1.0, 0.0)
+    return struck, (jnp.where(attempt.good & attempt.lands, more, crowded),)
+
+
+def _together(carried):
+    """Whether two constraints were hit within a vanishing part of a natural step."""
+    room = _TOGETHER * carried.longest
+    recent = [jnp.where(carried.t - t <= room, 1.0, 0.0) for t in carried.struck]
+    return sum(recent) > 1
+
+
+def _status(plan, carried, attempt, failures, crowded):
+    bad = ~attempt.finite | ~jnp.isfinite(attempt.effort)
+    reached = attempt.stopped & (attempt.t >= plan.t1)
+    gave_up = jnp.where(bad, NOT_FINITE, STEP_FAILED)
+    status = jnp.where(failures > _PATIENCE, gave_up, carried.status)
+    if carried.struck:
+        stuck = (failures > _PATIENCE) | (crowded[0] > _PATIENCE)
+        status = jnp.where(stuck & ~bad & _together(carried), TOGETHER, status)
+    status = jnp.where(reached, FINISHED, status)
+    return jnp.where(carried.status == RUNNING, status, carried.status)

@@ -1,0 +1,101 @@
+"""Judging a step of free flight: accept it, retake it shorter, or land."""
+
+from typing import Any, NamedTuple
+
+import jax.numpy as jnp
+
+from ._gap_polynomial import (
+    bernstein,
+    crossing,
+    Jet,
+    lowest,
+    lowest_point,
+    power_coefficients,
+    time_to_root,
+)
+
+
+# a landing is taken over by the Taylor series from this fraction of the step on: the
+# series then errs by its fourth power
+_CLOSE = 2e-3
+# and the gap is nearly a straight line there, so that its root is a short series
+_STRAIGHT = 4e-3
+# error of the gap's polynomial over the largest gap, up to which it is believed
+_TRUST = 0.02
+# over this part of the longest step a motion that leaves the surface does not return
+_SHORT = 1e-3
+
+
+class Verdict(NamedTuple):
+    """What became of a step; for one constraint, or the earliest of several."""
+
+    retake: Any
+    length: Any
+    lands: Any
+    offset: Any
+    constraint: Any
+
+
+def judge(left: Jet, right: Jet, h, slack, rounding, scale, room, longest) -> Verdict:
+    """Judge the step of one free constraint.
+
+    **Arguments:** the jets at both ends, the length of the step, the gap below zero
+    that is let pass, the gap that cannot be told from zero, the largest gap so far, the
+    time left to the next time that was asked for (an impact beyond it waits for a
+    later step), and the longest step that the error allows.
+    """
+    polynomial = bernstein(left, right, h)
+    inward = moves_in(right, rounding)
+    behind = (right.gap < -slack) | ((right.gap < 0) & inward)
+    # on the surface at the very start and moving, or pulled, in: no time passes
+    now = (left.gap <= 0) & moves_in(left, rounding) & (h == 0)
+    # a polynomial that errs by a part of the gap's own size says nothing; of a gap that
+    # has been closed so far, that size is rounding itself
+    size = jnp.maximum(scale, jnp.maximum(jnp.abs(left.gap), jnp.abs(right.gap)))
+    # a power of time from rest on the surface is as vague however short the step is
+    leaves = (left.gap == 0) & (left.velocity == 0) & (h <= _SHORT * longest)
+    leaves = leaves & (right.velocity > 0) & (right.acceleration > 0)
+    vague = (polynomial.error > _TRUST * size + rounding) & ~now & ~leaves
+    # judged by the straight line, since the series can vanish far from the root
+    distance = jnp.abs(right.gap)
+    speed = jnp.abs(right.velocity)
+    straight = distance * jnp.abs(right.acceleration) <= _STRAIGHT * speed * speed
+    close = (distance <= _CLOSE * h * speed) & straight
+    offset = jnp.where(close, time_to_root(right), 0.0)
+    offset = jnp.where(now, 0.0, offset)
+    near = (close | (distance <= rounding)) & (offset <= room)
+    dips = (lowest(polynomial) < -slack) & ~behind & ~now & ~leaves
+    lands = ((inward & near) | now) & ~dips & ~vague
+    retake = (behind & ~lands) | dips | vague
+    c = power_coefficients(left, right, h)
+    fraction = jnp.where(behind, crossing(c), lowest_point(polynomial, c))
+    fraction = jnp.where(vague, 0.5, fraction)
+    length = jnp.where(retake, fraction * h, jnp.inf)
+    return Verdict(retake, length, lands, offset, jnp.zeros_like(h))
+
+
+def moves_in(jet: Jet, rounding):
+    """Whether the motion at this instant goes, or is pulled, into the constraint.
+
+    A parabola that turns before it is below rounding only touches.
+    """
+    touches = (jet.acceleration > 0) & (
+        2 * jet.acceleration * (jet.gap + rounding) > jet.velocity**2
+    )
+    falls = (jet.velocity < 0) & ~touches
+    return falls | ((jet.velocity == 0) & (jet.acceleration < 0))
+
+
+def earliest(verdicts: list[Verdict]) -> Verdict:
+    """The verdict on the step as a whole: the first thing that happens in it."""
+    best = verdicts[0]
+    for k, v in enumerate(verdicts[1:], start=1):
+        sooner = v.lands & (~best.lands | (v.offset < best.offset))
+        best = Verdict(
+            best.retake | v.retake,
+            jnp.minimum(best.length, v.length),
+            best.lands | v.lands,
+            jnp.where(sooner, v.offset, best.offset),
+            jnp.where(sooner, float(k), best.constraint),
+        )
+    return best._replace(lands=best.lands & ~best.retake)

@@ -1,0 +1,302 @@
+"""The event loop: one iteration, one attempt at a step of whatever mode is in force.
+
+There is no loop within the loop. A step that crosses a constraint, or might have, is
+not accepted; the lane stays where it is and the next iteration tries a better length.
+Everything is arithmetic on scalars and selection, so that a batch of lanes, each in its
+own mode, advances together; lengths of steps carry no derivative, times of events do.
+"""
+
+from typing import Any, NamedTuple
+
+import jax.numpy as jnp
+
+from ..breakpoints import after
+from ..codes import Row, RUNNING
+from ._advance import after_attempt, Attempt, Plan
+from ._flight import earliest, judge, Verdict
+from ._functions import Functions
+from ._gap_polynomial import Jet
+from ._landing import land, Landing
+from ._loop_state import LoopState
+from ._release import judge_contact, lets_go_before
+from ._select import any_of, pick, select
+from ._series import off_rounding, taylor_of_release
+from ._step import End, end_of_step, make_step, Step
+
+
+class Record(NamedTuple):
+    """One row of the log."""
+
+    kind: Any
+    constraint: Any
+    t: Any
+    before: tuple
+    after: tuple
+    contact: tuple
+
+
+class Judged(NamedTuple):
+    """What became of the flights of a step."""
+
+    flown: Verdict
+    lands: Any
+    # whether the step is accepted, as far as its flights are concerned
+    good: Any
+    # whether it ends behind a constraint that is hit after a release
+    over: Any
+    # the length of a step that errors alone would allow
+    natural: Any
+    # largest gap that contact has held back; a gap that cannot be told from zero there
+    held: list
+    tiny: list
+
+
+def iterate(
+    functions: Functions, plan: Plan, carried: LoopState
+) -> tuple[LoopState, Record]:
+    """One attempt at a step."""
+    with functions.sharing():
+        return _iterate(functions, plan, carried)
+
+
+def _iterate(
+    functions: Functions, plan: Plan, carried: LoopState
+) -> tuple[LoopState, Record]:
+    active = carried.status == RUNNING
+    sticking = any_of(carried.contact)
+    rounding = [1e-15 * s + b for s, b in zip(carried.scale, carried.blur, strict=True)]
+    end = end_of_step(plan, carried, rounding)
+    made = make_step(functions, plan, carried, end)
+    judged = _judge_flights(plan, carried, end, made, rounding)
+    flown, lands = judged.flown, judged.lands
+    landing = land(functions, plan, carried, end, made, lands, flown, rounding)
+    chatter, begins = landing.chatter, landing.begins
+
+    # contact: the state is put on the surface a second time, then judged
+    settled = functions.onto(made.frame, landing.jets, landing.x, landing.contact)
+    near = [
+        jnp.abs(a - b) <= 1e-7 * (jnp.abs(a) + w)
+        for a, b, w in zip(settled, landing.x, made.scale, strict=True)
+    ]
+    converged = ~sticking | ~any_of([~n for n in near])
+    held = _judge_contacts(carried, end, landing, judged)
+    reached = held.lands & judged.good & ~lands & converged
+    released = reached & carried.locating
+    locates = reached & ~carried.locating
+    good = judged.good & ~locates
+    good = good & ~(held.retake & sticking & ~lands) & converged
+
+    # the state and the jets to go on with
+    delay = jnp.where(reached, held.offset, 0.0)
+    left = taylor_of_release(
+        functions, settled, made.rates, made.frame, landing.jets, delay, landing.contact
+    )
+    x, jets = off_rounding(
+        made.frame, landing.jets, landing.x, landing.hit, carried.extents
+    )
+    x = select(sticking & ~lands, left, x)
+    x = select(begins, chatter.state, x)
+    t = landing.t + delay
+    went = [released & (held.constraint == k) for k in range(functions.m)]
+    # who only touches zero still presses
+    pressing = sticking & good & ~lands & ~released & ~carried.completing
+    contact = tuple(
+        (landing.contact[k] | (begins & landing.hit[k])) & ~went[k] & active
+        for k in range(functions.m)
+    )
+    jets = _next_jets(carried, jets, landing, went, pressing, delay)
+    if plan.breaks:
+        # what goes on from a breakpoint is seen from its other side
+        passed = end.at_stop & (end.stop < end.asked) & good & ~lands & ~released
+        jets = _where_passed(functions, plan, passed, t, x, contact, jets)
+    finite = jnp.isfinite(sum(x) + t + sum(j.gap + j.velocity for j in jets))
+    good = good & finite
+    stopped = end.at_stop & (end.stop >= end.asked) & good & ~lands & ~released
+    attempt = Attempt(
+        t=t,
+        x=x,
+        contact=contact,
+        jets=jets,
+        arrived=tuple(made.jets),
+        tried=tuple(jnp.abs(b - a) for a, b in zip(carried.x, made.raw, strict=True)),
+        length=end.length,
+        effort=made.effort,
+        good=good,
+        fits=made.effort <= 1.0,
+        finite=finite,
+        shorter=_shorter(functions, end, judged, held, converged),
+        # algebraic contact may start its next attempt from here
+        guess=left if functions.planar else carried.x,
+        settling=~converged & functions.planar,
+        stopped=stopped,
+        lands=lands,
+        hit=landing.hit,
+        hidden=landing.hidden,
+        begins=begins,
+        locates=locates,
+        released=released,
+        fastest=landing.fastest,
+        fixed=jnp.where(locates, end.length + delay, chatter.duration),
+        blur=functions.blur(landing.seen, landing.x, carried.extents),
+        held=tuple(
+            jnp.where(c, new, old)
+            for c, new, old in zip(
+                carried.contact, judged.held, carried.held, strict=True
+            )
+        ),
+    )
+    kind = _kind(carried, lands, begins, released, stopped)
+    record = Record(
+        kind=jnp.where(good & active, kind, float(Row.NOTHING)),
+        constraint=jnp.where(released, held.constraint, flown.constraint),
+        t=t,
+        before=select(lands, landing.impact.before, x),
+        after=select(begins, landing.impact.after, x),
+        contact=contact,
+    )
+    return after_attempt(plan, carried, attempt), record
+
+
+def _judge_flights(
+    plan: Plan, carried: LoopState, end: End, made: Step, rounding
+) -> Judged:
+    """What happened to the gaps that are open."""
+    h, jets = end.length, made.jets
+    slack = [2e-12 * s + b for s, b in zip(carried.scale, carried.blur, strict=True)]
+    flown = earliest(
+        [
+            _where_in_force(
+                ~carried.contact[k],
+                judge(
+                    carried.jets[k],
+                    jet,
+                    h,
+                    slack[k],
+                    rounding[k],
+                    carried.scale[k],
+                    end.room,
+                    carried.longest,
+                ),
+            )
+            for k, jet in enumerate(jets)
+        ]
+    )
+    natural = jnp.minimum(carried.longest, plan.longest_step)
+    # what the multipliers held back counts as gap: rounding is a part of it
+    held = [
+        jnp.maximum(s, natural * natural * jnp.abs(j.acceleration))
+        for s, j in zip(carried.held, carried.jets, strict=True)
+    ]
+    tiny = [r + 1e-15 * s for r, s in zip(rounding, held, strict=True)]
+    fits = made.effort <= 1.0
+    active = carried.status == RUNNING
+    waits = _waits_for_release(carried, jets, flown, natural, tiny)
+    lands = flown.lands & fits & active & ~waits
+    # the step to a release does not end behind the constraint hit after it
+    behind = pick([j.gap for j in jets], flown.constraint)
+    over = waits & (behind < -pick(slack, flown.constraint))
+    good = fits & ~flown.retake & ~over & active
+    return Judged(flown, lands, good, over, natural, held, tiny)
+
+
+def _judge_contacts(
+    carried: LoopState, end: End, landing: Landing, judged: Judged
+) -> Verdict:
+    """What happened to the gaps that are closed."""
+    return earliest(
+        [
+            _where_in_force(
+                carried.contact[k],
+                judge_contact(
+                    carried.jets[k],
+                    jet,
+                    end.length,
+                    judged.natural,
+                    judged.tiny[k],
+                    end.room,
+                    carried.completing,
+                    carried.locating,
+                ),
+            )
+            for k, jet in enumerate(landing.jets)
+        ]
+    )
+
+
+def _shorter(functions, end: End, judged: Judged, held: Verdict, converged):
+    """The length to try instead, where the step is not accepted."""
+    shorter = jnp.minimum(judged.flown.length, held.length)
+    to_impact = jnp.minimum(shorter, end.length + judged.flown.offset)
+    shorter = jnp.where(judged.over, to_impact, shorter)
+    if functions.planar:
+        return shorter
+    return jnp.where(converged, shorter, 0.5 * end.length)
+
+
+def _kind(carried, lands, begins, released, stopped):
+    """What an accepted attempt is in the log: see `Row`."""
+    kind = jnp.where(stopped, float(Row.STOP), float(Row.STEP))
+    kind = jnp.where(carried.completing, float(Row.CONTACT), kind)
+    kind = jnp.where(released, float(Row.RELEASE), kind)
+    impact = jnp.where(begins, float(Row.LAST_IMPACT), float(Row.IMPACT))
+    return jnp.where(lands, impact, kind)
+
+
+def _next_jets(carried, jets, landing: Landing, went, pressing, delay):
+    """The jets to go on with: what contact has decided, rounding must not undo.
+
+    On the surface the gap is zero, at a release velocity is too, and the acceleration
+    does not press; a chatter that completes goes on with the acceleration of its end.
+    """
+    hit, chatter, after = landing.hit, landing.chatter, []
+    for k, jet in enumerate(jets):
+        ends = landing.begins & hit[k]
+        held = jnp.where(
+            pressing & carried.contact[k],
+            jnp.minimum(jet.acceleration, 0.0),
+            jet.acceleration,
+        )
+        acceleration = jnp.where(ends, chatter.acceleration, held)
+        after.append(
+            Jet(
+                jnp.where(went[k] | hit[k], 0.0, jet.gap),
+                jnp.where(went[k], 0.0, jet.velocity),
+                jnp.where(
+                    went[k],
+                    jnp.maximum(jet.acceleration + delay * jet.jerk, 0.0),
+                    acceleration,
+                ),
+                jnp.where(ends, chatter.rate, jet.jerk),
+            )
+        )
+    return tuple(after)
+
+
+def _waits_for_release(carried, jets, flown, natural, tiny):
+    """Whether a contact lets go before the impact that a step has found.
+
+    The impact is logged after the release.
+    """
+    if len(jets) == 1:
+        return jnp.asarray(False)
+    lets_go = [
+        c & lets_go_before(jet, flown.offset, natural, least)
+        for c, jet, least in zip(carried.contact, jets, tiny, strict=True)
+    ]
+    return flown.lands & any_of(lets_go) & ~carried.completing
+
+
+def _where_passed(functions, plan, passed, t, x, contact, jets):
+    """The jets on the far side of a breakpoint, where one was passed."""
+    fresh = functions.jets(after(t, plan.t1 - plan.t0), x, contact)
+    return tuple(
+        Jet(*select(passed, new, old)) for new, old in zip(fresh, jets, strict=True)
+    )
+
+
+def _where_in_force(condition, verdict):
+    return verdict._replace(
+        retake=verdict.retake & condition,
+        length=jnp.where(condition, verdict.length, jnp.inf),
+        lands=verdict.lands & condition,
+    )

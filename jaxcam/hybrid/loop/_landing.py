@@ -1,0 +1,110 @@
+"""An impact at the end of a step, and whether the rest of its sequence may follow."""
+
+from typing import Any, NamedTuple
+
+import jax.numpy as jnp
+
+from ._advance import Plan
+from ._flight import Verdict
+from ._functions import Functions
+from ._loop_state import LoopState
+from ._rest_of_chatter import Impact, Rest, rest_of_chatter
+from ._select import pick, select
+from ._series import taylor
+from ._step import End, seen_from_inside, Step
+
+
+class Landing(NamedTuple):
+    """The end of a step, with the impact there if it lands."""
+
+    t: Any
+    # the time as functions are evaluated at it
+    seen: Any
+    x: tuple
+    contact: tuple
+    jets: list
+    # which constraint was hit
+    hit: list
+    impact: Impact
+    chatter: Rest
+    # whether the rest of the chatter is summed up from here
+    begins: Any
+    fastest: Any
+    # whether rounding hides the hop that follows, or the one before
+    hidden: Any
+
+
+def land(
+    functions: Functions,
+    plan: Plan,
+    carried: LoopState,
+    end: End,
+    made: Step,
+    lands,
+    flown: Verdict,
+    rounding,
+) -> Landing:
+    """The state after the impact if the step `lands`, at its end if not."""
+    offset = jnp.where(lands, flown.offset, 0.0)
+    landed = taylor(made.x, made.rates, offset)
+    t = end.t + offset
+    seen = seen_from_inside(plan, end)(t)
+    after_each = functions.impact(seen, landed)
+    after = after_each[0]
+    for k in range(1, functions.m):
+        after = select(flown.constraint == k, after_each[k], after)
+    approach = pick(
+        [
+            j.velocity + offset * (j.acceleration + offset * j.jerk / 2)
+            for j in made.jets
+        ],
+        flown.constraint,
+    )
+    x = select(lands, after, made.x)
+    contact = _kept_contacts(functions, carried, lands, seen, landed, x)
+    jets = functions.jets(seen, x, contact)
+
+    # does the rest of the impacts follow in no time?
+    hit = [lands & (flown.constraint == k) for k in range(functions.m)]
+    rebound = jnp.maximum(pick([j.velocity for j in jets], flown.constraint), 0.0)
+    fastest = jnp.where(lands, jnp.maximum(carried.fastest, rebound), carried.fastest)
+    impact = Impact(t, landed, after, approach, rebound, flown.constraint)
+    chatter = rest_of_chatter(functions, plan, impact, jets, contact, end.stop)
+    # deep enough into the sequence, or so low that rounding hides the next hop
+    pulled = jnp.abs(pick([j.acceleration for j in jets], flown.constraint))
+    deep = rebound <= plan.depth * fastest
+    # a hop is v^2 / 2a high: hidden below 250 times the rounding
+    low = 500 * pick(carried.blur, flown.constraint)
+    begins = lands & chatter.possible & (deep | (rebound * rebound <= low * pulled))
+    hidden = _hides(carried, t, impact, pulled, pick(rounding, flown.constraint))
+    return Landing(
+        t, seen, x, contact, jets, hit, impact, chatter, begins, fastest, hidden
+    )
+
+
+def _kept_contacts(functions, carried, lands, t, before, after):
+    """An impact on one constraint may throw the system off another it rests on.
+
+    That is, it changes the normal velocity there by more than rounding.
+    """
+    if functions.m == 1:
+        return carried.contact
+    speeds = functions.velocity(t, before), functions.velocity(t, after)
+    rounding = functions.speed_blur(t, before), functions.speed_blur(t, after)
+    return tuple(
+        c & (~lands | (jnp.abs(new - old) <= 500 * (a + b)))
+        for c, old, new, a, b in zip(carried.contact, *speeds, *rounding, strict=True)
+    )
+
+
+def _hides(carried, t, impact, pulled, rounding):
+    """Whether rounding hides the hop after an impact, or the one before it.
+
+    The one after it is v^2 / 2a high; where nothing pulls, the one before it was no
+    higher than its end is fast and its duration long.
+    """
+    after = impact.rebound * impact.rebound <= 500 * rounding * pulled
+    if not carried.struck:
+        return after
+    since = t - pick(carried.struck, impact.constraint)
+    return after | (-impact.approach * since <= 500 * rounding)

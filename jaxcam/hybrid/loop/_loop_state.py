@@ -1,0 +1,138 @@
+"""What one trajectory carries from one iteration of the loop to the next."""
+
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+
+from ..codes import RUNNING
+from ..surface import forced_time, start_room
+from ._functions import Functions
+from ._gap_polynomial import Jet
+from ._scale import first_extents, first_step
+from ._select import any_of, select
+from ._start import first_status
+
+
+class LoopState(NamedTuple):
+    """All scalars, so that a batch of lanes is a set of plain vectors."""
+
+    t: Any
+    x: tuple
+    contact: tuple
+    jets: tuple
+    # the next step to try, and the longest one that the error allows
+    step: Any
+    longest: Any
+    # the end of this step is an accumulation of impacts, or a release: not a choice
+    completing: Any
+    locating: Any
+    stops: Any
+    # fastest rebound since the last release; largest gap of each constraint
+    fastest: Any
+    scale: tuple
+    # what rounding can tell of each gap
+    blur: tuple
+    # largest gap that contact has held back: the multiplier over a natural step
+    held: tuple
+    # of several constraints, when each was hit last, and how many impacts in a row have
+    # led to hops that rounding hides
+    struck: tuple
+    crowded: tuple
+    # where each component started, and how far it has been from there: see `_scale.py`
+    origin: tuple
+    extents: tuple
+    # the steps after the start are no longer than this
+    ramp: Any
+    failures: Any
+    # a code of `codes.py`
+    status: Any
+    steps: Any
+    impacts: Any
+    # impacts after which the rest of a chatter was summed
+    chatters: Any
+
+
+def first_state(
+    functions: Functions, t0, x, t1, longest=jnp.inf, period=jnp.inf
+) -> LoopState:
+    """The first loop state, in contact where gap and velocity are zero and a < 0.
+
+    Where there is no force to say, contact is taken: it ends as soon as one pulls.
+    A start that is refused is one of NaN. `longest` is the longest step (s) that is
+    allowed, and `period` that of the forcing.
+    """
+    free = tuple(jnp.asarray(False) for _ in range(functions.m))
+    jets = functions.jets(t0, x, free)
+    lifts = functions.lift(t0, x)
+    blurs = functions.blur(t0, x, (0.0,) * functions.n), functions.speed_blur(t0, x)
+    time = forced_time(period)
+    tinies, slows = (
+        [start_room(b, j.acceleration, s) for b, j in zip(each, jets, strict=True)]
+        for each, s in zip(blurs, (time * time, time), strict=True)
+    )
+    status = first_status(t0, x, t1, [jet.gap for jet in jets], tinies)
+    origin, extents = first_extents(lifts, jets, tinies, x)
+    contact, settled = [], []
+    for jet, lift, tiny, slow in zip(jets, lifts, tinies, slows, strict=True):
+        gap, velocity = jet.gap, jet.velocity
+        near = jnp.abs(gap) <= tiny
+        # a hop so low that rounding hides it is none, nor an impact that leads to one
+        hop = tiny * jnp.abs(jet.acceleration)
+        low = (jet.acceleration < 0) & (velocity * velocity <= hop)
+        touching = near & ((jnp.abs(velocity) <= slow) | low)
+        contact.append(touching & _presses(jet, tiny) & (status == RUNNING))
+        # off the surface a start is taken as it is; on it, rounding is removed
+        behind = near & (gap < 0)
+        shift = jax.lax.stop_gradient(jnp.where(behind, gap, 0.0))
+        x = tuple(a - shift * b for a, b in zip(x, lift, strict=True))
+        settled.append(
+            Jet(
+                jnp.where(touching | behind, 0.0, gap),
+                jnp.where(touching, 0.0, jet.velocity),
+                jet.acceleration,
+                jet.jerk,
+            )
+        )
+    longest = jnp.minimum((t1 - t0) / 64, longest)
+    # in contact the error of a step may say nothing, and its length is looked after
+    held = any_of(contact)
+    rates = functions.taylor(t0, x, contact)
+    first = jnp.where(held, longest, first_step(extents, rates, t0, longest))
+    x = select(status == RUNNING, x, (jnp.nan,) * len(x))
+    one = jnp.ones_like(t0)
+    return LoopState(
+        t=t0,
+        x=x,
+        contact=tuple(contact),
+        jets=tuple(settled),
+        step=first,
+        longest=longest * one,
+        completing=jnp.asarray(False),
+        locating=jnp.asarray(False),
+        stops=0.0 * one,
+        fastest=0.0 * one,
+        scale=tuple(jnp.abs(j.gap) for j in settled),
+        blur=tuple(map(jax.lax.stop_gradient, functions.blur(t0, x, extents))),
+        held=(0.0 * one,) * functions.m,
+        struck=(-jnp.inf * one,) * functions.m if functions.m > 1 else (),
+        crowded=(0.0 * one,) if functions.m > 1 else (),
+        origin=origin,
+        extents=extents,
+        ramp=first,
+        failures=0.0 * one,
+        status=status,
+        steps=0.0 * one,
+        impacts=0.0 * one,
+        chatters=0.0 * one,
+    )
+
+
+def _presses(jet: Jet, tiny):
+    """Whether a constraint that is touched without velocity presses, or is about to.
+
+    A hop under acceleration and jerk that is no higher than `tiny`, 2 a^3 / (3 j^2), is
+    none.
+    """
+    a, j = jet.acceleration, jet.jerk
+    return (a < 0) | ((j <= 0) & (2 * a * a * a <= 3 * tiny * j * j))

@@ -1,0 +1,95 @@
+"""Judging a step of contact: it goes on, or the constraint lets go."""
+
+import jax.numpy as jnp
+
+from ._flight import Verdict
+from ._gap_polynomial import end_curvature, Jet
+
+
+# a release is located by retaking the step until this fraction of a natural step
+# remains, over which the multiplier is a parabola
+CLOSE = 1e-7
+
+
+def judge_contact(
+    left: Jet, right: Jet, h, scale, rounding, room, completing, locating
+) -> Verdict:
+    """Judge the step of one constraint in contact.
+
+    The multiplier (the acceleration a that contact suppresses) is negative while the
+    constraint presses. Inside the step it is the cubic through values and rates at
+    both ends, trusted up to what the trapezoidal rule misses. `scale` is the length of
+    a step that errors alone would allow, `rounding` the gap that cannot be told from
+    zero. A step ends at an accumulation of impacts where `completing`, and at a release
+    that is known to be near where `locating`.
+    """
+    a0, a1 = left.acceleration, right.acceleration
+    s0, s1 = h * left.jerk, h * right.jerk
+    trust = jnp.abs(a1 - a0 - (s0 + s1) / 2)
+    # a pull so weak that it opens no gap in the step is none
+    first = a0 + s0 * (1 / 3)
+    highest = jnp.maximum(first, a1 - s1 * (1 / 3)) + trust
+    inside = (highest > 0) & (highest * h * h > rounding)
+    rises = right.jerk > 0
+    pulls = opens(right, scale, rounding)
+    passed = (a1 > 0) & pulls
+    slope = jnp.where(rises, right.jerk, 1.0)
+    straight = -a1 / slope
+    inverse = jnp.where(h > 0, 1.0, 0.0) / jnp.where(h > 0, h, 1.0)
+    curvature = end_curvature(left, right, inverse)
+    bend = straight * curvature / (2 * slope)
+    # so small over the short time left that the first correction is enough
+    offset = straight * (1 - jnp.where(jnp.abs(bend) < 0.01, bend, 0.0))
+    near = rises & pulls & (jnp.abs(offset) <= CLOSE * scale)
+    # the zero of a multiplier that has none of its rates there is only enclosed
+    enclosed = passed & (h <= CLOSE * scale)
+    # a multiplier that only touches zero: no hop would come out of rounding. Its rate
+    # falls by a half at least, which rounding cannot make it do over a short step
+    falls = (left.jerk > 0) & (2 * right.jerk <= left.jerk) & (h > 0)
+    curved = jnp.where(falls, (left.jerk - right.jerk) * inverse, 1.0)
+    peak = a1 + right.jerk**2 / (2 * curved)
+    touches = falls & (8 * peak**2 <= rounding * curved)
+    # one that rises on after an inflection does not only touch
+    touches = touches & ~(passed & (curvature > 0) & (a1 * h * h > rounding))
+    # it may have let go before the zero at the end of the step
+    early = (a0 < 0) & (first > 0)
+    lets_go = near & (locating | (~touches & ~early & (offset <= room)))
+    lets_go = (lets_go | (enclosed & ~touches)) & ~completing
+    # short of its end a step that only might have let go is halved
+    suspect = inside & ~passed & ((a0 < 0) | (s0 > 0))
+    retake = (passed | suspect) & ~lets_go & ~touches & ~completing
+    share = jnp.where(passed, _root(a0, s0, a1, s1), 0.5)
+    share = jnp.where(early, jnp.minimum(share, 0.5), share)
+    length = jnp.where(retake, h * share, jnp.inf)
+    offset = jnp.where(near & (h > 0), offset, 0.0)
+    return Verdict(retake, length, lets_go, offset, jnp.zeros_like(h))
+
+
+def opens(jet: Jet, scale, rounding):
+    """Whether a multiplier that goes on like this opens a gap in a natural step.
+
+    One that is zero but for rounding does not.
+    """
+    rise = jnp.maximum(jet.jerk, 0.0)
+    pull = jnp.maximum(jet.acceleration, 0.0) + rise * (scale / 3)
+    return pull * scale * scale > 2 * rounding
+
+
+def lets_go_before(jet: Jet, offset, scale, rounding):
+    """Whether a multiplier rises through zero before the impact `offset` (s) later."""
+    at_impact = jet.acceleration + offset * jet.jerk
+    return (jet.jerk > 0) & (at_impact > 0) & opens(jet, scale, rounding)
+
+
+def _root(a0, s0, a1, s1):
+    """Where in (0, 1) the cubic rises through zero; from the chord, by Newton."""
+    rise = a1 - a0
+    c2 = 3 * rise - 2 * s0 - s1
+    c3 = s0 + s1 - 2 * rise
+    s = -a0 / jnp.where(rise == 0, 1.0, rise)
+    for _ in range(2):
+        value = a0 + s * (s0 + s * (c2 + s * c3))
+        slope = s0 + s * (2 * c2 + 3 * s * c3)
+        s = jnp.clip(s - value / jnp.where(slope > 0, slope, jnp.inf), 0.02, 1.0)
+    # from where the cubic is flat Newton may leave the step
+    return jnp.where(s < 1.0, s, 0.5)

@@ -1,0 +1,66 @@
+"""Whether the rest of a chatter may follow an impact in no time, and where it ends."""
+
+from typing import Any, NamedTuple
+
+import jax.numpy as jnp
+
+from ..surface import completion_time
+from ._select import pick, select
+
+
+class Rest(NamedTuple):
+    """The rest of a chatter, as if it began with this impact."""
+
+    possible: Any
+    duration: Any
+    state: tuple
+    acceleration: Any
+    rate: Any
+
+
+class Impact(NamedTuple):
+    """An impact: scalars, and states as tuples of them."""
+
+    t: Any
+    before: tuple
+    after: tuple
+    # normal velocity before it, negative, and after it
+    approach: Any
+    rebound: Any
+    constraint: Any
+
+
+def rest_of_chatter(functions, plan, impact: Impact, jets, contact, stop) -> Rest:
+    """The completion of the sequence after an impact, and whether it may be used.
+
+    **Arguments:** the `jets` of all gaps after the impact, the constraints in `contact`
+    then, and where the run has to `stop` (s).
+    """
+    t, before, after, approach, rebound, constraint = impact
+    dampings, restitutions, states = functions.chatter(t, before, after)
+    damping = pick(dampings, constraint)
+    r0 = pick(restitutions, constraint)
+    state = states[0]
+    for k in range(1, functions.m):
+        state = select(constraint == k, states[k], state)
+    a = pick([j.acceleration for j in jets], constraint)
+    j = pick([j.jerk for j in jets], constraint)
+    small = rebound * jnp.abs(j) <= plan.smallness * (1 - r0) * a * a
+    possible = (a < 0) & small & (r0 < 1)
+    # quantities of the state without normal velocity
+    a = jnp.where(possible, a - damping * rebound, -1.0)
+    rate = j - damping * a
+    r0 = jnp.where(possible, r0, 0.0)
+    incoming = jnp.where(approach < 0, -approach, 1.0)
+    inverse = 1 / incoming
+    softening = (rebound * inverse - r0) * inverse
+    duration = completion_time(rebound, a, rate, damping, r0, softening)
+    at_end = a + rate * duration
+    soon = (t + duration <= stop) | (duration <= 1e-13 * jnp.abs(t))
+    possible = possible & (a < 0) & (at_end < 0) & soon
+    for k, jet in enumerate(jets if functions.m > 1 else ()):
+        # no other gap closes meanwhile; over so short a time it is a parabola
+        left = jet.gap + duration * (jet.velocity + duration * jet.acceleration / 2)
+        clear = (constraint == k) | contact[k] | (left > 0)
+        possible = possible & clear
+    return Rest(possible, duration, state, a, rate)

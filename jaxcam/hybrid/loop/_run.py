@@ -1,0 +1,204 @@
+"""Running the loop: a batch-friendly while loop, or a scan that can be transposed."""
+
+from collections.abc import Callable
+from typing import Literal, NamedTuple
+
+import equinox.internal as eqxi
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ..codes import Row, RUNNING
+from ..lowering import depend_on, one_kernel, with_kept
+from ._advance import Plan
+from ._functions import Functions
+from ._iterate import iterate, Record
+from ._loop_state import LoopState
+
+
+# iterations before it is asked whether any lane still runs, and between two writes to
+# the log, which under vmap are costly
+_BLOCK = 16
+
+
+class Log(NamedTuple):
+    """One row an iteration; rows of kind `Row.NOTHING` are failed attempts."""
+
+    kind: Float[Array, " rows"]
+    constraint: Float[Array, " rows"]
+    t: Float[Array, " rows"]
+    before: Float[Array, "rows n"]
+    after: Float[Array, "rows n"]
+    contact: Float[Array, "rows m"]
+
+
+#: how many lanes `vmap` will run together: no `vmap` at all, or a few
+Company = Literal["one", "few"]
+
+
+def run(
+    functions: Functions,
+    plan: Plan,
+    carried: LoopState,
+    rows: int,
+    company: Company = "few",
+) -> tuple[LoopState, Log]:
+    """Iterate until the run has finished or the log is full.
+
+    Forward mode only. Under `vmap` the iterations are shared by all lanes, so that one
+    row of the log is written for all of them at once.
+    """
+    carried, log = run_raw(functions, plan, carried, rows, _row, company)
+    return carried, _unpack(log, functions)
+
+
+def run_raw(
+    functions: Functions,
+    plan: Plan,
+    carried: LoopState,
+    rows: int,
+    row,
+    company: Company = "few",
+):
+    """`run` with a log of what `row(record, state)` makes of each attempt: scalars.
+
+    It is compiled in the way that is best in this `company`.
+    """
+    carried = jax.tree.map(jnp.asarray, carried)
+
+    def body(carried):
+        carried, record = iterate(functions, plan, carried)
+        return carried, jnp.stack(row(record, carried))
+
+    # scalars of one run are never computed twice, and to keep them costs compile time
+    alone = company == "one"
+    keeping, kept = with_kept(body, carried, on=not (functions.plain or alone))
+    width = len(row(_empty_record(functions.n, functions.m), carried))
+    blocks = -(-rows // _BLOCK)
+
+    def unfinished(carry):
+        count, (carried, _), _ = carry
+        return (count < blocks) & eqxi.unvmap_any(carried.status == RUNNING)
+
+    def several(carry):
+        count, state, log = carry
+        state, some = jax.lax.scan(lambda s, _: keeping(s), state, None, length=_BLOCK)
+        start = (count * _BLOCK, jnp.zeros_like(count))
+        return count + 1, state, jax.lax.dynamic_update_slice(log, some, start)
+
+    def loop(state):
+        # made here: the kernel keeps what it is given
+        log = jnp.zeros((blocks * _BLOCK, width))
+        start = (jnp.asarray(0, jnp.int32), state, log)
+        _, last, log = jax.lax.while_loop(unfinished, several, start)
+        return last, log
+
+    last, log = one_kernel(loop, on=not functions.plain)((carried, kept))
+    carried, kept = last
+    return carried._replace(steps=depend_on(carried.steps, kept)), log
+
+
+def attempts(functions: Functions, plan: Plan, carried: LoopState, row):
+    """A block of attempts of one run, to be mapped over many.
+
+    **Returns:** the lane, and of each number in `row` an array, one for each attempt.
+    """
+
+    def body(carried):
+        carried, record = iterate(functions, plan, carried)
+        return carried, tuple(row(record, carried))
+
+    keeping, kept = with_kept(body, carried, on=not functions.plain)
+    start = carried, kept
+    (carried, kept), log = jax.lax.scan(
+        lambda state, _: keeping(state), start, None, length=_BLOCK
+    )
+    return carried._replace(steps=depend_on(carried.steps, kept)), log
+
+
+def run_many(some: Callable, lanes: LoopState, rows: int, row):
+    """Iterate until no lane runs or the log is full.
+
+    **Arguments:** `some(lanes)`, the `attempts` of all lanes with the lanes last in the
+    log; the lanes, `(lanes,)` each; the rows of the log, and `row`.
+
+    **Returns:** the lanes and the log, `(rows, lanes)` for each number in a row.
+    """
+    # the log is written as it will lie: under `vmap` each write would move all of it
+    blocks, width = -(-rows // _BLOCK), len(lanes.status)
+    parts = row(_empty_record(len(lanes.x), len(lanes.jets)), lanes)
+    log = [jnp.zeros((blocks * _BLOCK, width)) for _ in parts]
+
+    def unfinished(carry):
+        count, lanes, _ = carry
+        return (count < blocks) & jnp.any(lanes.status == RUNNING)
+
+    def several(carry):
+        count, lanes, log = carry
+        lanes, made = some(lanes)
+        at = count * _BLOCK, jnp.zeros_like(count)
+        log = [
+            jax.lax.dynamic_update_slice(whole, part.astype(whole.dtype), at)
+            for whole, part in zip(log, made, strict=True)
+        ]
+        return count + 1, lanes, log
+
+    _, lanes, log = jax.lax.while_loop(
+        unfinished, several, (jnp.asarray(0, jnp.int32), lanes, log)
+    )
+    return lanes, log
+
+
+def run_reversible(
+    functions: Functions, plan: Plan, carried: LoopState, rows: int
+) -> tuple[LoopState, Log]:
+    """The same, always for `rows` iterations, for reverse-mode differentiation.
+
+    Blocks of iterations are recomputed on the way back, so that memory grows with the
+    square root of their number.
+    """
+    block = max(1, int(rows**0.5))
+    blocks = -(-rows // block)
+
+    def one(carried, _):
+        carried, record = iterate(functions, plan, carried)
+        return carried, jnp.stack(_row(record, carried))
+
+    @jax.checkpoint
+    def many(carried, _):
+        return jax.lax.scan(one, carried, None, length=block)
+
+    carried, log = jax.lax.scan(many, carried, None, length=blocks)
+    return carried, _unpack(log.reshape(blocks * block, -1), functions)
+
+
+def _empty_record(n: int, m: int) -> Record:
+    zero = 0.0
+    state = (zero,) * n
+    return Record(zero, zero, zero, state, state, (zero,) * m)
+
+
+def _row(record: Record, _: LoopState) -> list:
+    flags = [jnp.asarray(c, dtype=jnp.float64) for c in record.contact]
+    head = [record.kind, record.constraint, record.t]
+    return [jnp.asarray(v) for v in head] + [*record.before, *record.after, *flags]
+
+
+def _unpack(log, functions: Functions) -> Log:
+    n, m = functions.n, functions.m
+    return Log(
+        kind=log[:, 0],
+        constraint=log[:, 1],
+        t=log[:, 2],
+        before=log[:, 3 : 3 + n],
+        after=log[:, 3 + n : 3 + 2 * n],
+        contact=log[:, 3 + 2 * n : 3 + 2 * n + m],
+    )
+
+
+def kinds(log: Log, *wanted: Row):
+    """Which rows are of one of the kinds."""
+    mask = log.kind == float(wanted[0])
+    for w in wanted[1:]:
+        mask = mask | (log.kind == float(w))
+    return mask

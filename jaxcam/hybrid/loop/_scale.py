@@ -1,0 +1,149 @@
+"""How large a motion is: what its errors and its rounding are measured by.
+
+Nothing here has units of its own: in micrometres and milliseconds a motion is the same
+as in metres and seconds.
+"""
+
+import jax
+import jax.numpy as jnp
+
+from ._select import largest
+
+
+# an error below so many parts of a component's scale is rounding
+_ROUNDING = 1e-15
+# error allowed over the tolerance times the scale of the motion: a state of order one,
+# moving by as much, is then as accurate as with an absolute error of the tolerance
+_SHARE = 2.0
+# the first step over the time in which a component moves by its own scale
+_FIRST = 0.125
+
+
+def first_extents(lifts, jets, tinies, x) -> tuple[tuple, tuple]:
+    """Where components are measured from, and their scales before they have moved.
+
+    One that a gap depends on is measured from its start, and has the scale of that gap,
+    wherever the origin of its coordinate is; any other has its own size. With several
+    gaps the smallest counts. A gap below what can be told from zero (`tinies`) is zero.
+    """
+    origin, found = [], []
+    for i, component in enumerate(x):
+        own, least = jnp.abs(component), jnp.asarray(jnp.inf)
+        for lift, jet, tiny in zip(lifts, jets, tinies, strict=True):
+            # the gradient is lift / |lift|^2
+            square = sum(e * e for e in lift)
+            height, share = jnp.abs(jet.gap), jnp.abs(lift[i])
+            height = jnp.where(height <= tiny, 0.0, height)
+            seen = share > 0
+            # the part of the shortest way to the surface, and the way of it alone
+            alone = height * square / jnp.where(seen, share, 1.0)
+            near = jnp.clip(own, height * share, jnp.where(seen, alone, jnp.inf))
+            least = jnp.minimum(least, jnp.where(seen, near, jnp.inf))
+        seen = jnp.isfinite(least)
+        found.append(jnp.where(seen, least, own))
+        origin.append(jnp.where(seen, component, 0.0))
+    stop_gradient = jax.lax.stop_gradient
+    return tuple(map(stop_gradient, origin)), tuple(map(stop_gradient, found))
+
+
+def scales(extents, before, after, pairs, h, per_run) -> tuple:
+    """Scale of each component in a step: how far it has moved so far, or in the step.
+
+    Where a component is the rate of another (`pairs`: component to rate), it counts at
+    least what would move that one by its scale in the whole run, `per_run` being one
+    over its length (1/s); and the other at least what its rate moves it by in the
+    step of length `h` (s), as the rate's own error does.
+    """
+    found = [
+        jnp.maximum(e, jnp.abs(b - a))
+        for e, a, b in zip(extents, before, after, strict=True)
+    ]
+    for i, j in pairs.items():
+        found[j] = jnp.maximum(found[j], found[i] * per_run)
+        found[i] = found[i] + h * found[j]
+    return tuple(found)
+
+
+def held_scales(scale, carried, push, pairs, h) -> tuple:
+    """Scales of a step in contact: what the multipliers hold back counts as moved.
+
+    Bodies at rest under forces that balance move by the rounding of these forces, which
+    says nothing of how large their motion is. `push` are the directions in which the
+    multipliers act, the accelerations of the lane's jets; `pairs` as in `scales`.
+    """
+    found = list(scale)
+    for jet, held, direction in zip(carried.jets, carried.contact, push, strict=True):
+        speed = jnp.where(held, h * jnp.abs(jet.acceleration), 0.0)
+        for j, share in enumerate(direction):
+            found[j] = jnp.maximum(found[j], speed * jnp.abs(share))
+    for i, j in pairs.items():
+        found[i] = jnp.maximum(found[i], h * found[j])
+    return tuple(map(jax.lax.stop_gradient, found))
+
+
+def error_allowed(scale, before, after, tolerance, absolute) -> tuple:
+    """Error that a step may make in each component; below it is only rounding.
+
+    **Arguments:** scales, states at both ends, the relative tolerance, and what was
+    asked for instead of a share of the scale: a number for each component, or `None`.
+    """
+    sizes = [
+        jnp.maximum(jnp.abs(a), jnp.abs(b)) for a, b in zip(before, after, strict=True)
+    ]
+    if absolute is not None:
+        absolute = absolute * len(sizes) if len(absolute) == 1 else absolute
+        return tuple(a + tolerance * s for a, s in zip(absolute, sizes, strict=True))
+    return tuple(
+        jnp.maximum(_SHARE * tolerance * w, _ROUNDING * s)
+        for w, s in zip(scale, sizes, strict=True)
+    )
+
+
+def error_norm(error, allowed):
+    """Largest error of a step over the error allowed."""
+    return largest(
+        [
+            jnp.abs(e) / jnp.where(a > 0, a, 1.0)
+            for e, a in zip(error, allowed, strict=True)
+        ]
+    )
+
+
+def says_nothing(effort, tolerance):
+    """Whether the estimate of the error of a step is rounding, at this effort."""
+    return effort * tolerance <= _ROUNDING
+
+
+def moved_extents(extents, origin, attempt) -> tuple:
+    """The scales after an attempt: the furthest that a component was from its start.
+
+    One that has never moved takes its scale from the first attempt that moves it,
+    whatever becomes of it: relative to itself the error of a motion such as t^9 does
+    not fall with the step.
+    """
+    found = []
+    for e, start, there, tried in zip(
+        extents, origin, attempt.x, attempt.tried, strict=True
+    ):
+        new = jnp.maximum(e, jnp.abs(there - start))
+        first = jnp.where(attempt.finite & (e == 0), tried, e)
+        found.append(jax.lax.stop_gradient(jnp.where(attempt.good, new, first)))
+    return tuple(found)
+
+
+def first_step(extents, rates, t, longest):
+    """Length of the first step from `t` (s): a part of the time in which all changes.
+
+    The shortest in which a component moves by its scale, by any of its first three
+    `rates`; but the clock must move. (Hairer, Norsett and Wanner, Solving Ordinary
+    Differential Equations I, II.4, in a form without units)
+    """
+    length = longest
+    for order, rate in enumerate(rates, start=1):
+        for extent, r in zip(extents, rate, strict=True):
+            counts = (extent > 0) & (r != 0)
+            share = jnp.where(counts, extent, 1.0) / jnp.where(counts, jnp.abs(r), 1.0)
+            time = _FIRST * share ** (1.0 / order)
+            length = jnp.where(counts, jnp.minimum(length, time), length)
+    length = jnp.minimum(jnp.maximum(length, 1e-13 * jnp.abs(t)), longest)
+    return jax.lax.stop_gradient(length)

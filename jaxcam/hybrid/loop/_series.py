@@ -1,0 +1,62 @@
+"""The state over the short times at an event, by Taylor series."""
+
+import jax
+import jax.numpy as jnp
+
+
+def taylor(x, rates, tau):
+    """The state a time `tau` (s) after `x`, to third order, by its `rates`."""
+    first, second, third = rates
+    return tuple(
+        x[i] + tau * (first[i] + tau * (second[i] * 0.5 + tau * third[i] * (1 / 6)))
+        for i in range(len(x))
+    )
+
+
+def taylor_of_release(functions, x, rates, frame, jets, tau, contact):
+    """The sticking motion over the short time `tau` (s) to release, to second order.
+
+    `rates` of the free flight from `x`, its `frame` and `jets`, and what is in contact.
+    """
+    first, second, _ = rates
+    if not functions.planar:
+        return tuple(
+            x[i] + tau * (first[i] + tau * second[i] / 2) for i in range(len(x))
+        )
+    # F_s = F - a D: with a = 0 at release only its rate remains
+    a, rate = jets[0].acceleration, jets[0].jerk
+    push = frame.push[0]
+    return tuple(
+        jnp.where(
+            contact[0],
+            x[i]
+            + tau * (first[i] - a * push[i] + tau * (second[i] - rate * push[i]) / 2),
+            x[i],
+        )
+        for i in range(len(x))
+    )
+
+
+def off_rounding(frame, jets, x, hit, extents):
+    """The state after an impact without the gap that rounding left it, and its jets.
+
+    It would add up over the impacts of a chatter, whose last hops are lower than it. A
+    gap that hardly depends on the state is left: to mend it would move the state far.
+    The other gaps move along, and by more than their own rounding where the time is
+    late and the constraint that was hit moves.
+    """
+    jets = list(jets)
+    for k, (direction, here) in enumerate(zip(frame.lift, hit, strict=True)):
+        gap = jets[k].gap
+        for a, b, extent in zip(x, direction, extents, strict=True):
+            here = here & (jnp.abs(gap * b) <= 1e-6 * (jnp.abs(a) + extent))
+        gap = jax.lax.stop_gradient(jnp.where(here, gap, 0.0))
+        x = tuple(a - gap * b for a, b in zip(x, direction, strict=True))
+        for i, other in enumerate(frame.lift):
+            if i != k:
+                # the gradient is lift / |lift|^2
+                square = sum(b * b for b in other)
+                share = sum(a * b for a, b in zip(other, direction, strict=True))
+                moved = jets[i].gap - gap * share / square
+                jets[i] = jets[i]._replace(gap=moved)
+    return x, tuple(jets)

@@ -1,0 +1,25 @@
+"""Which starts are refused, whether a run is traced or not."""
+
+import jax.numpy as jnp
+
+from ..codes import BACKWARD, BEHIND, NOT_FINITE, RUNNING
+from ..surface import gaps, least_gaps
+from ._select import any_of
+
+
+def starts_behind(system, t, state):
+    """Whether a state is behind some constraint; also the gaps, shape `(m,)`."""
+    return jnp.any(least_gaps(system, t, state) < 0), gaps(system, t, state)
+
+
+def first_status(t0, x, t1, gaps, rooms):
+    """The status of a run at its start: `RUNNING`, or why it cannot start.
+
+    **Arguments:** times (s), the state, all gaps and what is not told from zero of them
+    (`start_room`) as tuples of scalars.
+    """
+    behind = any_of([gap + room < 0 for gap, room in zip(gaps, rooms, strict=True)])
+    finite = jnp.isfinite(sum(x) + sum(gaps) + t0 + t1)
+    status = jnp.where(behind, BEHIND, RUNNING)
+    status = jnp.where(finite, status, NOT_FINITE)
+    return jnp.where(t1 < t0, BACKWARD, status)

@@ -1,0 +1,107 @@
+"""One attempt at a step: where it ends, and the motion up to there."""
+
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+
+from ..breakpoints import between, neighbours
+from ..codes import RUNNING
+from ..runge_kutta import rates_among, step
+from ._advance import Plan
+from ._flight import moves_in
+from ._functions import Frame, Functions
+from ._loop_state import LoopState
+from ._scale import error_allowed, error_norm, held_scales, scales
+from ._select import any_of, select
+
+
+class End(NamedTuple):
+    """Where a step ends."""
+
+    length: Any
+    t: Any
+    # what must not be passed (s): a breakpoint, or a time that was asked for
+    stop: Any
+    asked: Any
+    # whether the step ends there, and how far it is from there else
+    at_stop: Any
+    room: Any
+    # the last breakpoint before the step, and the first after it
+    sides: tuple
+
+
+class Step(NamedTuple):
+    """A step that was made: what is known at its end."""
+
+    # the end as Runge-Kutta says, and put on the surfaces of contact
+    raw: tuple
+    x: tuple
+    # the gaps, and how states are put on the surface
+    jets: list
+    frame: Frame
+    # rates of the state, of first, second and third order
+    rates: tuple
+    # error over the error allowed; scale of each component
+    effort: Any
+    scale: tuple
+
+
+def end_of_step(plan: Plan, carried: LoopState, rounding) -> End:
+    """Where the next step ends; `rounding` is what cannot be told from a zero gap."""
+    asked = jnp.minimum(plan.t0 + (carried.stops + 1) * plan.stop_period, plan.t1)
+    sides = neighbours(plan.breaks, plan.repeat, carried.t)
+    stop = jnp.minimum(asked, sides[1])
+    # already in contact and moving in, or in contact and pulled away: no time passes
+    now = any_of(
+        [
+            jnp.where(c, j.acceleration > 0, (j.gap <= 0) & moves_in(j, near))
+            for j, c, near in zip(carried.jets, carried.contact, rounding, strict=True)
+        ]
+    )
+    wanted = jnp.where(now, 0.0, jax.lax.stop_gradient(carried.step))
+    timed = carried.completing | carried.locating
+    at_stop = (carried.t + wanted >= stop) & ~timed
+    h = jnp.where(at_stop, stop - carried.t, jnp.where(timed, carried.step, wanted))
+    h = jnp.where(carried.status == RUNNING, h, 0.0)
+    t = jnp.where(at_stop, stop, carried.t + h)
+    room = jnp.where(at_stop, 0.0, stop - t)
+    return End(h, t, stop, asked, at_stop, room, sides)
+
+
+def seen_from_inside(plan: Plan, end: End):
+    """How the times of a step are seen: inside the breakpoints on its sides."""
+    if not plan.breaks:
+        return lambda t: t
+    (low, high), span = end.sides, plan.t1 - plan.t0
+    return lambda t: between(t, low, high, span)
+
+
+def make_step(functions: Functions, plan: Plan, carried: LoopState, end: End) -> Step:
+    """The step to that end, in the modes that are in force."""
+    inside, h = seen_from_inside(plan, end), end.length
+    x, error, stages = step(
+        plan.tableau,
+        lambda t, x: functions.field(inside(t), x, carried.contact),
+        carried.t,
+        carried.x,
+        h,
+    )
+    seen = inside(end.t)
+    pairs = rates_among(carried.x, stages[0])
+    frame = functions.frame(seen, x)
+    scale = scales(carried.extents, carried.x, x, pairs, h, plan.per_run)
+    if not functions.planar:
+        pairs = functions.pairs(carried.t, carried.x)
+        scale = held_scales(scale, carried, frame.push, pairs, h)
+    allowed = error_allowed(scale, carried.x, x, plan.tolerance, plan.absolute)
+    effort = error_norm(error, allowed)
+    if functions.planar:
+        # contact is algebraic: the old state is the guess
+        sticking = any_of(carried.contact)
+        x = select(sticking, carried.x, x)
+        effort = jnp.where(sticking, 0.0, effort)
+    jets = functions.jets(seen, x, carried.contact)
+    projected = functions.onto(frame, jets, x, carried.contact)
+    rates = functions.taylor(seen, projected, carried.contact)
+    return Step(x, projected, jets, frame, rates, effort, scale)

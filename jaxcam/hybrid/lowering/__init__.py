@@ -1,0 +1,15 @@
+"""All that depends on how JAX traces and XLA compiles: it changes speed, not results.
+
+The one exception is `whole`, which gives a loop the transformations that it lacks.
+"""
+
+from ._jaxprs import saving_jvp as saving_jvp
+from ._materialise import (
+    depend_on as depend_on,
+    with_kept as with_kept,
+    without_library as without_library,
+)
+from ._one_kernel import one_kernel as one_kernel
+from ._packing import pack as pack, Packed as Packed
+from ._scalarise import joined as joined, scalarise as scalarise, split as split
+from ._whole import while_loop as while_loop, whole as whole

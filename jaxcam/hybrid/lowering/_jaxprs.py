@@ -1,0 +1,92 @@
+"""Reading programs that jax has traced."""
+
+import math
+from collections.abc import Callable, Iterator
+
+import jax
+from jax.extend.core import ClosedJaxpr, Jaxpr
+
+
+# calls that only group operations
+_GROUPS = frozenset({"jit", "pjit", "closed_call", "call", "remat", "checkpoint"})
+# linear algebra by LAPACK, Fourier transforms, and calls back to Python
+_LIBRARY = frozenset(
+    """
+    cholesky cholesky_update debug_callback eig eigh fft ffi_call geqp3 geqrf
+    hessenberg householder_product io_callback lu ormqr pure_callback qr schur svd
+    symmetric_product triangular_solve tridiagonal tridiagonal_solve
+    """.split()
+)
+# what the CPU backend does not write into a kernel
+_CALLS = frozenset(
+    """
+    approx_top_k conv_general_dilated select_and_scatter_add select_and_gather_add sort
+    top_k
+    """.split()
+)
+# name of a compiled function whose own derivative only saves work
+_SAVING = "its_derivative_only_saves_work"
+
+
+def opened(equation):
+    """The program inside a call that only groups, and its constants; else `None`."""
+    if equation.primitive.name not in _GROUPS:
+        return None
+    inner = equation.params.get("jaxpr", equation.params.get("call_jaxpr"))
+    return (
+        (inner.jaxpr, inner.consts) if isinstance(inner, ClosedJaxpr) else (inner, [])
+    )
+
+
+def equations(jaxpr) -> Iterator:
+    """All equations of a program and of those inside it."""
+    for equation in jaxpr.eqns:
+        yield equation
+        for value in equation.params.values():
+            for one in value if isinstance(value, (tuple, list)) else (value,):
+                if isinstance(one, ClosedJaxpr):
+                    yield from equations(one.jaxpr)
+                elif isinstance(one, Jaxpr):
+                    yield from equations(one)
+
+
+def saving_jvp(function: Callable) -> jax.custom_jvp:
+    """`jax.custom_jvp` for a derivative that is that of the function, at less work.
+
+    A function whose rule says something of its own must be called as it is; this one
+    may be taken apart, and is then as fast as any other arithmetic.
+    """
+
+    def marked(*arguments):
+        return function(*arguments)
+
+    marked.__name__ = _SAVING
+    return jax.custom_jvp(jax.jit(marked))
+
+
+def has_saving_rule(equation) -> bool:
+    """Whether an equation is a call of what `saving_jvp` has made."""
+    if equation.primitive.name != "custom_jvp_call":
+        return False
+    inner = equation.params["call_jaxpr"].jaxpr.eqns
+    return [e.params.get("name") for e in inner] == [_SAVING]
+
+
+def calls_library(jaxpr) -> bool:
+    """Whether some part of a program is left to a library, or to Python."""
+    return any(e.primitive.name in _LIBRARY for e in equations(jaxpr))
+
+
+def fits_kernel(jaxpr) -> bool:
+    """Whether the CPU backend can compile a program as one kernel."""
+    return not any(map(_needs_more, equations(jaxpr)))
+
+
+def _needs_more(equation) -> bool:
+    name = equation.primitive.name
+    if name.startswith("scatter"):
+        # one place is a slice, several are a scatter of its own
+        return math.prod(equation.invars[1].aval.shape[:-1]) > 1
+    if name == "dot_general":
+        return equation.outvars[0].aval.ndim > 1
+    return name in _LIBRARY | _CALLS

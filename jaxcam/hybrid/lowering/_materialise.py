@@ -1,0 +1,156 @@
+"""Keep shared intermediate values of a loop body in memory.
+
+The compiler fuses cheap operations into whatever uses them, and computes a shared value
+again in each of its users; in a long body such repetitions multiply until one iteration
+costs a hundred times what it should, to run and to compile. A value that the loop
+carries from iteration to iteration must exist in memory, so its users read it instead.
+This pass finds the values worth carrying. The results of the loop are not changed.
+"""
+
+import functools
+from collections.abc import Callable
+
+import jax
+import jax.numpy as jnp
+from jax.core import eval_jaxpr
+from jax.extend.core import jaxpr_as_fun, Literal
+from jax.interpreters import partial_eval
+
+from ._jaxprs import calls_library
+
+
+# a value is kept when computing it again in its users would cost more operations
+_THRESHOLD = 100
+# operations that cost more than an addition
+_COST = {"div": 4, "sqrt": 6, "custom_jvp_call": 40, "sin": 30, "cos": 30, "pow": 40}
+_COST |= {"exp": 20, "log": 20, "atan2": 30, "atan": 20, "asin": 30, "acos": 30}
+
+
+def _chosen(jaxpr) -> list:
+    """The variables of a jaxpr that are worth keeping."""
+    uses: dict = {}
+    for equation in jaxpr.eqns:
+        for v in equation.invars:
+            if not isinstance(v, Literal):
+                uses[v] = uses.get(v, 0) + 1
+    for v in jaxpr.outvars:
+        if not isinstance(v, Literal):
+            uses[v] = uses.get(v, 0) + 1
+    cost: dict = {}
+    kept = []
+    for equation in jaxpr.eqns:
+        # inputs of the body and kept values cost nothing more
+        price = _COST.get(equation.primitive.name, 1)
+        inputs = {v for v in equation.invars if not isinstance(v, Literal)}
+        price += sum(cost.get(v, 0) for v in inputs)
+        for v in equation.outvars:
+            number = uses.get(v, 0)
+            scalar = v.aval.shape == () and v.aval.dtype in (jnp.float64, jnp.bool_)
+            if number > 1 and scalar and price * (number - 1) >= _THRESHOLD:
+                kept.append(v)
+                cost[v] = 0
+            else:
+                cost[v] = price
+    return kept
+
+
+def _hoisted(jaxpr, constants):
+    """A program without the operations on constants alone, which are done here."""
+    known = set(jaxpr.constvars)
+    early, late = [], []
+    for equation in jaxpr.eqns:
+        inputs = [v for v in equation.invars if not isinstance(v, Literal)]
+        fixed = all(v in known for v in inputs) and not equation.effects
+        (early if fixed else late).append(equation)
+        if fixed:
+            known.update(equation.outvars)
+    needed = {v for e in late for v in e.invars if not isinstance(v, Literal)}
+    needed |= {v for v in jaxpr.outvars if not isinstance(v, Literal)}
+    made = [v for e in early for v in e.outvars if v in needed]
+    plain = jaxpr.debug_info.with_unknown_names()
+    first = jaxpr.replace(
+        invars=[], outvars=made, eqns=early, debug_info=plain, effects=set()
+    )
+    values = eval_jaxpr(first, constants)
+    rest = jaxpr.replace(
+        constvars=[*jaxpr.constvars, *made], eqns=late, debug_info=plain
+    )
+    return rest, [*constants, *values]
+
+
+def with_kept(body: Callable, carry, on: bool = True):
+    """A loop body that also carries its shared scalars.
+
+    **Arguments:** `body(carry) -> (carry, row)` and an example of the carry, scalars.
+    The row may be a pytree. Without `on` nothing is kept.
+
+    **Returns:** the new body, on `(carry, kept)`, and the first `kept`.
+    """
+    if not on:
+        return functools.partial(_keeping_nothing, body), []
+    leaves, treedef = jax.tree.flatten(carry)
+
+    def flat_body(*arguments):
+        return body(jax.tree.unflatten(treedef, arguments))
+
+    closed, shape = jax.make_jaxpr(flat_body, return_shape=True)(*leaves)
+    outputs = jax.tree.structure(shape)
+    # without this, unused values would be kept too
+    pruned, _ = partial_eval.dce_jaxpr(
+        closed.jaxpr, [True] * outputs.num_leaves, instantiate=True
+    )
+    rest, constants = _hoisted(pruned, closed.consts)
+    kept = _chosen(rest)
+    shown = closed.replace(
+        jaxpr=rest.replace(outvars=[*rest.outvars, *kept]), consts=constants
+    )
+    number = outputs.num_leaves
+
+    def whole(arguments):
+        state, _ = arguments
+        made = jaxpr_as_fun(shown)(*jax.tree.leaves(state))
+        after, row = jax.tree.unflatten(outputs, made[:number])
+        return (after, made[number:]), row
+
+    return whole, [jnp.zeros((), v.aval.dtype) for v in kept]
+
+
+def _keeping_nothing(body, state):
+    after, row = body(state[0])
+    return (after, []), row
+
+
+def without_library(function: Callable, argument):
+    """`function` with its calls of a library done here, if they need no argument.
+
+    A loop that calls one cannot be a single kernel. Other operations stay where they
+    are: within the kernel they cost less than as its arguments.
+    """
+    leaves, treedef = jax.tree.flatten(argument)
+
+    def flat(*leaves):
+        return function(jax.tree.unflatten(treedef, leaves))
+
+    closed, shape = jax.make_jaxpr(flat, return_shape=True)(*leaves)
+    program = closed
+    if calls_library(closed.jaxpr):
+        rest, constants = _hoisted(closed.jaxpr, closed.consts)
+        program = closed.replace(jaxpr=rest, consts=constants)
+
+    def called(argument):
+        made = jaxpr_as_fun(program)(*jax.tree.leaves(argument))
+        return jax.tree.unflatten(jax.tree.structure(shape), made)
+
+    return called
+
+
+def depend_on(value, kept):
+    """`value`, in a way that needs all kept scalars, which else would be dropped.
+
+    Adding 1e-300 changes no number that a count can be.
+    """
+    total = jnp.zeros(())
+    for v in kept:
+        total = total + v.astype(jnp.float64)
+    total = jax.lax.stop_gradient(total)
+    return jnp.where(total == 1.2345678901e-301, value + 1e-300, value)

@@ -1,0 +1,277 @@
+"""A program that the transformations of JAX take whole, never in part.
+
+Linearisation splits a program into what is known and what is linear, and leaves out
+results that nobody needs. XLA aborts where results of a loop that is compiled as one
+kernel (`_one_kernel.py`) are left out, and no loop can be run backward. Here a program
+is one operation (a primitive): `vmap` and `jvp` make another such operation of it,
+linearisation evaluates it and its derivative one after the other, and a gradient comes
+from its forward derivatives, one for each number differentiated by.
+"""
+
+import functools
+from collections.abc import Callable
+from typing import NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jax._src.interpreters.ad import jvp_jaxpr
+from jax._src.interpreters.batching import batch_jaxpr
+from jax.core import Tracer
+from jax.experimental.xla_metadata import set_xla_metadata
+from jax.extend.core import ClosedJaxpr, jaxpr_as_fun, Literal, Primitive
+from jax.flatten_util import ravel_pytree
+from jax.interpreters import ad, batching, mlir, partial_eval
+
+from ._jaxprs import fits_kernel
+
+
+# on a call: the CPU backend compiles it, and the calls inside it, as one function
+_ONE_FUNCTION = {"inlineable": "false", "xla_cpu_small_call": "true"}
+
+
+class Program(NamedTuple):
+    """What the operation does; hashable, compared by identity of the jaxpr."""
+
+    jaxpr: ClosedJaxpr
+    # whether the CPU backend compiles it as one function
+    kernel: bool
+    # the program that this one was made of by differentiation: its inputs and outputs
+    # come first among those here, tangents after them
+    plain: "Program | None" = None
+
+
+def whole(function: Callable, *, kernel: dict[str, str] | None = None) -> Callable:
+    """`function` as one operation, which is transformed as a whole.
+
+    **Arguments:** a function of pytrees; what is not an array in them is static. With
+    `kernel`, attributes of the calls inside, the CPU backend compiles it as one
+    function, if it can.
+
+    **Returns:** a function of the same arguments with the same results (arrays, and
+    what is static). It can be compiled, batched and differentiated in both modes, any
+    number of times. A gradient costs as much as a forward derivative in all numbers
+    differentiated by.
+    """
+
+    def call(*arguments):
+        arrays, static = eqx.partition(arguments, eqx.is_array)
+        kept = []
+
+        def of_arrays(arrays):
+            made, rest = eqx.partition(
+                function(*eqx.combine(arrays, static)), eqx.is_array
+            )
+            kept.append(rest)
+            return made
+
+        # calls take the attributes of the moment they are traced at
+        with set_xla_metadata(**(kernel or {})):
+            closed, shape = jax.make_jaxpr(of_arrays, return_shape=True)(arrays)
+        if kernel and not fits_kernel(closed.jaxpr):
+            return whole(function)(*arguments)
+        jaxpr, captured = _open(closed)
+        made = whole_p.bind(
+            *captured, *jax.tree.leaves(arrays), program=Program(jaxpr, bool(kernel))
+        )
+        made = jax.tree.unflatten(jax.tree.structure(shape), made)
+        return eqx.combine(made, kept[-1])
+
+    return call
+
+
+def while_loop(goes_on: Callable, body: Callable, start):
+    """`jax.lax.while_loop`, with a gradient too."""
+    return whole(lambda start: jax.lax.while_loop(goes_on, body, start))(start)
+
+
+def _open(closed: ClosedJaxpr):
+    """The jaxpr with what it captures of outer transformations as its first inputs."""
+    jaxpr = closed.jaxpr
+    pairs = list(zip(jaxpr.constvars, closed.consts, strict=True))
+    traced = [(v, c) for v, c in pairs if isinstance(c, Tracer)]
+    fixed = [(v, c) for v, c in pairs if not isinstance(c, Tracer)]
+    opened = jaxpr.replace(
+        constvars=[v for v, _ in fixed],
+        invars=[*(v for v, _ in traced), *jaxpr.invars],
+        debug_info=jaxpr.debug_info.with_unknown_names(),
+    )
+    return ClosedJaxpr(opened, [c for _, c in fixed]), [c for _, c in traced]
+
+
+whole_p = Primitive("whole")
+whole_p.multiple_results = True
+
+
+@functools.lru_cache(maxsize=256)
+def _compiled(program: Program) -> Callable:
+    return jax.jit(functools.partial(whole_p.bind, program=program))
+
+
+@whole_p.def_impl
+def _evaluate(*arguments, program: Program):
+    return _compiled(program)(*arguments)
+
+
+@whole_p.def_abstract_eval
+def _shapes(*_, program: Program):
+    return program.jaxpr.out_avals
+
+
+def _inlined(*arguments, program: Program):
+    return jaxpr_as_fun(program.jaxpr)(*arguments)
+
+
+def _on_cpu(*arguments, program: Program):
+    if not program.kernel or not fits_kernel(program.jaxpr.jaxpr):
+        return _inlined(*arguments, program=program)
+
+    def with_arguments(*arguments):
+        arguments = jax.lax.optimization_barrier(arguments)
+        return jaxpr_as_fun(program.jaxpr)(*arguments), arguments
+
+    # XLA aborts on such a call where its optimisation leaves an argument without a use,
+    # so all arguments are results too, and all results are held; and where an argument
+    # is a constant, as it becomes in a loop around the call
+    arguments = jax.lax.optimization_barrier(arguments)
+    with set_xla_metadata(**_ONE_FUNCTION):
+        made = jax.jit(with_arguments)(*arguments)
+    return jax.lax.optimization_barrier(made)[0]
+
+
+mlir.register_lowering(whole_p, mlir.lower_fun(_inlined, multiple_results=True))
+mlir.register_lowering(
+    whole_p, mlir.lower_fun(_on_cpu, multiple_results=True), platform="cpu"
+)
+
+
+def _batched(program: Program, axis, mapped: list[bool], wanted: list[bool]):
+    """The program of a batch, and which outputs have a batch: all `wanted`, and more.
+
+    A program and the one that it was made of agree on the outputs that they share.
+    """
+    jaxpr, out = batch_jaxpr(program.jaxpr, axis, mapped, list(wanted))
+    if program.plain is None:
+        return program._replace(jaxpr=jaxpr), list(out)
+    inputs, outputs = _sizes(program.plain)
+    plain, first = _batched(program.plain, axis, mapped[:inputs], out[:outputs])
+    if first != list(out[:outputs]):
+        wanted = [*first, *out[outputs:]]
+        jaxpr, out = batch_jaxpr(program.jaxpr, axis, mapped, wanted)
+    return Program(jaxpr, program.kernel, plain), list(out)
+
+
+def _batch(axis, arguments, dimensions, *, program: Program):
+    mapped = [d is not None for d in dimensions]
+    arguments = [
+        jnp.moveaxis(a, d, 0) if m else a
+        for a, d, m in zip(arguments, dimensions, mapped, strict=True)
+    ]
+    none = [False] * _sizes(program)[1]
+    program, out = _batched(program, axis, mapped, none)
+    made = whole_p.bind(*arguments, program=program)
+    return made, [0 if m else None for m in out]
+
+
+batching.fancy_primitive_batchers[whole_p] = _batch
+
+
+def _jvp(primals, tangents, *, program: Program):
+    moved = [type(t) is not ad.Zero for t in tangents]
+    jaxpr, moves = jvp_jaxpr(program.jaxpr, moved, instantiate=False)
+    given = [t for t, m in zip(tangents, moved, strict=True) if m]
+    both = Program(jaxpr, program.kernel, plain=program)
+    made = whole_p.bind(*primals, *given, program=both)
+    _, outputs = _sizes(program)
+    rest = iter(made[outputs:])
+    shapes = zip(moves, program.jaxpr.out_avals, strict=True)
+    return made[:outputs], [
+        next(rest) if m else ad.Zero(aval.to_tangent_aval()) for m, aval in shapes
+    ]
+
+
+ad.primitive_jvps[whole_p] = _jvp
+
+
+def _partly_known(trace, *tracers, program: Program):
+    """Linearisation: values are known, tangents are not."""
+    known = [tracer.is_known() for tracer in tracers]
+    if program.plain is None or all(known):
+        return trace.default_process_primitive(whole_p, tracers, {"program": program})
+    inputs, outputs = _sizes(program.plain)
+    if not all(known[:inputs]):
+        return trace.default_process_primitive(whole_p, tracers, {"program": program})
+    values = [tracer.pval.get_known() for tracer in tracers[:inputs]]
+    made = whole_p.bind(*values, program=program.plain)
+    only = {"program": _without(program, outputs)}
+    return [*made, *trace.default_process_primitive(whole_p, tracers, only)]
+
+
+partial_eval.custom_partial_eval_rules[whole_p] = _partly_known
+
+
+def _partly_known_equation(saveable, unknown, instantiated, equation):
+    """The same for an equation, under `jax.checkpoint`."""
+    del saveable
+    program = equation.params["program"]
+    inputs, outputs = (0, 0) if program.plain is None else _sizes(program.plain)
+    if any(unknown[:inputs]):
+        inputs = outputs = 0
+    known = None
+    if not any(unknown):
+        known, outputs = equation, len(equation.outvars)
+    elif outputs:
+        known = equation.replace(
+            invars=equation.invars[:inputs],
+            outvars=equation.outvars[:outputs],
+            params={"program": program.plain},
+        )
+    moving = [k >= outputs for k in range(len(equation.outvars))]
+    pairs = zip(equation.invars, instantiated, strict=True)
+    needed = [v for v, there in pairs if not there and not isinstance(v, Literal)]
+    return known, equation, moving, [True] * len(moving), needed
+
+
+partial_eval.partial_eval_jaxpr_custom_rules[whole_p] = _partly_known_equation
+
+
+@functools.lru_cache(maxsize=256)
+def _without(program: Program, first: int) -> Program:
+    """The program without its first outputs, which are then computed in vain."""
+    jaxpr = program.jaxpr.jaxpr
+    jaxpr = jaxpr.replace(
+        outvars=jaxpr.outvars[first:], debug_info=jaxpr.debug_info.with_unknown_names()
+    )
+    return Program(program.jaxpr.replace(jaxpr=jaxpr), program.kernel)
+
+
+def _transpose(cotangents, *arguments, program: Program):
+    """Cotangents of the inputs that the program is linear in, by its whole matrix."""
+    linear = [ad.is_undefined_primal(a) for a in arguments]
+    zeros = [
+        jnp.zeros(a.aval.shape, a.aval.dtype) if unknown else None
+        for a, unknown in zip(arguments, linear, strict=True)
+    ]
+    flat, shaped = ravel_pytree(zeros)
+
+    def along(direction):
+        pairs = zip(arguments, shaped(direction), linear, strict=True)
+        made = whole_p.bind(
+            *(part if unknown else a for a, part, unknown in pairs), program=program
+        )
+        total = jnp.zeros((), flat.dtype)
+        for cotangent, moved in zip(cotangents, made, strict=True):
+            if type(cotangent) is not ad.Zero:
+                # a result that does not count may move infinitely
+                counts = jnp.where(cotangent == 0, 0, cotangent * moved)
+                total = total + jnp.sum(counts.astype(flat.dtype))
+        return total
+
+    return shaped(jax.vmap(along)(jnp.eye(flat.size, dtype=flat.dtype)))
+
+
+ad.primitive_transposes[whole_p] = _transpose
+
+
+def _sizes(program: Program) -> tuple[int, int]:
+    return len(program.jaxpr.in_avals), len(program.jaxpr.out_avals)

@@ -1,0 +1,125 @@
+"""From the log of a run to impacts, contacts and steps."""
+
+from types import ModuleType
+from typing import NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from ..codes import Row
+from ..loop import kinds, Log
+from ..surface import normal_velocity
+from ._events import Contacts, Impacts, Steps
+
+
+# Numbers of velocities that programs are compiled for: the least, and by what they grow
+_FEWEST, _LONGER = 1024, 4
+
+
+class Parts(NamedTuple):
+    """The padded pieces of a trajectory."""
+
+    impacts: Impacts
+    contacts: Contacts
+    steps: Steps
+
+
+def assemble(
+    system, t0, state, contact, log: Log, sizes: tuple[int, int], xp: ModuleType = jnp
+) -> Parts:
+    """Sort the rows of a log into impacts, contacts and steps of fixed lengths.
+
+    With `xp=numpy` a log that is not traced is sorted without compiling anything.
+    """
+    rows = log.kind.shape[0]
+    max_impacts, max_contacts = sizes
+    valid = log.kind > 0
+    order = _places(xp, valid, rows, rows)
+    count = xp.sum(valid)
+
+    def first(start, rest, fill):
+        padded = xp.concatenate([rest, xp.full_like(rest[:1], fill)])
+        return xp.concatenate([start[None], padded[order]])
+
+    time = first(t0, log.t, xp.inf)
+    kept = first(contact, log.contact > 0.5, False)
+    steps = Steps(time, first(state, log.after, xp.nan), kept, count + 1)
+
+    hits = kinds(log, Row.IMPACT, Row.LAST_IMPACT)
+    number = xp.sum(hits)
+    index = _places(xp, hits, max_impacts, 0)
+    real = xp.arange(max_impacts) < number
+    t_hit = xp.where(real, log.t[index], xp.inf)
+    before = xp.where(real[:, None], log.before[index], xp.nan)
+    after = xp.where(real[:, None], log.after[index], xp.nan)
+    which = xp.where(real, log.constraint[index], 0.0).astype(xp.int32)
+    sides = log.before[index], log.after[index]
+    speeds = _speeds(xp, system, log.t[index], sides, which)
+    hit, left = (xp.where(real, speed, xp.nan) for speed in speeds)
+    impacts = Impacts(t_hit, before, after, which, hit, left, number)
+
+    # a contact begins at the row after its last impact, and ends where its flag falls
+    began = xp.concatenate([kept[:1], kept[1:] & ~kept[:-1]])
+    fell = xp.concatenate([xp.zeros_like(kept[:1]), kept[:-1] & ~kept[1:]])
+    fell = fell & (xp.arange(rows + 1) <= count)[:, None]
+    reached = time[count]
+    ends = _least_to_come(xp, xp.where(fell, time[:, None], xp.inf))
+    later = xp.concatenate([time[1:], xp.full_like(time[:1], xp.inf)])
+    starts = xp.where(xp.arange(rows + 1) == 0, time, later)
+    width = kept.shape[1]
+    flat = _places(xp, began.ravel(), max_contacts, 0)
+    row, column = flat // width, flat % width
+    total = xp.sum(began & (starts[:, None] < xp.inf))
+    real = xp.arange(max_contacts) < total
+    end = ends[row, column]
+    contacts = Contacts(
+        xp.where(real, starts[row], xp.inf),
+        xp.where(real, xp.minimum(end, reached), xp.inf),
+        real & (end < xp.inf),
+        xp.where(real, column, 0).astype(xp.int32),
+        total,
+    )
+    return Parts(impacts, contacts, steps)
+
+
+def _places(xp: ModuleType, mask, size: int, fill: int):
+    """Where a mask holds: `size` indices, those that are missing `fill`."""
+    if xp is jnp:
+        return jnp.nonzero(mask, size=size, fill_value=fill)[0]
+    found = np.flatnonzero(mask)[:size]
+    return np.pad(found, (0, size - len(found)), constant_values=fill)
+
+
+def _least_to_come(xp: ModuleType, values):
+    """The smallest of each entry and all later ones, along the first axis."""
+    if xp is jnp:
+        return jax.lax.cummin(values, axis=0, reverse=True)
+    return np.minimum.accumulate(values[::-1])[::-1]
+
+
+def _speeds(xp: ModuleType, system, times, sides, which):
+    """Normal velocities at the constraints that were hit, on either side of impacts."""
+    count = times.shape[0]
+    if xp is np and not count:
+        return times, times
+    times, which = xp.concatenate([times, times]), xp.concatenate([which, which])
+    states = xp.concatenate(sides)
+    if xp is np:
+        # a few lengths only, as each is compiled
+        size = _FEWEST
+        while size < 2 * count:
+            size *= _LONGER
+        # the last one again: a system may not be defined at zero
+        rows = np.minimum(np.arange(size), 2 * count - 1)
+        times, states, which = times[rows], states[rows], which[rows]
+    speeds = _normal_velocities(system, times, states, which)
+    speeds = xp.asarray(speeds)
+    return speeds[:count], speeds[count : 2 * count]
+
+
+@eqx.filter_jit
+def _normal_velocities(system, times, states, which):
+    speeds = jax.vmap(lambda t, x: normal_velocity(system, t, x))(times, states)
+    return jnp.take_along_axis(speeds, which[:, None], axis=1)[:, 0]

@@ -1,0 +1,41 @@
+"""Crossings of a Poincare section."""
+
+import jax
+import numpy as np
+
+from ._sample import pad
+
+
+# places within each step at which the section function is looked at
+_PLACES = 8
+
+
+def crossings(trajectory, function, direction: int):
+    """See `Trajectory.section`."""
+
+    def look(times):
+        # of a padded length, so that few lengths are compiled
+        longer = pad(times, points[0])
+        values = jax.vmap(function)(longer, trajectory.at(longer))
+        return np.asarray(values)[: len(times)]
+
+    points = np.asarray(trajectory.steps.time)[: int(trajectory.steps.count)]
+    share = np.linspace(0.0, 1.0, _PLACES + 1)
+    grid = points[:-1, None] + share[None, :] * np.diff(points)[:, None]
+    # an impact belongs to the step after it: every step ends just before its end
+    tiny = 1e-12 * np.maximum(np.abs(points[1:]), np.diff(points))
+    ends = np.maximum(points[1:] - tiny, points[:-1])
+    grid = np.minimum(grid, ends[:, None])
+    values = look(grid.ravel()).reshape(grid.shape)
+    left, right = values[:, :-1].ravel(), values[:, 1:].ravel()
+    # a zero exactly at a place belongs to the piece that ends there
+    crossed = (np.sign(left) * np.sign(right) < 0) | ((right == 0) & (left != 0))
+    crossed = crossed & (np.sign(right - left) * direction >= 0)
+    index = np.flatnonzero(crossed)
+    low, high = grid[:, :-1].ravel()[index], grid[:, 1:].ravel()[index]
+    sign = np.sign(left[index])
+    for _ in range(52):
+        middle = (low + high) / 2
+        same = np.sign(look(middle)) * sign > 0
+        low, high = np.where(same, middle, low), np.where(same, high, middle)
+    return jax.device_put(high), trajectory.at(high)

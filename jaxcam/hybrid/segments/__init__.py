@@ -1,0 +1,4 @@
+"""The second engine: a call of `diffrax.diffeqsolve` for each piece of motion."""
+
+from ._one_step import one_step as one_step
+from ._pieces import simulate_segments as simulate_segments

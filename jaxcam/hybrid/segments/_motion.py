@@ -1,0 +1,339 @@
+"""The compiled functions that the engine of `_pieces.py` is made of."""
+
+import functools
+from typing import NamedTuple
+
+import diffrax
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import optimistix as optx
+
+from .._system import HybridSystem
+from ..loop import first_extents, Jet
+from ..surface import (
+    completion_time,
+    contact_multipliers,
+    field_in_force,
+    forced_time,
+    gap_rounding,
+    gaps,
+    impacts,
+    least_gaps,
+    lie_derivative,
+    lie_series,
+    normal_acceleration,
+    normal_directions,
+    normal_velocity,
+    restitution_coefficients,
+    speed_rounding,
+    start_room,
+)
+from ._one_step import one_step, scaled_term
+
+
+# attempted steps in one call of diffrax
+_BATCH = 64
+# points at which each of its steps is looked through
+FRACTIONS = np.arange(1, 9) / 8
+
+
+class Point(NamedTuple):
+    """A state on the way, and for each constraint how far it is from its event.
+
+    The level is the gap of a free constraint and the pressure (minus the multiplier)
+    of one in contact; the event is where it falls through zero.
+    """
+
+    state: jax.Array
+    level: jax.Array
+    rate: jax.Array
+
+
+class Hop(NamedTuple):
+    """The end of a short hop: a `Point`, normal velocity, height climbed, error."""
+
+    state: jax.Array
+    level: jax.Array
+    rate: jax.Array
+    velocity: jax.Array
+    climbed: jax.Array
+    effort: jax.Array
+
+
+class End(NamedTuple):
+    """The end of a chatter, and whether the series for it may be used."""
+
+    possible: jax.Array
+    duration: jax.Array
+    state: jax.Array
+
+
+@eqx.filter_jit
+def prepared(system):
+    return system.prepared()
+
+
+def _compiled(method):
+    """Compile once: numbers become arrays, which are not part of the program."""
+    compiled = eqx.filter_jit(method)
+
+    @functools.wraps(method)
+    def call(self, *arguments):
+        return compiled(self, *map(np.asarray, arguments))
+
+    return call
+
+
+class Motion(eqx.Module):
+    """The compiled functions: of time, state and the constraints in contact."""
+
+    system: HybridSystem
+    tolerance: jax.Array
+    smallness: jax.Array
+    #: of each component, `(n,)`: what errors are relative to
+    scale: jax.Array
+    solver: diffrax.AbstractSolver = eqx.field(static=True)
+
+    def __init__(self, system, settings, scale):
+        self.system = system
+        self.scale = jnp.asarray(scale, dtype=jnp.float64)
+        # arrays, so that another value does not compile again
+        self.tolerance = jnp.asarray(settings.tolerance, dtype=jnp.float64)
+        self.smallness = jnp.asarray(settings.chatter_smallness, dtype=jnp.float64)
+        self.solver = settings.solver
+
+    def measured(self, scale) -> "Motion":
+        """The same with errors relative to another scale."""
+        return eqx.tree_at(lambda m: m.scale, self, jnp.asarray(scale))
+
+    @_compiled
+    def fly(self, t0, x, contact, t1, first, longest):
+        """Steps up to an event, `t1` or the end of the batch, and how many are real."""
+
+        def lowest(t, y, args, **kwargs):
+            del kwargs
+            time, state = t0 + t, x + self.scale * y
+            values = gaps(self.system, time, state)
+            pressure = jax.lax.cond(
+                jnp.any(args),
+                lambda: -contact_multipliers(self.system, time, state, args),
+                lambda: values,
+            )
+            return jnp.min(jnp.where(args, pressure, values))
+
+        solution = diffrax.diffeqsolve(
+            scaled_term(self._field, t0, x, self.scale),
+            self.solver,
+            jnp.zeros_like(t0),
+            t1 - t0,
+            jnp.minimum(first, t1 - t0),
+            jnp.zeros_like(x),
+            contact,
+            saveat=diffrax.SaveAt(t0=True, steps=True),
+            stepsize_controller=diffrax.PIDController(
+                rtol=self.tolerance, atol=self.tolerance, dtmax=longest
+            ),
+            event=diffrax.Event(
+                lowest,
+                optx.Bisection(1e-12, 1e-12 * longest, flip=True),  # pyright: ignore
+                direction=False,
+            ),
+            adjoint=diffrax.ForwardMode(),
+            max_steps=_BATCH,
+            throw=False,
+        )
+        assert solution.ts is not None and solution.ys is not None
+        real = jnp.isfinite(solution.ts)
+        # the end is `t1` itself
+        times = jnp.where(solution.ts == t1 - t0, t1, t0 + solution.ts)
+        states = jnp.where(
+            real[:, None], x[None] + self.scale[None] * solution.ys, jnp.inf
+        )
+        fired = solution.event_mask
+        return times, states, jnp.sum(real), solution.stats["num_steps"], fired
+
+    @_compiled
+    def probe(self, t, x, contact, h) -> Point:
+        """The point a step of length `h` after `(t, x)`."""
+        return self._point(t, x, contact, h)
+
+    @_compiled
+    def scan(self, times, states, contact, count) -> Point:
+        """Points inside the first `count` steps: `(steps, fractions, m)`."""
+        real = jnp.arange(times.shape[0] - 1) < count
+        lengths = jnp.where(real, jnp.diff(times), 0.0)
+        starts = jnp.where(real, times[:-1], times[0])
+        origins = jnp.where(real[:, None], states[:-1], states[0])
+
+        def inside(step):
+            t, x, length = step
+            return jax.lax.map(
+                lambda f: self._point(t, x, contact, f * length),
+                jnp.asarray(FRACTIONS),
+            )
+
+        # one after the other: a batch of them takes much longer to compile
+        return jax.lax.map(inside, (starts, origins, lengths))
+
+    @_compiled
+    def hop(self, t, x, contact, h) -> Hop:
+        """The end of a hop, its height by Gauss's quadrature of the velocity."""
+        nodes, weights = np.polynomial.legendre.leggauss(5)
+
+        def velocity_at(s):
+            after, _ = self._step(t, x, contact, s)
+            return normal_velocity(self.system, t + s, after)
+
+        lengths = h * jnp.asarray((nodes + 1) / 2)
+        speeds = jax.vmap(velocity_at)(lengths)
+        after, error = self._step(t, x, contact, h)
+        level, rate = self._levels(t + h, after, contact)
+        return Hop(
+            after,
+            level,
+            rate,
+            normal_velocity(self.system, t + h, after),
+            h * jnp.sum(jnp.asarray(weights / 2)[:, None] * speeds, axis=0),
+            jnp.max(jnp.abs(error) / (self.tolerance * self.scale)),
+        )
+
+    @_compiled
+    def jets(self, t, x):
+        """Gap and its first three derivatives in free flight, `(m, 4)`."""
+        return jnp.stack(self._free_series(3)(t, x), axis=1)
+
+    @_compiled
+    def velocity(self, t, x):
+        return normal_velocity(self.system, t, x)
+
+    @_compiled
+    def rounding(self, t, x, reach):
+        """What rounding can tell of gaps and normal velocities, `(2, m)`."""
+        found = gap_rounding, speed_rounding
+        return jnp.stack([one(self.system, t, x, reach) for one in found])
+
+    @_compiled
+    def start_room(self, t, x):
+        """Gaps and normal velocities up to which a start is in contact, `(2, m)`."""
+        acceleration, time = normal_acceleration(self.system, t, x), self.system.period
+        each = zip((gap_rounding, speed_rounding), (2, 1), strict=True)
+        rounding = [(one(self.system, t, x, jnp.abs(x)), n) for one, n in each]
+        return jnp.stack(
+            [start_room(r, acceleration, forced_time(time) ** n) for r, n in rounding]
+        )
+
+    @_compiled
+    def extents(self, t, x):
+        """Where components are measured from, and their first scales, two `(n,)`."""
+        gradient = jax.jacfwd(lambda y: gaps(self.system, t, y))(x)
+        lifts = gradient / jnp.sum(gradient * gradient, axis=1)[:, None]
+        jets = [Jet(*row) for row in jnp.stack(self._free_series(3)(t, x), axis=1)]
+        tinies = least_gaps(self.system, t, x) - gaps(self.system, t, x)
+        origin, found = first_extents(list(lifts), jets, list(tinies), tuple(x))
+        return jnp.stack(origin), jnp.stack(found)
+
+    @_compiled
+    def rates(self, t, x, contact):
+        """The rates of the state, `(n,)`."""
+        return self._field(t, x, contact)
+
+    @_compiled
+    def slopes(self, t, x, contact):
+        """Derivatives of the rates by the state, without a sign, `(n, n)`."""
+        return jnp.abs(jax.jacfwd(lambda y: self._field(t, y, contact))(x))
+
+    @_compiled
+    def impact(self, t, x):
+        return impacts(self.system, t, x)
+
+    @_compiled
+    def completion(self, t, x, contact, k, speed, incoming) -> End:
+        """The rest of the chatter on constraint `k` after a rebound at `speed`.
+
+        As [`jaxcam.hybrid.surface.chatter_completion`][], for one of several
+        constraints.
+        """
+        held = contact.at[k].set(True)
+
+        def pressing(s, y):
+            # acceleration along the motion that the other contacts allow
+            return lie_derivative(
+                lambda r, z: normal_velocity(self.system, r, z)[k],
+                lambda r, z: self._field(r, z, contact),
+            )(s, y)
+
+        direction = normal_directions(self.system, t, x)[k]
+        rest = x - speed * direction
+        r0 = restitution_coefficients(self.system, t, rest)[k]
+        softening = (speed / incoming - r0) / incoming
+        a = pressing(t, rest)
+        rate = lie_derivative(pressing, lambda s, y: self._field(s, y, held))(t, rest)
+        damping = jax.jvp(lambda y: pressing(t, y), (rest,), (direction,))[1]
+        jerk = lie_derivative(pressing, lambda s, y: self._field(s, y, contact))(t, x)
+        acceleration = pressing(t, x)
+        small = speed * jnp.abs(jerk) <= self.smallness * (1 - r0) * acceleration**2
+        duration = completion_time(speed, a, rate, damping, r0, softening)
+        possible = small & (r0 < 1) & (a < 0) & (a + rate * duration < 0)
+        return End(possible, duration, self._point(t, rest, held, duration).state)
+
+    def _field(self, t, x, contact):
+        # free flight does not pay for the multipliers of contact
+        return jax.lax.cond(
+            jnp.any(contact),
+            lambda: field_in_force(self.system, t, x, contact),
+            lambda: self.system.vector_field(t, x),
+        )
+
+    def _step(self, t, x, contact, h):
+        return one_step(
+            self.solver,
+            self.tolerance,
+            lambda s, y: self._field(s, y, contact),
+            t,
+            x,
+            h,
+            self.scale,
+        )
+
+    def _point(self, t, x, contact, h) -> Point:
+        after, _ = self._step(t, x, contact, h)
+        after = jax.lax.cond(
+            jnp.any(contact),
+            lambda: self._onto(t + h, self._onto(t + h, after, contact), contact),
+            lambda: after,
+        )
+        return Point(after, *self._levels(t + h, after, contact))
+
+    def _levels(self, t, x, contact):
+        gap = self._free_series(1)(t, x)
+
+        def pressed():
+            pressure = lie_series(
+                lambda s, y: -contact_multipliers(self.system, s, y, contact),
+                lambda s, y: field_in_force(self.system, s, y, contact),
+                1,
+            )(t, x)
+            return tuple(
+                jnp.where(contact, p, g) for p, g in zip(pressure, gap, strict=True)
+            )
+
+        return jax.lax.cond(jnp.any(contact), pressed, lambda: gap)
+
+    def _free_series(self, order):
+        return lie_series(
+            lambda s, y: gaps(self.system, s, y),
+            lambda s, y: self.system.vector_field(s, y),
+            order,
+        )
+
+    def _onto(self, t, x, contact):
+        """One Newton step onto gap = normal velocity = 0 where in contact."""
+
+        def conditions(y):
+            jet = jnp.stack(self._free_series(1)(t, y), axis=1)
+            return jnp.where(contact[:, None], jet, 0.0).ravel()
+
+        slope = jax.jacfwd(conditions)(x)
+        return x - jnp.linalg.pinv(slope, rtol=1e-10) @ conditions(x)

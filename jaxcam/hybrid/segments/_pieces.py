@@ -1,0 +1,327 @@
+"""The other engine: one call of `diffrax.diffeqsolve` for each piece of motion.
+
+A piece is flight or contact, up to the next event. Everything is arranged in plain
+Python around a few compiled functions: slower than the loop, easier to follow, open to
+implicit solvers, and a check on the loop, with which it shares only the derivatives of
+the gap and the formula for the duration of a chatter.
+
+diffrax looks at the sign of an event at the ends of its steps and locates it on an
+interpolant. That is where a piece ends at the latest; `_events.py` looks through
+its steps for anything earlier.
+"""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from .. import breakpoints
+from ..codes import FINISHED, NOT_FINITE, Row, RUNNING, STEP_FAILED, TOGETHER
+from ..loop import Log
+from ._events import Flown, TOO_LONG
+from ._motion import Motion, prepared
+
+
+# a hop whose lambda = v |j| / a^2 is smaller is one step, not a call of diffrax
+_SHORT = 1e-3
+# so many impacts in a row, each while another gap is closed to rounding, accumulate
+# together
+_MANY = 80
+
+
+def simulate_segments(
+    system, settings, t0, state, t1, max_steps, progress=None
+) -> tuple[Log, jax.Array, jax.Array]:
+    """Run from `t0` to `t1` (s) and log it as the loop does.
+
+    **Arguments:** as in [`jaxcam.simulate`][jaxcam.hybrid.simulate], with concrete
+    values.
+
+    **Returns:** the log, the constraints in contact at the start `(m,)`, and the index
+    into `RESULTS`.
+    """
+    engine = _Engine(system, settings, float(t0), np.asarray(state), float(t1))
+    contact = engine.contact.copy()
+    span = max(float(t1) - float(t0), 1e-300)
+    while engine.code is None:
+        if progress is not None:
+            progress((engine.t - float(t0)) / span)
+        if engine.t >= engine.t1:
+            engine.code = FINISHED
+        elif engine.steps >= max_steps:
+            engine.code = RUNNING
+        else:
+            engine.advance()
+    if progress is not None:
+        progress(1.0)
+    return engine.log(), jnp.asarray(contact), jnp.asarray(engine.code, jnp.int32)
+
+
+class _Engine:
+    """The state of a run. `contact` says for each constraint whether it is held."""
+
+    def __init__(self, system, settings, t0, state, t1):
+        self.settings = settings
+        self.motion = Motion(prepared(system), settings, np.ones_like(state))
+        self.span = t1 - t0
+        # breakpoints are passed between pieces: this is where the next one lies
+        own = system.period
+        self.breaks = breakpoints.declared(system)
+        self.repeat = np.inf if own is None else own
+        self.t, self.x, self.t1 = t0, state, t1
+        self._look_ahead(t0)
+        jets = np.asarray(self.motion.jets(self.t, state))
+        tiny = np.asarray(self.motion.start_room(self.t, state))
+        touching = np.all(np.abs(jets[:, :2]) <= tiny.T, axis=1)
+        self.contact = touching & (jets[:, 2] < 0)
+        # where components are measured from, and how far they have been from there
+        self.origin, self.extents = map(np.asarray, self.motion.extents(t0, state))
+        period, longest = system.period, settings.max_step
+        self.longest = self.span / 8 if period is None else float(period) / 8
+        self.longest = min(self.longest, np.inf if longest is None else float(longest))
+        # the first step of the next piece, shortened where it proves too long
+        self.first = np.inf
+        self.fastest = 0.0
+        # let go at this instant: its gap and velocity are zero, and grow
+        self.released: int | None = None
+        # impacts in a row while another gap was closed to rounding, but not in contact
+        self.crowded = 0
+        self.steps = 0
+        self.rows: list[tuple] = []
+        self.code: float | None = None
+
+    def advance(self):
+        """One piece of motion, or one event that takes no time."""
+        if self.t >= self.end:
+            self._pass_breakpoint()
+            return
+        _, level, rate = map(np.asarray, self._probe_here())
+        if not np.all(np.isfinite([level, rate])):
+            self.code = NOT_FINITE
+            return
+        for k in range(len(level)):
+            if self.contact[k]:
+                # rounding may leave a start at a release on either side of it
+                wait = -level[k] / rate[k] if rate[k] < 0 else np.inf
+                if level[k] < 0 or wait <= 1e-15 * (self.span + abs(self.t)):
+                    self._release(k, self.t, self.x)
+                    return
+            elif level[k] <= 0 and rate[k] < 0 and k != self.released:
+                self._impact(k, self.t, self.x)
+                return
+        jets = np.asarray(self.motion.jets(self.t, self.x))
+        if not self._hop(jets):
+            self._fly(jets, level, rate)
+
+    def log(self) -> Log:
+        """The rows, padded to a power of two so that few lengths are compiled."""
+        n, m = len(self.x), len(self.contact)
+        length = 64
+        while length < len(self.rows):
+            length *= 2
+        table = np.zeros((length, 3 + 2 * n + m))
+        for i, (kind, k, t, before, after, contact) in enumerate(self.rows):
+            table[i] = [float(kind), float(k), t, *before, *after, *contact]
+        columns = np.split(table, [1, 2, 3, 3 + n, 3 + 2 * n], axis=1)
+        head = [jnp.asarray(c[:, 0]) for c in columns[:3]]
+        return Log(*head, *map(jnp.asarray, columns[3:]))
+
+    def _fly(self, jets, level, rate):
+        """Up to the next event, or as far as one call of diffrax goes."""
+        first = min(self.first, self.longest / 16)
+        self._rescale(first)
+        for k, jet in enumerate(jets):
+            if not self.contact[k] and k != self.released:
+                first = min(first, _time_to_contact(jet) / 4)
+        piece = self.motion.fly(
+            self.t, self.x, self.contact, self.end, first, self.longest
+        )
+        times, states, count, attempts, fired = map(np.asarray, piece)
+        self.steps += int(attempts)
+        points = int(count) - int(fired)
+        if count < 2:
+            bad = not np.all(np.isfinite(jets))
+            self.code = NOT_FINITE if bad else self._no_step()
+            return
+        tiny = self._tiny(states[:count])
+        flown = Flown(self.motion, self.contact, times, states, tiny)
+        event = flown.first_event(int(count), bool(fired), level, rate, self.end)
+        if event is TOO_LONG:
+            self.first = first / 10
+            if first <= 1e-16 * (self.span + abs(self.t)):
+                self.code = self._no_step()
+            return
+        self.first = np.inf
+        if event is not None:
+            points = event.row + 1
+        elif fired:
+            # the interpolant erred: try again with shorter steps
+            self.first = float(times[count - 1] - times[count - 2]) / 4
+        if points > 1 or event is not None:
+            self.released = None
+        for i in range(1, points):
+            self._row(Row.STEP, 0, times[i], states[i])
+        if event is None:
+            i = points - 1
+            self.t, self.x = float(times[i]), states[i]
+            if np.any(self.contact):
+                self.x = flown.probe(i, 0.0).state
+            if self.t >= self.t1:
+                self.rows[-1] = (Row.STOP, *self.rows[-1][1:])
+            return
+        there = flown.probe(event.row, event.length)
+        t = float(times[event.row]) + event.length
+        if self.contact[event.constraint]:
+            self._release(event.constraint, t, there.state)
+        else:
+            self._impact(event.constraint, t, there.state)
+
+    def _hop(self, jets) -> bool:
+        """A hop too low for its gap to rise above rounding; whether there was one.
+
+        The height is taken from the integral of the normal velocity instead.
+        """
+        if not self.rows or self.rows[-1][0] != Row.IMPACT:
+            return False
+        k = int(self.rows[-1][1])
+        _, u, a, j = jets[k]
+        if np.any(self.contact) or not (a < 0 < u and u * abs(j) <= _SHORT * a * a):
+            return False
+        h = _time_to_contact((0.0, u, a, j))
+        for _ in range(8):
+            there = self.motion.hop(self.t, self.x, self.contact, h)
+            change = float(there.climbed[k] / there.velocity[k])
+            h = h - change
+            if abs(change) <= 1e-15 * h:
+                break
+        there = self.motion.hop(self.t, self.x, self.contact, h)
+        others = np.delete(np.asarray(there.level), k)
+        near = np.delete(np.asarray(there.rate), k) * h
+        if float(there.effort) > 1 or self.t + h > self.end:
+            return False
+        tiny = np.delete(self._tiny(self.x[None]), k)
+        if np.any(others - 2 * np.abs(near) <= tiny):
+            return False
+        self.steps += 1
+        self._impact(k, self.t + h, np.asarray(there.state))
+        return True
+
+    def _impact(self, k, t, before):
+        """Apply the impact law; complete the chatter if it is due."""
+        after = np.asarray(self.motion.impact(t, before))[k]
+        speeds = [np.asarray(self.motion.velocity(t, x)) for x in (before, after)]
+        u = max(float(speeds[1][k]), 0.0)
+        self.fastest = max(self.fastest, u)
+        # an impact on one constraint may throw the system off another it rests on
+        reach = np.abs(before) + np.abs(after)
+        rounding = np.asarray(self.motion.rounding(t, after, reach))[1]
+        kept = np.abs(speeds[1] - speeds[0]) <= 500 * rounding
+        self.contact = self.contact & kept
+        self.t, self.x = t, after
+        # an impact is an attempt as well, or a run might never end
+        self.steps += 1
+        closed = np.asarray(self.motion.jets(t, after))[:, 0] <= self._tiny(after[None])
+        closed[k] = False
+        self.crowded = self.crowded + 1 if np.any(closed & ~self.contact) else 0
+        if self.crowded == _MANY:
+            self.code = TOGETHER
+        if u <= self.settings.chatter_depth * self.fastest:
+            incoming = -float(speeds[0][k])
+            end = self.motion.completion(t, after, self.contact, k, u, incoming)
+            if bool(end.possible) and t + float(end.duration) <= self.end:
+                self.contact = self.contact.copy()
+                self.contact[k] = True
+                self._row(Row.LAST_IMPACT, k, t, after, before)
+                self.t, self.x = t + float(end.duration), np.asarray(end.state)
+                self._row(Row.CONTACT, k, self.t, self.x)
+                return
+        self._row(Row.IMPACT, k, t, after, before)
+
+    def _no_step(self) -> float:
+        """Why no step is short enough."""
+        return TOGETHER if self.crowded else STEP_FAILED
+
+    def _release(self, k, t, x):
+        self.contact = self.contact.copy()
+        self.contact[k] = False
+        self.released = k
+        self.fastest = 0.0
+        self.t, self.x = t, np.asarray(x)
+        self._row(Row.RELEASE, k, self.t, self.x)
+
+    def _row(self, kind, k, t, after, before=None):
+        before = after if before is None else before
+        for x in (before, after):
+            self.extents = np.maximum(self.extents, np.abs(x - self.origin))
+        self.rows.append((kind, k, float(t), before, after, self.contact))
+
+    def _look_ahead(self, time):
+        """Go on from just after a `time` (s) to just before the next breakpoint."""
+        self.ahead, self.end = np.inf, self.t1
+        if self.breaks:
+            ahead = breakpoints.next_breakpoint(self.breaks, self.repeat, time)
+            self.ahead = float(ahead)
+            self.t = float(breakpoints.after(time, self.span))
+            if self.ahead <= self.t1:
+                self.end = float(breakpoints.before(self.ahead, self.span))
+
+    def _pass_breakpoint(self):
+        """Go on from the far side of a breakpoint; the row there says when it was."""
+        last, here, time = self.rows[-1] if self.rows else None, self.t, self.ahead
+        self.x = self.x + (time - here) * self._rates()
+        if last is not None and last[0] == Row.STEP and last[2] == here:
+            kind = Row.STOP if time >= self.t1 else Row.STEP
+            self.rows[-1] = (kind, last[1], time, self.x, self.x, last[-1])
+        self.released = None
+        self._look_ahead(time)
+        self.x = self.x + (self.t - time) * self._rates()
+
+    def _rates(self):
+        return np.asarray(self.motion.rates(self.t, self.x, self.contact))
+
+    def _rescale(self, first):
+        """Measure errors by how far each component has moved, or will in a step."""
+        if self.settings.absolute is not None:
+            size = np.maximum(np.abs(self.x), self.extents + np.abs(self.origin))
+            wanted = np.asarray(self.settings.absolute) / float(self.settings.tolerance)
+            self.motion = self.motion.measured(wanted + size)
+            return
+        scale = self.extents.copy()
+        for length in (first, self.longest):
+            if np.all(scale > 0):
+                break
+            there = np.asarray(
+                self.motion.probe(self.t, self.x, self.contact, length).state
+            )
+            moved = np.where(np.isfinite(there), np.abs(there - self.x), 0.0)
+            scale = np.where(scale > 0, scale, moved)
+        if not np.all(scale > 0):
+            # what would move another component by its scale in the whole run
+            slopes = np.asarray(self.motion.slopes(self.t, self.x, self.contact))
+            seen = (slopes > 0) & (scale > 0)[:, None]
+            most = np.where(
+                seen, scale[:, None] / np.where(seen, slopes * self.span, 1.0), np.inf
+            )
+            least = most.min(axis=0)
+            known = np.where(np.isfinite(least), least, 1.0)
+            scale = np.where(scale > 0, scale, known)
+        self.motion = self.motion.measured(scale)
+
+    def _tiny(self, states):
+        """What rounding can tell of each gap, along some states."""
+        reach = np.abs(states).max(axis=0) + self.extents
+        return 500 * np.asarray(self.motion.rounding(self.t, self.x, reach))[0]
+
+    def _probe_here(self):
+        return self.motion.probe(self.t, self.x, self.contact, 0.0)
+
+
+def _time_to_contact(jet) -> float:
+    """Smallest positive time at which the cubic through the jet is zero, else inf."""
+    gap, velocity, acceleration, jerk = map(float, jet)
+    cubic = [jerk / 6, acceleration / 2, velocity, gap]
+    if velocity > 0 and abs(gap * acceleration) <= 1e-6 * velocity**2:
+        # leaving the surface: the root at the start is known
+        cubic = cubic[:3]
+    roots = np.roots(cubic)
+    times = roots.real[(np.abs(roots.imag) <= 1e-9 * np.abs(roots)) & (roots.real > 0)]
+    return float(times.min()) if times.size else np.inf

@@ -1,0 +1,41 @@
+"""The motion relative to the constraints: gaps, velocities, contact, chatter, release.
+
+Everything is derived from the three functions that a system states.
+"""
+
+from ._chatter import (
+    chatter_completion as chatter_completion,
+    Completion as Completion,
+    completion_coefficients as completion_coefficients,
+    completion_time as completion_time,
+)
+from ._impact_law import (
+    check_restitution as check_restitution,
+    restitutions as restitutions,
+)
+from ._normal import (
+    contact_multipliers as contact_multipliers,
+    field_in_force as field_in_force,
+    forced_time as forced_time,
+    free_jet as free_jet,
+    gap_rounding as gap_rounding,
+    gaps as gaps,
+    impacts as impacts,
+    least_gaps as least_gaps,
+    lie_derivative as lie_derivative,
+    lie_series as lie_series,
+    mode_jet as mode_jet,
+    normal_acceleration as normal_acceleration,
+    normal_directions as normal_directions,
+    normal_velocity as normal_velocity,
+    restitution_coefficients as restitution_coefficients,
+    speed_rounding as speed_rounding,
+    start_room as start_room,
+    sticking_field as sticking_field,
+)
+from ._release_point import (
+    contact_acceleration as contact_acceleration,
+    contact_state as contact_state,
+    release_point as release_point,
+    ReleasePoint as ReleasePoint,
+)

@@ -1,0 +1,155 @@
+"""The rest of a chattering sequence in one formula.
+
+After an impact with small rebound speed u the normal motion is y'' = A + B t + C y',
+where A < 0 and its rate B belong to the state without normal velocity, and C is the
+change of acceleration with normal velocity. With restitution r0 + r1 v the remaining,
+infinitely many hops last
+
+    T = 2 u (1 + r1 u / (1 - r0^2)) / (|A| (1 - r0))
+        - (4/3) B u^2 / (A^3 (1 - r0)^2) + (2/3) C u^2 / (A^2 (1 - r0)^2) + O(u^3).
+
+For C = r1 = 0 this is the expansion behind (3.17) carried to second order; the small
+number is lambda / (1 - r0), lambda = u j / A^2. Meanwhile the rest of the state moves
+by the sticking field from the state P whose normal velocity is removed along the
+direction of the impulse, which is exact to the same order.
+"""
+
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, ArrayLike, Float
+
+from .._system import HybridSystem
+from .._types import RealScalar, State
+from ._normal import (
+    impacts,
+    lie_derivative,
+    normal_acceleration,
+    normal_directions,
+    normal_velocity,
+    restitution_coefficients,
+    sticking_field,
+)
+
+
+def completion_time(
+    speed, acceleration, rate, damping, restitution, softening: ArrayLike = 0.0
+):
+    """Duration of the remaining hops, of second order in `speed`.
+
+    **Arguments:** rebound speed u > 0; A < 0, B and C as above; r0 and r1.
+
+    **Returns:** T, in the units of u/A.
+    """
+    rest = 1 - restitution
+    inverse = 1 / acceleration
+    small = speed * inverse / rest
+    series = 1 + softening * speed / (1 - restitution * restitution)
+    return -2 * small * series + small * small * (
+        (2 / 3) * (damping - 2 * rate * inverse)
+    )
+
+
+def completion_coefficients(system, t, before, after):
+    """C and r0 of each constraint, for an impact from `before` to `after`.
+
+    Also returns the state P without normal velocity, one row for each constraint, as if
+    each of them had been hit.
+    """
+    velocity_before = normal_velocity(system, t, before)
+    velocity_after = normal_velocity(system, t, after)
+    jump = velocity_after - velocity_before
+    safe = jnp.where(jump > 0, jump, jnp.ones_like(jump))
+    inverse = 1 / safe
+    share = -velocity_before * inverse
+    damping, restitution, rest = [], [], []
+    for k in range(jump.shape[0]):
+        direction = (after - before) * inverse[k]
+        point = before + share[k] * (after - before)
+        damping.append(
+            jax.jvp(
+                lambda y, k=k: normal_acceleration(system, t, y)[k],
+                (point,),
+                (direction,),
+            )[1]
+        )
+        restitution.append(
+            -jax.jvp(
+                lambda y, k=k: normal_velocity(system, t, impacts(system, t, y)[k])[k],
+                (point,),
+                (direction,),
+            )[1]
+        )
+        rest.append(point)
+    return jnp.stack(damping), jnp.stack(restitution), jnp.stack(rest)
+
+
+class Completion(NamedTuple):
+    """Where and when a chattering sequence ends."""
+
+    time: Float[Array, ""]
+    state: Float[Array, " n"]
+    smallness: Float[Array, ""]
+
+
+def chatter_completion(
+    system: HybridSystem, t: RealScalar, state: State, order: int = 2
+) -> Completion:
+    """End of the chatter that starts at a state on the surface, just after an impact.
+
+    **Arguments:**
+
+    - `t`: time of the impact (s).
+    - `state`: shape `(n,)`, gap zero, normal velocity u > 0, acceleration a < 0.
+    - `order`: 1 for (3.17), error O(u^2); 2 for the second-order map, error O(u^3).
+
+    **Returns:** the accumulation time (s), the state there, and lambda/(1 - r), which
+    must be small for either to mean anything. For systems with one constraint.
+    """
+    if order not in (1, 2):
+        raise ValueError(f"order is {order}; the completion map has order 1 or 2")
+
+    t = jnp.asarray(t, dtype=jnp.float64)
+
+    def field(s, y):
+        return system.vector_field(s, y)
+
+    def acceleration_of(s, y):
+        return normal_acceleration(system, s, y)[0]
+
+    speed = normal_velocity(system, t, state)[0]
+    direction = normal_directions(system, t, state)[0]
+    point = state - speed * direction
+    restitution = restitution_coefficients(system, t, point)[0]
+    acceleration = acceleration_of(t, point)
+    rate = lie_derivative(acceleration_of, lambda s, y: sticking_field(system, s, y))(
+        t, point
+    )
+    damping = jax.jvp(lambda y: acceleration_of(t, y), (point,), (direction,))[1]
+    jerk = lie_derivative(acceleration_of, field)(t, state)
+    smallness = speed * jnp.abs(jerk) / (acceleration**2 * (1 - restitution))
+    if order == 1:
+        duration = completion_time(speed, acceleration, 0.0, 0.0, restitution)
+        return Completion(
+            t + duration,
+            point + duration * sticking_field(system, t, point),
+            smallness,
+        )
+    softening = _softening(system, t, point, direction, speed, restitution)
+    duration = completion_time(
+        speed, acceleration, rate, damping, restitution, softening
+    )
+    half = point + duration / 2 * sticking_field(system, t, point)
+    moved = point + duration * sticking_field(system, t + duration / 2, half)
+    return Completion(t + duration, moved, smallness)
+
+
+def _softening(system, t, point, direction, speed, restitution):
+    """r1 of r0 + r1 v, from the impact that led to this rebound."""
+    bounces = restitution > 0
+    approach = speed / jnp.where(bounces, restitution, 1.0)
+    after = impacts(system, t, point - approach * direction)[0]
+    rebound = normal_velocity(system, t, after)[0]
+    inverse = 1 / jnp.where(approach > 0, approach, 1.0)
+    return jnp.where(bounces, (rebound * inverse - restitution) * inverse, 0.0)

@@ -1,0 +1,63 @@
+"""How much of the approach speed the impact law of a system gives back."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from .._system import HybridSystem
+from ._normal import gaps, impacts, normal_velocity, speed_rounding
+
+
+# rounding of a law that is evaluated through several coordinates
+_ROUNDING = 1e-6
+# a normal velocity this many times its rounding gives the law to a tenth of that
+_KNOWN = 1e7
+# Newton steps from the state to the constraint
+_STEPS = 4
+
+
+def restitutions(system: HybridSystem, t, x: Float[Array, " n"]) -> Float[Array, " m"]:
+    """Coefficient of restitution of each constraint, for an impact near a state.
+
+    The state is moved onto the constraint, and its normal velocity made negative: the
+    quotient of normal velocities after and before an impact (2.27) is minus the
+    coefficient. Of a state at rest on the constraint the normal velocity is nothing but
+    the rounding of its terms, so it is made larger than that; one where all are zero.
+    """
+    number = gaps(system, t, x).shape[0]
+    found = []
+    for k in range(number):
+        y = x
+        for _ in range(_STEPS):
+            gap, slope = jax.value_and_grad(lambda y, k=k: gaps(system, t, y)[k])(y)
+            y = y - gap * slope / jnp.sum(slope * slope)
+
+        def speed(y, k=k):
+            return normal_velocity(system, t, y)[k]
+
+        value, slope = jax.value_and_grad(speed)(y)
+        rounding = speed_rounding(system, t, y, jnp.abs(y))[k]
+        size = jnp.maximum(jnp.abs(value), _KNOWN * rounding)
+        wanted = -jnp.where(size == 0, 1.0, size)
+        y = y + (wanted - value) * slope / jnp.sum(slope * slope)
+        found.append(-speed(impacts(system, t, y)[k]) / speed(y))
+    return jnp.stack(found)
+
+
+def check_restitution(system: HybridSystem, values) -> None:
+    """Raise `ValueError` for a coefficient outside of [0, 1]; NaN says nothing.
+
+    **Arguments:** shape `(m,)`, or `(lanes, m)` for lanes that differ in parameters.
+    """
+    values = np.asarray(values)
+    high = np.inf if system.active else 1.0 + _ROUNDING
+    bad = np.argwhere((values < -_ROUNDING) | (values > high))
+    if len(bad):
+        which = tuple(int(k) for k in bad[0])
+        at = f" at constraint {which[-1]}" if values.shape[-1] > 1 else ""
+        lane = f" in lane {which[0]}" if values.ndim > 1 else ""
+        raise ValueError(
+            "Choose a coefficient of restitution between 0 and 1; it is "
+            f"{float(values[which]):.6g}{at}{lane}."
+        )

@@ -1,0 +1,11 @@
+"""Parameters of any pytree: which of them vary, and floats as arrays."""
+
+from ._arrays import as_arrays as as_arrays
+from ._pick import (
+    parameter_names as parameter_names,
+    Pick as Pick,
+    pick as pick,
+    unit_tangent as unit_tangent,
+    Where as Where,
+)
+from ._real import real_array as real_array

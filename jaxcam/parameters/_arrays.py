@@ -1,0 +1,25 @@
+"""Floats as arrays, so that they are arguments of a program and not constants in it."""
+
+from typing import TypeVar
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+
+_Tree = TypeVar("_Tree")
+
+
+def as_arrays(tree: _Tree) -> _Tree:
+    """The same tree with every Python or NumPy float as a float64 array.
+
+    A field declared as `stiffness: float = 3.0` is then a parameter like any other.
+    Arrays, traced values, integers and flags stay as they are.
+    """
+    return jax.tree.map(_as_array, tree)
+
+
+def _as_array(leaf):
+    if isinstance(leaf, float | np.floating):
+        return jnp.asarray(leaf, jnp.float64)
+    return leaf

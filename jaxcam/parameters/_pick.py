@@ -1,0 +1,171 @@
+"""Picking the parameters that vary: by a function, or by a dotted name."""
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax.tree_util import keystr, tree_flatten_with_path
+from jaxtyping import PyTree
+
+
+_Tree = TypeVar("_Tree")
+
+
+class _Marker:
+    """Stands in for a leaf while `where` runs."""
+
+    def __init__(self, index: int):
+        self.index = index
+
+
+@dataclass(frozen=True)
+class Pick:
+    """The parameters that a `where` picks, without its code.
+
+    It can be hashed, sent to another process and compared. Called with a tree of the
+    same structure it returns the leaf, or with `several` the tuple of leaves, so it
+    serves wherever equinox takes a `where`.
+    """
+
+    #: places among the leaves of the tree
+    leaves: tuple[int, ...]
+    #: `speed`, `profile.radius`, ...
+    names: tuple[str, ...]
+    #: whether a call returns a tuple
+    several: bool = False
+
+    def __call__(self, tree: PyTree) -> Any:
+        flat = jax.tree.leaves(tree)
+        found = tuple(flat[i] for i in self.leaves)
+        return found if self.several else found[0]
+
+    def replaced(self, tree: _Tree, *values: Any) -> _Tree:
+        """The tree with one new value for each parameter."""
+        flat, structure = jax.tree.flatten(tree)
+        for i, value in zip(self.leaves, values, strict=True):
+            flat[i] = value
+        return jax.tree.unflatten(structure, flat)
+
+
+#: what names a parameter: a function of the system, a dotted name, or several of those
+Where = Callable[[Any], Any] | str | tuple[Callable[[Any], Any] | str, ...] | Pick
+
+
+def pick(
+    where: Where,
+    tree: PyTree,
+    *,
+    integers: bool = False,
+) -> Pick:
+    """The parameters of `tree` that `where` picks.
+
+    **Arguments:**
+
+    - `where`: a function of the tree (`lambda system: system.speed`), a dotted name
+        (`"profile.radius"`), or a tuple of those. A function may return several
+        parameters at once.
+    - `tree`: a system, or any other pytree with numbers among its leaves.
+    - `integers`: whether integers may vary too; by default floating-point numbers only.
+
+    **Returns:** a [`jaxcam.parameters.Pick`][].
+
+    **Raises:** `ValueError` where a parameter does not exist or is not one number.
+    """
+    if isinstance(where, Pick):
+        return where
+    parts = where if isinstance(where, tuple) else (where,)
+    found = [_places(part, tree, integers) for part in parts]
+    if isinstance(where, tuple) and any(len(places) != 1 for places in found):
+        raise ValueError(
+            "where is a tuple of functions that pick several parameters each; let each "
+            "of them pick one"
+        )
+    places = tuple(place for some in found for place in some)
+    named = _named_leaves(tree)
+    for place in places:
+        name, leaf = named[place]
+        if not _varies(leaf, integers):
+            raise ValueError(
+                f"{name} is not one number that can vary; {_known(tree, integers)}"
+            )
+    several = isinstance(where, tuple) or len(places) > 1
+    return Pick(places, tuple(named[place][0] for place in places), several)
+
+
+def unit_tangent(where: Where, tree: _Tree) -> _Tree:
+    """The direction in which one parameter grows, for `equinox.filter_jvp`.
+
+    **Returns:** zeros for every inexact array of the tree, one for the parameter that
+    `where` picks, `None` for all other leaves.
+    """
+    picked = pick(where, tree)
+    zeros = jax.tree.map(jnp.zeros_like, eqx.filter(tree, eqx.is_inexact_array))
+    # the tree of arrays has fewer leaves, so the parameter has another place in it
+    along = pick(picked.names[0], zeros)
+    return along.replaced(zeros, jnp.ones_like(picked(tree)))
+
+
+def parameter_names(tree: PyTree, *, integers: bool = False) -> list[str]:
+    """Dotted names of all numbers of a tree that can vary."""
+    return [name for name, leaf in _named_leaves(tree) if _varies(leaf, integers)]
+
+
+def _places(where: Callable | str, tree, integers) -> tuple[int, ...]:
+    """Places among the leaves of what one function or name picks."""
+    if isinstance(where, str):
+        names = [name for name, _ in _named_leaves(tree)]
+        # a name may be written as Python spells it: terms[0].c1
+        name = re.sub(r"\[['\"]?(\w+)['\"]?\]", r".\1", where).lstrip(".")
+        if name not in names:
+            raise ValueError(
+                f"there is no parameter {where!r}; {_known(tree, integers)}"
+            )
+        return (names.index(name),)
+    flat, structure = jax.tree.flatten(tree)
+    marked = jax.tree.unflatten(structure, [_Marker(i) for i in range(len(flat))])
+    try:
+        made = where(marked)
+    except (AttributeError, KeyError, IndexError, TypeError) as error:
+        raise ValueError(
+            f"where picks a parameter that does not exist ({error}); "
+            f"{_known(tree, integers)}"
+        ) from error
+    made = tuple(made) if isinstance(made, tuple | list) else (made,)
+    if not made or not all(isinstance(one, _Marker) for one in made):
+        raise ValueError(
+            "where must pick parameters as they are, as in `lambda system: "
+            f"system.speed`; {_known(tree, integers)}"
+        )
+    return tuple(one.index for one in made)
+
+
+def _known(tree, integers) -> str:
+    names = ", ".join(parameter_names(tree, integers=integers)) or "none"
+    return f"the parameters are: {names}"
+
+
+def _named_leaves(tree) -> list[tuple[str, Any]]:
+    pairs, _ = tree_flatten_with_path(tree)
+    return [
+        (keystr(path, simple=True, separator=".") or "parameter", leaf)
+        for path, leaf in pairs
+    ]
+
+
+def _varies(leaf, integers: bool) -> bool:
+    """Whether a leaf is one number that can vary."""
+    if isinstance(leaf, bool):
+        return False
+    if isinstance(leaf, float | np.floating):
+        return True
+    if isinstance(leaf, int | np.integer):
+        return integers
+    if not isinstance(leaf, jax.Array | np.ndarray) or leaf.shape != ():
+        return False
+    kinds = np.number if integers else np.floating
+    return bool(jnp.issubdtype(leaf.dtype, kinds))

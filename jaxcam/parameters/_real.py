@@ -1,0 +1,17 @@
+"""Numbers from outside, as real arrays."""
+
+import jax
+import jax.numpy as jnp
+
+
+def real_array(values, name: str = "state") -> jax.Array:
+    """An array of 64-bit floats.
+
+    **Raises:** `ValueError` for complex numbers, whose imaginary part would be lost.
+    """
+    if any(jnp.iscomplexobj(leaf) for leaf in jax.tree.leaves(values)):
+        raise ValueError(
+            f"{name} is complex; give real numbers, with real and imaginary part as "
+            "two components where both are meant"
+        )
+    return jnp.asarray(values, dtype=jnp.float64)

@@ -1,0 +1,11 @@
+"""What colours stand for in every figure, for figures drawn elsewhere."""
+
+from ._style import (
+    BAND as BAND,
+    CAM as CAM,
+    CONTACT as CONTACT,
+    FLIGHT as FLIGHT,
+    IMPACT as IMPACT,
+    RECORDED as RECORDED,
+    SECTION as SECTION,
+)

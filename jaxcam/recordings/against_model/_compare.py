@@ -1,0 +1,99 @@
+"""Compare recordings with a model, flight by flight.
+
+A simulation from one initial state would soon be somewhere else: impacts magnify
+every error. Here each flight is started where the recording says it started, so that
+what is left over is what the model lacks in that mode: in flight, on the surface, or
+in the impacts.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Float
+
+from ...hybrid import HybridSystem
+from ...models import CamFollower
+from .._errors import RecordingError
+from .._rig import Rig
+from ..cut import measured_noise, Segments
+from ._comparison import Comparison, merge, Residuals
+from ._flight_fit import Observe
+from ._mode_residuals import at_impacts, in_contact, in_flight
+
+
+def compare(
+    system: HybridSystem,
+    segments: Segments,
+    *,
+    observe: Observe | None = None,
+    noise: dict[str, float] | None = None,
+    clock: Float[np.ndarray, " k"] | None = None,
+) -> Comparison:
+    """One recording against a model.
+
+    **Arguments:**
+
+    - `system`: the model. A `CamFollower` is compared at the measured angle of its
+        cam, whatever its own speed.
+    - `segments`: the recording, cut into its parts.
+    - `observe`: what the channels are of the state: `{"height_m": 0}` is the first
+        component; a function of the state gives anything else. By default the channel
+        that was cut is the first component.
+    - `noise`: standard deviations of the channels, where they are known; otherwise
+        they are measured.
+    - `clock`: time of the model at each sample (s).
+
+    **Raises:** `RecordingError` where a channel is missing.
+    """
+    observe = dict(observe or {segments.channel: 0})
+    known = {segments.channel: segments.noise, **(noise or {})}
+    recording = segments.recording
+    for channel in observe:
+        if channel not in known:
+            known[channel] = measured_noise(recording[channel])
+        if not known[channel] > 0:
+            raise RecordingError(
+                f"{recording.name}: the noise of `{channel}` cannot be measured; give "
+                f"it as noise={{{channel!r}: ...}}."
+            )
+    if clock is None:
+        clock = _clock(system, segments)
+    system = system.prepared()
+    parts: list[Residuals] = []
+    notes: list[str] = []
+    flown, note = in_flight(system, segments, observe, known, clock)
+    parts += flown
+    notes += note
+    if segments.channel in observe:
+        pick = observe[segments.channel]
+        parts += in_contact(system, segments, pick, clock)
+        parts += at_impacts(system, segments, pick, clock)
+    return Comparison(tuple(parts), tuple(notes))
+
+
+def compare_case(rig: Rig, case: Sequence[Segments]) -> Comparison:
+    """All recordings of a cam-follower against its nominal model.
+
+    **Arguments:**
+
+    - `rig`: the model; another set of values by `rig.replace(...)`.
+    - `case`: from `segment_case`.
+    """
+    found = []
+    for segments in case:
+        if segments.drive is None:
+            raise RecordingError(
+                f"{segments.recording.name}: it was cut without its drive; use "
+                f"`segment_case`, or `compare` with a system of your own."
+            )
+        system = rig.system(segments.drive.speed, segments.drive.phase)
+        found.append(compare(system, segments))
+    return merge(found)
+
+
+def _clock(system: HybridSystem, segments: Segments) -> Float[np.ndarray, " k"]:
+    """Time at which the model's cam is where the recorded one was."""
+    if isinstance(system, CamFollower) and segments.drive is not None:
+        speed, phase = float(system.speed), float(system.phase)
+        return (segments.drive.angle - phase) / speed
+    return segments.clock

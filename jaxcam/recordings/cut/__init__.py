@@ -1,0 +1,14 @@
+"""A recording cut into flights, contacts and impacts, on the surface it shows."""
+
+from ._padding import padded as padded
+from ._polynomial import fit_local as fit_local, measured_noise as measured_noise
+from ._segment import segment as segment, segment_case as segment_case
+from ._segments import (
+    Boundary as Boundary,
+    Contact as Contact,
+    Flight as Flight,
+    Impacts as Impacts,
+    Segments as Segments,
+)
+from ._surface import nominal_surface as nominal_surface, Surface as Surface
+from ._surface_fit import fit_surface as fit_surface, refine_surface as refine_surface

@@ -1,0 +1,311 @@
+"""Flights, contacts and impacts of a motion, with the evidence for each boundary."""
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+
+from ._contact_stretches import (
+    contact_stretches,
+    HIGH,
+    LOW,
+    overlap,
+    SHORTEST_CONTACT,
+    SIGNIFICANT,
+    Span,
+)
+from ._impact_marks import away, impact_marks
+from ._motion import Motion
+from ._polynomial import crossing, LocalFit
+from ._record_ends import clear_of_end, settled_alike
+from ._release import release_time
+from ._segments import Boundary, Contact, Flight, Impacts
+
+
+# Standard errors by which a motion must recede from a surface for an impact on it to be
+# refused
+_SURE = 3.0
+# Samples of a flight before an impact that show how it curves down
+_LONG = 10
+# Gap of an impact at most: in units of the noise, and as a part of the largest gap. It
+# leaves room for a surface that is known by its tolerance only
+_FAR_NOISE, _FAR_GAP = 20.0, 0.25
+
+
+def cut(
+    sides: Sequence[Motion], restitution: float
+) -> tuple[tuple[Flight, ...], tuple[Contact, ...], Impacts]:
+    """Flights, contacts and impacts of a motion between one surface or two.
+
+    **Arguments:**
+
+    - `sides`: the motion as each surface sees it, its gap positive; that of a surface
+        above the motion is `mirrored`.
+    - `restitution`: expected, for the bounces that are too low to be seen.
+    """
+    motion = sides[0]
+    resting, doubtful, marks = _places(sides)
+    while True:
+        stretches = sorted([*resting, *doubtful])
+        spans = _spans(len(motion.time), stretches, sorted(marks))
+        before = {b: motion.fit(a, b, at_end=True) for a, b in spans}
+        after = {a: motion.fit(a, b, at_end=False) for a, b in spans}
+        crossed = {
+            place: _crossed(sides[marks[place]], place, *pair)
+            for place, pair in _sided(sides, marks, before, after).items()
+        }
+        # a velocity that jumps while the motion leaves the surface is no impact on it
+        long = {last for first, last in spans if last - first >= _LONG}
+        wrong = [
+            place
+            for place in marks
+            if place in crossed and place in long and _leaves(crossed[place])
+        ]
+        if not wrong:
+            break
+        for place in wrong:
+            del marks[place]
+
+    side = {place: k for span, k in {**resting, **doubtful}.items() for place in span}
+    side |= marks
+    boundaries: dict[int, Boundary] = {}
+    for place, found in crossed.items():
+        boundaries[place] = _impact(found)
+    for first, last in stretches:
+        here = sides[side[first]]
+        if first in before:
+            boundaries[first] = _landing(
+                here, first, _as_seen(motion, here, before[first])
+            )
+        if last in after:
+            end = next(stop for start, stop in spans if start == last)
+            release = _release(here, first, last, end)
+            latest = float(motion.time[(last + end) // 2])
+            boundaries[last] = _not_before(boundaries.get(first), release, latest)
+    for place in (0, len(motion.time)):
+        boundaries[place] = _end(motion, place, "the record ends here")
+
+    left = {last for _, last in stretches}
+    flights = [_flight(sides, span, boundaries, left) for span in spans]
+    contacts = [
+        _contact(motion, span, boundaries, flights, restitution) for span in stretches
+    ]
+    contacts = [
+        dataclasses.replace(contact, settled=contact.stop.time)
+        if span in doubtful
+        else contact
+        for span, contact in zip(stretches, contacts)
+    ]
+    contacts = settled_alike(contacts, flights)
+    impacts = [
+        # a speed of approach that noise makes negative is not known
+        ({**crossed[place], "side": marks.get(place, side.get(place, 0))}, number)
+        for number, (_, place) in enumerate(spans)
+        if place in crossed and crossed[place]["approach"] > 0
+    ]
+    return tuple(flights), tuple(contacts), _gather(impacts)
+
+
+def _places(sides: Sequence[Motion]):
+    """Contacts, doubtful contacts and impacts, each with the number of its side."""
+    nearest = np.argmin(np.stack([side.gap for side in sides]), axis=0)
+    resting: dict[Span, int] = {}
+    doubtful: dict[Span, int] = {}
+    marks: dict[int, int] = {}
+    for number, side in enumerate(sides):
+        found, unsure = contact_stretches(side)
+        for mark in impact_marks(side, found):
+            # next to a jump one way, windows show jumps the other way
+            near = side.gap[mark - 1 : mark + 1]
+            if number in nearest[mark - 1 : mark + 1] and np.min(near) < _reach(side):
+                marks[mark] = number
+        resting |= dict.fromkeys(found, number)
+        doubtful |= dict.fromkeys(unsure, number)
+    # what is near the surface for long, without an impact, is no flight either
+    doubtful = {
+        pair: number
+        for pair, number in doubtful.items()
+        if not any(overlap(pair, (mark, mark + 1)) for mark in marks)
+        and not any(overlap(pair, other) for other in resting)
+    }
+    kept = away(sides[0], list(marks), sorted([*resting, *doubtful]))
+    return resting, doubtful, {mark: marks[mark] for mark in kept}
+
+
+def _reach(side: Motion) -> float:
+    """Gap above which a jump in velocity is on no surface that is stated."""
+    return max(_FAR_NOISE * side.noise, _FAR_GAP * float(np.max(side.gap)))
+
+
+def _sided(sides, marks, before, after):
+    """Fits before and after each place that has both, as its side sees them."""
+    return {
+        place: tuple(
+            _as_seen(sides[0], sides[marks[place]], fits[place])
+            for fits in (before, after)
+        )
+        for place in before.keys() & after.keys() & marks.keys()
+    }
+
+
+def _as_seen(first: Motion, side: Motion, fit: LocalFit) -> LocalFit:
+    """A fit of the samples of the first side, as another side sees them."""
+    sense = first.sense * side.sense
+    return dataclasses.replace(fit, coefficients=sense * fit.coefficients)
+
+
+def _leaves(found: dict) -> bool:
+    """Whether the motion surely went away from the surface that it is to have hit."""
+    return found["approach"] < -_SURE * found["before_stderr"]
+
+
+def _spans(count: int, resting: list[Span], marks: list[int]) -> list[Span]:
+    """First sample and one past the last of each flight."""
+    spans = []
+    begin = 0
+    for first, last in [*resting, (count, count)]:
+        places = [begin, *(m for m in marks if begin < m < first), first]
+        spans += [(a, b) for a, b in zip(places, places[1:]) if b > a]
+        begin = last
+    return spans
+
+
+def _crossed(motion: Motion, place: int, before: LocalFit, after: LocalFit) -> dict:
+    """What the fits on both sides say about an impact; they meet at its time."""
+    origin = float(motion.time[place] - motion.interval / 2)
+    reach = 5 * motion.interval
+    time, stderr = crossing(before, after, origin, reach)
+    if abs(time - origin) >= reach:
+        time, stderr = origin, 2 * motion.interval
+    surface = float(np.interp(time, motion.time, motion.rate))
+    approach, separation = surface - before.slope(time), after.slope(time) - surface
+    # the fits meet at a weighted mean of both, as seen from the surface
+    shares = np.array([separation, approach])
+    shares = shares / np.sum(shares) if np.sum(shares) > 0 else np.full(2, 0.5)
+    errors = np.array([before.value_stderr(time), after.value_stderr(time)])
+    error = float(np.linalg.norm(shares * errors))
+    return {
+        "time": time,
+        "time_stderr": stderr,
+        "angle": motion.sense * 0.5 * (before.value(time) + after.value(time)),
+        "angle_stderr": error,
+        "turned": float("nan"),
+        "before": motion.sense * before.slope(time),
+        "before_stderr": before.slope_stderr(time),
+        "after": motion.sense * after.slope(time),
+        "after_stderr": after.slope_stderr(time),
+        "approach": approach,
+        "separation": separation,
+        "surface_stderr": 0.0,
+    }
+
+
+def _impact(found: dict) -> Boundary:
+    jump = abs(found["after"] - found["before"])
+    error = np.hypot(found["before_stderr"], found["after_stderr"])
+    evidence = f"the velocity jumps by {jump:.3g}, {jump / error:.0f} standard errors"
+    if jump < SIGNIFICANT * error:
+        evidence = "a cubic with a hinge describes both sides of a slow impact"
+    return Boundary(found["time"], found["time_stderr"], "impact", evidence)
+
+
+def _landing(motion: Motion, place: int, before: LocalFit) -> Boundary:
+    time = float(motion.time[place])
+    slope = before.slope(time) - motion.rate[place]
+    height = before.value(time) - motion.contact[place]
+    # how far before or after the threshold the flight meets the surface
+    shift = -height / slope if slope < 0 else 0.0
+    limit = 10 * motion.interval
+    time = time + float(np.clip(shift, -limit, limit))
+    stderr = min(limit, before.value_stderr(time) / -slope) if slope < 0 else limit
+    evidence = (
+        f"the gap stays within {LOW:g} times the noise for "
+        f"{SHORTEST_CONTACT * 1e3:g} ms and more; approach speed {max(0, -slope):.2g}"
+    )
+    return Boundary(time, float(stderr), "landing", evidence)
+
+
+def _release(motion: Motion, first: int, last: int, end: int) -> Boundary:
+    high = last + np.argmax(motion.gap[last:end] > 4 * HIGH * motion.noise)
+    stop = min(end, max(int(high), last + 8))
+    begin = max(first, last - round(0.06 / motion.interval))
+    rows = slice(begin, stop)
+    time, stderr = release_time(
+        motion.time[rows],
+        motion.gap[rows],
+        motion.contact[rows],
+        motion.rate[rows],
+        motion.noise,
+    )
+    evidence = "the surface bends away from a free parabola from here"
+    return Boundary(time, stderr, "release", evidence)
+
+
+def _not_before(landing: Boundary | None, release: Boundary, latest) -> Boundary:
+    """The release, unless the follower may still have been landing by then.
+
+    A low hop that lands as the surface recedes bounces at once, too low to be seen. The
+    flight begins at `latest` (s) in any case.
+    """
+    if landing is None or landing.kind != "landing":
+        return release
+    late = landing.time + 2 * landing.stderr
+    if release.time > late:
+        return release
+    evidence = "bounces too low to be seen may last until here"
+    return Boundary(min(late, latest), landing.stderr, "impact", evidence)
+
+
+def _flight(sides, span, boundaries, left: set[int]) -> Flight:
+    motion = sides[0]
+    clear = [clear_of_end(side, span) for side in sides]
+    first, last = max(a for a, _ in clear), min(b for _, b in clear)
+    start, stop = (boundaries[place] for place in span)
+    hidden = "an impact may hide between here and the end of the record"
+    start = start if first == span[0] else _end(motion, first, hidden)
+    stop = stop if last == span[1] else _end(motion, last - 1, hidden)
+    height = float(np.max(motion.gap[first:last]))
+    # the threshold is passed long after release: give those samples to the flight
+    begin = int(np.searchsorted(motion.time, start.time))
+    first = begin if span[0] in left and start is boundaries[span[0]] else first
+    return Flight(start, stop, first, last, height)
+
+
+def _end(motion: Motion, place: int, why: str) -> Boundary:
+    time = float(motion.time[min(place, len(motion.time) - 1)])
+    return Boundary(time, float("nan"), "end of record", why)
+
+
+def _contact(motion, span, boundaries, flights, restitution) -> Contact:
+    first, last = span
+    start, stop = boundaries[first], boundaries[last]
+    settled = start.time
+    before = [flight for flight in flights if flight.stop is start]
+    if before and start.kind == "landing":
+        settled = settling_time(before[0], restitution)
+    end = int(np.searchsorted(motion.time, stop.time))
+    last = last if stop.kind == "end of record" else end
+    settled = stop.time if stop.kind == "impact" else min(settled, stop.time)
+    return Contact(start, stop, first, last, settled)
+
+
+def settling_time(flight: Flight, restitution: float) -> float:
+    """When the bounces after a landing have died out, if it was as late as it may be.
+
+    They shrink by the restitution in duration: the rest of a geometric series.
+    """
+    landing = flight.stop
+    late = landing.stderr if np.isfinite(landing.stderr) else 0.0
+    rest = restitution / (1 - min(restitution, 0.95))
+    return landing.time + late + (flight.duration + late) * rest
+
+
+def _gather(found: list[tuple[dict, int]]) -> Impacts:
+    numbers = {"flight", "side"}
+    names = [f.name for f in dataclasses.fields(Impacts) if f.name not in numbers]
+    columns = {name: np.array([row[name] for row, _ in found]) for name in names}
+    return Impacts(
+        **columns,
+        flight=np.array([n for _, n in found], dtype=int),
+        side=np.array([row["side"] for row, _ in found], dtype=int),
+    )

@@ -1,0 +1,137 @@
+"""Where a follower may have left its cam by less than the encoder shows.
+
+Just above the speed at which the valve floats, the follower hops by a few times the
+noise once a turn. Samples of such a hop look like contact. The rig file says where it
+may happen, whatever its tolerances hide: there the spring hardly presses.
+"""
+
+import dataclasses
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from ...hybrid.surface import contact_acceleration
+from .._drive import Drive
+from .._rig import Quantity, Rig
+
+
+# Samples of a turn
+_GRID = 720
+# Standard deviations of the tolerances that count
+_SPREAD = 3.0
+# How much earlier (rad) than elsewhere a release may be
+_EARLY = 0.1
+
+
+def hop_phases(rig: Rig, speed: float) -> Bool[np.ndarray, " 720"]:
+    """Phases of the turn (of 720) at which the follower may be in a hop, or bounce.
+
+    From where the pressing acceleration, with three standard deviations of what the
+    tolerances say of it, allows a release, to where the hop that follows has landed and
+    its bounces have died out.
+
+    **Arguments:** `speed` of the cam (rad/s). Phase zero is the nominal cam's.
+    """
+    nominal = _pull(rig, speed)
+    change = [_pull(moved, speed) - nominal for moved in _moved(rig)]
+    pull = nominal + _SPREAD * np.sqrt(np.sum(np.square(change), axis=0))
+    if not np.any(pull > 0):
+        return np.zeros(_GRID, dtype=bool)
+    if not np.any(pull < 0):
+        return np.ones(_GRID, dtype=bool)
+    restitution = min(rig.restitution.value + rig.restitution.tolerance, 0.99)
+    found = np.zeros(_GRID, dtype=bool)
+    step = 2 * np.pi / speed / _GRID
+    for first in np.flatnonzero((pull > 0) & (np.roll(pull, 1) <= 0)):
+        length = _hop(np.roll(pull, -first), step, restitution)
+        found[(first + np.arange(length)) % _GRID] = True
+    return found
+
+
+def _hop(pull: np.ndarray, step: float, restitution: float) -> int:
+    """Steps from a release to rest again, at most one turn."""
+    rate = np.cumsum(pull) * step
+    landed = np.flatnonzero(np.cumsum(rate) <= 0)
+    if len(landed) == 0:
+        return len(pull)
+    end = int(landed[0])
+    bounces = 2 * restitution * abs(rate[end]) / ((1 - restitution) * abs(pull[end]))
+    return min(len(pull), end + 1 + int(np.ceil(bounces / step)))
+
+
+def _moved(rig: Rig):
+    """The rig with each quantity off by the standard deviation of its tolerance."""
+    for field in dataclasses.fields(rig):
+        one = getattr(rig, field.name)
+        if not isinstance(one, Quantity) or not one.tolerance:
+            continue
+        yield rig.replace(**{field.name: one.value + one.tolerance / np.sqrt(3)})
+
+
+def _pull(rig: Rig, speed: float) -> Float[np.ndarray, " 720"]:
+    """Acceleration away from the cam (rad/s^2) that contact suppresses."""
+    system = rig.system(speed)
+    times = jnp.asarray(2 * np.pi / speed / _GRID * np.arange(_GRID))
+    return np.asarray(_along(system, times))
+
+
+@eqx.filter_jit
+def _along(system, times):
+    def one(t):
+        angle = system.contact_angle(system.cam_angle(t))
+        guess = jnp.stack([angle, jnp.zeros_like(angle)])
+        return contact_acceleration(system, t[None], guess)[0]
+
+    return jax.vmap(one)(times)
+
+
+def may_hop(rig: Rig, drive: Drive) -> Bool[np.ndarray, " k"]:
+    """Samples of a record at which the follower may be in a hop."""
+    phases = hop_phases(rig, drive.speed)
+    return phases[np.round(drive.angle / (2 * np.pi) * _GRID).astype(int) % _GRID]
+
+
+def pressed(rig: Rig, drive: Drive) -> Bool[np.ndarray, " k"]:
+    """Samples from which the surface may be learnt, where they are near it.
+
+    Those at which no hop may be; every one of a record in which one may be anywhere.
+    """
+    doubtful = may_hop(rig, drive)
+    return ~doubtful | doubtful.all()
+
+
+def sure_contact(
+    doubtful: Bool[np.ndarray, " k"], releases: Int[np.ndarray, " releases"]
+) -> Bool[np.ndarray, " k"]:
+    """Samples at which contact is beyond doubt, where it is contact at all.
+
+    A stretch of doubt in which a release was seen is none: the hop was seen too.
+
+    **Arguments:** what `may_hop` says, and the samples at which releases were seen.
+    """
+    sure = ~doubtful
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], doubtful.astype(int), [0]])))
+    for first, last in zip(edges[::2], edges[1::2]):
+        if np.any((releases >= first) & (releases <= last)):
+            sure[first:last] = True
+    return sure
+
+
+def before_release(
+    angle: Float[np.ndarray, " k"], first: int, releases: Int[np.ndarray, " releases"]
+) -> Bool[np.ndarray, " k"]:
+    """Samples of a contact that the record cuts off at which it surely goes on.
+
+    Those before the phase at which the follower was released elsewhere in the record: a
+    release just before the end is not seen.
+
+    **Arguments:** the angle that the cam has turned (rad), the first sample of the
+    contact, and the samples at which releases were seen.
+    """
+    if not len(releases):
+        return np.ones(len(angle), dtype=bool)
+    ahead = (angle[releases] - _EARLY - angle[first]) % (2 * np.pi)
+    return angle < angle[first] + np.min(ahead)

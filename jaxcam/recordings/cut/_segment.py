@@ -1,0 +1,185 @@
+"""Recordings of a rig, or of any system, cut into flights, contacts and impacts."""
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Float
+
+from .._drive import Drive, read_drive
+from .._recording import Recording
+from .._rig import Rig
+from ._cut import cut
+from ._hidden_hops import before_release, may_hop, sure_contact
+from ._motion import Motion
+from ._placed import placed
+from ._polynomial import measured_noise
+from ._segments import Boundary, Flight, no_impacts, Segments
+from ._surface import Surface
+from ._surface_fit import fit_surface, refine_surface
+
+
+def segment_case(
+    recordings: Sequence[Recording],
+    rig: Rig,
+    *,
+    channel: str = "follower_angle_rad",
+    surface: Surface | None = None,
+) -> tuple[Segments, ...]:
+    """Cut all recordings of a cam-follower rig, with one surface for all of them.
+
+    **Arguments:**
+
+    - `recordings`: a `Case`, or any recordings of the same rig.
+    - `rig`: its nominal geometry, tolerances and sensors.
+    - `surface`: the profile, where it is known; otherwise it is estimated from the
+        impacts and contacts of all recordings.
+
+    **Raises:** `RecordingError` where a channel is missing or the cam cannot be read.
+    """
+    recordings = tuple(recordings)
+    drives = [read_drive(recording) for recording in recordings]
+
+    def cut_all(surface):
+        return tuple(
+            _segment_rig(recording, rig, drive, surface, channel)
+            for recording, drive in zip(recordings, drives)
+        )
+
+    if surface is not None:
+        return cut_all(surface)
+    surface = fit_surface(recordings, rig, drives, channel)
+    for _ in range(2):
+        surface = refine_surface(surface, rig, cut_all(surface))
+    return cut_all(surface)
+
+
+def segment(
+    recording: Recording,
+    channel: str,
+    contact: Float[np.ndarray, " k"] | float | None = None,
+    *,
+    contact_rate: Float[np.ndarray, " k"] | None = None,
+    upper: Float[np.ndarray, " k"] | float | None = None,
+    upper_rate: Float[np.ndarray, " k"] | None = None,
+    tolerance: float = 0.0,
+    noise: float | None = None,
+    restitution: float = 0.5,
+) -> Segments:
+    """Cut a recording of any system with one constraint, or two that face each other.
+
+    **Arguments:**
+
+    - `recording`, `channel`: the motion.
+    - `contact`: what the channel would be in contact at each sample, shape `(k,)` or
+        one number; the motion is above it. `None` without `upper`: the whole record is
+        one flight.
+    - `contact_rate`: its rate of change; by default from differences of `contact`.
+    - `upper`, `upper_rate`: the same of a second surface that the motion is below, as
+        the far one of two stops.
+    - `tolerance`: how far (in the units of the channel) each surface may be from where
+        it is stated, by default nothing. Within it, it is put where the impacts are.
+    - `noise`: standard deviation of a sample; by default it is measured.
+    - `restitution`: expected, for the bounces that are too low to be seen.
+
+    **Returns:** the parts. Every impact in `impacts` has a positive speed of approach
+    to the surface that it is on.
+
+    **Raises:** `ValueError` where the surfaces have not one number for each sample, or
+    where the upper one is not above the other.
+    """
+    samples = recording[channel]
+    noise = noise or measured_noise(samples)
+    if contact is None and upper is None:
+        return _one_flight(recording, channel, noise)
+    sides = []
+    for name, place, rate in (
+        ("contact", contact, contact_rate),
+        ("upper", upper, upper_rate),
+    ):
+        if place is None:
+            continue
+        place = _each_sample(name, place, recording)
+        if rate is None:
+            rate = np.asarray(np.gradient(place, recording.time))
+        side = Motion(
+            time=recording.time,
+            samples=samples,
+            contact=place,
+            rate=_each_sample(f"{name}_rate", rate, recording),
+            noise=noise,
+            interval=recording.interval,
+        )
+        sides.append(
+            side if name == "contact" else side.mirrored(side.contact, side.rate)
+        )
+    if len(sides) == 2 and np.any(-sides[1].contact <= sides[0].contact):
+        raise ValueError(
+            "`upper` is not above `contact` at every sample; give the surface that the "
+            "motion is above as `contact` and the one that it is below as `upper`."
+        )
+    if tolerance > 0:
+        sides = [placed(side, tolerance) for side in sides]
+    flights, contacts, impacts = cut(sides, restitution)
+    return Segments(
+        recording,
+        channel,
+        noise,
+        recording.time,
+        flights,
+        contacts,
+        impacts,
+        gap=np.min([side.gap for side in sides], axis=0),
+    )
+
+
+def _each_sample(name: str, values, recording: Recording) -> Float[np.ndarray, " k"]:
+    try:
+        return np.broadcast_to(np.asarray(values, float), recording.time.shape).copy()
+    except ValueError:
+        raise ValueError(
+            f"`{name}` has shape {np.shape(values)} for {len(recording)} samples; give "
+            f"one number, or one for each sample."
+        ) from None
+
+
+def _segment_rig(recording, rig: Rig, drive: Drive, surface: Surface, channel):
+    contact = surface.angle(drive.angle)
+    rate = surface.slope(drive.angle) * drive.rate
+    found = segment(
+        recording,
+        channel,
+        contact,
+        contact_rate=rate,
+        noise=rig.sensors.follower_floor,
+        restitution=rig.restitution.value,
+    )
+    turned = np.interp(found.impacts.time, recording.time, drive.angle)
+    error = surface.slope_stderr(turned) * drive.speed
+    releases = [c.stop.time for c in found.contacts if c.stop.kind == "release"]
+    seen = np.searchsorted(recording.time, releases)
+    seen = np.minimum(seen, len(recording) - 1)
+    sure = sure_contact(may_hop(rig, drive), seen)
+    last = found.contacts[-1] if found.contacts else None
+    if last is not None and last.stop.kind == "end of record":
+        sure &= before_release(drive.angle, last.first, seen)
+    return dataclasses.replace(
+        found,
+        clock=drive.clock,
+        drive=drive,
+        surface=surface,
+        sure=sure,
+        impacts=dataclasses.replace(found.impacts, turned=turned, surface_stderr=error),
+    )
+
+
+def _one_flight(recording, channel, noise) -> Segments:
+    why = "no surface was given, so the whole record is one flight"
+    start, stop = (
+        Boundary(float(recording.time[i]), float("nan"), "end of record", why)
+        for i in (0, -1)
+    )
+    height = float(np.ptp(recording[channel]))
+    flight = Flight(start, stop, 0, len(recording), height)
+    clock = recording.time
+    return Segments(recording, channel, noise, clock, (flight,), (), no_impacts())

@@ -1,0 +1,144 @@
+"""The cam as the recordings show it: the nominal profile, corrected.
+
+A real cam differs from the nominal one by millimetres, which is tens of times the
+noise of an encoder: with the nominal contact angle no contact could be told from a
+low flight.
+"""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from ...models import EccentricCircle
+from .._rig import Rig
+from ._padding import padded
+
+
+# What remains of a cam besides its geometry: run-out, bearings, a bent shaft (rad)
+_HARMONICS = (2, 3)
+_HARMONIC_SIZE = 2e-4
+# What the zero of the cam's angle may be off, and what a sensor that lags by half a
+# millisecond makes of it (rad)
+_PHASE_SIZE = 1e-2
+# Least tolerance given to a length (m): a rig file may state none.
+_LEAST_TOLERANCE = 2e-4
+
+
+class Surface(eqx.Module):
+    """Contact angle (rad) as a function of the cam's angle: geometry and harmonics.
+
+    - `profile`: the eccentric circle that fits best.
+    - `phase`: how far ahead of its measured angle the cam seems to be (rad).
+    - `cosines`, `sines`: amplitudes of harmonics 2 and 3 on top of it (rad).
+    - `covariance`: of radius, eccentricity, centre, phase and amplitudes together.
+    - `sense`: -1 for a clockwise cam; the angle given is counted as it turns.
+    """
+
+    profile: EccentricCircle
+    phase: Float[Array, ""]
+    cosines: Float[Array, " harmonics"]
+    sines: Float[Array, " harmonics"]
+    covariance: Float[Array, " p p"]
+    sense: float = eqx.field(static=True)
+
+    def __call__(self, turned: Float[Array, "*k"]) -> Float[Array, "*k"]:
+        order = jnp.asarray(_HARMONICS, dtype=float)
+        angle = self.sense * (jnp.asarray(turned) + self.phase)
+        phases = jnp.multiply.outer(angle, order)
+        extra = jnp.cos(phases) @ self.cosines + jnp.sin(phases) @ self.sines
+        return self.profile(angle) + extra
+
+    def angle(self, turned) -> Float[np.ndarray, " k"]:
+        """The contact angle as a numpy array, shape `(k,)`."""
+        turned = np.asarray(turned)
+        return np.asarray(_evaluate(self, padded(turned))[0])[: len(turned)]
+
+    def slope(self, turned) -> Float[np.ndarray, " k"]:
+        """Its derivative to the angle that the cam has turned."""
+        turned = np.asarray(turned)
+        return np.asarray(_evaluate(self, padded(turned))[1])[: len(turned)]
+
+    def slope_stderr(self, turned) -> Float[np.ndarray, " k"]:
+        """Standard error of `slope`, large where no impact or contact was seen."""
+        turned = np.asarray(turned)
+        rows = np.asarray(_slope_jacobian(self, vector_of(self), padded(turned)))
+        rows = rows[: len(turned)]
+        return np.sqrt(np.einsum("...i,ij,...j", rows, self.covariance, rows))
+
+
+def nominal_surface(rig: Rig) -> Surface:
+    """The profile as the rig file states it."""
+    zero = jnp.zeros(len(_HARMONICS))
+    sense = -1.0 if rig.cam_rotation == "clockwise" else 1.0
+    covariance = jnp.diag(jnp.asarray(prior_sizes(rig)) ** 2)
+    return Surface(rig.profile(), jnp.zeros(()), zero, zero, covariance, sense)
+
+
+def prior_sizes(rig: Rig) -> np.ndarray:
+    """Tolerance of each number of a surface, shape `(p,)`."""
+    geometry = [
+        np.hypot(rig.cam_radius.tolerance, rig.follower_half_height.tolerance),
+        rig.cam_eccentricity.tolerance,
+        rig.cam_center_x.tolerance,
+        rig.cam_center_y.tolerance,
+    ]
+    harmonics = np.full(2 * len(_HARMONICS), _HARMONIC_SIZE)
+    geometry = np.maximum(geometry, _LEAST_TOLERANCE)
+    return np.concatenate([geometry, [_PHASE_SIZE], harmonics])
+
+
+def vector_of(surface: Surface) -> np.ndarray:
+    """The numbers of a surface that are fitted, shape `(p,)`."""
+    p = surface.profile
+    geometry = [p.radius + p.half_height, p.eccentricity, p.center_x, p.center_y]
+    parts = [np.array([*geometry, surface.phase]), surface.cosines, surface.sines]
+    return np.concatenate(parts)
+
+
+def with_vector(surface: Surface, vector) -> Surface:
+    """The same surface with other numbers."""
+    # only the sum of radius and half height is seen; the radius takes it
+    radius = vector[0] - surface.profile.half_height
+    cosines, sines = jnp.split(vector[5:], 2)
+    return eqx.tree_at(
+        lambda s: (
+            s.profile.radius,
+            s.profile.eccentricity,
+            s.profile.center_x,
+            s.profile.center_y,
+            s.phase,
+            s.cosines,
+            s.sines,
+        ),
+        surface,
+        (radius, vector[1], vector[2], vector[3], vector[4], cosines, sines),
+    )
+
+
+@eqx.filter_jit
+def linearise(surface, vector, turned):
+    """Contact angles `(k,)` and their derivatives `(k, p)` to the numbers."""
+
+    def contact_angle(vector):
+        return with_vector(surface, vector)(turned)
+
+    return contact_angle(vector), jax.jacfwd(contact_angle)(vector)
+
+
+@eqx.filter_jit
+def _evaluate(surface, turned):
+    turned = jnp.asarray(turned)
+    return jax.jvp(surface, (turned,), (jnp.ones_like(turned),))
+
+
+@eqx.filter_jit
+def _slope_jacobian(surface, vector, turned):
+    turned = jnp.asarray(turned)
+
+    def slope(vector):
+        profile = with_vector(surface, vector)
+        return jax.jvp(profile, (turned,), (jnp.ones_like(turned),))[1]
+
+    return jax.jacfwd(slope)(vector)

@@ -1,0 +1,188 @@
+"""The cam that the impacts and contacts of recordings show.
+
+They lie on the true profile, and correct the nominal one within the tolerances of the
+rig.
+"""
+
+from collections.abc import Sequence
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from scipy.ndimage import uniform_filter1d
+
+from .._drive import Drive, read_drive
+from .._recording import Recording
+from .._rig import Rig
+from ._contact_stretches import stretches
+from ._hidden_hops import pressed
+from ._kinks import find_kinks
+from ._padding import padded
+from ._polynomial import crossing, fit_local
+from ._surface import (
+    linearise,
+    nominal_surface,
+    prior_sizes,
+    Surface,
+    vector_of,
+    with_vector,
+)
+
+
+# How far from the cam a follower may be where its bounces are too low to be seen, in
+# units of the noise
+_NEAR = 3.0
+# Samples whose mean is looked at, and how far behind the cam it may seem to be, in
+# units of the noise: 4.5 standard errors of the mean, which noise hardly reaches
+_TOGETHER, _BEHIND = 9, 1.5
+# Half-widths (rad) of the band around the surface in which samples count as contact,
+# from the accuracy of the impacts alone to the noise of the encoder.
+_BANDS = (2e-3, 1e-3, 5e-4)
+
+
+def fit_surface(
+    recordings: Sequence[Recording],
+    rig: Rig,
+    drives: Sequence[Drive] | None = None,
+    channel: str = "follower_angle_rad",
+) -> Surface:
+    """Correct the nominal profile with the impacts and contacts of some recordings.
+
+    Impacts are found as jumps in velocity, without the profile, and each gives one
+    point of it: where the motion before meets the motion after. The profile through
+    those points then shows the contacts, which correct it further. Each parameter
+    stays near its nominal value by its tolerance. What results is good enough to cut
+    the recordings; `refine_surface` makes it as good as they allow.
+    """
+    drives = drives or [read_drive(recording) for recording in recordings]
+    noise = rig.sensors.follower_floor
+    sure = [pressed(rig, drive) for drive in drives]
+    points = [
+        _impact_points(recording, drive, channel, noise, rows)
+        for recording, drive, rows in zip(recordings, drives, sure)
+    ]
+    surface = _solve(
+        nominal_surface(rig), rig, *(np.concatenate(p) for p in zip(*points))
+    )
+    for band in _BANDS:
+        both = [
+            _with_contacts(surface, recording, drive, channel, band, noise, *found)
+            for recording, drive, *found in zip(recordings, drives, points, sure)
+        ]
+        surface = _solve(surface, rig, *(np.concatenate(p) for p in zip(*both)))
+    return surface
+
+
+def refine_surface(surface: Surface, rig: Rig, segments: Sequence) -> Surface:
+    """Fit the profile again, to what `Segments` found to be impacts and contacts.
+
+    Contacts count from where the bounces that cannot be seen have died out: before,
+    the follower is above the cam on average. It is near it, though, which counts for
+    one rough point, and it is never behind: where a cam is seen there alone, it would
+    else be anywhere.
+    """
+    turned, angle, error, above = [], [], [], []
+    for part in segments:
+        time, drive = part.recording.time, part.drive
+        samples = part.recording[part.channel]
+        seen = slice(None, None, _TOGETHER)
+        mean = uniform_filter1d(samples, _TOGETHER)[seen]
+        above.append((drive.angle[seen], mean + _BEHIND * part.noise, part.noise))
+        impacts, sure = part.impacts, pressed(rig, drive)
+        sharp = impacts.time_stderr < 2 * part.recording.interval
+        turned.append(np.interp(impacts.time[sharp], time, drive.angle))
+        angle.append(impacts.angle[sharp])
+        error.append(impacts.angle_stderr[sharp])
+        for contact in part.contacts:
+            rows = part.resting(contact) & sure
+            turned.append(drive.angle[rows])
+            angle.append(samples[rows])
+            error.append(np.full(rows.sum(), part.noise))
+            bouncing = slice(contact.first, np.searchsorted(time, contact.settled))
+            number = len(time[bouncing])
+            turned.append(drive.angle[bouncing])
+            angle.append(samples[bouncing])
+            error.append(np.full(number, _NEAR * np.sqrt(number) * part.noise))
+    count = sum(map(len, turned))
+    for place, least, noise in above:
+        turned.append(place)
+        angle.append(least)
+        error.append(np.full(len(place), noise))
+    joined = (np.concatenate([*column, []]) for column in (turned, angle, error))
+    return _solve(surface, rig, *joined, equal=count)
+
+
+def _impact_points(recording, drive, channel, noise, sure):
+    """Cam angle, follower angle and its error at each jump in velocity."""
+    time, samples = recording.time, recording[channel]
+    interval = recording.interval
+    kinks = find_kinks(samples, interval, noise)
+    turned, angle, error = [], [], []
+    reach = max(6, round(0.01 / interval))
+    for kink in kinks:
+        # the sample next to the impact may be on either side of it
+        left = slice(max(0, kink - 1 - reach), kink - 1)
+        right = slice(kink + 1, kink + 1 + reach)
+        origin = float(time[kink] - interval / 2)
+        before = fit_local(time[left], samples[left], noise, origin)
+        after = fit_local(time[right], samples[right], noise, origin)
+        moment, _ = crossing(before, after, origin, 3 * interval)
+        if abs(moment - origin) >= 3 * interval:
+            continue
+        turned.append(np.interp(moment, time, drive.angle))
+        angle.append(0.5 * (before.value(moment) + after.value(moment)))
+        error.append(before.value_stderr(moment) + after.value_stderr(moment))
+    if len(kinks) == 0:
+        # no impact in the whole record: either all contact, or nothing to learn
+        rows = np.flatnonzero(sure)[::8]
+        return drive.angle[rows], samples[rows], np.full(len(rows), 4 * noise)
+    return np.array(turned), np.array(angle), np.array(error)
+
+
+def _with_contacts(surface, recording, drive, channel, band, noise, impacts, sure):
+    """Impact points and every eighth sample of stretches inside the band."""
+    gap = recording[channel] - surface.angle(drive.angle)
+    shortest = max(4, round(0.008 / recording.interval))
+    inside = (np.abs(gap) < band) & sure
+    keep = np.zeros(len(gap), dtype=bool)
+    for start, stop in stretches(inside):
+        if stop - start >= shortest:
+            keep[start:stop:8] = True
+    found = (drive.angle[keep], recording[channel][keep], np.full(keep.sum(), noise))
+    return tuple(np.concatenate(pair) for pair in zip(impacts, found))
+
+
+def _solve(
+    surface: Surface, rig: Rig, turned, angle, error, *, equal: int | None = None
+) -> Surface:
+    """Gauss-Newton with the tolerances as prior and Huber weights on the points.
+
+    The first `equal` points lie on the profile, the others on it or above.
+    """
+    nominal = vector_of(nominal_surface(rig))
+    sizes = prior_sizes(rig)
+    count = len(turned)
+    places = padded(turned)
+    vector = vector_of(surface)
+    covariance = np.diag(sizes**2)
+    for _ in range(8):
+        fitted, jacobian = linearise(surface, vector, places)
+        misfit = (angle - np.asarray(fitted)[:count]) / error
+        on = np.abs(misfit[:equal])
+        scale = max(1.0, np.median(on) / 0.6745) if len(on) else 1.0
+        weight = 1 / np.maximum(1.0, np.abs(misfit) / (2 * scale))
+        if equal is not None:
+            weight[equal:] *= misfit[equal:] < 0
+        rows = np.asarray(jacobian)[:count] / error[:, None]
+        normal = rows.T @ (weight[:, None] * rows) + np.diag(sizes**-2.0)
+        target = rows.T @ (weight * misfit) + (nominal - vector) / sizes**2
+        # in units of the tolerances the matrix is well scaled
+        covariance = np.outer(sizes, sizes) * np.linalg.inv(
+            normal * np.outer(sizes, sizes)
+        )
+        step = covariance @ target
+        vector = vector + step
+        if np.max(np.abs(step / sizes)) < 1e-6:
+            break
+    surface = with_vector(surface, jnp.asarray(vector))
+    return eqx.tree_at(lambda s: s.covariance, surface, jnp.asarray(covariance))

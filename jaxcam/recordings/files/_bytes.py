@@ -1,0 +1,75 @@
+"""Whole files in memory, none larger than fits there."""
+
+import gzip
+import io
+import zlib
+from pathlib import Path
+
+from .._errors import RecordingError
+
+
+#: Bytes of a table once it is inflated: ten minutes of a rig at 5 kHz, or an hour at
+#: 800 Hz. Reading takes about ten times as much memory.
+LARGEST = 100_000_000
+#: Numbers in a table, whatever they take in the file.
+MOST = 15_000_000
+_GZIP = b"\x1f\x8b"
+
+
+def read_bytes(file: Path) -> bytes:
+    """What is in a file, not inflated.
+
+    **Raises:** `RecordingError` for something other than a file, or a larger one than
+    `LARGEST`; `OSError` where it cannot be read.
+    """
+    if file.is_dir():
+        raise RecordingError(
+            f"{file}: this is a folder; name a file in it, or read it as a case."
+        )
+    if not file.exists():
+        raise RecordingError(f"{file}: there is no such file; check the path.")
+    if not file.is_file():
+        # a pipe may never end
+        raise RecordingError(f"{file}: this is a pipe or a device; save it as a file.")
+    with file.open("rb") as stream:
+        raw = stream.read(LARGEST + 1)
+    if len(raw) > LARGEST:
+        raise too_large(file)
+    return raw
+
+
+def inflate_gzip(file: Path, raw: bytes) -> bytes:
+    """The content of a .gz file.
+
+    **Raises:** `RecordingError` where it is none, damaged, or inflates to more than
+    `LARGEST`, whatever its own size.
+    """
+    if not raw.startswith(_GZIP):
+        raise RecordingError(
+            f"{file}: the name ends in .gz but the file is not compressed; rename it "
+            f"or compress it."
+        )
+    try:
+        with gzip.GzipFile(fileobj=io.BytesIO(raw)) as stream:
+            content = stream.read(LARGEST + 1)
+    except EOFError:
+        raise RecordingError(
+            f"{file}: the compressed file is cut short; copy it again from where it "
+            f"came from."
+        ) from None
+    except (zlib.error, gzip.BadGzipFile):
+        raise RecordingError(
+            f"{file}: the compressed file is damaged; copy it again from where it came "
+            f"from."
+        ) from None
+    if len(content) > LARGEST:
+        raise too_large(file)
+    return content
+
+
+def too_large(file: Path) -> RecordingError:
+    return RecordingError(
+        f"{file}: it holds more than {LARGEST // 10**6} MB or {MOST // 10**6} million "
+        f"numbers, which is too much for one table; cut it into runs of a few minutes, "
+        f"one file each."
+    )

@@ -1,0 +1,115 @@
+"""What is wrong with the numbers of a recording, in one sentence."""
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from .._errors import RecordingError
+from .._recording import Recording
+
+
+# Encoders and clocks disagree by much less than this with the name of the file.
+_SPEED_TOLERANCE = 0.05
+# A follower is a lever that cannot pass the vertical; in degrees it always does.
+_FOLLOWER_RANGE = np.pi / 2
+# s; faster than any encoder or gyro is read
+_SHORTEST = 1e-9
+
+_DEGREES = "multiply it by pi/180 or name the column `{}_deg`"
+
+
+def find_gaps(
+    name: str, time: Float[np.ndarray, " k"], gaps: str
+) -> Int[np.ndarray, " pieces"]:
+    """Index of the first sample after each gap in time.
+
+    **Raises:** `RecordingError` where time does not increase, and for a gap unless
+    `gaps` is `"split"`.
+    """
+    if gaps not in ("refuse", "split"):
+        raise RecordingError(f'gaps is "refuse", "split" or "mend", not {gaps!r}.')
+    if len(time) < 2:
+        raise RecordingError(f"{name}: one sample is no recording; remove this run.")
+    steps = np.diff(time)
+    back = np.flatnonzero(steps <= 0)
+    if len(back):
+        row = int(back[0])
+        raise RecordingError(
+            f"{name}: time does not increase from row {row + 1} ({time[row]:.10g} s) "
+            f"to row {row + 2} ({time[row + 1]:.10g} s); sort the rows, or keep one of "
+            f"those with the same time."
+        )
+    usual = float(np.median(steps))
+    if usual < _SHORTEST:
+        raise RecordingError(
+            f"{name}: samples are {usual:.3g} s apart, which no sensor can do; check "
+            f"the unit of the time."
+        )
+    found = np.flatnonzero(steps > 1.5 * usual)
+    if len(found) and gaps == "refuse":
+        first = int(found[0])
+        many = "a gap" if len(found) == 1 else f"the first of {len(found)} gaps"
+        raise RecordingError(
+            f"{name}: there is {many} in time at {time[first]:.6g} s, "
+            f"{steps[first]:.4g} s long where samples are {usual:.4g} s apart; read it "
+            f'with gaps="split" to use the pieces as recordings of their own, or '
+            f'gaps="mend" to bridge short ones.'
+        )
+    return found + 1
+
+
+def check_channels(recording: Recording) -> None:
+    """Check that the channels of a recording can be what their names say.
+
+    **Raises:** `RecordingError` for a dead channel or a lever angle in degrees.
+    """
+    for name, samples in recording.channels.items():
+        # A force or a reference may well be constant; the motion itself may not.
+        if name.endswith(("_rad", "_rad_s")) and np.ptp(samples) == 0:
+            raise RecordingError(
+                f"{recording.name}: the channel `{name}` is {samples[0]:g} throughout; "
+                f"check that its sensor is connected, or remove the column."
+            )
+    follower = recording.channels.get("follower_angle_rad")
+    if follower is not None and np.max(np.abs(follower)) > _FOLLOWER_RANGE:
+        top = float(np.max(np.abs(follower)))
+        hint = _DEGREES.format("follower_angle")
+        raise RecordingError(
+            f"{recording.name}: `follower_angle_rad` reaches {top:.3g}, which looks "
+            f"like degrees; {hint}."
+        )
+
+
+def check_drive(recording: Recording) -> None:
+    """Compare the cam's speed with the one in the file's name.
+
+    **Raises:** `RecordingError` that names the unit the numbers look like.
+    """
+    angle = recording.channels.get("cam_angle_rad")
+    nominal = recording.nominal_speed
+    if angle is None:
+        return
+    wrapped = np.abs(np.diff(angle)) > np.pi
+    if np.any(wrapped):
+        angle = np.unwrap(angle)
+    speed = float(angle[-1] - angle[0]) / recording.duration
+    if nominal is None:
+        return
+    ratio = abs(speed) / nominal if nominal > 0 else np.inf
+    looks = {
+        180 / np.pi: f"`cam_angle_rad` looks like degrees; {_DEGREES}",
+        1 / (2 * np.pi): "`cam_angle_rad` looks like turns; multiply it by 2 pi or "
+        "name the column `{}_turns`",
+        1e-3: "`time_s` looks like milliseconds; divide it by 1000 or name the column "
+        "`time_ms`",
+    }
+    for factor, sentence in looks.items():
+        if abs(ratio / factor - 1) < _SPEED_TOLERANCE:
+            hint = sentence.format("cam_angle")
+            raise RecordingError(f"{recording.name}: {hint}.")
+    if abs(ratio - 1) > _SPEED_TOLERANCE:
+        rpm = 30 / np.pi
+        raise RecordingError(
+            f"{recording.name}: the cam turns at {abs(speed) * rpm:.1f} rpm where the "
+            f"name of the file says {nominal * rpm:.1f} rpm; correct the name or the "
+            f"column `cam_angle_rad`."
+        )

@@ -1,0 +1,151 @@
+"""Recordings with faults that can be undone: dropped samples, slips of an encoder."""
+
+import dataclasses
+
+import numpy as np
+from jaxtyping import Float
+
+from .._errors import RecordingError
+from .._recording import Recording
+
+
+# Longest run of dropped samples that is bridged; the motion between is a parabola
+_BRIDGE = 4
+
+
+@dataclasses.dataclass(frozen=True)
+class Mended:
+    """Pieces of a recording without faults, and what was done, in words.
+
+    Samples that were filled in are marked in `meta["filled"]` of each piece: they keep
+    the time even, and no fit uses them.
+    """
+
+    recordings: tuple[Recording, ...]
+    notes: tuple[str, ...]
+
+
+def mend(recording: Recording, *, bridge: int = _BRIDGE) -> Mended:
+    """Undo what a clock, an encoder or a saturated gyro does to a recording.
+
+    - Dropped samples: up to `bridge` in a row are filled in (and marked); at a longer
+        gap the recording is split, since nobody knows what happened in it.
+    - An encoder (`..._rad`) that slips by whole turns is put back.
+    - Saturated samples of a rate (`..._rad_s`) are counted; a fit whose `Sensor` has
+        that limit takes them for what they are.
+
+    **Raises:** `RecordingError` where time does not increase, or nothing is left.
+    """
+    notes: list[str] = []
+    channels = dict(recording.channels)
+    for name in channels:
+        if name.endswith("_rad"):
+            channels[name] = _unslipped(recording, name, bridge, notes)
+        elif name.endswith("_rad_s"):
+            _count_saturated(recording, name, notes)
+    whole = dataclasses.replace(recording, channels=channels)
+    pieces = _bridged(whole, bridge, notes)
+    if not pieces:
+        raise RecordingError(
+            f"{recording.name}: the gaps in time leave no piece of {2 * bridge} "
+            f"samples; record the run again."
+        )
+    return Mended(tuple(pieces), tuple(notes))
+
+
+def _unslipped(
+    recording: Recording, name: str, bridge: int, notes
+) -> Float[np.ndarray, " k"]:
+    samples = recording.channels[name]
+    steps = np.diff(samples)
+    # what the motion itself does between two samples, by the neighbours
+    usual = np.median(steps)
+    turns = np.round((steps - usual) / (2 * np.pi))
+    # across a gap at which the recording is split, the drive itself turns on
+    turns[np.diff(recording.time) > (bridge + 1.5) * recording.interval] = 0
+    places = np.flatnonzero(turns)
+    if not len(places):
+        return samples
+    unslipped = samples - 2 * np.pi * np.concatenate([[0.0], np.cumsum(turns)])
+    if np.ptp(samples) <= 2 * np.pi and np.ptp(unslipped) > 2 * np.pi:
+        # an angle that starts anew each turn is no fault
+        return unslipped
+    first = recording.time[places[0] + 1]
+    total = (
+        "a turn" if np.sum(np.abs(turns)) == 1 else f"{np.sum(np.abs(turns)):g} turns"
+    )
+    where = f"at {first:.4f} s" if len(places) == 1 else f"first at {first:.4f} s"
+    notes.append(
+        f"{recording.name}: `{name}` jumps by {total} {where}; that was undone."
+    )
+    return unslipped
+
+
+def _count_saturated(recording: Recording, name: str, notes) -> None:
+    size = np.abs(recording.channels[name])
+    at_limit = size >= np.max(size) * (1 - 1e-9)
+    # one largest sample is no limit, many of the same size are
+    if np.sum(at_limit) > max(3, 0.002 * len(size)):
+        notes.append(
+            f"{recording.name}: `{name}` is saturated at {np.max(size):.4g} in "
+            f"{np.mean(at_limit):.1%} of its samples."
+        )
+
+
+def _bridged(recording: Recording, bridge: int, notes) -> list[Recording]:
+    time, interval = recording.time, recording.interval
+    if np.any(np.diff(time) <= 0):
+        row = int(np.flatnonzero(np.diff(time) <= 0)[0])
+        raise RecordingError(
+            f"{recording.name}: time does not increase after {time[row]:.6g} s; sort "
+            f"the rows, or keep one of those with the same time."
+        )
+    missing = np.round(np.diff(time) / interval).astype(int) - 1
+    breaks = np.flatnonzero(missing > bridge) + 1
+    filled_total = int(np.sum(missing[(missing > 0) & (missing <= bridge)]))
+    if filled_total:
+        share = filled_total / (filled_total + len(time))
+        notes.append(
+            f"{recording.name}: {filled_total} samples ({share:.1%}) were dropped; "
+            f"they are filled in to keep the time even, and not used."
+        )
+    for place in breaks:
+        last, length = time[place - 1], (time[place] - time[place - 1]) * 1e3
+        notes.append(
+            f"{recording.name}: nothing was recorded for {length:.3g} ms from "
+            f"{last:.4f} s on; the recording is split there."
+        )
+    parts = [rows for rows in np.split(np.arange(len(time)), breaks)]
+    parts = [rows for rows in parts if len(rows) >= 2 * max(bridge, 1)]
+    found = []
+    for number, rows in enumerate(parts, start=1):
+        name = recording.name if len(parts) == 1 else f"{recording.name}_piece{number}"
+        found.append(_even(recording, rows, name, interval))
+    return found
+
+
+def _even(recording: Recording, rows, name: str, interval: float) -> Recording:
+    """One piece with the dropped samples put in by cubic interpolation."""
+    time = recording.time[rows]
+    # step by step: samples that come early or late do not add up to others
+    ticks = np.maximum(np.round(np.diff(time) / interval).astype(int), 1)
+    places = np.concatenate([[0], np.cumsum(ticks)])
+    count = places[-1] + 1
+    if count == len(rows):
+        channels = {c: v[rows] for c, v in recording.channels.items()}
+        return dataclasses.replace(recording, name=name, time=time, channels=channels)
+    from scipy.interpolate import PchipInterpolator
+
+    filled = np.ones(count, dtype=bool)
+    filled[places] = False
+    even = np.interp(np.arange(count), places, time)
+    channels = {
+        c: np.asarray(PchipInterpolator(time, v[rows])(even))
+        for c, v in recording.channels.items()
+    }
+    for c, v in recording.channels.items():
+        channels[c][places] = v[rows]
+    meta = {**recording.meta, "filled": filled}
+    return dataclasses.replace(
+        recording, name=name, time=even, channels=channels, meta=meta
+    )

@@ -1,0 +1,108 @@
+"""Attractors of all the motions of a sweep, in an order of their own."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ._fingerprint import clusters, SharedCells
+from ._label import APERIODIC, ESCAPED, FAILED, label_name, OUTSIDE
+from ._unique_rows import unique_rows
+
+
+#: instead of the number of an attractor
+NONE = {ESCAPED: -1, FAILED: -2, OUTSIDE: -3}
+
+
+class Attractors(NamedTuple):
+    """What motions end on, periodic ones first, by period, impacts and place."""
+
+    impacts: np.ndarray
+    turns: np.ndarray
+    #: (attractors, means) see `fingerprints`
+    fingerprint: np.ndarray
+    #: (attractors,) the lane that stands for each
+    lane: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.turns)
+
+
+def find_attractors(
+    impacts, turns, fingerprint, cells, starts, same: float
+) -> tuple[np.ndarray, Attractors]:
+    """Attractors, and the number of the one that each lane ends on.
+
+    **Arguments:**
+
+    - `impacts`, `turns`: labels, shape `(lanes,)`.
+    - `fingerprint`: shape `(lanes, means)`.
+    - `cells`: an iterable of pairs: indices of lanes that do not repeat, and the cells
+        `(lanes, keep)` that they visit.
+    - `starts`: `(lanes, n)`; where several lanes end on an attractor, the one with the
+        smallest start stands for it.
+    - `same`: two orbits are one where their fingerprints differ by less.
+
+    **Returns:** numbers `(lanes,)`, -1 for motions that escaped, -2 for those that
+    failed and -3 for those that could not start; and the attractors.
+    """
+    lanes = len(turns)
+    group = np.full(lanes, -1)
+    key = np.stack([impacts, turns], axis=1)
+    count = 0
+    for m, n in unique_rows(key[turns > 0])[0]:
+        (some,) = np.nonzero((impacts == m) & (turns == n))
+        group[some] = count + clusters(fingerprint[some], same)
+        count = group[some].max() + 1
+    shared, known, places = SharedCells(), [], []
+    for some, visited in cells:
+        if len(some):
+            known.append(some)
+            places.append(shared.add(visited))
+    if known:
+        some, place = np.concatenate(known), np.concatenate(places)
+        group[some] = count + shared.groups(place)
+    return _ordered(group, impacts, turns, fingerprint, starts)
+
+
+def _ordered(group, impacts, turns, fingerprint, starts):
+    """Numbers that say nothing of the order in which motions were seen."""
+    found = group >= 0
+    used = np.unique(group[found])
+    # the smallest start of each group; starts do not depend on their order
+    order = np.lexsort((*starts.T[::-1], group))
+    order = order[found[order]]
+    first = order[np.searchsorted(group[order], used)]
+    irregular = turns[first] == APERIODIC
+    rounded = np.round(fingerprint[first], 6)
+    keys = (*rounded.T[::-1], impacts[first], turns[first], irregular)
+    rank = np.lexsort(keys)
+    first = first[rank]
+    number = np.full(len(group), -1)
+    place = np.empty(len(used), dtype=int)
+    place[rank] = np.arange(len(used))
+    number[found] = place[np.searchsorted(used, group[found])]
+    for kind, value in NONE.items():
+        number[turns == kind] = value
+    return number, Attractors(impacts[first], turns[first], fingerprint[first], first)
+
+
+def attractor_names(impacts, turns) -> list[str]:
+    """P(1,1), P(6,6) a, P(6,6) b, ...: letters where several have one label."""
+    plain = [label_name(int(m), int(n)) for m, n in zip(impacts, turns, strict=True)]
+    made = []
+    for i, word in enumerate(plain):
+        if plain.count(word) == 1:
+            made.append(word)
+        else:
+            made.append(f"{word} {_letters(plain[:i].count(word))}")
+    return made
+
+
+def _letters(number: int) -> str:
+    """a, b, ..., z, aa, ab, ..."""
+    letters = ""
+    number += 1
+    while number:
+        number, rest = divmod(number - 1, 26)
+        letters = chr(ord("a") + rest) + letters
+    return letters

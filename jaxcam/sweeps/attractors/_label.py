@@ -1,0 +1,130 @@
+"""Labels P(m, n): what repeats after n turns, with m impacts."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ...hybrid.codes import BEHIND as STARTS_BEHIND, NOT_FINITE
+from ..sections import BEHIND, Samples
+from ._unique_rows import unique_rows
+
+
+#: instead of a number of turns
+APERIODIC, ESCAPED, FAILED, OUTSIDE = 0, -1, -2, -3
+#: instead of a number of impacts: infinitely many, contact without end, not counted
+STICKING, CONTACT, UNCOUNTED = -1, -2, -3
+
+# how steady the distances within an orbit must be
+_STEADY = 0.9
+
+
+class Labels(NamedTuple):
+    """What each lane has settled on, as small integers.
+
+    `turns` is the period in turns (or in points, on a section that is not taken once a
+    turn), or one of `APERIODIC`, `ESCAPED`, `FAILED`, `OUTSIDE`; `impacts` counts those
+    of one orbit, or is one of `STICKING`, `CONTACT`, `UNCOUNTED`.
+    """
+
+    impacts: np.ndarray
+    turns: np.ndarray
+
+
+def periods(states, tolerance: float = 1e-6) -> np.ndarray:
+    """Smallest number of points after which each lane repeats; 0 where none does.
+
+    **Arguments:**
+
+    - `states`: shape `(lanes, keep, n)`; periods up to `keep / 2` are found, so that
+        each is seen twice.
+    - `tolerance`: allowed difference of two states, relative to 1 + |state|, component
+        by component.
+
+    A motion that spirals in towards an orbit looks, for a while, as if it had a
+    multiple of its period. It counts as not repeating until its points stop
+    approaching.
+
+    **Returns:** shape `(lanes,)`.
+    """
+    states = np.asarray(states, dtype=float)
+    lanes, keep, _ = states.shape
+    found = np.zeros(lanes, dtype=int)
+    room = tolerance * (1 + np.abs(states))
+    left = np.arange(lanes)
+    for n in range(1, keep // 2 + 1):
+        if not len(left):
+            break
+        # most lanes are told apart by their last points
+        last = np.abs(states[left, -1] - states[left, -1 - n]) <= room[left, -1]
+        likely = left[np.all(last, axis=1)]
+        gone = np.abs(states[likely, n:] - states[likely, :-n])
+        same = np.all(gone <= room[likely, n:], axis=(1, 2))
+        found[likely[same]] = n
+        left = left[found[left] == 0]
+    for n in np.unique(found[found > 1]):
+        (some,) = np.nonzero(found == n)
+        found[some[_still_nearing(states[some], int(n))]] = 0
+    return found
+
+
+def _still_nearing(states, n: int) -> np.ndarray:
+    """Whether points that are not a period apart come closer to each other."""
+    nearing = np.zeros(len(states), dtype=bool)
+    for part in range(1, n):
+        if n % part:
+            continue
+        apart = np.abs(states[:, part:] - states[:, :-part]).max(axis=2)
+        first, last = apart[:, :n].max(axis=1), apart[:, -n:].max(axis=1)
+        nearing |= last < _STEADY * first
+    return nearing
+
+
+def label(samples: Samples, tolerance: float = 1e-6, impacting: bool = True) -> Labels:
+    """The label of each lane.
+
+    **Arguments:** `impacting`: whether impacts are counted; they are not for a map.
+    """
+    turns = periods(samples.states, tolerance)
+    index = np.maximum(turns, 1)[:, None] - 1
+
+    def in_the_orbit(counts):
+        total = np.cumsum(counts[:, ::-1], axis=1)
+        return np.take_along_axis(total, index, axis=1)[:, 0]
+
+    impacts = in_the_orbit(samples.hits)
+    impacts = np.where(in_the_orbit(samples.rests) > 0, STICKING, impacts)
+    impacts = np.where(samples.contact, CONTACT, impacts)
+    if not impacting:
+        impacts = np.full_like(impacts, UNCOUNTED)
+    impacts = np.where(turns > 0, impacts, UNCOUNTED)
+    for codes, kind in (((NOT_FINITE,), ESCAPED), ((BEHIND, STARTS_BEHIND), OUTSIDE)):
+        turns = np.where(np.isin(samples.code, codes), kind, turns)
+    other = (samples.code != 0) & (turns == APERIODIC)
+    turns = np.where(other, FAILED, turns)
+    impacts = np.where(turns > 0, impacts, UNCOUNTED)
+    return Labels(impacts.astype(np.int32), turns.astype(np.int32))
+
+
+def label_name(impacts: int, turns: int) -> str:
+    """The label in words: P(1,1), P(inf,1), contact, period 3, aperiodic, ..."""
+    words = {
+        APERIODIC: "aperiodic",
+        ESCAPED: "escaped",
+        FAILED: "failed",
+        OUTSIDE: "outside",
+    }
+    if int(turns) in words:
+        return words[int(turns)]
+    if impacts == CONTACT:
+        return "contact"
+    if impacts == UNCOUNTED:
+        return f"period {turns}"
+    return f"P({'inf' if impacts == STICKING else impacts},{turns})"
+
+
+def label_names(labels: Labels) -> np.ndarray:
+    """All labels in words, in the shape of the labels."""
+    pairs = np.stack([labels.impacts, labels.turns], axis=-1)
+    unique, back = unique_rows(pairs.reshape(-1, 2))
+    words = np.array([label_name(int(m), int(n)) for m, n in unique], dtype=object)
+    return words[back].reshape(labels.turns.shape)

@@ -1,0 +1,38 @@
+"""Motions until they repeat, or until patience ends."""
+
+import numpy as np
+
+from ..sections import AbstractSection, joined, Samples
+from ._label import APERIODIC, label, Labels
+
+
+def settle(
+    section: AbstractSection,
+    states,
+    turns: int,
+    keep: int,
+    *,
+    tolerance: float = 1e-6,
+    reruns: int = 0,
+    where=None,
+    values=None,
+) -> tuple[Samples, Labels]:
+    """Sample motions and label them; those that do not repeat yet go on.
+
+    **Arguments:** `reruns`: how often they go on, each time for twice as many turns.
+    """
+    values = None if values is None else np.asarray(values, dtype=float)
+    samples = section.sample(states, turns, keep, where=where, values=values)
+    counted = section.impacting and section.regular
+    labels = label(samples, tolerance, counted)
+    for _ in range(reruns):
+        turns *= 2
+        (open_,) = np.nonzero(labels.turns == APERIODIC)
+        if not len(open_):
+            break
+        some = None if values is None else values[open_]
+        start = samples.final[open_]
+        again = section.sample(start, turns, keep, where=where, values=some)
+        samples = joined(samples, open_, again)
+        labels = label(samples, tolerance, counted)
+    return samples, labels

@@ -1,0 +1,17 @@
+"""Blocks of a sweep: where they run, and how they are kept."""
+
+from ._checksums import checked as checked
+from ._cluster import cluster as cluster
+from ._identity import about_section as about_section, digest as digest
+from ._run import (
+    AbstractJob as AbstractJob,
+    Arrays as Arrays,
+    Progress as Progress,
+    run_blocks as run_blocks,
+)
+from ._store import (
+    Layout as Layout,
+    Store as Store,
+    SWEEP as SWEEP,
+    Variable as Variable,
+)

@@ -1,0 +1,186 @@
+"""Lanes of a hybrid system: which can start, and where they start by themselves."""
+
+import sys
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from ...hybrid import HybridSystem
+from ...hybrid.batch import split_lanes
+from ...hybrid.loop import starts_behind
+from ...hybrid.surface import contact_state, gaps, least_gaps
+from ...parameters import as_arrays
+from ._samples import BEHIND
+
+
+#: motions that advance together, for numbers of motions up to so many
+_WIDTHS = ((32, 16), (512, 48), (sys.maxsize, 1 << 16))
+
+
+def chunk_rows(width: int) -> int:
+    """Attempts between two looks at the lanes: few are wasted, and looks are rare."""
+    # few lanes gain from fewer looks at them
+    return 1024 if width < 16 else 64
+
+
+def smallest_gaps(
+    system: HybridSystem, t0, states, where=None, values=None, room: float = 0.0
+):
+    """Smallest gap of each state at `t0`, shape `(lanes,)`.
+
+    `room` times what cannot be told from zero is added to each.
+    """
+    batched, shared = split_lanes(as_arrays(system), where, values)
+    parts = jnp.asarray(t0, float), _rows(states), jnp.asarray(room, float)
+    return np.asarray(_gaps(batched, shared, *parts))
+
+
+def admissible(system: HybridSystem, t0, states, where=None, values=None):
+    """Whether each state is finite and in front of every constraint at `t0`."""
+    states = np.asarray(states, dtype=float)
+    finite = np.all(np.isfinite(states), axis=1)
+    batched, shared = split_lanes(as_arrays(system), where, values)
+    rows = _rows(np.where(finite[:, None], states, 0.0))
+    behind, found = _behind(batched, shared, jnp.asarray(t0, float), rows)
+    return finite & np.all(np.isfinite(found), axis=1) & ~np.asarray(behind)
+
+
+def lifted(system: HybridSystem, t0, states, where=None, values=None) -> np.ndarray:
+    """States behind a constraint at `t0`, put onto it; the others as they are."""
+    states = np.asarray(states, dtype=float)
+    if np.all(smallest_gaps(system, t0, states, where, values) >= 0):
+        return states
+    batched, shared = split_lanes(as_arrays(system), where, values)
+    return np.asarray(_lifted(batched, shared, jnp.asarray(t0, float), _rows(states)))
+
+
+def in_contact(system: HybridSystem, t0, where=None, values=None) -> np.ndarray:
+    """The state in contact, without velocity relative to the constraint, at `t0`.
+
+    **Raises:** `ValueError` where a state has not two components or there are several
+    constraints.
+    """
+    names = system.state_names
+    gap = jax.eval_shape(system.gap, jnp.asarray(t0, float), jnp.zeros(2))
+    if (names and len(names) != 2) or gap.size != 1:
+        raise ValueError(
+            "only a system with two states and one constraint has a start of its own; "
+            "pass the states to start from"
+        )
+    batched, shared = split_lanes(as_arrays(system), where, values)
+    t0 = jnp.asarray(t0, float)
+    if batched is None:
+        return np.asarray(_contact_states(None, shared, t0))[None]
+    return np.asarray(_contact_states(batched, shared, t0))
+
+
+def turn_lengths(system: HybridSystem, period, where=None, values=None) -> np.ndarray:
+    """Length of a turn (s) in each lane, shape `(lanes,)`, or `(1,)` for all alike.
+
+    **Raises:** `ValueError` for a system without a period of its own, if none is given.
+    """
+    length = system.period if period is None else period
+    if length is None:
+        raise ValueError(
+            "this system has no forcing period; pass period=... in seconds"
+        )
+    if period is not None or where is None:
+        return np.array([float(length)])
+    return np.asarray(_periods(*split_lanes(as_arrays(system), where, values)))
+
+
+def run_lanes(run, system, t0, states, where, values, lanes: int, tails):
+    """Run the motions that can start, in blocks of few different widths.
+
+    **Arguments:**
+
+    - `run(states, values, width)` returns arrays with one row for each lane, the last
+        of them the code.
+    - `lanes`: motions that advance together, at most.
+    - `tails`: shapes of a row of the arrays.
+
+    **Returns:** the same arrays for all lanes; rows of lanes that cannot start, or
+    failed, are NaN or zero, and of the code `BEHIND` or why.
+    """
+    states = np.asarray(states, dtype=float)
+    values = None if values is None else np.asarray(values, dtype=float)
+    ready = admissible(system, t0, states, where, values)
+    count = len(states)
+    # few widths, as each is a program of its own; several motions for each slot, so
+    # that the last ones leave few slots empty
+    width = 1 if count == 1 else next(w for most, w in _WIDTHS if count <= most)
+    width = min(lanes, width)
+    code = np.full(count, BEHIND)
+    if not np.any(ready):
+        return (*(np.full((count, *tail), np.nan) for tail in tails), code)
+    # lanes that cannot start, and those missing in a block, repeat one that can
+    one = int(np.argmax(ready))
+    index = np.full(max(count, width), one)
+    index[:count] = np.where(ready, np.arange(count), one)
+    some = None if values is None else values[index]
+    *parts, ends = (part[:count] for part in run(states[index], some, width))
+    code = np.where(ready, ends, code)
+    made = []
+    for part in parts:
+        part = np.array(part)
+        part[code != 0] = np.nan if part.dtype.kind == "f" else 0
+        made.append(part)
+    return (*made, code)
+
+
+def _rows(states):
+    return jnp.asarray(np.asarray(states, dtype=float))
+
+
+@eqx.filter_jit
+def _gaps(batched, shared, t0, states, room):
+    def one(batched, state):
+        return jnp.min(least_gaps(eqx.combine(batched, shared), t0, state, room))
+
+    return eqx.filter_vmap(one, in_axes=(eqx.if_array(0), 0))(batched, states)
+
+
+@eqx.filter_jit
+def _behind(batched, shared, t0, states):
+    def one(batched, state):
+        return starts_behind(eqx.combine(batched, shared), t0, state)
+
+    return eqx.filter_vmap(one, in_axes=(eqx.if_array(0), 0))(batched, states)
+
+
+@eqx.filter_jit
+def _lifted(batched, shared, t0, states):
+    def one(batched, state):
+        system = eqx.combine(batched, shared)
+
+        def worst(x):
+            return jnp.min(gaps(system, t0, x))
+
+        # the gap is nearly linear over such distances; Newton along its gradient
+        for _ in range(6):
+            gap, slope = jax.value_and_grad(worst)(state)
+            state = state + jnp.maximum(-gap, 0.0) * slope / jnp.sum(slope * slope)
+        return state
+
+    return eqx.filter_vmap(one, in_axes=(eqx.if_array(0), 0))(batched, states)
+
+
+@eqx.filter_jit
+def _contact_states(batched, shared, t0):
+    def one(batched):
+        system = eqx.combine(batched, shared)
+        return contact_state(system, t0[None], jnp.zeros(2))[0]
+
+    if batched is None:
+        return one(None)
+    return eqx.filter_vmap(one, in_axes=eqx.if_array(0))(batched)
+
+
+@eqx.filter_jit
+def _periods(batched, shared):
+    def one(batched):
+        return eqx.combine(batched, shared).period * 1.0
+
+    return eqx.filter_vmap(one, in_axes=eqx.if_array(0))(batched)

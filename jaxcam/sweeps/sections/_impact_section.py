@@ -1,0 +1,108 @@
+"""The impact section: every time that something is hit."""
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+
+from ...hybrid import HybridSystem, Settings
+from ...hybrid.batch import Chunking, Horizon, Lanes, run_refilled
+from ...hybrid.codes import Row
+from ...parameters import as_arrays
+from ._hybrid_lanes import chunk_rows, run_lanes
+from ._samples import Samples
+from ._system_section import AbstractSystemSection
+
+
+class ImpactSection(AbstractSystemSection):
+    """States just after each impact, with the time of it.
+
+    A chattering sequence is listed up to the impact after which the rest of it is
+    summed; `Settings(chatter_depth=...)` says how far.
+
+    **Arguments:**
+
+    - `system`: a [`jaxcam.hybrid.HybridSystem`][].
+    - `t0`: s, where motions start.
+    - `period`: s, length of a turn; the system's own forcing period by default.
+    - `settings`: accuracy; by default a tolerance of 1e-9 and chatter listed down to a
+        hundredth of the fastest rebound.
+    - `lanes`: how many motions advance together in one compiled program.
+    - `max_steps`: budget of attempted steps of a lane.
+    """
+
+    system: HybridSystem
+    t0: float = 0.0
+    period: float | None = None
+    settings: Settings | None = None
+    lanes: int = eqx.field(default=128, static=True)
+    max_steps: int = eqx.field(default=1_000_000, static=True)
+    regular: bool = eqx.field(default=False, static=True, init=False)
+    impacting: bool = eqx.field(default=True, static=True, init=False)
+
+    def sample(self, states, turns, keep, *, where=None, values=None) -> Samples:
+        states = np.asarray(states, dtype=float)
+        n = states.shape[1]
+        settings = self.settings
+        if settings is None:
+            settings = Settings(tolerance=1e-9, chatter_depth=0.01)
+        settings.check()
+        system = as_arrays(self.system)
+        settings = as_arrays(settings)
+        period = None if self.period is None else jnp.asarray(self.period, jnp.float64)
+        t0 = jnp.asarray(self.t0, dtype=jnp.float64)
+
+        def run(states, values, width):
+            seen = _Impacts(len(states), keep, n)
+            chunking = Chunking(width, chunk_rows(width), self.max_steps)
+            lanes = Lanes(system, where, values, states)
+            when = Horizon(t0, period, turns)
+            _, _, code = run_refilled(lanes, when, settings, chunking, seen)
+            return *seen.found(), code
+
+        lanes = (self.system, self.t0, states, where, values, self.lanes)
+        tails = ((keep, n), (keep,), (keep,), (n,))
+        found, times, rests, final, code = run_lanes(run, *lanes, tails)
+        return Samples(
+            states=found,
+            times=times,
+            hits=np.isfinite(times).astype(int),
+            rests=np.nan_to_num(rests).astype(int),
+            final=final,
+            contact=np.zeros(len(states), dtype=bool),
+            code=code,
+        )
+
+
+class _Impacts:
+    """The last impacts of each lane, in a ring, and its state at the last stop."""
+
+    def __init__(self, lanes: int, keep: int, n: int):
+        self._ring = np.full((lanes, keep, 2 + n), np.nan)
+        self._number = np.zeros(lanes, dtype=int)
+        self._final = np.full((lanes, n), np.nan)
+
+    @staticmethod
+    def row(record, _):
+        return [jnp.asarray(v) for v in (record.kind, record.t, *record.after)]
+
+    def take(self, work, log) -> None:
+        kind = log[0].astype(np.int8)
+        hit = (kind == Row.IMPACT) | (kind == Row.LAST_IMPACT)
+        rank = self._number[work] + np.cumsum(hit, axis=0) - 1
+        # attempt by attempt, so that the latest is what stays in a place
+        at = np.nonzero(hit)
+        place = work[at[1]], rank[at] % self._ring.shape[1]
+        self._ring[place] = np.stack([part[at] for part in log], axis=1)
+        # slots that do not run show a lane of another slot
+        np.add.at(self._number, work, hit.sum(axis=0))
+        at = np.nonzero(kind == Row.STOP)
+        self._final[work[at[1]]] = np.stack([part[at] for part in log[2:]], axis=1)
+
+    def found(self):
+        keep = self._ring.shape[1]
+        number = self._number
+        # the newest impact goes last; a ring that is not full starts with NaN
+        order = (number[:, None] + np.arange(keep)) % keep
+        rows = np.take_along_axis(self._ring, order[..., None], axis=1)
+        rests = (rows[..., 0] == float(Row.LAST_IMPACT)).astype(float)
+        return rows[..., 2:], rows[..., 1], rests, self._final

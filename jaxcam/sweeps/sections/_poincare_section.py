@@ -1,0 +1,94 @@
+"""Any Poincare section, by single trajectories."""
+
+from collections.abc import Callable
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+
+from ...hybrid import HybridSystem, Settings, simulate
+from ._hybrid_lanes import admissible
+from ._samples import BEHIND, Samples
+from ._system_section import AbstractSystemSection
+
+
+class PoincareSection(AbstractSystemSection):
+    """Where motions cross `function(t, state) = 0`, and when.
+
+    Motions are made one after the other by
+    [`jaxcam.simulate`][jaxcam.hybrid.simulate]: right for dozens of them, slow for
+    thousands.
+
+    **Arguments:**
+
+    - `system`: a [`jaxcam.hybrid.HybridSystem`][].
+    - `function`: smooth scalar function of time and state, in `jax.numpy`.
+    - `direction`: +1 for rising crossings, -1 for falling ones, 0 for both.
+    - `t0`: s, where motions start.
+    - `period`: s, length of a turn; the system's own forcing period by default.
+    - `settings`: accuracy; that of `simulate` by default.
+    """
+
+    system: HybridSystem
+    function: Callable = eqx.field(static=True)
+    direction: int = eqx.field(default=1, static=True)
+    t0: float = 0.0
+    period: float | None = None
+    settings: Settings | None = None
+    regular: bool = eqx.field(default=False, static=True, init=False)
+    impacting: bool = eqx.field(default=True, static=True, init=False)
+
+    def sample(self, states, turns, keep, *, where=None, values=None) -> Samples:
+        states = np.asarray(states, dtype=float)
+        lanes, n = states.shape
+        lengths = np.broadcast_to(self.turn(where, values), (lanes,))
+        ready = admissible(self.system, self.t0, states, where, values)
+        made = Samples(
+            states=np.full((lanes, keep, n), np.nan),
+            times=np.full((lanes, keep), np.nan),
+            hits=np.zeros((lanes, keep), dtype=int),
+            rests=np.zeros((lanes, keep), dtype=int),
+            final=np.full((lanes, n), np.nan),
+            contact=np.zeros(lanes, dtype=bool),
+            code=np.where(ready, 0, BEHIND),
+        )
+        for lane in np.flatnonzero(ready):
+            system = self._system(where, None if values is None else values[lane])
+            t1 = self.t0 + turns * lengths[lane]
+            self._one(system, states[lane], t1, int(lane), made)
+        return made
+
+    def _system(self, where, value) -> HybridSystem:
+        if where is None:
+            return self.system
+        value = jnp.asarray(value, dtype=jnp.float64)
+        several = isinstance(where(self.system), tuple)
+        return eqx.tree_at(where, self.system, tuple(value) if several else value)
+
+    def _one(self, system, state, t1, lane: int, made: Samples) -> None:
+        keep = made.states.shape[1]
+        run = simulate(system, state, self.t0, t1, settings=self.settings)
+        made.code[lane] = int(run.code)
+        if made.code[lane] != 0:
+            return
+        times, states = map(np.asarray, run.section(self.function, self.direction))
+        hits = np.asarray(run.impacts.time)
+        rests = np.asarray(run.contacts.start)[1:]
+        first = np.asarray(run.contacts.start)[:1]
+        rests = np.concatenate([first[first > self.t0], rests])
+        edges = np.concatenate([[self.t0], times])
+        count = min(keep, len(times))
+        if count:
+            made.states[lane, -count:] = states[-count:]
+            made.times[lane, -count:] = times[-count:]
+            made.hits[lane, -count:] = np.histogram(hits, edges)[0][-count:]
+            made.rests[lane, -count:] = np.histogram(rests, edges)[0][-count:]
+        made.final[lane] = np.asarray(run.final)
+
+
+def return_times(samples: Samples) -> np.ndarray:
+    """Times between consecutive points on a section, shape `(lanes, keep - 1)`.
+
+    s, or iterations of a map; NaN where a point is missing.
+    """
+    return np.diff(samples.times, axis=1)

@@ -1,0 +1,82 @@
+"""The stroboscopic section: once a period of the forcing."""
+
+import equinox as eqx
+import numpy as np
+
+from ...hybrid import HybridSystem, Settings, stroboscope
+from ._hybrid_lanes import chunk_rows, run_lanes, smallest_gaps
+from ._samples import Samples
+from ._system_section import AbstractSystemSection
+
+
+class Stroboscopic(AbstractSystemSection):
+    """States at t0 + k period, k = 1, 2, ...; a turn is one period.
+
+    **Arguments:**
+
+    - `system`: a [`jaxcam.hybrid.HybridSystem`][].
+    - `t0`: s, where motions start; its phase is that of the samples.
+    - `period`: s; the system's own forcing period by default.
+    - `settings`: accuracy; by default a tolerance of 1e-9 and chatter completed as soon
+        as theory allows.
+    - `lanes`: how many motions advance together in one compiled program.
+    - `max_steps`: budget of attempted steps of a lane in one call.
+    """
+
+    system: HybridSystem
+    t0: float = 0.0
+    period: float | None = None
+    settings: Settings | None = None
+    lanes: int = eqx.field(default=128, static=True)
+    max_steps: int = eqx.field(default=1_000_000, static=True)
+    regular: bool = eqx.field(default=True, static=True, init=False)
+    impacting: bool = eqx.field(default=True, static=True, init=False)
+
+    def sample(self, states, turns, keep, *, where=None, values=None) -> Samples:
+        states = np.asarray(states, dtype=float)
+        n = states.shape[1]
+
+        def run(states, values, width):
+            made = stroboscope(
+                self.system,
+                states,
+                turns,
+                skip=turns - keep,
+                t0=self.t0,
+                where=where,
+                values=values,
+                period=self.period,
+                settings=self.settings,
+                block=width,
+                rows=chunk_rows(width),
+                max_steps=self.max_steps,
+            )
+            return made.states, made.hits, made.rests, made.code
+
+        lanes = (self.system, self.t0, states, where, values, self.lanes)
+        tails = ((keep, n), (keep,), (keep,))
+        samples, hits, rests, code = run_lanes(run, *lanes, tails)
+        hits, rests = np.nan_to_num(hits).astype(int), np.nan_to_num(rests).astype(int)
+        return Samples(
+            states=samples,
+            times=self._times(turns, keep, where, values, len(states)),
+            hits=hits,
+            rests=rests,
+            final=samples[:, -1],
+            contact=self._touching(samples, hits, code, where, values),
+            code=code,
+        )
+
+    def _touching(self, samples, hits, code, where, values):
+        """In contact at the end, and no impact on the way there."""
+        calm = (code == 0) & (hits.sum(axis=1) == 0)
+        if not np.any(calm):
+            return calm
+        ends = np.where(calm[:, None], samples[:, -1], samples[calm][0, -1])
+        gap = smallest_gaps(self.system, self.t0, ends, where, values, room=-1e3)
+        return calm & (gap <= 0)
+
+    def _times(self, turns, keep, where, values, lanes):
+        turn = np.arange(turns - keep + 1, turns + 1, dtype=float)
+        length = self.turn(where, values)
+        return np.broadcast_to(self.t0 + turn * length[:, None], (lanes, keep))

@@ -1,0 +1,1 @@
+"""Chapter 1: what chatter is, in two figures."""

@@ -1,0 +1,1 @@
+"""Chapter 2: dynamical systems, smooth and not."""

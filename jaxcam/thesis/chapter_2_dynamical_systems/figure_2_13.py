@@ -1,0 +1,96 @@
+"""Figure 2.13 and (2.43): the Zeno ball, by events and by time-stepping.
+
+The thesis gives the formula; the ball is one of ours.
+"""
+
+from functools import cache
+from typing import NamedTuple
+
+import jax.numpy as jnp
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.ticker import NullFormatter
+
+from ...hybrid import simulate, Trajectory
+from ...models import BouncingBall, CamFollower
+from ...plotting.colours import CONTACT, FLIGHT
+from ...timestepping import moreau, SteppedMotion
+from ..target import Rows, Target
+
+
+_BALL = BouncingBall(jnp.asarray(9.81), jnp.asarray(0.7))
+_LAUNCH = 1.0
+
+
+class Zeno(NamedTuple):
+    """The bouncing ball to its rest, by events and by steps of three lengths."""
+
+    #: accumulation time (2.43)
+    exact: float
+    run: Trajectory
+    #: with the fewest steps
+    steps: SteppedMotion
+    counts: tuple[int, ...]
+    #: accumulation time of each number of steps, and its error (s)
+    rests: np.ndarray
+    errors: np.ndarray
+
+
+@cache
+def zeno() -> Zeno:
+    """Computed once, for the numbers and the drawing."""
+    gravity, r = float(_BALL.gravity), float(_BALL.restitution)
+    exact = 2 * _LAUNCH / (gravity * (1 - r))
+    start, end = np.array([0.0, _LAUNCH]), 1.2 * exact
+    counts = (1000, 2000, 4000, 8000, 16000)
+    stepped = [moreau(_BALL, start, 0.0, end, steps) for steps in counts]
+    rests = np.array([float(one.rests_from()) for one in stepped])
+    run = simulate(_BALL, start, 0.0, end)
+    return Zeno(exact, run, stepped[0], counts, rests, np.abs(rests - exact))
+
+
+def compute(system: CamFollower) -> Rows:
+    del system
+    gravity, r = float(_BALL.gravity), float(_BALL.restitution)
+    found = zeno()
+    rows: Rows = [
+        ("accumulation time, by events", found.exact, found.run.contacts.start[-1], "s")
+    ]
+    for steps, rest in zip(found.counts, found.rests, strict=True):
+        rows.append((f"accumulation time, {steps} time steps", found.exact, rest, "s"))
+    for n in range(3):
+        formula = 2 * _LAUNCH / gravity * sum(r**k for k in range(n + 1))
+        rows.append((f"impact {n + 1}", formula, found.run.impacts.time[n], "s"))
+    return rows
+
+
+def draw(system: CamFollower) -> Figure:
+    del system
+    found = zeno()
+    figure, axes = plt.subplots(1, 2, figsize=(9.6, 3.9))
+    times = np.linspace(0.0, float(found.run.t1), 3000)
+    axes[0].plot(times, np.asarray(found.run.gap(times)), color=FLIGHT, label="events")
+    rough = found.steps
+    axes[0].plot(
+        np.asarray(rough.time), np.asarray(rough.state)[:, 0], color=CONTACT, ls="--",
+        lw=1, label=f"{found.counts[0]} steps",
+    )  # fmt: skip
+    axes[0].axvline(found.exact, color="0.5", ls=":", lw=1.2)
+    axes[0].set_xlabel("time (s)")
+    axes[0].set_ylabel("height (m)")
+    axes[0].legend()
+    lengths = float(found.run.t1) / np.array(found.counts)
+    axes[1].loglog(lengths, found.errors, "o-", color=FLIGHT, label="accumulation time")
+    level = np.exp(np.mean(np.log(found.errors / lengths)))
+    axes[1].loglog(lengths, level * lengths, "--", color="0.6", label="order one")
+    # labels of minor ticks run into each other over less than two decades
+    axes[1].xaxis.set_minor_formatter(NullFormatter())
+    axes[1].yaxis.set_minor_formatter(NullFormatter())
+    axes[1].set_xlabel("length of a step (s)")
+    axes[1].set_ylabel("error (s)")
+    axes[1].legend()
+    return figure
+
+
+TARGET = Target("The Zeno ball, by events and by steps", compute, draw)

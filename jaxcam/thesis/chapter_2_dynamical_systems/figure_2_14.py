@@ -1,0 +1,198 @@
+"""Figure 2.14 (d): a branch over the belt's speed, with both kinds of event.
+
+The figure is a sketch; the oscillator is one of ours.
+"""
+
+from functools import cache
+from typing import NamedTuple
+
+import equinox as eqx
+import jax.numpy as jnp
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.figure import Figure
+
+from ...filippov import FilippovTrajectory, simulate_filippov, surface_rates
+from ...models import BeltOscillator, CamFollower
+from ...plotting.colours import CONTACT, FLIGHT, IMPACT
+from ..target import Rows, Target
+
+
+#: a forced mass with Coulomb friction on a belt, whose speed varies
+BELT = BeltOscillator(*(jnp.asarray(v) for v in (1.0, 0.4, 0.0, 0.05, 0.9, 0.7)))
+_BELTS = np.linspace(0.05, 1.5, 59)
+_SETTLE = 30
+#: speeds of the belt of which orbits are drawn, one between any two events
+DRAWN = 0.2, 0.7, 1.1, 1.4
+
+
+class Belted(NamedTuple):
+    """What a mass does on a belt of one speed, over one period of the forcing."""
+
+    belt: float
+    #: largest velocity; time of sticking over the period
+    highest: float
+    stuck: float
+    #: crossings of the surface that do not stick
+    crossings: int
+    run: FilippovTrajectory
+
+
+def belted(belt: float, state=(0.0, 0.0), turns: int = _SETTLE) -> Belted:
+    """The motion after some periods of the forcing."""
+    system = eqx.tree_at(lambda s: s.belt, BELT, jnp.asarray(float(belt)))
+    period = float(system.period)
+    settled = simulate_filippov(system, state, 0.0, turns * period).final
+    run = simulate_filippov(system, settled, 0.0, period)
+    held = np.asarray(run.sliding())
+    before, after = np.asarray(run.switches.before), np.asarray(run.switches.after)
+    crossed = int(np.sum((before != 0) & (after != 0)))
+    times = np.linspace(0.0, period, 400)
+    highest = float(np.max(np.asarray(run.at(jnp.asarray(times)))[:, 1]))
+    stuck = float(np.sum(held[:, 1] - held[:, 0])) / period if len(held) else 0.0
+    return Belted(float(belt), highest, stuck, crossed, run)
+
+
+@cache
+def belt_branch() -> list[Belted]:
+    """Motions over the speed of the belt, downwards, each from the one before."""
+    made, state = [], (0.0, 0.0)
+    for belt in _BELTS[::-1]:
+        made.append(belted(belt, state))
+        state = tuple(np.asarray(made[-1].run.final))
+    return made[::-1]
+
+
+class SlidingEvent(NamedTuple):
+    """A speed of the belt at which the sequence of switches changes."""
+
+    belt: float
+    #: rate at which the field beyond the surface leaves it, where the orbit arrives
+    beyond: float
+
+
+def _sticks(one: Belted) -> bool:
+    return one.stuck > 0
+
+
+def _crosses(one: Belted) -> bool:
+    return one.crossings > 0
+
+
+def _between(holds, first: Belted, second: Belted) -> float:
+    """Bisect the speed at which a property is lost from the first to the second."""
+    inside, outside = first.belt, second.belt
+    state = tuple(np.asarray(second.run.final))
+    for _ in range(24):
+        middle = (inside + outside) / 2
+        yes = holds(belted(middle, state))
+        inside, outside = (middle, outside) if yes else (inside, middle)
+    return (inside + outside) / 2
+
+
+@cache
+def sliding_events() -> dict[str, SlidingEvent]:
+    """The events of the branch, from a fast belt to a slow one, by bisection.
+
+    Grazing-sliding: the motion touches the surface and begins to slide there.
+    Switching-sliding: where it begins to slide, it begins to cross first.
+    Crossing-sliding: the other crossing begins, or ceases, to slide before it leaves.
+    At the last two the field beyond the surface is tangent to it.
+    """
+    branch = belt_branch()
+    pairs = list(zip(branch[:-1], branch[1:], strict=True))
+    searches = {
+        "grazing-sliding": [(_sticks, a, b) for a, b in pairs if _sticks(a)],
+        "switching-sliding": [(_crosses, a, b) for a, b in pairs if _crosses(a)],
+        "crossing-sliding": [(_sticks, b, a) for a, b in pairs if _sticks(b)],
+    }
+    found = {}
+    for name, search in searches.items():
+        changes = [one for one in search if not one[0](one[2])]
+        belt = _between(*changes[-1]) if changes else np.nan
+        found[name] = SlidingEvent(belt, _rate_beyond(belt, name))
+    return found
+
+
+def _rate_beyond(belt: float, name: str) -> float:
+    """At the switch of the event: from below for switching, from above for crossing."""
+    side = {"switching-sliding": -1, "crossing-sliding": 1}.get(name)
+    if side is None or not np.isfinite(belt):
+        return np.nan
+    run = belted(belt, turns=2 * _SETTLE).run
+    switches = run.switches
+    k = int(np.flatnonzero(np.asarray(switches.before) == side)[0])
+    above, below = surface_rates(run.system, switches.time[k], switches.state[k])
+    return float(above if side < 0 else below)
+
+
+def grazing_in_closed_form() -> float:
+    """Belt speed at which the motion without sticking just reaches the belt's.
+
+    Below the belt friction is constant, so the motion is harmonic about it.
+    """
+    omega, damping = float(BELT.omega), float(BELT.damping)
+    size = np.hypot(1 - omega**2, 2 * damping * omega)
+    return float(BELT.amplitude) * omega / size
+
+
+def compute(system: CamFollower) -> Rows:
+    del system
+    events = sliding_events()
+    rows: Rows = [
+        (
+            "grazing-sliding, closed form beside simulated",
+            grazing_in_closed_form(),
+            events["grazing-sliding"].belt,
+            "",
+        )
+    ]
+    for name in ("switching-sliding", "crossing-sliding"):
+        rows.append((f"{name}: belt", np.nan, events[name].belt, ""))
+        words = f"{name}: field beyond the surface there, beside tangency"
+        rows.append((words, 0.0, events[name].beyond, ""))
+    for belt in DRAWN:
+        one = min(belt_branch(), key=lambda b: abs(b.belt - belt))
+        words = f"belt {one.belt:.3g}"
+        rows.append((f"{words}: part of a turn that sticks", np.nan, one.stuck, ""))
+        rows.append((f"{words}: crossings a turn", np.nan, one.crossings, ""))
+    return rows
+
+
+def draw(system: CamFollower) -> Figure:
+    del system
+    branch = belt_branch()
+    events = sliding_events()
+    figure = plt.figure(figsize=(10.5, 6.4))
+    grid = figure.add_gridspec(2, 4)
+    top = figure.add_subplot(grid[0, :])
+    belts = np.array([one.belt for one in branch])
+    stuck = np.array([one.stuck for one in branch])
+    top.plot(belts, stuck, ".-", color=FLIGHT, ms=5)
+    styles = zip(events.items(), (":", "-.", "--"), strict=True)
+    for (name, event), dashes in styles:
+        top.axvline(event.belt, color=IMPACT, ls=dashes, lw=1.4, label=name)
+    top.set_xlabel("speed of the belt")
+    top.set_ylabel("sticks, of a turn")
+    top.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=3)
+    names = ("crosses", "crosses and sticks", "sticks", "slips")
+    drawn = zip(DRAWN, names, strict=True)
+    for k, (belt, name) in enumerate(drawn):
+        ax = figure.add_subplot(grid[1, k])
+        one = min(branch, key=lambda b: abs(b.belt - belt))
+        times = np.linspace(float(one.run.t0), float(one.run.t1), 1500)
+        states = np.asarray(one.run.at(jnp.asarray(times)))
+        ax.plot(*states.T, color=FLIGHT, lw=1.2)
+        held = np.zeros(len(times), dtype=bool)
+        for start, end in np.asarray(one.run.sliding()):
+            held |= (times >= start) & (times <= end)
+        shown = np.where(held[:, None], states, np.nan)
+        ax.plot(*shown.T, color=CONTACT, lw=3.2)
+        ax.axhline(one.belt, color="0.5", ls=":", lw=1)
+        ax.set_title(f"{name}, {one.belt:.3g}", fontsize=11)
+        ax.set_xlabel("position")
+    figure.axes[1].set_ylabel("velocity")
+    return figure
+
+
+TARGET = Target("Sliding bifurcations of a mass on a belt", compute, draw)

@@ -1,0 +1,1 @@
+"""Chapter 3: numerical methods, and the branches they follow."""

@@ -1,0 +1,27 @@
+"""Branches that continuation follows over the speed of the cam."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...models import rad_s_to_rpm, rpm_to_rad_s
+
+
+if TYPE_CHECKING:
+    from continuation import Branch
+
+
+#: where branches start (rpm)
+START_RPM = 145.0
+
+
+def bounds(ends: tuple[float, float]) -> tuple[float, float]:
+    """Speeds (rad/s), of those in rpm."""
+    low, high = (float(rpm_to_rad_s(end)) for end in ends)
+    return low, high
+
+
+def special_speed(branch: "Branch", kind: str) -> float:
+    """Speed (rpm) of the first special point of a kind."""
+    found = [point.parameter for point in branch.special if point.kind == kind]
+    return float(rad_s_to_rpm(found[0])) if found else np.nan

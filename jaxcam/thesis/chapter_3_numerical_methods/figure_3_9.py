@@ -1,0 +1,94 @@
+"""Figure 3.9: where P(inf,1) begins and where its sticking time is zero."""
+
+from typing import TYPE_CHECKING
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.figure import Figure
+
+from ... import plotting
+from ...models import CamFollower, rad_s_to_rpm
+from ...plotting.colours import CONTACT, FLIGHT
+from ..chapter_5_bifurcations.figure_5_24 import sticking_times
+from ..interruption import INTERRUPTION, interruption
+from ..remember import remembered
+from ..speeds import at_rpm, speed_of
+from ..target import Rows, Target
+from .branches import bounds, special_speed, START_RPM
+
+
+if TYPE_CHECKING:
+    from continuation import Branch
+
+
+#: rpm down to which it is followed
+_LOWEST = 115.0
+#: rpm past the interruption at which the branch that sticks is left
+_PAST = 0.01
+
+
+@remembered
+def sticking_branch(system: CamFollower) -> "Branch":
+    """P(inf,1) from the beginning of impacts to the interruption of chattering."""
+    import continuation
+
+    rig = at_rpm(system, START_RPM)
+    end = float(rad_s_to_rpm(interruption(system).speed)) + _PAST
+    start = continuation.periodic_orbits(rig, continuation.periodic_orbit(rig))
+    return continuation.branch(
+        start.problem, start, speed_of, bounds((_LOWEST, end)), direction="both"
+    )
+
+
+def sticking_along(branch: "Branch") -> list[tuple[float, float]]:
+    """Speed (rpm) and sticking time (s) of the orbits that stick."""
+    return [
+        (float(rad_s_to_rpm(p.parameter)), float(p.observed["sticking time"]))
+        for p in branch.points
+        if "sticking time" in p.observed
+    ]
+
+
+def compute(system: CamFollower) -> Rows:
+    branch = sticking_branch(system)
+    times = sticking_times(system)[1]
+    return [
+        (
+            "beginning of impacts",
+            125.0,
+            special_speed(branch, "beginning of impacts"),
+            "rpm",
+        ),
+        (
+            "interruption of chattering",
+            INTERRUPTION,
+            special_speed(branch, "interruption of chattering"),
+            "rpm",
+        ),
+        ("sticking time 1e-5 rpm below it", 0.0, times[-1], "s"),
+        ("orbits on the branch", np.nan, len(branch.regular), ""),
+    ]
+
+
+def draw(system: CamFollower) -> Figure:
+    branch = sticking_branch(system)
+    figure, axes = plt.subplots(1, 2, figsize=(10.0, 4.4))
+    scale = 30 / np.pi
+    plotting.branch_diagram(
+        branch, axes[0], x_label=("speed", "rpm"), y_label=("angle", "rad"),
+        x_scale=scale,
+    )  # fmt: skip
+    speeds, times, _ = sticking_times(system)
+    axes[1].plot(speeds, 1e3 * times, color=FLIGHT, label="motion")
+    speeds, times = np.array(sticking_along(branch)).T
+    axes[1].plot(speeds, 1e3 * times, "o", ms=3.5, color=CONTACT, label="followed")
+    axes[1].legend()
+    for point in branch.special:
+        axes[1].axvline(scale * point.parameter, color=CONTACT, ls=":", lw=1.2)
+    axes[1].axhline(0, color="0.4", lw=0.7)
+    axes[1].set_xlabel("speed (rpm)")
+    axes[1].set_ylabel("sticking time in a turn (ms)")
+    return figure
+
+
+TARGET = Target("The branch that sticks, to its interruption", compute, draw)

@@ -1,0 +1,1 @@
+"""Chapter 4: the cam-follower, its rig and the experiment."""

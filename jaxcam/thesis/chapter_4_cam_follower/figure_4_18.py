@@ -1,0 +1,74 @@
+"""Figure 4.18: what the experiment of section 4.7 stores, forward and backward.
+
+Printed are the ends that section 4.7.1 gives for the way up. On the way down the
+model, whose follower can rise without end, has orbits that no rig has room for, as
+the largest angle among the samples shows.
+"""
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.figure import Figure
+
+from ...models import CamFollower, rad_s_to_rpm
+from ..diagrams import draw_diagram
+from ..target import Rows, Target
+from .experiment import DWELL, experiment, EXPERIMENT_NOTE, UP
+
+
+#: rpm that a label is met over, at least, to be listed
+_WIDE = 1.0 - 1e-9
+
+
+def compute(system: CamFollower, size: str) -> Rows:
+    rows: Rows = []
+    said = {
+        ("forward", "contact", "to"): 125.0,
+        ("forward", "P(inf,1)", "from"): 125.0,
+        ("forward", "P(inf,1)", "to"): 155.0,
+    }
+    ways = ("forward", "backward")
+    for way, made in zip(ways, experiment(system, size), strict=True):
+        stored = np.isfinite(made.states[:, 0, :, 0]).sum(axis=1)
+        turn = 2 * np.pi / made.values
+        rows += [
+            (f"{way}: speeds", np.nan, len(made.values), ""),
+            (f"{way}: least stored at a speed", DWELL[1], np.min(stored * turn), "s"),
+            (f"{way}: samples", np.nan, stored.sum(), ""),
+        ]
+        angles = made.states[:, 0, :, 0]
+        for found in sorted(made.ranges(), key=lambda r: r.low):
+            low, high = rad_s_to_rpm(found.low), rad_s_to_rpm(found.high)
+            if high - low < _WIDE:
+                continue
+            words = f"{way}: {found.label}"
+            for end, value in (("from", low), ("to", high)):
+                printed = said.get((way, found.label, end), np.nan)
+                rows.append((f"{words}, {end}", printed, value, "rpm"))
+            some = (made.values >= found.low) & (made.values <= found.high)
+            rows.append(
+                (f"{words}, largest angle", np.nan, np.nanmax(angles[some]), "rad")
+            )
+    return rows
+
+
+def draw(system: CamFollower, size: str) -> Figure:
+    figure, axes = plt.subplots(2, 1, figsize=(8.4, 7.2), sharex=True, sharey=True)
+    words = ("(a) forward", "(b) backward")
+    for ax, word, made in zip(axes, words, experiment(system, size), strict=True):
+        draw_diagram(made, ax)
+        legend = ax.get_legend()
+        if legend is not None:
+            legend.remove()
+        ax.set_title(word, loc="left")
+        ax.label_outer()
+    axes[0].set_xlim(*UP)
+    return figure
+
+
+TARGET = Target(
+    "The experiment of section 4.7, forward and backward",
+    compute,
+    draw,
+    sized=True,
+    note=EXPERIMENT_NOTE,
+)

@@ -1,0 +1,10 @@
+"""Figure 4.20: P(inf,1) at 150 rpm."""
+
+import numpy as np
+
+from ..motions import Case, motion_target, RECORDED_NOTE
+
+
+TARGET = motion_target(
+    "P(inf,1) at 150 rpm", Case(150.0, None, np.inf, 1), note=RECORDED_NOTE
+)

@@ -1,0 +1,1 @@
+"""Chapter 5: bifurcation diagrams, motions, basins, the local map."""

@@ -1,0 +1,8 @@
+"""Figure 5.8: chatter, complete and less so."""
+
+from ..releases import released_target
+
+
+TARGET = released_target(
+    "Chatter, complete and less so", (151.0, 1), (153.5, 0), (153.9, 0)
+)

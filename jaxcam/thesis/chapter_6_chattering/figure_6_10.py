@@ -1,0 +1,14 @@
+"""Figure 6.10: the chattering of the orbit at 152.67 rpm, closer."""
+
+from matplotlib.figure import Figure
+
+from ...models import CamFollower
+from ..target import Target
+from .orbit_marks import compute_marks, draw_marks
+
+
+def draw(system: CamFollower) -> Figure:
+    return draw_marks(system, close=True)
+
+
+TARGET = Target("Its chattering, closer", compute_marks, draw)

@@ -1,0 +1,48 @@
+"""Figure 6.16: a whole turn by the composed map, without any compensation."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from matplotlib.figure import Figure
+
+from variational import section_turn
+
+from ...models import CamFollower
+from ..remember import remembered
+from ..target import Rows, Target
+from .rebuilt import composed_at, draw_rebuilt, lobe_rows, Rebuilt
+
+
+@remembered
+def rebuilt_turn(system: CamFollower) -> Rebuilt:
+    """Figure 6.16: a whole turn, from a deviation (rad) along B to the next section."""
+    rig, composed = composed_at(system, late=True)
+    change = np.linspace(-2e-5, 1e-4, 400)
+    epsilon = jnp.asarray(change) / composed.vector[0]
+    after = composed(epsilon)
+    predicted = np.asarray(
+        composed.relative + after[:, None] * composed.relative_vector
+    )
+    states = composed.state + epsilon[:, None] * composed.vector
+    section = _turns(rig, states)
+    simulated = np.stack([np.asarray(section.gap), np.asarray(section.velocity)], 1)
+    return Rebuilt(change, predicted, simulated, composed)
+
+
+@eqx.filter_jit
+def _turns(rig, states):
+    return jax.vmap(lambda state: section_turn(rig, state))(states)
+
+
+def compute(system: CamFollower) -> Rows:
+    found = rebuilt_turn(system)
+    return lobe_rows(found)
+
+
+def draw(system: CamFollower) -> Figure:
+    found = rebuilt_turn(system)
+    return draw_rebuilt(found, "deviation of the angle (mrad)", 1e3)
+
+
+TARGET = Target("Section after a whole turn", compute, draw)

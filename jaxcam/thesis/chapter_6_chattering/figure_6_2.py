@@ -1,0 +1,22 @@
+"""Figure 6.2: the first branches of the grazing manifold, for the rig."""
+
+from matplotlib.figure import Figure
+
+from ...models import CamFollower
+from ..target import Rows, Target
+from .manifold import draw_manifold, manifold_of, manifold_rows
+
+
+#: impacts S^k and W^k that are shown
+BRANCHES = 2
+
+
+def compute(system: CamFollower) -> Rows:
+    return manifold_rows(system, BRANCHES)
+
+
+def draw(system: CamFollower) -> Figure:
+    return draw_manifold(manifold_of(system, BRANCHES), most=None)
+
+
+TARGET = Target("The grazing manifold", compute, draw)

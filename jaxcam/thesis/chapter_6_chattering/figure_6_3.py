@@ -1,0 +1,116 @@
+"""Figure 6.3: S^1 and S^2 end in impacts without speed; what follows others."""
+
+from typing import NamedTuple
+
+import jax.numpy as jnp
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.figure import Figure
+
+from variational import impact_map
+
+from ...hybrid import contact_state, simulate, Trajectory
+from ...models import CamFollower
+from ...plotting import curve
+from ...plotting.colours import FLIGHT, IMPACT, RECORDED
+from ..orbits import NEAR_CAM
+from ..releases import sticking_time
+from ..remember import remembered
+from ..target import Rows, Target
+from .figure_6_2 import BRANCHES
+from .manifold import manifold_of
+
+
+#: a start this much slower hits where rounding would let the graze be missed; the speed
+#: of that impact goes with its root
+_UNDER = 1 - 1e-11
+
+
+class Series(NamedTuple):
+    """A motion of Figure 6.3, from an impact of the plane of Figure 6.2."""
+
+    name: str
+    time: float
+    speed: float
+    #: time of the graze, or of release
+    until: float
+    run: Trajectory
+
+
+@remembered
+def series(system: CamFollower) -> list[Series]:
+    """Motions from S^1 and to either side of it, from S^2, from C and from inside D."""
+    found = manifold_of(system, BRANCHES)
+    rig, before, region = found.system, found.manifold.before, found.region
+    starts = []
+    for k, name in ((0, "S$^1$"), (1, "S$^2$")):
+        times, speeds = np.asarray(before.time[k]), np.asarray(before.speed[k])
+        there = np.flatnonzero(np.isfinite(speeds))
+        middle = there[len(there) // 2]
+        time, speed = jnp.asarray(times[middle]), jnp.asarray(speeds[middle])
+        speed = speed * _UNDER
+        for _ in range(k + 1):
+            time, speed = impact_map(rig, time, speed)
+        start = (float(times[middle]), float(speeds[middle]), float(time))
+        starts.append((f"{name}: ends in a graze", *start))
+    _, time, speed, until = starts[0]
+    starts.insert(0, ("slower than S$^1$: an impact more", time, 0.97 * speed, until))
+    starts.insert(2, ("faster than S$^1$: an impact less", time, 1.03 * speed, until))
+    there = np.flatnonzero(np.isfinite(np.asarray(region.speed)))
+    far = there[-len(there) // 8]
+    time, speed = float(region.time[far]), float(region.speed[far])
+    release = float(found.frame.release)
+    starts.append(("C: accumulates at release", time, speed, release))
+    starts.append(("inside D: rests before release", time, 0.6 * speed, release))
+    made = []
+    prepared = rig.prepared()
+    for name, time, speed, until in starts:
+        state = contact_state(prepared, jnp.asarray([time]), jnp.array(NEAR_CAM))[0]
+        state = state.at[1].add(float(speed))
+        run = simulate(rig, state, float(time), float(time) + 0.8 * float(rig.period))
+        made.append(Series(name, time, speed, until, run))
+    return made
+
+
+def compute(system: CamFollower) -> Rows:
+    rows: Rows = []
+    rig = manifold_of(system, BRANCHES).system
+    for one in series(system):
+        name = one.name.replace("$", "")
+        if name.startswith("S^"):
+            time, speed = jnp.asarray(one.time), jnp.asarray(one.speed) * _UNDER
+            for _ in range(int(name[2])):
+                time, speed = impact_map(rig, time, speed)
+            rows.append((f"{name}: speed of that impact", 0.0, speed, "rad/s"))
+        count = len(np.asarray(one.run.impacts.time))
+        rows.append((f"{name}: impacts listed", np.nan, count, ""))
+        rows.append((f"{name}: sticking time", np.nan, sticking_time(one.run), "s"))
+    return rows
+
+
+def draw(system: CamFollower) -> Figure:
+    motions = series(system)
+    figure, axes = plt.subplots(3, 2, figsize=(9.6, 7.2))
+    for ax, one in zip(axes.flat, motions, strict=True):
+        drawn = curve(one.run, None, 3000)
+        start = float(one.run.t0)
+        ax.plot(drawn.time - start, drawn.gap[:, 0], color=FLIGHT, lw=1.2)
+        hit = drawn.impact_time - start
+        ax.plot(hit, np.zeros_like(hit), ".", color=IMPACT, ms=5)
+        ax.axhline(0, color="0.4", lw=0.7)
+        ax.set_title(one.name, fontsize=11)
+        # the graze would be lost beside the long flight after it
+        last = 1.25 * (one.until - start)
+        near = drawn.time - start <= one.until - start
+        top = 1.25 * np.nanmax(drawn.gap[near])
+        ax.set_xlim(0, last)
+        ax.set_ylim(-0.08 * top, top)
+        ax.axvline(one.until - start, color=RECORDED, ls=":", lw=1.2)
+    for ax in axes[-1]:
+        ax.set_xlabel("time (s)")
+    for ax in axes[:, 0]:
+        ax.set_ylabel("over cam (rad)")
+    return figure
+
+
+TARGET = Target("Motions from the grazing manifold", compute, draw)

@@ -1,0 +1,22 @@
+"""Figure 6.4: more branches of the grazing manifold."""
+
+from matplotlib.figure import Figure
+
+from ...models import CamFollower
+from ..target import Rows, Target
+from .manifold import draw_manifold, manifold_of, manifold_rows
+
+
+#: impacts S^k and W^k that are shown
+BRANCHES = 5
+
+
+def compute(system: CamFollower) -> Rows:
+    return manifold_rows(system, BRANCHES)
+
+
+def draw(system: CamFollower) -> Figure:
+    return draw_manifold(manifold_of(system, BRANCHES), most=4.0)
+
+
+TARGET = Target("More of the grazing manifold", compute, draw)

@@ -1,0 +1,7 @@
+"""Figure 6.7: where the local analysis applies, on the orbit of 152.67 rpm."""
+
+from ..target import Target
+from .orbit_marks import compute_marks, draw_marks
+
+
+TARGET = Target("Where the local analysis applies", compute_marks, draw_marks)

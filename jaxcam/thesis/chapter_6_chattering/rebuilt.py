@@ -1,0 +1,75 @@
+"""The section after a deviation, predicted by the composed map and simulated."""
+
+from typing import NamedTuple
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.figure import Figure
+
+from variational import composed_map, ComposedMap
+
+from ...models import CamFollower
+from ...plotting.colours import FLIGHT, IMPACT
+from ..interruption import interruption
+from ..speeds import speed_of
+from ..target import Rows
+from .table_6_3 import D_STAR, nearest_impact
+
+
+#: the late impact that the composed map starts from (docs/chatter.md)
+_RANK = 37
+
+
+class Rebuilt(NamedTuple):
+    """Deviations, and what is at the section: predicted and simulated, `(k, 2)`."""
+
+    deviations: np.ndarray
+    predicted: np.ndarray
+    simulated: np.ndarray
+    composed: ComposedMap
+
+
+def composed_at(system: CamFollower, late: bool) -> tuple[CamFollower, ComposedMap]:
+    """The rig at its interruption, and the map from D*, or from a late impact."""
+    rig = interruption(system)
+    if late:
+        return rig, composed_map(rig, speed_of, _RANK)
+    first = composed_map(rig, speed_of, 0)
+    rank = nearest_impact(rig, float(first.frame.release), D_STAR)
+    return rig, composed_map(rig, speed_of, rank)
+
+
+def error_of(found: Rebuilt) -> float:
+    """Median error of the predicted velocity over its range where it was simulated."""
+    velocity = found.simulated[:, 1]
+    range_ = float(np.ptp(velocity))
+    return float(np.median(np.abs(found.predicted[:, 1] - velocity))) / range_
+
+
+def lobe_rows(found: Rebuilt) -> Rows:
+    """What a prediction misses of the lobes, and how high they are."""
+    return [
+        ("median error over the range of the velocity", np.nan, error_of(found), ""),
+        (
+            "largest velocity of the lobes, simulated",
+            np.nan,
+            found.simulated[:, 1].max(),
+            "rad/s",
+        ),
+        ("the same, predicted", np.nan, np.nanmax(found.predicted[:, 1]), "rad/s"),
+    ]
+
+
+def draw_rebuilt(found: Rebuilt, label: str, scale: float = 1.0) -> Figure:
+    """Velocity and angle at the section, simulated and predicted."""
+    figure, axes = plt.subplots(1, 2, figsize=(9.6, 4.0))
+    base = np.asarray(found.composed.relative)
+    for ax, k, name in ((axes[0], 1, "velocity (rad/s)"), (axes[1], 0, "angle (rad)")):
+        x = scale * found.deviations
+        ax.plot(x, found.simulated[:, k] - base[k], color=FLIGHT, label="simulated")
+        predicted = found.predicted[:, k] - base[k]
+        ax.plot(x, predicted, "--", color=IMPACT, label="predicted")
+        ax.set_ylabel(f"change of the {name}")
+        ax.set_xlabel(label)
+    axes[0].legend()
+    return figure

@@ -1,0 +1,62 @@
+"""One chattering sequence of the rig, and its orbit."""
+
+from typing import NamedTuple
+
+import jax.numpy as jnp
+import numpy as np
+
+from variational import hop_ratio, lambda_map
+from variational.chatter import ChatterFrame
+
+from ...hybrid import simulate, Trajectory
+from ...models import CamFollower
+from ..interruption import accumulation_of, impacts_from_release, reference
+from ..remember import remembered
+
+
+class ChatterSequence(NamedTuple):
+    """The impacts of the sticking orbit below its interruption."""
+
+    system: CamFollower
+    frame: ChatterFrame
+    #: (k,) from release (s), rebound speeds (rad/s)
+    tau: np.ndarray
+    speed: np.ndarray
+    #: from release (s)
+    accumulation: float
+
+
+@remembered
+def sequence(system: CamFollower) -> ChatterSequence:
+    """Impacts as far below the interruption as Table 6.1."""
+    rig = reference(system)
+    orbit = accumulation_of(rig)
+    impacts = impacts_from_release(rig, 40)
+    end = float(orbit.frame.release) + float(rig.period)
+    found = np.asarray(impacts.found)
+    tau = np.asarray(impacts.time)[found] - end
+    speed = np.asarray(impacts.speed)[found]
+    early = tau < 0
+    rest = float(orbit.accumulation) - end
+    return ChatterSequence(rig, orbit.frame, tau[early], speed[early], rest)
+
+
+def hops(found: ChatterSequence, start: int, count: int) -> np.ndarray:
+    """Times from release of impacts after one of the sequence, by the lambda-map."""
+    r, tau = float(found.frame.restitution), float(found.tau[start])
+    lam = jnp.asarray(found.speed[start] / (found.frame.jerk * tau * tau))
+    made = [tau]
+    for _ in range(count):
+        tau *= float(hop_ratio(lam))
+        lam = lambda_map(lam, r)
+        made.append(tau)
+    return np.array(made)
+
+
+@remembered
+def sticking_turn(system: CamFollower) -> Trajectory:
+    """The orbit of Figures 6.7, 6.9 and 6.10: two turns from time zero."""
+    rig = reference(system)
+    run = simulate(rig, None, 0.0, 12 * float(rig.period))
+    period = float(rig.period)
+    return simulate(rig, run.at(np.array([10 * period]))[0], 0.0, 2 * period)

@@ -1,0 +1,58 @@
+"""Table 6.1: where chattering ends just below its interruption.
+
+The relative coordinates of the two contact points are not compared: they are zero,
+and what is printed for them is the thesis' integration error.
+"""
+
+import jax.numpy as jnp
+
+from ...models import CamFollower
+from ..interruption import accumulation_of, contact_at, reference, sticking_state
+from ..target import Rows, Target
+
+
+#: speed of the table (rpm)
+CHATTER_SPEED = 152.67
+#: time in the period (s), angle (rad) and velocity (rad/s) of the follower
+ACCUMULATION = (0.33474, 0.30531, 0.86956)
+RELEASE = (0.33668, 0.30698, 0.84854)
+#: at the end of the period: the follower, and the follower less the cam
+SECTION_STATE = (0.33717, 0.22313)
+SECTION_RELATIVE = (0.00494, 0.22315)
+#: digits after the point in the table
+DECIMALS = 5
+PERIOD, STICKING = 0.39300, 0.00194
+
+
+def compute(system: CamFollower) -> Rows:
+    rig = reference(system)
+    period = float(rig.period)
+    orbit = accumulation_of(rig)
+    rest = float(orbit.accumulation) - period
+    release = float(orbit.frame.release)
+    first = contact_at(rig.prepared(), jnp.asarray(rest), jnp.zeros(()))
+    last = orbit.frame.state
+    state, gap, velocity = sticking_state(rig)
+    rows = [
+        ("accumulation: time", ACCUMULATION[0], rest, "s"),
+        ("accumulation: angle", ACCUMULATION[1], first[0], "rad"),
+        ("accumulation: velocity", ACCUMULATION[2], first[1], "rad/s"),
+        ("release: time", RELEASE[0], release, "s"),
+        ("release: angle", RELEASE[1], last[0], "rad"),
+        ("release: velocity", RELEASE[2], last[1], "rad/s"),
+        ("end of the period: angle", SECTION_STATE[0], state[0], "rad"),
+        ("end of the period: velocity", SECTION_STATE[1], state[1], "rad/s"),
+        ("end of the period: relative angle", SECTION_RELATIVE[0], gap, "rad"),
+        (
+            "end of the period: relative velocity",
+            SECTION_RELATIVE[1],
+            velocity,
+            "rad/s",
+        ),
+        ("period", PERIOD, period, "s"),
+        ("sticking time", STICKING, release - rest, "s"),
+    ]
+    return rows
+
+
+TARGET = Target("End of chattering below its interruption", compute)

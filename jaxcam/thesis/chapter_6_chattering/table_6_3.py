@@ -1,0 +1,53 @@
+"""Table 6.3: what the speed of the cam does to the local map.
+
+The thesis estimates them from perturbed simulations. The dependence of lambda is
+given twice: with D* held, and with D* moving as the orbit does.
+"""
+
+import numpy as np
+
+from variational import composed_map
+
+from ...models import CamFollower, rad_s_to_rpm, rpm_to_rad_s
+from ..interruption import impacts_from_release, interruption, REFERENCE
+from ..speeds import speed_of
+from ..target import Rows, Target
+
+
+BY_SPEED, VELOCITY, ANGLE = 3.9, 0.009647, 0.0002305
+#: time of D* from release (Table 6.1)
+D_STAR = -0.00194
+
+
+def nearest_impact(rig: CamFollower, release: float, tau: float) -> int:
+    """Number of the impact after release that comes nearest to `tau` before the next.
+
+    Nearest by ratio.
+    """
+    impacts = impacts_from_release(rig, 40)
+    found = np.asarray(impacts.time) - release - float(rig.period)
+    usable = np.asarray(impacts.found) & (found < 0)
+    ratio = np.where(
+        usable, np.abs(np.log(np.where(usable, found, -1.0) / tau)), np.inf
+    )
+    return int(np.argmin(ratio))
+
+
+def compute(system: CamFollower) -> Rows:
+    rig = interruption(system)
+    first = composed_map(rig, speed_of, 0)
+    rank = nearest_impact(rig, float(first.frame.release), D_STAR)
+    local = composed_map(rig, speed_of, rank)
+    rpm = float(rpm_to_rad_s(1.0))
+    gap, velocity = np.asarray(local.drift) * rpm
+    held, moving = float(local.by_parameter) * rpm, float(local.incidence) * rpm
+    return [
+        ("speed", REFERENCE, rad_s_to_rpm(rig.speed), "rpm"),
+        ("lambda by the speed, D* held", BY_SPEED, held, "1/rpm"),
+        ("lambda by the speed, D* moving", BY_SPEED, moving, "1/rpm"),
+        ("Gamma by the speed", VELOCITY, velocity, "rad/s/rpm"),
+        ("Omega by the speed", ANGLE, gap, "rad/rpm"),
+    ]
+
+
+TARGET = Target("The speed of the cam in the local map", compute)

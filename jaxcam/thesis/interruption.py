@@ -1,0 +1,83 @@
+"""The rig at the interruption of complete chattering."""
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+
+from variational import chatter_accumulation, chatter_frame, fly
+from variational.chatter import interruption_in, release_impacts, surface_state
+
+from ..models import CamFollower, rad_s_to_rpm, rpm_to_rad_s
+from .remember import remembered
+from .speeds import at_speed, speed_of
+
+
+#: where the thesis' rig is interrupted (section 6.7.1), and where Table 6.1 is taken
+INTERRUPTION = 152.67658
+REFERENCE = 152.67
+#: rpm of the ranges in which an interruption is looked for, the thesis' own first,
+#: then the next above and below, so many times
+_RANGE, _RANGES = 12.0, 5
+#: rpm to which the interruption of another rig moves the printed speeds around it
+_MOVED = 0.01
+
+
+@remembered
+def interruption(system: CamFollower) -> CamFollower:
+    """The rig at the speed where its complete chattering is interrupted.
+
+    **Raises:** `ValueError` where that is not within 66 rpm of the thesis' speed.
+    """
+    places = [0, *(way * k for k in range(1, _RANGES + 1) for way in (1, -1))]
+    for place in places:
+        middle = INTERRUPTION + _RANGE * place
+        ends = np.array([middle - _RANGE / 2, middle + _RANGE / 2])
+        low, high = np.asarray(rpm_to_rad_s(ends))
+        found = _search(system, low, high)
+        # behind it chattering is interrupted; where impacts begin it is the other way
+        if bool(found.converged) and found.ends[0] < 0 < found.ends[1]:
+            return at_speed(system, found.value)
+    far = _RANGE * (_RANGES + 0.5)
+    raise ValueError(
+        "This rig has no interruption of chattering between "
+        f"{INTERRUPTION - far:.0f} and {INTERRUPTION + far:.0f} rpm; the theory around "
+        "one has nothing to start from."
+    )
+
+
+@eqx.filter_jit
+def _search(system, low, high):
+    return interruption_in(system, speed_of, low, high)
+
+
+def beside_interruption(system: CamFollower, rpm: float) -> float:
+    """A speed (rpm) as far from the interruption of `system` as a printed one is.
+
+    To 0.01 rpm, so that a rig whose interruption is the thesis' keeps printed speeds.
+    """
+    own = float(rad_s_to_rpm(interruption(system).speed))
+    moved = round((own - INTERRUPTION) / _MOVED) * _MOVED
+    return round(rpm + moved, 6)
+
+
+def reference(system: CamFollower) -> CamFollower:
+    """The rig as far below its interruption as Table 6.1 is below the thesis' own.
+
+    Close to the interruption everything that chatters depends on that distance.
+    """
+    below = float(rpm_to_rad_s(INTERRUPTION - REFERENCE))
+    return at_speed(system, speed_of(interruption(system)) - below)
+
+
+impacts_from_release = eqx.filter_jit(release_impacts)
+accumulation_of = eqx.filter_jit(chatter_accumulation)
+contact_at = eqx.filter_jit(surface_state)
+
+
+@eqx.filter_jit
+def sticking_state(system: CamFollower):
+    """State, gap and relative velocity at the end of the period of a sticking orbit."""
+    system = system.prepared()
+    release = chatter_frame(system)
+    left = system.period - release.release
+    return fly(system, release.release, release.state, jnp.zeros(()), left)

@@ -1,0 +1,58 @@
+"""Figures that show motions: what they are, and time series beside portraits."""
+
+import dataclasses
+from collections.abc import Callable, Sequence
+
+from matplotlib.figure import Figure
+
+from ..models import CamFollower
+from .motion_drawing import motion_figure
+from .settled import Case, Motion, motion_rows, settled
+from .target import Rows, Target
+
+
+RECORDED_NOTE = (
+    "The thesis shows a recording; printed is what it says of that. Simulated is the "
+    "rig at the same speed: the two differ where Table 5.1 says so."
+)
+WINDOW = (
+    "An orbit that sticks forgets its past, so within the chaos behind the "
+    "interruption there are windows of orbits that rest once in several turns."
+)
+
+
+@dataclasses.dataclass(frozen=True)
+class MotionTarget(Target):
+    """A figure of motions that have settled."""
+
+    cases: tuple[Case, ...] = ()
+
+
+def motions(system: CamFollower, cases: tuple[Case, ...]) -> list[Motion]:
+    """The motions of a figure; those of all figures are computed together, once."""
+    from .registry import TARGETS
+
+    shown = (t.cases for t in TARGETS.values() if isinstance(t, MotionTarget))
+    every = tuple(dict.fromkeys(case for some in (*shown, cases) for case in some))
+    found = dict(zip(every, settled(system, every), strict=True))
+    return [found[case] for case in cases]
+
+
+def motion_target(
+    title: str,
+    *cases: Case,
+    note: str = "",
+    layout: Callable[[CamFollower, Sequence[Motion]], Figure] = motion_figure,
+) -> MotionTarget:
+    """A figure that shows motions; they are drawn one below the other.
+
+    **Arguments:** `layout`: another drawing, of the rig and its motions.
+    """
+
+    def compute(system: CamFollower) -> Rows:
+        return motion_rows(motions(system, cases))
+
+    def draw(system: CamFollower) -> Figure:
+        return layout(system, motions(system, cases))
+
+    return MotionTarget(title, compute, draw, note=note, cases=cases)

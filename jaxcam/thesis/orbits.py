@@ -1,0 +1,97 @@
+"""The P(1,1) branch of a rig: one impact in one turn, from fold to flip and beyond."""
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+
+from variational import impact_orbit, orbit_monodromy, orbit_where
+from variational.orbits import ImpactOrbit, one_impact_orbits, SpecialPoint
+
+from ..models import CamFollower, rpm_to_rad_s
+from .speeds import at_rpm, speed_of
+
+
+#: a state near the cam, from which Newton finds contact
+NEAR_CAM = (0.3, 0.0)
+#: where the search for the branch begins (rpm), and the longest stride along it
+SEARCH, _STRIDE = 148.0, 0.5
+
+
+def first_orbit(system: CamFollower) -> ImpactOrbit | None:
+    """P(1,1) at 148 rpm that is no saddle, or None."""
+    orbits = one_impact_orbits(at_rpm(system, SEARCH), jnp.array(NEAR_CAM))
+    return orbits[0] if orbits else None
+
+
+def orbit_at(system: CamFollower, start: ImpactOrbit, rpm: float) -> ImpactOrbit:
+    """The orbit that `start`, at 148 rpm, becomes at another speed."""
+    strides = max(1, int(np.ceil(abs(rpm - SEARCH) / _STRIDE)))
+    orbit = start
+    for speed in np.linspace(SEARCH, rpm, strides + 1)[1:]:
+        orbit = next_orbit(at_rpm(system, speed), orbit)
+    return orbit
+
+
+def multipliers_at(system: CamFollower, start: ImpactOrbit, rpm: float) -> np.ndarray:
+    """The two multipliers of P(1,1); NaN where it is lost."""
+    orbit = orbit_at(system, start, rpm)
+    return multipliers_of(monodromy_of(at_rpm(system, rpm), orbit))
+
+
+def multipliers_of(matrix) -> np.ndarray:
+    """Eigenvalues, the larger in magnitude last; complex pairs as -, +."""
+    matrix = np.asarray(matrix)
+    if not np.all(np.isfinite(matrix)):
+        return np.full(2, np.nan, dtype=complex)
+    values = np.linalg.eigvals(matrix).astype(complex)
+    if np.any(np.imag(values) != 0):
+        return values[np.argsort(np.imag(values))]
+    return values[np.argsort(np.abs(values))]
+
+
+# A line in the plane of trace and product of the multipliers: trace = a + b product.
+# a = b = 1 is a fold, a = b = -1 a flip, and b = 0 asks for a trace.
+FOLD, FLIP = (1.0, 1.0), (-1.0, -1.0)
+
+
+def point_on_line(
+    system: CamFollower, guess: SpecialPoint, line: tuple[float, float]
+) -> SpecialPoint:
+    """Where the branch meets a line; `guess.parameter` in rad/s."""
+    system = eqx.tree_at(speed_of, system, guess.parameter)
+    return _point(system, guess.orbit, jnp.asarray(line[0]), jnp.asarray(line[1]))
+
+
+def along_traces(
+    system: CamFollower, start: ImpactOrbit, trace: float, stride: float = 0.1
+) -> SpecialPoint:
+    """Where the sum of the multipliers is `trace`, reached from 148 rpm.
+
+    The trace is monotonic along the branch, also around the fold, where the speed is
+    not.
+    """
+    point = SpecialPoint(jnp.asarray(rpm_to_rad_s(SEARCH)), start)
+    moved = at_rpm(system, SEARCH)
+    first = float(np.trace(np.asarray(monodromy_of(moved, start))))
+    strides = max(1, int(np.ceil(abs(trace - first) / stride)))
+    for value in np.linspace(first, trace, strides + 1)[1:]:
+        point = point_on_line(system, point, (float(value), 0.0))
+    return point
+
+
+@eqx.filter_jit
+def next_orbit(system, guess):
+    return impact_orbit(system, guess)
+
+
+@eqx.filter_jit
+def monodromy_of(system, orbit):
+    return orbit_monodromy(system, orbit)
+
+
+@eqx.filter_jit
+def _point(system, orbit, offset, slope):
+    def test(matrix):
+        return jnp.trace(matrix) - offset - slope * jnp.linalg.det(matrix)
+
+    return orbit_where(system, speed_of, orbit, test)

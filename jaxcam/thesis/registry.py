@@ -1,0 +1,66 @@
+"""Every target by its name, found by the names of the files in the chapters."""
+
+import pkgutil
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..models import CamFollower
+from .target import SIZES, Target
+
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+_CHAPTERS = "chapter_"
+_KINDS = ("table", "figure")
+
+
+def _place(module: str) -> tuple[int, int, int]:
+    """Chapter, tables first, and number of a file such as `figure_5_11`."""
+    kind, chapter, number = module.rpartition(".")[2].split("_")
+    return int(chapter), _KINDS.index(kind), int(number)
+
+
+def _discovered() -> dict[str, Target]:
+    """`TARGET` of each file `table_C_N.py` or `figure_C_N.py` in a chapter's folder."""
+    here = Path(__file__).parent
+    modules = [
+        f"{chapter.name}.{module.name}"
+        for chapter in pkgutil.iter_modules([str(here)])
+        if chapter.name.startswith(_CHAPTERS)
+        for module in pkgutil.iter_modules([str(here / chapter.name)])
+        if module.name.startswith(_KINDS)
+    ]
+    found = {}
+    for module in sorted(modules, key=_place):
+        kind, chapter, number = module.rpartition(".")[2].split("_")
+        target = import_module(f".{module}", __package__).TARGET
+        found[f"{kind}-{chapter}.{number}"] = target
+    return found
+
+
+TARGETS: dict[str, Target] = _discovered()
+
+
+def reproduce(name: str, system: CamFollower, size: str = SIZES[0]) -> "pd.DataFrame":
+    """A table of the thesis or the numbers of a figure, printed beside computed.
+
+    **Arguments:**
+
+    - `name`: a key of [`jaxcam.thesis.TARGETS`][], such as "table-5.2".
+    - `system`: the rig, such as `jaxcam.models.preset("calibrated")`.
+    - `size`: "full" for diagrams and basins as fine as published ones.
+
+    **Returns:** columns quantity, printed, computed, unit, difference, relative (the
+    difference over the size of the printed value); speeds in rpm and everything else in
+    SI units. NaN where the rig has no such thing, and under printed where the thesis
+    draws something but gives no number.
+
+    **Raises:** `ValueError` for an unknown name or size.
+    """
+    if name not in TARGETS:
+        known = ", ".join(TARGETS)
+        raise ValueError(f"There is no {name!r} to reproduce; choose one of {known}.")
+    return TARGETS[name].table(system, size)

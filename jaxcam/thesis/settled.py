@@ -1,0 +1,106 @@
+"""Motions of the rig that have settled, and what they are beside what is printed."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from ..hybrid import simulate, Trajectory
+from ..models import CamFollower, rpm_to_rad_s
+from ..sweeps import settle, Stroboscopic
+from ..sweeps.attractors import CONTACT, label_name, STICKING
+from .remember import remembered
+from .speeds import at_rpm, speed_of
+from .target import Rows
+
+
+#: turns before the first look, samples kept, and how often patience is doubled
+_TURNS, _KEEP, _RERUNS = 300, 64, 2
+
+
+class Case(NamedTuple):
+    """A motion that the thesis shows: where it starts, and what it is said to be."""
+
+    rpm: float
+    #: at time zero; None is in contact at rest
+    state: tuple[float, float] | None
+    #: printed P(impacts, turns); zero impacts are contact for good, zero turns chaos
+    impacts: float
+    turns: int
+    name: str = ""
+
+    @property
+    def title(self) -> str:
+        """The speed, and the letter of the start where it has one."""
+        return f"{self.name + ', ' if self.name else ''}{self.rpm:g} rpm"
+
+
+class Motion(NamedTuple):
+    """What it settles on."""
+
+    case: Case
+    #: as in `jaxcam.sweeps.attractors.Labels`
+    impacts: int
+    turns: int
+    #: rests in one orbit, or in all the turns kept
+    rests: int
+    #: at the end, at time zero in its turn
+    state: Float[np.ndarray, " 2"]
+
+    @property
+    def label(self) -> str:
+        """The label in words."""
+        return label_name(self.impacts, self.turns)
+
+
+@remembered
+def settled(system: CamFollower, cases: tuple[Case, ...]) -> list[Motion]:
+    """Follow the cases until they repeat, or for 2100 turns."""
+    section = Stroboscopic(system)
+    speeds = np.asarray(rpm_to_rad_s(np.array([case.rpm for case in cases])))
+    states = np.array(section.starts(speed_of, speeds))
+    for k, case in enumerate(cases):
+        if case.state is not None:
+            states[k] = case.state
+    samples, labels = settle(
+        section, states, _TURNS, _KEEP, reruns=_RERUNS, where=speed_of, values=speeds
+    )
+    return [
+        Motion(
+            case,
+            int(labels.impacts[k]),
+            int(labels.turns[k]),
+            int(samples.rests[k, -(int(labels.turns[k]) or _KEEP) :].sum()),
+            samples.final[k],
+        )
+        for k, case in enumerate(cases)
+    ]
+
+
+def run_of(system: CamFollower, motion: Motion, turns: float) -> Trajectory:
+    """The settled motion itself, over some turns from time zero."""
+    rig = at_rpm(system, motion.case.rpm)
+    touching = motion.impacts == CONTACT
+    state = None if touching else jnp.asarray(motion.state)
+    return simulate(rig, state, 0.0, turns * float(rig.period))
+
+
+def motion_rows(found: Sequence[Motion]) -> Rows:
+    """Rows that compare labels, as numbers, with those that are printed."""
+    rows: Rows = []
+    for motion in found:
+        case, at = motion.case, motion.case.title
+        if case.turns == 0:
+            words = f"{at}: turns of the orbit (0: does not repeat)"
+            rows.append((words, 0, motion.turns, ""))
+            continue
+        rows.append((f"{at}: turns of the orbit", case.turns, motion.turns, ""))
+        if case.impacts == np.inf:
+            rows.append((f"{at}: rests of the orbit", case.turns, motion.rests, ""))
+        else:
+            count = {STICKING: np.inf, CONTACT: 0}.get(motion.impacts, motion.impacts)
+            count = count if motion.turns > 0 else np.nan
+            rows.append((f"{at}: impacts of the orbit", case.impacts, count, ""))
+    return rows

@@ -1,0 +1,71 @@
+"""What a target is: printed values, the computation, the drawing."""
+
+import dataclasses
+from collections.abc import Callable, Iterable
+from typing import Any, TYPE_CHECKING, TypeAlias
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from ..models import CamFollower
+
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+#: quantity, printed value, computed value, unit
+Row: TypeAlias = tuple[str, Any, Any, str]
+Rows: TypeAlias = list[Row]
+SIZES = ("default", "full")
+
+
+@dataclasses.dataclass(frozen=True)
+class Target:
+    """A table of the thesis, or a figure: its numbers and its drawing."""
+
+    title: str
+    #: takes the rig; returns rows of quantity, printed and computed value, and unit
+    compute: Callable[..., Rows]
+    #: takes the rig; tables have no drawing
+    draw: Callable[..., Figure] | None = None
+    #: whether both also take a size, "default" or "full"
+    sized: bool = False
+    #: what to know of it when comparing
+    note: str = ""
+
+    def table(self, system: CamFollower, size: str = SIZES[0]) -> "pd.DataFrame":
+        """Printed beside computed, as [`jaxcam.thesis.reproduce`][] returns it."""
+        return frame(self.compute(system, *self._size(size)))
+
+    def figure(self, system: CamFollower, size: str = SIZES[0]) -> Figure | None:
+        """The drawing, in the style that is set; None for a table."""
+        return self.draw(system, *self._size(size)) if self.draw else None
+
+    def _size(self, size: str) -> tuple[str, ...]:
+        if size not in SIZES:
+            known = " or ".join(SIZES)
+            raise ValueError(f"There is no size {size!r}; choose {known}.")
+        return (size,) if self.sized else ()
+
+
+def frame(rows: Iterable[Row]) -> "pd.DataFrame":
+    """A table from rows of quantity, printed value, computed value and unit.
+
+    The relative difference is that over the size of the printed value; NaN where that
+    is zero and the computed one is not.
+    """
+    import pandas as pd
+
+    table = pd.DataFrame(
+        [
+            (name, float(printed), float(found), unit)
+            for name, printed, found, unit in rows
+        ],
+        columns=["quantity", "printed", "computed", "unit"],
+    )
+    difference = table["computed"] - table["printed"]
+    size = table["printed"].abs().where(table["printed"] != 0, np.nan)
+    table["difference"] = difference
+    table["relative"] = (difference / size).where(difference != 0, 0.0)
+    return table

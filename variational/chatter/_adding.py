@@ -1,0 +1,67 @@
+"""Parameter values at which the interrupted sequence loses its impacts, one by one."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from jaxcam import HybridSystem
+from jaxcam.parameters import Where
+
+from ._chatter_orbit import prepared_orbit
+from ._interruption import Line, line
+from ._scalar import check_chatter_system
+
+
+def adding_thresholds(
+    system: HybridSystem, where: Where, interruption, beyond, count: int = 8
+) -> Float[Array, " count"]:
+    """Parameter values at which the orbit from release grazes and loses an impact.
+
+    Past the interruption the motion that starts at release has finitely many impacts
+    before the next release. Their number falls by one where one of them grazes; these
+    values approach the interruption with the factor q of
+    [`variational.scaling_law`][].
+
+    **Arguments:**
+
+    - `system`, `where`: as in [`variational.chatter_interruption`][].
+    - `interruption`: the parameter value where complete chattering ends.
+    - `beyond`: a value on the interrupted side; thresholds between the two are found.
+    - `count`: how many, farthest first.
+
+    **Returns:** shape `(count,)`, in the parameter's unit.
+    """
+    check_chatter_system(system)
+    along = line(system, where)
+    near = jnp.asarray(interruption, jnp.float64)
+    far = jnp.asarray(beyond, jnp.float64)
+    fewest = _impacts(along, far)
+    return _thresholds(along, near, far, fewest + jnp.arange(1, count + 1))
+
+
+@eqx.filter_jit
+def _impacts(along: Line, value):
+    return prepared_orbit(along.at(value).prepared(), 0.0).impacts
+
+
+@eqx.filter_jit
+def _thresholds(along: Line, near, far, numbers):
+    """Bisect on the number of impacts, which is an integer and falls with distance."""
+
+    def one(number):
+        def halve(carry):
+            near, far, _ = carry
+            middle = 0.5 * (near + far)
+            orbit = prepared_orbit(along.at(middle).prepared(), 0.0)
+            more = orbit.complete | (orbit.impacts >= number)
+            near, far = jnp.where(more, middle, near), jnp.where(more, far, middle)
+            return near, far, middle
+
+        def wide(carry):
+            near, far, middle = carry
+            return jnp.abs(far - near) > 4e-16 * jnp.abs(middle)
+
+        return jax.lax.while_loop(wide, halve, (near, far, near))[0]
+
+    return jax.lax.map(one, numbers)

@@ -1,0 +1,90 @@
+"""All remaining impacts of an interrupted chattering sequence in one function."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float, Int
+
+from jaxcam.hybrid.lowering import while_loop
+
+from ._lambda_map import hop_ratio, lambda_map, LAMBDA_MAX
+from ._scaling_law import scaling_law
+
+
+# impacts before the iteration gives up; lambda - lambda_bar grows by 1/q each
+_IMPACTS = 4000
+
+
+class BetaMap(eqx.Module):
+    """What remains of a chattering sequence after its last impact.
+
+    With tau* the time from release of the first impact, the motion after the last one
+    is, at tau_P after release, (6.54) and (6.94) with c the jerk
+
+        velocity = c (tau_P^2 / 2 + beta tau*^2),
+        gap = c (tau_P^3 / 6 + beta tau*^2 tau_P + gamma tau*^3).
+    """
+
+    #: (P^2 (lambda - 1/2)) at the last impact, P the product of the h (6.43)
+    beta: Float[Array, "..."]
+    #: (P^3 (1/3 - lambda)) there, the term that (6.55) drops
+    gamma: Float[Array, "..."]
+    #: number of impacts that follow the first
+    impacts: Int[Array, "..."]
+
+
+def beta_parts(lam, r) -> BetaMap:
+    """Iterate the lambda-map to the last impact. (6.43)-(6.44), (6.97)
+
+    **Arguments:** `lam` >= 0 and `r` in (0, 1), dimensionless, broadcast.
+
+    **Returns:** a [`variational.chatter.BetaMap`][]. Zero up to lambda_bar, where
+    chattering completes before release (`impacts` is then 0).
+    """
+    lam, r = jnp.broadcast_arrays(
+        jnp.asarray(lam, jnp.float64), jnp.asarray(r, jnp.float64)
+    )
+    bar = scaling_law(r).lambda_bar
+    one = _one
+    for _ in range(lam.ndim):
+        one = jax.vmap(one)
+    return BetaMap(*one(lam, r, bar))
+
+
+def beta_map(lam, r) -> Float[Array, "..."]:
+    """beta(lambda): deviation that an interrupted chattering sequence leaves. (6.97)
+
+    **Arguments:** `lam` >= 0 and `r` in (0, 1), dimensionless, broadcast.
+
+    **Returns:** beta, dimensionless: 0 up to lambda_bar, then lobes between square-root
+    corners, each q^-1 wider and p^-2 higher than the one before.
+    """
+    return beta_parts(lam, r).beta
+
+
+def _one(lam, r, bar):
+    def goes_on(carry):
+        lam, _, count = carry
+        return (lam > bar) & (lam < 1 / 3) & (count < _IMPACTS)
+
+    def hop(carry):
+        lam, scale, count = carry
+        return lambda_map(lam, r), scale * hop_ratio(lam), count + 1
+
+    start = (lam, jnp.ones_like(lam), jnp.asarray(0))
+    lam, scale, count = while_loop(goes_on, hop, start)
+    # between 1/3 and 3/8 one more impact follows, after release
+    after = (lam >= 1 / 3) & (lam <= LAMBDA_MAX)
+    safe = jnp.where(after, lam, 0.35)
+    end = jnp.where(after, lambda_map(safe, r), lam)
+    scale = scale * jnp.where(after, hop_ratio(safe), 1.0)
+    # a flight that lands on release itself has lambda = inf and scale = 0
+    speed = jnp.where(jnp.isinf(end), 0.0, scale * scale * end)
+    beta = speed - scale * scale / 2
+    gamma = scale * (scale * scale / 3 - speed)
+    gone = lam > bar
+    return (
+        jnp.where(gone, beta, 0.0),
+        jnp.where(gone, gamma, 0.0),
+        jnp.where(gone, count + after.astype(count.dtype), 0),
+    )

@@ -1,0 +1,138 @@
+"""Where sticking ends, and the coordinates of chattering around it."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from jaxcam import HybridSystem
+from jaxcam.hybrid import normal_acceleration, release_point
+from jaxcam.hybrid.surface import (
+    contact_acceleration,
+    restitution_coefficients,
+    sticking_field,
+)
+from jaxcam.parameters import as_arrays, unit_tangent, Where
+
+from ._beta_map import beta_parts
+from ._scalar import check_chatter_system
+
+
+# of the contact acceleration over a period, to find where nothing can stick
+_SAMPLES = 256
+
+
+class ChatterFrame(eqx.Module):
+    """Release point, and the scales of chattering that ends there.
+
+    Times of the frame's methods are those of the system; tau is time less `release`.
+    """
+
+    #: time of release, phi_alpha of the thesis counted as a time
+    release: Float[Array, ""]
+    #: (n,) state there
+    state: Float[Array, " n"]
+    #: c, the rate of the relative acceleration there, > 0 (6.76), (6.112)
+    jerk: Float[Array, ""]
+    #: coefficient of restitution of slow impacts there
+    restitution: Float[Array, ""]
+
+    def coordinate(self, time, speed) -> Float[Array, "..."]:
+        """lambda = v / (c tau^2) of an impact with rebound speed v. (6.84), (6.98)"""
+        tau = time - self.release
+        return speed / (self.jerk * tau * tau)
+
+    def gradient(self, time, speed) -> Float[Array, "2"]:
+        """C = (C1, C2): derivatives of lambda by rebound speed and time. (6.100)"""
+        tau = time - self.release
+        first = 1 / (self.jerk * tau * tau)
+        return jnp.stack([first, -2 * speed * first / tau])
+
+    def at_section(self, time, speed, section) -> Float[Array, "2"]:
+        """Gap and normal velocity at a section after the last impact. (6.94)-(6.96)
+
+        **Arguments:** `time` and rebound `speed` of an impact before release;
+        `section`, the time of the section, after release.
+
+        **Returns:** shape `(2,)`. Unlike (6.55) the term of order tau*^3 is kept.
+        """
+        tau, after = time - self.release, section - self.release
+        parts = beta_parts(self.coordinate(time, speed), self.restitution)
+        deviation = parts.beta * tau * tau
+        gap = after**3 / 6 + deviation * after + parts.gamma * tau**3
+        return self.jerk * jnp.stack([gap, after * after / 2 + deviation])
+
+
+def chatter_frame(system: HybridSystem, time=0.0) -> ChatterFrame:
+    """Release point and scales of chattering; differentiable in the parameters.
+
+    **Arguments:**
+
+    - `system`: two states, one constraint, with a period.
+    - `time`: the release is the first at or after it, of the stretch of contact that
+      ends before the contact acceleration is greatest.
+
+    **Returns:** a [`variational.chatter.ChatterFrame`][]; NaN where the period has no
+    release.
+
+    **Raises:** `ValueError` for a system without a period.
+    """
+    check_chatter_system(system)
+    return _frame(as_arrays(system), jnp.asarray(time, jnp.float64))
+
+
+@eqx.filter_jit
+def _frame(system, time) -> ChatterFrame:
+    return prepared_frame(system.prepared(), time)
+
+
+def prepared_frame(system, time) -> ChatterFrame:
+    """The frame of a system that is already `prepared`."""
+    time = jnp.asarray(time, jnp.float64)
+    period = system.period
+    grid = time + period * jnp.linspace(0.0, 1.0, _SAMPLES, endpoint=False)
+    push = contact_acceleration(system, grid, jnp.zeros(2))
+    # where contact is least possible nothing sticks: the release is the last before
+    found = release_point(system, grid[jnp.argmax(push)])
+    release = found.time + jnp.where(found.time < time, period, jnp.zeros_like(period))
+
+    frame = frame_at(system, release, found.state)
+    lacking = (found.holds != 0) | (frame.jerk <= 0)
+    return eqx.tree_at(lambda f: f.release, frame, jnp.where(lacking, jnp.nan, release))
+
+
+def frame_at(system, release, state) -> ChatterFrame:
+    """The frame of a known release of a system that is already `prepared`."""
+
+    def suppressed(t, x):
+        return normal_acceleration(system, t, x)[0]
+
+    # by jvp, not grad: the same program is differentiated again
+    _, jerk = jax.jvp(
+        suppressed,
+        (release, state),
+        (jnp.ones_like(release), sticking_field(system, release, state)),
+    )
+    return ChatterFrame(
+        release=release,
+        state=state,
+        jerk=jerk,
+        restitution=restitution_coefficients(system, release, state)[0],
+    )
+
+
+def parameter_incidence(system: HybridSystem, where: Where, time=0.0) -> ChatterFrame:
+    """Derivatives of the release point and its scales by a parameter. (6.114)-(6.115)
+
+    `release` is then the rate of change of the time of release, `jerk` that of c: what
+    the thesis estimates from perturbed simulations.
+
+    **Arguments:** as in [`variational.chatter_frame`][]; `where` picks the parameter.
+
+    **Returns:** a [`variational.chatter.ChatterFrame`][] of derivatives, in units of
+    the frame over the parameter's.
+    """
+    system = as_arrays(system)
+    along = unit_tangent(where, system)
+    time = jnp.asarray(time, jnp.float64)
+    return eqx.filter_jvp(lambda s: _frame(s, time), (system,), (along,))[1]

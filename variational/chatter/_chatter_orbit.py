@@ -1,0 +1,187 @@
+"""The motion that leaves the release point, one impact after the other to its end."""
+
+from typing import NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Bool, Float, Int
+
+from jaxcam import HybridSystem
+from jaxcam.hybrid import normal_acceleration, normal_velocity
+from jaxcam.hybrid.lowering import while_loop
+from jaxcam.hybrid.surface import chatter_completion, normal_directions
+from jaxcam.parameters import as_arrays
+
+from ._chatter_frame import ChatterFrame, prepared_frame
+from ._impact_map import next_impact
+from ._lambda_map import koenigs
+from ._scalar import check_chatter_system
+from ._scaling_law import scaling_law
+
+
+# impacts before the search gives up
+_IMPACTS = 2000
+# lambda/(1 - r) below which the completion of second order is exact to 1e-12
+_SMALL = 1e-6
+# time from release, over the period, below which rounding decides what comes next
+_NEAR = 1e-12
+
+
+class ChatterOrbit(eqx.Module):
+    """The motion that starts at release, up to contact; where its chattering ends."""
+
+    #: where it starts; releases follow a period apart
+    frame: ChatterFrame
+    #: when the impacts accumulate; NaN where they do not before the last release
+    accumulation: Float[Array, ""]
+    #: whether they do, in the last of the periods asked for and not before
+    complete: Bool[Array, ""]
+    #: signed distance from the interruption in the last period: zero where accumulation
+    #: and release coincide, negative where chattering is complete, smooth in the
+    #: parameters except where an earlier impact grazes; NaN for a period without
+    #: impact, or where contact comes in an earlier one
+    margin: Float[Array, ""]
+    #: impacts listed: of a complete sequence those until the completion map takes
+    #: over, of an interrupted one all
+    impacts: Int[Array, ""]
+
+
+class _Search(NamedTuple):
+    """The last impact, and the one that the margin is taken from."""
+
+    time: Float[Array, ""]
+    state: Float[Array, " n"]
+    speed: Float[Array, ""]
+    found: Bool[Array, ""]
+    # whether what follows is a complete sequence, up to rounding
+    settled: Bool[Array, ""]
+    # number of the period, from 1, whose end is the next release
+    turn: Int[Array, ""]
+    # time from that release, of this impact and of the one before
+    tau: Float[Array, ""]
+    tau_before: Float[Array, ""]
+    count: Int[Array, ""]
+    # lambda and number, in its period, of the impact that the margin is taken from
+    taken: Float[Array, ""]
+    rank: Int[Array, ""]
+    here: Int[Array, ""]
+
+
+def chatter_accumulation(
+    system: HybridSystem, time=0.0, periods: int = 1
+) -> ChatterOrbit:
+    """Where the chattering of an orbit that sticks once in some periods accumulates.
+
+    Such an orbit forgets its past while it sticks: it leaves the release point without
+    relative velocity, so the motion from there decides. It is interrupted where
+    `accumulation` reaches the last release; `margin` is the smooth form of that
+    equation. With K the coordinate in which the lambda-map is multiplication by 1/q
+    ([`variational.koenigs`][]), q^k K(lambda_k) is the same for every impact k of the
+    last period up to terms of order q^k tau_k, and it is zero at the interruption.
+
+    **Arguments:** a system with two states, one constraint and a period; `time` as in
+    [`variational.chatter_frame`][]; `periods`, from release to the release after
+    sticking. Pure; may be compiled, batched and differentiated forward.
+
+    **Returns:** a [`variational.chatter.ChatterOrbit`][].
+
+    **Raises:** `ValueError` for a system without a period.
+    """
+    check_chatter_system(system)
+    return _orbit(as_arrays(system), jnp.asarray(time, jnp.float64), periods)
+
+
+@eqx.filter_jit
+def _orbit(system, time, periods) -> ChatterOrbit:
+    return prepared_orbit(system.prepared(), time, periods)
+
+
+def prepared_orbit(system, time, periods: int = 1) -> ChatterOrbit:
+    """The orbit of a system that is already `prepared`."""
+    return orbit_from(system, prepared_frame(system, time), periods)
+
+
+def orbit_from(system, frame: ChatterFrame, periods: int = 1) -> ChatterOrbit:
+    """The orbit of a system that is already `prepared`, from a known release."""
+    period = system.period
+    restitution = frame.restitution
+    law = scaling_law(restitution)
+    half = law.lambda_bar / 2
+
+    def coordinate(tau, speed):
+        # after release there is none: a number that is no impact's
+        early = tau < -_NEAR * period
+        safe = jnp.where(early, tau, -period)
+        return early, speed / (frame.jerk * safe * safe)
+
+    def goes_on(s):
+        before = (s.turn < periods) | (s.tau < -_NEAR * period) | (s.count == 0)
+        return s.found & ~s.settled & before & (s.count < _IMPACTS)
+
+    def hop(s):
+        # a flight that misses the wall near release may come back a turn later
+        point = next_impact(system, s.time, s.state, s.speed, 2 * period)
+        since = point.time - frame.release
+        passed = jnp.floor(jax.lax.stop_gradient(since) / period).astype(s.turn.dtype)
+        turn = jnp.clip(passed + 1, s.turn, periods)
+        tau = since - turn.astype(jnp.float64) * period
+        early, lam = coordinate(tau, point.speed)
+        push = normal_acceleration(system, point.time, point.state)[0]
+        small = point.speed * frame.jerk <= _SMALL * (1 - restitution) * push * push
+        new = turn > s.turn
+        rank, here = jnp.where(new, -1, s.rank), jnp.where(new, 0, s.here)
+        # the last impact before release that is not far below lambda_bar
+        take = point.found & early & (turn == periods) & ((lam >= half) | (rank < 0))
+        return _Search(
+            time=point.time,
+            state=point.state,
+            speed=point.speed,
+            found=point.found,
+            settled=point.found & early & (push < 0) & small,
+            turn=turn,
+            tau=tau,
+            tau_before=s.tau,
+            count=s.count + 1,
+            taken=jnp.where(take, lam, s.taken),
+            rank=jnp.where(take, here, rank),
+            here=here + 1,
+        )
+
+    start = _Search(
+        time=frame.release,
+        state=frame.state,
+        speed=jnp.zeros(()),
+        found=jnp.asarray(True),
+        settled=jnp.asarray(False),
+        turn=jnp.asarray(1),
+        tau=-period,
+        tau_before=-period,
+        count=jnp.asarray(0),
+        taken=jnp.asarray(jnp.nan),
+        rank=jnp.asarray(-1),
+        here=jnp.asarray(0),
+    )
+    s = while_loop(goes_on, hop, start)
+
+    complete = s.settled & (s.turn == periods)
+    on_wall = (
+        s.state
+        + (s.speed - normal_velocity(system, s.time, s.state)[0])
+        * normal_directions(system, s.time, s.state)[0]
+    )
+    ends = chatter_completion(system, s.time, on_wall).time
+    margin = koenigs(s.taken, law.lambda_bar, restitution, law.q) * jnp.exp(
+        s.rank.astype(jnp.float64) * jnp.log(law.q)
+    )
+    # an impact after release belongs to the sequence if it comes as soon as the
+    # lambda-map has it: not later than half of the time left at the one before
+    local = s.found & (s.tau < jnp.abs(s.tau_before))
+    listed = jnp.where(complete | local, s.count, s.count - 1)
+    return ChatterOrbit(
+        frame=frame,
+        accumulation=jnp.where(complete, ends, jnp.nan),
+        complete=complete,
+        margin=jnp.where(s.rank < 0, jnp.nan, margin),
+        impacts=listed,
+    )

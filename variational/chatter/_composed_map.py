@@ -1,0 +1,273 @@
+"""One turn of a chattering orbit as a map of one variable, from its local theory.
+
+At the interruption a turn is Theta, smooth, from a section after release to an impact
+D* of the chattering sequence, followed by beta. All motions leave beta along one
+direction B, so one number says where they are: epsilon = tau*^2 beta, which at release
+is a relative velocity c epsilon. With A the derivative of Theta, C that of lambda and
+mu the distance of the parameter from the interruption,
+
+    epsilon' = tau*^2 beta(lambda_bar + C A B epsilon + lambda_mu mu),
+
+where the deviation is first carried to where it is small, since it grows linearly in
+the coordinate K of [`variational.koenigs`][] only.
+(6.104) and (6.116) leave out tau*^2; the thesis' K_beta appears to stand for it.
+"""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from jaxcam import HybridSystem
+from jaxcam.hybrid.surface import normal_directions
+from jaxcam.parameters import as_arrays, pick, Where
+
+from ._beta_map import beta_parts
+from ._chatter_frame import ChatterFrame, prepared_frame
+from ._free_flight import fly
+from ._impact_map import ImpactPoint, surface_state
+from ._interruption import line
+from ._scalar import check_chatter_system
+from ._scaling_law import scaling_law
+from ._section_turn import (
+    impact_after,
+    Section,
+    section_to_impact,
+    to_section,
+)
+
+
+# deviation of lambda up to which K and lambda - lambda_bar agree to as many digits as
+# rounding leaves of it
+_LINEAR = 1e-8
+
+
+class ComposedMap(eqx.Module):
+    """Local theory of one turn around the interruption of complete chattering."""
+
+    #: its release lies between the section at the start of the turn and the next
+    frame: ChatterFrame
+    #: time of the section at the end of the turn
+    section: Float[Array, ""]
+    #: (2,) state there of the orbit that sticks until release; its gap and velocity
+    state: Float[Array, "2"]
+    relative: Float[Array, "2"]
+    #: time and rebound speed of D* on the orbit from release, and its lambda
+    time: Float[Array, ""]
+    speed: Float[Array, ""]
+    lam: Float[Array, ""]
+    #: fixed point of the lambda-map
+    lambda_bar: Float[Array, ""]
+    #: A: rebound speed and time of D* by the state at the section (6.107)
+    matrix: Float[Array, "2 2"]
+    #: B: state at the section by epsilon, and gap and velocity by epsilon (6.103)
+    vector: Float[Array, "2"]
+    relative_vector: Float[Array, "2"]
+    #: C: lambda by rebound speed and time of D*, (6.100), and by the parameter (6.114)
+    covector: Float[Array, "2"]
+    by_parameter: Float[Array, ""]
+    #: change of lambda - lambda_bar with the parameter, D* moving with the orbit
+    incidence: Float[Array, ""]
+    #: change of gap and velocity at the section with the parameter, epsilon = 0 (6.115)
+    drift: Float[Array, "2"]
+
+    @property
+    def tau(self) -> Float[Array, ""]:
+        """Time of D* from release, < 0."""
+        return self.time - self.frame.release
+
+    @property
+    def feedback(self) -> Float[Array, ""]:
+        """C A B: how much epsilon moves the next lambda."""
+        return self.covector @ self.matrix @ self.vector
+
+    def __call__(self, epsilon, parameter=0.0) -> Float[Array, "..."]:
+        """epsilon of the next turn. (6.109), (6.116)
+
+        **Arguments:** `epsilon`, in the unit of time squared; `parameter`, its distance
+        from the interruption; broadcast.
+        """
+        return self._left(self.feedback * epsilon + self.incidence * parameter)
+
+    def at_section(self, speed=0.0, time=0.0) -> Float[Array, "... 2"]:
+        """Gap and velocity at the section after D* itself is moved. (6.104)
+
+        **Arguments:** changes of the rebound speed and time of D*, broadcast.
+
+        **Returns:** shape `(..., 2)`.
+        """
+        moved = self.covector[0] * speed + self.covector[1] * time
+        parts = beta_parts(self.lambda_bar + moved, self.frame.restitution)
+        return self._section(self.tau**2 * parts.beta, 0.0)
+
+    def along_parameter(self, parameter) -> Float[Array, "... 2"]:
+        """Gap and velocity at the section of the orbit from release. (6.114)-(6.115)
+
+        **Arguments:** distance of the parameter from the interruption, any shape.
+
+        **Returns:** shape `(..., 2)`.
+        """
+        return self._section(self._left(self.incidence * parameter), parameter)
+
+    def _left(self, deviation):
+        """epsilon by a deviation that grew over all the impacts before D*.
+
+        It is linear in the coordinate K only, so beta is taken so many impacts earlier,
+        where the deviation is small and K is lambda - lambda_bar; there tau is larger
+        by p^-n.
+        """
+        law = scaling_law(self.frame.restitution)
+        deviation = jnp.asarray(deviation, jnp.float64)
+        size = jnp.where(deviation > 0, deviation, _LINEAR)
+        n = jnp.maximum(jnp.ceil(jnp.log(_LINEAR / size) / jnp.log(law.q)), 0.0)
+        earlier = law.lambda_bar + law.q**n * deviation
+        beta = beta_parts(earlier, self.frame.restitution).beta
+        return self.tau**2 * law.p ** (-2 * n) * beta
+
+    def _section(self, epsilon, parameter):
+        columns = [
+            self.relative[k] + epsilon * self.relative_vector[k] + parameter * drift
+            for k, drift in enumerate(self.drift)
+        ]
+        return jnp.stack(columns, axis=-1)
+
+
+def composed_map(
+    system: HybridSystem, where: Where, rank: int, phase=0.0
+) -> ComposedMap:
+    """Compose beta with the rest of the turn, all derivatives by differentiation.
+
+    **Arguments:**
+
+    - `system`: at the interruption ([`variational.chatter_interruption`][]).
+    - `where`: picks the parameter.
+    - `rank`: number of the impact D* after release, from 0. The later it is, the better
+      the lambda-map describes what follows, and the smaller the deviations for which
+      A and C are linear: they move D* by much less than tau*.
+    - `phase`: of the section, in periods, in the flight after release.
+
+    **Returns:** a [`variational.ComposedMap`][].
+
+    **Raises:** `ValueError` for a system without a period.
+    """
+    check_chatter_system(system)
+    system = as_arrays(system)
+    value = jnp.asarray(pick(where, system)(system), jnp.float64)
+    return _compose(line(system, where), value, jnp.asarray(rank), phase)
+
+
+@eqx.filter_jit
+def _compose(along, value, rank, phase) -> ComposedMap:
+    def turn(value):
+        moved = along.at(value).prepared()
+        period = moved.period
+        frame = prepared_frame(moved, jnp.asarray(phase * period, jnp.float64))
+        zero = jnp.zeros(())
+        point = impact_after(moved, frame.release, frame.state, zero, 0.0, rank)
+        # the orbit starts at the frame's release: a turn later than D*
+        return moved, frame, point.time - period, point.speed
+
+    def section_of(moved, frame, velocity):
+        """State, gap and velocity at the section by the velocity left at release."""
+        direction = normal_directions(moved, frame.release, frame.state)[0]
+        start = frame.state + velocity * direction
+        section = (phase + 1) * moved.period
+        state, *relative = fly(
+            moved, frame.release, start, velocity, section - frame.release
+        )
+        return state, jnp.stack(relative)
+
+    def by_value(value):
+        moved, frame, time, speed = turn(value)
+        lam = frame.coordinate(time, speed)
+        distance = lam - scaling_law(frame.restitution).lambda_bar
+        relative = section_of(moved, frame, jnp.zeros(()))[1]
+        return distance, frame.release, frame.jerk, relative
+
+    rates = jax.jvp(by_value, (value,), (jnp.ones_like(value),))[1]
+    incidence, release_rate, jerk_rate, drift = rates
+    moved, frame, time, speed = turn(value)
+    state, relative = section_of(moved, frame, jnp.zeros(()))
+    by_velocity = jax.jvp(
+        lambda v: section_of(moved, frame, v), (jnp.zeros(()),), (jnp.ones(()),)
+    )[1]
+
+    def theta(y):
+        point = section_to_impact(moved, y, phase, rank)
+        return jnp.stack([point.speed, point.time])
+
+    lam = frame.coordinate(time, speed)
+    covector = frame.gradient(time, speed)
+    return ComposedMap(
+        frame=frame,
+        section=(phase + 1) * moved.period,
+        state=state,
+        relative=relative,
+        time=time,
+        speed=speed,
+        lam=lam,
+        lambda_bar=scaling_law(frame.restitution).lambda_bar,
+        matrix=jax.jacfwd(theta)(state),
+        vector=frame.jerk * by_velocity[0],
+        relative_vector=frame.jerk * by_velocity[1],
+        covector=covector,
+        by_parameter=-lam * jerk_rate / frame.jerk - covector[1] * release_rate,
+        incidence=incidence,
+        drift=drift,
+    )
+
+
+def simulated_at_section(system: HybridSystem, composed: ComposedMap, speed) -> Section:
+    """What [`variational.ComposedMap.at_section`][] predicts, by the exact motion.
+
+    **Arguments:** `system` at the interruption; `speed`, changes of the rebound speed
+    of D*, shape `(k,)`.
+
+    **Returns:** a [`variational.Section`][] with a leading axis.
+    """
+    system = as_arrays(system).prepared()
+    speeds = composed.speed + jnp.asarray(speed, jnp.float64)
+    frame, section = composed.frame, composed.section
+    return _simulated(system, frame, composed.time, speeds, section)
+
+
+def simulated_by_parameter(
+    system: HybridSystem, where: Where, changes, phase=0.0
+) -> Section:
+    """The orbit from release, followed over a turn at other values of the parameter.
+
+    What [`variational.ComposedMap.along_parameter`][] predicts.
+
+    **Arguments:** `system` at the interruption; `where` picks the parameter; `changes`
+    of it, shape `(k,)`; `phase` of the section, in periods.
+
+    **Returns:** a [`variational.Section`][] with a leading axis, at the section after
+    the next release.
+    """
+    system = as_arrays(system)
+    value = jnp.asarray(pick(where, system)(system), jnp.float64)
+    return _moved(line(system, where), value + jnp.asarray(changes), phase)
+
+
+@eqx.filter_jit
+def _moved(along, values, phase):
+    def one(value):
+        system = along.at(value).prepared()
+        period = system.period
+        frame = prepared_frame(system, jnp.asarray(phase * period, jnp.float64))
+        zero, yes = jnp.zeros(()), jnp.asarray(True)
+        start = ImpactPoint(frame.release, frame.state, zero, zero, yes)
+        later = eqx.tree_at(lambda f: f.release, frame, frame.release + period)
+        return to_section(system, later, start, (phase + 2) * period)
+
+    return jax.vmap(one)(values)
+
+
+@eqx.filter_jit
+def _simulated(system, frame, time, speeds, section):
+    def one(speed):
+        state = surface_state(system, time, speed)
+        start = ImpactPoint(time, state, speed, -speed, jnp.asarray(True))
+        return to_section(system, frame, start, section)
+
+    return jax.vmap(one)(speeds)

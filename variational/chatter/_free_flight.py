@@ -1,0 +1,55 @@
+"""Free flight with a gap that keeps its relative accuracy however low it is.
+
+Gap and normal velocity are integrated on their own from the surface, beside the state:
+z' = v, v' = a, from the speed that the impact leaves, where a is the normal
+acceleration of free flight. They keep their relative accuracy where the gap computed
+from the state has lost it, so impacts 1e-12 high are as good as high ones.
+"""
+
+import jax.numpy as jnp
+from jaxtyping import ArrayLike
+
+from jaxcam import HybridSystem
+from jaxcam.hybrid import normal_acceleration
+from jaxcam.hybrid.runge_kutta import adaptive_steps, array_step, DOPRI8
+
+
+#: error of a step, relative to one plus the state
+TOLERANCE = 1e-14
+
+
+def runge_kutta_step(rates, s, y, h):
+    """One step of length `h`: the state after it and the error estimate."""
+    return array_step(DOPRI8, rates, s, y, h)[:2]
+
+
+def flight_rates(system: HybridSystem, time: ArrayLike = 0.0):
+    """Rates of state, normal velocity and gap, `y` of shape `(n + 2,)`, along free
+    flight, by the time after `time`."""
+
+    def rates(s, y):
+        t, x = time + s, y[:-2]
+        push = normal_acceleration(system, t, x)
+        return jnp.concatenate([system.vector_field(t, x), push, y[-2:-1]])
+
+    return rates
+
+
+def on_flight(state, speed, height: ArrayLike = 0.0):
+    """What is integrated: state, normal velocity and gap."""
+    beside = jnp.stack([jnp.asarray(b, jnp.float64) for b in (speed, height)])
+    return jnp.concatenate([state, beside])
+
+
+def fly(system: HybridSystem, time, state, speed, duration, height: ArrayLike = 0.0):
+    """Free flight for a given time, without a look at the constraint.
+
+    **Arguments:** as in [`variational.chatter.next_impact`][]; `duration` >= 0.
+
+    **Returns:** state `(n,)`, gap and normal velocity at the end; the gap keeps its
+    relative accuracy if the flight starts on the surface.
+    """
+    rates = flight_rates(system, jnp.asarray(time, jnp.float64))
+    y = on_flight(state, speed, height)
+    y = adaptive_steps(DOPRI8, rates, jnp.zeros(()), y, duration, TOLERANCE)
+    return y[:-2], y[-1], y[-2]

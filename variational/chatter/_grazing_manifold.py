@@ -1,0 +1,152 @@
+"""Pre-images and images of impacts without speed, and the region they accumulate on."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from jaxcam import HybridSystem
+from jaxcam.hybrid.surface import contact_acceleration
+from jaxcam.parameters import as_arrays
+
+from ._chatter_frame import prepared_frame
+from ._impact_map import next_impact, surface_state
+from ._reversed import Reversed
+from ._scalar import check_chatter_system
+from ._scaling_law import scaling_law
+
+
+class ImpactCurve(eqx.Module):
+    """Points in the plane of impact time and rebound speed; NaN where there is none."""
+
+    time: Float[Array, "..."]
+    speed: Float[Array, "..."]
+
+
+class GrazingManifold(eqx.Module):
+    """Impacts that lead to, or follow from, an impact without speed. (6.16)"""
+
+    #: (points,) phases outside contact at which the motion grazes
+    grazing: Float[Array, " points"]
+    #: (n, points) S^1..S^n, impacts whose n-th successor grazes (6.13), (6.15)
+    before: ImpactCurve
+    #: (n, points) W^1..W^n, the n-th successors of grazing impacts (6.14), (6.15)
+    after: ImpactCurve
+
+
+def grazing_manifold(
+    system: HybridSystem, n: int = 4, points: int = 200, horizon: float = 2.0
+) -> GrazingManifold:
+    """Pre-images S^k and images W^k of the line of impacts without speed. (6.13)-(6.16)
+
+    The line is taken where the constraint would let go, outside the sticking set Z: a
+    motion that grazes there touches the constraint from outside.
+
+    **Arguments:** a system with two states, one constraint, a period, and restitution
+    above zero; `n`, how many of each; `points` on the line; `horizon`, the longest
+    flight, in periods.
+
+    **Returns:** a [`variational.chatter.GrazingManifold`][]; times are not taken modulo
+    the period. A point of S^k whose flight would have started inside an earlier impact
+    is NaN.
+
+    **Raises:** `ValueError` for a system without a period.
+    """
+    check_chatter_system(system)
+    return _manifold(as_arrays(system).prepared(), n, points, horizon)
+
+
+@eqx.filter_jit
+def _manifold(system, n, points, horizon) -> GrazingManifold:
+    grid = system.period * jnp.linspace(0.0, 1.0, 4 * points, endpoint=False)
+    push = contact_acceleration(system, grid, jnp.zeros(2))
+    # all times without contact, spread evenly, wherever in the period they lie
+    order = jnp.argsort(push <= 0, stable=True)
+    count = jnp.sum(push > 0)
+    picks = order[(jnp.arange(points) * count) // points]
+    times = jnp.where(count > 0, grid[picks], jnp.nan)
+    backwards = Reversed(system)
+
+    def chain(field, sense, time):
+        state = surface_state(system, time, jnp.zeros(()))
+
+        def hop(carry, _):
+            s, x, speed, going = carry
+            point = next_impact(field, s, x, speed, horizon * system.period)
+            going = going & point.found
+            # backwards, the speed that arrives is the one that the impact left
+            found = jnp.abs(point.approach) if sense < 0 else point.speed
+            pair = jnp.stack([sense * point.time, found])
+            carry = (point.time, point.state, point.speed, going)
+            return carry, jnp.where(going, pair, jnp.nan)
+
+        start = (sense * time, state, jnp.zeros(()), jnp.asarray(True))
+        return jax.lax.scan(hop, start, length=n)[1]
+
+    before = jax.vmap(lambda t: chain(backwards, -1.0, t), out_axes=1)(times)
+    after = jax.vmap(lambda t: chain(system, 1.0, t), out_axes=1)(times)
+    return GrazingManifold(
+        grazing=times,
+        before=ImpactCurve(before[..., 0], before[..., 1]),
+        after=ImpactCurve(after[..., 0], after[..., 1]),
+    )
+
+
+def chattering_region(
+    system: HybridSystem, points: int = 64, impacts: int = 16, near: float = 1e-3
+) -> ImpactCurve:
+    """Upper boundary of the region D in which chattering is complete. (6.20), (6.91)
+
+    The boundary C consists of impacts whose sequence accumulates exactly at release.
+    Close to release it is the parabola of lambda_bar; from there it is continued
+    backwards by the impact map, which keeps it.
+
+    **Arguments:**
+
+    - `system`: two states, one constraint, a period; restitution above zero.
+    - `points`: on each piece between an impact and the one before.
+    - `impacts`: how many pieces.
+    - `near`: time from release, in periods, at which the parabola is trusted; its
+      relative error there is of that order, and the backward map reduces it.
+
+    **Returns:** a [`variational.chatter.ImpactCurve`][], shape `(impacts * points,)`,
+    ordered backwards in time from release; D lies between it and speed zero.
+
+    **Raises:** `ValueError` for a system without a period.
+    """
+    check_chatter_system(system)
+    return _boundary(as_arrays(system).prepared(), points, impacts, near)
+
+
+@eqx.filter_jit
+def _boundary(system, points, impacts, near) -> ImpactCurve:
+    frame = prepared_frame(system, 0.0)
+    law = scaling_law(frame.restitution)
+    # a fundamental piece: its first point is the image of its last
+    share = jnp.arange(points) / points
+    tau = -near * system.period * law.p ** (1 - share)
+    speed = law.lambda_bar * frame.jerk * tau * tau
+    backwards = Reversed(system)
+
+    def chain(tau, speed):
+        time = frame.release + tau
+        state = surface_state(system, time, speed)
+        # backwards, the impact comes first: from the speed left to that which arrived
+        start = backwards.impact(-time, state)
+        arrived = speed / frame.restitution
+
+        def hop(carry, _):
+            s, x, u, going = carry
+            point = next_impact(backwards, s, x, u, system.period)
+            going = going & point.found
+            pair = jnp.stack([-point.time, -point.approach])
+            found = jnp.where(going, pair, jnp.nan)
+            return (point.time, point.state, point.speed, going), found
+
+        begin = (-time, start, arrived, jnp.asarray(True))
+        first = jnp.stack([time, speed])[None]
+        rest = jax.lax.scan(hop, begin, length=impacts - 1)[1]
+        return jnp.concatenate([first, rest])
+
+    curve = jax.vmap(chain, out_axes=1)(tau, speed).reshape(-1, 2)
+    return ImpactCurve(curve[:, 0], curve[:, 1])

@@ -1,0 +1,167 @@
+"""From one impact to the next, exact to rounding however low the impact."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, ArrayLike, Bool, Float
+
+from jaxcam import HybridSystem
+from jaxcam.hybrid import contact_state, normal_velocity
+from jaxcam.hybrid.lowering import while_loop
+from jaxcam.hybrid.surface import normal_directions
+from jaxcam.parameters import as_arrays
+
+from ._free_flight import flight_rates, runge_kutta_step
+from ._impact_search import frozen, leave, longest_step, step
+from ._scalar import one_constraint
+
+
+# attempts, at most
+_MOST_STEPS = 4096
+_GAUSS, _GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(8)
+_GAUSS, _GAUSS_WEIGHTS = (_GAUSS + 1) / 2, _GAUSS_WEIGHTS / 2
+
+
+class ImpactPoint(eqx.Module):
+    """Just after an impact."""
+
+    #: time of the impact
+    time: Float[Array, "..."]
+    #: (n,) state after it
+    state: Float[Array, "... n"]
+    #: normal velocity after it, > 0; known better than the state's own
+    speed: Float[Array, "..."]
+    #: normal velocity before it, < 0
+    approach: Float[Array, "..."]
+    #: whether there was one before the horizon
+    found: Bool[Array, "..."]
+
+
+def next_impact(
+    system: HybridSystem, time, state, speed, horizon, height: ArrayLike = 0.0
+) -> ImpactPoint:
+    """The next impact of a motion that leaves the surface, and the state after it.
+
+    Pure; may be compiled, batched and differentiated forward, also twice.
+
+    **Arguments:**
+
+    - `system`: with one constraint, already `prepared`.
+    - `time`, `state`: on the surface, after an impact or at release; shape `(n,)`.
+    - `speed`: normal velocity there, >= 0 (0 at release).
+    - `horizon`: how long to wait for an impact, in units of time.
+    - `height`: gap at the start, > 0 for a motion that is already in flight; `speed`
+      may then have either sign.
+
+    **Returns:** a [`variational.chatter.ImpactPoint`][].
+    """
+    time = jnp.asarray(time, jnp.float64)
+    longest = longest_step(system, horizon)
+    start = leave(system, time, state, speed, longest, height)
+
+    def searching(carry):
+        f, count = carry
+        waits = ~f.searches | (f.time - time < horizon)
+        return ~f.lands & waits & (count < _MOST_STEPS)
+
+    def look(carry):
+        f, count = carry
+        return step(system, f)[0], count + 1
+
+    f, _ = while_loop(searching, look, (start, 0))
+    rates = flight_rates(system)
+
+    # the last steps of Newton's method carry first and second derivatives
+    def newton(_, carry):
+        _, _, length = carry
+        end, _ = runge_kutta_step(rates, f.time, f.y, length)
+        moved = length - end[-1] / jnp.where(end[-2] < 0, end[-2], -jnp.inf)
+        return end, length, moved
+
+    length = frozen(f.length)
+    end, length, _ = jax.lax.fori_loop(0, 4, newton, (f.y, length, length))
+    arrival = f.time + length
+    before, approach = end[:-2], end[-2]
+    after = one_constraint(system.impact(arrival, before), 1)
+    return ImpactPoint(
+        time=arrival,
+        state=after,
+        speed=rebound_speed(system, arrival, before, approach),
+        approach=approach,
+        found=f.lands,
+    )
+
+
+def rebound_speed(system: HybridSystem, time, before, approach):
+    """Speed after an impact, to the relative accuracy of the speed before it.
+
+    The difference of two nearly equal velocities would not do for slow impacts; there
+    the law is integrated from the impact without speed.
+    """
+    direction = normal_directions(system, time, before)[0]
+    rest = before - approach * direction
+
+    def after(v):
+        moved = one_constraint(system.impact(time, rest + v * direction), 1)
+        return normal_velocity(system, time, moved)[0]
+
+    shares = jnp.asarray(_GAUSS) * approach
+    slopes = jax.vmap(lambda v: jax.jvp(after, (v,), (jnp.ones_like(v),))[1])(shares)
+    slow = approach * (jnp.asarray(_GAUSS_WEIGHTS) @ slopes)
+    plain = after(approach)
+    size = jnp.max(jnp.abs(jax.lax.stop_gradient(before)))
+    return jnp.where(jnp.abs(approach) < 1e-3 * (1 + size), slow, plain)
+
+
+def impact_map(system: HybridSystem, time, speed, *, horizon=None):
+    """P_I: time and rebound speed of an impact to those of the next. (6.10)
+
+    Exact, where (6.10) is its first order at small speed. The rebound speed is the
+    normal velocity after the impact; the thesis' v is that before it.
+
+    **Arguments:** a system with two states and one constraint; `time`; `speed` >= 0 in
+    the units of the gap over time; `horizon`, the longest wait (a period by default).
+
+    **Returns:** time and rebound speed of the next impact; NaN where there is none.
+    """
+    system = as_arrays(system)
+    time = jnp.asarray(time, jnp.float64)
+    speed = jnp.asarray(speed, jnp.float64)
+    horizon = system.period if horizon is None else horizon
+    return _impact_map(system, time, speed, jnp.asarray(horizon, jnp.float64))
+
+
+@eqx.filter_jit
+def _impact_map(system, time, speed, horizon):
+    system = system.prepared()
+    state = surface_state(system, time, speed)
+    point = next_impact(system, time, state, speed, horizon)
+    return (
+        jnp.where(point.found, point.time, jnp.nan),
+        jnp.where(point.found, point.speed, jnp.nan),
+    )
+
+
+def impact_jacobian(system: HybridSystem, time, speed) -> Float[Array, "2 2"]:
+    """Derivative of P_I by time and rebound speed. (6.11)-(6.12)
+
+    Its determinant is r^2 v0/v1 times the change of phase volume in flight; it is
+    singular where the next impact grazes, v1 = 0.
+    """
+    time = jnp.asarray(time, jnp.float64)
+    speed = jnp.asarray(speed, jnp.float64)
+    return jax.jacfwd(lambda y: jnp.stack(impact_map(system, y[0], y[1])))(
+        jnp.stack([time, speed])
+    )
+
+
+def surface_state(system: HybridSystem, time, speed, guess=None):
+    """State on the surface with normal velocity `speed`, shape `(2,)`.
+
+    **Arguments:** a system with two states and one constraint, scalars `time` and
+    `speed`, and a state to start Newton's method from (zeros by default).
+    """
+    guess = jnp.zeros(2) if guess is None else guess
+    rest = contact_state(system, time[None], guess)[0]
+    return rest + speed * normal_directions(system, time, rest)[0]

@@ -1,0 +1,181 @@
+"""The search for the next impact, one Runge-Kutta step at a time.
+
+It stays apart from the event loop of `jaxcam.hybrid`, because it knows a gap to its own
+relative accuracy, and can be differentiated twice. One step is the same program whether
+it searches for the next impact, lands on it or looks for the lowest point of a flight;
+so a loop over steps is small to compile, and its forward derivative is that of the
+motion at fixed lengths of the steps, corrected where it lands.
+"""
+
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, ArrayLike, Bool, Float, Int
+
+from jaxcam import HybridSystem
+from jaxcam.hybrid import normal_acceleration
+
+from ._free_flight import flight_rates, on_flight, runge_kutta_step, TOLERANCE
+
+
+# a dip of the gap is looked for within one step: it must not hold two of them
+_STEPS_PER_PERIOD = 16
+# change of a landing step, over the flight and over the time in which the
+# acceleration would stop the fall, after which one more step is exact
+_LAST_CHANGE = 1e-3
+# steps towards a landing or a lowest point, before the last is taken for it
+_LANDINGS, _LOWERINGS = 100, 12
+
+# length of the first step, in speeds over accelerations: a little behind the impact
+_BEHIND = 2.2
+
+_SEARCH, _LAND, _LAST, _BOTTOM = range(4)
+#: lengths of steps and decisions carry no derivative
+frozen = jax.lax.stop_gradient
+
+
+class Flight(NamedTuple):
+    """Where the motion is, and what the next step is for."""
+
+    time: Float[Array, ""]
+    #: state, normal velocity and gap: the last two are integrated beside the state from
+    #: the last impact on, so that low flights are as exact as high ones
+    y: Float[Array, " n+2"]
+    #: time of the last impact
+    since: Float[Array, ""]
+    #: of the next step
+    length: Float[Array, ""]
+    #: of any step
+    longest: Float[Array, ""]
+    mode: Int[Array, ""]
+    #: lengths before and behind what is looked for
+    low: Float[Array, ""]
+    high: Float[Array, ""]
+    #: steps for the same purpose
+    tries: Int[Array, ""]
+    #: whether the flight has just passed its lowest point
+    rises: Bool[Array, ""]
+
+    @property
+    def searches(self) -> Bool[Array, ""]:
+        """Whether no impact is in sight yet."""
+        return self.mode == _SEARCH
+
+    @property
+    def lands(self) -> Bool[Array, ""]:
+        """Whether the next step ends in the impact, up to one correction."""
+        return (self.mode == _LAST) | ((self.mode == _LAND) & (self.tries >= _LANDINGS))
+
+
+def leave(
+    system: HybridSystem, time, state, speed, longest, height: ArrayLike = 0.0
+) -> Flight:
+    """The start of a flight from an impact, from release, or at a `height`.
+
+    `longest` is the step that is taken at most.
+    """
+    longest, time = frozen(longest), jnp.asarray(time, jnp.float64)
+    pull = -frozen(normal_acceleration(system, time, state)[0])
+    # a parabola returns after 2 u / pull
+    parabola = _BEHIND * frozen(speed) / jnp.where(pull > 0, pull, 1.0)
+    short = (pull > 0) & (frozen(speed) > 0)
+    return Flight(
+        time=time,
+        y=on_flight(state, speed, height),
+        since=frozen(time),
+        length=jnp.where(short, jnp.minimum(parabola, longest), longest / 8),
+        longest=longest,
+        mode=jnp.asarray(_SEARCH),
+        low=jnp.zeros(()),
+        high=jnp.zeros(()),
+        tries=jnp.asarray(0),
+        rises=jnp.asarray(False),
+    )
+
+
+def longest_step(system: HybridSystem, horizon=jnp.inf) -> Float[Array, ""]:
+    """The longest step: within the horizon, and of a part of the forcing period."""
+    if system.period is None:
+        return jnp.asarray(horizon, jnp.float64)
+    part = jnp.asarray(system.period, jnp.float64) / _STEPS_PER_PERIOD
+    return jnp.minimum(part, horizon)
+
+
+def step(system: HybridSystem, f: Flight) -> tuple[Flight, Bool[Array, ""]]:
+    """One step, and whether it ends in an impact: the motion is then just before it."""
+
+    rates = flight_rates(system)
+    end, wrong = runge_kutta_step(rates, f.time, f.y, f.length)
+    rate = rates(f.time + f.length, end)
+    # the landing moves with the motion: zero, but for its derivative
+    late = end[-1] / jnp.where(frozen(end[-2]) < 0, end[-2], -jnp.inf)
+    lands = f.lands
+    there = end - late * rate
+    moved, taken = _next(f, *frozen((end, wrong, rate)))
+    return (
+        moved._replace(
+            time=jnp.where(
+                lands,
+                f.time + f.length - late,
+                jnp.where(taken, f.time + f.length, f.time),
+            ),
+            y=jnp.where(lands, there, jnp.where(taken, end, f.y)),
+        ),
+        lands,
+    )
+
+
+def _next(f: Flight, end, wrong, rate) -> tuple[Flight, Bool[Array, ""]]:
+    """What the next step is for, and how long; whether this one is taken."""
+    size = jnp.max(jnp.abs(wrong) / (TOLERANCE * (1 + jnp.abs(end))))
+    fall, rise, gap, pull = frozen(f.y[-2]), end[-2], end[-1], rate[-2]
+    searches, bottoms = f.mode == _SEARCH, f.mode == _BOTTOM
+    good = ~searches | (size <= 1)
+
+    # landing, where a parabola through the end of the step does
+    enters = good & (gap < 0) & (searches | bottoms)
+    landing = enters | (f.mode == _LAND)
+    falls = (rise < 0) & (rise * rise > 2 * pull * gap)
+    root = jnp.sqrt(jnp.where(falls, rise * rise - 2 * pull * gap, 0.0))
+    change = -2 * gap / jnp.where(falls, rise - root, 1.0)
+    low = jnp.where(landing & (gap > 0), f.length, jnp.where(enters, 0.0, f.low))
+    high = jnp.where(landing & (gap <= 0), f.length, f.high)
+    towards = f.length + change
+    falls &= (towards > low) & (towards < high)
+    towards = jnp.where(falls, towards, (low + high) / 2)
+    elapsed = frozen(f.time) + f.length - f.since
+    least = jnp.minimum(elapsed * jnp.abs(pull), jnp.abs(rise))
+    close = landing & falls & (jnp.abs(change * pull) <= _LAST_CHANGE * least)
+
+    # the lowest point of a flight that may have gone below the surface within the step,
+    # between a time at which it falls and one at which it rises
+    dips = searches & good & ~f.rises & (fall < 0) & (rise > 0) & (gap > 0)
+    share = fall / jnp.where(dips, fall - rise, 1.0)
+    low = jnp.where(bottoms & ~enters & (rise < 0), f.length, jnp.where(dips, 0.0, low))
+    high = jnp.where(dips | (bottoms & ~enters & (rise >= 0)), f.length, high)
+    lower = f.length - rise / jnp.where(pull > 0, pull, jnp.inf)
+    between = (pull > 0) & (lower >= low) & (lower <= high)
+    lower = jnp.where(between, lower, (low + high) / 2)
+    lower = jnp.where(dips, f.length * share, lower)
+    lowest = bottoms & ~enters & (f.tries >= _LOWERINGS)
+    seeks = dips | (bottoms & ~enters & ~lowest)
+
+    taken = (searches & good & ~enters & ~dips) | lowest
+    factor = 0.9 * jnp.maximum(size, 1e-12) ** -0.125
+    grown = jnp.minimum(f.length * jnp.clip(factor, 0.2, 2.0), f.longest)
+    grown = jnp.where(lowest, f.longest / 8, grown)
+
+    mode = jnp.where(landing, _LAND, jnp.where(seeks, _BOTTOM, _SEARCH))
+    again = (landing & ~enters) | (seeks & ~dips)
+    return (
+        f._replace(
+            length=jnp.where(landing, towards, jnp.where(seeks, lower, grown)),
+            mode=jnp.where(close, _LAST, mode),
+            low=low,
+            high=high,
+            tries=jnp.where(again, f.tries + 1, 0),
+            rises=jnp.where(taken, lowest, f.rises),
+        ),
+        taken,
+    )

@@ -1,0 +1,220 @@
+"""The parameter value at which complete chattering ends at the release point.
+
+The orbit that sticks once a period starts each turn at release without relative
+velocity, so its interruption is one scalar equation, accumulation = release + period.
+As it stands the equation is not smooth (the difference falls like a power between 1/2
+and 1), so its smooth form is solved, `ChatterOrbit.margin`, by Newton's method inside a
+bracket.
+"""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax.core import Tracer
+from jaxtyping import Array, Bool, Float, Int
+
+from jaxcam import HybridSystem
+from jaxcam.parameters import as_arrays, pick, unit_tangent, Where
+
+from ._chatter_orbit import prepared_orbit
+from ._scalar import check_chatter_system
+
+
+_ITERATIONS = 200
+
+
+class Line(eqx.Module):
+    """A system along one parameter: everything but the parameter, and where it goes.
+
+    A pytree, so one compiled program serves every choice of parameter.
+    """
+
+    base: HybridSystem
+    direction: HybridSystem
+
+    def at(self, value) -> HybridSystem:
+        arrays, rest = eqx.partition(self.base, eqx.is_inexact_array)
+        moved = jax.tree.map(lambda b, d: b + value * d, arrays, self.direction)
+        return eqx.combine(moved, rest)
+
+
+def line(system: HybridSystem, where: Where) -> Line:
+    """The systems that differ from `system` in the parameter that `where` picks."""
+    system = as_arrays(system)
+    picked = pick(where, system)
+    return Line(
+        base=picked.replaced(system, jnp.zeros_like(picked(system))),
+        direction=unit_tangent(picked, system),
+    )
+
+
+class Interruption(eqx.Module):
+    """Where complete chattering ends at the release point."""
+
+    #: the parameter, in its own unit
+    value: Float[Array, ""]
+    #: whether the bracket was closed to rounding
+    converged: Bool[Array, ""]
+    #: margin at the two ends of the bracket, and its slope at `value`
+    ends: Float[Array, "2"]
+    slope: Float[Array, ""]
+    #: evaluations of one turn
+    turns: Int[Array, ""]
+
+
+def interruption_in(
+    system: HybridSystem, where: Where, low, high, periods: int = 1
+) -> Interruption:
+    """The interruption between two values of a parameter; for use inside `jit`.
+
+    Safeguarded Newton on the margin. The value is differentiable forward in every other
+    parameter of the system (implicit function theorem). Nothing is raised: `converged`
+    is false where the margin does not change sign.
+
+    **Arguments:** as in [`variational.chatter_interruption`][].
+    """
+    low, high = jnp.asarray(low, jnp.float64), jnp.asarray(high, jnp.float64)
+    return _solve(line(system, where), low, high, periods=periods)
+
+
+def _margin(along: Line, value, periods: int):
+    """Margin; a turn without impact or chatter counts as interrupted."""
+    orbit = prepared_orbit(along.at(value).prepared(), 0.0, periods)
+    return jnp.where(jnp.isnan(orbit.margin), jnp.inf, orbit.margin)
+
+
+def _slope(along: Line, value, periods: int):
+    """Margin and its derivative by the parameter."""
+
+    def margin(value):
+        return _margin(along, value, periods)
+
+    return jax.jvp(margin, (value,), (jnp.ones_like(value),))
+
+
+@eqx.filter_custom_jvp
+def _solve(along: Line, low, high, *, periods: int) -> Interruption:
+    return _search(along, low, high, periods)
+
+
+@_solve.def_jvp
+def _solve_jvp(primals, tangents, *, periods: int):
+    """Implicit function theorem: margin(value, parameters) stays zero."""
+    along, low, high = primals
+    moved, _, _ = tangents
+    found = _solve(along, low, high, periods=periods)
+    rate = _rate(along, moved, found.value, periods)
+    zeros = jax.tree.map(_no_tangent, found)
+    by_value = jnp.where(found.converged, -rate / found.slope, jnp.nan)
+    return found, eqx.tree_at(lambda f: f.value, zeros, by_value, is_leaf=_is_none)
+
+
+def _is_none(leaf):
+    return leaf is None
+
+
+def _no_tangent(leaf):
+    return jnp.zeros_like(leaf) if eqx.is_inexact_array(leaf) else None
+
+
+@eqx.filter_jit
+def _rate(along: Line, moved: Line, value, periods: int):
+    """Change of the margin at a fixed value of the parameter."""
+    return eqx.filter_jvp(lambda a: _margin(a, value, periods), (along,), (moved,))[1]
+
+
+@eqx.filter_jit
+def _search(along: Line, low, high, periods: int) -> Interruption:
+    """Newton's method, halving where it leaves the bracket or does not converge."""
+
+    def look(carry):
+        points, signs, value, step, ends, _, count, _ = carry
+        margin, slope = _slope(along, value, periods)
+        # the two ends come first
+        at_end = jnp.arange(2) == count
+        ends = jnp.where(at_end, margin, ends)
+        signs = jnp.where(at_end, jnp.sign(margin), signs)
+        inner = count >= 2
+        points = jnp.where(inner & (jnp.sign(margin) == signs), value, points)
+        lower, upper = jnp.min(points), jnp.max(points)
+        newton = value - margin / jnp.where(slope == 0, jnp.nan, slope)
+        good = (newton > lower) & (newton < upper)
+        good &= inner & (jnp.abs(newton - value) < 0.5 * step)
+        moved = jnp.where(good, newton, 0.5 * (lower + upper))
+        size = jnp.abs(moved - value)
+        close = inner & (size <= 2e-16 * jnp.abs(moved))
+        narrow = inner & (upper - lower <= 4e-16 * jnp.abs(upper))
+        hopeless = (count == 1) & ~(signs[0] * signs[1] < 0)
+        stays = close | narrow | hopeless
+        moved = jnp.where(count == 0, points[1], jnp.where(stays, value, moved))
+        step = jnp.where(inner, size, jnp.abs(points[1] - points[0]))
+        return points, signs, moved, step, ends, slope, count + 1, stays
+
+    def unsolved(carry):
+        return ~carry[7] & (carry[6] < _ITERATIONS)
+
+    points, nothing = jnp.stack([low, high]), jnp.full(2, jnp.nan)
+    start = (points, nothing, low, high - low, nothing, jnp.nan * low, 0, False)
+    _, signs, value, _, ends, slope, count, done = jax.lax.while_loop(
+        unsolved, look, jax.tree.map(jnp.asarray, start)
+    )
+    return Interruption(
+        value=value,
+        converged=done & (signs[0] * signs[1] < 0),
+        ends=ends,
+        slope=slope,
+        turns=count,
+    )
+
+
+def chatter_interruption(
+    system: HybridSystem,
+    where: Where,
+    bracket: tuple[float, float],
+    periods: int = 1,
+) -> Float[Array, ""]:
+    """The parameter value at which complete chattering ends at the release point.
+
+    There the impacts of the orbit that sticks once in so many periods accumulate at the
+    very moment of release: on one side it is periodic and sticks, on the other it does
+    not stick then and is followed by lobes of periodic windows and chaos (section 5.4,
+    chapter 6).
+
+    **Arguments:**
+
+    - `system`: two states, one constraint and a period.
+    - `where`: picks the parameter: `lambda system: system.speed`, or `"speed"`.
+    - `bracket`: two values of it, chattering complete at one and interrupted at the
+      other. With several periods, near the interruption: elsewhere contact may come
+      earlier, which counts as interrupted too.
+    - `periods`: of the forcing in one of the orbit.
+
+    **Returns:** the value, in the parameter's unit; differentiable forward in the other
+    parameters.
+
+    **Raises:** `ValueError` where the bracket holds no interruption, as far as the
+    values can be seen.
+    """
+    check_chatter_system(system)
+    low, high = bracket
+    found = interruption_in(system, where, low, high, periods)
+    if not isinstance(found.converged, Tracer):
+        _require(found, low, high)
+    return found.value
+
+
+def _require(found: Interruption, low, high) -> None:
+    if bool(np.all(found.converged)):
+        return
+    ends = np.asarray(found.ends)
+    if np.all(ends < 0):
+        state = "chattering is complete at both ends"
+    elif np.all(ends > 0):
+        state = "chattering is interrupted, or does not occur, at both ends"
+    else:
+        state = "the motion has no release from sticking in it"
+    raise ValueError(
+        f"No interruption of chattering between {float(low):g} and {float(high):g}: "
+        f"{state}. Give a bracket with complete chattering at one end only."
+    )

@@ -1,0 +1,156 @@
+"""The equation of an interruption, cheap enough to follow it in two parameters."""
+
+import functools
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Bool, Float, Int
+
+from jaxcam import HybridSystem
+from jaxcam.hybrid import normal_acceleration
+
+from .._one_jacobian import with_one_jacobian
+from ._chatter_frame import ChatterFrame
+from ._impact_map import rebound_speed
+from ._impact_search import Flight, frozen, leave, longest_step, step
+from ._lambda_map import koenigs
+from ._scalar import one_constraint
+from ._scaling_law import scaling_law
+
+
+_MAX_STEPS = 100_000
+# lambda/(1 - r) below which the rest of the sequence is certain to be complete
+_SMALL = 1e-6
+# what later impacts add to the margin, below which they are left out
+_ENOUGH = 1e-16
+# time from release, over the period, below which rounding decides what comes next
+_NEAR = 1e-12
+
+
+class _Sequence(NamedTuple):
+    """What the impacts so far say."""
+
+    over: Bool[Array, ""]
+    #: number of the period, from 1, whose end is the next release
+    turn: Int[Array, ""]
+    #: time from that release and speed of the impact that the margin is taken from, and
+    #: its number in its period
+    tau: Float[Array, ""]
+    speed: Float[Array, ""]
+    rank: Int[Array, ""]
+    here: Int[Array, ""]
+
+
+def interruption_margin(
+    system: HybridSystem, frame: ChatterFrame, periods: int = 1
+) -> Float[Array, ""]:
+    """Signed distance of an orbit that sticks once in some periods from interruption.
+
+    The margin of [`variational.chatter_accumulation`][], to the same accuracy: zero
+    where the impacts accumulate at the last release, negative where they do before.
+    Impacts so near to that release that they change nothing are left out, and the
+    derivative comes with one run along the motion, whatever the number of directions.
+
+    **Arguments:** a system with two states, one constraint and a period, already
+    `prepared`; its release; `periods` from there to the last release. Pure; may be
+    compiled, batched and differentiated forward, once.
+
+    **Returns:** NaN for a last period without impact, or where contact comes earlier.
+
+    **Raises:** `ValueError` where it is differentiated twice.
+    """
+    return _margin(system, frame, periods=periods)
+
+
+@jax.custom_jvp
+def _last(slope):
+    """The slope itself, which has no derivative: landings are right to first order."""
+    return slope
+
+
+@_last.defjvp
+def _last_jvp(primals, tangents):
+    del primals, tangents
+    raise ValueError(
+        "interruption_margin can be differentiated once only; for second derivatives "
+        "differentiate variational.chatter_accumulation(...).margin, or take "
+        "differences of first ones"
+    )
+
+
+@functools.partial(with_one_jacobian, finish=_last)
+def _margin(system, frame: ChatterFrame, *, periods: int) -> Float[Array, ""]:
+    """The margin, from the motion that leaves the release."""
+    period = jnp.asarray(system.period, jnp.float64)
+
+    def look(carry):
+        flight, said, count = carry
+        flight, lands = step(system, flight)
+        flight, said = jax.lax.cond(
+            lands,
+            lambda f, s: (
+                f := _bounced(system, f),
+                _heard(system, frame, periods, s, f),
+            ),
+            lambda f, s: (f, s),
+            flight,
+            said,
+        )
+        return flight, said, count + 1
+
+    def goes_on(carry):
+        flight, said, count = carry
+        # a flight that misses the wall near release may come back a turn later
+        waits = flight.time - flight.since < 2 * period
+        return ~said.over & waits & (count < _MAX_STEPS)
+
+    zero, none = jnp.zeros(()), jnp.asarray(0)
+    silence = _Sequence(jnp.asarray(False), none + 1, -period, zero, none - 1, none)
+    flight = leave(system, frame.release, frame.state, zero, longest_step(system))
+    start = (flight, silence, none)
+    said = jax.lax.while_loop(goes_on, look, start)[1]
+    known = said.rank >= 0
+    lam = said.speed / (frame.jerk * said.tau * said.tau)
+    law = scaling_law(frame.restitution)
+    power = jnp.exp(said.rank.astype(jnp.float64) * jnp.log(law.q))
+    margin = koenigs(lam, law.lambda_bar, frame.restitution, law.q) * power
+    return jnp.where(known, margin, jnp.nan)
+
+
+def _heard(system, frame, periods: int, s: _Sequence, f: Flight) -> _Sequence:
+    """What the impact says that the flight has just left."""
+    period = jnp.asarray(system.period, jnp.float64)
+    law = scaling_law(frozen(frame.restitution))
+    since, speed = f.time - frame.release, f.y[-2]
+    passed = jnp.floor(frozen(since / period)).astype(s.turn.dtype)
+    turn = jnp.clip(passed + 1, s.turn, periods)
+    tau = since - turn.astype(jnp.float64) * period
+    early = tau < -_NEAR * period
+    safe = jnp.where(early, tau, -period)
+    lam = speed / (frame.jerk * safe * safe)
+    push = normal_acceleration(system, f.time, f.y[:-2])[0]
+    small = _SMALL * (1 - frame.restitution) * push * push
+    settled = early & (push < 0) & (speed * frame.jerk <= small)
+    new, last = turn > s.turn, turn == periods
+    rank, here = jnp.where(new, -1, s.rank), jnp.where(new, 0, s.here)
+    # the last impact before release that is not far below lambda_bar
+    takes = early & last & ((lam >= law.lambda_bar / 2) | (rank < 0))
+    # terms of order q^k tau_k are what later impacts could still change
+    rest = jnp.exp(here.astype(jnp.float64) * jnp.log(law.q)) * jnp.abs(tau)
+    return _Sequence(
+        over=settled | (last & (~early | (rest <= _ENOUGH * period))),
+        turn=turn,
+        tau=jnp.where(takes, tau, s.tau),
+        speed=jnp.where(takes, speed, s.speed),
+        rank=jnp.where(takes, here, rank),
+        here=here + 1,
+    )
+
+
+def _bounced(system: HybridSystem, f: Flight) -> Flight:
+    """Just after the impact that the motion is just before."""
+    x, approach = f.y[:-2], f.y[-2]
+    after = one_constraint(system.impact(f.time, x), 1)
+    speed = rebound_speed(system, f.time, x, approach)
+    return leave(system, f.time, after, speed, f.longest)

@@ -1,0 +1,93 @@
+"""The map of low-velocity impacts close to release, in its own coordinate.
+
+Close to the release point of sticking the relative acceleration is c tau, with tau the
+time from release and c the jerk there. An impact at tau < 0 that leaves with speed v
+has lambda = v / (c tau^2); the next one is at h(lambda) tau with f(lambda). (6.28)-
+(6.37)
+"""
+
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from jaxcam.hybrid.lowering import while_loop
+
+
+#: above it the motion does not return (6.47); above 1/3 it does so after release
+LAMBDA_MAX = 3 / 8
+
+
+def _root(lam):
+    """s = sqrt(1 - 8 lambda / 3), NaN where there is no next impact. (6.32)"""
+    return jnp.sqrt(1 - 8 * lam / 3)
+
+
+def hop_ratio(lam) -> Float[Array, "..."]:
+    """h(lambda): time from release at the next impact, over that at this one. (6.33)
+
+    **Arguments:** `lam`, dimensionless, any shape, between 0 and 3/8.
+
+    **Returns:** h, between 1 and -1/2; negative where the next impact comes after
+    release; NaN above 3/8, where there is none.
+    """
+    return (3 * _root(lam) - 1) / 2
+
+
+def lambda_map(lam, r) -> Float[Array, "..."]:
+    """f(lambda): the coordinate of the next impact. (6.36), (6.89)
+
+    **Arguments:**
+
+    - `lam`: dimensionless, any shape, between 0 and 3/8.
+    - `r`: coefficient of restitution of slow impacts, broadcast against `lam`.
+
+    **Returns:** f, with a pole at 1/3 where the next impact falls on release; NaN above
+    3/8, where the motion does not return.
+    """
+    s = _root(lam)
+    # 3 s (1 - s) = 8 lambda s / (1 + s) keeps all digits of a small lambda
+    return 8 * r * lam * s / ((1 + s) * (3 * s - 1) ** 2)
+
+
+def lambda_inverse(lam, r) -> Float[Array, "..."]:
+    """The impact before, at lambda in [0, 1/3): f(lambda_inverse(lam, r)) = lam.
+
+    **Arguments:** `lam` >= 0, dimensionless; `r`, coefficient of restitution.
+    """
+    lam = jnp.asarray(lam)
+    root = jnp.sqrt(9 * r * r + 24 * r * lam)
+    s = (6 * lam + 3 * r + root) / (18 * lam + 6 * r)
+    # 1 - s without cancellation
+    return 3 * lam * (1 + s) / (12 * lam + 3 * r + root)
+
+
+def koenigs(lam, lambda_bar, r, q) -> Float[Array, ""]:
+    """Coordinate in which the lambda-map is multiplication: K(f(lambda)) = K(lambda)/q.
+
+    The limit of (f^-n(lambda) - lambda_bar) q^-n: zero at lambda_bar, with slope one;
+    negative where chattering completes before release, positive where it does not.
+
+    **Arguments:** scalars; `lam` >= 0; `lambda_bar` and `q` as in
+    [`variational.scaling_law`][].
+    """
+    bar_root = jnp.sqrt(9 * r * r + 24 * r * lambda_bar)
+    bar_top = 6 * lambda_bar + 3 * r + bar_root
+    bar_bottom = 18 * lambda_bar + 6 * r
+    bar_s = bar_top / bar_bottom
+
+    def back(carry):
+        deviation, scaled, count = carry
+        # f^-1 of lambda_bar + deviation less lambda_bar, without cancellation
+        lam = lambda_bar + deviation
+        root = jnp.sqrt(9 * r * r + 24 * r * lam)
+        bottom = 18 * lam + 6 * r
+        slope = bar_bottom * (6 + 24 * r / (root + bar_root)) - 18 * bar_top
+        slope = slope / (bottom * bar_bottom)
+        s = (6 * lam + 3 * r + root) / bottom
+        ratio = -3 / 8 * slope * (s + bar_s)
+        return deviation * ratio, scaled * (ratio / q), count + 1
+
+    def unsettled(carry):
+        return (jnp.abs(carry[0]) > 1e-17) & (carry[2] < 4000)
+
+    start = jnp.asarray(lam, jnp.float64) - lambda_bar
+    return while_loop(unsettled, back, (start, start, 0))[1]

@@ -1,0 +1,68 @@
+"""The same motion with time running backwards."""
+
+from typing import ClassVar
+
+import jax
+import jax.numpy as jnp
+
+from jaxcam import HybridSystem
+from jaxcam.hybrid import normal_velocity
+from jaxcam.hybrid.surface import normal_directions
+
+from ._scalar import one_constraint
+
+
+_NEWTON = 8
+
+
+class Reversed(HybridSystem):
+    """A system whose motion at time t is that of `forward` at -t.
+
+    Its impacts undo those of `forward`: the speed is divided by the restitution. For
+    one constraint, and restitution above zero.
+    """
+
+    active: ClassVar[bool] = True
+
+    forward: HybridSystem
+
+    def prepared(self) -> "Reversed":
+        """The same motion, cheaper to evaluate."""
+        return Reversed(self.forward.prepared())
+
+    def check(self) -> None:
+        """Raise `ValueError` where a parameter of `forward` has no meaning."""
+        self.forward.check()
+
+    def vector_field(self, t, state) -> jax.Array:
+        """Minus the field of `forward`."""
+        return -self.forward.vector_field(-jnp.asarray(t), state)
+
+    def gap(self, t, state) -> jax.Array:
+        """The gap of `forward`."""
+        return self.forward.gap(-jnp.asarray(t), state)
+
+    def impact(self, t, state) -> jax.Array:
+        """The state from which an impact of `forward` leads to `state`."""
+        time = -jnp.asarray(t)
+        direction = normal_directions(self.forward, time, state)[0]
+
+        def rebound(v):
+            before = rest + v * direction
+            after = one_constraint(self.forward.impact(time, before), 1)
+            return normal_velocity(self.forward, time, after)[0]
+
+        wanted = normal_velocity(self.forward, time, state)[0]
+        rest = state - wanted * direction
+
+        def newton(_, v):
+            value, slope = jax.jvp(rebound, (v,), (jnp.ones_like(v),))
+            return v - (value - wanted) / slope
+
+        before = jax.lax.fori_loop(0, _NEWTON, newton, -wanted)
+        return rest + before * direction
+
+    @property
+    def period(self):
+        """Period of the forcing."""
+        return self.forward.period

@@ -1,0 +1,24 @@
+"""Systems of one constraint may state its gap as a scalar or as a vector of one."""
+
+import jax.numpy as jnp
+
+from jaxcam import HybridSystem
+
+
+def one_constraint(value, ndim: int):
+    """`value` without the axis of constraints, if it has one."""
+    return jnp.reshape(value, value.shape[-ndim:] if ndim else ())
+
+
+def check_chatter_system(system: HybridSystem) -> None:
+    """Raise `ValueError` where the theory of chattering needs a period."""
+    if system.period is None:
+        raise ValueError(
+            "this system has no forcing period; chattering that ends at a release "
+            "needs one"
+        )
+
+
+def gap_of(system: HybridSystem, time, state):
+    """The gap of a system with one constraint, a scalar."""
+    return one_constraint(system.gap(time, state), 0)

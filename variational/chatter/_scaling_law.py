@@ -1,0 +1,62 @@
+"""Scales of the lobes that appear where complete chattering is interrupted."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax.core import Tracer
+from jaxtyping import Array, Float
+
+
+class ScalingLaw(eqx.Module):
+    """Fixed point of the lambda-map and the scales that follow from it."""
+
+    #: fixed point: impacts with this lambda accumulate exactly at release (6.45)
+    lambda_bar: Float[Array, "..."]
+    #: h(lambda_bar): each impact is closer to release by this factor
+    p: Float[Array, "..."]
+    #: 1 / f'(lambda_bar): each lobe is closer to lambda_bar by this factor (6.49)
+    q: Float[Array, "..."]
+    #: exponent of the envelope |beta| <= |lambda - lambda_bar|^kappa (6.53)
+    kappa: Float[Array, "..."]
+
+
+def scaling_law(r) -> ScalingLaw:
+    """Scales p and q and exponent kappa at the interruption of complete chattering.
+
+    With s = sqrt(1 - 8 lambda / 3) the fixed point of (6.36) is a root of
+    9 s^3 + 3 s^2 - (5 + 8 r) s + 1 in (1/3, 1); the other positive root has p < 0: it
+    stands for an impact after release and is not a fixed point of a motion. Then
+    p = (3 s - 1)/2 and 1/q = (1 + s)^2/(4 s^2 p).
+
+    **Arguments:** `r`, coefficient of restitution of slow impacts, any shape.
+
+    **Returns:** a [`variational.chatter.ScalingLaw`][], dimensionless, in the shape of
+    `r`.
+
+    **Raises:** `ValueError` for r outside (0, 1), where it can be seen.
+    """
+    if not isinstance(r, Tracer):
+        values = np.asarray(r)
+        if not np.all((values > 0) & (values < 1)):
+            raise ValueError(
+                f"r is {r}; give a coefficient of restitution between 0 and 1, both "
+                "excluded: without rebound, or without loss, nothing accumulates"
+            )
+    r = jnp.asarray(r, dtype=jnp.float64)
+
+    def newton(_, s):
+        value = ((9 * s + 3) * s - (5 + 8 * r)) * s + 1
+        slope = (27 * s + 6) * s - (5 + 8 * r)
+        return s - value / slope
+
+    # the cubic is convex here: from s = 1 Newton descends onto the largest root
+    s = jax.lax.fori_loop(0, 64, newton, jnp.ones_like(r))
+    p = (3 * s - 1) / 2
+    q = 4 * s * s * p / ((1 + s) * (1 + s))
+    return ScalingLaw(
+        lambda_bar=3 * (1 - s) * (1 + s) / 8,
+        p=p,
+        q=q,
+        kappa=2 * jnp.log(p) / jnp.log(q),
+    )

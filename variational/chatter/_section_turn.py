@@ -1,0 +1,201 @@
+"""From a section to the next, impact by impact, through chattering and sticking."""
+
+from typing import NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, ArrayLike, Bool, Float, Int
+
+from jaxcam import HybridSystem
+from jaxcam.hybrid import normal_velocity
+from jaxcam.hybrid.lowering import while_loop
+from jaxcam.parameters import as_arrays
+
+from ._chatter_frame import ChatterFrame, prepared_frame
+from ._free_flight import fly
+from ._impact_map import ImpactPoint, next_impact
+from ._scalar import check_chatter_system, gap_of
+
+
+_IMPACTS = 2000
+# what is left of a complete sequence then moves the next turn by less than rounding
+_SMALL = 1e-12
+
+
+class Section(eqx.Module):
+    """Arrival at a section."""
+
+    #: (n,) state; gap and normal velocity there, known better than the state's own
+    state: Float[Array, "... n"]
+    gap: Float[Array, "..."]
+    velocity: Float[Array, "..."]
+    #: impacts on the way; of a complete sequence those before it became negligible
+    impacts: Int[Array, "..."]
+    #: whether the motion stuck on the way
+    stuck: Bool[Array, "..."]
+
+
+class _Run(NamedTuple):
+    time: Float[Array, ""]
+    state: Float[Array, " n"]
+    speed: Float[Array, ""]
+    height: Float[Array, ""]
+    count: Int[Array, ""]
+    arrived: Bool[Array, ""]
+    stuck: Bool[Array, ""]
+
+
+def to_section(
+    system: HybridSystem,
+    frame: ChatterFrame,
+    start: ImpactPoint,
+    section,
+    height: ArrayLike = 0.0,
+) -> Section:
+    """Follow a motion, impact by impact, to the time `section`.
+
+    A sequence that becomes negligible before release has completed: the motion goes on
+    from the release point of `frame`.
+
+    **Arguments:** `system`, already `prepared`; `frame`, whose release lies between the
+    start and the section; `start`, of which time, state and speed are used; `section`,
+    a time; `height`, the gap at the start, > 0 in flight.
+
+    **Returns:** a [`variational.Section`][].
+    """
+    section = jnp.asarray(section, jnp.float64)
+
+    def goes_on(run):
+        return ~run.arrived & ~run.stuck & (run.count < _IMPACTS)
+
+    def hop(run):
+        left = section - run.time
+        point = next_impact(system, run.time, run.state, run.speed, left, run.height)
+        hit = point.found & (point.time < section)
+        tau = point.time - frame.release
+        early = tau < 0
+        lam = point.speed / (frame.jerk * jnp.where(early, tau * tau, 1.0))
+        stuck = hit & early & (lam < _SMALL * (1 - frame.restitution))
+        return _Run(
+            time=jnp.where(hit, point.time, run.time),
+            state=jnp.where(hit, point.state, run.state),
+            speed=jnp.where(hit, point.speed, run.speed),
+            height=jnp.where(hit, 0.0, run.height),
+            count=run.count + hit.astype(run.count.dtype),
+            arrived=~hit,
+            stuck=stuck,
+        )
+
+    run = _Run(
+        time=jnp.asarray(start.time, jnp.float64),
+        state=start.state,
+        speed=jnp.asarray(start.speed, jnp.float64),
+        height=jnp.asarray(height, jnp.float64),
+        count=jnp.asarray(0),
+        arrived=jnp.asarray(False),
+        stuck=jnp.asarray(False),
+    )
+    run = while_loop(goes_on, hop, run)
+    time = jnp.where(run.stuck, frame.release, run.time)
+    from_state = jnp.where(run.stuck, frame.state, run.state)
+    speed = jnp.where(run.stuck, 0.0, run.speed)
+    height = jnp.where(run.stuck, 0.0, run.height)
+    state, gap, velocity = fly(system, time, from_state, speed, section - time, height)
+    return Section(state, gap, velocity, run.count, run.stuck)
+
+
+def section_turn(system: HybridSystem, state, phase=0.0) -> Section:
+    """The stroboscopic map through chattering: state at a phase to that a turn later.
+
+    Exact to rounding however many and however low the impacts, unlike a simulation
+    that completes chattering near its interruption. (5.1)
+
+    **Arguments:** a system with two states, one constraint and a period; `state`, shape
+    `(2,)`, in flight at time `phase` x period. Pure; may be compiled, batched and
+    differentiated forward.
+
+    **Returns:** a [`variational.Section`][].
+    """
+    check_chatter_system(system)
+    return _turn(as_arrays(system), jnp.asarray(state, jnp.float64), phase)
+
+
+@eqx.filter_jit
+def _turn(system, state, phase) -> Section:
+    system = system.prepared()
+    time = jnp.asarray(phase * system.period, jnp.float64)
+    frame = prepared_frame(system, time)
+    start, height = in_flight(system, time, state)
+    return to_section(system, frame, start, time + system.period, height)
+
+
+def in_flight(system, time, state):
+    """A state off the surface as the start of a flight, and its gap."""
+    state = jnp.asarray(state, jnp.float64)
+    speed = normal_velocity(system, time, state)[0]
+    yes = jnp.asarray(True)
+    return ImpactPoint(time, state, speed, speed, yes), gap_of(system, time, state)
+
+
+def release_impacts(system: HybridSystem, count: int, time=0.0) -> ImpactPoint:
+    """The first `count` impacts of the orbit that starts at release.
+
+    **Returns:** a [`variational.chatter.ImpactPoint`][] with a leading axis of impacts;
+    its times are those of the turn that starts at the release of `chatter_frame(system,
+    time)`, and `found` is false from the first flight on that does not return.
+    """
+    check_chatter_system(system)
+    return _from_release(as_arrays(system), count, jnp.asarray(time, jnp.float64))
+
+
+@eqx.filter_jit
+def _from_release(system, count, time) -> ImpactPoint:
+    system = system.prepared()
+    frame = prepared_frame(system, time)
+    return _following(system, frame.release, frame.state, jnp.zeros(()), 0.0, count)
+
+
+def _following(system, time, state, speed, height, count) -> ImpactPoint:
+    def hop(carry, _):
+        point, height = carry
+        after = next_impact(
+            system, point.time, point.state, point.speed, system.period, height
+        )
+        after = eqx.tree_at(lambda p: p.found, after, after.found & point.found)
+        return (after, jnp.zeros(())), after
+
+    start = ImpactPoint(time, state, speed, -speed, jnp.asarray(True))
+    carry = (start, jnp.asarray(height, jnp.float64))
+    return jax.lax.scan(hop, carry, length=count)[1]
+
+
+def impact_after(system, time, state, speed, height, rank) -> ImpactPoint:
+    """Impact number `rank`, from 0, after a start on or off the surface.
+
+    `rank` may be an array: one program serves all.
+    """
+    start = ImpactPoint(time, state, speed, -speed, jnp.asarray(True))
+
+    def hop(_, carry):
+        point, height = carry
+        after = next_impact(
+            system, point.time, point.state, point.speed, system.period, height
+        )
+        after = eqx.tree_at(lambda p: p.found, after, after.found & point.found)
+        return after, jnp.zeros(())
+
+    carry = (start, jnp.asarray(height, jnp.float64))
+    return jax.lax.fori_loop(0, jnp.asarray(rank) + 1, hop, carry)[0]
+
+
+def section_to_impact(system: HybridSystem, state, phase, rank) -> ImpactPoint:
+    """Theta: from a state at a section to an impact after it. (6.105)
+
+    **Arguments:** as in [`variational.section_turn`][]; `rank`, 0 for the first impact.
+    """
+    check_chatter_system(system)
+    system = as_arrays(system).prepared()
+    time = jnp.asarray(phase * system.period, jnp.float64)
+    start, height = in_flight(system, time, state)
+    return impact_after(system, time, start.state, start.speed, height, rank)

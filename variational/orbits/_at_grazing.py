@@ -1,0 +1,38 @@
+"""Multipliers of an orbit at a grazing, as limits from the side of the impact."""
+
+from typing import Any
+
+import numpy as np
+from jaxtyping import Complex, Float
+
+
+def multipliers_at_grazing(
+    regular: Float[np.ndarray, "n n"], singular: Float[np.ndarray, "n n"]
+) -> Complex[np.ndarray, " n"]:
+    """Eigenvalues of regular + singular / speed as the speed tends to zero from below.
+
+    Next to a grazing the monodromy matrix is of this form, its second part of rank one,
+    b c' (saltation_parts, times the flights and the other impacts). One multiplier
+    grows like c'b / speed; the others tend to the eigenvalues of the first part on the
+    plane c'x = 0, projected onto it along b.
+
+    **Arguments:** both parts, shape `(n, n)`; the speed is the normal velocity before
+    the impact, below zero.
+
+    **Returns:** shape `(n,)`: plus or minus infinity and the n - 1 limits, the largest
+    modulus first; all NaN where c'b = 0, so that the growth is of another order.
+    """
+    n = regular.shape[0]
+    unknown = np.full(n, np.nan, complex)
+    if not (np.all(np.isfinite(regular)) and np.all(np.isfinite(singular))):
+        return unknown
+    _, sizes, right = np.linalg.svd(singular)
+    growth = float(np.trace(singular))
+    # what is left of a growth that cancels
+    if not abs(growth) > 1e-9 * sizes[0]:
+        return unknown
+    plane = right[1:].T
+    along = np.eye(n) - singular / growth
+    others: Any = np.linalg.eigvals(plane.T @ along @ regular @ plane).astype(complex)
+    others = others[np.lexsort((others.imag, others.real, -np.abs(others)))]
+    return np.concatenate([[complex(-np.sign(growth) * np.inf, 0.0)], others])

@@ -1,0 +1,63 @@
+"""A state that is just before or just after an impact."""
+
+from typing import NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jaxcam.hybrid import HybridSystem, normal_acceleration, normal_velocity
+from jaxcam.hybrid.surface import gaps, impacts
+
+
+class Start(NamedTuple):
+    """The impact that an orbit starts at."""
+
+    constraint: int
+    #: (n,) state just after it
+    after: np.ndarray
+    #: s, within which an impact of the same constraint is the same one
+    window: float
+
+
+def start_at_impact(system: HybridSystem, t, state) -> Start | None:
+    """The impact at `state`, or nothing where no constraint is touched with a speed."""
+    # as an array: a number would be compiled in
+    t = jnp.asarray(t, dtype=jnp.float64)
+    gap, speed, fall, after = map(np.asarray, _look(system, t, state))
+    tiny = 1e-12 * (1 + float(np.max(np.abs(state))))
+    touching = np.flatnonzero((np.abs(gap) <= tiny) & (np.abs(speed) > tiny))
+    if not len(touching):
+        return None
+    side = int(touching[0])
+    state = np.asarray(state)
+    pulled = float(np.abs(fall[side]))
+    slow = abs(float(speed[side]))
+    window = slow / pulled if pulled > 0 else np.inf
+    return Start(side, state if speed[side] > 0 else after[side], window)
+
+
+@eqx.filter_jit
+def _look(system, t, state):
+    return (
+        gaps(system, t, state),
+        normal_velocity(system, t, state),
+        normal_acceleration(system, t, state),
+        impacts(system, t, state),
+    )
+
+
+@eqx.filter_jit
+def after_and_speeds(system, time, before, sides):
+    """States after impacts, and normal velocities before and after."""
+
+    def one(t, x, side):
+        after = impacts(system, t, x)[side]
+        return (
+            after,
+            normal_velocity(system, t, x)[side],
+            normal_velocity(system, t, after)[side],
+        )
+
+    return jax.vmap(one)(jnp.asarray(time), jnp.asarray(before), jnp.asarray(sides))

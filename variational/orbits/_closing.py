@@ -1,0 +1,111 @@
+"""The impacts of a periodic orbit, as accurate as the parameters allow.
+
+A run that looks for its impacts loses digits where they are slow: an error d of the
+position changes an impact speed v by about a d / v. As the solution of the shooting
+equations the impacts are as well conditioned as the orbit itself, whatever their speed.
+"""
+
+from typing import NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float, Int
+
+from jaxcam.hybrid import HybridSystem
+
+from .._flight import fly
+from ._links import landed, matrix_of
+
+
+# of Newton's method, which starts from a run that has almost closed
+_STEPS = 4
+
+
+class Knots(NamedTuple):
+    """The impacts of a turn in order, and how well flights join them."""
+
+    #: (k, 1 + n) time (s) and state just after
+    rows: Float[np.ndarray, "k 1+n"]
+    #: (k, n) state just before
+    before: Float[np.ndarray, "k n"]
+    #: largest miss of a flight before the first step
+    miss: float
+
+
+def close(
+    system: HybridSystem,
+    rows: Float[np.ndarray, "k 1+n"],
+    sides: Int[np.ndarray, " k"],
+    period,
+) -> Knots:
+    """Improve the impacts of an orbit without contact; unchanged where that fails.
+
+    The states before impacts are those on arrival of the flights.
+
+    By flights of adaptive steps, so that the number of impacts is all that programs
+    differ by, filled up to a power of two.
+    """
+    number = len(rows)
+    length = 1
+    while length < number:
+        length *= 2
+    fill = np.minimum(np.arange(length), number - 1)
+    real = np.arange(length) < number
+    following = np.where(real, (np.arange(length) + 1) % number, np.arange(length))
+    # as an array: a number would be compiled in
+    span = np.asarray(period, dtype=float)
+    made = _newton(system, rows[fill], sides[fill], real, following, span)
+    improved, arrived, misses = map(np.asarray, made)
+    first, last = map(float, misses)
+    better = np.isfinite(last) and last <= first
+    # the flight of row k ends in impact k + 1
+    before = np.roll(arrived[int(better), :number], 1, axis=0)
+    return Knots(improved[:number] if better else rows, before, first)
+
+
+@eqx.filter_jit
+def _newton(system, rows, sides, real, following, period):
+    system = system.prepared()
+    # the last real row is followed by the first one, a period later
+    wraps = jnp.where(real & (following <= jnp.arange(len(rows))), period, 0.0)
+
+    def one(start, end, which, is_real):
+        time = jnp.where(is_real, end, start[0])
+        flight = fly(
+            lambda _, t, x: system.vector_field(t, x),
+            jnp.zeros(0),
+            start[0],
+            start[1:],
+            time,
+        )
+        found = landed(system, start, time, which, flight.state, flight.matrix)
+        return found, flight.state
+
+    def linear(rows):
+        later = rows[following]
+        ends = later[:, 0] + wraps
+        links, before = jax.vmap(one)(rows, ends, sides[following], real)
+        missed = later[:, 1:] - links.value[:, 1:]
+        miss = jnp.concatenate([links.value[:, :1], missed], axis=1)
+        return links, before, jnp.where(real[:, None], miss, 0.0)
+
+    def newton(_, rows):
+        links, _, miss = linear(rows)
+        matrix = matrix_of(links, following, real=real)
+        if system.period is None:
+            # any shift in time solves it: the smallest change is taken
+            step = jnp.linalg.lstsq(matrix, miss.ravel())[0]
+        else:
+            step = jnp.linalg.solve(matrix, miss.ravel())
+        return rows - step.reshape(rows.shape)
+
+    def judged(rows):
+        _, before, miss = linear(rows)
+        return before, jnp.max(jnp.abs(miss))
+
+    rows = jnp.asarray(rows)
+    better = jax.lax.fori_loop(0, _STEPS, newton, rows)
+    before, misses = jax.lax.map(judged, jnp.stack([rows, better]))
+    return better, before, misses

@@ -1,0 +1,42 @@
+"""One free flight of known length, compiled lean, with a derivative that is cheap.
+
+The event loop finds out when a flight ends; here its duration is an unknown of the
+equations, so that a fixed number of Runge-Kutta steps suffices and the end depends
+smoothly on everything, also where the flight grazes or passes through a constraint.
+"""
+
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from jaxcam.hybrid import HybridSystem
+from jaxcam.hybrid.runge_kutta import DOPRI8, fixed_steps
+
+from .._one_jacobian import with_one_jacobian
+
+
+def flight_nodes(
+    system: HybridSystem, t0, x0: Float[Array, " n"], t1, steps: int
+) -> tuple[Float[Array, " steps"], Float[Array, "steps n"], Float[Array, ""]]:
+    """Free flight from `x0` at `t0` to `t1` (s) in equal steps of order eight.
+
+    **Returns:** the times and states at the ends of the steps, and the sum of the
+    error estimates, relative to 1 + |x|.
+    """
+    field = system.prepared().vector_field
+    times, states, errors = fixed_steps(DOPRI8, field, t0, x0, t1, steps)
+    wrong = jnp.max(jnp.abs(errors) / (1.0 + jnp.abs(states)), axis=1)
+    return times, states, jnp.sum(wrong)
+
+
+def flight_end(system: HybridSystem, t0, x0, t1, *, steps: int) -> Float[Array, " n"]:
+    """State at `t1` (s) after free flight from `x0` at `t0`.
+
+    Its forward derivative is one small Jacobian a flight, whatever the number of
+    directions asked for. Can be differentiated again.
+    """
+    return _end(system, t0, x0, t1, steps=steps)
+
+
+@with_one_jacobian
+def _end(system, t0, x0, t1, *, steps):
+    return flight_nodes(system, t0, x0, t1, steps)[1][-1]

@@ -1,0 +1,274 @@
+"""Flights with the impacts that end them, and all derivatives that follow from them.
+
+One Jacobian of each flight, by the state at its start, gives the matrix of the shooting
+equations, the derivative of one impact by another, and the monodromy matrix, also as a
+regular part and one that grows where an impact becomes a graze.
+"""
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float, Int
+
+from jaxcam.hybrid import HybridSystem
+from jaxcam.hybrid.surface import gaps, impacts
+
+from ._flight import flight_nodes
+from ._shooting import Shooting
+
+
+# evaluations of Newton's method for a landing time that is known to a part in a hundred
+_EVALUATIONS = 5
+
+
+class Link(NamedTuple):
+    """A flight and the impact at its end: gap there, state after it, derivatives."""
+
+    #: (1 + n,) gap on arrival, and the state that the impact leaves
+    value: Float[Array, " 1+n"]
+    #: (1 + n, 1 + n) by time (s) and state at the start
+    by_start: Float[Array, "1+n 1+n"]
+    #: (1 + n,) by the time of arrival (s)
+    by_end: Float[Array, " 1+n"]
+    #: (n,) field after the impact
+    field: Float[Array, " n"]
+
+    @property
+    def by_impact(self) -> Float[Array, "1+n 1+n"]:
+        """Derivative of time and state of the impact by those at the start."""
+        sooner = -self.by_start[0] / self.by_end[0]
+        moved = self.by_start[1:] + jnp.outer(self.by_end[1:], sooner)
+        return jnp.concatenate([sooner[None], moved])
+
+    @property
+    def parts(self) -> tuple[Float[Array, "n n"], Float[Array, "n n"], Array]:
+        """Derivative of the state by that at the start, both at times of their own, as
+        regular + singular / speed; the speed is the normal velocity on arrival."""
+        left = jnp.outer(self.field - self.by_end[1:], self.by_start[0, 1:])
+        return self.by_start[1:, 1:], left, self.by_end[0]
+
+
+def landed(
+    system: HybridSystem, start, time, which, before, by_state: Float[Array, "n n"]
+) -> Link:
+    """The link of a flight from a row (time, state), whose end and derivative by the
+    state are known."""
+
+    def arrive(t, x):
+        return jnp.append(gaps(system, t, x)[which], impacts(system, t, x)[which])
+
+    value = arrive(time, before)
+    by_time, by_before = jax.jacfwd(arrive, argnums=(0, 1))(time, before)
+    by_x = by_before @ by_state
+    # a later start at the same state is the same flight, begun from further back
+    by_t = -by_x @ system.vector_field(start[0], start[1:])
+    return Link(
+        value,
+        jnp.concatenate([by_t[:, None], by_x], axis=1),
+        by_time + by_before @ system.vector_field(time, before),
+        system.vector_field(time, value[1:]),
+    )
+
+
+def link(system: HybridSystem, start, time, which, steps: int) -> Link:
+    """The flight from a row (time, state) to `time` (s), and the impact there."""
+
+    def flown(x):
+        before = flight_nodes(system, start[0], x, time, steps)[1][-1]
+        return before, before
+
+    by_state, before = jax.jacfwd(flown, has_aux=True)(start[1:])
+    return landed(system, start, time, which, before, by_state)
+
+
+def matrix_of(links: Link, following, sign: Any = 1.0, real: Any = True):
+    """Derivative of all equations (gap, next state - state left) by all rows.
+
+    **Arguments:** links `(m, ...)`; the index of the row after each; factors of the
+    entries by that row; which rows are real, others having the identity.
+
+    **Returns:** shape `(m (1 + n), m (1 + n))`, times in s.
+    """
+    m, size = links.value.shape
+    first = jnp.zeros(size).at[0].set(1.0)
+    keeps = jnp.diag(1.0 - first)
+    flip = jnp.diag(2 * first - 1.0)
+
+    def blocks(link, sign, real):
+        later = sign * keeps.at[:, 0].add(flip @ link.by_end)
+        own = jnp.where(real, flip @ link.by_start, jnp.eye(size))
+        return own, jnp.where(real, later, 0.0)
+
+    each = (jnp.broadcast_to(jnp.asarray(value), (m,)) for value in (sign, real))
+    own, later = jax.vmap(blocks)(links, *each)
+    k = jnp.arange(m)
+    whole = jnp.zeros((m, m, size, size)).at[k, k].add(own)
+    whole = whole.at[k, following].add(later)
+    return whole.transpose(0, 2, 1, 3).reshape(m * size, m * size)
+
+
+def links_of(shooting: Shooting, u, system: HybridSystem) -> Link:
+    """The links of an orbit, `(m, ...)`."""
+    starts, ends = shooting.flights(u, system)
+    return jax.vmap(lambda a, b, which: link(system, a, b, which, shooting.steps))(
+        starts, ends, shooting.hit()
+    )
+
+
+def product_of_links(
+    links: Link, number: Int[Array, ""] | None = None
+) -> tuple[Float[Array, "n n"], Float[Array, "n n"]]:
+    """The monodromy matrix, of the state just after the first impact.
+
+    With `number` as two matrices, regular + singular / approach speed of that impact;
+    both are bounded where it is a grazing.
+    """
+    regular, singular, speed = jax.vmap(lambda one: one.parts)(links)
+    whole = jax.vmap(lambda a, b, v: a + b / v)(regular, singular, speed)
+    m = whole.shape[0]
+    first, second = jnp.eye(whole.shape[1]), jnp.zeros(whole.shape[1:])
+    for k in range(m):
+        # the flight of row k ends in impact k + 1
+        mine = False if number is None else (k + 1) % m == number
+        second = jnp.where(mine, singular[k] @ first, whole[k] @ second)
+        first = jnp.where(mine, regular[k] @ first, whole[k] @ first)
+    return first, second
+
+
+def monodromy_of(shooting: Shooting, u, system: HybridSystem) -> Float[Array, "n n"]:
+    """Derivative of the state one period after the first impact by that there."""
+    return product_of_links(links_of(shooting, u, system))[0]
+
+
+def antiperiodic(shooting: Shooting, u, system: HybridSystem) -> Float[Array, "u u"]:
+    """Derivative of the equations for a deviation that changes sign each period.
+
+    It is singular at a flip, where its null vector is the deviation of the doubled
+    orbit. The first column belongs to the first phase, also without forcing.
+    """
+    if not shooting.constraints:
+        return jax.jacfwd(shooting.residual)(u, system) + 2 * jnp.eye(u.size)
+    m = len(shooting.constraints)
+    sign = jnp.ones(m).at[-1].set(-1.0)
+    following = (jnp.arange(m) + 1) % m
+    whole = matrix_of(links_of(shooting, u, system), following, sign)
+    return whole * _column_scale(shooting, u, system)
+
+
+def equations_and_monodromy(
+    shooting: Shooting, u, p, system_at: Callable
+) -> tuple[Float[Array, "u u+1"], Float[Array, "n n"]]:
+    """Derivative of the equations by unknowns and parameter, and the monodromy matrix.
+
+    For orbits with impacts; the system is `system_at(p)`.
+    """
+    system = system_at(p)
+    starts, ends = shooting.flights(u, system)
+    m = len(shooting.constraints)
+
+    def one(start, time, which):
+        def flown(joined):
+            before = flight_nodes(
+                system_at(joined[-1]), start[0], joined[:-1], time, shooting.steps
+            )[1][-1]
+            return before, before
+
+        by, before = jax.jacfwd(flown, has_aux=True)(jnp.append(start[1:], p))
+        found = landed(system, start, time, which, before, by[:, :-1])
+
+        def arrive(x, p):
+            moved = system_at(p)
+            gap, after = gaps(moved, time, x)[which], impacts(moved, time, x)[which]
+            return jnp.append(gap, after)
+
+        by_p = jax.jvp(arrive, (before, p), (by[:, -1], jnp.ones_like(p)))[1]
+        return found, by_p
+
+    links, by_p = jax.vmap(one)(starts, ends, shooting.hit())
+    whole = matrix_of(links, (jnp.arange(m) + 1) % m)
+    whole = whole * _column_scale(shooting, u, system)
+    flip = jnp.tile(-jnp.ones(1 + shooting.dimension).at[0].set(-1.0), m)
+    # all times are phases times one unit (s)
+    unit = shooting.period(u, system) / max(shooting.periods, 1)
+    by_unit = jax.vmap(
+        lambda one, t0, t1: (one.by_start[:, 0] * t0 + one.by_end * t1) / unit
+    )(links, starts[:, 0], ends)
+    if shooting.periods:
+        rate = jax.jvp(
+            lambda p: jnp.asarray(system_at(p).period, dtype=jnp.float64),
+            (p,),
+            (jnp.ones_like(p),),
+        )[1]
+        by_p = by_p + by_unit * rate
+    else:
+        # the place of the first phase is taken by the period
+        whole = whole.at[:, 0].set(flip * by_unit.reshape(-1))
+    by_p = flip * by_p.reshape(-1)
+    return jnp.append(whole, by_p[:, None], axis=1), product_of_links(links)[0]
+
+
+def _column_scale(shooting: Shooting, u, system) -> Float[Array, "1 u"]:
+    """From derivatives by times (s) to those by phases."""
+    unit = shooting.period(u, system) / max(shooting.periods, 1)
+    row = jnp.ones(1 + shooting.dimension).at[0].set(unit)
+    return jnp.tile(row, len(shooting.constraints))[None, :]
+
+
+def return_map(shooting: Shooting, u, system: HybridSystem, matrix):
+    """Derivative of the return map to the first constraint, from the monodromy matrix.
+
+    In coordinates on the surface, k = n - 1.
+    """
+    starts, _ = shooting.segments(u, system)
+    t, x = starts[0, 0], starts[0, 1:]
+    which = shooting.constraints[0]
+    normal = jax.grad(lambda y: gaps(system, t, y)[which])(x)
+    along = system.vector_field(t, x)
+    along = along / jnp.dot(normal, along)
+    basis = jnp.linalg.qr(normal[:, None], mode="complete")[0][:, 1:]
+    moved = matrix @ basis
+    return basis.T @ (moved - along[:, None] * (normal @ moved)[None, :])
+
+
+def around_the_period(shooting: Shooting, u, system: HybridSystem):
+    """The Jacobian of the map from the first impact to the one a period later.
+
+    Of (phase, state), without forcing of the state, without impacts of the state at
+    time zero.
+
+    **Returns:** the Jacobian as a function of a point near the orbit's own, and that.
+    """
+    if not shooting.constraints:
+        return jax.jacfwd(lambda x: shooting.residual(x, system) + x), u
+    starts, ends = shooting.segments(u, system)
+
+    def hop(carry, known):
+        start, matrix = carry
+        time, which = known
+
+        def improve(_, found):
+            time = found[0]
+            there = link(system, start, time, which, shooting.steps)
+            change = -there.value[0] / there.by_end[0]
+            after = there.value[1:] + change * there.by_end[1:]
+            return time + change, after, there.by_impact
+
+        first = (time, start[1:], jnp.zeros_like(matrix))
+        time, after, moved = jax.lax.fori_loop(0, _EVALUATIONS, improve, first)
+        return (jnp.append(time, after), moved @ matrix), None
+
+    def whole_turn(start):
+        begin = (start, jnp.eye(start.size))
+        return jax.lax.scan(hop, begin, (ends[:, 0], shooting.hit()))[0][1]
+
+    if shooting.periods == 0:
+        return lambda x: whole_turn(jnp.append(starts[0, :1], x))[1:, 1:], starts[0, 1:]
+    unit = shooting.period(u, system) / shooting.periods
+    sizes = jnp.ones(starts.shape[1]).at[0].set(unit)
+
+    def of_phase(y):
+        return whole_turn(y * sizes) * (sizes[None, :] / sizes[:, None])
+
+    return of_phase, u[: starts.shape[1]]

@@ -1,0 +1,99 @@
+"""The derivative of the flow over a turn, in two ways that must agree."""
+
+from typing import Literal
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from jaxcam.hybrid import flow, HybridSystem, Settings
+from jaxcam.parameters import as_arrays, pick, Where
+
+from ._orbit import Orbit
+from ._turn_derivative import builder, by_product, picked, TurnDerivative
+
+
+Method = Literal["product", "flow"]
+
+
+def monodromy(
+    system: HybridSystem,
+    orbit: Orbit,
+    *,
+    method: Method = "product",
+    settings: Settings | None = None,
+) -> Float[Array, "n n"]:
+    """The monodromy matrix: state after one period by state at its start.
+
+    **Arguments:**
+
+    - `orbit`: from [`variational.orbit_of`][] or `continuation.periodic_orbit`.
+    - `method`: "product" multiplies the transition matrices of the flights and the
+        saltation matrices of the recorded events; "flow" differentiates the event loop.
+        The first is right at every impact speed, the second loses one digit for each
+        of the impact speed, because it has to find the impacts again.
+    - `settings`: accuracy of "flow"; a tolerance of 1e-12 by default.
+
+    **Returns:** shape `(n, n)`.
+    """
+    made = turn_derivative(system, orbit, method=method, settings=settings)
+    return made.state
+
+
+def turn_derivative(
+    system: HybridSystem,
+    orbit: Orbit,
+    where: Where | None = None,
+    *,
+    method: Method = "product",
+    settings: Settings | None = None,
+) -> TurnDerivative:
+    """Derivatives of a turn by state, period, phase and parameters.
+
+    **Arguments:**
+
+    - `where`: picks a parameter of the system, or several, as for
+        [`jaxcam.parameters.pick`][]; none by default.
+    - the others as for [`variational.monodromy`][].
+
+    **Returns:** a [`variational.orbits.TurnDerivative`][]. The forcing's period does
+    not follow the parameters: add `period` times its own derivative where it should.
+
+    **Raises:** `ValueError` for another method.
+    """
+    if method not in ("product", "flow"):
+        raise ValueError(f'method is {method!r}; choose "product" or "flow"')
+    system = as_arrays(system)
+    where = None if where is None else pick(where, system)
+    values = picked(system, where)
+    if method == "product":
+        return by_product(
+            system, values, where, orbit.state, orbit.pieces, orbit.sticks
+        )
+    if settings is None:
+        settings = Settings(tolerance=1e-12)
+    settings = as_arrays(settings)
+    made = _by_flow(
+        system, values, where, orbit.state, orbit.time, orbit.period, settings
+    )
+    by_state, by_start, by_length, by_parameter = made
+    return TurnDerivative(
+        by_state,
+        by_length,
+        by_start,
+        by_parameter,
+        jnp.linalg.det(by_state),
+        jnp.asarray(jnp.nan),
+        orbit.sticks,
+    )
+
+
+@eqx.filter_jit
+def _by_flow(system, values, where, state, t0, period, settings):
+    build = builder(system, where)
+
+    def end(x, start, length, p):
+        return flow(build(p), x, start, start + length, settings=settings).state
+
+    return jax.jacfwd(end, argnums=(0, 1, 2, 3))(state, t0, period, values)

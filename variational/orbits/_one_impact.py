@@ -1,0 +1,67 @@
+"""Orbits with one impact a period, found without a simulation."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jaxcam.hybrid import contact_state, HybridSystem
+from jaxcam.hybrid.surface import contact_acceleration, normal_directions
+
+from ._impact_orbit import clearance, impact_orbit, ImpactOrbit, orbit_trace
+
+
+_PHASES, _SPEEDS = 12, 8
+
+
+def one_impact_orbits(system: HybridSystem, state) -> list[ImpactOrbit]:
+    """Orbits that hit once in a period of the forcing, stable or not.
+
+    Newton's method from a grid of impacts: phases over one period, and rebound speeds
+    around the one that a body thrown against the mean acceleration of contact needs to
+    return after one period.
+
+    **Arguments:** a system with a `period`, two states and one constraint, and a state
+    near its surface, shape `(2,)`.
+
+    **Returns:** those whose flight stays clear of the constraint, with impacts in the
+    first period, in the order of the sum of their multipliers: a saddle comes last. The
+    list may be empty.
+
+    **Raises:** `ValueError` for a system without a period.
+    """
+    if system.period is None:
+        raise ValueError("One impact a period needs a system with a `period`.")
+    orbits, clear, traces = jax.device_get(_search(system, jnp.asarray(state)))
+    found: list[ImpactOrbit] = []
+    scale = float(np.max(np.abs(orbits.states[clear > 0]), initial=0.0))
+    for k in np.argsort(np.where(clear > 0, traces, np.inf)):
+        if not clear[k] > 0:
+            break
+        orbit = jax.tree.map(lambda leaf, k=k: jnp.asarray(leaf[k]), orbits)
+        # the same orbit is found from many starts, to rounding error
+        near = [
+            np.max(np.abs(np.asarray(orbit.states - other.states))) < 1e-8 * scale
+            for other in found
+        ]
+        if not any(near):
+            found.append(orbit)
+    return found
+
+
+@eqx.filter_jit
+def _search(system, state):
+    period = jnp.asarray(system.period)
+    times = period * jnp.arange(_PHASES, dtype=float) / _PHASES
+    pull = jnp.mean(jnp.abs(contact_acceleration(system, times, state)))
+    speeds = pull * period / 2 * jnp.linspace(0.25, 2.0, _SPEEDS)
+
+    def one(t, speed):
+        contact = contact_state(system, t[None], state)[0]
+        start = contact + speed * normal_directions(system, t, contact)[0]
+        orbit = impact_orbit(system, ImpactOrbit(t[None], start[None]))
+        orbit = ImpactOrbit(jnp.mod(orbit.times, period), orbit.states)
+        return orbit, clearance(system, orbit), orbit_trace(system, orbit)
+
+    grid = jnp.meshgrid(times, speeds, indexing="ij")
+    return jax.vmap(one)(grid[0].ravel(), grid[1].ravel())

@@ -1,0 +1,223 @@
+"""A periodic orbit: one period of the motion, its events and its monodromy matrix."""
+
+from typing import NamedTuple
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, ArrayLike, Complex, Float
+
+from jaxcam.hybrid import (
+    Contacts,
+    HybridSystem,
+    Impacts,
+    Settings,
+    simulate,
+)
+from jaxcam.hybrid.checks import refuse_tracers
+from jaxcam.parameters import real_array
+
+from ._at_impact import after_and_speeds, Start, start_at_impact
+from ._closing import close, Knots
+from ._multipliers import eigenvalues
+from ._pieces import cut, Pieces
+from ._turn_derivative import by_product, flown
+
+
+class Event(NamedTuple):
+    """One event of an orbit: "impact", "stick" or "release", and which constraint."""
+
+    kind: str
+    constraint: int
+
+
+class Orbit(eqx.Module):
+    """One period of a motion that repeats."""
+
+    #: (n,) state at `time`
+    state: Float[Array, " n"]
+    #: s, where the turn starts
+    time: Float[Array, ""]
+    #: s, of the whole orbit: several periods of the forcing for a subharmonic
+    period: Float[Array, ""]
+    impacts: Impacts
+    contacts: Contacts
+    #: largest deviation of the state after one period, as it was given
+    closure: Float[Array, ""]
+    #: (n, n) derivative of the state after one period with respect to `state`
+    monodromy: Float[Array, "n n"]
+    #: its determinant, from flights and impacts one by one
+    determinant: Float[Array, ""]
+    #: the turn cut at its events
+    pieces: Pieces
+    #: whether there is contact in the turn
+    sticks: bool = eqx.field(static=True)
+
+    def __str__(self) -> str:
+        sizes = ", ".join(f"{abs(m):.3g}" for m in self.multipliers)
+        return (
+            f"{'stable' if self.stable else 'unstable'} orbit of period "
+            f"{float(self.period):.6g} s, impacts: {int(self.impacts.count)}, "
+            f"contacts: {int(self.contacts.count)}, multipliers of modulus {sizes}"
+        )
+
+    @property
+    def multipliers(self) -> Complex[Array, " n"]:
+        """Floquet multipliers, the largest modulus first."""
+        return eigenvalues(self.monodromy, self.determinant)
+
+    @property
+    def stable(self) -> bool:
+        """Whether all multipliers lie inside the unit circle."""
+        return bool(jnp.all(jnp.abs(self.multipliers) < 1))
+
+    @property
+    def signature(self) -> tuple[Event, ...]:
+        """The events of the turn in order.
+
+        Of a completed chatter it lists the impacts up to the completion.
+        """
+        return signature_of(self.impacts, self.contacts)
+
+
+def orbit_of(
+    system: HybridSystem,
+    state: Float[ArrayLike, " n"],
+    period: float | Array | None = None,
+    t0: float | Array = 0.0,
+    *,
+    settings: Settings | None = None,
+    closure: float = 1e-6,
+) -> Orbit:
+    """The orbit through `state` at `t0`, from one run over its period.
+
+    The impacts of an orbit without contact are then improved as a boundary value
+    problem, so that they, and the multipliers, are right at every impact speed.
+
+    **Arguments:**
+
+    - `state`: shape `(n,)`, of a motion that returns to it. At an impact it may be the
+        state before or after: the orbit then starts halfway through its first flight,
+        because the flow jumps at an impact and has no derivative from there.
+    - `period`: s; the forcing's own without.
+    - `t0`: s.
+    - `settings`: accuracy of the run; a tolerance of 1e-12 by default.
+    - `closure`: the deviation after one period that is allowed, relative to
+      1 + |state|.
+
+    **Returns:** a [`variational.Orbit`][] with its monodromy matrix.
+
+    **Raises:** `ValueError` where the run fails, or the state does not return.
+    """
+    refuse_tracers("orbit_of", "jaxcam.hybrid.flow", system, state, period, t0)
+    settings = Settings(tolerance=1e-12) if settings is None else settings
+    if period is None:
+        if system.period is None:
+            raise ValueError(
+                "this system has no forcing period; pass the period of the orbit (s)"
+            )
+        period = system.period
+    state = real_array(state)
+    t0, period = float(jnp.asarray(t0)), float(jnp.asarray(period))
+    if not period > 0:
+        raise ValueError(f"period is {period:g} s; give a positive one")
+    turn = simulate(system, state, t0, t0 + period, settings=settings)
+    if not bool(turn.successful):
+        raise ValueError(f"the run over one period did not end: {turn.result}")
+    system, impacts, contacts = turn.system, turn.impacts, turn.contacts
+    miss = float(jnp.max(jnp.abs(turn.final - state) / (1 + jnp.abs(state))))
+    start = start_at_impact(system, t0, state)
+    polished = int(contacts.count) == 0 and (
+        start is not None or int(impacts.count) > 0
+    )
+    if polished:
+        knots, sides = _knots(system, impacts, start, t0, period)
+        if start is not None:
+            t0 = _half_a_flight_on(knots, t0, period)
+            miss = knots.miss
+    _check_closure(miss, closure, period)
+    if polished:
+        impacts, state = _rebuilt(system, knots, sides, t0, period)
+    elif start is not None:
+        raise ValueError(
+            "an orbit with contact cannot start at an impact; give a state in flight "
+            "or in contact"
+        )
+    pieces, sticks = cut(impacts, contacts, state, t0, t0 + period)
+    made = by_product(system, jnp.zeros(0), None, state, pieces, sticks)
+    return Orbit(
+        state=state,
+        time=jnp.asarray(t0),
+        period=jnp.asarray(period),
+        impacts=impacts,
+        contacts=contacts,
+        closure=jnp.asarray(miss),
+        monodromy=made.state,
+        determinant=made.determinant,
+        pieces=pieces,
+        sticks=sticks,
+    )
+
+
+def _check_closure(miss, closure, period) -> None:
+    if not miss <= closure:
+        raise ValueError(
+            f"this state does not return: after {period:g} s it misses by "
+            f"{miss:.1e}; give a state and period closer to the orbit, or find it with "
+            "continuation.periodic_orbit"
+        )
+
+
+def _knots(system, impacts: Impacts, start: Start | None, t0, period):
+    """The impacts as a boundary value problem, and which constraints they hit."""
+    time, after = np.asarray(impacts.time), np.asarray(impacts.after)
+    sides = np.asarray(impacts.constraint)
+    if start is not None:
+        # the impact at the start, which the run may also have met at its end
+        other = (time > t0) & (time < t0 + period - start.window)
+        time = np.append(t0, time[other])
+        after = np.concatenate([start.after[None], after[other]])
+        sides = np.append(start.constraint, sides[other])
+    rows = np.concatenate([time[:, None], after], axis=1)
+    return close(system, rows, sides, period), sides
+
+
+def _half_a_flight_on(knots: Knots, t0, period) -> float:
+    time = knots.rows[:, 0]
+    later = np.append(time[1:], time[0] + period)
+    return float(time[0] + later[0]) / 2
+
+
+def _rebuilt(system, knots: Knots, sides, t0, period):
+    """The impacts after t0 in order, and the state at t0, from improved impacts."""
+    time = knots.rows[:, 0]
+    time = time + np.where(time <= t0, period, 0.0)
+    order = np.argsort(time, kind="stable")
+    time, before, sides = time[order], knots.before[order], sides[order]
+    after, speed_before, speed_after = after_and_speeds(system, time, before, sides)
+    impacts = Impacts(
+        time=jnp.asarray(time),
+        before=jnp.asarray(before),
+        after=jnp.asarray(after),
+        constraint=jnp.asarray(sides),
+        speed_before=jnp.asarray(speed_before),
+        speed_after=jnp.asarray(speed_after),
+        count=jnp.asarray(len(time)),
+    )
+    last = len(time) - 1
+    end = jnp.asarray(t0 + period)
+    state = flown(system, impacts.time[last], impacts.after[last], end)
+    return impacts, state
+
+
+def signature_of(impacts: Impacts, contacts: Contacts) -> tuple[Event, ...]:
+    """Impacts, starts of contact and releases as one sequence in time."""
+    found = []
+    for k in range(int(impacts.count)):
+        found.append((float(impacts.time[k]), 0, "impact", int(impacts.constraint[k])))
+    for k in range(int(contacts.count)):
+        which = int(contacts.constraint[k])
+        found.append((float(contacts.start[k]), 1, "stick", which))
+        if bool(contacts.released[k]):
+            found.append((float(contacts.end[k]), 2, "release", which))
+    return tuple(Event(kind, which) for _, _, kind, which in sorted(found))

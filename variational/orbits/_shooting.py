@@ -1,0 +1,170 @@
+"""Multiple shooting: one segment a flight, the impact times among the unknowns.
+
+An orbit with m impacts is the list of its impacts: time t_k and state x_k just after
+each. With phi the free flight and H, R gap and law of the constraint that is hit,
+
+    H(t_{k+1}, phi(t_{k+1}; t_k, x_k)) = 0,
+    x_{k+1} = R(t_{k+1}, phi(t_{k+1}; t_k, x_k)),
+
+closed by t_{m+1} = t_1 + n T, x_{m+1} = x_1. Nothing in these equations divides by an
+impact speed, so they are as regular at grazing as elsewhere; they go on behind it, to
+motions through the constraint, which `seen` tells apart.
+"""
+
+from typing import NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float, Int
+
+from jaxcam.hybrid import HybridSystem, normal_velocity
+from jaxcam.hybrid.surface import gaps, impacts
+
+from ._flight import flight_end, flight_nodes
+from ._lowest_gap import gap_or_speed, lowest_times, nodes_of
+
+
+class Seen(NamedTuple):
+    """What decides whether a solution of the equations is an orbit, and its flights."""
+
+    #: (m,) lowest gap inside each flight; of the whole turn without impacts
+    gaps: Float[Array, " flights"]
+    #: (m,) approach speed of each impact, positive where it is physical
+    speeds: Float[Array, " m"]
+    #: estimated error of the flights, relative to 1 + |x|
+    error: Float[Array, ""]
+    #: (flights, 1 + steps) and (flights, 1 + steps, n) at the ends of all steps
+    times: Float[Array, "flights nodes"]
+    states: Float[Array, "flights nodes n"]
+
+
+class Shooting(eqx.Module):
+    """The equations of a periodic orbit with a known sequence of impacts.
+
+    The unknowns u are, for each impact, its phase (time in forcing periods) and the
+    state after it: shape `(m (1 + n),)`. Without impacts they are the state at time
+    zero, shape `(n,)`. For a system without forcing the first phase is zero, its place
+    taken by the period (s), and phases count periods of the orbit.
+
+    **Arguments:**
+
+    - `constraints`: which constraint each impact hits, in order.
+    - `periods`: forcing periods until the orbit repeats; 0 for a system without
+      forcing.
+    - `dimension`: number of states n.
+    - `steps`: Runge-Kutta steps of order eight in each flight.
+    """
+
+    constraints: tuple[int, ...] = eqx.field(static=True)
+    periods: int = eqx.field(static=True)
+    dimension: int = eqx.field(static=True)
+    steps: int = eqx.field(static=True, default=32)
+
+    def residual(self, u, system: HybridSystem) -> Float[Array, " u"]:
+        """Zero for an orbit: gap at each impact, and what its law misses."""
+        if not self.constraints:
+            end = self.period(u, system)
+            start = jnp.zeros_like(end)
+            return flight_end(system, start, u, end, steps=self.steps) - u
+        starts, ends = self.segments(u, system)
+        before = self.arrivals(system, starts, ends)
+
+        def one(end, x, which):
+            gap = gaps(system, end[0], x)[which]
+            after = impacts(system, end[0], x)[which]
+            return jnp.concatenate([gap[None], end[1:] - after])
+
+        return jax.vmap(one)(ends, before, self.hit()).reshape(-1)
+
+    def period(self, u, system: HybridSystem) -> Float[Array, ""]:
+        """Period of the orbit (s)."""
+        if self.periods == 0:
+            return u[0]
+        return jnp.asarray(self.periods * system.period, dtype=jnp.float64)
+
+    def segments(self, u, system: HybridSystem):
+        """Starts and ends of the flights: times (s) and states, two `(m, 1 + n)`."""
+        starts = u.reshape(len(self.constraints), 1 + self.dimension)
+        if self.periods == 0:
+            starts = starts.at[0, 0].set(0.0)
+        ends = jnp.roll(starts, -1, axis=0).at[-1, 0].add(max(self.periods, 1))
+        unit = self.period(u, system) / max(self.periods, 1)
+        scale = jnp.ones(1 + self.dimension).at[0].set(unit)
+        return starts * scale[None, :], ends * scale[None, :]
+
+    def flights(self, u, system: HybridSystem):
+        """Starts `(m, 1 + n)` and end times `(m,)` of all flights."""
+        if self.constraints:
+            starts, ends = self.segments(u, system)
+            return starts, ends[:, 0]
+        start = jnp.concatenate([jnp.zeros(1), u])
+        return start[None], self.period(u, system)[None]
+
+    def hit(self) -> Int[Array, " m"]:
+        """Index of the constraint that ends each flight."""
+        return jnp.asarray(self.constraints[1:] + self.constraints[:1])
+
+    def arrivals(self, system: HybridSystem, starts, ends) -> Float[Array, "m n"]:
+        """States before the impacts that end the flights."""
+        return jax.vmap(
+            lambda a, b: flight_end(system, a[0], a[1:], b[0], steps=self.steps)
+        )(starts, ends)
+
+    def speeds(self, system: HybridSystem, ends, before) -> Float[Array, " m"]:
+        """Approach speeds from the states `before` the impacts at times `ends` (s)."""
+        found = jax.vmap(lambda t, x, which: -normal_velocity(system, t, x)[which])(
+            ends, before, self.hit()
+        )
+        # the flight of row k ends in impact k + 1
+        return jnp.roll(found, 1)
+
+    # -- admissibility
+
+    def seen(self, u, system: HybridSystem) -> Seen:
+        """Lowest gaps, approach speeds and error, from one integration of the flights.
+
+        For derivatives take `gap_or_speed`.
+        """
+        starts, ends = self.flights(u, system)
+
+        def one(start, end):
+            nodes = nodes_of(system, start, end, self.steps)
+            gap = lowest_times(
+                system, start, end, self.steps, not self.constraints, nodes
+            )[1]
+            return *nodes, jnp.min(gap)
+
+        times, states, wrong, lowest = jax.vmap(one)(starts, ends)
+        speeds = jnp.zeros(0)
+        if self.constraints:
+            speeds = self.speeds(system, ends, states[:, -1])
+        return Seen(lowest, speeds, jnp.max(wrong), times, states)
+
+    def approach(self, u, system: HybridSystem) -> Float[Array, " m"]:
+        """Approach speed of each impact; differentiable."""
+        starts, ends = self.segments(u, system)
+        return self.speeds(system, ends[:, 0], self.arrivals(system, starts, ends))
+
+    def gap_or_speed(self, number, u, system: HybridSystem) -> Float[Array, ""]:
+        """The lowest gap of flight `number`, or from m on the speed of an impact;
+        differentiable."""
+        starts, ends = self.flights(u, system)
+        hit = self.hit() if self.constraints else None
+        return gap_or_speed(system, starts, ends, number, hit, self.steps)
+
+    def stroboscopic(self, u, system: HybridSystem, seen: Seen):
+        """States at time zero and each forcing period after it, `(periods, n)`."""
+        times, states = seen.times, seen.states
+        length = self.periods * system.period
+
+        def at(time):
+            ago = jnp.mod(time - times[:, 0], length)
+            last = jnp.argmin(ago)
+            when = times[last, 0] + ago[last]
+            k = jnp.searchsorted(times[last], when, side="right") - 1
+            k = jnp.clip(k, 0, self.steps - 1)
+            return flight_nodes(system, times[last, k], states[last, k], when, 1)[1][-1]
+
+        turns = jnp.arange(self.periods, dtype=jnp.float64)
+        return jax.vmap(at)(system.period * turns)
