@@ -161,7 +161,6 @@ def restitution(system):
     return system.restitution
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     "name, case",
     [("fold", SETS[0]), ("flip", SETS[0]), ("grazing", TRAPS[1])],

@@ -160,10 +160,17 @@ class ImpactingOrbits(AbstractProblem):
     # -- between compiled programs
 
     def refused(self, monitors, observed) -> str | None:
-        """Why a solution is no orbit, from what has been seen of it, or None."""
+        """Why a solution is no orbit, from what has been seen of it, or None.
+
+        A curve of grazing orbits does not watch what is zero along it.
+        """
         known = watched_of(len(self.constraints))
         gaps, speeds = (
-            [monitors[name] for name, watched in known.items() if watched.what == what]
+            {
+                watched.number: monitors[name]
+                for name, watched in known.items()
+                if watched.what == what and name in monitors
+            }
             for what in ("gap", "speed")
         )
         return inadmissible(gaps, speeds, observed["integration error"], self.steps)

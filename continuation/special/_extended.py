@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Array, Float, PyTree
 
 from .._parameter import with_leaf
-from .._point import Point
+from .._point import Point, replace
 from .._problem import AbstractProblem, Stability
 
 
@@ -63,4 +63,14 @@ class AbstractExtended(AbstractProblem):
         }
 
     def check(self, point: Point) -> str | None:
-        return self.base.check(point.inner(self.base, self.leaf))
+        inner = point.inner(self.base, self.leaf)
+        tests = {
+            name: point.tests[here]
+            for name in self.base.monitors()
+            if (here := self.monitor_of_base(name)) in point.tests
+        }
+        return self.base.check(replace(inner, tests=tests))
+
+    def monitor_of_base(self, name: str) -> str:
+        """What a monitor of the problem inside is called here."""
+        return name

@@ -106,6 +106,9 @@ class SingularPoints(AbstractExtended):
     def signature(self) -> str:
         return f"{self.kind} of {self.base.signature}"
 
+    def monitor_of_base(self, name: str) -> str:
+        return f"base {name}"
+
     def _dimension(self) -> int:
         k = self.b.shape[0]
         if self.kind in (FOLD, FLIP):
@@ -147,7 +150,7 @@ class SingularPoints(AbstractExtended):
         last = ("double", "opposite") if self.kind in (HOPF, NEIMARK_SACKER) else ()
         found = {k: Monitor(v, ends=k in last) for k, v in names.items()}
         for name, monitor in self.base.monitors().items():
-            found[f"base {name}"] = Monitor(
+            found[self.monitor_of_base(name)] = Monitor(
                 f"{self.kind}-{monitor.kind}", ends=monitor.ends
             )
         return found
@@ -188,7 +191,7 @@ class SingularPoints(AbstractExtended):
                 )
         others, observed = base.seen(inner, inside)
         for name, value in others.items():
-            values[f"base {name}"] = value
+            values[self.monitor_of_base(name)] = value
         return {name: values[name] for name in wanted}, observed
 
 

@@ -1,5 +1,8 @@
 """Whether a solution of the shooting equations is an orbit: no penetration anywhere."""
 
+from collections.abc import Mapping
+from typing import Any
+
 import equinox as eqx
 import jax.numpy as jnp
 
@@ -15,19 +18,22 @@ _ROUNDING = 1e-9
 _ERROR = 1e-9
 
 
-def inadmissible(gaps, speeds, error, steps: int) -> str | None:
+def inadmissible(
+    gaps: Mapping[int, Any], speeds: Mapping[int, Any], error, steps: int
+) -> str | None:
     """Why a solution is no orbit, or None.
 
-    **Arguments:** lowest gap of each flight, approach speed of each impact, error of
-    the flights, as in [`variational.orbits.Seen`][]; Runge-Kutta steps in a flight.
+    **Arguments:** lowest gap of each flight and approach speed of each impact, by their
+    numbers, and the error of the flights, as in [`variational.orbits.Seen`][];
+    Runge-Kutta steps in a flight.
     """
-    for k, value in enumerate(map(float, gaps)):
+    for k, value in gaps.items():
         if not value >= -_ROUNDING:
             return (
                 f"the gap falls to {value:.1e} within flight {k}: the orbit would go "
                 "through the constraint"
             )
-    for k, value in enumerate(map(float, speeds)):
+    for k, value in speeds.items():
         if not value >= -_ROUNDING:
             return (
                 f"impact {k} moves away from its constraint: the orbit would have to "
@@ -44,7 +50,8 @@ def inadmissible(gaps, speeds, error, steps: int) -> str | None:
 def refuse(shooting: Shooting, u, system: HybridSystem) -> str | None:
     """Why a solution of the equations is no orbit, or None."""
     gaps, speeds, error = _look(shooting, jnp.asarray(u), system)
-    return inadmissible(gaps, speeds, error, shooting.steps)
+    numbered = (dict(enumerate(map(float, row))) for row in (gaps, speeds))
+    return inadmissible(*numbered, error, shooting.steps)
 
 
 @eqx.filter_jit
