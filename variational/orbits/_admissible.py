@@ -50,8 +50,8 @@ def inadmissible(
 def refuse(shooting: Shooting, u, system: HybridSystem) -> str | None:
     """Why a solution of the equations is no orbit, or None."""
     gaps, speeds, error = _look(shooting, jnp.asarray(u), system)
-    numbered = (dict(enumerate(map(float, row))) for row in (gaps, speeds))
-    return inadmissible(*numbered, error, shooting.steps)
+    gaps, speeds = (dict(enumerate(map(float, row))) for row in (gaps, speeds))
+    return inadmissible(gaps, speeds, error, shooting.steps)
 
 
 @eqx.filter_jit
