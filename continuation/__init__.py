@@ -26,6 +26,7 @@ from ._predictors import (
 )
 from ._problem import (
     AbstractProblem as AbstractProblem,
+    LocalMap as LocalMap,
     Monitor as Monitor,
     Start as Start,
 )
@@ -35,8 +36,15 @@ from ._problems import (
     FixedPoint as FixedPoint,
 )
 from ._record import load as load, Recorder as Recorder, save as save
+from ._representation import AbstractRepresentation as AbstractRepresentation
 from ._sensitivity import sensitivity as sensitivity, special_point as special_point
 from ._settings import Settings as Settings
+from ._step_control import (
+    AbstractStepControl as AbstractStepControl,
+    EffortAndAngle as EffortAndAngle,
+    Refusal as Refusal,
+    Way as Way,
+)
 from ._switch import emanating as emanating, switch as switch
 from ._table import Progress as Progress, table as table
 from .orbits import (

@@ -1,24 +1,28 @@
-"""Algorithms: in which plane the next point is sought."""
+"""Algorithms: how a branch is predicted, corrected and stepped along."""
 
 import abc
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import equinox as eqx
-import numpy as np
+from jaxtyping import Float
 
 from ._predictors import AbstractPredictor, Extrapolation, Tangent
+from ._step_control import AbstractStepControl, EffortAndAngle
 
 
 class AbstractAlgorithm(eqx.Module):
-    """A predictor and the equation that closes the corrector's system."""
+    """A predictor, the equation that closes the corrector's system, and what controls
+    the steps."""
 
     predictor: eqx.AbstractVar[AbstractPredictor]
+    control: eqx.AbstractVar[AbstractStepControl]
     #: whether the corrector takes the shortest corrections instead of a fixed plane
     least_norm: eqx.AbstractClassVar[bool]
 
     @abc.abstractmethod
-    def normal(self, tangent: np.ndarray) -> np.ndarray:
-        """(n+1,) normal of the corrector's plane, given the tangent; both scaled."""
+    def normal(self, tangent: Float[Any, " n+1"]) -> Float[Any, " n+1"]:
+        """Normal of the corrector's plane, given the tangent; both scaled. NumPy
+        arrays, or traced ones in a batch."""
 
 
 class Natural(AbstractAlgorithm):
@@ -29,9 +33,11 @@ class Natural(AbstractAlgorithm):
     - `predictor`: by default the linear extrapolation (3.40).
     - `component`: `"parameter"`, which stops at folds; or `"fastest"`: the component
       that changes most, chosen at each step, which passes them.
+    - `control`: of the steps, by effort and angle.
     """
 
     predictor: AbstractPredictor = Extrapolation()
+    control: AbstractStepControl = EffortAndAngle()
     component: str = eqx.field(static=True, default="parameter")
     least_norm: ClassVar[bool] = False
 
@@ -41,20 +47,21 @@ class Natural(AbstractAlgorithm):
                 f"component is {self.component!r}; give 'parameter' or 'fastest'"
             )
 
-    def normal(self, tangent: np.ndarray) -> np.ndarray:
-        normal = np.zeros_like(tangent)
-        k = -1 if self.component == "parameter" else int(np.argmax(np.abs(tangent)))
-        normal[k] = 1.0
-        return normal
+    def normal(self, tangent):
+        xp = tangent.__array_namespace__()
+        last = tangent.size - 1
+        k = last if self.component == "parameter" else xp.argmax(xp.abs(tangent))
+        return xp.where(xp.arange(tangent.size) == k, 1.0, 0.0)
 
 
 class PseudoArclength(AbstractAlgorithm):
     """Corrections are orthogonal to the tangent (3.4.3, 2); passes folds."""
 
     predictor: AbstractPredictor = Tangent()
+    control: AbstractStepControl = EffortAndAngle()
     least_norm: ClassVar[bool] = False
 
-    def normal(self, tangent: np.ndarray) -> np.ndarray:
+    def normal(self, tangent):
         return tangent
 
 
@@ -66,7 +73,8 @@ class MoorePenrose(AbstractAlgorithm):
     """
 
     predictor: AbstractPredictor = Tangent()
+    control: AbstractStepControl = EffortAndAngle()
     least_norm: ClassVar[bool] = True
 
-    def normal(self, tangent: np.ndarray) -> np.ndarray:
+    def normal(self, tangent):
         return tangent

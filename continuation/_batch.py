@@ -9,14 +9,15 @@ from jaxtyping import ArrayLike, PyTree
 
 from jaxcam.parameters import Where
 
-from ._batch_run import Axes, numbers_of, REASONS, run_lanes
+from ._algorithms import AbstractAlgorithm, PseudoArclength
+from ._batch_run import Axes, REASONS, run_lanes
 from ._follow import checked_bounds
 from ._parameter import as_arrays, leaf_of, pick, with_leaf
 from ._point import Branch, Point, set_parameters, with_field
 from ._problem import AbstractProblem
 from ._program import Corrected
-from ._settings import Settings
-from .special import Context, eigenvalues_at, is_stable, locate, test_values
+from ._settings import as_traced, Settings
+from .special import Context, eigenvalues_at, is_stable, locate, test_values, varied
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +101,7 @@ def _point(problem, at, kind, arclength, tests, converged, reason, leaf) -> Poin
         observed={k: np.asarray(v) for k, v in at.observed.items()},
         tests=tests,
         signature=problem.signature,
-        parameters=(*problem.free(at.z[:-1]), float(at.z[-1])),
+        parameters=varied(problem, at.z),
         problem=set_parameters(problem, parameters),
     )
 
@@ -110,6 +111,7 @@ def follow_batch(
     states: ArrayLike,
     where: Where,
     bounds: tuple[float, float],
+    algorithm: AbstractAlgorithm | None = None,
     *,
     parameters: PyTree | None = None,
     settings: Settings | None = None,
@@ -118,14 +120,16 @@ def follow_batch(
 ) -> Batch:
     """Follow many branches in one compiled program, each with its own steps.
 
-    Pseudo-arclength with tangent predictor. Branches differ in their starts, in the
-    values of other parameters, or both; what needs decisions in Python (transitions,
-    admissibility, fresh references) is left out.
+    Branches differ in their starts, in the values of other parameters, or both; what
+    needs decisions in Python (transitions, admissibility, fresh references) is left
+    out.
 
     **Arguments:**
 
     - `states`: (lanes, n) states to begin with.
     - `where`, `bounds`, `settings`: as of [`continuation.follow`][].
+    - `algorithm`: one that corrects in a plane and whose predictor takes a single
+      point, such as the tangent; by default [`continuation.PseudoArclength`][].
     - `parameters`: the problem's parameters, each float leaf (lanes,) or a scalar for
       all; None: those of the problem.
     - `direction`: 1 or -1, or (lanes,) of them.
@@ -134,6 +138,17 @@ def follow_batch(
     **Returns:** a [`continuation.Batch`][]; a lane that fails says so in its reason.
     """
     settings = Settings() if settings is None else settings
+    algorithm = PseudoArclength() if algorithm is None else algorithm
+    if algorithm.predictor.stations > 1:
+        raise ValueError(
+            f"{type(algorithm.predictor).__name__} predicts from several points, which "
+            "a batch does not keep; give the algorithm predictor=Tangent()"
+        )
+    if algorithm.least_norm:
+        raise ValueError(
+            f"{type(algorithm).__name__} corrects in no fixed plane, so that a batch "
+            "would not land on the bounds; use PseudoArclength()"
+        )
     leaf, name = pick(where, problem.parameters)
     low, high = checked_bounds(bounds, name)
     starts = np.asarray(states, float)
@@ -165,8 +180,8 @@ def follow_batch(
     z = np.concatenate([starts, p[:, None]], axis=1)
     signs = np.broadcast_to(np.asarray(direction, float), (lanes,))
     lane = run_lanes(
-        problem, given, Axes(axes), leaf, z, signs, np.asarray(low), np.asarray(high),
-        jax.tree.map(np.asarray, numbers_of(settings)), settings.max_iterations, points,
+        problem, algorithm, given, Axes(axes), leaf, z, signs, np.asarray(low),
+        np.asarray(high), as_traced(settings), settings.max_iterations, points,
     )  # fmt: skip
     lane = jax.tree.map(np.asarray, lane)
     passed = lane.passed

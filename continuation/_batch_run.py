@@ -1,6 +1,6 @@
 """The steps of many branches as one compiled program."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import equinox as eqx
 import jax
@@ -8,8 +8,9 @@ import jax.numpy as jnp
 from jaxtyping import PyTree
 
 from ._point import set_parameters, with_field
-from ._program import correct_, Corrected, scale_at
-from ._settings import Settings
+from ._predictors import Station
+from ._program import correct_, Corrected
+from ._step_control import way_between
 
 
 _RUNNING, _BOUND, _SHORT, _FULL, _NO_START = range(5)
@@ -39,35 +40,18 @@ class Axes(eqx.Module):
     tree: PyTree = eqx.field(static=True)
 
 
-class Numbers(NamedTuple):
-    """The settings that may differ between calls of one compiled program."""
-
-    tolerance: Any
-    iterations: Any
-    step: Any
-    min_step: Any
-    max_step: Any
-    angle: Any
-    max_angle: Any
-
-
-def numbers_of(s: Settings) -> Numbers:
-    """The numbers among the settings."""
-    return Numbers(
-        s.tolerance, float(s.iterations), s.step, s.min_step, s.max_step, s.angle,
-        s.max_angle,
-    )  # fmt: skip
-
-
 @eqx.filter_jit
 def run_lanes(
-    problem, given, axes, leaf, z, signs, low, high, s, max_iterations, points
-):
+    problem, algorithm, given, axes, leaf, z, signs, low, high, s, max_iterations,
+    points,
+):  # fmt: skip
     """All branches to their ends.
 
-    **Arguments:** the problem; parameters `given` to it, which differ between lanes by
-    `axes`, and the `leaf` that is followed; for each lane a point `z` and the sign of
-    its direction; bounds; `s` from `numbers_of`; and how many `points` at most.
+    **Arguments:** the problem, and an algorithm that predicts from one point;
+    parameters `given` to the problem, which differ between lanes by `axes`, and the
+    `leaf` that is followed; for each lane a point `z` and the sign of its direction;
+    bounds; settings, whose numbers are traced but for `max_iterations`; and how many
+    `points` at most.
 
     **Returns:** the last `Lane` of each branch.
     """
@@ -96,35 +80,31 @@ def run_lanes(
 
     def advance(parameters, lane: Lane) -> Lane:
         current = set_parameters(problem, parameters)
-        a = lane.at
-        scale = scale_at(current, leaf, a.z, width)
-        change = lane.step * a.tangent
+        a, control = lane.at, algorithm.control
+        tangent = a.tangent / a.scale / jnp.linalg.norm(a.tangent / a.scale)
+        stations = [Station(a.z / a.scale, tangent)]
+        change = algorithm.predictor(stations, lane.step) * a.scale - a.z
         target = a.z[-1] + change[-1]
         bound = jnp.where(change[-1] > 0, high, low)
         lands = (target > high) | (target < low)
         share = jnp.where(lands, (bound - a.z[-1]) / change[-1], 1.0)
         guess = a.z + share * change
         guess = guess.at[-1].set(jnp.where(lands, bound, guess[-1]))
-        across = jnp.zeros_like(scale).at[-1].set(1.0 / width)
-        normal = jnp.where(lands, across, a.tangent / scale**2)
+        across = jnp.zeros_like(a.z).at[-1].set(1.0 / width)
+        normal = jnp.where(lands, across, algorithm.normal(tangent) / a.scale)
         b = correct_(
             current, leaf, guess, normal, a.tangent, width, s.tolerance, max_iterations,
             False,
         )  # fmt: skip
         z = b.z.at[-1].set(jnp.where(lands, bound, b.z[-1]))
         b = with_field(b, "z", z)
-        old, new = a.tangent / b.scale, b.tangent / b.scale
-        cosine = jnp.dot(old, new) / (jnp.linalg.norm(old) * jnp.linalg.norm(new))
-        angle = jnp.arccos(jnp.clip(cosine, -1.0, 1.0))
-        moved = jnp.linalg.norm((z - guess) / scale)
+        way = way_between(a, b, guess)
+        refused = list(control.refusals(way, lane.step, s).values())
         inside = (low <= z[-1]) & (z[-1] <= high)
-        good = b.success & (angle <= s.max_angle) & (moved <= lane.step) & inside
-        effort = 2.0 ** ((s.iterations - b.iterations.astype(float)) / 2)
-        straight = s.angle / jnp.maximum(angle, 1e-3 * s.angle)
-        factor = jnp.clip(jnp.minimum(effort, straight), 0.5, 2.0)
-        step = jnp.where(
-            good, jnp.clip(lane.step * factor, s.min_step, s.max_step), lane.step / 2
-        )
+        finite = jnp.all(jnp.isfinite(b.tangent))
+        good = b.success & finite & inside & ~jnp.any(jnp.stack(refused))
+        following = control.next_step(way, lane.step, s)
+        step = jnp.where(good, following, lane.step / 2)
         count = lane.count + jnp.where(good, 1, 0)
         status = jnp.where(
             good & lands,

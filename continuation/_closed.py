@@ -41,7 +41,7 @@ class Past:
         """Keep a point that is no special one, with all its descriptions."""
         problem = with_parameter(problem, self.leaf, point.parameter)
         u, v = point.state, point.tangent[:-1]
-        for family, state, along in problem.copies(u, v):
+        for family, state, along in problem.representation.copies(u, v):
             passed = Passed(
                 np.append(state, point.parameter),
                 np.append(along, point.tangent[-1]),
@@ -54,7 +54,8 @@ class Past:
         self, current: Solution, following: Solution
     ) -> list[tuple[float, Passed]]:
         """Points beside the step, and which share of it lies before each."""
-        known = self.families.get(current.problem.family, [])
+        representation = current.problem.representation
+        known = self.families.get(representation.family, [])
         known = [p for p in known if p.z.shape == current.at.z.shape]
         if not known:
             return []
@@ -62,7 +63,7 @@ class Past:
         chord = (following.at.z - current.at.z) / scale
         length = float(np.linalg.norm(chord))
         states = np.stack([p.z for p in known])
-        states[:, :-1] = current.problem.brought_near(states[:, :-1], current.at.z[:-1])
+        states[:, :-1] = representation.brought_near(states[:, :-1], current.at.z[:-1])
         ago = current.arclength - np.array([p.arclength for p in known])
         way = (states - current.at.z) / scale
         share = way @ chord / length**2

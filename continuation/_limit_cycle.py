@@ -12,6 +12,7 @@ from jaxcam.hybrid.runge_kutta import DOPRI8, fixed_steps
 
 from ._point import with_field
 from ._problem import AbstractProblem, Stability, Start
+from .special import FLIP, flip_direction
 
 
 class LimitCycle(AbstractProblem):
@@ -38,6 +39,7 @@ class LimitCycle(AbstractProblem):
     basis: Any
     steps: int = eqx.field(static=True)
     stability: ClassVar[Stability] = "map"
+    normal_forms: ClassVar[bool] = False
 
     def __init__(
         self,
@@ -86,14 +88,10 @@ class LimitCycle(AbstractProblem):
         on_plane = monodromy @ self.basis
         return self.basis.T @ (on_plane - along @ on_plane)
 
-    @property
-    def normal_forms(self) -> bool:
-        return False
-
-    def observe(self, u: Float[Array, " n"], parameters: PyTree) -> dict[str, Array]:
+    def seen(self, u: Float[Array, " n"], parameters: PyTree):
         size = jnp.maximum(1.0, jnp.max(jnp.abs(u[:-1])))
         error = self._turn(u, parameters)[1] / size
-        return {"period": u[-1], "error": error}
+        return {}, {"period": u[-1], "error": error}
 
     def refreshed(self, u: np.ndarray, parameters: PyTree) -> "LimitCycle":
         x = np.asarray(u[:-1], float)
@@ -112,7 +110,10 @@ class LimitCycle(AbstractProblem):
             return "the period is not positive"
         return None
 
-    def doubled(self, point: Any, direction: np.ndarray) -> Start:
+    def transition(self, point: Any, at: Any) -> Start | None:
+        if point.kind != FLIP:
+            return None
+        direction = flip_direction(at.linearisation)
         twice = with_field(self, "steps", 2 * self.steps)
         state = np.append(point.state[:-1], 2 * point.state[-1])
         tangent = np.concatenate([np.asarray(self.basis) @ direction, [0.0, 0.0]])

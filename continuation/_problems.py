@@ -11,6 +11,8 @@ from jaxtyping import Array, Float, Int, PyTree
 
 from ._limit_cycle import cycle_at_hopf
 from ._problem import AbstractProblem, Stability, Start
+from ._representation import AbstractRepresentation
+from .special import FLIP, flip_direction, HOPF
 
 
 class Equations(AbstractProblem):
@@ -41,8 +43,12 @@ class Equilibrium(AbstractProblem):
     def residual(self, u: Float[Array, " n"], parameters: PyTree) -> Float[Array, " n"]:
         return self.vector_field(u, parameters)
 
-    def cycle(self, point: Any, matrix: np.ndarray) -> Start | None:
-        return cycle_at_hopf(self.vector_field, self.parameters, point, matrix)
+    def transition(self, point: Any, at: Any) -> Start | None:
+        if point.kind != HOPF:
+            return None
+        return cycle_at_hopf(
+            self.vector_field, self.parameters, point, at.linearisation
+        )
 
 
 class FixedPoint(AbstractProblem):
@@ -70,31 +76,22 @@ class FixedPoint(AbstractProblem):
         self.parameters = parameters
         self.period = jnp.asarray(period, jnp.int32)
 
-    def motion(self, u: Float[Array, " n"], parameters: PyTree) -> Float[Array, " n"]:
-        return jax.lax.fori_loop(
+    def residual(self, u: Float[Array, " n"], parameters: PyTree) -> Float[Array, " n"]:
+        moved = jax.lax.fori_loop(
             0, self.period, lambda _, u: self.map(u, parameters), u
         )
+        return moved - u
 
-    def residual(self, u: Float[Array, " n"], parameters: PyTree) -> Float[Array, " n"]:
-        return self.motion(u, parameters) - u
-
-    def doubled(self, point: Any, direction: np.ndarray) -> Start:
+    def transition(self, point: Any, at: Any) -> Start | None:
+        if point.kind != FLIP:
+            return None
+        direction = flip_direction(at.linearisation)
         twice = eqx.tree_at(lambda p: p.period, self, 2 * self.period)
         return Start(twice, point.state, point.parameter, np.append(direction, 0.0))
 
-    def copies(self, u, tangent):
-        found = [(self.family, u, tangent)]
-        for _ in range(int(self.period) - 1):
-            u, tangent = _mapped(self, u, tangent)
-            found.append((self.family, np.asarray(u), np.asarray(tangent)))
-        return found
-
-    def half_away(self, u, parameters):
-        if int(self.period) % 2:
-            return None
-        half = eqx.tree_at(lambda p: p.period, self, self.period // 2)
-        moved, scale = _moved(half, jnp.asarray(u), parameters)
-        return float(np.linalg.norm(np.asarray(moved) / np.asarray(scale)))
+    @property
+    def representation(self) -> "PeriodicPoints":
+        return PeriodicPoints(self.signature, self)
 
     @property
     def signature(self) -> str:
@@ -108,6 +105,32 @@ class FixedPoint(AbstractProblem):
                 "a map; take it up with the problem it was made with"
             )
         return FixedPoint(self.map, self.parameters, int(number))
+
+
+class PeriodicPoints(AbstractRepresentation):
+    """A periodic orbit of a map is each of its points."""
+
+    family: str = eqx.field(static=True)
+    problem: FixedPoint
+
+    def copies(self, u, tangent):
+        found = [(self.family, u, tangent)]
+        for _ in range(int(self.problem.period) - 1):
+            u, tangent = _mapped(self.problem, u, tangent)
+            found.append((self.family, np.asarray(u), np.asarray(tangent)))
+        return found
+
+    def brought_near(self, states, u):
+        del u
+        return states
+
+    def half_away(self, u, parameters):
+        problem = self.problem
+        if int(problem.period) % 2:
+            return None
+        half = eqx.tree_at(lambda p: p.period, problem, problem.period // 2)
+        moved, scale = _moved(half, jnp.asarray(u), parameters)
+        return float(np.linalg.norm(np.asarray(moved) / np.asarray(scale)))
 
 
 @eqx.filter_jit

@@ -12,9 +12,10 @@ from ._passed import located_between, sign_changes, special_here
 from ._point import Point, set_parameters, with_field, with_parameter
 from ._predictors import Station
 from ._problem import AbstractProblem
-from ._program import evaluate
+from ._program import Corrected, evaluate
 from ._solution import point_of, Solution, solution_at
-from ._step import Attempt, StepControl
+from ._step import attempt
+from ._step_control import Refusal
 from .special import ahead, BRANCH_POINT, Context, Located
 
 
@@ -37,7 +38,6 @@ class Run:
         self.algorithm = algorithm
         self.name = name
         self.direction = direction
-        self.control = StepControl(context.settings)
         self.label = 0
         self.pending: list[Point] = []
         self.past = Past(context.leaf)
@@ -143,9 +143,9 @@ class Run:
 
     def _advance(self, current: Solution) -> tuple[Solution | None, str]:
         """The next point, and why the branch ends with it; None: it ends before."""
-        step, control, failures = current.step, self.control, 0
+        step, failures = current.step, 0
         while True:
-            attempt = control.attempt(
+            attempted = attempt(
                 current.problem,
                 self.context,
                 self.algorithm,
@@ -154,10 +154,9 @@ class Run:
                 step,
                 self.name,
             )
-            refusal = attempt.refusal
-            if not refusal:
-                assert attempt.at is not None
-                following = self._moved(current, attempt, step)
+            refusal = attempted.refusal
+            if attempted.at is not None:
+                following = self._moved(current, attempted.at, attempted.following)
                 names = sign_changes(self.context, current, following)
                 passed = located_between(self.context, current, following, names)
                 doubt = self._doubt(current, passed)
@@ -173,10 +172,10 @@ class Run:
                     back = closed(self.context, self.past, current, following)
                     if back is not None:
                         return back
-                    return following, attempt.bound
+                    return following, attempted.bound
             # a bend says nothing of an end, and long steps fail for other reasons
             last = step / 2 < self.context.settings.min_step
-            failures += attempt.angle == 0 or not attempt.refusal
+            failures += attempted.refusal is not Refusal.TURNED
             if failures > _HALVINGS or last:
                 over = self._end_ahead(current, step)
                 if over is not None:
@@ -196,16 +195,14 @@ class Run:
             Station(z / scale, v / scale / np.linalg.norm(v / scale)) for z, v in trail
         ]
 
-    def _moved(self, current: Solution, attempt: Attempt, step: float) -> Solution:
-        at = attempt.at
-        assert at is not None
+    def _moved(self, current: Solution, at: Corrected, step: float) -> Solution:
         length = float(np.linalg.norm((at.z - current.at.z) / current.at.scale))
         trail = (*current.trail, (current.at.z, current.at.tangent))[-8:]
         following = solution_at(
             current.problem,
             self.context.leaf,
             at,
-            self.control.next_step(attempt, step),
+            step,
             current.arclength + length,
             trail,
         )
@@ -245,7 +242,7 @@ class Run:
             point, stood = found
             self.pending.append(point)
             if self._ends(current, name):
-                return self._transition(current, point)
+                return self._transition(current, point, stood)
             if self._joins(current, point):
                 return stood, JOINS
         return None
@@ -256,8 +253,9 @@ class Run:
         if point.kind != BRANCH_POINT:
             return False
         problem, parameters = current.problem, getattr(point.problem, "parameters")
-        before = problem.half_away(current.at.z[:-1], parameters)
-        away = problem.half_away(point.state, parameters)
+        half_away = problem.representation.half_away
+        before = half_away(current.at.z[:-1], parameters)
+        away = half_away(point.state, parameters)
         if before is None or away is None:
             return False
         return away < min(HALF, 1e-2 * before)
@@ -299,12 +297,12 @@ class Run:
             found = self._special(current, chord, name, located)
             if found is not None:
                 self.pending.append(found[0])
-                return self._transition(current, found[0])
+                return self._transition(current, *found)
         return None
 
-    def _transition(self, current: Solution, point: Point):
+    def _transition(self, current: Solution, point: Point, stood: Solution):
         """Go on with another problem behind a point, or end there."""
-        start = current.problem.transition(point)
+        start = current.problem.transition(point, stood.at)
         if start is None:
             return None, f"{point.kind} ends the branch"
         towards = current.at.tangent[-1]

@@ -1,6 +1,8 @@
 """Numbers that decide how a branch is walked, not what it is."""
 
 import equinox as eqx
+import jax
+import numpy as np
 
 
 class Settings(eqx.Module):
@@ -61,3 +63,11 @@ class Settings(eqx.Module):
             raise ValueError(
                 f"localise is {self.localise!r}; give 'auto', 'newton' or 'bracket'"
             )
+
+
+def as_traced(settings: Settings) -> Settings:
+    """The same with its floats as arrays, which one compiled program takes as they come
+    (a `Settings` with traced numbers is not checked again)."""
+    return jax.tree.map(
+        lambda x: np.asarray(x) if isinstance(x, float) else x, settings
+    )

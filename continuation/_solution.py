@@ -7,7 +7,7 @@ import numpy as np
 from ._point import Point, with_parameter
 from ._problem import AbstractProblem
 from ._program import Corrected
-from .special import Context, eigenvalues_at, is_stable, test_values
+from .special import Context, eigenvalues_at, is_stable, test_values, varied
 
 
 class Solution(NamedTuple):
@@ -69,7 +69,7 @@ def point_of(
         observed={k: np.asarray(v) for k, v in at.observed.items()},
         tests=dict(current.tests),
         signature=problem.signature,
-        parameters=(*problem.free(z[:-1]), float(z[-1])),
+        parameters=varied(problem, z),
         problem=with_parameter(problem, context.leaf, z[-1]),
         leaf=context.leaf,
     )

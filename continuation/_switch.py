@@ -14,7 +14,7 @@ from ._point import Branch, Point
 from ._problem import AbstractProblem, Start
 from ._program import evaluate
 from ._settings import Settings
-from .special import BRANCH_POINT, FLIP, HOPF, null_vectors, second
+from .special import BRANCH_POINT, FLIP, HOPF, second
 
 
 def emanating(point: Point, where: Where, width: float = 1.0) -> tuple[Start, ...]:
@@ -44,12 +44,7 @@ def emanating(point: Point, where: Where, width: float = 1.0) -> tuple[Start, ..
     if point.kind in (FLIP, HOPF):
         z = np.append(point.state, point.parameter)
         at = evaluate(problem, leaf, z, point.tangent, width, Settings())
-        if point.kind == FLIP:
-            one = np.eye(at.linearisation.shape[0])
-            right, _ = null_vectors(at.linearisation + one)
-            start = problem.doubled(point, right)
-        else:
-            start = problem.cycle(point, at.linearisation)
+        start = problem.transition(point, at)
     if start is None:
         raise ValueError(
             f"no branch is known to leave a {point.kind or 'regular'} point of this "
@@ -87,11 +82,11 @@ def switch(
 def _quadratic(problem: AbstractProblem, leaf: int, z, basis, left):
     """left . B(basis_i, basis_j) of G(u, parameter)."""
 
-    def g(z, _):
+    def g(z):
         return problem.residual(z[:-1], with_leaf(problem.parameters, leaf, z[-1]))
 
     def entry(a, b):
-        return jnp.dot(left, second(g, z, None, a, b))
+        return jnp.dot(left, second(g, z, a, b))
 
     return jax.vmap(lambda a: jax.vmap(lambda b: entry(a, b))(basis))(basis)
 

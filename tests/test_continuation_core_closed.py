@@ -97,14 +97,14 @@ class Chart(continuation.AbstractProblem):
         first = u[:1] ** 2 + parameters["mu"] ** 2 - 1.0
         return first if self.above else jnp.append(first, u[1] - 2 * u[0])
 
-    def monitor(self, u, parameters):
+    def seen(self, u, parameters):
         del parameters
-        return {"edge": u[0] if self.above else -u[0]}
+        return {"edge": u[0] if self.above else -u[0]}, {}
 
     def monitors(self):
         return {"edge": Monitor("edge", ends=True)}
 
-    def transition(self, point):
+    def transition(self, point, at):
         other = Chart(point.problem.parameters, not self.above)
         state = np.zeros(2 if self.above else 1)
         sign = 1.0 if other.above else -1.0

@@ -203,8 +203,8 @@ class Level(continuation.AbstractProblem):
     def residual(self, u, parameters):
         return u - parameters["mu"]
 
-    def monitor(self, u, parameters):
-        return {"level": u[0] - parameters["b"] ** 2}
+    def seen(self, u, parameters):
+        return {"level": u[0] - parameters["b"] ** 2}, {}
 
     def monitors(self):
         return {"level": continuation.Monitor("crossing")}

@@ -151,16 +151,16 @@ class Shelf(continuation.AbstractProblem):
             return jnp.where(u < 1.0, u - parameters["mu"], jnp.nan)
         return u - 2.0 * parameters["mu"] + 1.0
 
-    def monitor(self, u, parameters):
+    def seen(self, u, parameters):
         if not self.lower:
-            return {}
-        return {"room": jnp.where(u[0] <= 1.0, 1.0 - u[0], jnp.nan)}
+            return {}, {}
+        return {"room": jnp.where(u[0] <= 1.0, 1.0 - u[0], jnp.nan)}, {}
 
     def monitors(self):
         edge = continuation.Monitor("edge", ends=True)
         return {"room": edge} if self.lower else {}
 
-    def transition(self, point):
+    def transition(self, point, at):
         return continuation.Start(
             Shelf(point.problem.parameters, False), point.state, point.parameter
         )

@@ -131,7 +131,7 @@ def lowest_gap(exact, state):
     return gap[100:-100].min()
 
 
-def test_monitors_by_number_are_those_by_name():
+def test_monitors_by_a_traced_number_are_those_by_a_whole_one():
     # five periods from impact to impact, so that the gap has minima on the way
     exact = Exact(2.8, 0.8, 1)
     once, row = exact.problem((exact.fold + exact.flip) / 2)
@@ -139,18 +139,15 @@ def test_monitors_by_number_are_those_by_name():
     # no orbit, so that the two halves differ
     u = jnp.asarray(np.concatenate([row, row + [5.0, 0.01, 0.02]]))
 
-    def by_name(u):
-        values = twice.monitor(u, twice.parameters)
-        return jnp.stack([values[name] for name in twice.monitors()])
+    def one_by_one(u):
+        return jnp.stack([twice.watched(k, u, twice.parameters) for k in range(4)])
 
     def by_number(u):
-        return jax.vmap(lambda k: twice.watched_by_number(k, u, twice.parameters))(
-            jnp.arange(4)
-        )
+        return jax.vmap(lambda k: twice.watched(k, u, twice.parameters))(jnp.arange(4))
 
     found = [
         jax.jit(lambda u, f=f: (f(u), jax.jacfwd(f)(u)))(u)
-        for f in (by_name, by_number)
+        for f in (one_by_one, by_number)
     ]
     for a, b in zip(*found, strict=True):
         assert len(np.unique(np.round(a, 12), axis=0)) == 4

@@ -67,6 +67,8 @@ class StickingOrbits(AbstractProblem):
     """
 
     stability: ClassVar[Stability] = "map"
+    normal_forms: ClassVar[bool] = False
+    detects: ClassVar[bool] = False
 
     parameters: HybridSystem
     periods: int = eqx.field(static=True, default=1)
@@ -88,26 +90,15 @@ class StickingOrbits(AbstractProblem):
         del parameters, jacobian
         return jnp.zeros((u.shape[0] - 1, u.shape[0] - 1))
 
-    @property
-    def normal_forms(self) -> bool:
-        return False
-
-    @property
-    def detects(self) -> bool:
-        return False
-
     def _frame(self, u, system) -> ChatterFrame:
         return frame_at(system, u[0] * system.period, u[1:])
 
-    def watched(self, name: str, u, parameters) -> Float[Array, ""]:
+    def watched(self, number, u, parameters) -> Float[Array, ""]:
         system = parameters.prepared()
         frame = self._frame(u, system)
-        if name == DETACHMENT:
+        if list(self.monitors())[number] == DETACHMENT:
             return frame.jerk * system.period**3
         return -interruption_margin(system, frame, self.periods)
-
-    def monitor(self, u, parameters) -> dict[str, Float[Array, ""]]:
-        return self.seen(u, parameters)[0]
 
     def monitors(self) -> Mapping[str, Monitor]:
         return {
@@ -115,12 +106,9 @@ class StickingOrbits(AbstractProblem):
             DETACHMENT: Monitor("beginning of impacts", ends=True),
         }
 
-    def observe(self, u, parameters) -> dict[str, Array]:
-        """Period, release, accumulation and sticking time (s), impacts listed; the
-        states at whole forcing periods, `(periods, 2)`."""
-        return self.seen(u, parameters)[1]
-
     def seen(self, u, parameters):
+        """Observed: period, release, accumulation and sticking time (s), impacts
+        listed; the states at whole forcing periods, `(periods, 2)`."""
         system = parameters.prepared()
         period = jnp.asarray(system.period, dtype=jnp.float64)
         turn = orbit_from(system, self._frame(u, system), self.periods)
@@ -150,7 +138,8 @@ class StickingOrbits(AbstractProblem):
             return "contact is made, not released, at this zero of its acceleration"
         return None
 
-    def transition(self, point: Any) -> Start | None:
+    def transition(self, point: Any, at: Any) -> Start | None:
+        del at
         if self.beyond and point.kind == self.monitors()[CHATTER].kind:
             return orbit_behind(point, self.periods)
         return None

@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from typing import Any, ClassVar
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
@@ -13,9 +12,11 @@ from jaxcam.hybrid import HybridSystem
 from variational import orbits
 from variational.orbits import inadmissible, Shooting
 
-from .._problem import AbstractProblem, Monitor, Stability, Start
+from .._problem import AbstractProblem, LocalMap, Monitor, Stability, Start
+from ..special import FLIP
+from ._impact_sequences import ImpactSequences
 from ._orbit_grazing import orbit_grazing
-from ._run_twice import away_from_half, rotations, run_twice
+from ._run_twice import run_twice
 from ._shooting_graze import multipliers_of
 from ._watched import Watched, watched_of
 
@@ -40,6 +41,7 @@ class ImpactingOrbits(AbstractProblem):
     """
 
     stability: ClassVar[Stability] = "map"
+    costly: ClassVar[bool] = True
 
     parameters: HybridSystem
     constraints: tuple[int, ...] = eqx.field(static=True)
@@ -83,12 +85,13 @@ class ImpactingOrbits(AbstractProblem):
             return matrix
         return orbits.return_map(self.equations, u, parameters, matrix)
 
-    def local_jacobian(self, u, parameters):
-        """Of the map from the first impact to the one a period later.
+    def local_map(self, u, parameters) -> LocalMap:
+        """From the first impact to the one a period later.
 
         In its phase and the state after it, without forcing in the state alone.
         """
-        return orbits.around_the_period(self.equations, u, parameters)
+        jacobian, at = orbits.around_the_period(self.equations, u, parameters)
+        return LocalMap(at, None, jacobian)
 
     def derivatives(self, u, p, parameters_at):
         """Both from one Jacobian of each flight."""
@@ -99,46 +102,30 @@ class ImpactingOrbits(AbstractProblem):
         )
         return whole, self._returned(u, parameters_at(p), matrix)
 
-    @property
-    def costly(self) -> bool:
-        return True
-
     # -- what to watch
 
-    def monitor(self, u, parameters) -> dict[str, Float[Array, ""]]:
-        names = list(self.monitors())
-        values = jax.vmap(lambda k: self.watched_by_number(k, u, parameters))(
-            jnp.arange(len(names))
-        )
-        return dict(zip(names, values, strict=True))
-
     def monitors(self) -> Mapping[str, Monitor]:
-        names = watched_of(len(self.constraints))
-        return {name: Monitor(kind="grazing", ends=True) for name in names}
-
-    def vanishing_with(self, name: str) -> tuple[str, ...]:
-        """The gaps of the flights beside an impact without speed."""
         m = len(self.constraints)
-        what, number = watched_of(m)[name]
-        if what == "gap":
-            return ()
-        return Watched("gap", (number - 1) % m).name, Watched("gap", number).name
 
-    def watched(self, name: str, u, parameters) -> Float[Array, ""]:
-        what, number = watched_of(len(self.constraints))[name]
-        if what == "speed":
-            return self.equations.approach(u, parameters)[number]
-        return self.watched_by_number(jnp.asarray(number), u, parameters)
+        def monitor(one: Watched) -> Monitor:
+            if one.what == "gap":
+                return Monitor("grazing", ends=True)
+            # so are the gaps of the flights beside an impact without speed
+            beside = ((one.number - 1) % m, one.number)
+            names = tuple(Watched("gap", k).name for k in beside)
+            return Monitor("grazing", ends=True, vanishing=names)
 
-    def watched_by_number(self, number, u, parameters) -> Float[Array, ""]:
-        return self.equations.gap_or_speed(number, u, parameters)
+        return {name: monitor(one) for name, one in watched_of(m).items()}
 
-    def observe(self, u, parameters) -> dict[str, Array]:
-        """Period (s); time (s) and state after the first impact; integration error;
-        with forcing, the states at whole forcing periods, `(periods, n)`."""
-        return self.seen(u, parameters)[1]
+    def watched(self, number, u, parameters) -> Float[Array, ""]:
+        flights = max(len(self.constraints), 1)
+        if isinstance(number, int) and number >= flights:
+            return self.equations.approach(u, parameters)[number - flights]
+        return self.equations.gap_or_speed(jnp.asarray(number), u, parameters)
 
     def seen(self, u, parameters):
+        """Observed: period (s); time (s) and state after the first impact; integration
+        error; with forcing, the states at whole forcing periods, `(periods, n)`."""
         equations = self.equations
         seen = equations.seen(u, parameters)
         start = equations.flights(u, parameters)[0][0]
@@ -178,11 +165,13 @@ class ImpactingOrbits(AbstractProblem):
     def check(self, point: Any) -> str | None:
         return self.refused(point.tests, point.observed)
 
-    def transition(self, point: Any) -> Start | None:
+    def transition(self, point: Any, at: Any) -> Start | None:
+        del at
+        if point.kind == FLIP:
+            return self._doubled(point)
         return orbit_grazing(self, point)
 
-    def doubled(self, point: Any, direction) -> Start | None:
-        del direction
+    def _doubled(self, point: Any) -> Start:
         u = jnp.asarray(point.state)
         parameters = point.problem.parameters
         matrix = np.asarray(_antiperiodic(self.equations, u, parameters))
@@ -200,33 +189,13 @@ class ImpactingOrbits(AbstractProblem):
     def eigenvalues(self, u, parameters, at):
         return multipliers_of(self.equations, u, parameters, at)
 
-    def copies(self, u, tangent):
-        hits, m = self.constraints, len(self.constraints)
-        if not hits:
-            return [(self.family, u, tangent)]
-        states = rotations(self, u)
-        tangents = rotations(self, tangent, rate=True)
-        return [
-            (self._family(hits[k:] + hits[:k]), states[k], tangents[k])
-            for k in range(m)
-        ]
-
-    def brought_near(self, states, u):
-        if not (self.periods and self.constraints):
-            return states
-        # a motion repeats after whole periods of the forcing
-        phases = np.zeros(u.size)
-        phases[:: 1 + self.dimension] = 1.0
-        return states + np.round(u[0] - states[:, :1]) * phases
-
-    def half_away(self, u, parameters):
-        return away_from_half(self, u, parameters)
-
     @property
-    def family(self) -> str:
-        return self._family(self.constraints)
+    def representation(self) -> "ImpactSequences":
+        """An orbit is written down from each of its impacts on."""
+        return ImpactSequences(self.sequence(self.constraints), self)
 
-    def _family(self, constraints: tuple[int, ...]) -> str:
+    def sequence(self, constraints: tuple[int, ...]) -> str:
+        """The family of orbits with these impacts, in this order."""
         # two numbers of steps differ by the error of the integration
         return f"impacts {constraints} periods {self.periods}"
 

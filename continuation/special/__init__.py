@@ -1,5 +1,6 @@
 """Special points of a branch: seen, located, and their normal forms."""
 
+from ._extended import varied as varied
 from ._locate import (
     ahead as ahead,
     between as between,
@@ -11,7 +12,10 @@ from ._locate import (
 )
 from ._monitor_points import MonitorPoints as MonitorPoints
 from ._multilinear import second as second
-from ._normal_forms import normal_form as normal_form, null_vectors as null_vectors
+from ._normal_forms import (
+    flip_direction as flip_direction,
+    normal_form as normal_form,
+)
 from ._singular_points import SingularPoints as SingularPoints
 from ._test_functions import (
     BRANCH_POINT as BRANCH_POINT,

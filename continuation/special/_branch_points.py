@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Array, Float, PyTree
 
 from .._parameter import with_leaf
-from .._problem import AbstractProblem, Stability
+from .._problem import AbstractProblem, jacobian_of, Stability
 from .._program import evaluate, residual_at, solve
 from .._settings import Settings
 
@@ -48,7 +48,7 @@ class BranchPoints(AbstractProblem):
             return self.base.residual(inner, with_leaf(parameters, self.leaf, p))
 
         value = g(inner, p)
-        j_u = self.base.jacobian(inner, with_leaf(parameters, self.leaf, p))
+        j_u = jacobian_of(self.base, inner, with_leaf(parameters, self.leaf, p))
         _, j_p = jax.jvp(lambda p: g(inner, p), (p,), (jnp.ones_like(p),))
         rest = jnp.stack([psi @ j_p, psi @ psi - 1.0])
         return jnp.concatenate([value + slack * psi, psi @ j_u, rest])

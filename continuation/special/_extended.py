@@ -4,12 +4,11 @@ from typing import ClassVar
 
 import equinox as eqx
 import jax.numpy as jnp
-import numpy as np
 from jaxtyping import Array, Float, PyTree
 
 from .._parameter import with_leaf
 from .._point import Point, replace
-from .._problem import AbstractProblem, Stability
+from .._problem import AbstractProblem, jacobian_of, Stability
 
 
 class AbstractExtended(AbstractProblem):
@@ -21,40 +20,25 @@ class AbstractExtended(AbstractProblem):
     width: eqx.AbstractVar[Array]
     bounds: eqx.AbstractVar[Array]
     stability: ClassVar[Stability] = "none"
+    normal_forms: ClassVar[bool] = False
+    detects: ClassVar[bool] = False
 
     @property
     def parameters(self) -> PyTree:
         return self.base.parameters
-
-    @property
-    def detects(self) -> bool:
-        return False
-
-    @property
-    def normal_forms(self) -> bool:
-        return False
 
     def inside(self, u, parameters):
         """Unknowns and parameters of the problem inside."""
         return u[:-1], with_leaf(parameters, self.leaf, u[-1])
 
     def linearisation(self, u: Float[Array, " n"], parameters: PyTree, jacobian):
-        del jacobian
         inner, inside = self.inside(u, parameters)
-        return self.base.linearisation(inner, inside, self.base.jacobian(inner, inside))
-
-    def monitor(self, u: Float[Array, " n"], parameters: PyTree) -> dict[str, Array]:
-        return self.seen(u, parameters)[0]
-
-    def observe(self, u: Float[Array, " n"], parameters: PyTree) -> dict[str, Array]:
-        return self.base.observe(*self.inside(u, parameters))
+        jacobian = jacobian_of(self.base, inner, inside)
+        return self.base.linearisation(inner, inside, jacobian)
 
     def scale(self, u: Float[Array, " n"], parameters: PyTree):
         sizes = self.base.scale(*self.inside(u, parameters))
         return jnp.concatenate([sizes, jnp.reshape(self.width, (1,))])
-
-    def free(self, u: np.ndarray) -> tuple[float, ...]:
-        return (*self.base.free(u[:-1]), float(u[-1]))
 
     def limits(self) -> dict[int, tuple[float, float]]:
         return {
@@ -74,3 +58,9 @@ class AbstractExtended(AbstractProblem):
     def monitor_of_base(self, name: str) -> str:
         """What a monitor of the problem inside is called here."""
         return name
+
+
+def varied(problem: AbstractProblem, z) -> tuple[float, ...]:
+    """Values of the parameters that vary, at z = (u, parameter): two on a curve."""
+    first = (float(z[-2]),) if isinstance(problem, AbstractExtended) else ()
+    return *first, float(z[-1])

@@ -24,7 +24,8 @@ class MonitorPoints(AbstractExtended):
 
     def residual(self, u: Float[Array, " n"], parameters: PyTree):
         inner, inside = self.inside(u, parameters)
-        value = self.base.watched(self.name, inner, inside)
+        number = list(self.base.monitors()).index(self.name)
+        value = self.base.watched(number, inner, inside)
         return jnp.append(self.base.residual(inner, inside), value)
 
     def seen(self, u: Float[Array, " n"], parameters: PyTree):
@@ -33,7 +34,7 @@ class MonitorPoints(AbstractExtended):
 
     def monitors(self) -> dict[str, Monitor]:
         own = self.base.monitors()[self.name]
-        silent = (self.name, *self.base.vanishing_with(self.name))
+        silent = (self.name, *self.base.monitors()[self.name].vanishing)
         return {
             name: Monitor(f"{own.kind}-{other.kind}", ends=other.ends)
             for name, other in self.base.monitors().items()
@@ -49,14 +50,14 @@ class MonitorPoints(AbstractExtended):
 class MonitorLevel(AbstractProblem):
     """The point (u, parameter) on a branch where a monitor has some value.
 
-    The number of the monitor is an array where the problem can do with that, so that
+    The number of the monitor is an array where no derivative of one is costly, so that
     one program finds the zeros of all.
     """
 
     base: AbstractProblem
     leaf: int = eqx.field(static=True)
     width: Array
-    which: str | Array
+    number: int | Array
     level: Array
     stability: ClassVar[Stability] = "none"
 
@@ -66,10 +67,7 @@ class MonitorLevel(AbstractProblem):
 
     def residual(self, u: Float[Array, " n"], parameters: PyTree):
         inner, inside = u[:-1], with_leaf(parameters, self.leaf, u[-1])
-        if isinstance(self.which, str):
-            value = self.base.watched(self.which, inner, inside)
-        else:
-            value = self.base.watched_by_number(self.which, inner, inside)
+        value = self.base.watched(self.number, inner, inside)
         return jnp.append(self.base.residual(inner, inside), value - self.level)
 
     def scale(self, u: Float[Array, " n"], parameters: PyTree):
@@ -86,7 +84,8 @@ def monitor_level(
     problem: AbstractProblem, name: str, leaf: int, width, level: float = 0.0
 ) -> MonitorLevel:
     """The problem of the point where a monitor has this value."""
-    which: Any = name
-    if type(problem).watched_by_number is not AbstractProblem.watched_by_number:
-        which = np.asarray(list(problem.monitors()).index(name))
-    return _level(problem, leaf, np.asarray(width), which, np.asarray(level))
+    monitors = problem.monitors()
+    number: Any = list(monitors).index(name)
+    if not any(monitor.bracket for monitor in monitors.values()):
+        number = np.asarray(number)
+    return _level(problem, leaf, np.asarray(width), number, np.asarray(level))

@@ -3,15 +3,15 @@
 import jax
 
 
-def second(function, u, parameters, a, b):
-    """B(a, b), the second derivative with respect to u."""
+def second(function, u, a, b):
+    """B(a, b), the second derivative at u."""
 
     def first(u):
-        return jax.jvp(lambda u: function(u, parameters), (u,), (a,))[1]
+        return jax.jvp(function, (u,), (a,))[1]
 
     return jax.jvp(first, (u,), (b,))[1]
 
 
-def third(function, u, parameters, a, b, c):
-    """C(a, b, c), the third derivative with respect to u."""
-    return jax.jvp(lambda u: second(function, u, parameters, a, b), (u,), (c,))[1]
+def third(function, u, a, b, c):
+    """C(a, b, c), the third derivative at u."""
+    return jax.jvp(lambda u: second(function, u, a, b), (u,), (c,))[1]

@@ -13,7 +13,7 @@ from .._program import Corrected, evaluate
 from .._settings import Settings
 from ._differences import along, STEPS
 from ._multilinear import second, third
-from ._test_functions import FLIP, FOLD, HOPF, NEIMARK_SACKER
+from ._test_functions import FLIP, FOLD, has_own_map, HOPF, NEIMARK_SACKER
 
 
 # largest displacement for differences, of a component of a state or phase
@@ -23,22 +23,22 @@ _REACH = 2.0**-7
 @eqx.filter_jit
 def _b(problem, parameters, u, a, b, of_residual: bool):
     if of_residual:
-        return second(problem.residual, u, parameters, a, b)
-    motion, y = problem.local_motion(u, parameters)
-    return second(lambda y, _: motion(y), y, None, a, b)
+        return second(lambda u: problem.residual(u, parameters), u, a, b)
+    local = problem.local_map(u, parameters)
+    return second(local.motion, local.at, a, b)
 
 
 @eqx.filter_jit
 def _c(problem, parameters, u, a, b, c):
-    motion, y = problem.local_motion(u, parameters)
-    return third(lambda y, _: motion(y), y, None, a, b, c)
+    local = problem.local_map(u, parameters)
+    return third(local.motion, local.at, a, b, c)
 
 
 @eqx.filter_jit
 def _jacobians(problem, parameters, u, moves):
-    """The Jacobian of the local motion next to a solution, displaced by these."""
-    jacobian, y = problem.local_jacobian(u, parameters)
-    return jax.lax.map(lambda move: jacobian(y + move), moves)
+    """The Jacobian of the local map next to a solution, displaced by these."""
+    local = problem.local_map(u, parameters)
+    return jax.lax.map(lambda move: local.jacobian(local.at + move), moves)
 
 
 def _parts(x: Any):
@@ -66,10 +66,10 @@ class _Derivatives:
         self.u = jnp.asarray(z[:-1])
 
     def a(self, at: Corrected) -> np.ndarray:
-        if not has_own_motion(self.problem):
+        if not has_own_map(self.problem):
             return at.linearisation
         y = jax.eval_shape(
-            lambda u: self.problem.local_jacobian(u, self.parameters)[1], self.u
+            lambda u: self.problem.local_map(u, self.parameters).at, self.u
         )
         # as many as differences take, so that it is the same program
         return self._jacobians(np.zeros((2 * STEPS + 1, y.size)))[0]
@@ -140,15 +140,6 @@ class _Derivatives:
         )  # fmt: skip
 
 
-def has_own_motion(problem: AbstractProblem) -> bool:
-    """Whether normal forms are those of another map than the linearisation is of."""
-    kind, base = type(problem), AbstractProblem
-    return (
-        kind.local_motion is not base.local_motion
-        or kind.local_jacobian is not base.local_jacobian
-    )
-
-
 def _eigen(matrix: np.ndarray) -> tuple[Any, Any]:
     """Complex eigenvalues and eigenvectors."""
     values, vectors = np.linalg.eig(matrix)
@@ -159,6 +150,11 @@ def null_vectors(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Unit right and left null vectors of a nearly singular matrix."""
     left, _, right = np.linalg.svd(matrix)
     return right[-1].conj(), left[:, -1]
+
+
+def flip_direction(linearisation: np.ndarray) -> np.ndarray:
+    """Unit eigenvector of the multiplier -1."""
+    return null_vectors(linearisation + np.eye(linearisation.shape[0]))[0]
 
 
 def fold_form(d: _Derivatives, at: Corrected) -> tuple[float | None, str]:
@@ -173,7 +169,7 @@ def fold_form(d: _Derivatives, at: Corrected) -> tuple[float | None, str]:
     words = f"the branch lies at {side} parameters"
     if problem.stability == "none":
         return None, words
-    if has_own_motion(problem):
+    if has_own_map(problem):
         a = d.a(at)
         right, left = null_vectors(a - np.eye(a.shape[0]))
         bending = float(left @ d.b(right, right))

@@ -9,7 +9,7 @@ from jaxtyping import Array, Float, PyTree
 
 from .._parameter import with_leaf
 from .._point import set_parameters, with_field
-from .._problem import AbstractProblem, Monitor, Stability
+from .._problem import AbstractProblem, jacobian_of, Monitor, Stability
 from ._bialternate import (
     additive,
     determinant_on_plane,
@@ -18,7 +18,7 @@ from ._bialternate import (
 )
 from ._extended import AbstractExtended
 from ._multilinear import second, third
-from ._test_functions import FLIP, FOLD, HOPF, NEIMARK_SACKER
+from ._test_functions import FLIP, FOLD, has_own_map, HOPF, NEIMARK_SACKER
 
 
 # pairs of eigenvalues beside a critical one are watched up to this dimension
@@ -27,7 +27,7 @@ _LARGEST_FOR_PAIRS = 8
 
 def singular_matrix(problem, kind: str, u, parameters):
     """The matrix that is singular at this kind of point."""
-    jacobian = problem.jacobian(u, parameters)
+    jacobian = jacobian_of(problem, u, parameters)
     if kind == FOLD:
         return jacobian
     a = problem.linearisation(u, parameters, jacobian)
@@ -131,7 +131,7 @@ class SingularPoints(AbstractExtended):
                 if small and n >= 3:
                     names["pair"] = "fold-Neimark-Sacker"
         elif self.kind == FLIP:
-            if self.base.normal_forms and not self.base.costly:
+            if self.base.normal_forms and not has_own_map(self.base):
                 names["degenerate"] = "generalized flip"
             names["double"] = "1:2 resonance"
             names["other"] = "fold-flip"
@@ -159,21 +159,21 @@ class SingularPoints(AbstractExtended):
         wanted = self.monitors()
         inner, inside = self.inside(u, parameters)
         base = self.base
-        a = base.linearisation(inner, inside, base.jacobian(inner, inside))
+        a = base.linearisation(inner, inside, jacobian_of(base, inner, inside))
         one = jnp.eye(a.shape[0], dtype=a.dtype)
         right, left = self.null_vectors(u, parameters)
         values = {}
         if self.kind == FOLD:
-            values["cusp"] = left @ second(base.residual, inner, inside, right, right)
+            bent = second(lambda u: base.residual(u, inside), inner, right, right)
+            values["cusp"] = left @ bent
             values["double"] = left @ right
             values["other"] = jnp.linalg.det(a + one)
         elif self.kind == FLIP:
             values["double"] = left @ right
             values["other"] = jnp.linalg.det(a - one)
             if "degenerate" in wanted:
-                values["degenerate"] = flip_coefficient(
-                    base.motion, inner, inside, a, right, left
-                )
+                motion = base.local_map(inner, inside).motion
+                values["degenerate"] = flip_coefficient(motion, inner, a, right, left)
         elif self.kind == HOPF:
             values["double"] = determinant_on_plane(a, right)
             values["other"] = jnp.linalg.det(a) / values["double"]
@@ -195,7 +195,7 @@ class SingularPoints(AbstractExtended):
         return {name: values[name] for name in wanted}, observed
 
 
-def flip_coefficient(motion, u, parameters, a, right, left):
+def flip_coefficient(motion, u, a, right, left):
     """Coefficient c of the flip's normal form x -> -x + c x^3, times left . right and
     the determinant of A - I.
 
@@ -203,8 +203,8 @@ def flip_coefficient(motion, u, parameters, a, right, left):
     where c has poles.
     """
     one = jnp.eye(a.shape[0], dtype=a.dtype)
-    bqq = second(motion, u, parameters, right, right)
+    bqq = second(motion, u, right, right)
     inner = jnp.linalg.solve(a - one, bqq)
-    c = third(motion, u, parameters, right, right, right)
-    c = left @ (c - 3 * second(motion, u, parameters, right, inner)) / 6
+    c = third(motion, u, right, right, right)
+    c = left @ (c - 3 * second(motion, u, right, inner)) / 6
     return c * jnp.linalg.det(a - one)

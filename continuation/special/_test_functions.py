@@ -28,6 +28,11 @@ def kinds(problem: AbstractProblem) -> tuple[str, ...]:
     return common + more[problem.stability]
 
 
+def has_own_map(problem: AbstractProblem) -> bool:
+    """Whether normal forms are those of another map than the linearisation is of."""
+    return type(problem).local_map is not AbstractProblem.local_map
+
+
 def test_values(problem: AbstractProblem, leaf: int, at: Corrected) -> dict[str, float]:
     """Values of all test functions at a point.
 

@@ -1,0 +1,41 @@
+"""The ways in which an orbit with impacts can be written down."""
+
+from typing import Any
+
+import equinox as eqx
+import numpy as np
+
+from .._representation import AbstractRepresentation
+from ._run_twice import away_from_half, rotations
+
+
+class ImpactSequences(AbstractRepresentation):
+    """An orbit with m impacts begins at each of them, and m unknowns are times."""
+
+    family: str = eqx.field(static=True)
+    #: an `ImpactingOrbits`
+    problem: Any
+
+    def copies(self, u, tangent):
+        problem = self.problem
+        hits, m = problem.constraints, len(problem.constraints)
+        if not hits:
+            return [(self.family, u, tangent)]
+        states = rotations(problem, u)
+        tangents = rotations(problem, tangent, rate=True)
+        return [
+            (problem.sequence(hits[k:] + hits[:k]), states[k], tangents[k])
+            for k in range(m)
+        ]
+
+    def brought_near(self, states, u):
+        problem = self.problem
+        if not (problem.periods and problem.constraints):
+            return states
+        # a motion repeats after whole periods of the forcing
+        phases = np.zeros(u.size)
+        phases[:: 1 + problem.dimension] = 1.0
+        return states + np.round(u[0] - states[:, :1]) * phases
+
+    def half_away(self, u, parameters):
+        return away_from_half(self.problem, u, parameters)

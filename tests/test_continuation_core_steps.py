@@ -1,0 +1,113 @@
+"""Step control: what steps are taken, and that branches and batches agree on it."""
+
+from typing import Any, ClassVar
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import continuation
+from continuation import (
+    AbstractStepControl,
+    EffortAndAngle,
+    Natural,
+    PseudoArclength,
+    Refusal,
+    Secant,
+    Settings,
+    Tangent,
+    Way,
+)
+
+
+def mu(parameters):
+    return parameters["mu"]
+
+
+def parabola(u, parameters):
+    return parameters["mu"] - u * u
+
+
+def leap(u, parameters):
+    """Two lines, and nothing between them: u = 0 and, from mu = 0.5 on, u = 10."""
+    return u - jnp.where(parameters["mu"] < 0.5, 0.0, 10.0)
+
+
+class Short(AbstractStepControl):
+    """Steps of one length, whatever happened."""
+
+    kept: ClassVar[float] = 0.03
+
+    def refusals(self, way: Way, step: Any, settings: Settings):
+        return {Refusal.TURNED: way.angle > settings.max_angle}
+
+    def next_step(self, way: Way, step: Any, settings: Settings):
+        return 0 * step + self.kept
+
+
+def test_length_follows_effort_and_angle():
+    """Twice the step at most, half at least; by sqrt 2 for each iteration."""
+    control, settings = EffortAndAngle(), Settings(max_step=1.0)
+
+    def factor(iterations, angle):
+        way = Way(np.float64(iterations), np.float64(0.0), np.float64(angle))
+        return control.next_step(way, 0.01, settings) / 0.01
+
+    aimed = settings.iterations
+    assert factor(aimed, settings.angle) == pytest.approx(1.0)
+    assert factor(aimed - 1, 1e-9) == pytest.approx(2**0.5)
+    assert factor(aimed, 1.25 * settings.angle) == pytest.approx(0.8)
+    assert factor(0, 1e-9) == 2.0
+    assert factor(settings.max_iterations + 4, 1.0) == 0.5
+
+
+def test_a_correction_longer_than_the_step_is_refused():
+    """The branch ends at the discontinuity instead of leaping over it."""
+    branch = continuation.branch(
+        continuation.Equations(leap, {"mu": 0.0}), [0.0], mu, (-1.0, 1.0)
+    )
+    assert np.max(np.abs(branch.states)) == 0.0
+    assert branch.parameters.max() == pytest.approx(0.5, abs=1e-6)
+    assert Refusal.FARTHER in branch.reason
+
+
+@pytest.mark.parametrize(
+    "algorithm",
+    [
+        PseudoArclength(),
+        PseudoArclength(control=Short()),
+        Natural(predictor=Tangent(), component="fastest"),
+    ],
+    ids=["arclength", "own control", "fastest component"],
+)
+def test_batch_takes_the_steps_of_a_branch(algorithm):
+    """The same points to 1e-9 for the same algorithm, around a fold."""
+    problem = continuation.Equilibrium(parabola, {"mu": 1.0})
+    bounds, settings = (-1.0, 2.0), Settings(special=False, max_points=60)
+    branch = continuation.branch(
+        problem, [-1.0], mu, bounds, algorithm, settings=settings, direction=-1
+    )
+    batch = continuation.follow_batch(
+        problem, [[-1.0], [1.0]], mu, bounds, algorithm,
+        settings=settings, direction=-1, points=60,
+    )  # fmt: skip
+    n = min(len(branch.regular), int(batch.count[0]))
+    assert n > 30
+    states, parameters = batch.states[0, :n], batch.parameters[0, :n]
+    np.testing.assert_allclose(states, branch.states[:n], atol=1e-9)
+    np.testing.assert_allclose(parameters, branch.parameters[:n], atol=1e-9)
+    # both sides of the fold
+    assert states.min() < -0.9 and states.max() > 0.1
+    if isinstance(algorithm.control, Short):
+        steps = np.array([point.step for point in branch.regular])[1:-1]
+        assert steps == pytest.approx(Short.kept)
+
+
+def test_what_a_batch_cannot_follow_with_is_said():
+    problem = continuation.Equilibrium(parabola, {"mu": 1.0})
+    for algorithm, words in (
+        (PseudoArclength(predictor=Secant()), "several points"),
+        (continuation.MoorePenrose(), "no fixed plane"),
+    ):
+        with pytest.raises(ValueError, match=words):
+            continuation.follow_batch(problem, [[-1.0]], mu, (-1.0, 2.0), algorithm)
