@@ -106,6 +106,19 @@ def _point(problem, at, kind, arclength, tests, converged, reason, leaf) -> Poin
     )
 
 
+def _check_algorithm(algorithm: AbstractAlgorithm) -> None:
+    if algorithm.predictor.stations > 1:
+        raise ValueError(
+            f"{type(algorithm.predictor).__name__} predicts from several points, which "
+            "a batch does not keep; give the algorithm predictor=Tangent()"
+        )
+    if algorithm.least_norm:
+        raise ValueError(
+            f"{type(algorithm).__name__} corrects in no fixed plane, so that a batch "
+            "would not land on the bounds; use PseudoArclength()"
+        )
+
+
 def follow_batch(
     problem: AbstractProblem,
     states: ArrayLike,
@@ -139,16 +152,7 @@ def follow_batch(
     """
     settings = Settings() if settings is None else settings
     algorithm = PseudoArclength() if algorithm is None else algorithm
-    if algorithm.predictor.stations > 1:
-        raise ValueError(
-            f"{type(algorithm.predictor).__name__} predicts from several points, which "
-            "a batch does not keep; give the algorithm predictor=Tangent()"
-        )
-    if algorithm.least_norm:
-        raise ValueError(
-            f"{type(algorithm).__name__} corrects in no fixed plane, so that a batch "
-            "would not land on the bounds; use PseudoArclength()"
-        )
+    _check_algorithm(algorithm)
     leaf, name = pick(where, problem.parameters)
     low, high = checked_bounds(bounds, name)
     starts = np.asarray(states, float)
@@ -160,17 +164,7 @@ def follow_batch(
     given = problem.parameters if parameters is None else parameters
     given = as_arrays(given, leaf)
     problem = set_parameters(problem, as_arrays(problem.parameters, leaf))
-    axes = jax.tree.map(
-        lambda one, many: 0 if np.ndim(many) == np.ndim(one) + 1 else None,
-        problem.parameters,
-        given,
-    )
-    for axis, many in zip(_leaves(axes), jax.tree.leaves(given), strict=True):
-        if axis == 0 and len(many) != lanes:
-            raise ValueError(
-                f"a parameter has {len(many)} values for {lanes} branches; give one "
-                "for each or one for all"
-            )
+    axes = Axes.of(problem.parameters, given, lanes)
     p = np.broadcast_to(np.asarray(leaf_of(given, leaf), float), (lanes,))
     if not np.all((low <= p) & (p <= high)):
         raise ValueError(
@@ -180,7 +174,7 @@ def follow_batch(
     z = np.concatenate([starts, p[:, None]], axis=1)
     signs = np.broadcast_to(np.asarray(direction, float), (lanes,))
     lane = run_lanes(
-        problem, algorithm, given, Axes(axes), leaf, z, signs, np.asarray(low),
+        problem, algorithm, given, axes, leaf, z, signs, np.asarray(low),
         np.asarray(high), as_traced(settings), settings.max_iterations, points,
     )  # fmt: skip
     lane = jax.tree.map(np.asarray, lane)
@@ -190,14 +184,6 @@ def follow_batch(
     multipliers = np.linalg.eigvals(np.where(finite, matrices, 0.0))
     multipliers = np.where(finite[..., 0], multipliers, np.nan)
 
-    def at_lane(index: int) -> AbstractProblem:
-        flat, structure = jax.tree.flatten(given)
-        chosen = [
-            x[index] if axis == 0 else x
-            for x, axis in zip(flat, _leaves(axes), strict=True)
-        ]
-        return set_parameters(problem, jax.tree.unflatten(structure, chosen))
-
     return Batch(
         states=passed.z[..., :-1],
         parameters=passed.z[..., -1],
@@ -206,10 +192,6 @@ def follow_batch(
         reasons=tuple(REASONS[s] for s in lane.status),
         name=name,
         _passed=passed,
-        _problems=at_lane,
+        _problems=lambda k: set_parameters(problem, axes.of_lane(given, k)),
         _context=Context(leaf, high - low, (low, high), settings),
     )
-
-
-def _leaves(axes: PyTree) -> list:
-    return jax.tree.leaves(axes, is_leaf=lambda x: x is None)

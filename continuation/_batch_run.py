@@ -5,6 +5,7 @@ from typing import NamedTuple
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import PyTree
 
 from ._point import set_parameters, with_field
@@ -37,7 +38,40 @@ class Lane(NamedTuple):
 class Axes(eqx.Module):
     """Which parameters differ from lane to lane; static."""
 
+    #: 0 for each leaf that differs, None for one that all share
     tree: PyTree = eqx.field(static=True)
+
+    @staticmethod
+    def of(one: PyTree, given: PyTree, lanes: int) -> "Axes":
+        """From the parameters of one lane and those given for all.
+
+        **Raises:** `ValueError` for a wrong number of values.
+        """
+        axes = jax.tree.map(
+            lambda a, b: 0 if np.ndim(b) == np.ndim(a) + 1 else None, one, given
+        )
+        found = Axes(axes)
+        for axis, many in zip(found.leaves, jax.tree.leaves(given), strict=True):
+            if axis == 0 and len(many) != lanes:
+                raise ValueError(
+                    f"a parameter has {len(many)} values for {lanes} branches; give "
+                    "one for each or one for all"
+                )
+        return found
+
+    @property
+    def leaves(self) -> list:
+        """In the order of the parameters' leaves."""
+        return jax.tree.leaves(self.tree, is_leaf=lambda x: x is None)
+
+    def of_lane(self, given: PyTree, index: int) -> PyTree:
+        """The parameters of one lane."""
+        flat, structure = jax.tree.flatten(given)
+        chosen = [
+            x[index] if axis == 0 else x
+            for x, axis in zip(flat, self.leaves, strict=True)
+        ]
+        return jax.tree.unflatten(structure, chosen)
 
 
 @eqx.filter_jit
