@@ -28,7 +28,7 @@ from jaxcam.plotting import branch_diagram
 # ## One orbit, and its stability
 
 system = ImpactOscillator(omega=2.8, restitution=0.8, wall=-0.5)
-orbit = continuation.periodic_orbit(system, guess=[-0.8, 1.0], period=1)
+orbit = continuation.periodic_orbit(system, guess=[-0.8, 1.0], periods=1)
 print(f"impact at {orbit.impacts.time[0]:.6f} s, multipliers {orbit.multipliers}")
 
 # Free flight keeps areas and the impact shrinks them by r squared, so the product of

@@ -35,7 +35,7 @@ from jaxcam.plotting import branch_diagram, multipliers, special_curves, style
 
 # +
 system = ImpactOscillator(omega=2.8, restitution=0.8, wall=-0.5)
-orbit = continuation.periodic_orbit(system, guess=[-0.8, 1.0], period=1)
+orbit = continuation.periodic_orbit(system, guess=[-0.8, 1.0], periods=1)
 hit = float(orbit.impacts.time[0])
 saltation = variational.saltation_matrix(system, hit, orbit.impacts.before[0])
 print("saltation matrix\n", saltation)

@@ -36,7 +36,7 @@ def speed(s):
 
 
 rig = eqx.tree_at(speed, preset("calibrated"), jnp.asarray(rpm_to_rad_s(145.0)))
-start = continuation.periodic_orbits(rig, np.array([0.4245, 1.828]), 1)
+start = continuation.periodic_orbits(rig, np.array([0.4245, 1.828]), periods=1)
 family = continuation.branch(
     start.problem,
     start,

@@ -54,7 +54,7 @@ with style():
     figure, panels = plt.subplots(1, 2, figsize=(9, 4.2), layout="constrained")
 for ax, name, points in zip(panels, found.names, found.orbits, strict=True):
     turns = int(np.isfinite(points[:, 0]).sum())
-    orbit = continuation.periodic_orbit(system, points[0], turns)
+    orbit = continuation.periodic_orbit(system, points[0], periods=turns)
     size = abs(orbit.multipliers).max()
     turns_to_settle = -turns / np.log(size)
     print(f"{name}: |mu| = {size:.6f}, {turns_to_settle:.0f} turns for a factor e")

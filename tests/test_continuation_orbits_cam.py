@@ -45,7 +45,7 @@ def detachment():
 
 
 def one_impact(rpm=145.0):
-    return continuation.periodic_orbits(rig(rpm), SEED, 1)
+    return continuation.periodic_orbits(rig(rpm), SEED, periods=1)
 
 
 @pytest.mark.slow
@@ -134,7 +134,7 @@ def test_orbit_that_sticks_from_its_beginning_to_its_interruption():
 def test_family_of_period_three():
     # Figure 5.12; the seed is where one motion in seven of a sweep at 155.25 rpm ends
     seed = np.array([0.47075613, 2.29945954])
-    start = continuation.periodic_orbits(rig(155.25), seed, 3)
+    start = continuation.periodic_orbits(rig(155.25), seed, periods=3)
     assert start.problem.periods == 3  # pyright: ignore
     ends = {}
     for direction in (-1, 1):

@@ -210,6 +210,26 @@ def test_orbit_from_a_guess_with_its_multipliers():
     assert complex(jnp.prod(orbit.multipliers)).real == pytest.approx(0.64, abs=1e-9)
 
 
+def test_periods_are_counted_and_period_is_in_seconds():
+    exact = Exact(2.8, 0.8, 1)
+    phi = 0.9 * exact.flip + 0.1 * exact.fold
+    system, time, state = exact.start(phi)
+    counted = continuation.periodic_orbit(system, state, periods=1, t0=time)
+    assert float(counted.period) == pytest.approx(float(system.period), rel=1e-15)
+    with pytest.warns(UserWarning, match="periods=1"):
+        same = continuation.periodic_orbit(system, state, 1, t0=time)
+    np.testing.assert_array_equal(same.state, counted.state)
+    # one second is no whole number of the forcing's 2.24 s
+    for given, words in (
+        ({"period": 1.0}, "as `periods`"),
+        ({"period": 1.0, "periods": 1}, "not both"),
+        ({"periods": 0}, "at least 1"),
+        ({"periods": 1.5}, "whole number"),
+    ):
+        with pytest.raises(ValueError, match=words):
+            continuation.periodic_orbit(system, state, t0=time, **given)
+
+
 class Digits:
     """The map from impact to impact, in phase and rebound speed, with fifty digits."""
 

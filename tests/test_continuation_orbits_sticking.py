@@ -44,7 +44,7 @@ def simulated_periods(system, turns):
 
 def test_sticks_every_second_period_between_two_interruptions():
     system = oscillator(3.1, 0.3)
-    orbit = continuation.periodic_orbit(system, None, 2)
+    orbit = continuation.periodic_orbit(system, periods=2)
     assert orbit.sticks
     start = continuation.periodic_orbits(system, orbit)
     np.testing.assert_allclose(simulated_periods(system, 21), 2.0, rtol=1e-9)
@@ -106,7 +106,7 @@ def _orbits(point) -> Any:
 def test_cam_follower_sticks_every_third_period():
     system = rig(153.6)
     np.testing.assert_allclose(simulated_periods(system, 31), 3.0, rtol=1e-8)
-    orbit = continuation.periodic_orbit(system, None, 3)
+    orbit = continuation.periodic_orbit(system, periods=3)
     start = continuation.periodic_orbits(system, orbit)
     bounds = rpm_to_rad_s(153.5), rpm_to_rad_s(153.7)
     for direction in (-1, 1):

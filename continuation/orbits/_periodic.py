@@ -18,8 +18,9 @@ from ._shooting import ImpactingOrbits
 def periodic_orbits(
     system: HybridSystem,
     orbit: Orbit | Float[ArrayLike, " n"] | None = None,
-    period: float | int | None = None,
+    period: float | None = None,
     *,
+    periods: int | None = None,
     beyond: bool = False,
 ) -> Start:
     """The family of periodic orbits that an orbit belongs to, and where it is on it.
@@ -30,8 +31,7 @@ def periodic_orbits(
     **Arguments:**
 
     - `orbit`: from [`continuation.periodic_orbit`][]; or a guess of its state, or None,
-      with `period`, as taken there.
-
+      with `period` or `periods`, as taken there.
     - `beyond`: for an orbit that sticks, whether to go on behind the interruption of
       its chattering with the orbits that have finitely many impacts.
 
@@ -42,7 +42,7 @@ def periodic_orbits(
     """
     system = as_arrays(system)
     if not isinstance(orbit, Orbit):
-        orbit = periodic_orbit(system, orbit, period)
+        orbit = periodic_orbit(system, orbit, period, periods=periods)
     base = None if system.period is None else float(system.period)
     length = float(orbit.period)
     number = 0 if base is None else round(length / base)

@@ -1,5 +1,7 @@
 """Finding one periodic orbit: from a guess, or from where the motion settles."""
 
+import warnings
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -14,7 +16,7 @@ from variational import Orbit, orbit_of
 from variational.orbits import flown, refuse, seed, Shooting
 
 from .._program import solve
-from .._settings import Settings as Context
+from .._settings import Settings as WalkSettings
 from ._shooting import ImpactingOrbits
 
 
@@ -27,8 +29,9 @@ _SAME = 1e-7
 def periodic_orbit(
     system: HybridSystem,
     guess: Float[ArrayLike, " n"] | None = None,
-    period: float | int | None = None,
+    period: float | None = None,
     *,
+    periods: int | None = None,
     t0: float = 0.0,
     settings: Settings | None = None,
 ) -> Orbit:
@@ -44,9 +47,9 @@ def periodic_orbit(
     - `system`: a [`jaxcam.hybrid.HybridSystem`][], forced or not.
     - `guess`: shape `(n,)`, the state at `t0`. Without: where the motion has settled
         after some hundred forcing periods (a stable orbit).
-    - `period`: of the orbit, in s, or as an `int` the number of forcing periods.
-        Without: one forcing period, or with no guess either the one that is seen. For a
-        system without forcing a guess of it in s.
+    - `period`: of the orbit, in s. For a system without forcing a guess of it.
+    - `periods`: instead, the number of forcing periods in it. With neither: one, or
+        with no guess either as many as are seen.
     - `t0`: s.
     - `settings`: accuracy of the runs; a tolerance of 1e-12 by default.
 
@@ -61,9 +64,10 @@ def periodic_orbit(
     system = as_arrays(system)
     system.check()
     base = None if system.period is None else float(system.period)
-    number = _periods(base, period)
+    number = _periods(base, period, periods)
     if guess is None:
-        guess, number = _settled(system, base, number, period is None, t0)
+        free = period is None and periods is None
+        guess, number = _settled(system, base, number, free, t0)
     guess = real_array(guess, "guess")
     check_start(system, settings, jnp.asarray(float(t0)), guess, jnp.asarray(float(t0)))
     length = float(period) if base is None else number * base  # pyright: ignore
@@ -79,8 +83,17 @@ def periodic_orbit(
     return orbit
 
 
-def _periods(base: float | None, period) -> int:
+def _periods(base: float | None, period, periods) -> int:
     """The number of forcing periods; 0 without forcing."""
+    if base is not None and isinstance(period, int | np.integer):
+        warnings.warn(
+            f"period={period} is taken as forcing periods; write periods={period}, or "
+            f"period={period}.0 for seconds",
+            stacklevel=3,
+        )
+        period, periods = None, period
+    if periods is not None:
+        return _counted(base, period, periods)
     if period is not None and not (np.ndim(period) == 0 and float(period) > 0):
         raise ValueError(f"period is {period}; give a positive number of seconds")
     if base is None:
@@ -92,16 +105,28 @@ def _periods(base: float | None, period) -> int:
         return 0
     if period is None:
         return 1
-    if isinstance(period, int | np.integer):
-        return int(period)
     number = round(float(period) / base)
     if number < 1 or abs(float(period) / base - number) > 1e-6 * number:
         raise ValueError(
             f"period is {float(period):g} s, which is {float(period) / base:.6g} "
             f"forcing periods of {base:g} s; an orbit lasts a whole number of them. "
-            "Give that number as an int"
+            "Give that number as `periods`"
         )
     return number
+
+
+def _counted(base: float | None, period, periods) -> int:
+    """The number of forcing periods, where it is given."""
+    if base is None:
+        raise ValueError(
+            "this system has no forcing whose periods could be counted; give a guess "
+            "of the orbit's period in seconds, as `period`"
+        )
+    if period is not None:
+        raise ValueError("give period (s) or periods (of the forcing), not both")
+    if not isinstance(periods, int | np.integer) or periods < 1:
+        raise ValueError(f"periods is {periods!r}; give a whole number, at least 1")
+    return int(periods)
 
 
 def _settled(system, base, number: int, free: bool, t0):
@@ -208,7 +233,7 @@ def _with_impacts_of(system, turn, number, t0, settings):
     except ValueError as error:
         return None, str(error)
     problem = ImpactingOrbits.of(system, equations)
-    u, success, _ = solve(problem, u, Context(tolerance=1e-11))
+    u, success, _ = solve(problem, u, WalkSettings(tolerance=1e-11))
     if not success:
         return None, (
             f"Newton's method on the {len(problem.constraints)} impacts of the motion "

@@ -12,8 +12,9 @@ from ._periodic_orbit import periodic_orbit
 def orbits_near(
     system: HybridSystem,
     states: Float[ArrayLike, "k n"],
-    period: float | int | None = None,
+    period: float | None = None,
     *,
+    periods: int | None = None,
     t0: float = 0.0,
     settings: Settings | None = None,
     same: float = 1e-6,
@@ -27,7 +28,7 @@ def orbits_near(
     **Arguments:**
 
     - `states`: shape `(k, n)`, states at `t0`.
-    - `period`, `t0`, `settings`: as for [`continuation.periodic_orbit`][].
+    - `period`, `periods`, `t0`, `settings`: as for [`continuation.periodic_orbit`][].
     - `same`: orbits are one where their states at `t0` differ by less than this,
       relative to 1 + |state|.
 
@@ -46,7 +47,9 @@ def orbits_near(
         if any(_passes(orbit, state, same) for orbit in found):
             continue
         try:
-            orbit = periodic_orbit(system, state, period, t0=t0, settings=settings)
+            orbit = periodic_orbit(
+                system, state, period, periods=periods, t0=t0, settings=settings
+            )
         except ValueError:
             continue
         if not any(_passes(o, np.asarray(orbit.state), same) for o in found):

@@ -60,7 +60,7 @@ def continue_(
     guess = following.guess
     output = Output(json_file, out)
     with progress("finding the orbit (the first run takes longest)") as report:
-        start = continuation.periodic_orbits(model, guess, following.periods)
+        start = continuation.periodic_orbits(model, guess, periods=following.periods)
         report("following the branch", None)
 
         def show(point) -> None:

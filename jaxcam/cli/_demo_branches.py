@@ -56,7 +56,7 @@ def follow_branches(folder: Path) -> Branches:
 
     rig = eqx.tree_at(speed, preset("calibrated"), jnp.asarray(rpm_to_rad_s(_AT_RPM)))
     starts = (
-        continuation.periodic_orbits(rig, jnp.asarray(_NEAR), 1),
+        continuation.periodic_orbits(rig, jnp.asarray(_NEAR), periods=1),
         continuation.periodic_orbits(rig, continuation.periodic_orbit(rig)),
     )
     branches = [

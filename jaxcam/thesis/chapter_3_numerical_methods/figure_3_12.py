@@ -30,7 +30,9 @@ def hitting_branch(system: CamFollower) -> "Branch":
     """P(1,1), around its fold and past its flip."""
     import continuation
 
-    start = continuation.periodic_orbits(at_rpm(system, START_RPM), jnp.array(A), 1)
+    start = continuation.periodic_orbits(
+        at_rpm(system, START_RPM), jnp.array(A), periods=1
+    )
     return continuation.branch(
         start.problem, start, speed_of, bounds(_HITTING), direction="both"
     )
