@@ -39,9 +39,6 @@ from ._own_states import own_states as own_states
 from ._parameter import Parameter as Parameter
 from ._pieces import FLIGHT as FLIGHT, IMPACT as IMPACT
 from ._predict import runge_kutta as runge_kutta
-from ._problem import (
-    parameter_places as parameter_places,
-    Problem as Problem,
-    Weights as Weights,
-)
+from ._problem import Problem as Problem, Weights as Weights
+from ._problem_checks import parameter_places as parameter_places
 from ._sharpness import loosened as loosened

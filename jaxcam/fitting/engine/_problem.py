@@ -57,23 +57,18 @@ from jaxtyping import Float
 from ...recordings import RecordingError, Segments
 from ._linear import Extras
 from ._linearise import Layout, Point
-from ._model import augmented_field, Input, Model
+from ._model import Input, Model
 from ._own_states import own_states
 from ._parameter import Parameter
 from ._pieces import gather, Pieces, Span
-from ._predict import fly
+from ._problem_checks import parameter_places, refuse_not_finite, refuse_repeated
 from ._sharpness import joint_sharpness
 from ._starts import suggested_starts
+from ._step_size import fine_enough, follows_inputs, longest_flight
 
 
 # Steps of a piece to begin with, and at most
 _STEPS, _MOST_STEPS = 10, 160
-# Change (in units of the noise) that halving the steps may make
-_STEP_ERROR = 0.01
-# Pieces of a flight from which on that must be less, as errors add up along it
-_LONG = 16
-# Step over time constant of a filter: Hermite's error is then 1e-4 of a jump
-_FILTER_STEP = 0.4
 
 
 class Weights(eqx.Module):
@@ -125,7 +120,7 @@ class Problem:
         if not segments:
             raise RecordingError("There is no recording to fit; give at least one.")
         parameters = tuple(parameters)
-        _refuse_repeated(parameters)
+        refuse_repeated(parameters)
         model = jax.tree.map(
             lambda leaf: (
                 jnp.asarray(leaf, dtype=float) if isinstance(leaf, float) else leaf
@@ -139,16 +134,16 @@ class Problem:
         steps, first, extras = _STEPS, _STEPS, None
         while True:
             pieces, cuts = gather(segments, tuple(model.sensors), steps, measured)
-            if steps < _MOST_STEPS and not _follows(model, segments, pieces):
+            if steps < _MOST_STEPS and not follows_inputs(model, segments, pieces):
                 steps *= 2
                 continue
             states, guess = suggested_starts(model, segments, cuts, pieces)
             point = Point(jnp.asarray(values), jnp.asarray(states))
-            _refuse_not_finite(layout, segments, pieces, point)
+            refuse_not_finite(layout, segments, pieces, point)
             if extras is None:
                 # as a scale of errors, that of the first steps will do for all
                 extras, first = joint_sharpness(layout, pieces, point, guess), steps
-            fine = _fine(layout, pieces, extras, point, _longest_flight(cuts))
+            fine = fine_enough(layout, pieces, extras, point, longest_flight(cuts))
             if steps >= _MOST_STEPS or fine:
                 break
             steps *= 2
@@ -186,7 +181,7 @@ class Problem:
     @property
     def longest_flight(self) -> int:
         """Number of pieces of the flight that has most of them."""
-        return _longest_flight(self.spans)
+        return longest_flight(self.spans)
 
     def parameter(self, name: str) -> Parameter:
         """**Raises:** `ValueError` that lists the names there are."""
@@ -234,118 +229,3 @@ class Problem:
         return self.extras._replace(
             weight=jnp.asarray(weights.flown), rest_weight=jnp.asarray(weights.rested)
         )
-
-
-def _refuse_not_finite(layout: Layout, segments, pieces: Pieces, point: Point) -> None:
-    """A field that is no number where the data are cannot be fitted to them."""
-    rates = np.asarray(_rates(layout, point, pieces))
-    bad = pieces.exists & ~np.all(np.isfinite(rates), axis=-1)
-    if np.any(bad):
-        r, k = np.argwhere(bad)[0]
-        state = ", ".join(f"{x:.4g}" for x in np.asarray(point.states)[r, k])
-        raise ValueError(
-            f"The model gives no finite number in {segments[r].recording.name} at "
-            f"{pieces.flown.start[r, k]:.4g} s, where the data suggest the state "
-            f"({state}); check its vector field and the nominal parameters there."
-        )
-
-
-@eqx.filter_jit
-def _rates(layout: Layout, point: Point, pieces: Pieces):
-    """Rate of change of each state that pieces start from."""
-
-    def one(values, states, start, angle, rate):
-        model = layout.at(values)
-
-        def at(state, t, angle, rate):
-            return augmented_field(model, model.driven(t, angle, rate), t, state)
-
-        return jax.vmap(at)(states, start, angle, rate)
-
-    drive = pieces.flown.start, pieces.angle_at, pieces.rate_at
-    return jax.vmap(one)(*point, *(jnp.asarray(part) for part in drive))
-
-
-def _longest_flight(cuts) -> int:
-    pieces = (np.array([span.flight for span in side]) for side, _ in cuts)
-    counts = (np.unique(part, return_counts=True)[1] for part in pieces)
-    return max(int(np.max(count, initial=0)) for count in counts)
-
-
-def _refuse_repeated(parameters) -> None:
-    names = [parameter.name for parameter in parameters]
-    repeated = {name for name in names if names.count(name) > 1}
-    if repeated:
-        raise ValueError(
-            f"Two parameters are called {min(repeated)!r}; rename one of them."
-        )
-
-
-def parameter_places(model: Model, parameters) -> tuple[int, ...]:
-    """Index of each parameter among the leaves of a model, for a `Layout`.
-
-    **Raises:** `ValueError` for a parameter that is not one number of the model, or
-    the same one as another.
-    """
-    leaves, tree = jax.tree.flatten(model)
-    numbered = jax.tree.unflatten(tree, list(range(len(leaves))))
-    places = []
-    for parameter in parameters:
-        place = parameter.where(numbered)
-        if not isinstance(place, int) or np.shape(leaves[place]) != ():
-            raise ValueError(
-                f"The parameter {parameter.name!r} is not one number of the model; let "
-                f"`where` pick a field that holds a single number."
-            )
-        if place in places:
-            other = parameters[places.index(place)].name
-            raise ValueError(
-                f"The parameters {other!r} and {parameter.name!r} are the same number; "
-                f"leave one of them out."
-            )
-        places.append(place)
-    return tuple(places)
-
-
-def _follows(model: Model, segments, pieces: Pieces) -> bool:
-    """Whether the steps are short beside the filters of the sensors, and the input.
-
-    A filter is not at rest after an impact, which the states to begin with do not show.
-    """
-    longest = float(np.max(np.where(pieces.exists, pieces.flown.step, 0.0)))
-    interval = min(part.recording.interval for part in segments)
-    if isinstance(model.drive, Input) and longest > interval:
-        return False
-    corners = [2 * np.pi * s.bandwidth_hz for s in model.sensors.values() if s.filtered]
-    return all(longest * corner <= _FILTER_STEP for corner in corners)
-
-
-def _fine(
-    layout: Layout, pieces: Pieces, extras: Extras, point: Point, flight: int
-) -> bool:
-    """Whether half the steps would change no state by a part of its error.
-
-    **Arguments:** `flight` is the number of pieces of the longest flight.
-    """
-    part = pieces.flown
-    rate = np.repeat(pieces.rate, 2, axis=-1)
-    # a quarter of a step before and after the middle, as the drive turns evenly
-    quarter = np.asarray(part.step)[..., None] / 4
-    sign = np.tile([-1.0, 1.0], pieces.rate.shape[-1])
-    half = np.repeat(pieces.angle, 2, axis=-1) + sign * quarter * rate, rate
-    coarse = _ends(layout, point, part.start, part.step, pieces.angle, pieces.rate)
-    fine = _ends(layout, point, part.start, part.step / 2, *half)
-    change = np.abs(coarse - fine) / np.asarray(extras.sharpness.piece)
-    # errors of one sign add up to a frequency over a flight of many pieces
-    part_of_error = _STEP_ERROR / max(1.0, flight / _LONG) ** 1.5
-    return bool(np.max(np.where(pieces.exists[..., None], change, 0.0)) < part_of_error)
-
-
-@eqx.filter_jit
-def _ends(layout: Layout, point: Point, start, step, angle, rate):
-    def one(values, *piece):
-        model = layout.at(values)
-        return jax.vmap(lambda *inputs: fly(model, *inputs)[0])(*piece)
-
-    drive = (jnp.asarray(part) for part in (start, step, angle, rate))
-    return jax.vmap(one)(point.values, point.states, *drive)
