@@ -36,7 +36,7 @@ def test_a_motion_that_spirals_in_is_not_of_a_multiple_period(multiplier):
     """x_k = Re c^k: period 1 within the tolerance, or none yet; never another."""
     k = np.arange(24)[None] + np.arange(40)[:, None]
     lanes = np.real(multiplier**k)[..., None]
-    found = periods(lanes, 1e-6)
+    found = periods(lanes, 1e-6, np.ones((40, 1)))
     assert set(found) == {0, 1}
     size = np.abs(multiplier) ** np.arange(40) * np.abs(multiplier - 1)
     assert np.all(found[size < 1e-7] == 1) and np.all(found[size > 1e-4] == 0)

@@ -112,3 +112,32 @@ class DampedImpactOscillator(HybridSystem):
     @property
     def period(self):
         return 2 * jnp.pi / self.omega
+
+
+class InUnits(HybridSystem):
+    """A system whose states and times are measured in other units, from `origin`."""
+
+    system: HybridSystem
+    units: jax.Array
+    length: jax.Array
+    time: jax.Array
+    origin: jax.Array
+
+    def _plain(self, t, state):
+        return t / self.time, (state - self.origin) / self.units
+
+    def vector_field(self, t, state):
+        return self.units * self.system.vector_field(*self._plain(t, state)) / self.time
+
+    def gap(self, t, state):
+        return self.length * self.system.gap(*self._plain(t, state))
+
+    def impact(self, t, state):
+        after = self.system.impact(*self._plain(t, state))
+        shape = (1,) * (after.ndim - 1) + state.shape
+        return self.units.reshape(shape) * after + self.origin.reshape(shape)
+
+    @property
+    def period(self):
+        period = self.system.period
+        return None if period is None else period * self.time

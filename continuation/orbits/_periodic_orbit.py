@@ -9,7 +9,14 @@ import numpy as np
 import optimistix as optx
 from jaxtyping import ArrayLike, Float
 
-from jaxcam.hybrid import flow, HybridSystem, Settings, simulate, stroboscope
+from jaxcam.hybrid import (
+    component_sizes,
+    flow,
+    HybridSystem,
+    Settings,
+    simulate,
+    stroboscope,
+)
 from jaxcam.hybrid.checks import check_start
 from jaxcam.parameters import as_arrays, real_array
 from variational import Orbit, orbit_of
@@ -22,7 +29,7 @@ from ._shooting import ImpactingOrbits
 
 #: turns after which a motion is expected to have settled, and looked at after that
 _TURNS, _LOOKED = 400, 64
-#: motions are called equal when they differ by less than this, relative to 1 + |x|
+#: motions are called equal when they differ by less than this, relative to their size
 _SAME = 1e-7
 
 
@@ -144,7 +151,9 @@ def _settled(system, base, number: int, free: bool, t0):
             "the run that should settle on an orbit did not end; give a guess of the "
             "state"
         )
-    size = 1 + np.max(np.abs(states), axis=0)
+    when = float(t0) + (_TURNS + _LOOKED) * base
+    moved = np.asarray(component_sizes(system, when, states[-1], base))
+    size = np.maximum(np.max(np.abs(np.vstack([start, states])), axis=0), moved)
     for n in range(1, _LOOKED // 2 + 1) if free else (number,):
         if np.all(np.abs(states[n:] - states[:-n]) <= _SAME * size):
             return states[-1], n

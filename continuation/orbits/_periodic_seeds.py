@@ -3,7 +3,7 @@
 import numpy as np
 from jaxtyping import ArrayLike, Float
 
-from jaxcam.hybrid import HybridSystem, Settings
+from jaxcam.hybrid import component_sizes, HybridSystem, Settings
 from variational import Orbit
 
 from ._periodic_orbit import periodic_orbit
@@ -30,7 +30,7 @@ def orbits_near(
     - `states`: shape `(k, n)`, states at `t0`.
     - `period`, `periods`, `t0`, `settings`: as for [`continuation.periodic_orbit`][].
     - `same`: orbits are one where their states at `t0` differ by less than this,
-      relative to 1 + |state|.
+      relative to [`jaxcam.hybrid.component_sizes`][].
 
     **Returns:** the orbits in the order in which they were found; guesses from which
     Newton's method leads nowhere are left out, so there may be none.
@@ -44,7 +44,7 @@ def orbits_near(
         )
     found: list[Orbit] = []
     for state in states:
-        if any(_passes(orbit, state, same) for orbit in found):
+        if any(_passes(system, orbit, state, same) for orbit in found):
             continue
         try:
             orbit = periodic_orbit(
@@ -52,12 +52,14 @@ def orbits_near(
             )
         except ValueError:
             continue
-        if not any(_passes(o, np.asarray(orbit.state), same) for o in found):
+        there = np.asarray(orbit.state)
+        if not any(_passes(system, other, there, same) for other in found):
             found.append(orbit)
     return tuple(found)
 
 
-def _passes(orbit: Orbit, state, same: float) -> bool:
+def _passes(system: HybridSystem, orbit: Orbit, state, same: float) -> bool:
     """Whether an orbit has this state where it starts."""
     current = np.asarray(orbit.state)
-    return bool(np.all(np.abs(current - state) <= same * (1 + np.abs(current))))
+    sizes = component_sizes(system, orbit.time, current, orbit.period)
+    return bool(np.all(np.abs(current - state) <= same * np.asarray(sizes)))

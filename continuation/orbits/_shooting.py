@@ -125,7 +125,8 @@ class ImpactingOrbits(AbstractProblem):
 
     def seen(self, u, parameters):
         """Observed: period (s); time (s) and state after the first impact; integration
-        error; with forcing, the states at whole forcing periods, `(periods, n)`."""
+        error; what gaps are large beside, in their units; with forcing, the states at
+        whole forcing periods, `(periods, n)`."""
         equations = self.equations
         seen = equations.seen(u, parameters)
         start = equations.flights(u, parameters)[0][0]
@@ -134,6 +135,7 @@ class ImpactingOrbits(AbstractProblem):
             "time": start[0],
             "state": start[1:],
             "integration error": seen.error,
+            "gap size": seen.gap_size,
         }
         if self.periods:
             found["stroboscopic"] = equations.stroboscopic(u, parameters, seen)
@@ -160,7 +162,14 @@ class ImpactingOrbits(AbstractProblem):
             }
             for what in ("gap", "speed")
         )
-        return inadmissible(gaps, speeds, observed["integration error"], self.steps)
+        return inadmissible(
+            gaps,
+            speeds,
+            observed["integration error"],
+            gap_size=observed["gap size"],
+            period=observed["period"],
+            steps=self.steps,
+        )
 
     def check(self, point: Any) -> str | None:
         return self.refused(point.tests, point.observed)

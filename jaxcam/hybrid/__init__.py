@@ -3,6 +3,7 @@
 from ._flow import Arrival as Arrival, flow as flow
 from ._settings import Settings as Settings
 from ._simulate import simulate as simulate
+from ._sizes import component_sizes as component_sizes
 from ._stroboscope import Stroboscope as Stroboscope, stroboscope as stroboscope
 from ._system import HybridSystem as HybridSystem
 from .codes import RESULTS as RESULTS

@@ -178,7 +178,8 @@ def one_after_the_other(
         many, kept = int(many), int(kept)
         samples = section.sample(state, many, kept, where=where, values=lanes)
         counted = section.impacting and section.regular
-        labels = label(samples, tolerance, counted)
+        sizes = section.sizes(state, samples, where, lanes)
+        labels = label(samples, tolerance, counted, sizes)
         carried = samples.final
         turn = section.turn(where, lanes)
         samples = filled(samples, room)

@@ -1,5 +1,6 @@
 """Whether a solution of the shooting equations is an orbit: no penetration anywhere."""
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -11,30 +12,37 @@ from jaxcam.hybrid import HybridSystem
 from ._shooting import Shooting
 
 
-# what rounding and the equations' tolerance leave of a gap or a speed of zero, in the
-# units of the system: a gap that is lower is a penetration
+# what rounding and the equations' tolerance leave of a gap or a speed of zero, relative
+# to the size of gaps: a gap that is lower is a penetration
 _ROUNDING = 1e-9
 # error of the flights up to which the gaps are believed
 _ERROR = 1e-9
 
 
 def inadmissible(
-    gaps: Mapping[int, Any], speeds: Mapping[int, Any], error, steps: int
+    gaps: Mapping[int, Any],
+    speeds: Mapping[int, Any],
+    error: Any,
+    *,
+    gap_size: Any,
+    period: Any,
+    steps: int,
 ) -> str | None:
     """Why a solution is no orbit, or None.
 
     **Arguments:** lowest gap of each flight and approach speed of each impact, by their
-    numbers, and the error of the flights, as in [`variational.orbits.Seen`][];
-    Runge-Kutta steps in a flight.
+    numbers, the error of the flights and the size of gaps, as in
+    [`variational.orbits.Seen`][]; period (s); Runge-Kutta steps in a flight.
     """
+    room = _ROUNDING * float(gap_size)
     for k, value in gaps.items():
-        if not value >= -_ROUNDING:
+        if not value >= -room:
             return (
                 f"the gap falls to {value:.1e} within flight {k}: the orbit would go "
                 "through the constraint"
             )
     for k, value in speeds.items():
-        if not value >= -_ROUNDING:
+        if not value >= -room * 2 * math.pi / float(period):
             return (
                 f"impact {k} moves away from its constraint: the orbit would have to "
                 "start its flight inside it"
@@ -49,12 +57,20 @@ def inadmissible(
 
 def refuse(shooting: Shooting, u, system: HybridSystem) -> str | None:
     """Why a solution of the equations is no orbit, or None."""
-    gaps, speeds, error = _look(shooting, jnp.asarray(u), system)
-    gaps, speeds = (dict(enumerate(map(float, row))) for row in (gaps, speeds))
-    return inadmissible(gaps, speeds, error, shooting.steps)
+    seen, period = _look(shooting, jnp.asarray(u), system)
+    gaps, speeds = (
+        dict(enumerate(map(float, row))) for row in (seen.gaps, seen.speeds)
+    )
+    return inadmissible(
+        gaps,
+        speeds,
+        seen.error,
+        gap_size=seen.gap_size,
+        period=period,
+        steps=shooting.steps,
+    )
 
 
 @eqx.filter_jit
 def _look(shooting, u, system):
-    seen = shooting.seen(u, system)
-    return seen.gaps, seen.speeds, seen.error
+    return shooting.seen(u, system), shooting.period(u, system)

@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Array, ArrayLike, Complex, Float
 
 from jaxcam.hybrid import (
+    component_sizes,
     Contacts,
     HybridSystem,
     Impacts,
@@ -103,7 +104,7 @@ def orbit_of(
     - `t0`: s.
     - `settings`: accuracy of the run; a tolerance of 1e-12 by default.
     - `closure`: the deviation after one period that is allowed, relative to
-      1 + |state|.
+      [`jaxcam.hybrid.component_sizes`][].
 
     **Returns:** a [`variational.Orbit`][] with its monodromy matrix.
 
@@ -125,7 +126,9 @@ def orbit_of(
     if not bool(turn.successful):
         raise ValueError(f"the run over one period did not end: {turn.result}")
     system, impacts, contacts = turn.system, turn.impacts, turn.contacts
-    miss = float(jnp.max(jnp.abs(turn.final - state) / (1 + jnp.abs(state))))
+    sizes = component_sizes(system, t0, state, period)
+    away = jnp.abs(turn.final - state)
+    miss = float(jnp.max(jnp.where(away > 0, away / sizes, 0.0)))
     start = start_at_impact(system, t0, state)
     polished = int(contacts.count) == 0 and (
         start is not None or int(impacts.count) > 0

@@ -18,7 +18,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
-from jaxcam.hybrid import HybridSystem, normal_velocity
+from jaxcam.hybrid import component_sizes, HybridSystem, normal_velocity
 from jaxcam.hybrid.surface import gaps, impacts
 
 from ._flight import flight_end, flight_nodes
@@ -34,6 +34,8 @@ class Seen(NamedTuple):
     speeds: Float[Array, " m"]
     #: estimated error of the flights, relative to 1 + |x|
     error: Float[Array, ""]
+    #: what a gap is large or small beside, in its units
+    gap_size: Float[Array, ""]
     #: (flights, 1 + steps) and (flights, 1 + steps, n) at the ends of all steps
     times: Float[Array, "flights nodes"]
     states: Float[Array, "flights nodes n"]
@@ -139,7 +141,14 @@ class Shooting(eqx.Module):
         speeds = jnp.zeros(0)
         if self.constraints:
             speeds = self.speeds(system, ends, states[:, -1])
-        return Seen(lowest, speeds, jnp.max(wrong), times, states)
+        size = self._gap_size(u, system, starts[0, 0], starts[0, 1:])
+        return Seen(lowest, speeds, jnp.max(wrong), size, times, states)
+
+    def _gap_size(self, u, system: HybridSystem, time, state) -> Float[Array, ""]:
+        """The change of a gap, when each component changes by its size; the least."""
+        sizes = component_sizes(system, time, state, self.period(u, system))
+        slopes = jax.jacfwd(lambda x: gaps(system, time, x))(state)
+        return jnp.min(jnp.abs(slopes) @ sizes)
 
     def approach(self, u, system: HybridSystem) -> Float[Array, " m"]:
         """Approach speed of each impact; differentiable."""

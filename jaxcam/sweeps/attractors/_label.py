@@ -30,15 +30,15 @@ class Labels(NamedTuple):
     turns: np.ndarray
 
 
-def periods(states, tolerance: float = 1e-6) -> np.ndarray:
+def periods(states, tolerance: float = 1e-6, sizes=None) -> np.ndarray:
     """Smallest number of points after which each lane repeats; 0 where none does.
 
     **Arguments:**
 
     - `states`: shape `(lanes, keep, n)`; periods up to `keep / 2` are found, so that
         each is seen twice.
-    - `tolerance`: allowed difference of two states, relative to 1 + |state|, component
-        by component.
+    - `tolerance`: allowed difference of two states, relative to `sizes`.
+    - `sizes`: shape `(lanes, n)`, of each component; by default its largest value.
 
     A motion that spirals in towards an orbit looks, for a while, as if it had a
     multiple of its period. It counts as not repeating until its points stop
@@ -49,7 +49,9 @@ def periods(states, tolerance: float = 1e-6) -> np.ndarray:
     states = np.asarray(states, dtype=float)
     lanes, keep, _ = states.shape
     found = np.zeros(lanes, dtype=int)
-    room = tolerance * (1 + np.abs(states))
+    if sizes is None:
+        sizes = np.abs(states).max(axis=1)
+    room = np.broadcast_to(tolerance * sizes[:, None], states.shape)
     left = np.arange(lanes)
     for n in range(1, keep // 2 + 1):
         if not len(left):
@@ -79,12 +81,15 @@ def _still_nearing(states, n: int) -> np.ndarray:
     return nearing
 
 
-def label(samples: Samples, tolerance: float = 1e-6, impacting: bool = True) -> Labels:
+def label(
+    samples: Samples, tolerance: float = 1e-6, impacting: bool = True, sizes=None
+) -> Labels:
     """The label of each lane.
 
-    **Arguments:** `impacting`: whether impacts are counted; they are not for a map.
+    **Arguments:** `impacting`: whether impacts are counted; they are not for a map;
+    `tolerance`, `sizes`: as of [`jaxcam.sweeps.periods`][].
     """
-    turns = periods(samples.states, tolerance)
+    turns = periods(samples.states, tolerance, sizes)
     index = np.maximum(turns, 1)[:, None] - 1
 
     def in_the_orbit(counts):

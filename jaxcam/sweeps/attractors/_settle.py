@@ -24,7 +24,8 @@ def settle(
     values = None if values is None else np.asarray(values, dtype=float)
     samples = section.sample(states, turns, keep, where=where, values=values)
     counted = section.impacting and section.regular
-    labels = label(samples, tolerance, counted)
+    sizes = section.sizes(states, samples, where, values)
+    labels = label(samples, tolerance, counted, sizes)
     for _ in range(reruns):
         turns *= 2
         (open_,) = np.nonzero(labels.turns == APERIODIC)
@@ -34,5 +35,5 @@ def settle(
         start = samples.final[open_]
         again = section.sample(start, turns, keep, where=where, values=some)
         samples = joined(samples, open_, again)
-        labels = label(samples, tolerance, counted)
+        labels = label(samples, tolerance, counted, sizes)
     return samples, labels

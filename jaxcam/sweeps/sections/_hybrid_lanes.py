@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from ...hybrid import HybridSystem
+from ...hybrid import component_sizes, HybridSystem
 from ...hybrid.batch import split_lanes
 from ...hybrid.loop import starts_behind
 from ...hybrid.surface import contact_state, gaps, least_gaps
@@ -91,6 +91,15 @@ def turn_lengths(system: HybridSystem, period, where=None, values=None) -> np.nd
     return np.asarray(_periods(*split_lanes(as_arrays(system), where, values)))
 
 
+def lane_sizes(system: HybridSystem, times, states, turns, where=None, values=None):
+    """How large each component of each motion is, shape `(lanes, n)`."""
+    batched, shared = split_lanes(as_arrays(system), where, values)
+    times, turns = (
+        jnp.broadcast_to(jnp.asarray(x, float), (len(states),)) for x in (times, turns)
+    )
+    return np.asarray(_sizes(batched, shared, times, _rows(states), turns))
+
+
 def run_lanes(run, system, t0, states, where, values, lanes: int, tails):
     """Run the motions that can start, in blocks of few different widths.
 
@@ -140,6 +149,15 @@ def _gaps(batched, shared, t0, states, room):
         return jnp.min(least_gaps(eqx.combine(batched, shared), t0, state, room))
 
     return eqx.filter_vmap(one, in_axes=(eqx.if_array(0), 0))(batched, states)
+
+
+@eqx.filter_jit
+def _sizes(batched, shared, times, states, turns):
+    def one(batched, t, state, turn):
+        return component_sizes(eqx.combine(batched, shared), t, state, turn)
+
+    axes = (eqx.if_array(0), 0, 0, 0)
+    return eqx.filter_vmap(one, in_axes=axes)(batched, times, states, turns)
 
 
 @eqx.filter_jit

@@ -59,6 +59,23 @@ class AbstractSection(eqx.Module):
     def turn(self, where: Callable | None = None, values=None) -> np.ndarray:
         """Length of a turn (s, or iterations), shape `(lanes,)`, or `(1,)` for all."""
 
+    def sizes(
+        self,
+        states,
+        samples: Samples,
+        where: Callable | None = None,
+        values=None,
+    ) -> np.ndarray:
+        """How large each component is in each lane, shape `(lanes, n)`.
+
+        Two states are equal where their difference is small beside this. By default
+        the largest value among the start (`states`) and the samples.
+        """
+        del where, values
+        seen = np.where(np.isfinite(samples.states), np.abs(samples.states), 0.0)
+        start = np.abs(np.nan_to_num(np.asarray(states, dtype=float)))
+        return np.maximum(start, seen.max(axis=1))
+
     @abc.abstractmethod
     def lifted(self, states, where: Callable | None = None, values=None) -> np.ndarray:
         """The states, moved out of the constraint where a parameter moved it there."""

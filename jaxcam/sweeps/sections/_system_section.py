@@ -4,7 +4,7 @@ import numpy as np
 from equinox import AbstractVar
 
 from ...hybrid import HybridSystem
-from ._hybrid_lanes import in_contact, lifted, turn_lengths
+from ._hybrid_lanes import in_contact, lane_sizes, lifted, turn_lengths
 from ._section import AbstractSection, system_names
 
 
@@ -22,6 +22,16 @@ class AbstractSystemSection(AbstractSection):
 
     def turn(self, where=None, values=None) -> np.ndarray:
         return turn_lengths(self.system, self.period, where, values)
+
+    def sizes(self, states, samples, where=None, values=None) -> np.ndarray:
+        largest = super().sizes(states, samples, where, values)
+        last = np.isfinite(samples.states[:, -1]).all(axis=1)
+        last &= np.isfinite(samples.times[:, -1])
+        time = np.where(last, samples.times[:, -1], self.t0)
+        state = np.where(last[:, None], samples.states[:, -1], np.nan_to_num(states))
+        turn = self.turn(where, values)
+        moved = lane_sizes(self.system, time, state, turn, where, values)
+        return np.maximum(largest, np.nan_to_num(moved, posinf=0.0))
 
     def lifted(self, states, where=None, values=None) -> np.ndarray:
         return lifted(self.system, self.t0, states, where, values)

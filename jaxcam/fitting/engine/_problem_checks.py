@@ -1,0 +1,75 @@
+"""What a problem is refused for before anything is fitted, in sentences."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from ._linearise import Layout, Point
+from ._model import augmented_field, Model
+from ._pieces import Pieces
+
+
+def refuse_not_finite(layout: Layout, segments, pieces: Pieces, point: Point) -> None:
+    """A field that is no number where the data are cannot be fitted to them."""
+    rates = np.asarray(_rates(layout, point, pieces))
+    bad = pieces.exists & ~np.all(np.isfinite(rates), axis=-1)
+    if np.any(bad):
+        r, k = np.argwhere(bad)[0]
+        state = ", ".join(f"{x:.4g}" for x in np.asarray(point.states)[r, k])
+        raise ValueError(
+            f"The model gives no finite number in {segments[r].recording.name} at "
+            f"{pieces.flown.start[r, k]:.4g} s, where the data suggest the state "
+            f"({state}); check its vector field and the nominal parameters there."
+        )
+
+
+@eqx.filter_jit
+def _rates(layout: Layout, point: Point, pieces: Pieces):
+    """Rate of change of each state that pieces start from."""
+
+    def one(values, states, start, angle, rate):
+        model = layout.at(values)
+
+        def at(state, t, angle, rate):
+            return augmented_field(model, model.driven(t, angle, rate), t, state)
+
+        return jax.vmap(at)(states, start, angle, rate)
+
+    drive = pieces.flown.start, pieces.angle_at, pieces.rate_at
+    return jax.vmap(one)(*point, *(jnp.asarray(part) for part in drive))
+
+
+def refuse_repeated(parameters) -> None:
+    names = [parameter.name for parameter in parameters]
+    repeated = {name for name in names if names.count(name) > 1}
+    if repeated:
+        raise ValueError(
+            f"Two parameters are called {min(repeated)!r}; rename one of them."
+        )
+
+
+def parameter_places(model: Model, parameters) -> tuple[int, ...]:
+    """Index of each parameter among the leaves of a model, for a `Layout`.
+
+    **Raises:** `ValueError` for a parameter that is not one number of the model, or
+    the same one as another.
+    """
+    leaves, tree = jax.tree.flatten(model)
+    numbered = jax.tree.unflatten(tree, list(range(len(leaves))))
+    places = []
+    for parameter in parameters:
+        place = parameter.where(numbered)
+        if not isinstance(place, int) or np.shape(leaves[place]) != ():
+            raise ValueError(
+                f"The parameter {parameter.name!r} is not one number of the model; let "
+                f"`where` pick a field that holds a single number."
+            )
+        if place in places:
+            other = parameters[places.index(place)].name
+            raise ValueError(
+                f"The parameters {other!r} and {parameter.name!r} are the same number; "
+                f"leave one of them out."
+            )
+        places.append(place)
+    return tuple(places)
