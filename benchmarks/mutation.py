@@ -36,6 +36,7 @@ MODULES = (
 ).split()
 TESTS = [
     "tests/test_motion_parts.py",
+    "tests/test_motion_rules.py",
     # one program or two each, and most of what a motion can do
     "tests/test_motion_exact.py::test_launched_ball_bounces_and_rests",
     "tests/test_motion_exact.py::test_ball_leaves_the_table_where_it_falls_faster_than_free",

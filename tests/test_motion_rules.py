@@ -1,0 +1,101 @@
+"""Rules of the event loop one by one, where whole motions do not tell them apart."""
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from textbook_systems import BallBetweenWalls, parameters
+
+from jaxcam import Settings
+from jaxcam.hybrid import stroboscope
+from jaxcam.hybrid.loop import Jet
+from jaxcam.hybrid.loop._advance import Plan
+from jaxcam.hybrid.loop._functions import Functions
+from jaxcam.hybrid.loop._loop_state import _presses, first_state
+from jaxcam.hybrid.loop._release import lets_go_before, opens
+from jaxcam.hybrid.loop._scale import error_norm
+from jaxcam.models import BouncingBall
+
+
+def jet(*rates):
+    return Jet(*(jnp.asarray(float(rate)) for rate in rates))
+
+
+@pytest.mark.parametrize("worst", range(3))
+def test_the_error_of_a_step_is_that_of_its_worst_component(worst):
+    error, allowed = np.full(3, 1e-9), np.full(3, 1e-3)
+    error[worst] = -7e-3
+    assert float(error_norm(tuple(error), tuple(allowed))) == pytest.approx(7.0)
+
+
+def test_counters_begin_at_zero():
+    functions = Functions(BouncingBall().prepared(), 2)
+    first = first_state(functions, jnp.asarray(0.0), (1.0, 0.0), jnp.asarray(1.0))
+    assert [float(x) for x in (first.steps, first.impacts, first.chatters)] == [0.0] * 3
+
+
+def test_counted_impacts_are_those_listed():
+    """A ball on a moving table, 30 turns: in each turn and in all."""
+    ball = BouncingBall(amplitude=0.02, frequency=31.0)
+    seen = stroboscope(ball, np.array([[0.3, 0.0], [0.1, 0.5]]), 30)
+    assert np.all(seen.impacts > 5)
+    np.testing.assert_array_equal(seen.impacts, seen.hits.sum(axis=1))
+
+
+@pytest.mark.parametrize(
+    ("acceleration", "jerk", "offset", "lets_go"),
+    [
+        (-1.0, 2.0, 1.0, True),
+        # still pressing at the impact
+        (-5.0, 2.0, 1.0, False),
+        # the pull falls
+        (1.0, -0.5, 1.0, False),
+    ],
+)
+def test_release_before_an_impact(acceleration, jerk, offset, lets_go):
+    found = lets_go_before(jet(0, 0, acceleration, jerk), offset, 10.0, 1e-9)
+    assert bool(found) is lets_go
+
+
+@pytest.mark.parametrize(("scale", "wanted"), [(1e-3, False), (1e-1, True)])
+def test_a_pull_counts_by_the_gap_that_it_opens(scale, wanted):
+    """Half of 1 m/s^2 times the square of the step, beside a rounding of 1e-5 m."""
+    assert bool(opens(jet(0, 0, 1.0, 0), scale, 1e-5)) is wanted
+
+
+@pytest.mark.parametrize(
+    ("acceleration", "jerk", "tiny", "presses"),
+    [
+        (-1.0, 0.0, 0.0, True),
+        (1.0, 0.0, 1.0, False),
+        # hops of 2 a^3 / (3 j^2) = 0.0067 beside a gap that is 0.01, or 0.001
+        (0.1, -0.316, 0.01, True),
+        (0.1, -0.316, 0.001, False),
+        # no force yet, and it grows outwards, or inwards
+        (0.0, 1.0, 1.0, False),
+        (0.0, -1.0, 1e-12, True),
+    ],
+)
+def test_what_is_touched_without_velocity_presses(acceleration, jerk, tiny, presses):
+    assert bool(_presses(jet(0, 0, acceleration, jerk), tiny)) is presses
+
+
+def test_plan_knows_the_period_that_it_is_given():
+    """Steps are at most a part of it; without, of the system's own period."""
+    walls = BallBetweenWalls(**parameters(gravity=9.81, width=1.0, restitution=0.8))
+    table = BouncingBall(amplitude=0.02, frequency=2 * np.pi)
+    zero, end = jnp.asarray(0.0), jnp.asarray(8.0)
+
+    def longest(system, period=None):
+        plan = Plan.of(system, Settings(), zero, end, period=period)
+        return float(plan.longest_step)
+
+    assert longest(walls) == np.inf
+    assert longest(table, 2.0) == pytest.approx(2 * longest(table))
+    assert longest(walls, 2.0) == pytest.approx(2 * longest(table))
+
+
+def test_plan_measures_rates_by_the_length_of_the_run():
+    plan = Plan.of(BouncingBall(), Settings(), jnp.asarray(1.0), jnp.asarray(5.0))
+    assert float(plan.per_run) == 0.25
+    empty = Plan.of(BouncingBall(), Settings(), jnp.asarray(1.0), jnp.asarray(1.0))
+    assert float(empty.per_run) == 0.0
