@@ -26,7 +26,7 @@ from ._predictors import (
 )
 from ._problem import (
     AbstractProblem as AbstractProblem,
-    LocalMap as LocalMap,
+    LocalDynamics as LocalDynamics,
     Monitor as Monitor,
     Start as Start,
 )

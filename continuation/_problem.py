@@ -41,7 +41,7 @@ class Monitor(eqx.Module):
     vanishing: tuple[str, ...] = eqx.field(static=True, default=())
 
 
-class LocalMap(NamedTuple):
+class LocalDynamics(NamedTuple):
     """The vector field or map around a solution whose eigenvalues are the problem's."""
 
     #: (k,) where the solution is
@@ -92,7 +92,7 @@ class AbstractProblem(eqx.Module):
 
     The other methods have defaults. **Traced** (called inside compiled programs; jax
     functions, differentiable forward): `residual`, `linearisation`, `derivatives`,
-    `local_map`, `seen`, `watched`, `scale`. Everything about them that is not an array
+    `local_dynamics`, `seen`, `watched`, `scale`. Everything about them that is not an array
     must be static: one program is compiled for each structure of a problem, and reused
     for all values of arrays in it. `residual` and monitors of `ends=False` are to be
     smooth; where an orbit does not exist return NaN, and the step is halved.
@@ -114,10 +114,10 @@ class AbstractProblem(eqx.Module):
 
     parameters: eqx.AbstractVar[PyTree]
     stability: eqx.AbstractClassVar[Stability]
-    #: whether `local_map` is there, for the coefficients of normal forms
+    #: whether `local_dynamics` is there, for the coefficients of normal forms
     normal_forms: ClassVar[bool] = True
     #: whether second derivatives of `residual` take long to compile, so that special
-    #: points are better enclosed than solved for, and `local_map` has only a Jacobian
+    #: points are better enclosed than solved for, and `local_dynamics` has only a Jacobian
     costly: ClassVar[bool] = False
     #: whether folds, branch points and those of `stability` are sought
     detects: ClassVar[bool] = True
@@ -155,7 +155,9 @@ class AbstractProblem(eqx.Module):
         )
         return whole, self.linearisation(u, parameters_at(p), whole[:, :-1])
 
-    def local_map(self, u: Float[Array, " n"], parameters: PyTree) -> LocalMap:
+    def local_dynamics(
+        self, u: Float[Array, " n"], parameters: PyTree
+    ) -> LocalDynamics:
         """The vector field or map around a solution.
 
         Normal-form coefficients come from its first three derivatives; its eigenvalues
@@ -168,7 +170,7 @@ class AbstractProblem(eqx.Module):
             moved = self.residual(y, parameters)
             return moved + y if self.stability == "map" else moved
 
-        return LocalMap(u, motion, jax.jacfwd(motion))
+        return LocalDynamics(u, motion, jax.jacfwd(motion))
 
     def scale(self, u: Float[Array, " n"], parameters: PyTree) -> Float[Array, " n"]:
         """(n,) sizes of the components of u, by which lengths along a branch are

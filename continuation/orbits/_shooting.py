@@ -12,7 +12,7 @@ from jaxcam.hybrid import HybridSystem
 from variational import orbits
 from variational.orbits import inadmissible, Shooting
 
-from .._problem import AbstractProblem, LocalMap, Monitor, Stability, Start
+from .._problem import AbstractProblem, LocalDynamics, Monitor, Stability, Start
 from ..special import FLIP
 from ._impact_sequences import ImpactSequences
 from ._orbit_grazing import orbit_grazing
@@ -85,13 +85,13 @@ class ImpactingOrbits(AbstractProblem):
             return matrix
         return orbits.return_map(self.equations, u, parameters, matrix)
 
-    def local_map(self, u, parameters) -> LocalMap:
+    def local_dynamics(self, u, parameters) -> LocalDynamics:
         """From the first impact to the one a period later.
 
         In its phase and the state after it, without forcing in the state alone.
         """
         jacobian, at = orbits.around_the_period(self.equations, u, parameters)
-        return LocalMap(at, None, jacobian)
+        return LocalDynamics(at, None, jacobian)
 
     def derivatives(self, u, p, parameters_at):
         """Both from one Jacobian of each flight."""

@@ -13,7 +13,7 @@ from .._program import Corrected, evaluate
 from .._settings import Settings
 from ._differences import along, STEPS
 from ._multilinear import second, third
-from ._test_functions import FLIP, FOLD, has_own_map, HOPF, NEIMARK_SACKER
+from ._test_functions import FLIP, FOLD, has_own_dynamics, HOPF, NEIMARK_SACKER
 
 
 # largest displacement for differences, of a component of a state or phase
@@ -24,20 +24,20 @@ _REACH = 2.0**-7
 def _b(problem, parameters, u, a, b, of_residual: bool):
     if of_residual:
         return second(lambda u: problem.residual(u, parameters), u, a, b)
-    local = problem.local_map(u, parameters)
+    local = problem.local_dynamics(u, parameters)
     return second(local.motion, local.at, a, b)
 
 
 @eqx.filter_jit
 def _c(problem, parameters, u, a, b, c):
-    local = problem.local_map(u, parameters)
+    local = problem.local_dynamics(u, parameters)
     return third(local.motion, local.at, a, b, c)
 
 
 @eqx.filter_jit
 def _jacobians(problem, parameters, u, moves):
     """The Jacobian of the local map next to a solution, displaced by these."""
-    local = problem.local_map(u, parameters)
+    local = problem.local_dynamics(u, parameters)
     return jax.lax.map(lambda move: local.jacobian(local.at + move), moves)
 
 
@@ -66,10 +66,10 @@ class _Derivatives:
         self.u = jnp.asarray(z[:-1])
 
     def a(self, at: Corrected) -> np.ndarray:
-        if not has_own_map(self.problem):
+        if not has_own_dynamics(self.problem):
             return at.linearisation
         y = jax.eval_shape(
-            lambda u: self.problem.local_map(u, self.parameters).at, self.u
+            lambda u: self.problem.local_dynamics(u, self.parameters).at, self.u
         )
         # as many as differences take, so that it is the same program
         return self._jacobians(np.zeros((2 * STEPS + 1, y.size)))[0]
@@ -169,7 +169,7 @@ def fold_form(d: _Derivatives, at: Corrected) -> tuple[float | None, str]:
     words = f"the branch lies at {side} parameters"
     if problem.stability == "none":
         return None, words
-    if has_own_map(problem):
+    if has_own_dynamics(problem):
         a = d.a(at)
         right, left = null_vectors(a - np.eye(a.shape[0]))
         bending = float(left @ d.b(right, right))

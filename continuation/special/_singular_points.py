@@ -18,7 +18,7 @@ from ._bialternate import (
 )
 from ._extended import AbstractExtended
 from ._multilinear import second, third
-from ._test_functions import FLIP, FOLD, has_own_map, HOPF, NEIMARK_SACKER
+from ._test_functions import FLIP, FOLD, has_own_dynamics, HOPF, NEIMARK_SACKER
 
 
 # pairs of eigenvalues beside a critical one are watched up to this dimension
@@ -131,7 +131,7 @@ class SingularPoints(AbstractExtended):
                 if small and n >= 3:
                     names["pair"] = "fold-Neimark-Sacker"
         elif self.kind == FLIP:
-            if self.base.normal_forms and not has_own_map(self.base):
+            if self.base.normal_forms and not has_own_dynamics(self.base):
                 names["degenerate"] = "generalized flip"
             names["double"] = "1:2 resonance"
             names["other"] = "fold-flip"
@@ -172,7 +172,7 @@ class SingularPoints(AbstractExtended):
             values["double"] = left @ right
             values["other"] = jnp.linalg.det(a - one)
             if "degenerate" in wanted:
-                motion = base.local_map(inner, inside).motion
+                motion = base.local_dynamics(inner, inside).motion
                 values["degenerate"] = flip_coefficient(motion, inner, a, right, left)
         elif self.kind == HOPF:
             values["double"] = determinant_on_plane(a, right)

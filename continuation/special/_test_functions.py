@@ -28,9 +28,9 @@ def kinds(problem: AbstractProblem) -> tuple[str, ...]:
     return common + more[problem.stability]
 
 
-def has_own_map(problem: AbstractProblem) -> bool:
+def has_own_dynamics(problem: AbstractProblem) -> bool:
     """Whether normal forms are those of another map than the linearisation is of."""
-    return type(problem).local_map is not AbstractProblem.local_map
+    return type(problem).local_dynamics is not AbstractProblem.local_dynamics
 
 
 def test_values(problem: AbstractProblem, leaf: int, at: Corrected) -> dict[str, float]:
