@@ -92,7 +92,7 @@ class AbstractProblem(eqx.Module):
 
     The other methods have defaults. **Traced** (called inside compiled programs; jax
     functions, differentiable forward): `residual`, `linearisation`, `derivatives`,
-    `local_dynamics`, `seen`, `watched`, `scale`. Everything about them that is not an array
+    `local_dynamics`, `seen`, `watched`, `scale`. Everything about them that is no array
     must be static: one program is compiled for each structure of a problem, and reused
     for all values of arrays in it. `residual` and monitors of `ends=False` are to be
     smooth; where an orbit does not exist return NaN, and the step is halved.
@@ -117,7 +117,7 @@ class AbstractProblem(eqx.Module):
     #: whether `local_dynamics` is there, for the coefficients of normal forms
     normal_forms: ClassVar[bool] = True
     #: whether second derivatives of `residual` take long to compile, so that special
-    #: points are better enclosed than solved for, and `local_dynamics` has only a Jacobian
+    #: points are better enclosed than solved for; `local_dynamics` has only a Jacobian
     costly: ClassVar[bool] = False
     #: whether folds, branch points and those of `stability` are sought
     detects: ClassVar[bool] = True
