@@ -8,9 +8,9 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, ArrayLike, Float, Int
+from jaxtyping import Array, Int
 
-from ..parameters import as_arrays, real_array
+from ..parameters import as_arrays, real_array, VectorLike
 from ._settings import Settings
 from ._system import HybridSystem
 from ._types import RealScalar
@@ -30,7 +30,7 @@ _CHUNK = 2048
 
 def simulate(
     system: HybridSystem,
-    state: Float[ArrayLike, " n"] | None,
+    state: VectorLike | None,
     t0: RealScalar,
     t1: RealScalar,
     *,

@@ -9,3 +9,8 @@ from ._pick import (
     Where as Where,
 )
 from ._real import real_array as real_array
+from ._vectors import (
+    AnyArray as AnyArray,
+    RealScalar as RealScalar,
+    VectorLike as VectorLike,
+)
