@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Int
 
-from ..parameters import as_arrays, real_array, VectorLike
+from ..parameters import as_arrays, FloatScalar, real_array, VectorLike
 from ._settings import Settings
 from ._system import HybridSystem
 from ._types import RealScalar
@@ -34,10 +34,10 @@ def simulate(
     t0: RealScalar,
     t1: RealScalar,
     *,
-    tolerance: float = 1e-10,
+    tolerance: FloatScalar = 1e-10,
     solver: diffrax.AbstractSolver | None = None,
     settings: Settings | None = None,
-    max_step: float | None = None,
+    max_step: FloatScalar | None = None,
     max_steps: int | None = None,
     derivatives: Literal["forward", "reverse"] = "forward",
     engine: Literal["loop", "diffeqsolve"] = "loop",

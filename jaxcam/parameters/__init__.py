@@ -11,6 +11,7 @@ from ._pick import (
 from ._real import real_array as real_array
 from ._vectors import (
     AnyArray as AnyArray,
+    FloatScalar as FloatScalar,
     RealScalar as RealScalar,
     VectorLike as VectorLike,
 )

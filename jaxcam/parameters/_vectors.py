@@ -10,5 +10,7 @@ from jaxtyping import Array, ArrayLike, Float, Real
 #: of a program, or of the host
 AnyArray: TypeAlias = Array | np.ndarray
 RealScalar: TypeAlias = Real[ArrayLike, ""]
+#: a number that may be an argument of a program
+FloatScalar: TypeAlias = float | Float[AnyArray, ""]
 #: one vector, as an array or as a list of numbers
 VectorLike: TypeAlias = Float[ArrayLike, " n"] | Sequence[RealScalar]
