@@ -3,8 +3,9 @@
 import diffrax
 import equinox as eqx
 import numpy as np
+from jaxtyping import ArrayLike, Float
 
-from ..parameters import FloatScalar, VectorLike
+from ..parameters import FloatScalar
 
 
 class Settings(eqx.Module):
@@ -45,7 +46,7 @@ class Settings(eqx.Module):
     solver: diffrax.AbstractSolver = eqx.field(
         default_factory=diffrax.Dopri8, static=True
     )
-    absolute: FloatScalar | VectorLike | None = None
+    absolute: FloatScalar | Float[ArrayLike, " n"] | None = None
     max_step: FloatScalar | None = None
     plain: bool = eqx.field(default=False, static=True)
 

@@ -12,5 +12,5 @@ AnyArray: TypeAlias = Array | np.ndarray
 RealScalar: TypeAlias = Real[ArrayLike, ""]
 #: a number that may be an argument of a program
 FloatScalar: TypeAlias = float | Float[AnyArray, ""]
-#: one vector, as an array or as a list of numbers
-VectorLike: TypeAlias = Float[ArrayLike, " n"] | Sequence[RealScalar]
+#: one vector of any length, as an array or as a list of numbers
+VectorLike: TypeAlias = Float[ArrayLike, " _"] | Sequence[RealScalar]
