@@ -1,13 +1,13 @@
 """Many branches at once."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import jax
 import numpy as np
-from jaxtyping import ArrayLike, PyTree
+from jaxtyping import ArrayLike, Float, PyTree
 
-from jaxcam.parameters import Where
+from jaxcam.parameters import VectorLike, Where
 
 from ._batch_run import Axes, numbers_of, REASONS, run_lanes
 from ._follow import checked_bounds
@@ -107,7 +107,7 @@ def _point(problem, at, kind, arclength, tests, converged, reason, leaf) -> Poin
 
 def follow_batch(
     problem: AbstractProblem,
-    states: ArrayLike,
+    states: Float[ArrayLike, "lanes n"] | Sequence[VectorLike],
     where: Where,
     bounds: tuple[float, float],
     *,

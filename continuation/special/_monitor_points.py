@@ -7,6 +7,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, PyTree
 
+from jaxcam.parameters import AnyArray
+
 from .._parameter import with_leaf
 from .._problem import AbstractProblem, Monitor, Stability
 from ._extended import AbstractExtended
@@ -18,8 +20,8 @@ class MonitorPoints(AbstractExtended):
     base: AbstractProblem
     name: str = eqx.field(static=True)
     leaf: int = eqx.field(static=True)
-    width: Array
-    bounds: Array
+    width: AnyArray
+    bounds: AnyArray
     stability: ClassVar[Stability] = "none"
 
     def residual(self, u: Float[Array, " n"], parameters: PyTree):
@@ -55,9 +57,9 @@ class MonitorLevel(AbstractProblem):
 
     base: AbstractProblem
     leaf: int = eqx.field(static=True)
-    width: Array
-    which: str | Array
-    level: Array
+    width: AnyArray
+    which: str | AnyArray
+    level: AnyArray
     stability: ClassVar[Stability] = "none"
 
     @property
