@@ -71,7 +71,8 @@ class MonitorLevel(AbstractProblem):
         if isinstance(self.which, str):
             value = self.base.watched(self.which, inner, inside)
         else:
-            value = self.base.watched_by_number(self.which, inner, inside)
+            number = jnp.asarray(self.which)
+            value = self.base.watched_by_number(number, inner, inside)
         return jnp.append(self.base.residual(inner, inside), value - self.level)
 
     def scale(self, u: Float[Array, " n"], parameters: PyTree):
