@@ -1,13 +1,13 @@
 """Many branches at once."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import jax
 import numpy as np
-from jaxtyping import ArrayLike, PyTree
+from jaxtyping import ArrayLike, Float, PyTree
 
-from jaxcam.parameters import Where
+from jaxcam.parameters import VectorLike, Where
 
 from ._algorithms import AbstractAlgorithm, PseudoArclength
 from ._batch_run import Axes, REASONS, run_lanes
@@ -121,7 +121,7 @@ def _check_algorithm(algorithm: AbstractAlgorithm) -> None:
 
 def follow_batch(
     problem: AbstractProblem,
-    states: ArrayLike,
+    states: Float[ArrayLike, "lanes n"] | Sequence[VectorLike],
     where: Where,
     bounds: tuple[float, float],
     algorithm: AbstractAlgorithm | None = None,

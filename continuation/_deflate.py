@@ -8,6 +8,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import ArrayLike
 
+from jaxcam.parameters import VectorLike
+
 from ._parameter import as_arrays
 from ._point import set_parameters
 from ._problem import AbstractProblem
@@ -35,8 +37,8 @@ def _deflated(problem, guesses, known, count, scale, tolerance, iterations: int)
 
 def deflate(
     problem: AbstractProblem,
-    guesses: ArrayLike,
-    known: Sequence[ArrayLike] = (),
+    guesses: ArrayLike | VectorLike | Sequence[VectorLike],
+    known: Sequence[VectorLike] = (),
     *,
     settings: Settings | None = None,
     most: int = 16,

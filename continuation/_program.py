@@ -20,16 +20,16 @@ class Corrected(eqx.Module):
     Traced arrays inside programs, NumPy's outside.
     """
 
-    z: Float[Any, " n+1"]
+    z: Float[Any, " n1"]
     success: Any
     iterations: Any
     #: (n, n+1) derivative of the residual with respect to (state, parameter)
-    jacobian: Float[Any, "n n+1"]
+    jacobian: Float[Any, "n n1"]
     linearisation: Float[Any, "k k"]
-    tangent: Float[Any, " n+1"]
+    tangent: Float[Any, " n1"]
     #: sign and (n+1)-th root of the determinant of jacobian and tangent, scaled
     determinant: Any
-    scale: Float[Any, " n+1"]
+    scale: Float[Any, " n1"]
     monitors: dict[str, Any]
     observed: dict[str, Any]
 

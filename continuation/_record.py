@@ -169,11 +169,28 @@ def _point_to_json(point: Point) -> dict:
     }
 
 
-def _point_from_json(line: dict, attach: Callable) -> Point:
+# fields of a point that JSON holds as they are
+_TAKEN_OVER: dict[str, Any] = {
+    "label": int,
+    "kind": str,
+    "stable": bool | None,
+    "iterations": int,
+    "converged": bool,
+    "reason": str,
+    "coefficient": float | int | None,
+    "criticality": str,
+    "signature": str,
+}
+
+
+def _point_from_json(line: Any, attach: Callable) -> Point:
     def vector(x):
         return np.array([float(v) for v in x])
 
     value = dict(line)
+    for name, kind in _TAKEN_OVER.items():
+        if not isinstance(value[name], kind):
+            raise TypeError(name)
     value["parameter"] = float(line["parameter"])
     value["parameters"] = tuple(float(x) for x in line["parameters"])
     for name in ("state", "tangent", "scale"):

@@ -5,9 +5,18 @@ import tempfile
 from pathlib import Path
 
 import jax
+import jaxtyping
 import matplotlib
 import pytest
 from hypothesis import settings
+
+
+# types and shapes are checked as functions are called; before any of ours is imported.
+# As Python's type system has it, an integer is a float
+jaxtyping.install_import_hook(
+    ["continuation", "jaxcam", "variational"],
+    "beartype.beartype(conf=beartype.BeartypeConf(is_pep484_tower=True))",
+)
 
 import jaxcam  # noqa: F401  64-bit floats, and everything it does on import is allowed
 
@@ -36,6 +45,14 @@ def _cache_folder() -> Path:
 jax.config.update("jax_compilation_cache_dir", str(_cache_folder()))
 jax.config.update("jax_persistent_cache_min_compile_time_secs", 0)
 jax.config.update("jax_persistent_cache_min_entry_size_bytes", 0)
+
+
+@pytest.fixture
+def unchecked_types():
+    """What a user sees who passes something of the wrong type: nothing checks it."""
+    jaxtyping.config.update("jaxtyping_disable", True)
+    yield
+    jaxtyping.config.update("jaxtyping_disable", False)
 
 
 # Linux gives a process 65530 memory mappings, and a large compiled program takes

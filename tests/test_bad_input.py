@@ -68,6 +68,7 @@ def test_state_of_the_wrong_length(state):
 
 
 @pytest.mark.parametrize("state", [1.0, [ABOVE, ABOVE]])
+@pytest.mark.usefixtures("unchecked_types")
 def test_state_that_is_no_vector(state):
     assert "pass one vector, and jax.vmap for many" in refusal(BouncingBall(), state)
 
@@ -105,11 +106,13 @@ def test_meaningless_settings(settings, word):
     assert f"{word} is" in refusal(BouncingBall(), ABOVE, settings=settings)
 
 
+@pytest.mark.usefixtures("unchecked_types")
 def test_unknown_engine():
     text = refusal(BouncingBall(), ABOVE, engine="leapfrog")
     assert "'leapfrog'" in text and '"loop" or "diffeqsolve"' in text
 
 
+@pytest.mark.usefixtures("unchecked_types")
 def test_unknown_derivatives():
     text = refusal(BouncingBall(), ABOVE, derivatives="backward")
     assert "'backward'" in text and '"forward" or "reverse"' in text

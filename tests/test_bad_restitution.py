@@ -95,11 +95,13 @@ def test_an_active_wall_may_give_speed_but_not_keep_the_direction():
 
 
 @pytest.mark.parametrize("name", sorted(ENTRIES))
+@pytest.mark.usefixtures("unchecked_types")
 def test_complex_states(name):
     with pytest.raises(ValueError, match="is complex; give real numbers"):
         ENTRIES[name](Table(), STATE + 1j)
 
 
+@pytest.mark.usefixtures("unchecked_types")
 def test_complex_numbers_elsewhere():
     tries = [
         lambda: jax.jit(lambda x: hybrid.flow(Table(), x, 0.0, 0.1).state)(STATE + 0j),

@@ -229,6 +229,7 @@ def test_zero_of_a_monitor_and_its_curve():
     assert "first parameter" in curve.reason
 
 
+@pytest.mark.usefixtures("unchecked_types")
 def test_curves_need_points_that_form_some(cusp_branch):
     with pytest.raises(ValueError, match="form no curve"):
         continuation.curve(cusp_branch.points[0], (a, b), TWO)

@@ -221,6 +221,7 @@ def test_an_inadmissible_point_is_reported_and_not_returned():
         ([np.nan], mu, (1.0, 4.0), "finite numbers"),
     ],
 )
+@pytest.mark.usefixtures("unchecked_types")
 def test_bad_input(start, where, bounds, words):
     with pytest.raises(ValueError, match=words):
         continuation.follow(LOGISTIC, start, where, bounds)

@@ -82,6 +82,7 @@ EFFECT = Effect(
 @pytest.mark.parametrize(
     ("verdict", "effects"), [("effect", (EFFECT,)), ("none", ()), ("unknown", ())]
 )
+@pytest.mark.usefixtures("unchecked_types")
 def test_the_page_is_complete(tmp_path, verdict, effects):
     found = _diagnosis(verdict, effects)
     page = diagnosis_page(found, draw(tmp_path, found), ("A note.",))
@@ -95,6 +96,7 @@ def test_the_page_is_complete(tmp_path, verdict, effects):
     assert '"verdict"' in to_text(found.to_json())
 
 
+@pytest.mark.usefixtures("unchecked_types")
 def test_shapes_are_drawn_with_units_on_both_axes():
     figure = _shapes(plt, _diagnosis("none", ()))
     axes = figure.axes[0]

@@ -137,7 +137,8 @@ def test_the_constants_of_a_rig_reach_its_terms(tmp_path):
         assert terms[name].slip == 0.02
     # half of the restitution's fall by the definition of its form, r = (1 + v/v0)^-rb
     bounce = dataclasses.replace(terms["restitution_velocity"], rb=1.0)
-    assert float(bounce.restitution(0.5, None)) == pytest.approx(0.5, rel=1e-14)
+    motion = Motion(0.0, 0.0, -0.5, 0.0)
+    assert float(bounce.restitution(0.5, motion)) == pytest.approx(0.5, rel=1e-14)
 
 
 @pytest.mark.parametrize(

@@ -253,6 +253,7 @@ def test_a_diagnosed_system_is_saved_and_read_again(tmp_path):
         load_system(tmp_path / "model.json")
 
 
+@pytest.mark.usefixtures("unchecked_types")
 def test_the_most_promising_exchanges_are_tried(monkeypatch):
     """Of nine terms the six whose scores are highest, whatever order they stand in.
 
@@ -324,6 +325,7 @@ def test_a_fit_that_is_late_to_beat_another_is_given_up():
     assert not any(given_up(100, _POLICY)(costs[: k + 1]) for k in range(1, 16))
 
 
+@pytest.mark.usefixtures("unchecked_types")
 def test_a_fit_that_goes_on_to_an_optimum_at_the_same_cost_is_kept(monkeypatch):
     ends = iter([(False, 15), (True, 3)])
 

@@ -5,6 +5,9 @@ import pytest
 from hypothesis import given, HealthCheck, settings
 
 
+# what a user sees, whose types nothing checks
+pytestmark = pytest.mark.usefixtures("unchecked_types")
+
 FEW = settings(max_examples=20, suppress_health_check=list(HealthCheck))
 
 

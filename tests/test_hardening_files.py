@@ -11,6 +11,9 @@ from jaxcam.recordings import RecordingError
 from jaxcam.recordings.files import read_recordings
 
 
+# what a user sees, whose types nothing checks
+pytestmark = pytest.mark.usefixtures("unchecked_types")
+
 FEW = settings(max_examples=60, suppress_health_check=list(HealthCheck))
 GAPS = st.sampled_from(["refuse", "split", "mend"])
 

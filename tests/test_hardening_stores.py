@@ -24,6 +24,9 @@ from jaxcam.cli._reproduce_record import (
 from jaxcam.sweeps import basins, Grid, load
 
 
+# what a user sees, whose types nothing checks
+pytestmark = pytest.mark.usefixtures("unchecked_types")
+
 FEW = settings(max_examples=60, suppress_health_check=list(HealthCheck))
 OPTIONS = {"turns": 40, "block": 3}
 GRID = Grid((-2, -2), (2, 2), (12, 5))
@@ -56,6 +59,19 @@ def test_any_branch(branch_text, tmp_path_factory, data):
         sentence = str(error)
         assert str(file) in sentence and "\n" not in sentence
         assert error.__cause__ is None and len(sentence) < 400
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("converged", {}), ("label", "2"), ("stable", 1.5), ("reason", None)],
+)
+def test_a_point_with_a_field_of_another_type(branch_text, tmp_path, name, value):
+    header, first, *rest = branch_text.splitlines()
+    altered = json.dumps({**json.loads(first), name: value})
+    file = tmp_path / "branch.jsonl"
+    file.write_text("\n".join([header, altered, *rest]) + "\n")
+    with pytest.raises(ValueError, match="is damaged"):
+        continuation.load(file)
 
 
 @pytest.fixture(scope="module")
@@ -135,3 +151,4 @@ def test_any_record_of_a_table(tmp_path_factory, data):
     found = earlier(folder, "table", wanted)
     if found is not None:
         assert found.settings == wanted and not math.isnan(len(found.table))
+        assert found.name == "table" and isinstance(found.seconds, float)

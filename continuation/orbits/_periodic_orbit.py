@@ -7,7 +7,6 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import optimistix as optx
-from jaxtyping import ArrayLike, Float
 
 from jaxcam.hybrid import (
     component_sizes,
@@ -18,7 +17,7 @@ from jaxcam.hybrid import (
     stroboscope,
 )
 from jaxcam.hybrid.checks import check_start
-from jaxcam.parameters import as_arrays, real_array
+from jaxcam.parameters import as_arrays, real_array, VectorLike
 from variational import Orbit, orbit_of
 from variational.orbits import flown, refuse, seed, Shooting
 
@@ -35,7 +34,7 @@ _SAME = 1e-7
 
 def periodic_orbit(
     system: HybridSystem,
-    guess: Float[ArrayLike, " n"] | None = None,
+    guess: VectorLike | None = None,
     period: float | None = None,
     *,
     periods: int | None = None,

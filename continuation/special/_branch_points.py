@@ -8,6 +8,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, PyTree
 
+from jaxcam.parameters import AnyArray
+
 from .._parameter import with_leaf
 from .._problem import AbstractProblem, jacobian_of, Stability
 from .._program import evaluate, residual_at, solve
@@ -33,7 +35,7 @@ class BranchPoints(AbstractProblem):
 
     base: AbstractProblem
     leaf: int = eqx.field(static=True)
-    width: Array
+    width: AnyArray
     stability: ClassVar[Stability] = "none"
 
     @property

@@ -7,6 +7,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, PyTree
 
+from jaxcam.parameters import AnyArray
+
 from .._parameter import with_leaf
 from .._problem import AbstractProblem, Monitor, Stability
 from ._extended import AbstractExtended
@@ -18,8 +20,8 @@ class MonitorPoints(AbstractExtended):
     base: AbstractProblem
     name: str = eqx.field(static=True)
     leaf: int = eqx.field(static=True)
-    width: Array
-    bounds: Array
+    width: AnyArray
+    bounds: AnyArray
     stability: ClassVar[Stability] = "none"
 
     def residual(self, u: Float[Array, " n"], parameters: PyTree):
@@ -56,9 +58,9 @@ class MonitorLevel(AbstractProblem):
 
     base: AbstractProblem
     leaf: int = eqx.field(static=True)
-    width: Array
-    number: int | Array
-    level: Array
+    width: AnyArray
+    number: int | AnyArray
+    level: AnyArray
     stability: ClassVar[Stability] = "none"
 
     @property
@@ -67,7 +69,10 @@ class MonitorLevel(AbstractProblem):
 
     def residual(self, u: Float[Array, " n"], parameters: PyTree):
         inner, inside = u[:-1], with_leaf(parameters, self.leaf, u[-1])
-        value = self.base.watched(self.number, inner, inside)
+        number = (
+            self.number if isinstance(self.number, int) else jnp.asarray(self.number)
+        )
+        value = self.base.watched(number, inner, inside)
         return jnp.append(self.base.residual(inner, inside), value - self.level)
 
     def scale(self, u: Float[Array, " n"], parameters: PyTree):

@@ -7,6 +7,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, PyTree
 
+from jaxcam.parameters import AnyArray
+
 from .._parameter import with_leaf
 from .._point import set_parameters, with_field
 from .._problem import AbstractProblem, jacobian_of, Monitor, Stability
@@ -63,10 +65,10 @@ class SingularPoints(AbstractExtended):
     base: AbstractProblem
     kind: str = eqx.field(static=True)
     leaf: int = eqx.field(static=True)
-    width: Array
-    bounds: Array
-    b: Array
-    c: Array
+    width: AnyArray
+    bounds: AnyArray
+    b: AnyArray
+    c: AnyArray
     stability: ClassVar[Stability] = "none"
 
     def _matrix(self, u, parameters):

@@ -35,12 +35,13 @@ app.command()(one_sentence(fit))
 app.command()(one_sentence(reproduce))
 
 
-def _version(wanted: bool) -> None:
+def _version(wanted: bool) -> bool:
     if wanted:
         from importlib.metadata import version
 
         typer.echo(f"jaxcam {version('jaxcam')}")
         raise typer.Exit()
+    return wanted
 
 
 @app.callback()

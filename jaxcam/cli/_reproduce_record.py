@@ -141,4 +141,6 @@ def _read(out: Path, name: str) -> Record:
     found = json.loads((out / f"{name}.json").read_text(encoding="utf-8"))
     # records of versions that had no mark are those of other code
     found["settings"] = Settings(**{"code": "", **found["settings"]})
-    return Record(**found)
+    if found["name"] != name or not isinstance(found.get("figure", False), bool):
+        raise ValueError("the record of another target, or damaged")
+    return Record(**{**found, "seconds": float(found["seconds"])})

@@ -132,12 +132,12 @@ class _Follower:
         self.t = target if h == target - self.t else self.t + h
 
     def _inside(self, x: float, t: float) -> bool:
-        return x < self.cam.surface(t)[0] - _ROUNDING
+        return bool(x < self.cam.surface(t)[0] - _ROUNDING)
 
     def _lifts(self, t: float) -> bool:
         """Whether a follower that rests is pulled off the cam."""
         x, v, a = self.cam.surface(t)
-        return self.rig.acceleration(x, v) > a
+        return bool(self.rig.acceleration(x, v) > a)
 
     def _fly(self, h: float) -> tuple[float, float]:
         """Angle and velocity after a flight of length h, by one Runge-Kutta step."""

@@ -3,10 +3,9 @@
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import ArrayLike, Float
 
 from ..hybrid.checks import refuse_tracers
-from ..parameters import as_arrays, real_array
+from ..parameters import as_arrays, real_array, VectorLike
 from ._modes import region
 from ._run import CHUNK, chunk, start
 from ._step import EVENT, NOT_FINITE, NOTHING, RUNNING
@@ -26,7 +25,7 @@ _WHY = {
 
 def simulate_filippov(
     system: FilippovSystem,
-    state: Float[ArrayLike, " n"],
+    state: VectorLike,
     t0,
     t1,
     *,

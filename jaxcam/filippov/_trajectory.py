@@ -6,6 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
 
+from ..parameters import VectorLike
 from ._step import in_mode
 from ._system import FilippovSystem
 
@@ -46,7 +47,7 @@ class FilippovTrajectory(eqx.Module):
         """State at the end of the run."""
         return self.state[-1]
 
-    def at(self, times: Float[Array, " times"]) -> Float[Array, "times n"]:
+    def at(self, times: VectorLike) -> Float[Array, "times n"]:
         """State at each of `times` (s), by one more step from the point before it.
 
         **Raises:** `ValueError` for times outside the run.

@@ -3,7 +3,7 @@
 import dataclasses
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float, Int
 
 from ._fit_result import Fit
 from .engine import predict
@@ -24,8 +24,8 @@ class Residuals:
     time: Float[np.ndarray, " k"]
     turned: Float[np.ndarray, " k"]
     value: Float[np.ndarray, " k"]
-    flight: Float[np.ndarray, " k"]
-    resting: Float[np.ndarray, " k"]
+    flight: Int[np.ndarray, " k"]
+    resting: Bool[np.ndarray, " k"]
     noise: float
 
     @property

@@ -9,7 +9,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
-from ..parameters import as_arrays, real_array
+from ..parameters import as_arrays, real_array, VectorLike
 from ._settings import Settings
 from ._system import HybridSystem
 from ._types import RealScalar
@@ -39,7 +39,7 @@ class Arrival(eqx.Module):
 
 def flow(
     system: HybridSystem,
-    state: Float[Array, " n"],
+    state: VectorLike,
     t0: RealScalar,
     t1: RealScalar,
     *,

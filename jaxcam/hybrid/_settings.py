@@ -5,6 +5,8 @@ import equinox as eqx
 import numpy as np
 from jaxtyping import ArrayLike, Float
 
+from ..parameters import FloatScalar
+
 
 class Settings(eqx.Module):
     """Numbers that decide the accuracy of a run, not its physics.
@@ -38,14 +40,14 @@ class Settings(eqx.Module):
     - `solver`: any explicit Runge-Kutta solver of diffrax with an error estimate.
     """
 
-    tolerance: float = 1e-10
-    chatter_smallness: float = 1e-3
-    chatter_depth: float = 1e-6
+    tolerance: FloatScalar = 1e-10
+    chatter_smallness: FloatScalar = 1e-3
+    chatter_depth: FloatScalar = 1e-6
     solver: diffrax.AbstractSolver = eqx.field(
         default_factory=diffrax.Dopri8, static=True
     )
-    absolute: float | Float[ArrayLike, " n"] | None = None
-    max_step: float | None = None
+    absolute: FloatScalar | Float[ArrayLike, " n"] | None = None
+    max_step: FloatScalar | None = None
     plain: bool = eqx.field(default=False, static=True)
 
     def check(self) -> None:

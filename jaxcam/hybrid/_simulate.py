@@ -8,9 +8,9 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, ArrayLike, Float, Int
+from jaxtyping import Array, Int
 
-from ..parameters import as_arrays, real_array
+from ..parameters import as_arrays, FloatScalar, real_array, VectorLike
 from ._settings import Settings
 from ._system import HybridSystem
 from ._types import RealScalar
@@ -30,14 +30,14 @@ _CHUNK = 2048
 
 def simulate(
     system: HybridSystem,
-    state: Float[ArrayLike, " n"] | None,
+    state: VectorLike | None,
     t0: RealScalar,
     t1: RealScalar,
     *,
-    tolerance: float = 1e-10,
+    tolerance: FloatScalar = 1e-10,
     solver: diffrax.AbstractSolver | None = None,
     settings: Settings | None = None,
-    max_step: float | None = None,
+    max_step: FloatScalar | None = None,
     max_steps: int | None = None,
     derivatives: Literal["forward", "reverse"] = "forward",
     engine: Literal["loop", "diffeqsolve"] = "loop",

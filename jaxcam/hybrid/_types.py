@@ -2,8 +2,9 @@
 
 from typing import TypeAlias
 
-from jaxtyping import Array, ArrayLike, Float, Real
+from jaxtyping import Array, Float
+
+from ..parameters import RealScalar as RealScalar
 
 
-RealScalar: TypeAlias = Real[ArrayLike, ""]
 State: TypeAlias = Float[Array, " n"]

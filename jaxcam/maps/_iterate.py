@@ -7,10 +7,10 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Float
 
-from ..parameters import real_array
+from ..parameters import real_array, VectorLike
 
 
-def iterate(system: Callable, start: ArrayLike, count: int) -> jax.Array:
+def iterate(system: Callable, start: ArrayLike | VectorLike, count: int) -> jax.Array:
     """The orbit of `start`, with it: shape `(count + 1, ...)`."""
     start = real_array(start, "start")
     return jnp.concatenate([start[None], _orbit(system, start, count)])
@@ -19,7 +19,7 @@ def iterate(system: Callable, start: ArrayLike, count: int) -> jax.Array:
 def map_diagram(
     system: eqx.Module,
     where: Callable,
-    values: Float[ArrayLike, " values"],
+    values: VectorLike,
     start=0.3,
     *,
     transient: int = 1000,

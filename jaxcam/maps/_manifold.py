@@ -7,9 +7,9 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, ArrayLike, Float
+from jaxtyping import Array, Float
 
-from ..parameters import real_array
+from ..parameters import real_array, VectorLike
 
 
 _NEWTON = 50
@@ -25,7 +25,7 @@ class Saddle(NamedTuple):
     directions: Float[np.ndarray, "2 2"]
 
 
-def saddle_at(system: Callable, guess: Float[ArrayLike, " 2"]) -> Saddle:
+def saddle_at(system: Callable, guess: VectorLike) -> Saddle:
     """The saddle near a guess, by Newton's method.
 
     **Raises:** `ValueError` where there is no fixed point, or it is no saddle.
@@ -53,8 +53,8 @@ def saddle_at(system: Callable, guess: Float[ArrayLike, " 2"]) -> Saddle:
 
 def grow_manifold(
     system: Callable,
-    point: Float[ArrayLike, " 2"],
-    direction: Float[ArrayLike, " 2"],
+    point: VectorLike,
+    direction: VectorLike,
     *,
     length: float,
     spacing: float = 0.01,

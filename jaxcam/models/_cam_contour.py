@@ -4,14 +4,14 @@ The cam turns counterclockwise about the origin of the fixed frame; a contour is
 in the frame of the cam, which coincides with the fixed one at cam angle zero.
 """
 
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Float
 
 from ._eccentric_circle import EccentricCircle
-from ._profile import CamProfile
 
 
 class CamContour(NamedTuple):
@@ -34,7 +34,7 @@ class CamContour(NamedTuple):
 
 
 def flat_translating_contour(
-    profile: CamProfile, base_radius, cam_angles: Float[ArrayLike, " angles"]
+    profile: Callable[[Any], Any], base_radius, cam_angles: Float[ArrayLike, " angles"]
 ) -> CamContour:
     """The cam of a flat-faced follower that slides along a line through its axis.
 
@@ -53,7 +53,7 @@ def flat_translating_contour(
 
 
 def flat_oscillating_contour(
-    profile: CamProfile,
+    profile: Callable[[Any], Any],
     cam_angles: Float[ArrayLike, " angles"],
     *,
     center: tuple | None = None,
@@ -108,7 +108,7 @@ def flat_oscillating_contour(
 
 
 def roller_translating_contour(
-    profile: CamProfile,
+    profile: Callable[[Any], Any],
     base_radius,
     roller_radius,
     cam_angles: Float[ArrayLike, " angles"],
@@ -132,7 +132,7 @@ def roller_translating_contour(
 
 
 def roller_oscillating_contour(
-    profile: CamProfile,
+    profile: Callable[[Any], Any],
     pivot: tuple,
     arm_length,
     roller_radius,

@@ -9,3 +9,9 @@ from ._pick import (
     Where as Where,
 )
 from ._real import real_array as real_array
+from ._vectors import (
+    AnyArray as AnyArray,
+    FloatScalar as FloatScalar,
+    RealScalar as RealScalar,
+    VectorLike as VectorLike,
+)

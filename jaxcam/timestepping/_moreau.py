@@ -6,12 +6,12 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, ArrayLike, Float
+from jaxtyping import Array, Float
 
 from ..hybrid import HybridSystem, normal_velocity
 from ..hybrid.checks import check_system
 from ..hybrid.surface import gaps, impacts, normal_directions
-from ..parameters import as_arrays, real_array
+from ..parameters import as_arrays, real_array, VectorLike
 from ._chunks import CHUNK, in_chunks
 from ._lemke import explain, lemke
 
@@ -42,7 +42,7 @@ class SteppedMotion(NamedTuple):
 
 
 def moreau(
-    system: HybridSystem, state: Float[ArrayLike, " n"], t0, t1, steps: int
+    system: HybridSystem, state: VectorLike, t0, t1, steps: int
 ) -> SteppedMotion:
     """The motion from `t0` to `t1` by `steps` steps that know nothing of events.
 

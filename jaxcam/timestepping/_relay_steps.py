@@ -6,9 +6,9 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, ArrayLike, Float
+from jaxtyping import Array, Float
 
-from ..parameters import real_array
+from ..parameters import real_array, VectorLike
 from ._chunks import CHUNK, in_chunks
 from ._lemke import explain
 from ._relay import is_p_matrix, relay_problem, RelaySystem
@@ -26,9 +26,7 @@ class RelayMotion(NamedTuple):
     outputs: Float[Array, "steps m"]
 
 
-def relay_steps(
-    system: RelaySystem, state: Float[ArrayLike, " n"], t1, steps: int
-) -> RelayMotion:
+def relay_steps(system: RelaySystem, state: VectorLike, t1, steps: int) -> RelayMotion:
     """The motion from time zero to `t1` by `steps` backward Euler steps.
 
     Switches are not located and sliding is nothing special: infinitely many events in

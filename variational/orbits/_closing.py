@@ -26,8 +26,8 @@ _STEPS = 4
 class Knots(NamedTuple):
     """The impacts of a turn in order, and how well flights join them."""
 
-    #: (k, 1 + n) time (s) and state just after
-    rows: Float[np.ndarray, "k 1+n"]
+    #: (k, n + 1) time (s) and state just after
+    rows: Float[np.ndarray, "k n1"]
     #: (k, n) state just before
     before: Float[np.ndarray, "k n"]
     #: largest miss of a flight before the first step
@@ -36,7 +36,7 @@ class Knots(NamedTuple):
 
 def close(
     system: HybridSystem,
-    rows: Float[np.ndarray, "k 1+n"],
+    rows: Float[np.ndarray, "k n1"],
     sides: Int[np.ndarray, " k"],
     period,
 ) -> Knots:

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, ArrayLike, Complex, Float
+from jaxtyping import Array, Complex, Float
 
 from jaxcam.hybrid import (
     component_sizes,
@@ -16,7 +16,7 @@ from jaxcam.hybrid import (
     simulate,
 )
 from jaxcam.hybrid.checks import refuse_tracers
-from jaxcam.parameters import real_array
+from jaxcam.parameters import real_array, VectorLike
 
 from ._at_impact import after_and_speeds, Start, start_at_impact
 from ._closing import close, Knots
@@ -83,7 +83,7 @@ class Orbit(eqx.Module):
 
 def orbit_of(
     system: HybridSystem,
-    state: Float[ArrayLike, " n"],
+    state: VectorLike,
     period: float | Array | None = None,
     t0: float | Array = 0.0,
     *,

@@ -25,6 +25,7 @@ from ...fitting.engine import (
     prior_information,
     runge_kutta,
 )
+from ...parameters import FloatScalar
 from ..terms import Motion, Term, WithTerms
 from ._blocks import Blocks
 
@@ -36,8 +37,8 @@ class LocalForce(Term):
     sentence: ClassVar[str] = "a force at one time"
     listed: ClassVar[bool] = False
     force: Float[Array, " k"]
-    start: Float[Array, ""]
-    spacing: Float[Array, ""]
+    start: FloatScalar
+    spacing: FloatScalar
 
     def acceleration(self, motion: Motion):
         place = (motion.t - self.start) / self.spacing

@@ -129,7 +129,7 @@ def off_nominal(problem: Problem, columns: Columns, point: Point):
     return (now - nominal) / columns.scale
 
 
-def _nominal(problem: Problem, place: int) -> float:
+def _nominal(problem: Problem, place: int | np.integer) -> float:
     parameter: Parameter = problem.parameters[place]
     if parameter.nominal is not None:
         return parameter.nominal

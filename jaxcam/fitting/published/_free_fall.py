@@ -21,7 +21,8 @@ class FreeFall(eqx.Module):
     """A system, and the state in which it was let go."""
 
     system: HybridSystem
-    state: Float[Array, " n"]
+    #: (n,), or its components one by one
+    state: Float[Array, " n"] | tuple[Float[Array, ""], ...]
 
 
 def fit_free_fall(
@@ -77,7 +78,7 @@ def fit_free_fall(
     def pick(model):
         return [where(model.system), *model.state]
 
-    split = FreeFall(system, tuple(jnp.asarray(v) for v in state))  # pyright: ignore
+    split = FreeFall(system, tuple(jnp.asarray(v) for v in state))
 
     def joined(model):
         return fall(FreeFall(model.system, jnp.stack(model.state)))

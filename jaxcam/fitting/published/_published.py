@@ -19,6 +19,7 @@ import scipy.optimize
 from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, Float
 
+from ...parameters import VectorLike
 from ._published_fit import PublishedFit
 
 
@@ -74,8 +75,8 @@ def fit_published(
     published: Sequence[Published],
     *,
     names: Sequence[str],
-    tolerances: Sequence[float],
-    start: Sequence[float] | None = None,
+    tolerances: VectorLike,
+    start: VectorLike | None = None,
     max_steps: int = 512,
 ) -> PublishedFit:
     """Fit parameters of a model to published numbers.

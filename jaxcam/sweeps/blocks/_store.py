@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Mapping
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 import xarray
@@ -41,6 +41,7 @@ class Layout(NamedTuple):
         return block * self.block, min((block + 1) * self.block, self.units)
 
 
+@runtime_checkable
 class Store(Protocol):
     """What the blocks are put into and read from."""
 
