@@ -2,19 +2,22 @@
 
 import abc
 from collections.abc import Sequence
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import equinox as eqx
 import numpy as np
+from jaxtyping import Float
+
+from jaxcam.parameters import AnyArray
 
 
 class Station(NamedTuple):
     """A point passed, as predictors see it: lengths are scaled."""
 
     #: (n+1,) scaled state and parameter
-    y: np.ndarray
+    y: Float[AnyArray, " n+1"]
     #: (n+1,) scaled unit tangent
-    tangent: np.ndarray
+    tangent: Float[AnyArray, " n+1"]
 
 
 class AbstractPredictor(eqx.Module):
@@ -24,8 +27,9 @@ class AbstractPredictor(eqx.Module):
     stations: eqx.AbstractClassVar[int]
 
     @abc.abstractmethod
-    def __call__(self, stations: Sequence[Station], step: float) -> np.ndarray:
-        """(n+1,) predicted scaled state and parameter, at about `step` ahead."""
+    def __call__(self, stations: Sequence[Station], step: Any) -> Any:
+        """(n+1,) predicted scaled state and parameter, at about `step` ahead. NumPy
+        arrays; traced ones in a batch, for predictors that take one station."""
 
 
 class Tangent(AbstractPredictor):
@@ -33,7 +37,7 @@ class Tangent(AbstractPredictor):
 
     stations: ClassVar[int] = 1
 
-    def __call__(self, stations: Sequence[Station], step: float) -> np.ndarray:
+    def __call__(self, stations: Sequence[Station], step: Any) -> Any:
         return stations[-1].y + step * stations[-1].tangent
 
 
@@ -42,7 +46,7 @@ class Secant(AbstractPredictor):
 
     stations: ClassVar[int] = 2
 
-    def __call__(self, stations: Sequence[Station], step: float) -> np.ndarray:
+    def __call__(self, stations: Sequence[Station], step: Any) -> Any:
         current = stations[-1]
         if len(stations) < 2:
             return current.y + step * current.tangent
@@ -55,7 +59,7 @@ class Extrapolation(AbstractPredictor):
 
     stations: ClassVar[int] = 2
 
-    def __call__(self, stations: Sequence[Station], step: float) -> np.ndarray:
+    def __call__(self, stations: Sequence[Station], step: Any) -> Any:
         current = stations[-1]
         chord = current.tangent if len(stations) < 2 else current.y - stations[-2].y
         # next to a fold the state is no function of the parameter
@@ -82,7 +86,7 @@ class Polynomial(AbstractPredictor):
                 f"order is {self.order}; give a degree from 2 to {self.stations}"
             )
 
-    def __call__(self, stations: Sequence[Station], step: float) -> np.ndarray:
+    def __call__(self, stations: Sequence[Station], step: Any) -> Any:
         used = stations[-self.order :]
         current = used[-1]
         y = np.stack([station.y for station in used])
