@@ -11,7 +11,7 @@ from jaxcam.hybrid.loop import Jet
 from jaxcam.hybrid.loop._advance import Plan
 from jaxcam.hybrid.loop._functions import Functions
 from jaxcam.hybrid.loop._loop_state import _presses, first_state
-from jaxcam.hybrid.loop._release import lets_go_before, opens
+from jaxcam.hybrid.loop._release import _root, lets_go_before, opens
 from jaxcam.hybrid.loop._scale import error_norm
 from jaxcam.models import BouncingBall
 
@@ -30,7 +30,16 @@ def test_the_error_of_a_step_is_that_of_its_worst_component(worst):
 def test_counters_begin_at_zero():
     functions = Functions(BouncingBall().prepared(), 2)
     first = first_state(functions, jnp.asarray(0.0), (1.0, 0.0), jnp.asarray(1.0))
-    assert [float(x) for x in (first.steps, first.impacts, first.chatters)] == [0.0] * 3
+    counters = first.steps, first.impacts, first.chatters, first.failures
+    assert [float(x) for x in counters] == [0.0] * 4
+    assert first.struck == ()
+
+
+def test_impacts_on_each_of_several_constraints_are_remembered():
+    walls = BallBetweenWalls(**parameters(gravity=9.81, width=1.0, restitution=0.8))
+    functions = Functions(walls.prepared(), 2)
+    first = first_state(functions, jnp.asarray(0.0), (0.5, 0.0), jnp.asarray(1.0))
+    assert [float(t) for t in first.struck] == [-np.inf, -np.inf]
 
 
 def test_counted_impacts_are_those_listed():
@@ -99,3 +108,18 @@ def test_plan_measures_rates_by_the_length_of_the_run():
     assert float(plan.per_run) == 0.25
     empty = Plan.of(BouncingBall(), Settings(), jnp.asarray(1.0), jnp.asarray(1.0))
     assert float(empty.per_run) == 0.0
+
+
+def test_root_of_a_multiplier_that_rises_through_zero():
+    """The cubic through values and rates at both ends, to 1e-6 of the step."""
+    draw = np.random.default_rng(0)
+    for _ in range(200):
+        a0, a1 = -draw.uniform(0.1, 1), draw.uniform(0.1, 1)
+        s0, s1 = (a1 - a0) * (1 + draw.uniform(-0.3, 0.3, 2))
+        rise = a1 - a0
+        cubic = [s0 + s1 - 2 * rise, 3 * rise - 2 * s0 - s1, s0, a0]
+        roots = np.roots(cubic)
+        inside = (np.abs(roots.imag) < 1e-9) & (roots.real > 0) & (roots.real < 1)
+        assert float(_root(a0, s0, a1, s1)) == pytest.approx(
+            roots[inside].real[0], abs=1e-6
+        )
