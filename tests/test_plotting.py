@@ -237,6 +237,7 @@ def test_impact_map_has_a_point_for_every_pair(ball):
     assert speed.get_xlabel() == "speed of impact $k$ (m/s)"
 
 
+@pytest.mark.usefixtures("unchecked_types")
 def test_impact_map_against_time_and_without_a_period(ball, walls):
     left, _ = plotting.impact_map(ball, against="time").axes
     assert left.get_xlabel() == "time of impact $k$ (s)"
@@ -406,6 +407,7 @@ def test_residual_by_mode_of_one_record_and_against_phase(comparison):
     assert figure.axes[2].get_xlabel() == "cam angle in its turn (rad)"
 
 
+@pytest.mark.usefixtures("unchecked_types")
 def test_residual_by_mode_says_what_is_missing(comparison):
     with pytest.raises(ValueError, match="has run1, run2"):
         plotting.residual_by_mode(comparison, record="run9")

@@ -32,7 +32,7 @@ def parabola(number=41, converged=True):
             step=0.05,
             arclength=1 - x,
             iterations=2,
-            converged=converged or x != 0,
+            converged=bool(converged or x != 0),
         )
         for k, x in enumerate(states)
     ]

@@ -2,7 +2,7 @@
 
 import equinox as eqx
 import numpy as np
-from jaxtyping import Array, Bool, Float, Int
+from jaxtyping import Bool, Float, Int
 
 from ...parameters import AnyArray
 
@@ -25,7 +25,7 @@ class Impacts(eqx.Module):
     #: (k,) normal velocity before (negative) and after (positive)
     speed_before: Float[AnyArray, " k"]
     speed_after: Float[AnyArray, " k"]
-    count: Int[Array | np.integer, ""]
+    count: Int[AnyArray | np.integer, ""]
 
 
 class Contacts(eqx.Module):
@@ -39,7 +39,7 @@ class Contacts(eqx.Module):
     end: Float[AnyArray, " m"]
     released: Bool[AnyArray, " m"]
     constraint: Int[AnyArray, " m"]
-    count: Int[Array | np.integer, ""]
+    count: Int[AnyArray | np.integer, ""]
 
 
 class Steps(eqx.Module):
@@ -49,4 +49,4 @@ class Steps(eqx.Module):
     state: Float[AnyArray, "s n"]
     #: (s, constraints) whether the constraint is in contact from here on
     contact: Bool[AnyArray, "s constraints"]
-    count: Int[Array | np.integer, ""]
+    count: Int[AnyArray | np.integer, ""]

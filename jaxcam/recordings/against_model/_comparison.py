@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from rich.table import Table
 
 
@@ -29,7 +29,7 @@ class Residuals:
     turned: Float[np.ndarray, " k"]
     value: Float[np.ndarray, " k"]
     stderr: Float[np.ndarray, " k"]
-    piece: Float[np.ndarray, " k"]
+    piece: Int[np.ndarray, " k"]
     fitted: int = 0
 
 

@@ -43,8 +43,8 @@ class FlightFits(NamedTuple):
 
 def fit_flights(
     system: HybridSystem,
-    times: Sequence[Float[np.ndarray, " k"]],
-    samples: Sequence[Float[np.ndarray, "c k"]],
+    times: Sequence[Float[np.ndarray, " _"]],
+    samples: Sequence[Float[np.ndarray, "c _"]],
     clocks: Sequence[float],
     observe: Sequence[int | Callable[[Array], Array]],
     noise: Float[np.ndarray, " c"],
@@ -54,7 +54,7 @@ def fit_flights(
 
     **Arguments:**
 
-    - `times`, `samples`: of each flight.
+    - `times` `(k,)`, `samples` `(c, k)`: of each flight, whose k is its own.
     - `clocks`: time of the model at each flight's first sample (s).
     - `observe`: what each channel is of the state.
     - `noise`: standard deviation of each channel.
