@@ -210,7 +210,7 @@ def test_orbit_from_a_guess_with_its_multipliers():
     assert complex(jnp.prod(orbit.multipliers)).real == pytest.approx(0.64, abs=1e-9)
 
 
-def test_periods_are_counted_and_period_is_in_seconds():
+def test_periods_are_counted_and_period_is_in_seconds(unchecked_types):
     exact = Exact(2.8, 0.8, 1)
     phi = 0.9 * exact.flip + 0.1 * exact.fold
     system, time, state = exact.start(phi)

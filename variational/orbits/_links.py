@@ -36,7 +36,7 @@ class Link(NamedTuple):
     field: Float[Array, " n"]
 
     @property
-    def by_impact(self) -> Float[Array, "1+n 1+n"]:
+    def by_impact(self) -> Float[Array, "k k"]:
         """Derivative of time and state of the impact by those at the start."""
         sooner = -self.by_start[0] / self.by_end[0]
         moved = self.by_start[1:] + jnp.outer(self.by_end[1:], sooner)
