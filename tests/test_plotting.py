@@ -432,7 +432,7 @@ def test_compare_recording_takes_a_comparison(recording):
         recording["cam_angle_rad"][rows],
         np.full(200, 2e-4),
         np.full(200, 1e-4),
-        np.zeros(200),
+        np.zeros(200, dtype=int),
     )
     figure = plotting.compare_recording(recording, Comparison((part,)))
     above, below = figure.axes

@@ -140,6 +140,7 @@ def test_random_starts_show_what_one_start_hides():
         ),
     ],
 )
+@pytest.mark.usefixtures("unchecked_types")
 def test_bad_input_is_one_sentence(options, word):
     given = {"system": SECTION, "where": "omega", "values": [2.6, 2.61]}
     given |= {"states": START, "turns": 40, "keep": 10} | options

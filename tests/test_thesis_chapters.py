@@ -65,7 +65,7 @@ def test_results_are_kept_by_the_values_of_the_parameters(calibrated):
     assert slow(calibrated, "a") != 20.0
 
 
-def test_a_run_that_failed_is_no_end_of_sticking(monkeypatch):
+def test_a_run_that_failed_is_no_end_of_sticking(monkeypatch, calibrated):
     """Of Figure 5.11: beside P(inf,1), its speed is neither before nor behind it."""
     speeds = rpm_to_rad_s(np.linspace(152.6, 152.7, 6))
     labels = ["P(inf,1)", "P(inf,1)", "failed", "P(25,1)", "aperiodic", "failed"]
@@ -73,7 +73,7 @@ def test_a_run_that_failed_is_no_end_of_sticking(monkeypatch):
     monkeypatch.setattr(figure_5_11, "onset", lambda system, size: made)
     end = SimpleNamespace(speed=speeds[3])
     monkeypatch.setattr(figure_5_11, "interruption", lambda system: end)
-    table = figure_5_11.TARGET.table(None, "default")  # pyright: ignore
+    table = figure_5_11.TARGET.table(calibrated, "default")
     computed = table.set_index("quantity")["computed"]
     assert computed["first speed without P(inf,1)"] == pytest.approx(152.66)
     assert computed["part of the speeds behind it that repeat"] == 0.5

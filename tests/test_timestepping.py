@@ -73,6 +73,7 @@ def test_lemke_does_not_cycle_where_ratios_tie():
     assert np.max(np.abs(z - 1 / 3)) < 1e-12
 
 
+@pytest.mark.usefixtures("unchecked_types")
 def test_unsolvable_problem_is_refused():
     with pytest.raises(ValueError, match="no solution"):
         solve_lcp(-np.eye(1), -np.ones(1))

@@ -393,6 +393,11 @@ def test_a_state_that_does_not_return_is_refused():
         variational.orbit_of(system, [-0.9, 0.0])
     with pytest.raises(ValueError, match="period"):
         variational.orbit_of(system, [-0.9, 0.0], -1.0)
+
+
+@pytest.mark.usefixtures("unchecked_types")
+def test_an_unknown_method_is_refused():
+    system = impact_oscillator(omega=2.8, restitution=0.8, wall=-0.2)
     speed, phase, _ = max(closed_form(2.8, 0.8, -0.2, 1))
     orbit = variational.orbit_of(system, [-0.2, speed], None, phase / 2.8)
     with pytest.raises(ValueError, match='"product" or "flow"'):

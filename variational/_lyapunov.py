@@ -34,8 +34,8 @@ class LyapunovSpectrum(eqx.Module):
     local: Float[Array, "*lanes turns n"]
     #: (n,) state at the end, to go on from
     state: Float[Array, "*lanes n"]
-    #: s, length of a turn
-    turn: Float[Array, "*lanes"]
+    #: s, length of a turn; shape (1,) where it is the same for all lanes
+    turn: Float[Array, "*lanes"] | Float[Array, "1"]
     #: 0 where every turn was finished, else an index into `RESULTS`; the exponents are
     #: NaN there
     code: Array

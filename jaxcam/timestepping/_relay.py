@@ -4,7 +4,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, ArrayLike, Float
 
 from ._lemke import lemke, Pivoting
 
@@ -66,7 +66,7 @@ def relay_problem(
     return u, matrix @ u + vector, found
 
 
-def is_p_matrix(matrix: Float[Array, "m m"]) -> bool:
+def is_p_matrix(matrix: Float[ArrayLike, "m m"]) -> bool:
     """Whether all principal minors are positive: one solution for every vector.
 
     **Raises:** `ValueError` for more than 14 rows; there are 2^m minors.

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from .._drive import Drive, read_drive
-from .._recording import Recording
+from .._recording import Case, Recording
 from .._rig import Rig
 from ._cut import cut
 from ._hidden_hops import before_release, may_hop, sure_contact
@@ -20,7 +20,7 @@ from ._surface_fit import fit_surface, refine_surface
 
 
 def segment_case(
-    recordings: Sequence[Recording],
+    recordings: Case | Sequence[Recording],
     rig: Rig,
     *,
     channel: str = "follower_angle_rad",
