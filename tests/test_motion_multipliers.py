@@ -145,6 +145,14 @@ def test_products_of_zeros(kind, sign, zeros):
     _check(trajectory, sign, zeros)
 
 
+@pytest.mark.xfail(strict=True, reason="the flight after the release finds no step")
+def test_release_at_a_triple_zero_after_a_double_one():
+    """A force of t^2 (t - 1/4)^3, from rest without a force."""
+    zeros = [0.0, 0.0, 0.25, 0.25, 0.25]
+    trajectory = jaxcam.simulate(_pulled(Pulled, 1, zeros), _start(Pulled), 0.0, _END)
+    _check(trajectory, 1, zeros)
+
+
 @pytest.mark.slow
 @settings(max_examples=8)
 @given(_signs, _zeros)

@@ -170,6 +170,10 @@ MOTIONS = {
 
 def _simulated(motion: Motion, **options):
     """Final state, time of the first impact, and states between points of the run."""
+    # short steps, so that a sample hardly depends on which of them it is in
+    short = jaxcam.Settings(
+        tolerance=1e-12, solver=diffrax.Dopri8(), max_step=motion.end / 64
+    )
 
     def function(p):
         run = jaxcam.simulate(
@@ -177,7 +181,7 @@ def _simulated(motion: Motion, **options):
             motion.start(p[1]),
             0.0,
             motion.end,
-            settings=SHARP,
+            settings=short,
             **options,
         )
         between = jnp.asarray([0.3 * motion.end, 0.83 * motion.end])
