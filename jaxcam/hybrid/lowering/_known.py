@@ -4,6 +4,8 @@ Most come from the zeros and ones of derivatives. They are computed in numpy: ea
 operation would be a program to compile.
 """
 
+from typing import no_type_check
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -28,6 +30,8 @@ _NUMPY = {
 }
 
 
+# asked of every scalar: see `_jaxprs.py`
+@no_type_check
 def is_known(element) -> bool:
     return isinstance(element, (np.generic, bool, int, float))
 

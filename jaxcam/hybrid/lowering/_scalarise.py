@@ -10,6 +10,7 @@ An operation that cannot be split keeps its array form: it is slower, never wron
 """
 
 from collections.abc import Callable
+from typing import no_type_check
 
 import jax
 import jax.numpy as jnp
@@ -111,6 +112,8 @@ def _boxed(leaf) -> np.ndarray:
     return out
 
 
+# for every equation: see `_jaxprs.py`
+@no_type_check
 def _evaluate(jaxpr, consts, arguments, memory):
     values = {}
 
@@ -126,6 +129,7 @@ def _evaluate(jaxpr, consts, arguments, memory):
     return [read(v) for v in jaxpr.outvars]
 
 
+@no_type_check
 def _apply(equation, inputs, memory):
     name = equation.primitive.name
     params = equation.params
