@@ -19,7 +19,7 @@ from ._stated import stated
 
 
 def branch(
-    problem: AbstractProblem,
+    problem: Any,
     start: Any,
     where: Where,
     bounds: tuple[float, float],

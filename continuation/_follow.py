@@ -18,7 +18,7 @@ from .special import Context
 
 
 def follow(
-    problem: AbstractProblem,
+    problem: Any,
     start: Any,
     where: Where,
     bounds: tuple[float, float],
@@ -32,7 +32,8 @@ def follow(
 
     **Arguments:**
 
-    - `problem`: what is followed, such as [`continuation.Equilibrium`][].
+    - `problem`: what is followed, such as [`continuation.Equilibrium`][]; or a hybrid
+      system, with an orbit of it as `start`.
     - `start`: a state (n,), on the branch at the parameter that the problem has, or so
       near that Newton's method gets there; or a [`continuation.Start`][], such as a
       branch to switch to; or a [`continuation.Point`][], to go on from there exactly as
