@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
-from ..fitting import Input, Parameter, Sensor
+from ..fitting import Input, Parameter, Sensor, Turning
 from ..hybrid import HybridSystem
 from ..recordings import Recording, Rig, Segments
 from .evidence import choose, ripple_of
@@ -20,7 +20,7 @@ def diagnose(
     *,
     sensors: Mapping[str, Sensor] | None = None,
     parameters: Sequence[Parameter] = (),
-    drive: Input | None = None,
+    drive: Turning | Input | None = None,
     case: str = "",
     seed: int = 0,
     progress: Callable[[str, float | None], None] | None = None,
