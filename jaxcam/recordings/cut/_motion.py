@@ -8,8 +8,10 @@ from jaxtyping import Float
 from ._polynomial import fit_local, LocalFit
 
 
-# Longest stretch (s) that a cubic follows within the noise of a good encoder
-_FIT_WINDOW = 0.1
+# Longest stretch (s) that is fitted, and fewest samples to which it is shortened
+_FIT_WINDOW, _FEWEST = 0.1, 16
+# Residuals (in units of the noise) above which a cubic does not follow a stretch
+_FOLLOWED = 2.0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -39,11 +41,22 @@ class Motion:
         return self.samples - self.contact
 
     def fit(self, first: int, last: int, *, at_end: bool) -> LocalFit:
-        """A polynomial through one end of a flight."""
+        """A polynomial through one end of a flight, as much of it as a cubic follows."""
         # the samples next to an impact may be from the other side of it
         inner = slice(first + 1, last - 1) if last - first > 6 else slice(first, last)
         count = max(4, round(_FIT_WINDOW / self.interval))
-        rows = np.arange(len(self.time))[inner]
-        rows = rows[-count:] if at_end else rows[:count]
+        every = np.arange(len(self.time))[inner]
         origin = float(self.time[min(last, len(self.time) - 1) if at_end else first])
-        return fit_local(self.time[rows], self.samples[rows], self.noise, origin)
+        while True:
+            rows = every[-count:] if at_end else every[:count]
+            time, samples = self.time[rows], self.samples[rows]
+            found = fit_local(time, samples, self.noise, origin)
+            shorter = min(len(rows), round(0.7 * count))
+            if shorter < _FEWEST or self._follows(found, time, samples):
+                return found
+            count = shorter
+
+    def _follows(self, fit: LocalFit, time, samples) -> bool:
+        off = samples - fit.values(time)
+        free = max(1, len(time) - len(fit.coefficients))
+        return float(np.sum(off**2)) <= (_FOLLOWED * self.noise) ** 2 * free

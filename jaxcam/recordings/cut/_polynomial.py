@@ -17,6 +17,10 @@ class LocalFit:
     def value(self, time: float) -> float:
         return float(self._row(time) @ self.coefficients)
 
+    def values(self, times: Float[np.ndarray, " k"]) -> Float[np.ndarray, " k"]:
+        """At many times at once."""
+        return np.polynomial.polynomial.polyval(times - self.origin, self.coefficients)
+
     def slope(self, time: float) -> float:
         return float(self._slope_row(time) @ self.coefficients)
 
