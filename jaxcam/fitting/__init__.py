@@ -20,6 +20,7 @@ from ._profile import (
     Profile as Profile,
     profile as profile,
 )
+from ._read_setup import is_setup as is_setup, read_setup as read_setup
 from ._residuals import Residuals as Residuals, residuals as residuals
 from ._restitution import (
     first_bounce as first_bounce,
@@ -33,6 +34,7 @@ from ._reverse import (
     Trained as Trained,
 )
 from ._score import linearise as linearise, Linearised as Linearised
+from ._setup import Setup as Setup
 from ._unconstrained import Unconstrained as Unconstrained
 from .engine import (
     Input as Input,
