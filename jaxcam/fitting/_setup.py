@@ -15,13 +15,13 @@ class Setup:
     - `parameters`: what is fitted, each within its tolerance.
     - `drive_channel`: of the encoder of a turning drive (rad), or `None`.
     - `references`: constants of the forms of missing physics, in the units of the
-        motion.
+        motion; `None` where the file says nothing of them.
     """
 
     model: Model
     parameters: tuple[Parameter, ...] = ()
     drive_channel: str | None = None
-    references: References = References(spring_center=0.0)
+    references: References | None = None
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -30,19 +30,23 @@ class Setup:
         measured = drive.channel if isinstance(drive, Input) else self.drive_channel
         return (*self.model.sensors, *([] if measured is None else [measured]))
 
-    def segments(self, recordings: Iterable[Recording]) -> tuple[Segments, ...]:
-        """Recordings cut at the gaps of the system.
+    def segments(
+        self, recordings: Iterable[Recording | Segments]
+    ) -> tuple[Segments, ...]:
+        """Recordings cut at the gaps of the system; those that are all cut stay.
 
         **Raises:** `RecordingError` for a channel that is missing, or a gap that no
         channel shows.
         """
+        runs = tuple(recordings)
+        cut = tuple(run for run in runs if isinstance(run, Segments))
+        if len(cut) == len(runs):
+            return cut
         from ._segment_by_model import segment_by_model
 
+        whole = [run.recording if isinstance(run, Segments) else run for run in runs]
         return segment_by_model(
-            self.model,
-            tuple(recordings),
-            self.parameters,
-            drive_channel=self.drive_channel,
+            self.model, whole, self.parameters, drive_channel=self.drive_channel
         )
 
     def problem(self, recordings: Iterable[Recording | Segments]) -> Problem:
@@ -50,8 +54,4 @@ class Setup:
 
         **Raises:** as `segments` and `Problem.build` do.
         """
-        runs = tuple(recordings)
-        cut = [run for run in runs if isinstance(run, Segments)]
-        if len(cut) < len(runs):
-            cut = self.segments(run for run in runs if isinstance(run, Recording))
-        return Problem.build(self.model, cut, self.parameters)
+        return Problem.build(self.model, self.segments(recordings), self.parameters)

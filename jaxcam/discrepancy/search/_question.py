@@ -15,6 +15,8 @@ from ...fitting import (
     Parameter,
     Problem,
     Sensor,
+    Setup,
+    Turning,
 )
 from ...hybrid import HybridSystem
 from ...recordings import (
@@ -25,7 +27,7 @@ from ...recordings import (
     segment_case,
     Segments,
 )
-from ...recordings.files import check_channels, check_drive
+from ...recordings.files import check_channels, check_drive, unit_of
 from ..policy import Policy
 from ..terms import base_drive, library, SensorTerm, Term, WithTerms
 
@@ -69,6 +71,19 @@ class Question:
     shown: Mapping[str, Shown] = dataclasses.field(default_factory=dict)
 
 
+@dataclasses.dataclass(frozen=True)
+class _OfBase:
+    """What picks a field out of the system that a `WithTerms` holds.
+
+    Equal for equal picks, so that diagnoses of one rig share compiled programs.
+    """
+
+    pick: Callable
+
+    def __call__(self, system):
+        return self.pick(system.base)
+
+
 def rig_question(
     rig: Rig,
     recordings: Sequence[Recording | Segments],
@@ -81,11 +96,7 @@ def rig_question(
     **Raises:** `RecordingError` for recordings that cannot be those of the rig.
     """
     runs = tuple(recordings)
-    if len(runs) < 2:
-        raise RecordingError(
-            f"There is {len(runs)} recording; give at least two of the same rig at "
-            f"different speeds, so that one can test what the other says."
-        )
+    _refuse_one(runs)
     _check(rig, [r.recording if isinstance(r, Segments) else r for r in runs])
     report("finding impacts and contacts", None)
     cut = [run for run in runs if isinstance(run, Segments)]
@@ -116,15 +127,46 @@ def rig_question(
     )
 
 
+def setup_question(
+    setup: Setup,
+    recordings: Sequence[Recording | Segments],
+    candidates: Sequence[Term] | None,
+    report: Report,
+    policy: Policy,
+) -> Question:
+    """The question of a rig of any system, which states its sensors and tolerances.
+
+    **Raises:** `RecordingError` for recordings that cannot be those of the rig.
+    """
+    runs = tuple(recordings)
+    _refuse_one(runs)
+    for run in runs:
+        check_channels(run.recording if isinstance(run, Segments) else run)
+    report("finding impacts and contacts", None)
+    model = setup.model
+    return system_question(
+        model.system,
+        setup.segments(runs),
+        candidates,
+        model.sensors,
+        setup.parameters,
+        model.drive,
+        report,
+        policy,
+        setup.references,
+    )
+
+
 def system_question(
     system: HybridSystem,
     recordings: Sequence[Segments],
     candidates: Sequence[Term] | None,
     sensors: Mapping[str, Sensor] | None,
     parameters: Sequence[Parameter],
-    drive: Input | None,
+    drive: Turning | Input | None,
     report: Report,
     policy: Policy,
+    references: References | None = None,
 ) -> Question:
     """The question of any system with one coordinate.
 
@@ -142,14 +184,16 @@ def system_question(
                 "channel)` for each of them."
             )
     turned = system.period is not None
-    references = References(spring_center=0.0)
+    if references is None:
+        references = References(spring_center=0.0)
     if candidates is None:
         clocked = turned or drive is not None
         candidates = library(turned, references, clocked=clocked)
     terms, unlisted = _sorted(tuple(candidates))
-    if drive is not None:
-        value = drive.value
-        drive = Input(drive.channel, lambda s: value(s.base))  # pyright: ignore
+    if isinstance(drive, Input):
+        drive = Input(drive.channel, _OfBase(drive.value))
+    elif drive is not None:
+        drive = Turning(_OfBase(drive.speed), _OfBase(drive.phase))
     model = Model(WithTerms(system, terms), dict(sensors), drive)
     inside = [_within(parameter) for parameter in parameters]
     report("preparing the fits", None)
@@ -160,17 +204,17 @@ def system_question(
         terms,
         unlisted,
         turned,
-        _unit(next(iter(sensors))),
+        unit_of(next(iter(sensors))),
         references,
     )
 
 
-def _unit(channel: str) -> str:
-    """The unit that ends the name of a channel of a recording, as in `height_m`."""
-    for unit, written in (("_rad_s", "rad/s"), ("_rad", "rad"), ("_m", "m")):
-        if channel.endswith(unit):
-            return written
-    return ""
+def _refuse_one(runs: Sequence[Recording | Segments]) -> None:
+    if len(runs) < 2:
+        raise RecordingError(
+            f"There is {len(runs)} recording; give at least two of the same rig at "
+            f"different speeds, so that one can test what the other says."
+        )
 
 
 def _within(parameter: Parameter) -> Parameter:
