@@ -22,7 +22,7 @@ def impact_laws(segments: Sequence[Segments]) -> dict[str, RestitutionFit]:
         before = f"gap {side + 1}, " if len(sides) > 1 else ""
         try:
             laws = restitution_laws(there)
-        except (RecordingError, np.linalg.LinAlgError):
+        except RecordingError:
             # a fit of the motion needs no impacts, so they are no condition
             continue
         found |= {f"{before}{name}": law for name, law in laws.items()}
