@@ -17,9 +17,9 @@ from typer.testing import CliRunner
 import jaxcam as package
 from jaxcam.cli import app
 from jaxcam.cli._cache import keep_compiled_programs
-from jaxcam.cli._choices import make_system
 from jaxcam.cli._output import to_text
 from jaxcam.cli._parameters import parameters, set_parameters
+from jaxcam.cli._source import make_system
 from jaxcam.data import DEMO_RIG
 
 

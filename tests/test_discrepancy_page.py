@@ -4,7 +4,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
-from jaxcam.cli._diagnose_page import _shapes, _UNITS, diagnosis_page, draw
+from jaxcam.cli._diagnose_page import _shapes, diagnosis_page, draw, unit_along
 from jaxcam.cli._output import to_text
 from jaxcam.discrepancy import Diagnosis, Verdict
 from jaxcam.discrepancy.evidence import Structure
@@ -107,4 +107,12 @@ def test_shapes_are_drawn_with_units_on_both_axes():
 
 def test_every_shape_has_a_quantity_whose_unit_is_known():
     offered = shapes((0.2, 0.4), (-1.0, 1.0), (0.0, 2.0), 4.0)
-    assert {one.variable for one in offered} == set(_UNITS) == set(Variable)
+    assert {one.variable for one in offered} == set(Variable)
+    units = {Variable(one.variable): unit_along(one.variable, "m") for one in offered}
+    assert units == {
+        Variable.POSITION: "m",
+        Variable.VELOCITY: "m/s",
+        Variable.APPROACH: "m/s",
+        Variable.PHASE: "rad",
+        Variable.TIME: "s",
+    }

@@ -7,8 +7,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxcam.cli._choices import make_system, saved_name
 from jaxcam.cli._parameters import parameters, set_parameters
+from jaxcam.cli._source import make_system, Source
 from jaxcam.discrepancy import diagnose, library, Policy, strength, Term, Where
 from jaxcam.discrepancy.search import _search, _trials, added_gain, given_up
 from jaxcam.discrepancy.terms import saved_classes, Value, WithTerms
@@ -243,8 +243,8 @@ def test_a_diagnosed_system_is_saved_and_read_again(tmp_path):
     for name in ("vector_field", "gap", "impact"):
         mine, theirs = (getattr(s, name)(TIME, state) for s in (system, again))
         assert np.array_equal(np.asarray(mine), np.asarray(theirs))
-    assert saved_name(tmp_path / "model.json") == "cam-follower"
-    faster = make_system("cam-follower", None, 150.0, tmp_path / "model.json")
+    assert Source(tmp_path / "model.json").name("") == "cam-follower"
+    faster = make_system("cam-follower", None, 150.0, Source(tmp_path / "model.json"))
     assert float(faster.base.speed) == pytest.approx(5 * np.pi)
     assert parameters(faster)["speed"] == pytest.approx(5 * np.pi)
     changed = set_parameters(faster, ["terms[0].c1=0.3"])

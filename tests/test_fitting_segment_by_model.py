@@ -98,12 +98,16 @@ def _phase(system):
     return system.phase
 
 
+def _rest(found):
+    return found.system.rest1
+
+
 def model(channels=(("position1_m", 0), ("position2_m", 2))):
     sensors = {name: Sensor(place, noise=NOISE) for name, place in channels}
     return Model(TwoMasses(), sensors, Turning(_speed, _phase))
 
 
-REST = Parameter("rest1", lambda m: m.system.rest1, tolerance=2e-4)
+REST = Parameter("rest1", _rest, tolerance=2e-4)
 
 
 def test_each_impact_is_on_the_gap_that_closed():

@@ -13,6 +13,7 @@ from ._diagnose import diagnose
 from ._diagram import diagram
 from ._errors import INTERRUPTED, one_sentence
 from ._fit import fit
+from ._new_rig import new_rig
 from ._reproduce import reproduce
 from ._simulate import simulate
 
@@ -32,6 +33,7 @@ app.command("continue")(one_sentence(continue_))
 app.command()(one_sentence(demo))
 app.command()(one_sentence(diagnose))
 app.command()(one_sentence(fit))
+app.command("new-rig")(one_sentence(new_rig))
 app.command()(one_sentence(reproduce))
 
 

@@ -7,9 +7,10 @@ import typer
 
 from ._basins_options import Cells
 from ._checks import check_resume
-from ._choices import CAM, system_name
+from ._choices import CAM
 from ._grouped import grouped
-from ._options import JsonFile, Preset, Resume, SavedSystem, Settings, Speed, System
+from ._options import JsonFile, Preset, Resume, Settings, Speed, System
+from ._source import Source
 from ._sweep import show, Where
 
 
@@ -21,7 +22,7 @@ def basins(
     system: System = CAM,
     cells: Cells = Cells(),
     speed: Speed = None,
-    saved: SavedSystem = None,
+    source: Source = Source(),
     preset: Preset = None,
     set_: Settings = None,
     where: Where = Where(),
@@ -41,7 +42,7 @@ def basins(
       jaxcam basins --speed 152.3 --low 0.33,0 --high 0.45,2 --shape 256,256
       jaxcam basins impact-oscillator --set omega=2.6 --turns 500 --reruns 4
     """
-    system = system_name(system, saved)
+    system = source.name(system)
     cells.check(system)
     where.check()
     check_resume(resume, out)
@@ -55,7 +56,8 @@ def basins(
     keep_compiled_programs()
     low, high = cells.corners(system)
     grid = sweeps.Grid(low, high, cells.counts)
-    model = make_model(system, preset, speed, saved, set_)
+    model = make_model(system, preset, speed, source, set_)
+    where.check_system(model)
     output = Output(json_file, out)
     with where.running() as running, progress(COMPILING) as report:
         made = sweeps.basins(

@@ -3,13 +3,22 @@
 from pathlib import Path
 
 
-def read(case: Path, rig: Path | None, gaps: str):
+def read(case: Path, rig: Path | None, gaps: str, system: str | None = None):
     """The runs of a folder, and the rig as its maker states it.
+
+    **Arguments:** `system` is `FILE.py:CLASS`, in the place of that of the rig file.
+
+    **Returns:** a `Case`, and a `Rig` or a `Setup`.
 
     **Raises:** `ValueError` that names the file at fault and the fix.
     """
+    from ..fitting import is_setup, read_setup
     from ..recordings import read_case, read_rig
 
+    usual = case / "rig.toml" if rig is None else rig
+    if system is not None or (usual.is_file() and is_setup(usual)):
+        setup = read_setup(_rig_file(case, rig), system)
+        return read_case(case, channels=setup.channels, gaps=gaps), setup  # pyright: ignore
     runs = read_case(case, gaps=gaps)  # pyright: ignore
     return runs, read_rig(_rig_file(case, rig))
 

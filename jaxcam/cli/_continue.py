@@ -7,10 +7,11 @@ import typer
 
 from ._axis import Axis
 from ._checks import check_resume
-from ._choices import CAM, system_name
+from ._choices import CAM
 from ._continue_options import ALGORITHMS, Along, DIRECTIONS, Following
 from ._grouped import grouped
-from ._options import JsonFile, Preset, Resume, SavedSystem, Settings, System
+from ._options import JsonFile, Preset, Resume, Settings, System
+from ._source import Source
 
 
 _FILE = "branch.jsonl"
@@ -21,7 +22,7 @@ def continue_(
     system: System = CAM,
     along: Along = Along(),
     preset: Preset = None,
-    saved: SavedSystem = None,
+    source: Source = Source(),
     set_: Settings = None,
     following: Following = Following(),
     json_file: JsonFile = None,
@@ -40,7 +41,7 @@ def continue_(
       jaxcam continue impact-oscillator --parameter omega --from 2 --to 3 --at 2.2
       jaxcam continue cam-follower --from 130 --to 150 --out DIR --resume
     """
-    system = system_name(system, saved)
+    system = source.name(system)
     following.check()
     low, high = along.bounds
     check_resume(resume, out)
@@ -56,7 +57,7 @@ def continue_(
 
     keep_compiled_programs()
     axis = Axis.of(along.parameter, system)
-    model = along.started(make_model(system, preset, None, saved, set_), axis)
+    model = along.started(make_model(system, preset, None, source, set_), axis)
     guess = following.guess
     output = Output(json_file, out)
     with progress("finding the orbit (the first run takes longest)") as report:

@@ -52,6 +52,7 @@ def demo(
     choose("--gaps", gaps, ("refuse", "split"))
 
     from ..data import DEMO_RIG
+    from ..recordings import Rig
     from ._beside import beside
     from ._cache import keep_compiled_programs
     from ._case import read
@@ -62,6 +63,11 @@ def demo(
 
     keep_compiled_programs()
     runs, nominal = read(DEMO_RIG if case is None else case, rig, gaps)
+    if not isinstance(nominal, Rig):
+        raise ValueError(
+            f"{case}: the demonstration is that of a cam-follower; use jaxcam fit or "
+            f"jaxcam diagnose for a rig of your own."
+        )
     output = Output(json_file, out)
     with (
         beside(follow_branches, out if branches else None) as followed,

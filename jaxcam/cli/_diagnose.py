@@ -6,12 +6,13 @@ from typing import Annotated
 
 import typer
 
-from ._options import Case, Gaps, Resume, RigFile
+from ._options import Case, Gaps, OwnSystem, Resume, RigFile
 
 
 def diagnose(
     case: Case,
     rig: RigFile = None,
+    system: OwnSystem = None,
     gaps: Gaps = "mend",
     seed: Annotated[int, typer.Option(help="Of the redrawn stretches.")] = 0,
     predict: Annotated[
@@ -36,19 +37,23 @@ def diagnose(
     ] = None,
 ) -> None:
     """
-    Say what physics the model of a cam-follower rig leaves out.
+    Say what physics the model of a rig leaves out.
+
+    Of a cam-follower, or of any system in a Python file; see jaxcam new-rig.
 
     \b
     Examples:
       jaxcam diagnose demo --out ./jaxcam-diagnosis
       jaxcam diagnose demo --json -
       jaxcam diagnose demo --next --out ./jaxcam-next
+      jaxcam diagnose ./case --system two_stops.py:TwoStops --rig two_stops.toml
     """
     from ._choices import choose
 
     choose("--gaps", gaps, ("mend", "refuse", "split"))
 
     from .. import discrepancy
+    from ..fitting import Setup
     from ._cache import keep_compiled_programs
     from ._case import notes_of, read
     from ._diagnose_files import write_diagnosis, write_verdict
@@ -56,7 +61,12 @@ def diagnose(
     from ._progress import progress
 
     keep_compiled_programs()
-    runs, nominal = read(case, rig, gaps)
+    runs, nominal = read(case, rig, gaps, system)
+    if propose and isinstance(nominal, Setup):
+        raise ValueError(
+            "--next proposes speeds of a cam; leave it out, and give records of your "
+            "own rig that you simulated to jaxcam.discrepancy.compare_experiments."
+        )
     output = Output(json_file, out)
     keep = _kept_fits(out, resume)
     notes = notes_of(runs)
@@ -127,4 +137,7 @@ def _print(output, found, notes, outlook) -> None:
     if output.folder is not None:
         output.print(f"Report: {output.folder / 'index.html'}")
         model = output.folder / "model.json"
-        output.print(f"Model: {model}, for --system of other commands")
+        if model.is_file():
+            output.print(f"Model: {model}, for --system of other commands")
+        else:
+            output.print("The system has a field that cannot be saved as a model.json.")

@@ -5,10 +5,10 @@ from pathlib import Path
 from typing import TypeAlias
 
 from ..discrepancy import Diagnosis
-from ..models import save_system
 from ._diagnose_page import diagnosis_page, draw
 from ._outlook import Outlook
 from ._output import to_text, write_text
+from ._saved_system import as_saved
 
 
 # Each figure's file and caption
@@ -19,7 +19,11 @@ def write_diagnosis(folder: Path, found: Diagnosis, notes: Sequence[str]) -> Fig
     """Write verdict.json, model.json and index.html with its figures to a folder."""
     folder.mkdir(parents=True, exist_ok=True)
     about = {"case": found.case, "summary": found.summary}
-    save_system(found.system(), folder / "model.json", about=about)
+    model = as_saved(found.system(), about)
+    if "not_saved" in model:
+        (folder / "model.json").unlink(missing_ok=True)
+    else:
+        write_text(folder / "model.json", to_text(model) + "\n")
     figures = draw(folder, found)
     write_verdict(folder, found, figures, notes)
     return figures

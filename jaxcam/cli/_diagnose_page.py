@@ -14,6 +14,7 @@ from ..discrepancy.terms import Variable
 from ..fitting import Residuals
 from ._outlook import Outlook
 from ._page import figure_html, sentences, STYLE, table_html
+from ._residual_axes import Along, residual_label, shown_in, title_of
 
 
 matplotlib.use("Agg")
@@ -23,24 +24,27 @@ from ..plotting.colours import CONTACT, FLIGHT, IMPACT, RECORDED
 
 
 _BINS = 36
-# of what shapes depend on
-_UNITS = {
-    Variable.POSITION: "rad",
-    Variable.VELOCITY: "rad/s",
-    Variable.APPROACH: "rad/s",
-    Variable.PHASE: "rad",
-    Variable.TIME: "s",
-}
+
+
+def unit_along(variable: str, motion: str) -> str:
+    """Unit of what a shape depends on, in a motion in this unit."""
+    of_drive = {Variable.PHASE: "rad", Variable.TIME: "s"}
+    if variable in of_drive:
+        return of_drive[Variable(variable)]
+    if motion in ("", "-"):
+        return "-" if variable == Variable.POSITION else "1/s"
+    return motion if variable == Variable.POSITION else f"{motion}/s"
 
 
 def draw(folder: Path, found: Diagnosis) -> list[tuple[Path, str]]:
     """Write all figures; each comes with its caption."""
     import matplotlib.pyplot as plt
 
+    maps = _MAPS.format(Along(found.unseen[0]).word)
     with style():
         return [
             (save_figure(_unseen(plt, found), folder / "unseen.png"), _UNSEEN),
-            (save_figure(_maps(plt, found), folder / "maps.png"), _MAPS),
+            (save_figure(_maps(plt, found), folder / "maps.png"), maps),
             (save_figure(_shapes(plt, found), folder / "shapes.png"), _SHAPES),
             (save_figure(_ranking(plt, found), folder / "ranking.png"), _RANKING),
         ]
@@ -52,9 +56,9 @@ _UNSEEN = (
     "band is twice the noise on either side."
 )
 _MAPS = (
-    "Mean residual of each record by the angle of the cam, in standard errors, before "
-    "(left) and after (right); flights above, contacts below. Beyond the colours' ends "
-    "is what chance would show in one of a hundred such maps."
+    "Mean residual of each record by {}, in standard errors, before (left) and after "
+    "(right); flights above, contacts below. Beyond the colours' ends is what chance "
+    "would show in one of a hundred such maps."
 )
 _SHAPES = (
     "What the data would have the model changed by, as free functions: of the textbook "
@@ -69,25 +73,26 @@ def _unseen(plt, found: Diagnosis):
     figure, axes = plt.subplots(
         2, 1, figsize=(8.5, 4.6), sharex=True, sharey=True, layout="constrained"
     )
-    name = max(zip(before, after), key=_improvement)[0].record
-    for axis, parts, label in zip(
-        axes, (before, after), ("textbook model, refitted", "with what was found")
+    both = max(zip(before, after), key=_improvement)
+    factor, _ = shown_in(both[0])
+    for axis, part, label in zip(
+        axes, both, ("textbook model, refitted", "with what was found")
     ):
-        part = next(part for part in parts if part.record == name)
         for resting, color in ((False, FLIGHT), (True, CONTACT)):
             keep = part.resting == resting
             axis.plot(
                 part.time[keep],
-                1e3 * part.value[keep],
+                factor * part.value[keep],
                 ".",
                 ms=1.5,
                 color=color,
                 label="contact" if resting else "flight",
                 rasterized=True,
             )
-        axis.axhspan(-2e3 * part.noise, 2e3 * part.noise, color="0.5", alpha=0.25, lw=0)
-        axis.set_title(f"{name}: {label}")
-        axis.set_ylabel("residual (mrad)")
+        band = 2 * factor * part.noise
+        axis.axhspan(-band, band, color="0.5", alpha=0.25, lw=0)
+        axis.set_title(f"{title_of(part, before)}: {label}")
+        axis.set_ylabel(residual_label(part))
     axes[-1].set_xlabel("time (s)")
     handles, labels = axes[0].get_legend_handles_labels()
     figure.legend(handles, labels, markerscale=6, ncols=2, loc="outside upper right")
@@ -106,34 +111,35 @@ def _maps(plt, found: Diagnosis):
     figure, axes = plt.subplots(
         2, 2, figsize=(8.5, 5.0), sharex=True, sharey=True, layout="constrained"
     )
-    records = [part.record for part in found.unseen[0]]
-    end = float(norm.isf(0.005 / (_BINS * len(records) * 2)))
+    every = found.unseen[0]
+    along = Along(every)
+    end = float(norm.isf(0.005 / (_BINS * len(every) * 2)))
     image = None
     for column, parts, which in zip(axes.T, found.unseen, ("before", "after")):
         for axis, resting in zip(column, (False, True)):
-            rows = [_binned(part, resting) for part in parts]
+            rows = [_binned(part, resting, along) for part in parts]
             image = axis.imshow(
                 np.array(rows),
                 aspect="auto",
-                extent=(0, 2 * np.pi, len(rows) - 0.5, -0.5),
+                extent=(along.start, along.end, len(rows) - 0.5, -0.5),
                 vmin=-end,
                 vmax=end,
                 cmap="RdBu_r",
                 interpolation="nearest",
             )
-            axis.set_yticks(range(len(rows)), [part.record for part in parts])
+            axis.set_yticks(range(len(rows)), [title_of(p, every) for p in parts])
             axis.set_title(f"{'contact' if resting else 'flight'}, {which}")
             axis.grid(False)
     for axis in axes[-1]:
-        axis.set_xlabel("cam angle in its turn (rad)")
+        axis.set_xlabel(along.label)
     figure.colorbar(image, ax=axes, label="mean residual (standard errors)")
     return figure
 
 
-def _binned(part: Residuals, resting: bool):
+def _binned(part: Residuals, resting: bool, along: Along):
     keep = part.resting == resting
-    phase = np.nan_to_num(part.turned[keep]) % (2 * np.pi)
-    where = np.minimum((phase / (2 * np.pi) * _BINS).astype(int), _BINS - 1)
+    place = (along.place(part)[keep] - along.start) / (along.end - along.start)
+    where = np.minimum((place * _BINS).astype(int), _BINS - 1)
     count = np.bincount(where, minlength=_BINS)
     total = np.bincount(where, part.value[keep] / part.noise, minlength=_BINS)
     return np.where(count > 0, total / np.sqrt(np.maximum(count, 1)), np.nan)
@@ -152,7 +158,7 @@ def _shapes(plt, found: Diagnosis):
         axis.axhline(0.0, color="k", lw=0.6)
         one = before[name]
         axis.set_title(name.replace("_", " "), fontsize=11)
-        axis.set_xlabel(labelled(one.variable, _UNITS[Variable(one.variable)]))
+        axis.set_xlabel(labelled(one.variable, unit_along(one.variable, found.unit)))
         axis.set_ylabel(labelled(one.quantity, one.unit.replace("^2", "²")))
         axis.xaxis.label.set_size(10)
         axis.yaxis.label.set_size(10)

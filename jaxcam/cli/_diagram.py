@@ -7,10 +7,11 @@ import typer
 
 from ._axis import Axis
 from ._checks import check_resume
-from ._choices import CAM, system_name
+from ._choices import CAM
 from ._diagram_options import Starts, Sweep
 from ._grouped import grouped
-from ._options import JsonFile, Preset, Resume, SavedSystem, Settings, System
+from ._options import JsonFile, Preset, Resume, Settings, System
+from ._source import Source
 from ._sweep import show, Where
 
 
@@ -22,7 +23,7 @@ def diagram(
     system: System = CAM,
     sweep: Sweep = Sweep(),
     starts: Starts = Starts(),
-    saved: SavedSystem = None,
+    source: Source = Source(),
     preset: Preset = None,
     set_: Settings = None,
     where: Where = Where(),
@@ -44,7 +45,7 @@ def diagram(
       jaxcam diagram --from 150 --to 154 --section impacts --direction each
       jaxcam diagram --from 120 --to 200 --direction up --dwell 60,10
     """
-    system = system_name(system, saved)
+    system = source.name(system)
     sweep.check()
     starts.check(sweep)
     where.check()
@@ -60,7 +61,8 @@ def diagram(
     from ._progress import COMPILING, progress
 
     keep_compiled_programs()
-    model = make_model(system, preset, None, saved, set_)
+    model = make_model(system, preset, None, source, set_)
+    where.check_system(model)
     axis = Axis.of(sweep.parameter, system)
     states = starts.states(sweep)
     looked = sweeps.ImpactSection(model) if sweep.section == "impacts" else model

@@ -1,16 +1,17 @@
-"""`jaxcam fit`: the parameters of a cam-follower rig from its recordings."""
+"""`jaxcam fit`: the parameters of a rig from its recordings."""
 
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from ._options import Case, Gaps, RigFile
+from ._options import Case, Gaps, OwnSystem, RigFile
 
 
 def fit(
     case: Case,
     rig: RigFile = None,
+    system: OwnSystem = None,
     gaps: Gaps = "mend",
     bootstrap: Annotated[
         int,
@@ -31,12 +32,15 @@ def fit(
     ] = None,
 ) -> None:
     """
-    Fit the parameters of a cam-follower rig to recordings of it.
+    Fit the parameters of a rig to recordings of it.
+
+    Of a cam-follower, or of any system in a Python file; see jaxcam new-rig.
 
     \b
     Examples:
       jaxcam fit demo --json fitted.json --out ./jaxcam-fit
       jaxcam simulate --system fitted.json --speed 140
+      jaxcam fit ./case --system two_stops.py:TwoStops --rig two_stops.toml
     """
     from ._choices import choose
 
@@ -53,7 +57,7 @@ def fit(
     from ._progress import progress
 
     keep_compiled_programs()
-    runs, nominal = read(case, rig, gaps)
+    runs, nominal = read(case, rig, gaps, system)
     output = Output(json_file, out)
     with progress("finding impacts and contacts") as report:
         found = fitted(runs, nominal, bootstrap, report)
@@ -64,7 +68,10 @@ def fit(
     print_fit(output, found, notes_of(runs))
     output.print_figures(figures)
     about = {"case": runs.name, "notes": list(notes_of(runs)), "figures": figures}
-    output.write_json(found.to_json(about))
+    written = found.to_json(about)
+    output.write_json(written)
+    if json_file is not None and "not_saved" in written:
+        output.print(written["not_saved"])
     if not found.after.converged:
         fail(found.after.message)
         raise typer.Exit(STOPPED_EARLY)

@@ -3,7 +3,6 @@
 from pathlib import Path
 
 import matplotlib
-import numpy as np
 from rich.table import Table
 
 
@@ -11,6 +10,7 @@ matplotlib.use("Agg")
 
 from ..fitting import Bootstrap, Fit, Problem, residuals
 from ..plotting.colours import CONTACT, FLIGHT
+from ._residual_axes import Along, residual_label, shown_in, title_of
 
 
 def parameter_table(problem: Problem, found: Fit, again: Bootstrap | None) -> Table:
@@ -56,7 +56,7 @@ def correlation_table(found: Fit) -> Table:
 
 
 def draw(folder: Path, before: Fit, after: Fit) -> list[Path]:
-    """Residuals of each record before and after the fit, and against the cam."""
+    """Residuals of each record before and after the fit, against time and drive."""
     import matplotlib.pyplot as plt
 
     from ..plotting import save_figure, style
@@ -66,15 +66,18 @@ def draw(folder: Path, before: Fit, after: Fit) -> list[Path]:
 
 
 def _draw(plt, save_figure, folder, before, after) -> list[Path]:
-    pairs = list(zip(residuals(before), residuals(after)))
+    every = residuals(before)
+    pairs = list(zip(every, residuals(after)))
+    along = Along(every)
     files = []
-    for name, sideways in (("time", False), ("phase", True)):
+    for name, sideways in (("time", False), ("phase", True))[: 1 + along.turns]:
         figure, axes = plt.subplots(
             len(pairs), 2, figsize=(9, 1.6 * len(pairs) + 0.8), squeeze=False
         )
         for row, both in zip(axes, pairs):
+            factor, _ = shown_in(both[0])
             for axis, part, when in zip(row, both, ("nominal", "fitted")):
-                x = part.turned % (2 * np.pi) if sideways else part.time
+                x = along.place(part) if sideways else part.time
                 for resting, color, label in (
                     (False, FLIGHT, "flight"),
                     (True, CONTACT, "contact"),
@@ -82,21 +85,19 @@ def _draw(plt, save_figure, folder, before, after) -> list[Path]:
                     keep = part.resting == resting
                     axis.plot(
                         x[keep],
-                        part.value[keep] * 1e3,
+                        part.value[keep] * factor,
                         ".",
                         ms=1,
                         color=color,
                         label=label,
                         rasterized=True,
                     )
-                axis.axhspan(
-                    -2e3 * part.noise, 2e3 * part.noise, color="0.5", alpha=0.25, lw=0
-                )
-                axis.set_title(f"{part.record}: {when}", fontsize=8)
-            row[0].set_ylabel("residual (mrad)", fontsize=8)
-        unit = "cam angle in its turn (rad)" if sideways else "time (s)"
+                band = 2 * factor * part.noise
+                axis.axhspan(-band, band, color="0.5", alpha=0.25, lw=0)
+                axis.set_title(f"{title_of(part, every)}: {when}", fontsize=8)
+            row[0].set_ylabel(residual_label(both[0]), fontsize=8)
         for axis in axes[-1]:
-            axis.set_xlabel(unit)
+            axis.set_xlabel(along.label if sideways else "time (s)")
         axes[0, 0].legend(markerscale=6, fontsize=7)
         files.append(save_figure(figure, folder / f"residuals_{name}.png"))
     return files

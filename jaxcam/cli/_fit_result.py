@@ -1,14 +1,15 @@
 """What `jaxcam fit` finds: computed, and as words and data."""
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from .. import fitting
-from ..models import system_to_json
-from ..recordings import Rig, segment_case, Segments
+from ..recordings import Recording, Rig, segment_case, Segments
 from ._fit_report import correlation_table, parameter_table
+from ._impact_laws import impact_laws
 from ._output import Output
+from ._saved_system import as_saved
 
 
 @dataclasses.dataclass(frozen=True)
@@ -58,31 +59,47 @@ class Result:
         }
         if self.again is not None:
             fit["bootstrap_stderr"] = self.again.stderr
-        # the rig as a whole: the encoder's zero is the geometry's, the speed is free
-        drive = self.segments[0].drive
-        assert drive is not None
-        system = self.after.model(0).driven(0.0, 0.0 * drive.phase, drive.speed)
-        return system_to_json(system, about=fit)
+        drive, model = self.segments[0].drive, self.after.model(0)
+        system = model.system
+        if drive is not None:
+            # the rig as a whole: the encoder's zero is the geometry's, the speed free
+            system = model.driven(0.0, 0.0 * drive.phase, drive.speed)
+        return as_saved(system, fit)
 
 
-def fitted(runs, nominal: Rig, bootstrap: int, report) -> Result:
+def fitted(
+    runs: Iterable[Recording], nominal: Rig | fitting.Setup, bootstrap: int, report
+) -> Result:
     """Cut the runs, fit, and say what the recordings can tell apart.
 
     **Arguments:** `bootstrap`: how often flights are weighted at random; 0 is never.
+
+    **Raises:** `ValueError` for a rig of which nothing is to be fitted.
     """
-    segments = segment_case(tuple(runs), nominal)
+    runs = tuple(runs)
+    if isinstance(nominal, fitting.Setup):
+        model, parameters = nominal.model, nominal.parameters
+        if not parameters:
+            raise ValueError(
+                "Nothing is to be fitted; give at least one entry of [parameters] in "
+                "the rig file a `tolerance`."
+            )
+        segments = nominal.segments(runs)
+    else:
+        model = fitting.cam_follower_model(nominal)
+        parameters = fitting.cam_follower_parameters(nominal)
+        segments = segment_case(runs, nominal)
     report("preparing the fit", None)
-    problem = fitting.Problem.build(
-        fitting.cam_follower_model(nominal),
-        segments,
-        fitting.cam_follower_parameters(nominal),
-    )
+    problem = fitting.Problem.build(model, segments, parameters)
     before = fitting.fit(problem, free=())
     seen = fitting.identify(problem, at=before)
     after = fitting.fit(
         problem, progress=lambda k, cost: report(f"fitting, step {k}", None)
     )
-    laws = fitting.restitution_laws(segments)
+    if isinstance(nominal, fitting.Setup):
+        laws = impact_laws(segments)
+    else:
+        laws = fitting.restitution_laws(segments)
     again = None
     if bootstrap:
         again = fitting.bootstrap(
@@ -98,6 +115,8 @@ def print_fit(output: Output, found: Result, notes: Sequence[str]) -> None:
     output.print(parameter_table(found.problem, found.after, found.again))
     output.print(correlation_table(found.after))
     output.print(found.after.most_correlated())
-    for law in found.laws.values():
-        output.print(law.sentence())
+    for name, law in found.laws.items():
+        where = name.rpartition(", ")[0]
+        sentence = law.sentence()
+        output.print(f"{where.capitalize()}: {sentence}" if where else sentence)
     output.print(found.sentence)

@@ -22,7 +22,7 @@ SavedSystem: TypeAlias = Annotated[
     typer.Option(
         "--system",
         metavar="FILE",
-        help="A system that `jaxcam fit` or `diagnose` wrote.",
+        help="A system that `jaxcam fit` or `diagnose` wrote, or FILE.py:CLASS.",
     ),
 ]
 Preset: TypeAlias = Annotated[
@@ -74,6 +74,14 @@ Case: TypeAlias = Annotated[
 ]
 RigFile: TypeAlias = Annotated[
     Path | None, typer.Option(metavar="FILE", help="The rig; CASE/rig.toml without.")
+]
+OwnSystem: TypeAlias = Annotated[
+    str | None,
+    typer.Option(
+        "--system",
+        metavar="FILE.py:CLASS",
+        help="A system of your own; without, that of the rig file.",
+    ),
 ]
 Gaps: TypeAlias = Annotated[
     str,

@@ -3,7 +3,6 @@
 import math
 import re
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from typing import Any
 
 import equinox as eqx
@@ -13,10 +12,10 @@ import numpy as np
 
 from ..hybrid import HybridSystem
 from ..models import CamFollower, ConstantRestitution
-from ._choices import make_system
+from ._source import make_system, Source
 
 
-# in rad/s, while speeds are rpm at the command line: it has an option of its own
+# of a cam in rad/s, while it is rpm at the command line and has an option of its own
 _SPEED = "speed"
 _CONSTANT = "restitution.r"
 
@@ -25,14 +24,14 @@ def make_model(
     name: str,
     preset: str | None,
     rpm: float | None,
-    saved: Path | None,
+    source: Source,
     assignments: Sequence[str] | None,
 ) -> HybridSystem:
-    """A ready system with parameters of its own, as a command line names it.
+    """A system with parameters of its own, as a command line names it.
 
     **Raises:** `ValueError` that names the fix.
     """
-    return set_parameters(make_system(name, preset, rpm, saved), assignments or ())
+    return set_parameters(make_system(name, preset, rpm, source), assignments or ())
 
 
 def parameters(system: HybridSystem) -> dict[str, float]:
@@ -54,7 +53,7 @@ def set_parameters(system: HybridSystem, assignments: Sequence[str]) -> HybridSy
             system = eqx.tree_at(lambda s: s.restitution, system, law)
             continue
         leaves = _leaves(system)
-        if name == _SPEED and name in leaves:
+        if name == _SPEED and name in leaves and _in_rpm(system):
             raise ValueError(f"--set {assignment}: give the speed in rpm, as --speed.")
         if name not in leaves:
             raise ValueError(
@@ -76,6 +75,11 @@ def pick(name: str) -> Callable[[Any], Any]:
         return system
 
     return where
+
+
+def _in_rpm(system: HybridSystem) -> bool:
+    """Whether the command line counts the speed of a system in rpm."""
+    return isinstance(getattr(system, "base", system), CamFollower)
 
 
 def _split(assignment: str) -> tuple[str, float]:
@@ -106,7 +110,7 @@ def _leaves(system) -> dict[str, jax.Array]:
 
 
 def _names(system, leaves) -> list[str]:
-    names = [name for name in leaves if name != _SPEED]
+    names = [name for name in leaves if name != _SPEED or not _in_rpm(system)]
     if isinstance(system, CamFollower) and _CONSTANT not in names:
         names.append(f"{_CONSTANT} (a constant restitution)")
     return names

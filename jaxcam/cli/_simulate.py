@@ -5,16 +5,17 @@ from typing import Annotated, Any
 
 import typer
 
-from ._choices import CAM, make_solver, system_name
+from ._choices import CAM, make_solver
 from ._grouped import grouped
-from ._options import JsonFile, Preset, SavedSystem, Settings, Speed, System
+from ._options import JsonFile, Preset, Settings, Speed, System
 from ._simulate_options import Run
+from ._source import Source
 
 
 @grouped
 def simulate(
     system: System = CAM,
-    saved: SavedSystem = None,
+    source: Source = Source(),
     preset: Preset = None,
     speed: Speed = None,
     set_: Settings = None,
@@ -33,7 +34,7 @@ def simulate(
       jaxcam simulate bouncing-ball --set restitution=0.5 --state 2,0 --t1 3
       jaxcam simulate impact-oscillator --set omega=2.6 --out ./jaxcam-oscillator
     """
-    system = system_name(system, saved)
+    system = source.name(system)
     run.check()
 
     import jaxcam
@@ -46,7 +47,7 @@ def simulate(
 
     keep_compiled_programs()
     start = run.start(system)
-    model = make_model(system, preset, speed, saved, set_)
+    model = make_model(system, preset, speed, source, set_)
     end = run.end(system, model)
     output = Output(json_file, out)
     with progress(COMPILING) as report:

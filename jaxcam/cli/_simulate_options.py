@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from ._checks import check_finite, numbers
-from ._choices import choose, ENGINES, SOLVERS, SYSTEMS
+from ._choices import choose, ENGINES, ready, SOLVERS
 
 
 @dataclasses.dataclass(frozen=True)
@@ -67,7 +67,7 @@ class Run:
         if self.state == "release":
             return None
         if self.state is None:
-            start = SYSTEMS[name].state
+            start = ready(name).state
             return None if start is None else np.array(start)
         words = "0.3,0, or the word release"
         return np.array(numbers("--state", self.state, words, finite=False))
@@ -81,10 +81,10 @@ class Run:
             raise ValueError("Give --t1 or --turns, not both.")
         if self.t1 is not None:
             return self.t1
-        ready = SYSTEMS[name]
-        turns = ready.turns if self.turns is None else self.turns
+        usual = ready(name)
+        turns = usual.turns if self.turns is None else self.turns
         if turns is None:
-            return self.t0 + ready.duration
+            return self.t0 + usual.duration
         if model.period is None:
             raise ValueError(f"{name} has no forcing to count turns of; give --t1.")
         if not turns > 0:

@@ -8,6 +8,7 @@ from contextlib import contextmanager
 
 import typer
 
+from ..hybrid import HybridSystem
 from ._checks import at_least
 from ._errors import fail, STOPPED_EARLY
 from ._options import Cluster, Workers
@@ -28,6 +29,18 @@ class Where:
             raise ValueError(
                 f"--cluster is {address!r}; choose local, or the address of a "
                 "scheduler, such as tcp://127.0.0.1:8786."
+            )
+
+    def check_system(self, system: HybridSystem) -> None:
+        """**Raises:** `ValueError` for one that other processes could not import."""
+        from ..discrepancy.terms import WithTerms
+        from ..fitting.own_systems import system_source
+
+        base = system.base if isinstance(system, WithTerms) else system
+        if self.cluster is not None and system_source(type(base)) is not None:
+            raise ValueError(
+                f"--cluster: other processes do not know {type(base).__name__}, which "
+                f"is in a file of your own; leave it out to run in threads here."
             )
 
     @contextmanager

@@ -1,7 +1,10 @@
-"""Small recordings that ship with the package."""
+"""Small recordings and an example of a rig of one's own, shipped with the package."""
 
 from pathlib import Path
 
 
 #: a case folder of three runs and its rig file, made by `make_demo.py`
 DEMO_RIG = Path(__file__).parent / "demo_rig"
+
+#: a system in Python and its rig file, to be copied and changed (`jaxcam new-rig`)
+NEW_RIG = Path(__file__).parent / "new_rig"

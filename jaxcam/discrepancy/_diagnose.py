@@ -3,18 +3,18 @@
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
-from ..fitting import Input, Parameter, Sensor, Turning
+from ..fitting import Input, Parameter, Sensor, Setup, Turning
 from ..hybrid import HybridSystem
 from ..recordings import Recording, Rig, Segments
 from .evidence import choose, ripple_of
 from .policy import Policy
 from .report import Diagnosis, diagnosis_of
-from .search import KeptTrials, rig_question, system_question, Trials
+from .search import KeptTrials, rig_question, setup_question, system_question, Trials
 from .terms import Term
 
 
 def diagnose(
-    system: HybridSystem | Rig,
+    system: HybridSystem | Rig | Setup,
     recordings: Sequence[Recording | Segments],
     candidates: Sequence[Term] | None = None,
     *,
@@ -31,14 +31,15 @@ def diagnose(
 
     **Arguments:**
 
-    - `system`: a `Rig` from `jaxcam.recordings.read_rig`, which knows its sensors and
-        tolerances; or any system with one coordinate, with what follows.
-    - `recordings`: at least two of a rig; of another system, what
+    - `system`: a `Rig` from `jaxcam.recordings.read_rig` or a `Setup` from
+        `jaxcam.fitting.read_setup`, which know their sensors and tolerances; or any
+        system with one coordinate, with what follows.
+    - `recordings`: at least two of a rig; of a bare system, what
         `jaxcam.recordings.segment` makes of them.
     - `candidates`: terms that may be named; by default `library()`, with the constants
         of the rig. Those that are not `listed` only help to describe what is unknown.
     - `sensors`, `parameters`, `drive`: as for `jaxcam.fitting.Model` and `Problem`, of
-        a system that is not a rig; the drive is an input that was measured.
+        a bare system; the drive is an input that was measured.
     - `seed`: of the redrawn blocks.
     - `progress`: called with a sentence and a fraction, or `None`.
     - `keep`: a folder in which fits are kept until the diagnosis is done; one that was
@@ -51,6 +52,8 @@ def diagnose(
     report = progress or (lambda sentence, fraction: None)
     if isinstance(system, Rig):
         question = rig_question(system, recordings, candidates, report, policy)
+    elif isinstance(system, Setup):
+        question = setup_question(system, recordings, candidates, report, policy)
     else:
         question = system_question(
             system,

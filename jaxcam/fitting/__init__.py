@@ -20,6 +20,7 @@ from ._profile import (
     Profile as Profile,
     profile as profile,
 )
+from ._read_setup import is_setup as is_setup, read_setup as read_setup
 from ._residuals import Residuals as Residuals, residuals as residuals
 from ._restitution import (
     first_bounce as first_bounce,
@@ -34,6 +35,7 @@ from ._reverse import (
 )
 from ._score import linearise as linearise, Linearised as Linearised
 from ._segment_by_model import segment_by_model as segment_by_model
+from ._setup import Setup as Setup
 from ._unconstrained import Unconstrained as Unconstrained
 from .engine import (
     Input as Input,

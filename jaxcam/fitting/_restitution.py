@@ -56,7 +56,8 @@ def restitution_laws(segments: Sequence[Segments]) -> dict[str, RestitutionFit]:
     """Three laws fitted to the impacts of some recordings.
 
     **Returns:** `"constant"`, `"speed"` (linear in the speed of the drive, Figure 4.15
-    of the thesis) and `"approach"` (a power of the approach speed).
+    of the thesis) and `"approach"` (a power of the approach speed); without a law whose
+    parameters the impacts do not determine.
 
     **Raises:** `RecordingError` where there are too few impacts.
     """
@@ -73,10 +74,14 @@ def restitution_laws(segments: Sequence[Segments]) -> dict[str, RestitutionFit]:
     speeds = {part.drive.speed for part in segments if part.drive is not None}
     if len(speeds) < 2:
         del start["speed"]
-    return {
-        name: fit_restitution(segments, law, names)
-        for name, (law, names) in start.items()
-    }
+    found = {}
+    for name, (law, names) in start.items():
+        try:
+            found[name] = fit_restitution(segments, law, names)
+        except np.linalg.LinAlgError:
+            # the impacts leave a combination of its parameters open
+            continue
+    return found
 
 
 def fit_restitution(

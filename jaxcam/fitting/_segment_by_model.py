@@ -53,7 +53,7 @@ def segment_by_model(
     """
     picks = {
         sensor.observe: name
-        for name, sensor in reversed(model.sensors.items())
+        for name, sensor in reversed(tuple(model.sensors.items()))
         if isinstance(sensor.observe, int) and not sensor.filtered
     }
     primary = next(iter(model.sensors))

@@ -142,8 +142,8 @@ class Diagnosis:
         if drive is not None:
             angle, rate = (jnp.asarray(x) for x in (0.0, drive.speed))
             system = model.driven(0.0, angle, rate)
-        base = system.base  # pyright: ignore
-        return WithTerms(base, tuple(terms), system.coordinates) if terms else base
+        base, pairs = system.base, system.coordinates  # pyright: ignore
+        return WithTerms(base, tuple(terms), pairs) if terms else base
 
     @property
     def records(self) -> tuple[str, ...]:

@@ -19,6 +19,7 @@ from ._local_force import force_blocks as force_blocks, Response as Response
 from ._question import (
     Question as Question,
     rig_question as rig_question,
+    setup_question as setup_question,
     system_question as system_question,
 )
 from ._search import Search as Search

@@ -16,6 +16,7 @@ from ...fitting import (
     Parameter,
     Problem,
     Sensor,
+    Setup,
     Turning,
 )
 from ...hybrid import HybridSystem
@@ -27,7 +28,8 @@ from ...recordings import (
     segment_case,
     Segments,
 )
-from ...recordings.files import check_channels, check_drive
+from ...recordings.against_model import size_of
+from ...recordings.files import check_channels, check_drive, unit_of
 from ..policy import Policy
 from ..terms import base_drive, coordinates, library, SensorTerm, Term, WithTerms
 
@@ -37,8 +39,9 @@ _FOLLOWER = "follower_angle_rad"
 _ANGLES = 64
 
 # Share of the speeds of a motion below its fast ones, and that speed (rad/s) of the
-# thesis' cam-follower, for which the constants of the forms are stated
-_FAST, _THESIS_FAST = 0.95, 2.0
+# thesis' cam-follower, for which the constants of the forms are stated; time (s) over
+# which a speed is measured
+_FAST, _THESIS_FAST, _STRIDE = 0.95, 2.0, 5e-3
 
 Report = Callable[[str, float | None], None]
 
@@ -75,6 +78,19 @@ class Question:
     shown: Mapping[str, Shown] = dataclasses.field(default_factory=dict)
 
 
+@dataclasses.dataclass(frozen=True)
+class _OfBase:
+    """What picks a field out of the system that a `WithTerms` holds.
+
+    Equal for equal picks, so that diagnoses of one rig share compiled programs.
+    """
+
+    pick: Callable
+
+    def __call__(self, system):
+        return self.pick(system.base)
+
+
 def rig_question(
     rig: Rig,
     recordings: Sequence[Recording | Segments],
@@ -87,11 +103,7 @@ def rig_question(
     **Raises:** `RecordingError` for recordings that cannot be those of the rig.
     """
     runs = tuple(recordings)
-    if len(runs) < 2:
-        raise RecordingError(
-            f"There is {len(runs)} recording; give at least two of the same rig at "
-            f"different speeds, so that one can test what the other says."
-        )
+    _refuse_one(runs)
     _check(rig, [r.recording if isinstance(r, Segments) else r for r in runs])
     report("finding impacts and contacts", None)
     cut = [run for run in runs if isinstance(run, Segments)]
@@ -122,6 +134,36 @@ def rig_question(
     )
 
 
+def setup_question(
+    setup: Setup,
+    recordings: Sequence[Recording | Segments],
+    candidates: Sequence[Term] | None,
+    report: Report,
+    policy: Policy,
+) -> Question:
+    """The question of a rig of any system, which states its sensors and tolerances.
+
+    **Raises:** `RecordingError` for recordings that cannot be those of the rig.
+    """
+    runs = tuple(recordings)
+    _refuse_one(runs)
+    for run in runs:
+        check_channels(run.recording if isinstance(run, Segments) else run)
+    report("finding impacts and contacts", None)
+    model = setup.model
+    return system_question(
+        model.system,
+        setup.segments(runs),
+        candidates,
+        model.sensors,
+        setup.parameters,
+        model.drive,
+        report,
+        policy,
+        setup.references,
+    )
+
+
 def system_question(
     system: HybridSystem,
     recordings: Sequence[Segments],
@@ -131,9 +173,11 @@ def system_question(
     drive: Turning | Input | None,
     report: Report,
     policy: Policy,
-    references: References | None = None,
+    stated: Mapping[str, float] | None = None,
 ) -> Question:
     """The question of any system; terms act on its first coordinate and first gap.
+
+    **Arguments:** as for `diagnose`; `stated` constants of the forms, by name.
 
     **Raises:** `ValueError` for recordings that are not cut, or without sensors.
     """
@@ -148,27 +192,18 @@ def system_question(
                 "Cut the recordings first: `jaxcam.recordings.segment(recording, "
                 "channel)` for each of them."
             )
-    plain = Problem.build(Model(system, dict(sensors), drive), recordings, parameters)
-    states = np.asarray(plain.start.states)[np.asarray(plain.pieces.exists)]
-    size = len(system.state_names) or states.shape[1]
-    pairs = coordinates(system, np.median(states, axis=0)[:size])
-    unit = _unit(_channel_of(sensors, pairs[0][0]))
-    turned = system.period is not None
-    if references is None:
-        references = _scaled(states[:, pairs[0][1]])
+    pairs = coordinates(system, _usual_state(system, sensors, recordings))
+    seen = _channel_of(sensors, pairs[0][0])
+    unit, turned = unit_of(seen), system.period is not None
+    references = _scaled(recordings, seen, stated or {})
     if candidates is None:
         clocked = turned or drive is not None
         candidates = library(turned, references, clocked=clocked)
     terms, unlisted = _sorted(_measured_in(unit, candidates))
     if isinstance(drive, Input):
-        value = drive.value
-        drive = Input(drive.channel, lambda s: value(s.base))  # pyright: ignore
+        drive = Input(drive.channel, _OfBase(drive.value))
     elif drive is not None:
-        speed, phase = drive.speed, drive.phase
-        drive = Turning(
-            lambda s: speed(s.base),  # pyright: ignore
-            lambda s: phase(s.base),  # pyright: ignore
-        )
+        drive = Turning(_OfBase(drive.speed), _OfBase(drive.phase))
     model = Model(WithTerms(system, terms, pairs), dict(sensors), drive)
     inside = [_within(parameter) for parameter in parameters]
     report("preparing the fits", None)
@@ -192,22 +227,40 @@ def _channel_of(sensors: Mapping[str, Sensor], place: int) -> str:
     return next(iter(sensors))
 
 
-def _scaled(velocities: Float[np.ndarray, " k"]) -> References:
-    """Constants of the forms for a motion at these speeds, about a zero in its middle.
+def _usual_state(system, sensors, recordings) -> Float[np.ndarray, " n"]:
+    """The middle of what is measured of a state, zero for what is not."""
+    picks = {name: sensor.observe for name, sensor in sensors.items()}
+    state = np.zeros(size_of(system, picks))
+    for name, pick in picks.items():
+        if isinstance(pick, int):
+            samples = np.concatenate([part.recording[name] for part in recordings])
+            state[pick] = np.nanmedian(samples)
+    return state
+
+
+def _scaled(
+    recordings: Sequence[Segments], channel: str, stated: Mapping[str, float]
+) -> References:
+    """Constants of the forms for a motion; those that are not stated, by its speeds.
 
     The speeds within which dry friction changes sign and rises stand to those of the
     motion as they do in the thesis' rig.
     """
-    usual = References()
-    fast = float(np.quantile(np.abs(velocities), _FAST))
-    share = fast / _THESIS_FAST if fast > 0 else 1.0
-    return References(
-        spring_center=0.0,
-        impact_speed=usual.impact_speed * share,
-        stribeck_speed=usual.stribeck_speed * share,
-        slip_speed=usual.slip_speed * share,
-        free_slip_speed=usual.free_slip_speed * share,
-    )
+    speeds = []
+    for part in recordings:
+        time, samples = part.recording.time, part.recording[channel]
+        # over so many samples noise is no speed
+        stride = max(1, round(_STRIDE / part.recording.interval))
+        time, samples = time[::stride], samples[::stride]
+        speeds.append(np.abs(np.diff(samples) / np.diff(time)))
+    every = np.concatenate(speeds)
+    fast = float(np.quantile(every[np.isfinite(every)], _FAST))
+    usual, share = References(), fast / _THESIS_FAST if fast > 0 else 1.0
+    scaled = {
+        name: getattr(usual, name) * share
+        for name in ("impact_speed", "stribeck_speed", "slip_speed", "free_slip_speed")
+    }
+    return dataclasses.replace(usual, **{"spring_center": 0.0, **scaled, **stated})
 
 
 def _measured_in(unit: str, terms: Sequence[Term]) -> tuple[Term, ...]:
@@ -215,12 +268,12 @@ def _measured_in(unit: str, terms: Sequence[Term]) -> tuple[Term, ...]:
     return tuple(dataclasses.replace(term, motion_unit=unit or "1") for term in terms)
 
 
-def _unit(channel: str) -> str:
-    """The unit that ends the name of a channel of a recording, as in `height_m`."""
-    for unit, written in (("_rad_s", "rad/s"), ("_rad", "rad"), ("_m", "m")):
-        if channel.endswith(unit):
-            return written
-    return ""
+def _refuse_one(runs: Sequence[Recording | Segments]) -> None:
+    if len(runs) < 2:
+        raise RecordingError(
+            f"There is {len(runs)} recording; give at least two of the same rig at "
+            f"different speeds, so that one can test what the other says."
+        )
 
 
 def _within(parameter: Parameter) -> Parameter:

@@ -41,11 +41,8 @@ class Motion(NamedTuple):
 MOTION = "[q]"
 
 
-def _about(default: Any) -> Any:
-    """Where a term acts: not fitted, and left out of files that do not say it."""
-    return eqx.field(
-        default=default, static=True, kw_only=True, metadata={"spare": True}
-    )
+# where a term acts is left out of files that do not say it
+_SPARE = {"spare": True}
 
 
 def strength(
@@ -115,9 +112,11 @@ class Term(eqx.Module):
     source: ClassVar[str] = ""
     listed: ClassVar[bool] = True
     acts: ClassVar[tuple[str, ...]] = ()
-    coordinate: int = _about(0)
-    constraint: int = _about(0)
-    motion_unit: str = _about("rad")
+    coordinate: int = eqx.field(default=0, static=True, kw_only=True, metadata=_SPARE)
+    constraint: int = eqx.field(default=0, static=True, kw_only=True, metadata=_SPARE)
+    motion_unit: str = eqx.field(
+        default="rad", static=True, kw_only=True, metadata=_SPARE
+    )
 
     def __init_subclass__(cls, **options):
         super().__init_subclass__(**options)

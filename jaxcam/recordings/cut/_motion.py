@@ -41,7 +41,7 @@ class Motion:
         return self.samples - self.contact
 
     def fit(self, first: int, last: int, *, at_end: bool) -> LocalFit:
-        """A polynomial through one end of a flight, as much of it as a cubic follows."""
+        """A polynomial through one end of a flight, as far as a cubic follows it."""
         # the samples next to an impact may be from the other side of it
         inner = slice(first + 1, last - 1) if last - first > 6 else slice(first, last)
         count = max(4, round(_FIT_WINDOW / self.interval))

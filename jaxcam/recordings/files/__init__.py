@@ -8,4 +8,12 @@ from ._read import (
     read_recording as read_recording,
     read_recordings as read_recordings,
 )
-from ._read_rig import read_rig as read_rig
+from ._read_rig import read_references as read_references, read_rig as read_rig
+from ._toml import (
+    known_keys as known_keys,
+    printable as printable,
+    read_tables as read_tables,
+    Section as Section,
+    shown_value as shown_value,
+)
+from ._units import si as si, unit_of as unit_of

@@ -33,3 +33,25 @@ def si(column: str) -> tuple[str, float]:
             target, factor = _UNITS[ending]
             return column.removesuffix(ending) + target, factor
     return column, 1.0
+
+
+# ending of a channel's name -> its unit as it is written; the longest ending wins
+_WRITTEN = {
+    "_rad_s": "rad/s",
+    "_rad": "rad",
+    "_m_s": "m/s",
+    "_m_s2": "m/s^2",
+    "_m": "m",
+    "_N": "N",
+    "_V": "V",
+    "_A": "A",
+    "_s": "s",
+}
+
+
+def unit_of(channel: str) -> str:
+    """The unit that ends the name of a channel: `m` of `height_m`, or nothing."""
+    for ending in sorted(_WRITTEN, key=len, reverse=True):
+        if channel.endswith(ending):
+            return _WRITTEN[ending]
+    return ""

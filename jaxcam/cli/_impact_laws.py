@@ -1,0 +1,39 @@
+"""Laws of restitution from the impacts on each gap of a system."""
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..fitting import restitution_laws, RestitutionFit
+from ..recordings import Impacts, RecordingError, Segments
+
+
+def impact_laws(segments: Sequence[Segments]) -> dict[str, RestitutionFit]:
+    """Laws by the gap that was hit, for each gap with impacts enough.
+
+    **Returns:** laws as of `restitution_laws`; where there are several gaps, with the
+    number of the gap before their names.
+    """
+    sides = np.unique(np.concatenate([part.impacts.side for part in segments]))
+    found = {}
+    for side in sides:
+        there = [_on(part, int(side)) for part in segments]
+        before = f"gap {side + 1}, " if len(sides) > 1 else ""
+        try:
+            laws = restitution_laws(there)
+        except RecordingError:
+            # a fit of the motion needs no impacts, so they are no condition
+            continue
+        found |= {f"{before}{name}": law for name, law in laws.items()}
+    return found
+
+
+def _on(part: Segments, side: int) -> Segments:
+    """A record with the impacts on one of its gaps only."""
+    keep = part.impacts.side == side
+    columns = {
+        field.name: getattr(part.impacts, field.name)[keep]
+        for field in dataclasses.fields(Impacts)
+    }
+    return dataclasses.replace(part, impacts=Impacts(**columns))

@@ -1,0 +1,61 @@
+"""`jaxcam new-rig`: an example of a system of one's own, to be changed."""
+
+import keyword
+import re
+import shlex
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ..data import NEW_RIG
+from ._output import write_text
+
+
+# names in the example that become those of the new rig
+_FILE, _CLASS = "cart", "Cart"
+
+
+def new_rig(
+    name: Annotated[
+        Path, typer.Argument(metavar="NAME", help="Of the files NAME.py and NAME.toml.")
+    ],
+) -> None:
+    """
+    Write an example of a rig of your own: a system in Python, and what is known of it.
+
+    \b
+    Examples:
+      jaxcam new-rig two_stops
+    """
+    if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_-]*", name.name):
+        raise ValueError(
+            f"NAME is {name.name[:100]!r}; give letters, digits, _ and - after a first "
+            f"letter, such as two_stops."
+        )
+    if not name.parent.is_dir():
+        raise ValueError(f"{name.parent}: there is no such folder; make it first.")
+    files = {name.parent / f"{name.name}{kind}": kind for kind in (".py", ".toml")}
+    for file in files:
+        if file.exists():
+            raise ValueError(f"{file} exists already; give another name.")
+    for file, kind in files.items():
+        text = (NEW_RIG / f"{_FILE}{kind}").read_text("utf-8")
+        text = text.replace(f"{_FILE}.", f"{name.name}.")
+        write_text(file, re.sub(rf"\b{_CLASS}\b", _class_name(name.name), text))
+    code, rig = (shlex.quote(str(file)) for file in files)
+    typer.echo(f"Written: {code}, the system, and {rig}, what is known of it.")
+    typer.echo(f"Try it: jaxcam simulate --rig {rig} --state 0,0.8 --t1 3")
+    typer.echo(
+        f"With a folder of recordings: jaxcam fit CASE --rig {rig}, then jaxcam "
+        f"diagnose CASE --rig {rig} --out DIR"
+    )
+
+
+def _class_name(name: str) -> str:
+    """TwoStops of two_stops."""
+    found = "".join(
+        part[0].upper() + part[1:] for part in re.split("[_-]", name) if part
+    )
+    taken = keyword.iskeyword(found) or found == "HybridSystem"
+    return f"{found}Rig" if taken else found

@@ -1,0 +1,59 @@
+"""Residuals as reports draw them: in a unit that suits them, by turn or by time."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Float
+
+from ..fitting import Residuals
+from ..recordings.files import unit_of
+
+
+# Residuals that are nothing but noise seldom reach this many of its deviations
+_REACH = 10.0
+
+
+def shown_in(part: Residuals) -> tuple[float, str]:
+    """A factor and the unit in which the residuals of a channel are drawn."""
+    from ..plotting import scaled
+
+    return scaled(unit_of(part.channel), _REACH * part.noise)
+
+
+def residual_label(part: Residuals) -> str:
+    """Of an axis, with that unit."""
+    _, unit = shown_in(part)
+    return f"residual ({unit})" if unit else "residual"
+
+
+def title_of(part: Residuals, parts: Sequence[Residuals]) -> str:
+    """The record, and the channel where there are several."""
+    several = len({one.channel for one in parts}) > 1
+    return f"{part.record}, {part.channel}" if several else part.record
+
+
+class Along:
+    """What residuals are drawn along: a turn of the drive, or time without a drive."""
+
+    def __init__(self, parts: Sequence[Residuals]):
+        self.turns = all(np.any(np.isfinite(part.turned)) for part in parts)
+        if self.turns:
+            self.start, self.end = 0.0, 2 * math.pi
+        else:
+            times = np.concatenate([part.time for part in parts])
+            self.start, self.end = float(np.min(times)), float(np.max(times))
+
+    @property
+    def label(self) -> str:
+        return "drive angle in its turn (rad)" if self.turns else "time (s)"
+
+    @property
+    def word(self) -> str:
+        return "the angle of the drive" if self.turns else "time"
+
+    def place(self, part: Residuals) -> Float[np.ndarray, " k"]:
+        """Where each residual is, between `start` and `end`."""
+        if not self.turns:
+            return part.time
+        return np.nan_to_num(part.turned) % (2 * math.pi)

@@ -1,0 +1,62 @@
+"""Systems that commands write and read again, those of a user's own files too."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+from ..hybrid import HybridSystem
+
+
+# where a saved system of a user's own comes from: FILE.py:CLASS
+_SOURCE = "source"
+
+
+def as_saved(system: HybridSystem, about: dict[str, Any]) -> dict[str, Any]:
+    """A system as data, with what names its file where it is not one of the package.
+
+    A system that cannot be saved leaves `about`, and `not_saved`, a sentence why.
+    """
+    from ..discrepancy.terms import WithTerms
+    from ..fitting.own_systems import system_source
+    from ..models import system_to_json
+
+    try:
+        found = system_to_json(system, about=about)
+    except ValueError as error:
+        return {"not_saved": f"The system is not saved: {error}", "about": about}
+    base = system.base if isinstance(system, WithTerms) else system
+    source = system_source(type(base))
+    return found if source is None else {**found, _SOURCE: source}
+
+
+def load(file: Path) -> HybridSystem:
+    """The system in a file of `jaxcam fit` or `jaxcam diagnose`.
+
+    The Python file that a system of a user's own comes from is run.
+
+    **Raises:** `ValueError` that says what is wrong with it.
+    """
+    from ..discrepancy.terms import saved_classes
+    from ..fitting.own_systems import classes_beside, split_name, system_class
+    from ..models import load_system
+
+    classes, source = saved_classes(), _source_of(file)
+    if source is not None:
+        python = Path(split_name(source)[0])
+        if not python.is_file():
+            raise ValueError(
+                f"{file}: its system is in {python}, which is not there; put it back, "
+                f"or correct `{_SOURCE}`."
+            )
+        classes = (*classes, *classes_beside(system_class(source)))
+    return load_system(file, classes=classes)
+
+
+def _source_of(file: Path) -> str | None:
+    try:
+        found = json.loads(file.read_text("utf-8"))
+    except (ValueError, RecursionError):
+        # what is wrong with it is said by those who read the rest
+        return None
+    source = found.get(_SOURCE) if isinstance(found, dict) else None
+    return source if isinstance(source, str) else None

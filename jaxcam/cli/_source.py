@@ -1,0 +1,118 @@
+"""The system that a command works on: a ready one, a saved one, or one's own."""
+
+import dataclasses
+import math
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ..hybrid import HybridSystem
+from ._choices import CAM, choose, SYSTEMS
+from ._options import SavedSystem
+
+
+@dataclasses.dataclass(frozen=True)
+class Source:
+    """A system that is not chosen by its name, with `--system` and `--rig`."""
+
+    saved: SavedSystem = None
+    rig: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="Its nominal values: a rig file, as of jaxcam new-rig."
+        ),
+    ] = None
+
+    def __bool__(self) -> bool:
+        return self.saved is not None or self.rig is not None
+
+    def system(self) -> HybridSystem:
+        """The system that was saved, or that of a file with its nominal values.
+
+        **Raises:** `ValueError` that names the file at fault and the fix.
+        """
+        from ..fitting import is_setup, read_setup
+        from ..fitting.own_systems import stated_system, system_class
+        from ._saved_system import load
+
+        named = None if self.saved is None else str(self.saved)
+        coded = named is not None and _is_code(named)
+        if self.rig is None:
+            assert self.saved is not None
+            if not coded:
+                return load(self.saved)
+            return stated_system(self.saved, system_class(str(self.saved)), {})
+        if named is not None and not coded:
+            raise ValueError(
+                f"{named} holds the values of its system; leave out --rig, or give "
+                f"--system FILE.py:CLASS."
+            )
+        if coded or is_setup(self.rig):
+            return read_setup(self.rig, named).model.system
+        from ..models import CamFollower
+        from ..recordings import read_rig
+
+        return read_rig(self.rig).system(float(CamFollower().speed))
+
+    def name(self, word: str) -> str:
+        """The name of the system; `word` is that of a ready one.
+
+        **Raises:** `ValueError` for an unknown one, or a file that is at fault.
+        """
+        if not self:
+            if _is_code(word):
+                raise ValueError(
+                    f"{word[:100]}: give a system of your own as --system."
+                )
+            return choose("SYSTEM", word, SYSTEMS)
+        from ..discrepancy.terms import WithTerms
+
+        system = self.system()
+        model = type(system.base if isinstance(system, WithTerms) else system).__name__
+        for name, ready in SYSTEMS.items():
+            if ready.model == model:
+                return name
+        return model
+
+
+def make_system(
+    name: str, preset: str | None, rpm: float | None, source: Source = Source()
+) -> HybridSystem:
+    """A system; `preset` and a speed in rpm are for the cam-follower alone.
+
+    **Raises:** `ValueError` that names the fix.
+    """
+    import equinox as eqx
+    import jax.numpy as jnp
+
+    from .. import models
+
+    if name != CAM:
+        for option, value in (("--preset", preset), ("--speed", rpm)):
+            if value is not None:
+                raise ValueError(
+                    f"{option} belongs to {CAM}; leave it out, and use --set for the "
+                    f"parameters of {name}."
+                )
+        if source:
+            return source.system()
+        return getattr(models, SYSTEMS[name].model)()
+    if source and preset is not None:
+        raise ValueError("Give --system or --preset, not both.")
+    if source:
+        system = source.system()
+    else:
+        system = models.CamFollower() if preset is None else models.preset(preset)
+    if rpm is not None:
+        if not 0 < rpm < math.inf:
+            raise ValueError(f"--speed is {rpm:g} rpm; give a positive number.")
+        speed = jnp.asarray(models.rpm_to_rad_s(rpm), dtype=float)
+        system = eqx.tree_at(lambda s: s.speed, system, speed)
+    return system
+
+
+def _is_code(named: str) -> bool:
+    """Whether a Python file is meant, with a class in it or without."""
+    path, colon, _ = named.rpartition(":")
+    return named.endswith(".py") or (bool(colon) and path.endswith(".py"))

@@ -1,0 +1,241 @@
+"""Reading the rig file of a system of one's own."""
+
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+from ..hybrid import HybridSystem
+from ..recordings import References, RigError
+from ..recordings.files import (
+    known_keys,
+    printable,
+    read_references,
+    read_tables,
+    Section,
+    shown_value,
+    si,
+    unit_of,
+)
+from ._setup import Setup
+from .engine import Input, Model, Parameter, Sensor, Turning
+from .own_systems import Field, stated_system, system_class
+
+
+_TABLES = ("system", "parameters", "channels", "drive", "input", "references")
+# what is written of one number
+_NUMBER = ("value", "tolerance", "lower", "upper", "unit")
+
+
+class _Stated(NamedTuple):
+    """One entry of `[parameters]`; without a tolerance it is known."""
+
+    value: float | bool | str
+    tolerance: float = 0.0
+    lower: float = -math.inf
+    upper: float = math.inf
+    unit: str = ""
+
+
+def read_setup(
+    path: str | Path, system: str | type[HybridSystem] | None = None
+) -> Setup:
+    """The rig of a system of one's own, as a TOML file describes it.
+
+    `system` in the file, such as `"two_stops.py:TwoStops"`, names a Python file beside
+    it and a class, and the Python file is run: read rigs only from those you trust.
+
+    **Arguments:** the file; and another system than that of the file: a class, or
+    `FILE.py:CLASS` as seen from the working directory.
+
+    **Raises:** `RigError`, one sentence that names the file, the key and the fix.
+    """
+    file = Path(path)
+    tables = read_tables(file)
+    known_keys(file, "", tables, _TABLES)
+    cls = _class(file, tables, system)
+    stated = dict(_parameters(file, tables))
+    fitted = {name: one for name, one in stated.items() if one.tolerance > 0}
+    drive, drive_channel, measured = _drive(file, tables)
+    for name in measured:
+        if name in fitted and name != _phase_of(drive):
+            raise RigError(
+                f"{file}: `{name}` in [parameters] has a tolerance, but a channel says "
+                f"what it is; remove the tolerance."
+            )
+    made = stated_system(
+        file,
+        cls,
+        {name: one.value for name, one in stated.items()},
+        fitted=fitted,
+        measured=measured,
+    )
+    return Setup(
+        Model(made, _sensors(file, tables, made), drive),
+        tuple(_parameter(name, one) for name, one in fitted.items()),
+        drive_channel,
+        _references(file, tables),
+    )
+
+
+def is_setup(path: str | Path) -> bool:
+    """Whether a rig file is one for `read_setup`, and not that of a cam-follower.
+
+    **Raises:** `RigError` for a file that is no TOML.
+    """
+    return not {"system", "parameters", "channels"}.isdisjoint(read_tables(Path(path)))
+
+
+def _references(file: Path, tables) -> dict[str, float]:
+    found = read_references(file, tables, References(spring_center=0.0), None)
+    return {name: getattr(found, name) for name in tables.get("references", {})}
+
+
+def _class(file: Path, tables, system) -> type[HybridSystem]:
+    if isinstance(system, type):
+        return system
+    if system is not None:
+        return system_class(system)
+    named = tables.get("system")
+    if not isinstance(named, str) or not named.strip():
+        raise RigError(
+            f"{file}: it does not say which system it is the rig of; begin it with "
+            f'system = "FILE.py:CLASS".'
+        )
+    return system_class(named, file.parent)
+
+
+def _parameters(file: Path, tables) -> Iterator[tuple[str, _Stated]]:
+    """The entries of `[parameters]`, those of parts under dotted names."""
+    if "parameters" not in tables:
+        return
+    section = Section(file, "parameters", tables)
+    seen = set()
+    for name, inner, key in _flat(section, ""):
+        if name in seen:
+            raise section.error(name, "is given twice")
+        seen.add(name)
+        yield name, _stated(inner, key)
+
+
+def _flat(section: Section, before: str) -> Iterator[tuple[str, Section, str]]:
+    for key, entry in section.table.items():
+        name = f"{before}{key}"
+        if isinstance(entry, dict) and entry and set(entry).isdisjoint(_NUMBER):
+            inner = Section(section.file, key, section.table, section.name)
+            yield from _flat(inner, f"{name}.")
+        else:
+            yield name, section, key
+
+
+def _stated(section: Section, key: str) -> _Stated:
+    entry = section.table[key]
+    if isinstance(entry, bool | str):
+        return _Stated(entry)
+    if not isinstance(entry, dict):
+        return _Stated(section.as_number(key, entry))
+    known_keys(section.file, f"{section.name}.{printable(key)}", entry, _NUMBER)
+    if "value" not in entry:
+        raise section.error(key, "has no `value`")
+    value = section.as_number(key, entry["value"])
+    lower, upper = (
+        section.as_number(key, entry[which]) if which in entry else otherwise
+        for which, otherwise in (("lower", -math.inf), ("upper", math.inf))
+    )
+    if not lower <= value <= upper or lower == upper:
+        raise section.error(
+            key, f"is {value:g}, and must be between {lower:g} and {upper:g}"
+        )
+    tolerance = entry.get("tolerance", 0.0)
+    if tolerance != math.inf:
+        tolerance = section.as_number(key, tolerance)
+    if tolerance < 0:
+        raise section.error(key, f"has the tolerance {tolerance:g}, below zero")
+    unit = entry.get("unit", "")
+    if not isinstance(unit, str):
+        raise section.error(key, f"has the unit {shown_value(unit)}, which is no word")
+    return _Stated(value, float(tolerance), lower, upper, unit)
+
+
+def _parameter(name: str, one: _Stated) -> Parameter:
+    return Parameter(
+        name,
+        Field(f"system.{name}"),
+        one.tolerance,
+        lower=one.lower,
+        upper=one.upper,
+        unit=one.unit,
+    )
+
+
+def _phase_of(drive: Turning | Input | None) -> str | None:
+    """The field of a turning drive's phase: of the encoder's zero, to be fitted."""
+    if not isinstance(drive, Turning):
+        return None
+    assert isinstance(drive.phase, Field)
+    return drive.phase.name
+
+
+def _drive(
+    file: Path, tables
+) -> tuple[Turning | Input | None, str | None, dict[str, float]]:
+    """The drive, its channel if it turns, and what its fields hold at rest."""
+    if "drive" in tables and "input" in tables:
+        raise RigError(
+            f"{file}: there are both [drive] and [input]; remove the one that the "
+            f"system does not have."
+        )
+    if "drive" in tables:
+        section = Section(file, "drive", tables)
+        channel = _channel(section, section.word("channel"))
+        speed, phase = (
+            section.word(key) if key in section.table else key
+            for key in ("speed", "phase")
+        )
+        known_keys(file, "drive", section.table, ("channel", "speed", "phase"))
+        measured = {phase: 0.0, speed: 1.0}
+        return Turning(Field(speed), Field(phase)), channel, measured
+    if "input" in tables:
+        section = Section(file, "input", tables)
+        channel = _channel(section, section.word("channel"))
+        field = section.word("field")
+        section.done()
+        return Input(channel, Field(field)), None, {field: 0.0}
+    return None, None, {}
+
+
+def _sensors(file: Path, tables, system: HybridSystem) -> dict[str, Sensor]:
+    """A sensor for each table of `[channels]`."""
+    outer = Section(file, "channels", tables)
+    if not outer.table:
+        raise RigError(
+            f"{file}: [channels] is empty; add a table for each channel that is "
+            f"measured, such as [channels.position_m]."
+        )
+    return {_channel(outer, name): _sensor(outer, name, system) for name in outer.table}
+
+
+def _sensor(outer: Section, name: str, system: HybridSystem) -> Sensor:
+    if not isinstance(outer.table[name], dict):
+        raise outer.error(name, "is no table with `sees` and `noise`")
+    section = Section(outer.file, name, outer.table, outer.name)
+    seen = section.choice("sees", *system.state_names)
+    unit = unit_of(name) or None
+    noise = section.positive("noise", unit)
+    units = {"resolution": unit, "limit": unit, "bandwidth_hz": "Hz", "tails": ""}
+    options = {
+        key: section.positive(key, units[key]) for key in units if key in section.table
+    }
+    known_keys(section.file, section.name, section.table, ("sees", "noise", *units))
+    place = system.state_names.index(seen)
+    return Sensor(place, noise, **options)  # pyright: ignore
+
+
+def _channel(section: Section, name: str) -> str:
+    """The name of a channel, which is read in SI units."""
+    renamed, factor = si(name)
+    if renamed != name or factor != 1.0:
+        raise section.error(
+            name, f"is read in SI units; call it `{renamed}` and give its noise in them"
+        )
+    return name

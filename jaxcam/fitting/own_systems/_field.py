@@ -1,0 +1,21 @@
+"""A number of a system by its dotted name, as what picks it."""
+
+import dataclasses
+from typing import Any
+
+
+@dataclasses.dataclass(frozen=True)
+class Field:
+    """What picks a number out of a system or a model: `Field("spring.stiffness")`.
+
+    Two of the same name are equal and have the same hash, so that problems of the same
+    rig share compiled programs, as those with a new `lambda` each do not.
+    """
+
+    name: str
+
+    def __call__(self, owner: Any) -> Any:
+        for part in self.name.split("."):
+            inside = isinstance(owner, tuple | list)
+            owner = owner[int(part)] if inside else getattr(owner, part)
+        return owner

@@ -1,0 +1,153 @@
+"""A system made of the values that a rig file states for its fields."""
+
+import difflib
+import inspect
+from collections.abc import Collection, Mapping
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+
+from ...hybrid import HybridSystem
+from ...parameters import as_arrays, parameter_names
+from ...recordings import RigError
+from ...recordings.files import printable
+from ._field import Field
+from ._system_file import fault
+
+
+#: a number, or what a field holds that is none
+Stated: TypeAlias = float | bool | str
+
+
+def stated_system(
+    file: Path,
+    cls: type[HybridSystem],
+    values: Mapping[str, Stated],
+    *,
+    fitted: Collection[str] = (),
+    measured: Mapping[str, float] = {},
+) -> HybridSystem:
+    """The system with some of its fields as a file states them.
+
+    **Arguments:**
+
+    - `values`: by the names of fields, dotted for those of a part of the system, which
+        must have a default then.
+    - `fitted`: names among these that have to be numbers.
+    - `measured`: fields that follow a channel, and what they hold without a default
+        and without a value in the file.
+
+    **Raises:** `RigError`, one sentence that names the file, the field and the fix.
+    """
+    known = inspect.signature(cls).parameters
+    for name in (*values, *measured):
+        if name.partition(".")[0] not in known:
+            raise _unknown(file, cls, name, list(known), name in values)
+    given = {
+        name: _as_declared(file, name, value, known[name], name in fitted)
+        for name, value in values.items()
+        if "." not in name
+    }
+    for name, at_rest in measured.items():
+        if name in known and known[name].default is inspect.Parameter.empty:
+            given.setdefault(name, at_rest)
+    for name, one in known.items():
+        named = one.kind not in (one.VAR_POSITIONAL, one.VAR_KEYWORD)
+        if named and one.default is inspect.Parameter.empty and name not in given:
+            raise RigError(
+                f"{file}: the field `{name}` of {cls.__name__} has no value; add it to "
+                f"[parameters]."
+            )
+    try:
+        system = as_arrays(cls(**given))
+    except Exception as error:
+        raise RigError(
+            f"{file}: {cls.__name__} cannot be made of these values ({fault(error)}); "
+            f"correct [parameters]."
+        ) from error
+    names = parameter_names(system)
+    inner = [name for name in values if "." in name]
+    for name in (*fitted, *inner, *measured):
+        if name not in names:
+            raise _unknown(file, cls, name, names, name in values)
+    for name in inner:
+        number = jnp.asarray(values[name], dtype=float)
+        system = eqx.tree_at(Field(name), system, number)
+    _refuse_broken(file, system)
+    return system
+
+
+def _as_declared(
+    file: Path, name: str, value: Stated, declared: inspect.Parameter, varies: bool
+) -> Any:
+    """The value as a field of its kind holds it.
+
+    **Raises:** `RigError` for a word or a flag where a number belongs.
+    """
+    kind, default = declared.annotation, declared.default
+    if isinstance(value, float):
+        # a number of teeth, by which a loop may count
+        whole = kind in (int, "int") and value.is_integer()
+        return int(value) if whole and not varies else value
+    numbers = float | int | jax.Array
+    number = isinstance(default, numbers) and not isinstance(default, bool)
+    if number or kind in (float, int, jax.Array, "float", "int"):
+        raise RigError(
+            f"{file}: `{name}` in [parameters] is no number; write it without quotes, "
+            f"in SI units."
+        )
+    return value
+
+
+def _unknown(
+    file: Path, cls: type, name: str, known: list[str], listed: bool
+) -> RigError:
+    near = difflib.get_close_matches(name, known, n=1)
+    hint = f"is `{near[0]}` meant?" if near else f"it has {', '.join(known) or 'none'}."
+    where = "[parameters]" if listed else "[drive] or [input]"
+    return RigError(
+        f"{file}: {where} names `{printable(name)}`, a number that {cls.__name__} has "
+        f"not; {hint}"
+    )
+
+
+def _refuse_broken(file: Path, system: HybridSystem) -> None:
+    """**Raises:** `RigError` for functions that fail, or are of the wrong shape."""
+    name, count = type(system).__name__, len(system.state_names)
+    if not count:
+        raise RigError(
+            f'{file}: {name} names no states; add state_names = ("position", '
+            f'"velocity") to the class.'
+        )
+    try:
+        system.check()
+    except ValueError as error:
+        raise RigError(f"{file}: {str(error).rstrip('.')}.") from None
+    except Exception as error:
+        raise RigError(
+            f"{file}: `check` of {name} fails ({fault(error)}); correct it."
+        ) from error
+    found = {}
+    for function in ("vector_field", "gap", "impact"):
+        at = jnp.zeros(()), jnp.zeros(count)
+        try:
+            found[function] = jax.eval_shape(getattr(system, function), *at).shape
+        except Exception as error:
+            raise RigError(
+                f"{file}: `{function}` of {name} fails ({fault(error)}); correct it."
+            ) from error
+    gaps = found["gap"]
+    wanted = {
+        "vector_field": (count,),
+        "gap": gaps if len(gaps) < 2 else (),
+        "impact": (*gaps, count),
+    }
+    for function, shape in wanted.items():
+        if found[function] != shape:
+            raise RigError(
+                f"{file}: `{function}` of {name} has the shape {found[function]} where "
+                f"{shape} belongs to its {count} state names; correct it."
+            )

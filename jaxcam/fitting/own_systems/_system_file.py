@@ -1,0 +1,138 @@
+"""Systems in Python files of their own: `two_stops.py:TwoStops`."""
+
+import difflib
+import hashlib
+import inspect
+import sys
+import traceback
+from pathlib import Path
+from types import ModuleType
+
+import equinox as eqx
+
+from ...hybrid import HybridSystem
+from ...recordings import RigError
+from ...recordings.files import printable
+
+
+# letters of somebody else's message that are repeated
+_MOST = 200
+# programs are compiled for classes: a file that did not change is not run again
+_loaded: dict[Path, tuple[bytes, ModuleType]] = {}
+
+
+def system_class(named: str, folder: str | Path = ".") -> type[HybridSystem]:
+    """The class of a system in a Python file, which is run.
+
+    **Arguments:** `named` is `FILE.py:CLASS`, the file seen from `folder`.
+
+    **Raises:** `RigError`, one sentence that names the file and the fix.
+    """
+    path, name = split_name(named)
+    file = Path(folder) / path
+    module = _module(file)
+    found = _systems(module)
+    if not name:
+        some = next(iter(found), "CLASS")
+        raise RigError(
+            f"{file}: say which class of it is the system, as in {file.name}:{some}."
+        )
+    cls = getattr(module, name, None)
+    if cls is None:
+        near = difflib.get_close_matches(name, found, n=1)
+        hint = f"is `{near[0]}` meant?" if near else _there(found)
+        raise RigError(f"{file}: there is no class `{name}` in it; {hint}")
+    if not inspect.isclass(cls) or not issubclass(cls, HybridSystem):
+        raise RigError(
+            f"{file}: `{name}` is no HybridSystem; derive it from jaxcam.HybridSystem."
+        )
+    missing = sorted(cls.__abstractmethods__)
+    if missing:
+        raise RigError(f"{file}: `{name}` has no `{missing[0]}`; add that method.")
+    return cls
+
+
+def system_source(cls: type[HybridSystem]) -> str | None:
+    """`FILE.py:CLASS` of a class from such a file, or `None` for any other."""
+    for file, (_, module) in _loaded.items():
+        if getattr(module, cls.__name__, None) is cls:
+            return f"{file}:{cls.__name__}"
+    return None
+
+
+def classes_beside(cls: type[HybridSystem]) -> tuple[type, ...]:
+    """Modules that the file of a system has: what `load_system` may meet."""
+    there = vars(sys.modules[cls.__module__]).values()
+    return tuple(
+        one for one in there if inspect.isclass(one) and issubclass(one, eqx.Module)
+    )
+
+
+def split_name(named: str) -> tuple[str, str]:
+    """File and class of `FILE.py:CLASS`; no class where none is named."""
+    path, colon, name = named.rpartition(":")
+    # the colon of a drive, as in C:\rigs\cart.py, names no class
+    return (path, name) if colon and name.isidentifier() else (named, "")
+
+
+def fault(error: BaseException, file: Path | None = None) -> str:
+    """What somebody else's code raised, and in which line of the file."""
+    lines = [
+        frame.lineno
+        for frame in traceback.extract_tb(error.__traceback__)
+        if file is not None and Path(frame.filename) == file
+    ]
+    where = f"line {lines[-1]} raises " if lines and lines[-1] else ""
+    if isinstance(error, SyntaxError):
+        where = f"line {error.lineno} is no Python: "
+    words = " ".join(str(error).split())
+    words = words if len(words) <= _MOST else f"{words[:_MOST]}..."
+    said = f"{type(error).__name__}: {words}" if words else type(error).__name__
+    return printable(f"{where}{said}").rstrip(".")
+
+
+def _module(file: Path) -> ModuleType:
+    """What a file defines, run once as long as it stays the same."""
+    if file.suffix != ".py":
+        raise RigError(f"{file}: name a Python file and a class, as in cart.py:Cart.")
+    if not file.is_file():
+        raise RigError(f"{file}: there is no such file; give the path of a .py file.")
+    file = file.resolve()
+    content = file.read_bytes()
+    known = _loaded.get(file)
+    if known is not None and known[0] == content:
+        return known[1]
+    mark = hashlib.sha256(str(file).encode()).hexdigest()[:8]
+    name = f"jaxcam_system_{file.stem}_{mark}"
+    module = ModuleType(name)
+    module.__file__ = str(file)
+    sys.modules[name] = module
+    # what lies beside the file can be imported by it
+    sys.path.insert(0, str(file.parent))
+    try:
+        # compiled here, since the cache of Python's own import looks at seconds only
+        exec(compile(content, str(file), "exec"), vars(module))
+    except (Exception, SystemExit) as error:
+        del sys.modules[name]
+        raise RigError(f"{file}: {fault(error, file)}; correct it.") from error
+    finally:
+        sys.path.remove(str(file.parent))
+    _loaded[file] = content, module
+    return module
+
+
+def _systems(module: ModuleType) -> list[str]:
+    """Names of the systems that a file defines itself."""
+    return [
+        name
+        for name, one in vars(module).items()
+        if inspect.isclass(one)
+        and issubclass(one, HybridSystem)
+        and one.__module__ == module.__name__
+    ]
+
+
+def _there(found: list[str]) -> str:
+    if not found:
+        return "derive one from jaxcam.HybridSystem."
+    return f"its systems are {', '.join(found)}."
