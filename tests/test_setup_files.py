@@ -104,7 +104,7 @@ def test_numbers_arrive_where_they_belong():
     assert (law.tolerance, law.lower, law.upper) == (0.12, 0.0, 1.0)
     gyro = setup.model.sensors["gyro_rad_s"]
     assert gyro.observe == 1 and gyro.filtered and gyro.limit == 1.7453
-    assert setup.references == {"spring_center": 0.27}
+    assert setup.references == {"spring_center": 0.27, "impact_speed": 0.3}
 
 
 def test_two_readings_of_a_file_are_of_one_class(tmp_path):
