@@ -68,7 +68,9 @@ def diagnose(
     ripple = None
     if question.drives:
         report("reading the drive", None)
-        ripple = ripple_of(question.drives, question.drive_noise, policy=policy)
+        ripple = ripple_of(
+            question.drives, question.drive_noise, question.drive_channel, policy
+        )
     kept = None if keep is None else KeptTrials(keep, question.problem, policy)
     trials = Trials(
         question.problem, question.rig, question.terms, policy, report, kept

@@ -57,7 +57,7 @@ def read_drive(recording: Recording, channel: str = "cam_angle_rad") -> Drive:
     if count < 5 or count > len(raw):
         raise RecordingError(
             f"{recording.name}: {len(raw)} samples {recording.interval:.3g} s apart "
-            f"are too few to follow the cam; give a record that is longer than "
+            f"are too few to follow the drive; give a record that is longer than "
             f"{_WINDOW:g} s and sampled above {4 / _WINDOW:g} Hz."
         )
     angle = np.asarray(savgol_filter(raw, count, 2))
@@ -66,7 +66,7 @@ def read_drive(recording: Recording, channel: str = "cam_angle_rad") -> Drive:
     speed, phase = np.polyfit(recording.time, raw, 1)
     if abs(angle[-1] - angle[0]) < np.pi:
         raise RecordingError(
-            f"{recording.name}: the cam turns by {abs(angle[-1] - angle[0]):.2g} rad "
+            f"{recording.name}: the drive turns by {abs(angle[-1] - angle[0]):.2g} rad "
             f"only; give a record of at least half a turn."
         )
     noise = float(np.std(raw - angle))

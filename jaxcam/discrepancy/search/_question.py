@@ -3,7 +3,7 @@
 import dataclasses
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Float
@@ -29,6 +29,7 @@ from ...recordings import (
     Segments,
 )
 from ...recordings.against_model import size_of
+from ...recordings.cut import measured_noise
 from ...recordings.files import check_channels, check_drive, unit_of
 from ..policy import Policy
 from ..terms import base_drive, coordinates, library, SensorTerm, Term, WithTerms
@@ -62,7 +63,8 @@ class Question:
     - `terms`: those that may be named; `unlisted` only describe what is unknown.
     - `turned`: whether there is a drive with a phase.
     - `unit`: of the motion. `references`: constants of the forms of shapes.
-    - `drives`: recordings with the channel of a drive whose noise is `drive_noise`.
+    - `drives`: recordings of a drive in the channel `drive_channel`, whose noise is
+        `drive_noise`.
     - `shown`: parameters that are reported in another way.
     """
 
@@ -75,6 +77,7 @@ class Question:
     references: References
     drives: tuple[Recording, ...] = ()
     drive_noise: float = math.nan
+    drive_channel: str = "cam_angle_rad"
     shown: Mapping[str, Shown] = dataclasses.field(default_factory=dict)
 
 
@@ -161,6 +164,7 @@ def setup_question(
         report,
         policy,
         setup.references,
+        setup.drive_channel,
     )
 
 
@@ -174,10 +178,12 @@ def system_question(
     report: Report,
     policy: Policy,
     stated: Mapping[str, float] | None = None,
+    drive_channel: str | None = None,
 ) -> Question:
     """The question of any system; terms act on its first coordinate and first gap.
 
-    **Arguments:** as for `diagnose`; `stated` constants of the forms, by name.
+    **Arguments:** as for `diagnose`; `stated` constants of the forms, by name; the
+    channel of a turning drive, to look for a ripple in it.
 
     **Raises:** `ValueError` for recordings that are not cut, or without sensors.
     """
@@ -216,7 +222,17 @@ def system_question(
         turned,
         unit,
         references,
+        **_drives(recordings, drive_channel),
     )
+
+
+def _drives(recordings: Sequence[Segments], channel: str | None) -> dict[str, Any]:
+    """What is asked of a drive, with the noise that its encoder shows."""
+    if channel is None:
+        return {}
+    runs = tuple(part.recording for part in recordings)
+    noise = float(np.median([measured_noise(run[channel]) for run in runs]))
+    return {"drives": runs, "drive_noise": noise, "drive_channel": channel}
 
 
 def _channel_of(sensors: Mapping[str, Sensor], place: int) -> str:

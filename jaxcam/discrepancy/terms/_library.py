@@ -99,9 +99,9 @@ class CamProfileError(Term):
     """A cam that is out of round, by `run cos(2 phi + lead)`."""
 
     name: ClassVar[str] = "cam_profile_error"
-    sentence: ClassVar[str] = "an error of the cam's profile, twice a turn"
+    sentence: ClassVar[str] = "an error of the surface, twice a turn"
     where: ClassVar[str] = Where.CONTACT
-    region: ClassVar[str] = "at impacts and rests, by the angle of the cam"
+    region: ClassVar[str] = "at impacts and rests, by the angle of the drive"
     source: ClassVar[str] = "Norton, Cam Design and Manufacturing Handbook, chapter 12"
     run: float = strength("[q]", 1e-4)
     lead: float = _reference(References.profile_lead)
@@ -114,8 +114,8 @@ class SensorLag(SensorTerm):
     """A channel of the motion that is late."""
 
     name: ClassVar[str] = "sensor_lag"
-    sentence: ClassVar[str] = "a lag of the follower's sensor"
-    region: ClassVar[str] = "in the measured angle, in proportion to the velocity"
+    sentence: ClassVar[str] = "a lag of the sensor"
+    region: ClassVar[str] = "in the measured motion, in proportion to the velocity"
     source: ClassVar[str] = "Ljung, System Identification, 1999, section 4.2"
     fields: ClassVar[tuple[str, ...]] = ("lag",)
     lag: float = strength("s", 1e-4, lower=0.0)
@@ -160,9 +160,9 @@ class DriveRipple(Term):
     """
 
     name: ClassVar[str] = "drive_ripple"
-    sentence: ClassVar[str] = "a ripple of the cam's speed, once a turn"
+    sentence: ClassVar[str] = "a ripple of the drive's speed, once a turn"
     where: ClassVar[str] = Where.DRIVE
-    region: ClassVar[str] = "in the cam's own angle, by that angle"
+    region: ClassVar[str] = "in the drive's own angle, by that angle"
     source: ClassVar[str] = "Norton, Cam Design and Manufacturing Handbook, chapter 10"
 
 
@@ -234,8 +234,8 @@ class SensorGain(SensorTerm):
     """A sensor that shows too much or too little, in proportion."""
 
     name: ClassVar[str] = "sensor_gain"
-    sentence: ClassVar[str] = "a wrong gain of the follower's sensor"
-    region: ClassVar[str] = "in the measured angle, in proportion to it"
+    sentence: ClassVar[str] = "a wrong gain of the sensor"
+    region: ClassVar[str] = "in the measured motion, in proportion to it"
     source: ClassVar[str] = "Doebelin, Measurement Systems, chapter 3"
     listed: ClassVar[bool] = False
     fields: ClassVar[tuple[str, ...]] = ("gain",)
@@ -246,8 +246,8 @@ class SensorOffset(SensorTerm):
     """A sensor whose zero is off."""
 
     name: ClassVar[str] = "sensor_offset"
-    sentence: ClassVar[str] = "a wrong zero of the follower's sensor"
-    region: ClassVar[str] = "in the measured angle, everywhere"
+    sentence: ClassVar[str] = "a wrong zero of the sensor"
+    region: ClassVar[str] = "in the measured motion, everywhere"
     source: ClassVar[str] = "Doebelin, Measurement Systems, chapter 3"
     listed: ClassVar[bool] = False
     fields: ClassVar[tuple[str, ...]] = ("offset",)
