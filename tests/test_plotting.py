@@ -12,14 +12,8 @@ import matplotlib.pyplot as plt
 from matplotlib.colors import to_rgba
 
 from jaxcam import plotting, simulate
-from jaxcam.hybrid import (
-    Contacts,
-    HybridSystem,
-    Impacts,
-    Settings,
-    Steps,
-    Trajectory,
-)
+from jaxcam.hybrid import HybridSystem, Settings, Trajectory
+from jaxcam.hybrid.record import Contacts, Impacts, Steps
 from jaxcam.models import BouncingBall
 from jaxcam.plotting._curve import curve
 from jaxcam.plotting._prefix import scaled

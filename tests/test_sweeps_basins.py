@@ -5,7 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxcam.hybrid import Stroboscope, stroboscope
+from jaxcam.hybrid import stroboscope
 from jaxcam.models import ImpactOscillator, preset, rpm_to_rad_s
 from jaxcam.sweeps import (
     basins,
@@ -190,7 +190,6 @@ def test_skipped_turns_change_nothing():
     states = GRID.states()[:16]
     whole = stroboscope(OSCILLATOR, states, 12, block=16, rows=128)
     part = stroboscope(OSCILLATOR, states, 12, skip=7, block=16, rows=128)
-    assert isinstance(part, Stroboscope)
     for name in ("states", "hits", "rests"):
         one, other = getattr(whole, name)[:, 7:], getattr(part, name)
         assert np.array_equal(one, other)

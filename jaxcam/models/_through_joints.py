@@ -7,8 +7,9 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from ..hybrid import Contacts, Impacts, simulate, Steps, Trajectory
+from ..hybrid import simulate, Trajectory
 from ..hybrid.checks import refuse_tracers
+from ..hybrid.record import Contacts, Impacts, Steps
 from ._cam_follower import CamFollower
 from ._desmodromic import DesmodromicCam
 from ._motion_program import MotionPieces, MotionProgram

@@ -8,8 +8,8 @@ import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Bool, Float, Int
 
 from jaxcam import HybridSystem
-from jaxcam.hybrid import normal_velocity
 from jaxcam.hybrid.lowering import while_loop
+from jaxcam.hybrid.surface import normal_velocity
 from jaxcam.parameters import as_arrays
 
 from ._chatter_frame import ChatterFrame, prepared_frame

@@ -9,7 +9,8 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from jaxcam.hybrid import HybridSystem, normal_velocity
+from jaxcam.hybrid import HybridSystem
+from jaxcam.hybrid.surface import normal_velocity
 
 from ._implicit import implicit_root
 from ._links import monodromy_of

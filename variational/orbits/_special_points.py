@@ -106,7 +106,7 @@ def graze_of_orbit(
 
     **Returns:** the orbit begins with the graze. NaN where Newton's method does not
     converge. That the gap has a minimum there, not a maximum, and is open elsewhere is
-    not looked at; see [`jaxcam.hybrid.normal_acceleration`][].
+    not looked at; see [`jaxcam.hybrid.surface.normal_acceleration`][].
     """
 
     def speed(shooting, u, system):

@@ -6,7 +6,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.figure import Figure
 
-from ...hybrid import contact_state, normal_acceleration
+from ...hybrid.surface import contact_state, normal_acceleration
 from ...models import CamFollower
 from ...plotting import curve
 from ...plotting.colours import FLIGHT, IMPACT, RECORDED, SECTION

@@ -9,7 +9,8 @@ from matplotlib.figure import Figure
 
 from variational import impact_map
 
-from ...hybrid import contact_state, simulate, Trajectory
+from ...hybrid import simulate, Trajectory
+from ...hybrid.surface import contact_state
 from ...models import CamFollower
 from ...plotting import curve
 from ...plotting.colours import FLIGHT, IMPACT, RECORDED

@@ -8,7 +8,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.figure import Figure
 
-from ...hybrid import contact_state
+from ...hybrid.surface import contact_state
 from ...models import CamFollower
 from ...plotting import curve
 from ...plotting.colours import FLIGHT, IMPACT
