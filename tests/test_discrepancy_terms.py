@@ -23,14 +23,8 @@ from jaxcam.discrepancy.terms._library import (
 )
 from jaxcam.fitting import Sensor
 from jaxcam.fitting.engine import Point
-from jaxcam.models import (
-    CamFollower,
-    ConstantRestitution,
-    load_system,
-    save_system,
-    system_from_json,
-    system_to_json,
-)
+from jaxcam.models import CamFollower, ConstantRestitution, load_system, save_system
+from jaxcam.models.saved import system_from_json, system_to_json
 from jaxcam.recordings import Recording, References, segment
 
 

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from .. import fitting
-from ..models import system_to_json
+from ..models.saved import system_to_json
 from ..recordings import Rig, segment_case, Segments
 from ._fit_report import correlation_table, parameter_table
 from ._output import Output
