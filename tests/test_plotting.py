@@ -17,8 +17,8 @@ from jaxcam.hybrid.record import Contacts, Impacts, Steps
 from jaxcam.models import BouncingBall
 from jaxcam.plotting._curve import curve
 from jaxcam.plotting._prefix import scaled
-from jaxcam.recordings import Recording, Residuals
-from jaxcam.recordings.against_model import Comparison
+from jaxcam.recordings import Recording
+from jaxcam.recordings.against_model import Comparison, Residuals
 
 
 pytestmark = pytest.mark.filterwarnings("error")
