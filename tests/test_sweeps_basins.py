@@ -14,10 +14,10 @@ from jaxcam.sweeps import (
     Grid,
     largest_exponents,
     load,
-    match,
     Stroboscopic,
 )
 from jaxcam.sweeps._basins_job import default_scale
+from jaxcam.sweeps.attractors import match_orbits
 from jaxcam.sweeps.attractors._attractors import find_attractors
 from jaxcam.sweeps.attractors._fingerprint import cell_codes, fingerprints
 from jaxcam.sweeps.attractors._label import label_names
@@ -132,7 +132,8 @@ def test_an_attractor_keeps_its_number_where_others_are_absent(coexisting):
     assert alone.names == ["P(6,6)"] and np.all(alone.attractor == 0)
     known = basins(SECTION, tiny, **OPTIONS, known=coexisting)
     assert known.names == coexisting.names and np.all(known.attractor == 1)
-    assert match(coexisting, alone) == {0: 1}
+    pairs = match_orbits(coexisting.orbits, alone.orbits, coexisting.scale, 0.2)
+    assert pairs == {0: 1}
 
 
 def test_attractors_are_matched_along_a_parameter(tmp_path):
