@@ -9,9 +9,9 @@ import pytest
 
 from jaxcam.cli._choices import make_system, saved_name
 from jaxcam.cli._parameters import parameters, set_parameters
-from jaxcam.discrepancy import diagnose, library, Policy, strength, Term, Where
+from jaxcam.discrepancy import diagnose, library, Policy, strength, Term
 from jaxcam.discrepancy.search import _search, _trials, added_gain, given_up
-from jaxcam.discrepancy.terms import saved_classes, Value, WithTerms
+from jaxcam.discrepancy.terms import saved_classes, Value, Where, WithTerms
 from jaxcam.discrepancy.terms._library import (
     CamProfileError,
     CoulombFriction,

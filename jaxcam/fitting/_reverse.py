@@ -82,7 +82,7 @@ def train(
     - `where`: picks a field, or a tuple of fields, out of the model: `lambda m:
         m.system.network`.
     - `steps`: of L-BFGS, at most.
-    - `progress`: called with the number of each step and the cost after it.
+    - `progress`: called after each evaluation with its number and its cost.
     """
     values = where(problem.model)
     arrays, rest = eqx.partition(values, eqx.is_inexact_array)

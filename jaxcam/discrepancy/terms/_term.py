@@ -84,8 +84,8 @@ class Term(eqx.Module):
     `acts` follows from these methods.
 
     Class variables: `name`, `sentence` (what it is, in words that go on after "the
-    model lacks"), `where` (a [`jaxcam.discrepancy.Where`][] or its name; by default
-    the first of `acts`), `region` (of the motion, in words), `source` (literature),
+    model lacks"), `where` (a [`Where`][jaxcam.discrepancy.terms.Where] or its name; by
+    default the first of `acts`), `region` (of the motion, in words), `source` (literature),
     `listed` (false for one that describes a shape but is not a verdict by itself).
 
     **Raises:** `TypeError` for a subclass whose own `acts` is not what it overrides.
