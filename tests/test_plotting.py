@@ -15,8 +15,8 @@ from jaxcam import plotting, simulate
 from jaxcam.hybrid import HybridSystem, Settings, Trajectory
 from jaxcam.hybrid.record import Contacts, Impacts, Steps
 from jaxcam.models import BouncingBall
-from jaxcam.plotting._curve import curve
 from jaxcam.plotting._prefix import scaled
+from jaxcam.plotting.curves import curve
 from jaxcam.recordings import Recording
 from jaxcam.recordings.against_model import Comparison, Residuals
 

@@ -18,8 +18,9 @@ from ._page import figure_html, sentences, STYLE, table_html
 
 matplotlib.use("Agg")
 
-from ..plotting import labelled, save_figure, style
+from ..plotting import save_figure, style
 from ..plotting.colours import CONTACT, FLIGHT, IMPACT, RECORDED
+from ..plotting.labels import labelled
 
 
 _BINS = 36

@@ -85,8 +85,9 @@ class Term(eqx.Module):
 
     Class variables: `name`, `sentence` (what it is, in words that go on after "the
     model lacks"), `where` (a [`Where`][jaxcam.discrepancy.terms.Where] or its name; by
-    default the first of `acts`), `region` (of the motion, in words), `source` (literature),
-    `listed` (false for one that describes a shape but is not a verdict by itself).
+    default the first of `acts`), `region` (of the motion, in words), `source`
+    (literature), `listed` (false for one that describes a shape but is not a verdict by
+    itself).
 
     **Raises:** `TypeError` for a subclass whose own `acts` is not what it overrides.
     """

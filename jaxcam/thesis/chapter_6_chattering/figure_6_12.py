@@ -8,8 +8,8 @@ from matplotlib.figure import Figure
 
 from ...hybrid.surface import contact_state, normal_acceleration
 from ...models import CamFollower
-from ...plotting import curve
 from ...plotting.colours import FLIGHT, IMPACT, RECORDED, SECTION
+from ...plotting.curves import curve
 from ..orbits import NEAR_CAM
 from ..remember import remembered
 from ..target import Rows, Target
