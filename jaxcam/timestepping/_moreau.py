@@ -13,7 +13,7 @@ from ..hybrid.checks import check_system
 from ..hybrid.surface import gaps, impacts, normal_directions, normal_velocity
 from ..parameters import as_arrays, real_array, VectorLike
 from ._chunks import CHUNK, in_chunks
-from ._lemke import explain, lemke
+from .complementarity import explain, lemke
 
 
 class SteppedMotion(NamedTuple):
