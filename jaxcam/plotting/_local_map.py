@@ -4,8 +4,7 @@ import jax.numpy as jnp
 import numpy as np
 from matplotlib.axes import Axes
 
-from variational import Lobes
-from variational.chatter import LocalMap
+from variational.chatter import Lobes, LocalMap
 
 from ._axes import legend_above, one_axes
 from ._style import FLIGHT, IMPACT, RECORDED, SECTION, styled

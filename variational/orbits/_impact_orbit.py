@@ -63,7 +63,7 @@ def impact_orbit(system: HybridSystem, guess: ImpactOrbit) -> ImpactOrbit:
 
     **Returns:** a [`variational.orbits.ImpactOrbit`][], NaN where there is none near
     the guess. That its flights stay clear of the constraints is not looked at; see
-    [`variational.clearance`][].
+    [`variational.orbits.clearance`][].
     """
 
     def residual(unknowns):

@@ -5,7 +5,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.figure import Figure
 
-from variational import hop_ratio
+from variational.chatter import hop_ratio
 
 from ...models import CamFollower
 from ...plotting.colours import FLIGHT, IMPACT, SECTION
