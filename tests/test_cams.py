@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from jaxcam import simulate
-from jaxcam.hybrid import release_point
+from jaxcam.hybrid.surface import release_point
 from jaxcam.models import (
     CamFollower,
     ConstantRestitution,

@@ -11,8 +11,8 @@ from textbook_systems import BallBetweenWalls, TwoMasses
 import jaxcam
 import variational
 from jaxcam.filippov import filippov_flow
-from jaxcam.hybrid import flow, release_point
-from jaxcam.hybrid.surface import chatter_completion, contact_state
+from jaxcam.hybrid import flow
+from jaxcam.hybrid.surface import chatter_completion, contact_state, release_point
 from jaxcam.models import (
     BeltOscillator,
     BouncingBall,

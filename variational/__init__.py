@@ -41,7 +41,6 @@ from .orbits import (
     monodromy as monodromy,
     Orbit as Orbit,
     orbit_determinant as orbit_determinant,
-    orbit_monodromy as orbit_monodromy,
     orbit_of as orbit_of,
     orbit_trace as orbit_trace,
     orbit_where as orbit_where,

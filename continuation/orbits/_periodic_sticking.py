@@ -27,7 +27,7 @@ from variational.chatter import (
 )
 from variational.orbits import flight_end
 
-from .._problem import AbstractProblem, Monitor, Stability, Start
+from ..problem import AbstractProblem, Monitor, Stability, Start
 from ._behind_interruption import orbit_behind
 from ._shooting import ImpactingOrbits
 

@@ -32,5 +32,4 @@ from .published import (
     fit_published as fit_published,
     interruption_of_chattering as interruption_of_chattering,
     Published as Published,
-    PublishedFit as PublishedFit,
 )

@@ -7,4 +7,3 @@ from ._stroboscope import stroboscope as stroboscope
 from ._system import HybridSystem as HybridSystem
 from .codes import RESULTS as RESULTS
 from .record import Trajectory as Trajectory
-from .surface import release_point as release_point

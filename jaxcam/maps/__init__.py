@@ -13,7 +13,6 @@ from ._manifold import (
     Saddle as Saddle,
     saddle_at as saddle_at,
 )
-from ._normal_forms import NORMAL_FORMS as NORMAL_FORMS
 from ._piecewise import (
     PiecewiseMap as PiecewiseMap,
     SkewMap as SkewMap,
