@@ -9,14 +9,14 @@ from jaxtyping import ArrayLike, Float, PyTree
 
 from jaxcam.parameters import VectorLike, Where
 
-from ._algorithms import AbstractAlgorithm, PseudoArclength
 from ._batch_run import Axes, REASONS, run_lanes
 from ._follow import checked_bounds
 from ._parameter import as_arrays, leaf_of, pick, with_leaf
 from ._point import Branch, Point, set_parameters, with_field
-from ._problem import AbstractProblem
 from ._program import Corrected
 from ._settings import as_traced, Settings
+from .algorithms import AbstractAlgorithm, PseudoArclength
+from .problem import AbstractProblem
 from .special import Context, eigenvalues_at, is_stable, locate, test_values, varied
 
 
@@ -148,7 +148,7 @@ def follow_batch(
     - `direction`: 1 or -1, or (lanes,) of them.
     - `points`: at most this many on each branch.
 
-    **Returns:** a [`continuation.Batch`][]; a lane that fails says so in its reason.
+    **Returns:** a `Batch`; a lane that fails says so in its reason.
     """
     settings = Settings() if settings is None else settings
     algorithm = PseudoArclength() if algorithm is None else algorithm

@@ -9,9 +9,9 @@ import numpy as np
 from jaxtyping import PyTree
 
 from ._point import set_parameters, with_field
-from ._predictors import Station
 from ._program import correct_, Corrected
-from ._step_control import way_between
+from .predictors import Station
+from .step_control import way_between
 
 
 _RUNNING, _BOUND, _SHORT, _FULL, _NO_START = range(5)

@@ -4,8 +4,8 @@ import jax.numpy as jnp
 import numpy as np
 
 from ._point import with_field, with_parameter
-from ._problem import AbstractProblem, Start
 from ._program import correct, Corrected, evaluate
+from .problem import AbstractProblem, Start
 from .special import Context
 
 

@@ -8,14 +8,14 @@ from typing import Any
 
 from jaxcam.parameters import Where
 
-from ._algorithms import AbstractAlgorithm, PseudoArclength
 from ._follow import checked_bounds, follow
 from ._parameter import pick
 from ._point import Branch, Point, relabelled, replace
-from ._problem import AbstractProblem, Start
 from ._record import header_of, read, Recorder
 from ._settings import Settings
 from ._stated import stated
+from .algorithms import AbstractAlgorithm, PseudoArclength
+from .problem import AbstractProblem, Start
 
 
 def branch(

@@ -7,13 +7,13 @@ import numpy as np
 
 from jaxcam.parameters import Where
 
-from ._algorithms import AbstractAlgorithm
 from ._follow import checked_bounds, follow
 from ._parameter import pick
 from ._point import Branch, Point, with_field
-from ._problem import AbstractProblem, Start
 from ._settings import Settings
 from ._switch import emanating
+from .algorithms import AbstractAlgorithm
+from .problem import AbstractProblem, Start
 from .special import FLIP
 
 
@@ -66,7 +66,7 @@ def cascade(
     **Arguments:** as of [`continuation.follow`][], and `flips`: how many to locate.
     Steps shrink with the lengths of the branches.
 
-    **Returns:** a [`continuation.Cascade`][]; it has fewer flips where a branch ends
+    **Returns:** a `Cascade`; it has fewer flips where a branch ends
     without one, and then its `reason` says why.
     """
     if flips < 1:

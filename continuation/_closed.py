@@ -5,9 +5,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ._point import Point, with_parameter
-from ._problem import AbstractProblem
 from ._program import correct, evaluate
 from ._solution import Solution, solution_at
+from .problem import AbstractProblem
 from .special import between, Context
 
 

@@ -8,14 +8,14 @@ import numpy as np
 
 from jaxcam.parameters import Where
 
-from ._algorithms import AbstractAlgorithm
 from ._branch import branch
 from ._follow import checked_bounds
 from ._parameter import as_arrays, leaf_of, pick
 from ._point import Branch, Point, set_parameters
-from ._problem import Start
 from ._program import evaluate
 from ._settings import Settings
+from .algorithms import AbstractAlgorithm
+from .problem import Start
 from .special import (
     Context,
     FLIP,

@@ -12,9 +12,9 @@ from jaxcam.parameters import VectorLike
 
 from ._parameter import as_arrays
 from ._point import set_parameters
-from ._problem import AbstractProblem
 from ._program import newton, solve
 from ._settings import Settings
+from .problem import AbstractProblem
 
 
 @eqx.filter_jit

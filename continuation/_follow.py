@@ -7,13 +7,13 @@ import numpy as np
 
 from jaxcam.parameters import real_array, Where
 
-from ._algorithms import AbstractAlgorithm, PseudoArclength
 from ._parameter import as_arrays, pick
 from ._point import Point, set_parameters
-from ._problem import AbstractProblem, Start
 from ._run import Run
 from ._settings import Settings
 from ._stated import stated
+from .algorithms import AbstractAlgorithm, PseudoArclength
+from .problem import AbstractProblem, Start
 from .special import Context
 
 

@@ -11,7 +11,7 @@ from jaxtyping import Array, Float, PyTree
 from jaxcam.hybrid.runge_kutta import DOPRI8, fixed_steps
 
 from ._point import with_field
-from ._problem import AbstractProblem, Stability, Start
+from .problem import AbstractProblem, Stability, Start
 from .special import FLIP, flip_direction
 
 

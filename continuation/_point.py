@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ._parameter import leaf_of, with_leaf
-from ._problem import AbstractProblem
+from .problem import AbstractProblem
 
 
 #: kinds of points that are not special

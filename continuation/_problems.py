@@ -10,8 +10,8 @@ import numpy as np
 from jaxtyping import Array, Float, Int, PyTree
 
 from ._limit_cycle import cycle_at_hopf
-from ._problem import AbstractProblem, Stability, Start
-from ._representation import AbstractRepresentation
+from .problem import AbstractProblem, Stability, Start
+from .representation import AbstractRepresentation
 from .special import FLIP, flip_direction, HOPF
 
 

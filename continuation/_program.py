@@ -11,7 +11,7 @@ import optimistix as optx
 from jaxtyping import Float
 
 from ._parameter import with_leaf
-from ._problem import AbstractProblem
+from .problem import AbstractProblem
 
 
 class Corrected(eqx.Module):

@@ -19,7 +19,7 @@ import numpy as np
 
 from ._parameter import as_arrays
 from ._point import Branch, Point, set_parameters, with_parameter
-from ._problem import AbstractProblem
+from .problem import AbstractProblem
 
 
 FORMAT = "continuation branch"

@@ -10,13 +10,13 @@ from ._closed import closed, Past
 from ._parameter import as_arrays, leaf_of
 from ._passed import located_between, sign_changes, special_here
 from ._point import Point, set_parameters, with_field, with_parameter
-from ._predictors import Station
-from ._problem import AbstractProblem
 from ._program import Corrected, evaluate
 from ._solution import point_of, Solution, solution_at
 from ._step import attempt
-from ._step_control import Refusal
+from .predictors import Station
+from .problem import AbstractProblem
 from .special import ahead, BRANCH_POINT, Context, Located
+from .step_control import Refusal
 
 
 # failures in one place before an end is looked for just ahead

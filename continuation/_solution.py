@@ -5,8 +5,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ._point import Point, with_parameter
-from ._problem import AbstractProblem
 from ._program import Corrected
+from .problem import AbstractProblem
 from .special import Context, eigenvalues_at, is_stable, test_values, varied
 
 

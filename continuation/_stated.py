@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from ._problem import AbstractProblem
+from .problem import AbstractProblem
 
 
 def stated(problem: Any, start: Any) -> tuple[AbstractProblem, Any]:

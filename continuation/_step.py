@@ -5,13 +5,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ._algorithms import AbstractAlgorithm
 from ._point import with_field
-from ._predictors import Station
-from ._problem import AbstractProblem
 from ._program import correct, Corrected
-from ._step_control import Refusal, way_between
+from .algorithms import AbstractAlgorithm
+from .predictors import Station
+from .problem import AbstractProblem
 from .special import Context, varied
+from .step_control import Refusal, way_between
 
 
 class Attempt(NamedTuple):

@@ -7,13 +7,13 @@ import numpy as np
 
 from jaxcam.parameters import Where
 
-from ._algorithms import AbstractAlgorithm
 from ._branch import branch
 from ._parameter import pick, with_leaf
 from ._point import Branch, Point
-from ._problem import AbstractProblem, Start
 from ._program import evaluate
 from ._settings import Settings
+from .algorithms import AbstractAlgorithm
+from .problem import AbstractProblem, Start
 from .special import BRANCH_POINT, FLIP, HOPF, second
 
 

@@ -52,7 +52,7 @@ def rig() -> str:
 @functools.cache
 def system(name: str) -> str:
     made = {"ball": models.BouncingBall, "rig": models.CamFollower}[name]()
-    return json.dumps(models.system_to_json(made), indent=1)
+    return json.dumps(models.saved.system_to_json(made), indent=1)
 
 
 # --- pieces

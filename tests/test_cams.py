@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from jaxcam import simulate
-from jaxcam.hybrid import release_point
+from jaxcam.hybrid.surface import release_point
 from jaxcam.models import (
     CamFollower,
     ConstantRestitution,
@@ -20,7 +20,6 @@ from jaxcam.models import (
     flat_translating_contour,
     float_speed,
     FourierProfile,
-    MOTION_LAWS,
     MotionProgram,
     preset,
     rad_s_to_rpm,
@@ -30,6 +29,7 @@ from jaxcam.models import (
     simulate_through_joints,
     ValveTrain,
 )
+from jaxcam.models.cams import MOTION_LAWS
 from jaxcam.plotting import cam_contour, motion_program
 
 

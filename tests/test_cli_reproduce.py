@@ -9,7 +9,8 @@ from typer.testing import CliRunner
 
 from jaxcam.cli import app
 from jaxcam.cli._source_mark import mark_of, source_mark
-from jaxcam.thesis import Target, TARGETS
+from jaxcam.thesis import TARGETS
+from jaxcam.thesis.target import Target
 
 
 @pytest.fixture(autouse=True)

@@ -7,17 +7,9 @@ import numpy as np
 import pytest
 
 import continuation
-from continuation import (
-    AbstractStepControl,
-    EffortAndAngle,
-    Natural,
-    PseudoArclength,
-    Refusal,
-    Secant,
-    Settings,
-    Tangent,
-    Way,
-)
+from continuation import Natural, PseudoArclength, Settings
+from continuation.predictors import Secant, Tangent
+from continuation.step_control import AbstractStepControl, EffortAndAngle, Refusal, Way
 
 
 def mu(parameters):

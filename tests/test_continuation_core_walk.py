@@ -8,15 +8,13 @@ from continuation_examples import a, circle, CUSP, cusp_start, LOGISTIC, logisti
 import continuation
 from continuation import (
     Equations,
-    Extrapolation,
     MoorePenrose,
     Natural,
     Polynomial,
     PseudoArclength,
-    Secant,
     Settings,
-    Tangent,
 )
+from continuation.predictors import Extrapolation, Secant, Tangent
 
 
 # parameter values of the folds of x^3 - x + a

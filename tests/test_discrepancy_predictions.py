@@ -5,7 +5,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxcam.discrepancy import event_causes, event_speeds, library
+from jaxcam.discrepancy import event_causes, library
+from jaxcam.discrepancy._event_speeds import event_speeds
 from jaxcam.discrepancy.terms import WithTerms
 from jaxcam.models import preset, rad_s_to_rpm
 

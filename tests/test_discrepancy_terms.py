@@ -9,9 +9,9 @@ import pytest
 
 from jaxcam.cli._parameters import parameters, set_parameters
 from jaxcam.cli._source import make_system, Source
-from jaxcam.discrepancy import diagnose, library, Policy, strength, Term, Where
+from jaxcam.discrepancy import diagnose, library, Policy, strength, Term
 from jaxcam.discrepancy.search import _search, _trials, added_gain, given_up
-from jaxcam.discrepancy.terms import saved_classes, Value, WithTerms
+from jaxcam.discrepancy.terms import saved_classes, Value, Where, WithTerms
 from jaxcam.discrepancy.terms._library import (
     CamProfileError,
     CoulombFriction,
@@ -23,14 +23,8 @@ from jaxcam.discrepancy.terms._library import (
 )
 from jaxcam.fitting import Sensor
 from jaxcam.fitting.engine import Point
-from jaxcam.models import (
-    CamFollower,
-    ConstantRestitution,
-    load_system,
-    save_system,
-    system_from_json,
-    system_to_json,
-)
+from jaxcam.models import CamFollower, ConstantRestitution, load_system, save_system
+from jaxcam.models.saved import system_from_json, system_to_json
 from jaxcam.recordings import Recording, References, segment
 
 

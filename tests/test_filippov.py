@@ -13,10 +13,9 @@ from jaxcam.filippov import (
     equivalent_control,
     filippov_flow,
     FilippovSystem,
-    region,
     simulate_filippov,
-    sliding_field,
 )
+from jaxcam.filippov.modes import region, sliding_field
 from jaxcam.models import (
     BeltOscillator,
     PiecewiseLinear,

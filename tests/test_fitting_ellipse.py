@@ -10,6 +10,7 @@ from fitting_rigs import DraggedBall
 from numpy.testing import assert_allclose
 
 from jaxcam import fitting
+from jaxcam.fitting._ellipse import Ellipse
 from jaxcam.recordings import record, segment
 
 
@@ -42,14 +43,14 @@ def found():
     return fitted(0)
 
 
-def region(level, number=3) -> fitting.Ellipse:
+def region(level, number=3) -> Ellipse:
     """Of parameters of very different size, two of them closely correlated."""
     size = np.diag([1e-3, 50.0, 2.0])
     correlation = np.array([[1, 0.99, 0.3], [0.99, 1, 0.3], [0.3, 0.3, 1]])
     covariance = size @ correlation @ size
     names = ("a", "b", "c")[:number]
     centre = np.array([1.0, 1e4, -3.0])[:number]
-    return fitting.Ellipse(names, centre, covariance[:number, :number], level)
+    return Ellipse(names, centre, covariance[:number, :number], level)
 
 
 @pytest.mark.parametrize("number", [2, 3])

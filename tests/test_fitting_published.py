@@ -23,7 +23,6 @@ from jaxcam.fitting import fit_published, Published
 from jaxcam.fitting.published import fit_free_fall, rounding_error
 from jaxcam.models import BouncingBall, CamFollower, TripleIntegrator
 from variational import (
-    clearance,
     detachment,
     flip_of_orbit,
     fold_of_orbit,
@@ -32,7 +31,7 @@ from variational import (
     orbit_trace,
     release_near,
 )
-from variational.orbits import ImpactOrbit, implicit_root, one_impact_orbits
+from variational.orbits import clearance, ImpactOrbit, implicit_root, one_impact_orbits
 
 
 G, R, W = 9.81, 0.5, 20.0

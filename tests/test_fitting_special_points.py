@@ -29,8 +29,8 @@ from jaxcam.models import (
     rad_s_to_rpm,
     rpm_to_rad_s,
 )
-from variational import clearance, graze_of_orbit
-from variational.orbits import ImpactOrbit
+from variational import graze_of_orbit
+from variational.orbits import clearance, ImpactOrbit
 
 
 def omega(system):

@@ -15,8 +15,8 @@ from jaxcam.discrepancy.policy import Policy
 from jaxcam.discrepancy.search import within_tolerances
 from jaxcam.fitting.engine._pieces import FREE, IMPACT, spans
 from jaxcam.hybrid import HybridSystem
-from jaxcam.recordings import Flight, Recording, segment
-from jaxcam.recordings.cut import Boundary
+from jaxcam.recordings import Recording, segment
+from jaxcam.recordings.cut import Boundary, Flight
 from jaxcam.recordings.cut._segments import no_impacts, Segments
 
 

@@ -17,12 +17,12 @@ from jaxcam.maps import (
     LogisticMap,
     map_attractor,
     map_diagram,
-    NORMAL_FORMS,
     saddle_at,
     SkewMap,
     SquareRootMap,
     superstable,
 )
+from jaxcam.maps.normal_forms import NORMAL_FORMS
 from jaxcam.models import ForcedOscillator, ImpactOscillator
 from variational import poincare_derivative
 

@@ -8,8 +8,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from jaxcam import simulate
-from jaxcam.hybrid import contact_state
-from jaxcam.hybrid.surface import contact_acceleration
+from jaxcam.hybrid.surface import contact_acceleration, contact_state
 from jaxcam.models import CamFollower, rpm_to_rad_s
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from jaxcam import HybridSystem, Settings, simulate
-from jaxcam.hybrid import normal_velocity
+from jaxcam.hybrid.surface import normal_velocity
 from jaxcam.models import BouncingBall, ImpactOscillator
 
 

@@ -6,7 +6,8 @@ import jax.numpy as jnp
 import numpy as np
 
 import jaxcam
-from jaxcam.hybrid import flow, release_point
+from jaxcam.hybrid import flow
+from jaxcam.hybrid.surface import release_point
 from jaxcam.models import CamFollower
 
 

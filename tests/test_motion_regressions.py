@@ -8,8 +8,9 @@ import pytest
 from jax import monitoring
 
 import jaxcam
-from jaxcam.hybrid import contact_state, HybridSystem, stroboscope
+from jaxcam.hybrid import HybridSystem, stroboscope
 from jaxcam.hybrid.lowering._scalarise import scalarise, split
+from jaxcam.hybrid.surface import contact_state
 from jaxcam.models import (
     BouncingBall,
     CamFollower,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from jaxcam import HybridSystem, simulate
-from jaxcam.hybrid import contact_state, release_point
+from jaxcam.hybrid.surface import contact_state, release_point
 from jaxcam.hybrid.surface._release_point import contact_acceleration
 from jaxcam.models import BouncingBall, CamFollower
 

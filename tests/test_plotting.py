@@ -12,19 +12,13 @@ import matplotlib.pyplot as plt
 from matplotlib.colors import to_rgba
 
 from jaxcam import plotting, simulate
-from jaxcam.hybrid import (
-    Contacts,
-    HybridSystem,
-    Impacts,
-    Settings,
-    Steps,
-    Trajectory,
-)
+from jaxcam.hybrid import HybridSystem, Settings, Trajectory
+from jaxcam.hybrid.record import Contacts, Impacts, Steps
 from jaxcam.models import BouncingBall
-from jaxcam.plotting._curve import curve
 from jaxcam.plotting._prefix import scaled
-from jaxcam.recordings import Recording, Residuals
-from jaxcam.recordings.against_model import Comparison
+from jaxcam.plotting.curves import curve
+from jaxcam.recordings import Recording
+from jaxcam.recordings.against_model import Comparison, Residuals
 
 
 pytestmark = pytest.mark.filterwarnings("error")

@@ -6,7 +6,8 @@ import pytest
 import jaxcam
 from jaxcam.models import ImpactOscillator
 from jaxcam.parameters import pick
-from jaxcam.sweeps import label, periods, PoincareSection, return_times, Stroboscopic
+from jaxcam.sweeps import PoincareSection, return_times, Stroboscopic
+from jaxcam.sweeps.attractors import label, periods
 from jaxcam.sweeps.attractors._label import label_names
 from jaxcam.sweeps.attractors._unique_rows import unique_rows
 

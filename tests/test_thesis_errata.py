@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from jaxcam.hybrid import normal_acceleration
+from jaxcam.hybrid.surface import normal_acceleration
 from jaxcam.models import CamFollower, EccentricCircle
 
 

@@ -8,7 +8,8 @@ from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 from scipy.optimize import fsolve
 
-from jaxcam.hybrid import flow, release_point
+from jaxcam.hybrid import flow
+from jaxcam.hybrid.surface import release_point
 from jaxcam.models import preset, rad_s_to_rpm, rpm_to_rad_s
 from jaxcam.thesis import reproduce
 from jaxcam.thesis.make_calibrated import fit_rig, free, Observed, restitution_law

@@ -15,15 +15,9 @@ from jaxcam.models import (
     ImpactOscillator,
     preset,
 )
-from jaxcam.timestepping import (
-    is_p_matrix,
-    lemke,
-    moreau,
-    relay_problem,
-    relay_steps,
-    RelaySystem,
-    solve_lcp,
-)
+from jaxcam.timestepping import moreau, relay_steps, RelaySystem
+from jaxcam.timestepping.complementarity import lemke, solve_lcp
+from jaxcam.timestepping.relay import is_p_matrix, relay_problem
 
 
 _lemke = eqx.filter_jit(lemke)

@@ -10,10 +10,10 @@ from variational import (
     find_lobes,
     fit_local_map,
     iterate_local_map,
-    Lobes,
     scaling_law,
     section_turn,
 )
+from variational.chatter import Lobes
 
 
 Q, M, X, HEIGHT, WIDTH = -0.62, -0.535, 0.34, 2.2e-4, 1.0e-3

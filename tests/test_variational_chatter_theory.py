@@ -11,13 +11,12 @@ from jaxcam.models import TripleIntegrator
 from variational import (
     beta_map,
     chatter_interruption,
-    hop_ratio,
     koenigs,
     lambda_inverse,
     lambda_map,
     scaling_law,
 )
-from variational.chatter import beta_parts, next_impact
+from variational.chatter import beta_parts, hop_ratio, next_impact
 
 
 RESTITUTIONS = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95]

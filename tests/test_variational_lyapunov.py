@@ -7,7 +7,7 @@ from textbook_systems import parameters
 
 import variational
 from jaxcam.models import ImpactOscillator
-from variational._lyapunov import _in_turn
+from variational._lyapunov import _in_turn, LyapunovSpectrum
 
 
 # omega, wall: one impact a turn, and chaos
@@ -87,9 +87,7 @@ def test_blocks_of_lanes_are_put_together_in_order(lanes, each):
         sizes.add(len(states))
         first, turn = states[:, 0], jnp.ones(1) if batched is None else batched
         table = states[:, None, :]
-        return variational.LyapunovSpectrum(
-            states, states, first, table, states, turn, first
-        )
+        return LyapunovSpectrum(states, states, first, table, states, turn, first)
 
     states = jnp.arange(2.0 * lanes).reshape(lanes, 2)
     lengths = jnp.arange(1.0 * lanes) if each else None

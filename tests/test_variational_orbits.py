@@ -332,7 +332,7 @@ def test_second_order_saltation_of_a_ball():
     np.testing.assert_allclose(
         first, variational.saltation_matrix(ball, 0.0, point), atol=1e-12
     )
-    second = variational.saltation_second(ball, 0.0, point)
+    second = variational.saltation.saltation_second(ball, 0.0, point)
     np.testing.assert_allclose(
         second, jax.jacfwd(jax.jacfwd(exact))(point), rtol=1e-9, atol=1e-12
     )
@@ -359,13 +359,17 @@ class Trailer(HybridSystem):
 def test_entering_contact_drops_the_rank_by_two():
     system = Trailer(**parameters(restitution=0.0))
     speed, z = -0.8, 0.3
-    found = variational.saltation_into_contact(system, 0.0, jnp.array([0.0, speed, z]))
+    found = variational.saltation.saltation_into_contact(
+        system, 0.0, jnp.array([0.0, speed, z])
+    )
     # contact begins at the impact, dx / speed later than nominal; z' is -z / 2 after
     # it and speed - z / 2 before it
     exact = np.zeros((3, 3))
     exact[2] = [((-z / 2) - (speed - z / 2)) / speed, 0.0, 1.0]
     np.testing.assert_allclose(found, exact, atol=1e-13)
-    release = variational.saltation_at_release(system, 0.0, jnp.array([0.0, 0.0, 5.0]))
+    release = variational.saltation.saltation_at_release(
+        system, 0.0, jnp.array([0.0, 0.0, 5.0])
+    )
     np.testing.assert_allclose(release, np.diag([0.0, 0.0, 1.0]), atol=1e-13)
 
 
@@ -406,11 +410,13 @@ def test_an_unknown_method_is_refused():
 
 def test_multipliers_of_any_size():
     matrix = np.diag([3.0, -0.5, 0.1]) + np.triu(np.ones((3, 3)), 1)
-    found = np.asarray(variational.eigenvalues(jnp.asarray(matrix)))
+    found = np.asarray(variational.orbits.eigenvalues(jnp.asarray(matrix)))
     np.testing.assert_allclose(found, [3.0, -0.5, 0.1], atol=1e-12)
-    fold, flip, pairs = variational.test_functions(jnp.asarray(found))
+    fold, flip, pairs = variational.floquet.test_functions(jnp.asarray(found))
     np.testing.assert_allclose(fold, 2.0 * -1.5 * -0.9, atol=1e-12)
     np.testing.assert_allclose(flip, 4.0 * 0.5 * 1.1, atol=1e-12)
     np.testing.assert_allclose(pairs, -2.5 * -0.7 * -1.05, atol=1e-12)
-    turned = jax.jit(variational.eigenvalues)(jnp.array([[0.0, -2.0], [0.5, 0.0]]))
+    turned = jax.jit(variational.orbits.eigenvalues)(
+        jnp.array([[0.0, -2.0], [0.5, 0.0]])
+    )
     np.testing.assert_allclose(turned, [1j, -1j], atol=1e-15)

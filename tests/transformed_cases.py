@@ -11,8 +11,8 @@ from textbook_systems import BallBetweenWalls, TwoMasses
 import jaxcam
 import variational
 from jaxcam.filippov import filippov_flow
-from jaxcam.hybrid import contact_state, flow, release_point
-from jaxcam.hybrid.surface import chatter_completion
+from jaxcam.hybrid import flow
+from jaxcam.hybrid.surface import chatter_completion, contact_state, release_point
 from jaxcam.models import (
     BeltOscillator,
     BouncingBall,
@@ -297,7 +297,7 @@ def _theory(name: str) -> Case:
 
     def flight(p):
         start = jnp.stack([p[1], jnp.asarray(1.0)])
-        end = variational.fly(Ball(gravity=p[0]), 0.0, start, 1.0, 0.3, p[1])
+        end = variational.chatter.fly(Ball(gravity=p[0]), 0.0, start, 1.0, 0.3, p[1])
         return jnp.concatenate([end[0], end[1][None], end[2][None]])
 
     def impact(p):

@@ -1,36 +1,14 @@
 """Derivatives of trajectories: orbits, saltation matrices, monodromy, multipliers."""
 
-from ._covariant import (
-    covariant_vectors as covariant_vectors,
-    CovariantVectors as CovariantVectors,
-)
+from ._covariant import covariant_vectors as covariant_vectors
 from ._filippov import (
     filippov_monodromy as filippov_monodromy,
     filippov_saltation as filippov_saltation,
 )
-from ._floquet import (
-    floquet_multipliers as floquet_multipliers,
-    impact_scale as impact_scale,
-    Stability as Stability,
-    stability as stability,
-    test_functions as test_functions,
-)
 from ._grazing import grazing_form as grazing_form, GrazingForm as GrazingForm
-from ._lyapunov import (
-    lyapunov_spectrum as lyapunov_spectrum,
-    LyapunovSpectrum as LyapunovSpectrum,
-)
+from ._lyapunov import lyapunov_spectrum as lyapunov_spectrum
 from ._nordmark import nordmark_map as nordmark_map, nordmark_window as nordmark_window
 from ._poincare import poincare_derivative as poincare_derivative
-from ._saltation import (
-    event_map as event_map,
-    saltation_at_release as saltation_at_release,
-    saltation_into_contact as saltation_into_contact,
-    saltation_matrix as saltation_matrix,
-    saltation_parts as saltation_parts,
-    saltation_second as saltation_second,
-    SaltationParts as SaltationParts,
-)
 from .chatter import (
     adding_thresholds as adding_thresholds,
     beta_map as beta_map,
@@ -39,29 +17,23 @@ from .chatter import (
     chatter_interruption as chatter_interruption,
     chattering_region as chattering_region,
     composed_map as composed_map,
-    ComposedMap as ComposedMap,
     find_lobes as find_lobes,
     fit_local_map as fit_local_map,
-    fly as fly,
     grazing_manifold as grazing_manifold,
-    hop_ratio as hop_ratio,
     impact_jacobian as impact_jacobian,
     impact_map as impact_map,
     iterate_local_map as iterate_local_map,
     koenigs as koenigs,
     lambda_inverse as lambda_inverse,
     lambda_map as lambda_map,
-    Lobes as Lobes,
     Reversed as Reversed,
     scaling_law as scaling_law,
-    Section as Section,
     section_turn as section_turn,
     simulated_at_section as simulated_at_section,
 )
+from .floquet import floquet_multipliers as floquet_multipliers, stability as stability
 from .orbits import (
-    clearance as clearance,
     detachment as detachment,
-    eigenvalues as eigenvalues,
     flip_of_orbit as flip_of_orbit,
     fold_of_orbit as fold_of_orbit,
     graze_of_orbit as graze_of_orbit,
@@ -69,10 +41,14 @@ from .orbits import (
     monodromy as monodromy,
     Orbit as Orbit,
     orbit_determinant as orbit_determinant,
-    orbit_monodromy as orbit_monodromy,
     orbit_of as orbit_of,
     orbit_trace as orbit_trace,
     orbit_where as orbit_where,
     release_near as release_near,
     turn_derivative as turn_derivative,
+)
+from .saltation import (
+    event_map as event_map,
+    saltation_matrix as saltation_matrix,
+    saltation_parts as saltation_parts,
 )

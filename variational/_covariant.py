@@ -68,7 +68,7 @@ def covariant_vectors(
         settles and the frame turns; as many follow, from which the vectors turn back.
     - `settings`: accuracy; a tolerance of 1e-12 by default.
 
-    **Returns:** a [`variational.CovariantVectors`][]. A motion that sticks forgets
+    **Returns:** a `CovariantVectors`. A motion that sticks forgets
     every deviation, so it has no such directions, and all of them are NaN.
 
     **Raises:** `ValueError` for a system without a period, or for numbers of turns that

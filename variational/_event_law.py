@@ -6,8 +6,8 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
-from jaxcam.hybrid import HybridSystem, normal_velocity
-from jaxcam.hybrid.surface import field_in_force, normal_directions
+from jaxcam.hybrid import HybridSystem
+from jaxcam.hybrid.surface import field_in_force, normal_directions, normal_velocity
 
 
 def gap_of(system: HybridSystem, constraint) -> Callable:

@@ -6,12 +6,9 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from jaxcam.filippov import (
-    FilippovSystem,
-    FilippovTrajectory,
-    leg_flow,
-    mode_field,
-)
+from jaxcam.filippov import FilippovSystem, FilippovTrajectory
+from jaxcam.filippov.flows import leg_flow
+from jaxcam.filippov.modes import mode_field
 
 
 def filippov_saltation(

@@ -18,8 +18,12 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Complex, Float
 
-from jaxcam.hybrid import HybridSystem, normal_acceleration, simulate
-from jaxcam.hybrid.surface import normal_directions, restitution_coefficients
+from jaxcam.hybrid import HybridSystem, simulate
+from jaxcam.hybrid.surface import (
+    normal_acceleration,
+    normal_directions,
+    restitution_coefficients,
+)
 from jaxcam.parameters import as_arrays, pick, Where
 
 from .orbits import (

@@ -83,7 +83,7 @@ def lyapunov_spectrum(
     - `blocks`: number of blocks for the standard error.
     - `max_steps`: budget of attempted steps of a lane.
 
-    **Returns:** a [`variational.LyapunovSpectrum`][]. An exponent is minus infinity
+    **Returns:** a `LyapunovSpectrum`. An exponent is minus infinity
     where the motion sticks, because contact forgets what came before.
 
     **Raises:** `ValueError` where shapes do not fit, or there is no period.

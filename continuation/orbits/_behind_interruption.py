@@ -19,9 +19,9 @@ from variational.chatter import next_impact, orbit_from, prepared_frame
 from variational.orbits import steps_for
 
 from .._parameter import with_leaf
-from .._problem import Start
 from .._program import correct
 from .._settings import Settings
+from ..problem import Start
 from ._shooting import ImpactingOrbits
 
 

@@ -5,7 +5,7 @@ from typing import Any
 import equinox as eqx
 import numpy as np
 
-from .._representation import AbstractRepresentation
+from ..representation import AbstractRepresentation
 from ._run_twice import away_from_half, rotations
 
 

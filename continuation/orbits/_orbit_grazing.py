@@ -11,9 +11,9 @@ from variational.orbits import lowest_times
 
 from .._parameter import as_arrays
 from .._point import set_parameters
-from .._problem import Start
 from .._program import evaluate
 from .._settings import Settings
+from ..problem import Start
 from ._signature import with_impact, without_impact
 from ._watched import Watched, watched_of
 

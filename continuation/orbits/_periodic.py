@@ -9,7 +9,7 @@ from jaxcam.parameters import as_arrays
 from variational import Orbit
 from variational.orbits import seed
 
-from .._problem import Start
+from ..problem import Start
 from ._periodic_orbit import periodic_orbit
 from ._periodic_sticking import on_release
 from ._shooting import ImpactingOrbits

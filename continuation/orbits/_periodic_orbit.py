@@ -8,15 +8,9 @@ import jax.numpy as jnp
 import numpy as np
 import optimistix as optx
 
-from jaxcam.hybrid import (
-    component_sizes,
-    flow,
-    HybridSystem,
-    Settings,
-    simulate,
-    stroboscope,
-)
+from jaxcam.hybrid import flow, HybridSystem, Settings, simulate, stroboscope
 from jaxcam.hybrid.checks import check_start
+from jaxcam.hybrid.sizes import component_sizes
 from jaxcam.parameters import as_arrays, real_array, VectorLike
 from variational import Orbit, orbit_of
 from variational.orbits import flown, refuse, seed, Shooting

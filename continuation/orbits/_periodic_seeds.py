@@ -3,7 +3,8 @@
 import numpy as np
 from jaxtyping import ArrayLike, Float
 
-from jaxcam.hybrid import component_sizes, HybridSystem, Settings
+from jaxcam.hybrid import HybridSystem, Settings
+from jaxcam.hybrid.sizes import component_sizes
 from variational import Orbit
 
 from ._periodic_orbit import periodic_orbit
@@ -30,7 +31,7 @@ def orbits_near(
     - `states`: shape `(k, n)`, states at `t0`.
     - `period`, `periods`, `t0`, `settings`: as for [`continuation.periodic_orbit`][].
     - `same`: orbits are one where their states at `t0` differ by less than this,
-      relative to [`jaxcam.hybrid.component_sizes`][].
+      relative to [`jaxcam.hybrid.sizes.component_sizes`][].
 
     **Returns:** the orbits in the order in which they were found; guesses from which
     Newton's method leads nowhere are left out, so there may be none.

@@ -9,13 +9,13 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from jaxcam.hybrid import (
+from jaxcam.hybrid import HybridSystem
+from jaxcam.hybrid.surface import (
     contact_state,
-    HybridSystem,
+    gaps,
     normal_acceleration,
     normal_velocity,
 )
-from jaxcam.hybrid.surface import gaps
 from variational import chatter_frame
 from variational.chatter import (
     ChatterFrame,
@@ -27,7 +27,7 @@ from variational.chatter import (
 )
 from variational.orbits import flight_end
 
-from .._problem import AbstractProblem, Monitor, Stability, Start
+from ..problem import AbstractProblem, Monitor, Stability, Start
 from ._behind_interruption import orbit_behind
 from ._shooting import ImpactingOrbits
 

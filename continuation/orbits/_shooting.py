@@ -12,7 +12,7 @@ from jaxcam.hybrid import HybridSystem
 from variational import orbits
 from variational.orbits import inadmissible, Shooting
 
-from .._problem import AbstractProblem, LocalDynamics, Monitor, Stability, Start
+from ..problem import AbstractProblem, LocalDynamics, Monitor, Stability, Start
 from ..special import FLIP
 from ._impact_sequences import ImpactSequences
 from ._orbit_grazing import orbit_grazing

@@ -11,9 +11,9 @@ from jaxtyping import Array, Float, PyTree
 from jaxcam.parameters import AnyArray
 
 from .._parameter import with_leaf
-from .._problem import AbstractProblem, jacobian_of, Stability
 from .._program import evaluate, residual_at, solve
 from .._settings import Settings
+from ..problem import AbstractProblem, jacobian_of, Stability
 
 
 # displacement for the second derivatives of the correction, of unknowns of size one:

@@ -8,7 +8,7 @@ from jaxtyping import Array, Float, PyTree
 
 from .._parameter import with_leaf
 from .._point import Point, replace
-from .._problem import AbstractProblem, jacobian_of, Stability
+from ..problem import AbstractProblem, jacobian_of, Stability
 
 
 class AbstractExtended(AbstractProblem):

@@ -5,9 +5,9 @@ from typing import Any, NamedTuple
 import jax.numpy as jnp
 import numpy as np
 
-from .._problem import AbstractProblem
 from .._program import correct, Corrected, solve
 from .._settings import Settings
+from ..problem import AbstractProblem
 from ._bialternate import determinant_on_plane, trace_on_plane
 from ._branch_points import differenced_crossing, solved_crossing
 from ._monitor_points import monitor_level

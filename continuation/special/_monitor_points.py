@@ -10,7 +10,7 @@ from jaxtyping import Array, Float, PyTree
 from jaxcam.parameters import AnyArray
 
 from .._parameter import with_leaf
-from .._problem import AbstractProblem, Monitor, Stability
+from ..problem import AbstractProblem, Monitor, Stability
 from ._extended import AbstractExtended
 
 

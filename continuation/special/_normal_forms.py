@@ -8,9 +8,9 @@ import jax.numpy as jnp
 import numpy as np
 
 from .._parameter import with_leaf
-from .._problem import AbstractProblem
 from .._program import Corrected, evaluate
 from .._settings import Settings
+from ..problem import AbstractProblem
 from ._differences import along, STEPS
 from ._multilinear import second, third
 from ._test_functions import FLIP, FOLD, has_own_dynamics, HOPF, NEIMARK_SACKER

@@ -11,7 +11,7 @@ from jaxcam.parameters import AnyArray
 
 from .._parameter import with_leaf
 from .._point import set_parameters, with_field
-from .._problem import AbstractProblem, jacobian_of, Monitor, Stability
+from ..problem import AbstractProblem, jacobian_of, Monitor, Stability
 from ._bialternate import (
     additive,
     determinant_on_plane,

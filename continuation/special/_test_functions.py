@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 
 from .._parameter import with_leaf
-from .._problem import AbstractProblem
 from .._program import Corrected
+from ..problem import AbstractProblem
 from ._bialternate import pairs
 
 

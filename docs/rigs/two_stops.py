@@ -6,7 +6,7 @@ from jaxcam.hybrid import HybridSystem
 
 
 class TwoStops(HybridSystem):
-    """Position is measured from the base, which moves by `base_amplitude * sin(phi)`."""
+    """Position is measured from the base, at `base_amplitude * sin(phi)`."""
 
     state_names = ("position", "velocity")
     state_units = ("m", "m/s")

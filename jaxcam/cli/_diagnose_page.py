@@ -19,8 +19,9 @@ from ._residual_axes import Along, residual_label, shown_in, title_of
 
 matplotlib.use("Agg")
 
-from ..plotting import labelled, save_figure, style
+from ..plotting import save_figure, style
 from ..plotting.colours import CONTACT, FLIGHT, IMPACT, RECORDED
+from ..plotting.labels import labelled
 
 
 _BINS = 36

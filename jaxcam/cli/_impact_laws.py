@@ -6,7 +6,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..fitting import restitution_laws, RestitutionFit
-from ..recordings import Impacts, RecordingError, Segments
+from ..recordings import RecordingError, Segments
+from ..recordings.cut import Impacts
 
 
 def impact_laws(segments: Sequence[Segments]) -> dict[str, RestitutionFit]:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from html import escape
 from pathlib import Path
 
-from ..recordings import Row
+from ..recordings.against_model import Row
 from ._demo_branches import Branches, HEADINGS as HEADINGS_OF_BRANCHES
 from ._rests import HEADINGS, rest_rows, Rests
 

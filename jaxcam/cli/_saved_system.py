@@ -18,7 +18,7 @@ def as_saved(system: HybridSystem, about: dict[str, Any]) -> dict[str, Any]:
     """
     from ..discrepancy.terms import WithTerms
     from ..fitting.own_systems import system_source
-    from ..models import system_to_json
+    from ..models.saved import system_to_json
 
     try:
         found = system_to_json(system, about=about)

@@ -1,20 +1,13 @@
 """What physics a model leaves out: where it acts, its name, its strength."""
 
 from ._diagnose import diagnose as diagnose
-from ._event_causes import event_causes as event_causes, EventCause as EventCause
-from ._event_speeds import event_speeds as event_speeds, EventSpeeds as EventSpeeds
+from ._event_causes import event_causes as event_causes
 from ._next_experiment import (
     compare_experiments as compare_experiments,
     Experiment as Experiment,
     next_experiments as next_experiments,
 )
 from ._predictions import Prediction as Prediction, predictions as predictions
-from .evidence import Ripple as Ripple
 from .policy import Policy as Policy
 from .report import Diagnosis as Diagnosis, Verdict as Verdict
-from .terms import (
-    library as library,
-    strength as strength,
-    Term as Term,
-    Where as Where,
-)
+from .terms import library as library, strength as strength, Term as Term

@@ -12,8 +12,13 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from variational import chatter_interruption, detachment, orbit_monodromy, orbit_where
-from variational.orbits import ImpactOrbit, one_impact_orbits, SpecialPoint
+from variational import chatter_interruption, detachment, orbit_where
+from variational.orbits import (
+    ImpactOrbit,
+    one_impact_orbits,
+    orbit_monodromy,
+    SpecialPoint,
+)
 
 from ..models import float_speed
 from .policy import Policy

@@ -6,11 +6,11 @@ import numpy as np
 
 from ..hybrid.checks import refuse_tracers
 from ..parameters import as_arrays, real_array, VectorLike
-from ._modes import region
-from ._run import CHUNK, chunk, start
 from ._step import EVENT, NOT_FINITE, NOTHING, RUNNING
 from ._system import FilippovSystem
 from ._trajectory import FilippovTrajectory, Switches
+from .flows import CHUNK, chunk, start
+from .modes import region
 
 
 _WHY = {

@@ -10,8 +10,8 @@ import jax
 import jax.numpy as jnp
 
 from ..hybrid.runge_kutta import array_step, DOPRI5
-from ._modes import levels, mode_after, mode_field, onto_surface
 from ._system import FilippovSystem
+from .modes import levels, mode_after, mode_field, onto_surface
 
 
 NOTHING, STEP, EVENT = 0, 1, 2

@@ -18,7 +18,8 @@ class Switches(eqx.Module):
     time: Float[Array, " k"]
     #: (k, n)
     state: Float[Array, "k n"]
-    #: (k,) [`jaxcam.filippov.Mode`][] before and after: 1 above, 0 sliding, -1 below
+    #: (k,) [`Mode`][jaxcam.filippov.modes.Mode] before and after: 1 above, 0 sliding,
+    #: -1 below
     before: Int[Array, " k"]
     after: Int[Array, " k"]
 

@@ -22,6 +22,7 @@ from .engine import (
     Point,
     prior_cost,
     Problem,
+    total_cost,
     Weights,
 )
 
@@ -233,15 +234,3 @@ def start_point(problem: Problem, start) -> Point:
         problem.parameter(name)
         values[:, problem.names.index(name)] = value
     return problem.start._replace(values=jnp.asarray(values))
-
-
-def total_cost(costs: Costs, extras) -> float:
-    """Cost of all pieces by their weights; a joint counts as the less of its two."""
-    before = jnp.concatenate([extras.weight[:, :1], extras.weight[:, :-1]], axis=1)
-    shared = jnp.minimum(extras.weight, before)
-    parts = (
-        jnp.sum(extras.weight * costs.flown),
-        jnp.sum(shared * costs.joints),
-        jnp.sum(extras.rest_weight * costs.rested),
-    )
-    return float(sum(parts))

@@ -77,7 +77,12 @@ def train(
     L-BFGS (scipy) with gradients in reverse mode. At each step the states of the pieces
     are fitted first, so that the gradient is that of the best cost.
 
-    **Arguments:** as for `cost_and_gradient`; `steps` at most.
+    **Arguments:**
+
+    - `where`: picks a field, or a tuple of fields, out of the model: `lambda m:
+        m.system.network`.
+    - `steps`: of L-BFGS, at most.
+    - `progress`: called after each evaluation with its number and its cost.
     """
     values = where(problem.model)
     arrays, rest = eqx.partition(values, eqx.is_inexact_array)

@@ -9,16 +9,9 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from ..recordings import (
-    Drive,
-    read_drive,
-    Recording,
-    RecordingError,
-    segment,
-    Segments,
-)
+from ..recordings import Recording, RecordingError, segment
 from ..recordings.against_model import size_of
-from ..recordings.cut import padded, segment_gaps
+from ..recordings.cut import Drive, padded, read_drive, segment_gaps, Segments
 from .engine import Layout, Model, Parameter, parameter_places
 
 

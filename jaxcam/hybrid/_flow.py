@@ -62,7 +62,7 @@ def flow(
     - `settings`: accuracy; `Settings()` by default.
     - `max_steps`: budget of attempted steps.
 
-    **Returns:** a [`jaxcam.hybrid.Arrival`][]; its `code` is an index into `RESULTS`.
+    **Returns:** an `Arrival`; its `code` is an index into `RESULTS`.
 
     **Raises:** `ValueError` for a complex state; and for parameters or functions of the
     system that cannot be, where nothing is traced.

@@ -70,7 +70,7 @@ def stroboscope(
     - `workers`: threads that work on blocks; results do not depend on their number.
     - `progress`: called with the fraction of lanes done.
 
-    **Returns:** a [`jaxcam.hybrid.Stroboscope`][].
+    **Returns:** a `Stroboscope`.
 
     **Raises:** `ValueError` where shapes do not fit, or there is no period.
     """

@@ -1,9 +1,8 @@
 """Iterated maps: smooth ones, piecewise-smooth ones, and what they do."""
 
-from ._attractor import Attractor as Attractor, map_attractor as map_attractor
+from ._attractor import map_attractor as map_attractor
 from ._border_collision import (
     border_collision as border_collision,
-    BorderCollision as BorderCollision,
     classify_border_collision as classify_border_collision,
 )
 from ._cascade import feigenbaum_ratios as feigenbaum_ratios, superstable as superstable
@@ -14,7 +13,6 @@ from ._manifold import (
     Saddle as Saddle,
     saddle_at as saddle_at,
 )
-from ._normal_forms import NORMAL_FORMS as NORMAL_FORMS, NormalForm as NormalForm
 from ._piecewise import (
     PiecewiseMap as PiecewiseMap,
     SkewMap as SkewMap,

@@ -2,60 +2,40 @@
 
 from ._belt_oscillator import BeltOscillator as BeltOscillator
 from ._bouncing_ball import BouncingBall as BouncingBall
-from ._cam_contour import (
-    CamContour as CamContour,
-    flat_oscillating_contour as flat_oscillating_contour,
-    flat_translating_contour as flat_translating_contour,
-    roller_oscillating_contour as roller_oscillating_contour,
-    roller_translating_contour as roller_translating_contour,
-)
 from ._cam_follower import CamFollower as CamFollower
 from ._contact_load import (
     contact_force as contact_force,
     contact_load as contact_load,
     float_speed as float_speed,
-    FloatSpeed as FloatSpeed,
 )
 from ._desmodromic import DesmodromicCam as DesmodromicCam
-from ._eccentric_circle import EccentricCircle as EccentricCircle
 from ._forced_oscillator import ForcedOscillator as ForcedOscillator
-from ._fourier_profile import FourierProfile as FourierProfile
 from ._impact_oscillator import ImpactOscillator as ImpactOscillator
-from ._motion_law import (
-    LawPiece as LawPiece,
-    MOTION_LAWS as MOTION_LAWS,
-    MotionLaw as MotionLaw,
-)
-from ._motion_program import (
-    Joint as Joint,
-    MotionPieces as MotionPieces,
-    MotionProgram as MotionProgram,
-    Segment as Segment,
-)
 from ._piecewise_linear import (
     PiecewiseLinear as PiecewiseLinear,
     planar_stability as planar_stability,
-    PlanarStability as PlanarStability,
 )
 from ._presets import preset as preset
-from ._profile import CamProfile as CamProfile
 from ._relay_feedback import RelayFeedback as RelayFeedback
 from ._restitution import (
     ConstantRestitution as ConstantRestitution,
     LinearInSpeed as LinearInSpeed,
     PowerLawRestitution as PowerLawRestitution,
 )
-from ._saved import (
-    load_system as load_system,
-    save_system as save_system,
-    system_from_json as system_from_json,
-    system_to_json as system_to_json,
-)
-from ._spline_profile import (
-    PiecewiseProfile as PiecewiseProfile,
-    SplineProfile as SplineProfile,
-)
 from ._through_joints import simulate_through_joints as simulate_through_joints
 from ._triple_integrator import TripleIntegrator as TripleIntegrator
 from ._units import rad_s_to_rpm as rad_s_to_rpm, rpm_to_rad_s as rpm_to_rad_s
 from ._valve_train import ValveTrain as ValveTrain
+from .cams import (
+    CamProfile as CamProfile,
+    EccentricCircle as EccentricCircle,
+    flat_oscillating_contour as flat_oscillating_contour,
+    flat_translating_contour as flat_translating_contour,
+    FourierProfile as FourierProfile,
+    MotionProgram as MotionProgram,
+    roller_oscillating_contour as roller_oscillating_contour,
+    roller_translating_contour as roller_translating_contour,
+    Segment as Segment,
+    SplineProfile as SplineProfile,
+)
+from .saved import load_system as load_system, save_system as save_system

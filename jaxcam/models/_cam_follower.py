@@ -7,16 +7,15 @@ import jax
 import jax.numpy as jnp
 
 from ..hybrid import HybridSystem
-from ._eccentric_circle import EccentricCircle
 from ._parameters import (
     parameter,
     require_finite,
     require_positive,
     require_restitution,
 )
-from ._profile import CamProfile
 from ._restitution import LinearInSpeed
 from ._units import rpm_to_rad_s
+from .cams import CamProfile, EccentricCircle
 
 
 _SENSE = {"clockwise": -1.0, "counterclockwise": 1.0}

@@ -7,10 +7,9 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
-from ._cam_contour import flat_oscillating_contour, profile_jet
 from ._cam_follower import CamFollower
-from ._motion_program import MotionPieces, MotionProgram
 from ._valve_train import ValveTrain
+from .cams import flat_oscillating_contour, MotionPieces, MotionProgram, profile_jet
 
 
 _TURN = 2 * np.pi

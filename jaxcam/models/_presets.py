@@ -5,8 +5,8 @@ from collections.abc import Callable
 import jax.numpy as jnp
 
 from ._cam_follower import CamFollower
-from ._eccentric_circle import EccentricCircle
 from ._restitution import LinearInSpeed
+from .cams import EccentricCircle
 
 
 def _calibrated() -> CamFollower:

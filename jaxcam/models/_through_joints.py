@@ -7,14 +7,14 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from ..hybrid import Contacts, Impacts, simulate, Steps, Trajectory
+from ..hybrid import simulate, Trajectory
 from ..hybrid.checks import refuse_tracers
+from ..hybrid.record import Contacts, Impacts, Steps
 from ._cam_follower import CamFollower
 from ._desmodromic import DesmodromicCam
-from ._motion_program import MotionPieces, MotionProgram
 from ._parameters import parameter
-from ._profile import CamProfile
 from ._valve_train import ValveTrain
+from .cams import CamProfile, MotionPieces, MotionProgram
 
 
 _TURN = 2 * np.pi

@@ -15,8 +15,8 @@ from ._parameters import (
     require_positive,
     require_restitution,
 )
-from ._profile import CamProfile
 from ._restitution import ConstantRestitution
+from .cams import CamProfile
 
 
 class ValveTrain(HybridSystem):

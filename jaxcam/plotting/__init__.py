@@ -10,15 +10,10 @@ from ._chatter_maps import (
 )
 from ._chatter_region import chattering_region as chattering_region
 from ._compare_recording import compare_recording as compare_recording
-from ._curve import Curve as Curve, curve as curve
 from ._diagram import sweep_chart as sweep_chart, sweep_diagram as sweep_diagram
 from ._grazing_map import cobweb as cobweb
 from ._impact_map import impact_map as impact_map
-from ._labels import labelled as labelled
-from ._local_map import (
-    local_map as local_map,
-    local_map_diagram as local_map_diagram,
-)
+from ._local_map import local_map as local_map
 from ._lyapunov import lyapunov_convergence as lyapunov_convergence
 from ._motion_program import motion_program as motion_program
 from ._multipliers import multipliers as multipliers

@@ -11,8 +11,8 @@ from matplotlib.patches import Patch
 
 from ._axes import one_axes
 from ._diagram import COLOURS, NOTHING
-from ._labels import labelled
 from ._style import SECTION, styled
+from .labels import labelled
 
 
 if TYPE_CHECKING:

@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 
 from ._axes import legend_above, one_axes
-from ._labels import labelled
 from ._style import CONTACT, FLIGHT, IMPACT, SECTION, styled
+from .labels import labelled
 
 
 if TYPE_CHECKING:

@@ -3,7 +3,7 @@
 import numpy as np
 from matplotlib.axes import Axes
 
-from ..models import CamContour
+from ..models.cams import CamContour
 from ._axes import legend_above, one_axes
 from ._style import CAM, IMPACT, styled
 

@@ -1,6 +1,6 @@
 """A channel of a recording is named after what it is and its unit."""
 
-from ._labels import labelled
+from .labels import labelled
 
 
 # endings of channel names and how their units are written; the longest ending wins

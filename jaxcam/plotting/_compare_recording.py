@@ -12,10 +12,10 @@ from ..recordings import Recording
 from ..recordings.against_model import Comparison
 from ._axes import legend_above, several_axes
 from ._channels import channel_label, name_and_unit
-from ._labels import labelled
 from ._prefix import scaled
 from ._simulated import simulated_channel
 from ._style import BAND, CAM, RECORDED, styled
+from .labels import labelled
 
 
 Simulated: TypeAlias = ArrayLike | Comparison

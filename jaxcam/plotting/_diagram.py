@@ -10,8 +10,8 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from ._axes import one_axes
-from ._labels import labelled
 from ._style import FLIGHT, IMPACT, SECTION, styled
+from .labels import labelled
 
 
 if TYPE_CHECKING:

@@ -9,9 +9,9 @@ from matplotlib.figure import Figure
 
 from ..hybrid import Trajectory
 from ._axes import legend_above, several_axes
-from ._curve import Hits, hits, window
-from ._labels import labelled, speed_unit, time_unit
 from ._style import BAND, IMPACT, styled
+from .curves import Hits, hits, window
+from .labels import labelled, speed_unit, time_unit
 
 
 # speeds that differ by more than this factor are drawn on a logarithmic scale

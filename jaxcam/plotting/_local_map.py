@@ -1,11 +1,10 @@
-"""The local map of section 5.4 with its cobwebs, and the diagram it iterates to."""
+"""The local map of section 5.4 with its cobwebs."""
 
 import jax.numpy as jnp
 import numpy as np
 from matplotlib.axes import Axes
 
-from variational import Lobes
-from variational.chatter import LocalMap
+from variational.chatter import Lobes, LocalMap
 
 from ._axes import legend_above, one_axes
 from ._style import FLIGHT, IMPACT, RECORDED, SECTION, styled
@@ -70,28 +69,5 @@ def local_map(
     ax.set_xlabel("state at the section")
     ax.set_ylabel("one turn later")
     ax.set_ylim(np.nanmin(shown) - 0.1 * span, np.nanmax(shown) + 0.3 * span)
-    legend_above(ax)
-    return ax
-
-
-@styled
-def local_map_diagram(shifts, attractor, ax: Axes | None = None, *, flow=None) -> Axes:
-    """Draw the attractor of the fitted map over its shift. (Figure 5.28)
-
-    **Arguments:** `shifts`, shape `(k,)`; `attractor`, shape `(k, keep)`; `ax`, a new
-    figure without; `flow`, shifts and states of the motion itself, drawn beneath.
-
-    **Returns:** the axes.
-    """
-    ax = one_axes(ax)
-    if flow is not None:
-        ax.plot(*flow, ",", color=IMPACT)
-        # pixels do not show in a legend
-        ax.plot([], [], ".", color=IMPACT, label="motion")
-    shifts = np.repeat(np.asarray(shifts), attractor.shape[1])
-    ax.plot(shifts, np.ravel(attractor), ",", color=FLIGHT)
-    ax.plot([], [], ".", color=FLIGHT, label="fitted map")
-    ax.set_xlabel("shift of the map")
-    ax.set_ylabel("state at the section")
     legend_above(ax)
     return ax

@@ -5,9 +5,9 @@ from matplotlib.axes import Axes
 
 from ..hybrid import Trajectory
 from ._axes import legend_above, one_axes
-from ._curve import Curve, curve, window
-from ._labels import state_label
 from ._style import CONTACT, FLIGHT, IMPACT, SECTION, styled
+from .curves import Curve, curve, window
+from .labels import state_label
 
 
 @styled

@@ -10,13 +10,12 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from scipy.stats import norm
 
-from ..recordings import Residuals
-from ..recordings.against_model import Comparison
+from ..recordings.against_model import Comparison, Residuals
 from ._axes import several_axes
 from ._channels import name_and_unit
-from ._labels import labelled
 from ._prefix import scaled
 from ._style import BAND, FLIGHT, styled
+from .labels import labelled
 
 
 # odd, so that one of them is about zero

@@ -10,8 +10,8 @@ from matplotlib.patheffects import withStroke
 
 from ._axes import one_axes
 from ._branch import mark_of
-from ._labels import labelled
 from ._style import styled
+from .labels import labelled
 
 
 if TYPE_CHECKING:

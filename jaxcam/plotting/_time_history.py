@@ -9,9 +9,9 @@ from matplotlib.figure import Figure
 
 from ..hybrid import Trajectory
 from ._axes import legend_above, several_axes
-from ._curve import Curve, curve
-from ._labels import gap_label, state_label, time_label
 from ._style import CONTACT, FLIGHT, IMPACT, styled
+from .curves import Curve, curve
+from .labels import gap_label, state_label, time_label
 
 
 @styled

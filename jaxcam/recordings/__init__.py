@@ -1,26 +1,11 @@
 """Recordings: reading, sensors, segmentation, and comparison with a model."""
 
-from ._drive import Drive as Drive, read_drive as read_drive
 from ._errors import RecordingError as RecordingError, RigError as RigError
-from ._recording import Case as Case, Recording as Recording
-from ._rig import (
-    Gyro as Gyro,
-    Quantity as Quantity,
-    References as References,
-    Rig as Rig,
-    Sensors as Sensors,
-)
+from ._recording import Recording as Recording
+from ._rig import References as References, Rig as Rig
 from ._synthetic import record as record, Wandering as Wandering
-from .against_model import (
-    compare as compare,
-    merge as merge,
-    Residuals as Residuals,
-    Row as Row,
-)
+from .against_model import compare as compare, merge as merge
 from .cut import (
-    Contact as Contact,
-    Flight as Flight,
-    Impacts as Impacts,
     segment as segment,
     segment_case as segment_case,
     Segments as Segments,

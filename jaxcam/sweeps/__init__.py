@@ -1,35 +1,26 @@
 """Many motions: sections, bifurcation diagrams, basins; on threads or a cluster."""
 
 from ._basins import basins as basins
-from ._basins_result import Basins as Basins, Share as Share
+from ._basins_result import Basins as Basins
 from ._boundary import (
     basin_entropy as basin_entropy,
-    BasinEntropy as BasinEntropy,
-    Uncertainty as Uncertainty,
     uncertainty_exponent as uncertainty_exponent,
 )
-from ._cell_mapping import cell_mapping as cell_mapping, CellMapping as CellMapping
+from ._cell_mapping import cell_mapping as cell_mapping
 from ._chart import chart as chart
 from ._chart_result import Chart as Chart
 from ._diagram import diagram as diagram
-from ._diagram_result import Diagram as Diagram, Range as Range
-from ._exponents import Exponents as Exponents, largest_exponents as largest_exponents
-from ._follow import (
-    follow_basins as follow_basins,
-    FollowedBasins as FollowedBasins,
-    match as match,
-)
+from ._diagram_result import Diagram as Diagram
+from ._exponents import largest_exponents as largest_exponents
+from ._follow import follow_basins as follow_basins
 from ._grid import Grid as Grid
 from ._load import load as load
 from ._starts import monte_carlo as monte_carlo
-from .attractors import label as label, periods as periods, settle as settle
-from .blocks import cluster as cluster, Progress as Progress
+from .blocks import cluster as cluster
 from .sections import (
-    AbstractSection as AbstractSection,
     ImpactSection as ImpactSection,
     Map as Map,
     PoincareSection as PoincareSection,
     return_times as return_times,
-    Samples as Samples,
     Stroboscopic as Stroboscopic,
 )

@@ -30,20 +30,6 @@ class FollowedBasins(NamedTuple):
     names: np.ndarray
 
 
-def match(first: Basins, second: Basins, most: float = 0.2) -> dict[int, int]:
-    """Which attractors of two basins are the same one, moved.
-
-    Pairs are chosen so that all distances together are smallest; the label may change,
-    as it does where P(1,1) turns into P(2,2).
-
-    **Arguments:** `most`: distance of two orbits, in units of the first scale, beyond
-    which they are no pair.
-
-    **Returns:** for numbers of `second` that have one, the number in `first`.
-    """
-    return match_orbits(first.orbits, second.orbits, first.scale, most)
-
-
 def follow_basins(
     system,
     where: Callable | str,
@@ -61,7 +47,9 @@ def follow_basins(
     **Arguments:**
 
     - `where`, `values`: the parameter, and its values in the order to go through.
-    - `most`: as for [`jaxcam.sweeps.match`][].
+    - `most`: distance of two orbits, in units of the first scale, beyond which they are
+        not the same attractor, moved. Pairs are chosen so that all distances together
+        are smallest; the label may change, as it does where P(1,1) turns into P(2,2).
     - `out`: folder, in which there will be one sweep for each value.
     - everything else: as for [`jaxcam.sweeps.basins`][].
 

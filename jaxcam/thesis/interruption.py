@@ -4,8 +4,8 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
-from variational import chatter_accumulation, chatter_frame, fly
-from variational.chatter import interruption_in, release_impacts, surface_state
+from variational import chatter_accumulation, chatter_frame
+from variational.chatter import fly, interruption_in, release_impacts, surface_state
 
 from ..models import CamFollower, rad_s_to_rpm, rpm_to_rad_s
 from .remember import remembered

@@ -24,9 +24,9 @@ from jaxtyping import Array, Float
 from variational import impact_orbit, orbit_trace, release_near
 from variational.orbits import flight_end
 
-from ..fitting import fit_published, Published, PublishedFit
-from ..fitting.published import rounding_error
-from ..hybrid import contact_state, release_point
+from ..fitting import fit_published, Published
+from ..fitting.published import PublishedFit, rounding_error
+from ..hybrid.surface import contact_state, release_point
 from ..models import CamFollower, LinearInSpeed, rad_s_to_rpm, rpm_to_rad_s
 from .chapter_5_bifurcations import table_5_2
 from .chapter_6_chattering import table_6_1

@@ -9,8 +9,8 @@ from matplotlib.figure import Figure
 
 from ..hybrid import Trajectory
 from ..models import CamFollower
-from ..plotting import curve
 from ..plotting.colours import CAM, FLIGHT, IMPACT
+from ..plotting.curves import curve
 from .settled import Motion, run_of
 
 

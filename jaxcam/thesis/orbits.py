@@ -4,8 +4,13 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
-from variational import impact_orbit, orbit_monodromy, orbit_where
-from variational.orbits import ImpactOrbit, one_impact_orbits, SpecialPoint
+from variational import impact_orbit, orbit_where
+from variational.orbits import (
+    ImpactOrbit,
+    one_impact_orbits,
+    orbit_monodromy,
+    SpecialPoint,
+)
 
 from ..models import CamFollower, rpm_to_rad_s
 from .speeds import at_rpm, speed_of

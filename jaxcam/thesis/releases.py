@@ -6,7 +6,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.figure import Figure
 
-from ..hybrid import release_point, simulate, Trajectory
+from ..hybrid import simulate, Trajectory
+from ..hybrid.surface import release_point
 from ..models import CamFollower, rpm_to_rad_s
 from .motion_drawing import draw_gap
 from .speeds import at_speed

@@ -9,8 +9,8 @@ from jaxtyping import Float
 
 from ..hybrid import simulate, Trajectory
 from ..models import CamFollower, rpm_to_rad_s
-from ..sweeps import settle, Stroboscopic
-from ..sweeps.attractors import CONTACT, label_name, STICKING
+from ..sweeps import Stroboscopic
+from ..sweeps.attractors import CONTACT, label_name, settle, STICKING
 from .remember import remembered
 from .speeds import at_rpm, speed_of
 from .target import Rows

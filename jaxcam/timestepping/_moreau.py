@@ -8,12 +8,12 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ..hybrid import HybridSystem, normal_velocity
+from ..hybrid import HybridSystem
 from ..hybrid.checks import check_system
-from ..hybrid.surface import gaps, impacts, normal_directions
+from ..hybrid.surface import gaps, impacts, normal_directions, normal_velocity
 from ..parameters import as_arrays, real_array, VectorLike
 from ._chunks import CHUNK, in_chunks
-from ._lemke import explain, lemke
+from .complementarity import explain, lemke
 
 
 class SteppedMotion(NamedTuple):

@@ -10,8 +10,8 @@ from jaxtyping import Array, Float
 
 from ..parameters import real_array, VectorLike
 from ._chunks import CHUNK, in_chunks
-from ._lemke import explain
-from ._relay import is_p_matrix, relay_problem, RelaySystem
+from .complementarity import explain
+from .relay import is_p_matrix, relay_problem, RelaySystem
 
 
 class RelayMotion(NamedTuple):

@@ -6,9 +6,10 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from jaxcam import HybridSystem
-from jaxcam.hybrid import normal_acceleration, release_point
 from jaxcam.hybrid.surface import (
     contact_acceleration,
+    normal_acceleration,
+    release_point,
     restitution_coefficients,
     sticking_field,
 )

@@ -8,9 +8,13 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
 from jaxcam import HybridSystem
-from jaxcam.hybrid import normal_acceleration, normal_velocity
 from jaxcam.hybrid.lowering import while_loop
-from jaxcam.hybrid.surface import chatter_completion, normal_directions
+from jaxcam.hybrid.surface import (
+    chatter_completion,
+    normal_acceleration,
+    normal_directions,
+    normal_velocity,
+)
 from jaxcam.parameters import as_arrays
 
 from ._chatter_frame import ChatterFrame, prepared_frame

@@ -146,7 +146,7 @@ def composed_map(
       A and C are linear: they move D* by much less than tau*.
     - `phase`: of the section, in periods, in the flight after release.
 
-    **Returns:** a [`variational.ComposedMap`][].
+    **Returns:** a [`variational.chatter.ComposedMap`][].
 
     **Raises:** `ValueError` for a system without a period.
     """
@@ -218,12 +218,12 @@ def _compose(along, value, rank, phase) -> ComposedMap:
 
 
 def simulated_at_section(system: HybridSystem, composed: ComposedMap, speed) -> Section:
-    """What [`variational.ComposedMap.at_section`][] predicts, by the exact motion.
+    """What `ComposedMap.at_section` predicts, by the exact motion.
 
     **Arguments:** `system` at the interruption; `speed`, changes of the rebound speed
     of D*, shape `(k,)`.
 
-    **Returns:** a [`variational.Section`][] with a leading axis.
+    **Returns:** a [`variational.chatter.Section`][] with a leading axis.
     """
     system = as_arrays(system).prepared()
     speeds = composed.speed + jnp.asarray(speed, jnp.float64)
@@ -236,13 +236,13 @@ def simulated_by_parameter(
 ) -> Section:
     """The orbit from release, followed over a turn at other values of the parameter.
 
-    What [`variational.ComposedMap.along_parameter`][] predicts.
+    What [`variational.chatter.ComposedMap.along_parameter`][] predicts.
 
     **Arguments:** `system` at the interruption; `where` picks the parameter; `changes`
     of it, shape `(k,)`; `phase` of the section, in periods.
 
-    **Returns:** a [`variational.Section`][] with a leading axis, at the section after
-    the next release.
+    **Returns:** a [`variational.chatter.Section`][] with a leading axis, at the section
+    after the next release.
     """
     system = as_arrays(system)
     value = jnp.asarray(pick(where, system)(system), jnp.float64)

@@ -10,8 +10,8 @@ import jax.numpy as jnp
 from jaxtyping import ArrayLike
 
 from jaxcam import HybridSystem
-from jaxcam.hybrid import normal_acceleration
 from jaxcam.hybrid.runge_kutta import adaptive_steps, array_step, DOPRI8
+from jaxcam.hybrid.surface import normal_acceleration
 
 
 #: error of a step, relative to one plus the state

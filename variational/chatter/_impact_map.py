@@ -7,9 +7,8 @@ import numpy as np
 from jaxtyping import Array, ArrayLike, Bool, Float
 
 from jaxcam import HybridSystem
-from jaxcam.hybrid import contact_state, normal_velocity
 from jaxcam.hybrid.lowering import while_loop
-from jaxcam.hybrid.surface import normal_directions
+from jaxcam.hybrid.surface import contact_state, normal_directions, normal_velocity
 from jaxcam.parameters import as_arrays
 
 from ._free_flight import flight_rates, runge_kutta_step

@@ -14,7 +14,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Bool, Float, Int
 
 from jaxcam import HybridSystem
-from jaxcam.hybrid import normal_acceleration
+from jaxcam.hybrid.surface import normal_acceleration
 
 from ._free_flight import flight_rates, on_flight, runge_kutta_step, TOLERANCE
 

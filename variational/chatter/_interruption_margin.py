@@ -8,7 +8,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
 from jaxcam import HybridSystem
-from jaxcam.hybrid import normal_acceleration
+from jaxcam.hybrid.surface import normal_acceleration
 
 from .._one_jacobian import with_one_jacobian
 from ._chatter_frame import ChatterFrame

@@ -116,8 +116,8 @@ def find_lobes(
     - `deviations`: shape `(n,)`, of `component` of the state, in order and across the
       accumulation point.
     - `direction`: shape `(2,)`, along which the state deviates; only `component` does
-      by default, as in the thesis. Motions leave the lobes along
-      [`variational.ComposedMap`][]`.vector`, so the map that is iterated needs that.
+      by default, as in the thesis. Motions leave the lobes along the `vector` of a
+      [`variational.chatter.ComposedMap`][], so the map that is iterated needs that.
     - `samples`: points measured in each lobe; `most`: how many lobes.
 
     **Raises:** `ValueError` where fewer than two lobes are found.

@@ -6,8 +6,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxcam import HybridSystem
-from jaxcam.hybrid import normal_velocity
-from jaxcam.hybrid.surface import normal_directions
+from jaxcam.hybrid.surface import normal_directions, normal_velocity
 
 from ._scalar import one_constraint
 

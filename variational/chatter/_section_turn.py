@@ -8,8 +8,8 @@ import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Bool, Float, Int
 
 from jaxcam import HybridSystem
-from jaxcam.hybrid import normal_velocity
 from jaxcam.hybrid.lowering import while_loop
+from jaxcam.hybrid.surface import normal_velocity
 from jaxcam.parameters import as_arrays
 
 from ._chatter_frame import ChatterFrame, prepared_frame
@@ -62,7 +62,7 @@ def to_section(
     start and the section; `start`, of which time, state and speed are used; `section`,
     a time; `height`, the gap at the start, > 0 in flight.
 
-    **Returns:** a [`variational.Section`][].
+    **Returns:** a [`variational.chatter.Section`][].
     """
     section = jnp.asarray(section, jnp.float64)
 
@@ -115,7 +115,7 @@ def section_turn(system: HybridSystem, state, phase=0.0) -> Section:
     `(2,)`, in flight at time `phase` x period. Pure; may be compiled, batched and
     differentiated forward.
 
-    **Returns:** a [`variational.Section`][].
+    **Returns:** a [`variational.chatter.Section`][].
     """
     check_chatter_system(system)
     return _turn(as_arrays(system), jnp.asarray(state, jnp.float64), phase)

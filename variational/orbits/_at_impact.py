@@ -7,8 +7,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxcam.hybrid import HybridSystem, normal_acceleration, normal_velocity
-from jaxcam.hybrid.surface import gaps, impacts
+from jaxcam.hybrid import HybridSystem
+from jaxcam.hybrid.surface import gaps, impacts, normal_acceleration, normal_velocity
 
 
 class Start(NamedTuple):

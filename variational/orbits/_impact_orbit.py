@@ -9,7 +9,8 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from jaxcam.hybrid import HybridSystem, normal_velocity
+from jaxcam.hybrid import HybridSystem
+from jaxcam.hybrid.surface import normal_velocity
 
 from ._implicit import implicit_root
 from ._links import monodromy_of
@@ -62,7 +63,7 @@ def impact_orbit(system: HybridSystem, guess: ImpactOrbit) -> ImpactOrbit:
 
     **Returns:** a [`variational.orbits.ImpactOrbit`][], NaN where there is none near
     the guess. That its flights stay clear of the constraints is not looked at; see
-    [`variational.clearance`][].
+    [`variational.orbits.clearance`][].
     """
 
     def residual(unknowns):

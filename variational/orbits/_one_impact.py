@@ -5,8 +5,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxcam.hybrid import contact_state, HybridSystem
-from jaxcam.hybrid.surface import contact_acceleration, normal_directions
+from jaxcam.hybrid import HybridSystem
+from jaxcam.hybrid.surface import contact_acceleration, contact_state, normal_directions
 
 from ._impact_orbit import clearance, impact_orbit, ImpactOrbit, orbit_trace
 

@@ -7,15 +7,10 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Complex, Float
 
-from jaxcam.hybrid import (
-    component_sizes,
-    Contacts,
-    HybridSystem,
-    Impacts,
-    Settings,
-    simulate,
-)
+from jaxcam.hybrid import HybridSystem, Settings, simulate
 from jaxcam.hybrid.checks import refuse_tracers
+from jaxcam.hybrid.record import Contacts, Impacts
+from jaxcam.hybrid.sizes import component_sizes
 from jaxcam.parameters import real_array, VectorLike
 
 from ._at_impact import after_and_speeds, Start, start_at_impact
@@ -104,7 +99,7 @@ def orbit_of(
     - `t0`: s.
     - `settings`: accuracy of the run; a tolerance of 1e-12 by default.
     - `closure`: the deviation after one period that is allowed, relative to
-      [`jaxcam.hybrid.component_sizes`][].
+      [`jaxcam.hybrid.sizes.component_sizes`][].
 
     **Returns:** a [`variational.Orbit`][] with its monodromy matrix.
 

@@ -4,7 +4,7 @@ import equinox as eqx
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from jaxcam.hybrid import Contacts, Impacts
+from jaxcam.hybrid.record import Contacts, Impacts
 
 
 #: what ends a piece: nothing (its mode may change), an impact, or the impact after

@@ -8,7 +8,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from jaxcam.hybrid import HybridSystem, Impacts, Trajectory
+from jaxcam.hybrid import HybridSystem, Trajectory
+from jaxcam.hybrid.record import Impacts
 
 from ._flight import flight_nodes
 from ._shooting import Shooting

@@ -18,8 +18,9 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
-from jaxcam.hybrid import component_sizes, HybridSystem, normal_velocity
-from jaxcam.hybrid.surface import gaps, impacts
+from jaxcam.hybrid import HybridSystem
+from jaxcam.hybrid.sizes import component_sizes
+from jaxcam.hybrid.surface import gaps, impacts, normal_velocity
 
 from ._flight import flight_end, flight_nodes
 from ._lowest_gap import gap_or_speed, lowest_times, nodes_of

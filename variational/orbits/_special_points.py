@@ -60,7 +60,7 @@ def orbit_where(
 
     **Arguments:** the system with the parameter near the point, `where` that picks the
     parameter, the orbit near it, and `test(matrix)` with the matrix of
-    [`variational.orbit_monodromy`][].
+    [`variational.orbits.orbit_monodromy`][].
 
     **Returns:** NaN where Newton's method does not converge.
     """
@@ -106,7 +106,7 @@ def graze_of_orbit(
 
     **Returns:** the orbit begins with the graze. NaN where Newton's method does not
     converge. That the gap has a minimum there, not a maximum, and is open elsewhere is
-    not looked at; see [`jaxcam.hybrid.normal_acceleration`][].
+    not looked at; see [`jaxcam.hybrid.surface.normal_acceleration`][].
     """
 
     def speed(shooting, u, system):
@@ -149,7 +149,7 @@ def release_near(
     """Time (s) and state of the release from contact near `t` and `state`.
 
     The root of gap, normal velocity and acceleration, differentiable in all parameters.
-    [`jaxcam.hybrid.release_point`][] finds a place to start from.
+    [`jaxcam.hybrid.surface.release_point`][] finds a place to start from.
     """
 
     def residual(unknowns):

@@ -7,7 +7,7 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
-from ...fitting import Fit, Model, Problem, total_cost
+from ...fitting import Fit, Model, Problem
 from ...fitting.engine import (
     assemble,
     eliminate_states,
@@ -16,6 +16,7 @@ from ...fitting.engine import (
     parameter_places,
     Point,
     state_steps,
+    total_cost,
     Weights,
 )
 from ..policy import Policy

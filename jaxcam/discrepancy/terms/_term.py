@@ -94,9 +94,10 @@ class Term(eqx.Module):
     `acts` follows from these methods.
 
     Class variables: `name`, `sentence` (what it is, in words that go on after "the
-    model lacks"), `where` (a [`jaxcam.discrepancy.Where`][] or its name; by default
-    the first of `acts`), `region` (of the motion, in words), `source` (literature),
-    `listed` (false for one that describes a shape but is not a verdict by itself).
+    model lacks"), `where` (a [`Where`][jaxcam.discrepancy.terms.Where] or its name; by
+    default the first of `acts`), `region` (of the motion, in words), `source`
+    (literature), `listed` (false for one that describes a shape but is not a verdict by
+    itself).
 
     Fields, given by name: `coordinate`, the number of the coordinate (0 for the first)
     that is pushed and whose position and velocity are seen; `constraint`, that of the

@@ -27,6 +27,7 @@ from ._linearise import (
     Layout as Layout,
     Point as Point,
     predict as predict,
+    total_cost as total_cost,
 )
 from ._model import (
     cam_follower_drive as cam_follower_drive,

@@ -172,3 +172,15 @@ def chained(found: LinearPieces) -> Blocks:
     pp = found.pp + jnp.sum(inner, axis=0)
     p = found.p + jnp.sum(found.slope[:, size:] + times(params), axis=0)
     return Blocks(ss, sp, s, product(later, earlier), pp, p)
+
+
+def total_cost(costs: Costs, extras) -> float:
+    """Cost of all pieces by their weights; a joint counts as the less of its two."""
+    before = jnp.concatenate([extras.weight[:, :1], extras.weight[:, :-1]], axis=1)
+    shared = jnp.minimum(extras.weight, before)
+    parts = (
+        jnp.sum(extras.weight * costs.flown),
+        jnp.sum(shared * costs.joints),
+        jnp.sum(extras.rest_weight * costs.rested),
+    )
+    return float(sum(parts))

@@ -53,8 +53,8 @@ def fit_free_fall(
     - `name`: of the parameter, for the report.
     - `steps`: Runge-Kutta steps of order 8 between two samples.
 
-    **Returns:** a [`jaxcam.fitting.PublishedFit`][] whose `model` has the fields
-    `system` and `state`.
+    **Returns:** a [`jaxcam.fitting.published.PublishedFit`][] whose `model` has the
+    fields `system` and `state`.
 
     **Raises:** `ValueError` for times that do not increase.
     """

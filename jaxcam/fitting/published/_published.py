@@ -97,7 +97,7 @@ def fit_published(
     - `start`: values to begin at instead of the nominal ones.
     - `max_steps`: most evaluations at one scale of the errors.
 
-    **Returns:** a [`jaxcam.fitting.PublishedFit`][].
+    **Returns:** a [`jaxcam.fitting.published.PublishedFit`][].
 
     **Raises:** `ValueError` where lengths differ, a tolerance is not positive, or a
     quantity cannot be computed at the start.

@@ -87,7 +87,7 @@ def label(
     """The label of each lane.
 
     **Arguments:** `impacting`: whether impacts are counted; they are not for a map;
-    `tolerance`, `sizes`: as of [`jaxcam.sweeps.periods`][].
+    `tolerance`, `sizes`: as of [`jaxcam.sweeps.attractors.periods`][].
     """
     turns = periods(samples.states, tolerance, sizes)
     index = np.maximum(turns, 1)[:, None] - 1

@@ -8,7 +8,7 @@ import equinox as eqx
 import jax
 import numpy as np
 
-from ...models import system_to_json
+from ...models.saved import system_to_json
 from ..sections import AbstractSection
 
 

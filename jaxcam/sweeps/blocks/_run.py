@@ -71,7 +71,7 @@ def run_blocks(
         damaged are computed again.
     - `executor`: any `concurrent.futures.Executor`; without, `workers` threads, one a
         core if that is not given either. Results do not depend on it.
-    - `progress`: called after each block, with a [`jaxcam.sweeps.Progress`][].
+    - `progress`: called after each block, with a [`jaxcam.sweeps.blocks.Progress`][].
 
     **Raises:** `ValueError` for a folder with something else in it; `RuntimeError`
     where workers were lost. An interruption (Ctrl-C) loses the blocks in work only.

@@ -7,9 +7,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from ...hybrid import component_sizes, HybridSystem
+from ...hybrid import HybridSystem
 from ...hybrid.batch import split_lanes
 from ...hybrid.loop import starts_behind
+from ...hybrid.sizes import component_sizes
 from ...hybrid.surface import contact_state, gaps, least_gaps
 from ...parameters import as_arrays
 from ._samples import BEHIND

@@ -44,8 +44,8 @@ class AbstractSection(eqx.Module):
         - `where`, `values`: `where(system)` picks a parameter, which takes `values[i]`
             in lane i; or a tuple of parameters, which take the row `values[i]`.
 
-        **Returns:** [`jaxcam.sweeps.Samples`][]. A lane that cannot start has the code
-        `BEHIND` and no points.
+        **Returns:** [`jaxcam.sweeps.sections.Samples`][]. A lane that cannot start has
+        the code `BEHIND` and no points.
         """
 
     @abc.abstractmethod

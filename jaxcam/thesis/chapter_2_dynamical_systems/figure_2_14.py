@@ -12,7 +12,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.figure import Figure
 
-from ...filippov import FilippovTrajectory, simulate_filippov, surface_rates
+from ...filippov import FilippovTrajectory, simulate_filippov
+from ...filippov.modes import surface_rates
 from ...models import BeltOscillator, CamFollower
 from ...plotting.colours import CONTACT, FLIGHT, IMPACT
 from ..target import Rows, Target

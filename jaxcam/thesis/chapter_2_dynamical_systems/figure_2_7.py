@@ -4,7 +4,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.figure import Figure
 
-from ...maps import NORMAL_FORMS
+from ...maps.normal_forms import NORMAL_FORMS
 from ...models import CamFollower
 from ...plotting.colours import FLIGHT
 from ..target import Rows, Target

@@ -4,8 +4,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.figure import Figure
 
-from variational import fit_local_map, Lobes
-from variational.chatter import LocalMap
+from variational import fit_local_map
+from variational.chatter import Lobes, LocalMap
 
 from ... import plotting
 from ...models import CamFollower

@@ -8,7 +8,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ... import sweeps
-from ...hybrid import normal_velocity, Settings
+from ...hybrid import Settings
+from ...hybrid.surface import normal_velocity
 from ...models import CamFollower, rpm_to_rad_s
 from ...plotting.colours import FLIGHT
 from ..interruption import beside_interruption

@@ -7,7 +7,8 @@ coefficients multiply powers of 0.34 rad and cancel to a part in a million.
 import jax.numpy as jnp
 import numpy as np
 
-from variational import chatter_frame, find_lobes, fit_local_map, Lobes, scaling_law
+from variational import chatter_frame, find_lobes, fit_local_map, scaling_law
+from variational.chatter import Lobes
 
 from ...models import CamFollower
 from ..interruption import beside_interruption, sticking_state

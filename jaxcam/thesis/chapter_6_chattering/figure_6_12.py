@@ -6,10 +6,10 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.figure import Figure
 
-from ...hybrid import contact_state, normal_acceleration
+from ...hybrid.surface import contact_state, normal_acceleration
 from ...models import CamFollower
-from ...plotting import curve
 from ...plotting.colours import FLIGHT, IMPACT, RECORDED, SECTION
+from ...plotting.curves import curve
 from ..orbits import NEAR_CAM
 from ..remember import remembered
 from ..target import Rows, Target

@@ -9,10 +9,11 @@ from matplotlib.figure import Figure
 
 from variational import impact_map
 
-from ...hybrid import contact_state, simulate, Trajectory
+from ...hybrid import simulate, Trajectory
+from ...hybrid.surface import contact_state
 from ...models import CamFollower
-from ...plotting import curve
 from ...plotting.colours import FLIGHT, IMPACT, RECORDED
+from ...plotting.curves import curve
 from ..orbits import NEAR_CAM
 from ..releases import sticking_time
 from ..remember import remembered

@@ -5,11 +5,11 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.figure import Figure
 
-from variational import hop_ratio
+from variational.chatter import hop_ratio
 
 from ...models import CamFollower
-from ...plotting import curve
 from ...plotting.colours import FLIGHT, IMPACT, SECTION
+from ...plotting.curves import curve
 from ..target import Rows, Target
 from .sequence import sequence, sticking_turn
 

@@ -8,10 +8,10 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.figure import Figure
 
-from ...hybrid import contact_state
+from ...hybrid.surface import contact_state
 from ...models import CamFollower
-from ...plotting import curve
 from ...plotting.colours import FLIGHT, IMPACT
+from ...plotting.curves import curve
 from ..orbits import NEAR_CAM
 from ..target import Rows
 from .sequence import sequence, sticking_turn

@@ -6,7 +6,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.figure import Figure
 
-from variational import composed_map, ComposedMap
+from variational import composed_map
+from variational.chatter import ComposedMap
 
 from ...models import CamFollower
 from ...plotting.colours import FLIGHT, IMPACT

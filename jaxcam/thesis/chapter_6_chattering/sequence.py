@@ -5,8 +5,8 @@ from typing import NamedTuple
 import jax.numpy as jnp
 import numpy as np
 
-from variational import hop_ratio, lambda_map
-from variational.chatter import ChatterFrame
+from variational import lambda_map
+from variational.chatter import ChatterFrame, hop_ratio
 
 from ...hybrid import simulate, Trajectory
 from ...models import CamFollower

@@ -7,7 +7,8 @@ given from release, since the thesis counts them from an arbitrary turn.
 import jax.numpy as jnp
 import numpy as np
 
-from variational import hop_ratio, lambda_map
+from variational import lambda_map
+from variational.chatter import hop_ratio
 
 from ...models import CamFollower
 from ..interruption import accumulation_of, impacts_from_release, reference

@@ -5,8 +5,8 @@ import jax.numpy as jnp
 import numpy as np
 from jax.custom_derivatives import SymbolicZero
 
-from ..hybrid.lowering import saving_jvp
-from ._parameters import parameter, require_finite
+from ...hybrid.lowering import saving_jvp
+from .._parameters import parameter, require_finite
 from ._profile import CamProfile
 
 

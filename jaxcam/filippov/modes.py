@@ -82,7 +82,7 @@ def region(system: FilippovSystem, t, state: Float[Array, " n"]) -> str:
 
 
 def mode_field(system: FilippovSystem, mode, t, state) -> Float[Array, " n"]:
-    """The field in force in a [`jaxcam.filippov.Mode`][]."""
+    """The field in force in a [`jaxcam.filippov.modes.Mode`][]."""
     share = jnp.where(mode == 0, sliding_share(system, t, state), (mode + 1.0) / 2)
     return share * system.above(t, state) + (1 - share) * system.below(t, state)
 

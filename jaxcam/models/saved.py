@@ -24,12 +24,10 @@ import numpy as np
 from ..hybrid import HybridSystem
 from ._bouncing_ball import BouncingBall
 from ._cam_follower import CamFollower
-from ._eccentric_circle import EccentricCircle
-from ._fourier_profile import FourierProfile
 from ._impact_oscillator import ImpactOscillator
 from ._restitution import ConstantRestitution, LinearInSpeed, PowerLawRestitution
-from ._spline_profile import PiecewiseProfile, SplineProfile
 from ._triple_integrator import TripleIntegrator
+from .cams import EccentricCircle, FourierProfile, PiecewiseProfile, SplineProfile
 
 
 _FORMAT, _VERSION = "jaxcam.system", 1

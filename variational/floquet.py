@@ -6,12 +6,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Complex, Float
 
-from jaxcam.hybrid import (
-    HybridSystem,
-    normal_acceleration,
-    normal_velocity,
-    Settings,
-)
+from jaxcam.hybrid import HybridSystem, Settings
+from jaxcam.hybrid.surface import normal_acceleration, normal_velocity
 from jaxcam.parameters import as_arrays
 
 from .orbits import by_product, eigenvalues, Method, Orbit, turn_derivative

@@ -4,7 +4,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from ._parameters import as_parameter, is_concrete, parameter
+from .._parameters import as_parameter, is_concrete, parameter
 from ._profile import CamProfile
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Array, Float, Int, PyTree
 
 from ._eigenvalues import eigenvalues_of
-from ._representation import AbstractRepresentation, Unique
+from .representation import AbstractRepresentation, Unique
 
 
 #: what the eigenvalues of `linearisation` mean

@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
-from ._lemke import lemke, Pivoting
+from .complementarity import lemke, Pivoting
 
 
 _LARGEST = 14

@@ -5,8 +5,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from .._parameters import is_concrete, parameter, require_finite, require_positive
 from ._fourier_profile import FourierProfile
-from ._parameters import is_concrete, parameter, require_finite, require_positive
 from ._profile import CamProfile
 
 

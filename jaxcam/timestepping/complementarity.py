@@ -86,7 +86,7 @@ def lemke(matrix: Float[Array, "m m"], vector: Float[Array, " m"]) -> Pivoting:
 def solve_lcp(
     matrix: Float[ArrayLike, "m m"], vector: Float[ArrayLike, " m"]
 ) -> Float[Array, " m"]:
-    """The z of [`jaxcam.timestepping.lemke`][], or an error.
+    """The z of [`jaxcam.timestepping.complementarity.lemke`][], or an error.
 
     **Raises:** `ValueError` where Lemke's method finds no solution.
     """

@@ -6,8 +6,8 @@ from typing import Any, ClassVar
 import equinox as eqx
 from jaxtyping import Float
 
-from ._predictors import AbstractPredictor, Extrapolation, Tangent
-from ._step_control import AbstractStepControl, EffortAndAngle
+from .predictors import AbstractPredictor, Extrapolation, Tangent
+from .step_control import AbstractStepControl, EffortAndAngle
 
 
 class AbstractAlgorithm(eqx.Module):

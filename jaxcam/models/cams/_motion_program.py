@@ -10,8 +10,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from .._parameters import as_parameter, is_concrete, parameter, require_positive
 from ._motion_law import MOTION_LAWS, MotionLaw
-from ._parameters import as_parameter, is_concrete, parameter, require_positive
 from ._profile import CamProfile
 
 
@@ -25,8 +25,8 @@ class Segment(NamedTuple):
 
     **Arguments:**
 
-    - `law`: a name in [`jaxcam.models.MOTION_LAWS`][], or a
-        [`jaxcam.models.MotionLaw`][].
+    - `law`: a name in [`jaxcam.models.cams.MOTION_LAWS`][], or a
+        [`jaxcam.models.cams.MotionLaw`][].
     - `width`: cam angle that it takes (rad).
     - `rise`: change of the lift over it; negative for a fall, 0 for a dwell.
     """

@@ -7,9 +7,9 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..hybrid.lowering import while_loop
-from ._modes import first_mode
 from ._step import attempt, DONE, in_mode, LoopState, RUNNING
 from ._system import FilippovSystem
+from .modes import first_mode
 
 
 #: attempts between two looks from Python
