@@ -10,6 +10,7 @@ import collections
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jax.interpreters import partial_eval
 
 import jaxcam  # noqa: F401  64-bit floats
@@ -78,22 +79,22 @@ def part_of(equation) -> str:
 
 
 def attempts(rpm: float = 145.0, settled: int = 50, turns: int = 100) -> str:
-    """In a turn of the settled motion, which is P(oo,1), and what happens in it."""
+    """In a turn of the settled motion, which is P(oo,1), and what happens in it.
+
+    Steps remember the lengths before them: how many there are depends on the start.
+    """
     system = CamFollower(speed=rpm_to_rad_s(rpm))
-    start = [0.27, 0.0]
+    starts = np.stack([np.linspace(0.26, 0.3, 8), np.zeros(8)], axis=1)
     settings = Settings(tolerance=1e-9, chatter_depth=1.0)
     first, both = (
-        stroboscope(system, [start], number, settings=settings)
+        stroboscope(system, starts, number, settings=settings)
         for number in (settled, settled + turns)
     )
-    steps, impacts = (
-        float(getattr(both, name)[0] - getattr(first, name)[0]) / turns
-        for name in ("steps", "impacts")
-    )
-    contacts = both.rests[0, settled:].mean()
+    steps = (both.steps - first.steps) / turns
+    hits, rests = both.hits[:, settled:].mean(), both.rests[:, settled:].mean()
     return (
-        f"at {rpm:g} rpm: {steps:.1f} attempts a turn for {impacts:.1f} impacts and "
-        f"{contacts:.1f} contacts"
+        f"{rpm:g} rpm: {steps.min():g} to {steps.max():g} attempts a turn for "
+        f"{hits:g} impacts and {rests:g} contacts"
     )
 
 
