@@ -3,22 +3,23 @@
     python -m benchmarks.operations
 
 Counts the program of one attempt on the cam-follower, before the compiler fuses it.
-Divisions and square roots cost several additions each.
+Divisions and square roots cost several additions each. Then the attempts of a turn.
 """
 
 import collections
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jax.interpreters import partial_eval
 
 import jaxcam  # noqa: F401  64-bit floats
-from jaxcam.hybrid import Settings
+from jaxcam.hybrid import Settings, stroboscope
 from jaxcam.hybrid.loop._advance import Plan
 from jaxcam.hybrid.loop._functions import Functions
 from jaxcam.hybrid.loop._iterate import iterate
 from jaxcam.hybrid.loop._loop_state import first_state
-from jaxcam.models import CamFollower
+from jaxcam.models import CamFollower, rpm_to_rad_s
 
 
 #: function of the loop that an operation is called from, the innermost first
@@ -77,6 +78,26 @@ def part_of(equation) -> str:
     return next((PARTS[name] for name in names if name in PARTS), OTHER)
 
 
+def attempts(rpm: float = 145.0, settled: int = 50, turns: int = 100) -> str:
+    """In a turn of the settled motion, which is P(oo,1), and what happens in it.
+
+    Steps remember the lengths before them: how many there are depends on the start.
+    """
+    system = CamFollower(speed=rpm_to_rad_s(rpm))
+    starts = np.stack([np.linspace(0.26, 0.3, 8), np.zeros(8)], axis=1)
+    settings = Settings(tolerance=1e-9, chatter_depth=1.0)
+    first, both = (
+        stroboscope(system, starts, number, settings=settings)
+        for number in (settled, settled + turns)
+    )
+    steps = (both.steps - first.steps) / turns
+    hits, rests = both.hits[:, settled:].mean(), both.rests[:, settled:].mean()
+    return (
+        f"{rpm:g} rpm: {steps.min():g} to {steps.max():g} attempts a turn for "
+        f"{hits:g} impacts and {rests:g} contacts"
+    )
+
+
 def main() -> None:
     counts, slow = collections.Counter(), collections.Counter()
     for name, equation in operations(program()):
@@ -92,6 +113,7 @@ def main() -> None:
     for part, number in counts.most_common():
         print(f"| {part} | {number} | {number / total:.0%} | {slow[part]} |")
     print(f"| all | {total} | | {slow.total()} |")
+    print(attempts())
 
 
 if __name__ == "__main__":

@@ -175,7 +175,7 @@ def follow_batch(
     signs = np.broadcast_to(np.asarray(direction, float), (lanes,))
     lane = run_lanes(
         problem, algorithm, given, axes, leaf, z, signs, np.asarray(low),
-        np.asarray(high), as_traced(settings), settings.max_iterations, points,
+        np.asarray(high), as_traced(settings), points,
     )  # fmt: skip
     lane = jax.tree.map(np.asarray, lane)
     passed = lane.passed

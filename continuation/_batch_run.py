@@ -76,16 +76,14 @@ class Axes(eqx.Module):
 
 @eqx.filter_jit
 def run_lanes(
-    problem, algorithm, given, axes, leaf, z, signs, low, high, s, max_iterations,
-    points,
+    problem, algorithm, given, axes, leaf, z, signs, low, high, s, points,
 ):  # fmt: skip
     """All branches to their ends.
 
     **Arguments:** the problem, and an algorithm that predicts from one point;
     parameters `given` to the problem, which differ between lanes by `axes`, and the
     `leaf` that is followed; for each lane a point `z` and the sign of its direction;
-    bounds; settings, whose numbers are traced but for `max_iterations`; and how many
-    `points` at most.
+    bounds; settings from `as_traced`; and how many `points` at most.
 
     **Returns:** the last `Lane` of each branch.
     """
@@ -127,8 +125,8 @@ def run_lanes(
         across = jnp.zeros_like(a.z).at[-1].set(1.0 / width)
         normal = jnp.where(lands, across, algorithm.normal(tangent) / a.scale)
         b = correct_(
-            current, leaf, guess, normal, a.tangent, width, s.tolerance, max_iterations,
-            False,
+            current, leaf, guess, normal, a.tangent, width, s.tolerance,
+            s.max_iterations, False,
         )  # fmt: skip
         z = b.z.at[-1].set(jnp.where(lands, bound, b.z[-1]))
         b = with_field(b, "z", z)

@@ -1,7 +1,8 @@
 """Numbers that decide how a branch is walked, not what it is."""
 
+import dataclasses
+
 import equinox as eqx
-import jax
 import numpy as np
 
 
@@ -65,9 +66,25 @@ class Settings(eqx.Module):
             )
 
 
+#: what a batch does not use: it is told its number of points, and special points are
+#: located when a lane is looked at
+_NOT_OF_A_BATCH = ("max_points", "special", "localise")
+
+
 def as_traced(settings: Settings) -> Settings:
-    """The same with its floats as arrays, which one compiled program takes as they come
-    (a `Settings` with traced numbers is not checked again)."""
-    return jax.tree.map(
-        lambda x: np.asarray(x) if isinstance(x, float) else x, settings
-    )
+    """The settings of a batch, whose compiled program takes them as they come.
+
+    Numbers are arrays (not checked again) but for `max_iterations`, which the loop of
+    the corrector wants as an integer of Python's; what a batch does not use has its
+    default. So only `max_iterations` compiles another program.
+    """
+    unused = {name: getattr(Settings, name) for name in _NOT_OF_A_BATCH}
+    settings = dataclasses.replace(settings, **unused)
+    fixed = (*_NOT_OF_A_BATCH, "max_iterations")
+    traced = [f.name for f in dataclasses.fields(settings) if f.name not in fixed]
+
+    def numbers(s: Settings) -> list:
+        return [getattr(s, name) for name in traced]
+
+    arrays = [np.asarray(x, float) for x in numbers(settings)]
+    return eqx.tree_at(numbers, settings, arrays)

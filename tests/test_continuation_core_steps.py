@@ -95,6 +95,41 @@ def test_batch_takes_the_steps_of_a_branch(algorithm):
         assert steps == pytest.approx(Short.kept)
 
 
+def test_settings_of_a_batch_share_a_program():
+    """Tracing asks for the vector field; all settings but one do without it."""
+    asked = []
+
+    def counted(u, parameters):
+        asked.append(u)
+        return parabola(u, parameters)
+
+    problem = continuation.Equilibrium(counted, {"mu": 1.0})
+
+    def follow(**changes):
+        before = len(asked)
+        batch = continuation.follow_batch(
+            problem, [[-1.0]], mu, (-1.0, 2.0),
+            settings=Settings(**changes), direction=-1, points=200,
+        )  # fmt: skip
+        return int(batch.count[0]), len(asked) > before
+
+    plain, traced = follow()
+    assert traced
+    unused = {"max_points": 3, "special": False, "localise": "bracket"}
+    assert follow(**unused) == (plain, False)
+    # the program takes these as they come, and uses them
+    for changes in (
+        {"tolerance": 1e-6},
+        {"iterations": 1},
+        {"step": 1e-3},
+        {"max_step": 1},
+        {"angle": 1e-3},
+    ):
+        count, traced = follow(**changes)
+        assert count != plain and not traced
+    assert follow(max_iterations=9) == (plain, True)
+
+
 def test_what_a_batch_cannot_follow_with_is_said():
     problem = continuation.Equilibrium(parabola, {"mu": 1.0})
     for algorithm, words in (

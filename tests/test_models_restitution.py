@@ -12,29 +12,7 @@ from jaxcam.models import (
     rad_s_to_rpm,
     rpm_to_rad_s,
 )
-
-
-# Table 5.2 as printed: speed (rpm) and two multipliers of the orbit P(1,1)
-TABLE_5_2 = [
-    (135.946698873817, 0.212856564951, 0.996008664393),
-    (135.946850039257, 0.214199564174, 0.989769009976),
-    (135.947353924057, 0.216351137284, 0.979943000383),
-    (135.949033540057, 0.220281698370, 0.962513414400),
-    (135.951832900057, 0.224549930832, 0.944309362903),
-    (
-        147.941373499943,
-        -0.467436119698 - 0.300839993821j,
-        -0.467436119698 + 0.300839993821j,
-    ),
-    (
-        148.962048199932,
-        -0.521622451717 - 0.214489798539j,
-        -0.521622451717 + 0.214489798539j,
-    ),
-    (150.186857839919, -0.467765740979, -0.703735852712),
-    (151.656629407902, -0.353243069838, -0.970265166132),
-    (153.420355289483, -0.297944998464, -1.206154145399),
-]
+from jaxcam.thesis.chapter_5_bifurcations.table_5_2 import PRODUCTS, SPEEDS
 
 
 def test_units_are_inverse_and_a_turn_a_second_is_sixty_rpm():
@@ -45,10 +23,9 @@ def test_units_are_inverse_and_a_turn_a_second_is_sixty_rpm():
 
 def test_linear_law_is_the_one_behind_table_5_2():
     law = LinearInSpeed()
-    for speed, first, second in TABLE_5_2:
-        r = np.sqrt(np.real(first * second))
+    for speed, product in zip(SPEEDS, PRODUCTS, strict=True):
         # dimensionless; the defaults carry eight decimals
-        assert abs(law(rpm_to_rad_s(speed), 0.1) - r) < 6e-7
+        assert abs(law(rpm_to_rad_s(speed), 0.1) - np.sqrt(product)) < 6e-7
 
 
 def test_linear_law_stays_between_zero_and_one():

@@ -11,9 +11,10 @@ import optimistix as optx
 from jaxcam.hybrid import flow, HybridSystem, Settings, simulate, stroboscope
 from jaxcam.hybrid.checks import check_start
 from jaxcam.hybrid.sizes import component_sizes
+from jaxcam.hybrid.surface import gaps
 from jaxcam.parameters import as_arrays, real_array, VectorLike
 from variational import Orbit, orbit_of
-from variational.orbits import flown, refuse, seed, Shooting
+from variational.orbits import flown, gap_sizes, refuse, seed, Shooting
 
 from .._program import solve
 from .._settings import Settings as WalkSettings
@@ -24,6 +25,10 @@ from ._shooting import ImpactingOrbits
 _TURNS, _LOOKED = 400, 64
 #: motions are called equal when they differ by less than this, relative to their size
 _SAME = 1e-7
+#: times are equal that differ by less than this of the period
+_SAME_TIME = 1e-9
+#: a gap is closed up to this, relative to its size
+_CLOSED = 1e-9
 
 
 def periodic_orbit(
@@ -211,7 +216,7 @@ def _by_shooting(system, guess, length, number, t0, settings):
             state = turn.final
         return None, f"the motion from the guess sticks, and {why}"
     start, count, why = float(t0), int(turn.impacts.count), None
-    if not count or not _touches(system, guess, start):
+    if not count or not _touches(system, guess, start, length):
         orbit, why = _with_impacts_of(system, turn, number, start, settings)
         if orbit is not None:
             return orbit, None
@@ -248,10 +253,11 @@ def _with_impacts_of(system, turn, number, t0, settings):
     return _confirmed(system, state, time, length, settings)
 
 
-def _touches(system, state, t0) -> bool:
+def _touches(system, state, t0, length) -> bool:
     """Whether a gap is closed, up to rounding."""
-    gap = float(jnp.min(jnp.atleast_1d(system.gap(jnp.asarray(t0), state))))
-    return gap <= 1e-9 * (1 + float(jnp.max(jnp.abs(state))))
+    t0 = jnp.asarray(t0)
+    sizes = gap_sizes(system, t0, state, jnp.asarray(length))
+    return bool(jnp.any(gaps(system, t0, state) <= _CLOSED * sizes))
 
 
 def _by_flow(system, guess, length, number, t0, settings):
@@ -268,14 +274,18 @@ def _by_flow(system, guess, length, number, t0, settings):
 
 @eqx.filter_jit
 def _root(system, guess, t0, length, settings):
-    def moved(x, _):
-        return flow(system, x, t0, t0 + length, settings=settings).state - x
+    sizes = component_sizes(system, t0, guess, length)
+    # a component that stays zero has no size
+    sizes = jnp.where(sizes > 0, sizes, 1.0)
 
-    found = optx.root_find(
-        moved, optx.Newton(rtol=1e-9, atol=1e-9), guess, max_steps=30, throw=False
-    )
+    def moved(y, _):
+        x = y * sizes
+        return (flow(system, x, t0, t0 + length, settings=settings).state - x) / sizes
+
+    newton = optx.Newton(rtol=1e-9, atol=1e-9)
+    found = optx.root_find(moved, newton, guess / sizes, max_steps=30, throw=False)
     good = found.result == optx.RESULTS.successful
-    return found.value, good & jnp.all(jnp.isfinite(found.value))
+    return found.value * sizes, good & jnp.all(jnp.isfinite(found.value))
 
 
 def _at(equations: Shooting, u, system, t0):
@@ -286,10 +296,11 @@ def _at(equations: Shooting, u, system, t0):
     if equations.periods == 0:
         t0 = starts[0, 0] + (ends[0] - starts[0, 0]) / 2
     # the latest start of a flight at or before t0, some periods away
-    ago = np.mod(t0 - starts[:, 0], length)
+    same = _SAME_TIME * length
+    ago = np.mod(t0 + same - starts[:, 0], length) - same
     last = int(np.argmin(ago))
     begin = starts[last, 0]
-    if ago[last] < 1e-9 * length:
+    if ago[last] < same:
         # t0 is the time of an impact: half a flight later
         time = begin + (ends[last] - begin) / 2
         t0 = t0 + (time - begin)

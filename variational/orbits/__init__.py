@@ -6,6 +6,7 @@ What `continuation` and `jaxcam.fitting` build on; the face of it is `variationa
 from ._admissible import inadmissible as inadmissible, refuse as refuse
 from ._at_grazing import multipliers_at_grazing as multipliers_at_grazing
 from ._flight import flight_end as flight_end, flight_nodes as flight_nodes
+from ._gap_sizes import gap_sizes as gap_sizes
 from ._impact_orbit import (
     clearance as clearance,
     impact_orbit as impact_orbit,

@@ -10,6 +10,12 @@ import numpy as np
 from jaxcam.hybrid import HybridSystem
 from jaxcam.hybrid.surface import gaps, impacts, normal_acceleration, normal_velocity
 
+from ._gap_sizes import gap_sizes
+
+
+# what rounding leaves of a gap or a speed of zero, relative to their sizes
+_ZERO = 1e-11
+
 
 class Start(NamedTuple):
     """The impact that an orbit starts at."""
@@ -21,13 +27,14 @@ class Start(NamedTuple):
     window: float
 
 
-def start_at_impact(system: HybridSystem, t, state) -> Start | None:
+def start_at_impact(system: HybridSystem, t, state, period) -> Start | None:
     """The impact at `state`, or nothing where no constraint is touched with a speed."""
-    # as an array: a number would be compiled in
-    t = jnp.asarray(t, dtype=jnp.float64)
-    gap, speed, fall, after = map(np.asarray, _look(system, t, state))
-    tiny = 1e-12 * (1 + float(np.max(np.abs(state))))
-    touching = np.flatnonzero((np.abs(gap) <= tiny) & (np.abs(speed) > tiny))
+    # as arrays: numbers would be compiled in
+    t, period = (jnp.asarray(x, dtype=jnp.float64) for x in (t, period))
+    gap, speed, fall, after, size = map(np.asarray, _look(system, t, state, period))
+    closed = np.abs(gap) <= _ZERO * size
+    moves = np.abs(speed) > _ZERO * size * 2 * np.pi / float(period)
+    touching = np.flatnonzero(closed & moves)
     if not len(touching):
         return None
     side = int(touching[0])
@@ -39,12 +46,13 @@ def start_at_impact(system: HybridSystem, t, state) -> Start | None:
 
 
 @eqx.filter_jit
-def _look(system, t, state):
+def _look(system, t, state, period):
     return (
         gaps(system, t, state),
         normal_velocity(system, t, state),
         normal_acceleration(system, t, state),
         impacts(system, t, state),
+        gap_sizes(system, t, state, period),
     )
 
 

@@ -11,7 +11,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import ArrayLike, Float, Int
 
 from jaxcam.hybrid import HybridSystem
 
@@ -30,7 +30,7 @@ class Knots(NamedTuple):
     rows: Float[np.ndarray, "k n1"]
     #: (k, n) state just before
     before: Float[np.ndarray, "k n"]
-    #: largest miss of a flight before the first step
+    #: largest miss of a flight before the first step, relative to the scale
     miss: float
 
 
@@ -39,9 +39,11 @@ def close(
     rows: Float[np.ndarray, "k n1"],
     sides: Int[np.ndarray, " k"],
     period,
+    scale: Float[ArrayLike, " n1"],
 ) -> Knots:
     """Improve the impacts of an orbit without contact; unchanged where that fails.
 
+    `scale` is what a gap and the components of a state are small or large beside.
     The states before impacts are those on arrival of the flights.
 
     By flights of adaptive steps, so that the number of impacts is all that programs
@@ -56,7 +58,7 @@ def close(
     following = np.where(real, (np.arange(length) + 1) % number, np.arange(length))
     # as an array: a number would be compiled in
     span = np.asarray(period, dtype=float)
-    made = _newton(system, rows[fill], sides[fill], real, following, span)
+    made = _newton(system, rows[fill], sides[fill], real, following, span, scale)
     improved, arrived, misses = map(np.asarray, made)
     first, last = map(float, misses)
     better = np.isfinite(last) and last <= first
@@ -66,7 +68,7 @@ def close(
 
 
 @eqx.filter_jit
-def _newton(system, rows, sides, real, following, period):
+def _newton(system, rows, sides, real, following, period, scale):
     system = system.prepared()
     # the last real row is followed by the first one, a period later
     wraps = jnp.where(real & (following <= jnp.arange(len(rows))), period, 0.0)
@@ -103,7 +105,9 @@ def _newton(system, rows, sides, real, following, period):
 
     def judged(rows):
         _, before, miss = linear(rows)
-        return before, jnp.max(jnp.abs(miss))
+        size = jnp.abs(miss) / scale[None, :]
+        # a component that is always zero has no size
+        return before, jnp.max(jnp.where(miss == 0, 0.0, size))
 
     rows = jnp.asarray(rows)
     better = jax.lax.fori_loop(0, _STEPS, newton, rows)

@@ -15,6 +15,7 @@ from jaxcam.parameters import real_array, VectorLike
 
 from ._at_impact import after_and_speeds, Start, start_at_impact
 from ._closing import close, Knots
+from ._gap_sizes import gap_sizes
 from ._multipliers import eigenvalues
 from ._pieces import cut, Pieces
 from ._turn_derivative import by_product, flown
@@ -124,12 +125,14 @@ def orbit_of(
     sizes = component_sizes(system, t0, state, period)
     away = jnp.abs(turn.final - state)
     miss = float(jnp.max(jnp.where(away > 0, away / sizes, 0.0)))
-    start = start_at_impact(system, t0, state)
+    start = start_at_impact(system, t0, state, period)
     polished = int(contacts.count) == 0 and (
         start is not None or int(impacts.count) > 0
     )
     if polished:
-        knots, sides = _knots(system, impacts, start, t0, period)
+        heights = gap_sizes(system, t0, state, period)
+        scale = jnp.concatenate([jnp.min(heights)[None], sizes])
+        knots, sides = _knots(system, impacts, start, t0, period, scale)
         if start is not None:
             t0 = _half_a_flight_on(knots, t0, period)
             miss = knots.miss
@@ -166,7 +169,7 @@ def _check_closure(miss, closure, period) -> None:
         )
 
 
-def _knots(system, impacts: Impacts, start: Start | None, t0, period):
+def _knots(system, impacts: Impacts, start: Start | None, t0, period, scale):
     """The impacts as a boundary value problem, and which constraints they hit."""
     time, after = np.asarray(impacts.time), np.asarray(impacts.after)
     sides = np.asarray(impacts.constraint)
@@ -177,7 +180,7 @@ def _knots(system, impacts: Impacts, start: Start | None, t0, period):
         after = np.concatenate([start.after[None], after[other]])
         sides = np.append(start.constraint, sides[other])
     rows = np.concatenate([time[:, None], after], axis=1)
-    return close(system, rows, sides, period), sides
+    return close(system, rows, sides, period, scale), sides
 
 
 def _half_a_flight_on(knots: Knots, t0, period) -> float:

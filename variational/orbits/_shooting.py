@@ -19,10 +19,10 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
 from jaxcam.hybrid import HybridSystem
-from jaxcam.hybrid.sizes import component_sizes
 from jaxcam.hybrid.surface import gaps, impacts, normal_velocity
 
 from ._flight import flight_end, flight_nodes
+from ._gap_sizes import gap_sizes
 from ._lowest_gap import gap_or_speed, lowest_times, nodes_of
 
 
@@ -142,14 +142,9 @@ class Shooting(eqx.Module):
         speeds = jnp.zeros(0)
         if self.constraints:
             speeds = self.speeds(system, ends, states[:, -1])
-        size = self._gap_size(u, system, starts[0, 0], starts[0, 1:])
+        start, period = starts[0], self.period(u, system)
+        size = jnp.min(gap_sizes(system, start[0], start[1:], period))
         return Seen(lowest, speeds, jnp.max(wrong), size, times, states)
-
-    def _gap_size(self, u, system: HybridSystem, time, state) -> Float[Array, ""]:
-        """The change of a gap, when each component changes by its size; the least."""
-        sizes = component_sizes(system, time, state, self.period(u, system))
-        slopes = jax.jacfwd(lambda x: gaps(system, time, x))(state)
-        return jnp.min(jnp.abs(slopes) @ sizes)
 
     def approach(self, u, system: HybridSystem) -> Float[Array, " m"]:
         """Approach speed of each impact; differentiable."""

@@ -21,13 +21,10 @@ class ImpactSection(AbstractSystemSection):
 
     **Arguments:**
 
-    - `system`: a [`jaxcam.hybrid.HybridSystem`][].
+    - `system`, `period`, `lanes`, `max_steps`: as of [`jaxcam.sweeps.Stroboscopic`][].
     - `t0`: s, where motions start.
-    - `period`: s, length of a turn; the system's own forcing period by default.
     - `settings`: accuracy; by default a tolerance of 1e-9 and chatter listed down to a
         hundredth of the fastest rebound.
-    - `lanes`: how many motions advance together in one compiled program.
-    - `max_steps`: budget of attempted steps of a lane.
     """
 
     system: HybridSystem

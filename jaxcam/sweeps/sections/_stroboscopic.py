@@ -16,7 +16,7 @@ class Stroboscopic(AbstractSystemSection):
 
     - `system`: a [`jaxcam.hybrid.HybridSystem`][].
     - `t0`: s, where motions start; its phase is that of the samples.
-    - `period`: s; the system's own forcing period by default.
+    - `period`: s, length of a turn; the system's own forcing period by default.
     - `settings`: accuracy; by default a tolerance of 1e-9 and chatter completed as soon
         as theory allows.
     - `lanes`: how many motions advance together in one compiled program.

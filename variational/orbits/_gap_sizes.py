@@ -1,0 +1,29 @@
+"""How large each gap of a motion is, for comparisons that know no units."""
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, ArrayLike, Float
+
+from jaxcam.hybrid import HybridSystem
+from jaxcam.hybrid.sizes import component_sizes
+from jaxcam.hybrid.surface import gaps
+
+
+def gap_sizes(
+    system: HybridSystem,
+    t: Float[ArrayLike, ""],
+    state: Float[ArrayLike, " n"],
+    period: Float[ArrayLike, ""],
+) -> Float[Array, " m"]:
+    """What each gap is small or large beside, in its units.
+
+    Its change, at most, where each component of the state changes by
+    [`jaxcam.hybrid.sizes.component_sizes`][].
+
+    **Arguments:** time (s), state `(n,)`, and the period of the motion (s).
+
+    **Returns:** shape `(m,)`, for each constraint.
+    """
+    sizes = component_sizes(system, t, state, period)
+    slopes = jax.jacfwd(lambda x: gaps(system, t, x))(jnp.asarray(state))
+    return jnp.abs(slopes) @ sizes
