@@ -133,7 +133,7 @@ def rig_question(
         rig.references,
         tuple(run.recording for run in cut),
         rig.sensors.cam_floor,
-        {"stiffness": stiffness},
+        shown={"stiffness": stiffness},
     )
 
 
