@@ -34,6 +34,7 @@ from ._reverse import (
     Trained as Trained,
 )
 from ._score import linearise as linearise, Linearised as Linearised
+from ._segment_by_model import segment_by_model as segment_by_model
 from ._setup import Setup as Setup
 from ._unconstrained import Unconstrained as Unconstrained
 from .engine import (

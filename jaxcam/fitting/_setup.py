@@ -1,9 +1,10 @@
 """A rig of any kind: its system, what is measured of it, and what is known of it."""
 
 import dataclasses
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
-from ..recordings import Recording, References, Segments
+from ..recordings import Recording, Segments
+from ._segment_by_model import segment_by_model
 from .engine import Input, Model, Parameter, Problem
 
 
@@ -14,14 +15,15 @@ class Setup:
     - `model`: the system at its nominal values, with its sensors and its drive.
     - `parameters`: what is fitted, each within its tolerance.
     - `drive_channel`: of the encoder of a turning drive (rad), or `None`.
-    - `references`: constants of the forms of missing physics, in the units of the
-        motion; `None` where the file says nothing of them.
+    - `references`: constants of the forms of missing physics that are stated, by the
+        names of fields of `jaxcam.recordings.References`, in the units of the motion;
+        the others follow its speeds.
     """
 
     model: Model
     parameters: tuple[Parameter, ...] = ()
     drive_channel: str | None = None
-    references: References | None = None
+    references: Mapping[str, float] = dataclasses.field(default_factory=dict)
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -42,8 +44,6 @@ class Setup:
         cut = tuple(run for run in runs if isinstance(run, Segments))
         if len(cut) == len(runs):
             return cut
-        from ._segment_by_model import segment_by_model
-
         whole = [run.recording if isinstance(run, Segments) else run for run in runs]
         return segment_by_model(
             self.model, whole, self.parameters, drive_channel=self.drive_channel

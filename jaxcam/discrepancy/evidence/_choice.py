@@ -83,5 +83,6 @@ def _left(question: Question, trials: Trials, trial: Trial) -> list[Structure]:
         trials.scan(trial.names),
         question.turned,
         question.references,
+        question.unit,
         trials.policy,
     )

@@ -105,22 +105,28 @@ def structures(
     scan: Periodogram,
     turned: bool,
     references: References,
+    unit: str,
     policy: Policy,
 ) -> list[Structure]:
     """Everything that the residuals of a fit are asked for, largest excess first.
 
     **Arguments:** the fit, what a force would gain beside it, terms that describe but
     are no verdicts, the periodogram of what is left, whether there is a drive, the
-    constants of forms, and the policy.
+    constants of forms, the unit of the motion, and the policy.
     """
     problem = found.problem
     more: tuple[Term, ...] = (
         *unlisted,
-        *shapes(*_ranges(problem, policy), turned=turned, references=references),
+        *(
+            dataclasses.replace(shape, motion_unit=unit)
+            for shape in shapes(
+                *_ranges(problem, policy), turned=turned, references=references
+            )
+        ),
     )
     # a force needs no program of its own
-    forces = [t for t in more if t.acts == (Where.FLIGHT,)]
-    others = [t for t in more if t.acts != (Where.FLIGHT,)]
+    forces = [t for t in more if t.acts == (Where.FLIGHT,) and t.coordinate == 0]
+    others = [t for t in more if not any(t is force for force in forces)]
     wide = extended(problem, others, found.point)
     tests = len(more) + 2
     made = []
@@ -197,7 +203,7 @@ def _function(
     spread = basis * scale
     error = np.sqrt(np.maximum(np.einsum("kp,pq,kq->k", spread, covariance, spread), 0))
     return {
-        "unit": term.unit,
+        "unit": term.written(term.unit),
         "variable": term.variable,
         "quantity": term.quantity,
         "grid": grid,
@@ -268,10 +274,12 @@ def _coloured(found: Fit, tests: int, policy: Policy) -> Structure:
 def _ranges(problem: Problem, policy: Policy):
     """Least and largest position, velocity and approach speed, and the duration."""
     states = np.asarray(problem.start.states)[np.asarray(problem.pieces.exists)]
-    position, velocity = states[:, 0], states[:, 1]
-    position = np.concatenate(
-        [part.recording[part.channel] for part in problem.segments]
-    )
+    place, rate = problem.model.system.coordinates[0]  # pyright: ignore
+    channels = [n for n, s in problem.model.sensors.items() if s.observe == place]
+    position, velocity = states[:, place], states[:, rate]
+    if channels:
+        name = channels[0]
+        position = np.concatenate([p.recording[name] for p in problem.segments])
     speeds = np.concatenate([part.impacts.approach for part in problem.segments])
     speeds = speeds[np.isfinite(speeds) & (speeds > 0)]
     top = float(np.max(speeds, initial=_SLOWEST))

@@ -143,7 +143,7 @@ class Diagnosis:
             angle, rate = (jnp.asarray(x) for x in (0.0, drive.speed))
             system = model.driven(0.0, angle, rate)
         base = system.base  # pyright: ignore
-        return WithTerms(base, tuple(terms)) if terms else base
+        return WithTerms(base, tuple(terms), system.coordinates) if terms else base
 
     @property
     def records(self) -> tuple[str, ...]:

@@ -34,7 +34,7 @@ def extended(problem: Problem, terms: Sequence[Term], at: Point) -> Problem:
     model: Model = eqx.tree_at(
         lambda m: m.system,
         problem.model,
-        WithTerms(system.base, (*system.terms, *terms)),
+        WithTerms(system.base, (*system.terms, *terms), system.coordinates),
     )
     more = [p for k, t in enumerate(terms) for p in t.parameters(before + k)]
     parameters = (*problem.parameters, *more)

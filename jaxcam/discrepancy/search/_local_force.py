@@ -17,6 +17,7 @@ from ...fitting import Problem
 from ...fitting.engine import (
     chained,
     eliminate_states,
+    filtered_channels,
     free_columns,
     linear_pieces,
     LinearPieces,
@@ -106,8 +107,9 @@ def force_response(problem: Problem, point: Point, free: Sequence[str]) -> Respo
 def force_blocks(problem: Problem, response: Response, terms: Sequence[Term]) -> Blocks:
     """Score and information of the free parameters and of terms that act in flight.
 
-    **Arguments:** terms that are not in the problem, linear in their strengths; the
-    rows of their strengths come after those of the free parameters, in order.
+    **Arguments:** terms that are not in the problem, linear in their strengths, and
+    that push the first coordinate; the rows of their strengths come after those of the
+    free parameters, in order.
     """
     strengths = [p for k, term in enumerate(terms) for p in term.parameters(k)]
     scale = np.array([p.scale for p in strengths], dtype=float)
@@ -179,7 +181,11 @@ def _linear(layout, pieces, extras, point, columns, scales, nodes) -> LinearPiec
         def model_at(change, start, step):
             model = layout.at(values.at[columns].add(change[:size] * scales))
             force = LocalForce(change[size:], start, step / 2)
-            system = WithTerms(model.system.base, (*model.system.terms, force))
+            system = WithTerms(
+                model.system.base,
+                (*model.system.terms, force),
+                model.system.coordinates,
+            )
             return eqx.tree_at(lambda m: m.system, model, system)
 
         return linear_pieces(model_at, pieces, extras, states, size + nodes)
@@ -193,13 +199,15 @@ def _forces(layout, pieces, point, terms) -> Float[Array, "r k l p"]:
     """Acceleration by a unit of each strength, at the nodes of every piece."""
 
     def piece(model, state, start, step, angle, rate):
+        size = state.shape[0] - len(filtered_channels(model))
+
         def advance(x, inputs):
             number, a, w = inputs
             t = start + (number + jnp.array([0.0, 0.5, 1.0])) * step
             system = model.driven(t[1], a, w)
             middle, _ = runge_kutta(model, system, t[0], x, step / 2)
             end, _ = runge_kutta(model, system, t[1], middle, step / 2)
-            states = jnp.stack([x, middle, end])
+            states = jnp.stack([x, middle, end])[:, :size]
             return end, jax.vmap(lambda t, x: _slopes(terms, system, t, x))(t, states)
 
         numbers = jnp.arange(angle.shape[0], dtype=float)
@@ -218,7 +226,7 @@ def _forces(layout, pieces, point, terms) -> Float[Array, "r k l p"]:
 
 def _slopes(terms, system, t, state):
     """Derivatives of the terms' accelerations to their strengths, shape `(p,)`."""
-    motion = system.motion(t, state)
+    motion = system.motion(t, state, field=system.base.vector_field(t, state))
 
     def total(terms):
         return sum(term.acceleration(motion) for term in terms)

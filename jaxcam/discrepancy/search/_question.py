@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
+from jaxtyping import Float
 
 from ...fitting import (
     cam_follower_model,
@@ -29,12 +30,16 @@ from ...recordings import (
 )
 from ...recordings.files import check_channels, check_drive, unit_of
 from ..policy import Policy
-from ..terms import base_drive, library, SensorTerm, Term, WithTerms
+from ..terms import base_drive, coordinates, library, SensorTerm, Term, WithTerms
 
 
 _FOLLOWER = "follower_angle_rad"
 # Angles at which the nominal cam is looked up, to check the sign of a recording
 _ANGLES = 64
+
+# Share of the speeds of a motion below its fast ones, and that speed (rad/s) of the
+# thesis' cam-follower, for which the constants of the forms are stated
+_FAST, _THESIS_FAST = 0.95, 2.0
 
 Report = Callable[[str, float | None], None]
 
@@ -166,9 +171,12 @@ def system_question(
     drive: Turning | Input | None,
     report: Report,
     policy: Policy,
-    references: References | None = None,
+    references: Mapping[str, float] = {},
 ) -> Question:
-    """The question of any system with one coordinate.
+    """The question of any system; terms act on its first coordinate and first gap.
+
+    **Arguments:** `references`: constants of the forms, those that are stated; the
+    others follow the speeds of the motion.
 
     **Raises:** `ValueError` for recordings that are not cut, or without sensors.
     """
@@ -183,18 +191,23 @@ def system_question(
                 "Cut the recordings first: `jaxcam.recordings.segment(recording, "
                 "channel)` for each of them."
             )
+    plain = Problem.build(Model(system, dict(sensors), drive), recordings, parameters)
+    states = np.asarray(plain.start.states)[np.asarray(plain.pieces.exists)]
+    size = len(system.state_names) or states.shape[1]
+    pairs = coordinates(system, np.median(states, axis=0)[:size])
+    unit = unit_of(_channel_of(sensors, pairs[0][0]))
     turned = system.period is not None
-    if references is None:
-        references = References(spring_center=0.0)
+    usual = _scaled(states[:, pairs[0][1]])
+    constants = dataclasses.replace(usual, **references)
     if candidates is None:
         clocked = turned or drive is not None
-        candidates = library(turned, references, clocked=clocked)
-    terms, unlisted = _sorted(tuple(candidates))
+        candidates = library(turned, constants, clocked=clocked)
+    terms, unlisted = _sorted(_measured_in(unit, candidates))
     if isinstance(drive, Input):
         drive = Input(drive.channel, _OfBase(drive.value))
     elif drive is not None:
         drive = Turning(_OfBase(drive.speed), _OfBase(drive.phase))
-    model = Model(WithTerms(system, terms), dict(sensors), drive)
+    model = Model(WithTerms(system, terms, pairs), dict(sensors), drive)
     inside = [_within(parameter) for parameter in parameters]
     report("preparing the fits", None)
     problem = Problem.build(model, recordings, inside + _own(terms, recordings, policy))
@@ -204,9 +217,40 @@ def system_question(
         terms,
         unlisted,
         turned,
-        unit_of(next(iter(sensors))),
-        references,
+        unit,
+        constants,
     )
+
+
+def _channel_of(sensors: Mapping[str, Sensor], place: int) -> str:
+    """The channel that shows a component of the state, or the first one."""
+    for name, sensor in sensors.items():
+        if isinstance(sensor.observe, int) and sensor.observe == place:
+            return name
+    return next(iter(sensors))
+
+
+def _scaled(velocities: Float[np.ndarray, " k"]) -> References:
+    """Constants of the forms for a motion at these speeds, about a zero in its middle.
+
+    The speeds within which dry friction changes sign and rises stand to those of the
+    motion as they do in the thesis' rig.
+    """
+    usual = References()
+    fast = float(np.quantile(np.abs(velocities), _FAST))
+    share = fast / _THESIS_FAST if fast > 0 else 1.0
+    return References(
+        spring_center=0.0,
+        impact_speed=usual.impact_speed * share,
+        stribeck_speed=usual.stribeck_speed * share,
+        slip_speed=usual.slip_speed * share,
+        free_slip_speed=usual.free_slip_speed * share,
+    )
+
+
+def _measured_in(unit: str, terms: Sequence[Term]) -> tuple[Term, ...]:
+    """The terms with the unit of the coordinate in their own."""
+    return tuple(dataclasses.replace(term, motion_unit=unit or "1") for term in terms)
 
 
 def _refuse_one(runs: Sequence[Recording | Segments]) -> None:

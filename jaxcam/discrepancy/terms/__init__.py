@@ -4,6 +4,7 @@ A `Term` has a strength; a `Shape` is a free function that says where something 
 missing and what it looks like.
 """
 
+from ._coordinates import coordinates as coordinates
 from ._library import (
     DriveRipple as DriveRipple,
     library as library,

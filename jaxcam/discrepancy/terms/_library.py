@@ -45,7 +45,7 @@ class CoulombFriction(Term):
     source: ClassVar[str] = (
         "Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica 1994"
     )
-    fc: float = strength("rad/s^2", 0.1, lower=0.0)
+    fc: float = strength("[q]/s^2", 0.1, lower=0.0)
     slip: float = _reference(References.slip_speed)
 
     def acceleration(self, motion: Motion):
@@ -59,7 +59,7 @@ class QuadraticDrag(Term):
     sentence: ClassVar[str] = "quadratic drag, as of moving air or oil"
     region: ClassVar[str] = "in flight, at large speeds"
     source: ClassVar[str] = "Batchelor, An Introduction to Fluid Dynamics, 5.11"
-    c2: float = strength("1/rad", 0.1, lower=0.0)
+    c2: float = strength("1/[q]", 0.1, lower=0.0)
 
     def acceleration(self, motion: Motion):
         return -self.c2 * jnp.abs(motion.velocity) * motion.velocity
@@ -72,7 +72,7 @@ class NonlinearSpring(Term):
     sentence: ClassVar[str] = "a cubic part of the spring force"
     region: ClassVar[str] = "in flight, at large deflections"
     source: ClassVar[str] = "Duffing 1918; Kovacic and Brennan 2011, chapter 2"
-    k3: float = strength("1/(s^2 rad^2)", 100.0)
+    k3: float = strength("1/(s^2 [q]^2)", 100.0)
     center: float = _reference(References.spring_center)
 
     def acceleration(self, motion: Motion):
@@ -103,7 +103,7 @@ class CamProfileError(Term):
     where: ClassVar[str] = Where.CONTACT
     region: ClassVar[str] = "at impacts and rests, by the angle of the cam"
     source: ClassVar[str] = "Norton, Cam Design and Manufacturing Handbook, chapter 12"
-    run: float = strength("rad", 1e-4)
+    run: float = strength("[q]", 1e-4)
     lead: float = _reference(References.profile_lead)
 
     def contact(self, motion: Motion):
@@ -131,8 +131,8 @@ class ExternalVibration(Term):
     sentence: ClassVar[str] = "an external vibration at a frequency of its own"
     region: ClassVar[str] = "in flight, periodic in time and not with the cam"
     source: ClassVar[str] = "Den Hartog, Mechanical Vibrations, 1956, section 2.9"
-    ext_sin: float = strength("rad/s^2", 0.1)
-    ext_cos: float = strength("rad/s^2", 0.1)
+    ext_sin: float = strength("[q]/s^2", 0.1)
+    ext_cos: float = strength("[q]/s^2", 0.1)
     fe: float = strength("Hz", 0.05, lower=0.0, default=10.0, inner=True)
 
     def acceleration(self, motion: Motion):
@@ -146,7 +146,7 @@ class ExternalVibration(Term):
         error = math.hypot(a.value * a.stderr, b.value * b.stderr) / size
         phase = math.hypot(a.value * b.stderr, b.value * a.stderr) / size**2
         return {
-            "ext": Value(size, error, "rad/s^2"),
+            "ext": Value(size, error, self.written("[q]/s^2")),
             "fe": fe,
             "phase": Value(math.atan2(b.value, a.value), phase, "rad"),
         }
@@ -176,7 +176,7 @@ class StribeckFriction(Term):
         "Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica 1994"
     )
     listed: ClassVar[bool] = False
-    fs: float = strength("rad/s^2", 0.1, lower=0.0)
+    fs: float = strength("[q]/s^2", 0.1, lower=0.0)
     speed: float = _reference(References.stribeck_speed)
     slip: float = _reference(References.slip_speed)
 
@@ -193,7 +193,7 @@ class AsymmetricFriction(Term):
     region: ClassVar[str] = "in flight, on the way up"
     source: ClassVar[str] = "Armstrong-Helouvry 1991, Control of Machines with Friction"
     listed: ClassVar[bool] = False
-    fa: float = strength("rad/s^2", 0.1, lower=0.0)
+    fa: float = strength("[q]/s^2", 0.1, lower=0.0)
     slip: float = _reference(References.slip_speed)
 
     def acceleration(self, motion: Motion):
@@ -208,7 +208,7 @@ class GravityImbalance(Term):
     region: ClassVar[str] = "in flight, by position"
     source: ClassVar[str] = "Meriam and Kraige, Dynamics, chapter 6"
     listed: ClassVar[bool] = False
-    imbalance: float = strength("rad/s^2", 0.1)
+    imbalance: float = strength("[q]/s^2", 0.1)
 
     def acceleration(self, motion: Motion):
         return -self.imbalance * jnp.cos(motion.position)
@@ -251,7 +251,7 @@ class SensorOffset(SensorTerm):
     source: ClassVar[str] = "Doebelin, Measurement Systems, chapter 3"
     listed: ClassVar[bool] = False
     fields: ClassVar[tuple[str, ...]] = ("offset",)
-    offset: float = strength("rad", 1e-3)
+    offset: float = strength("[q]", 1e-3)
 
 
 def library(

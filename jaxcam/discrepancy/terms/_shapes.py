@@ -49,7 +49,7 @@ class Shape(Term):
     """
 
     listed: ClassVar[bool] = False
-    unit: ClassVar[str] = "rad/s^2"
+    unit: ClassVar[str] = "[q]/s^2"
     size: ClassVar[float] = 0.1
     quantity: ClassVar[str] = "force"
     variable: ClassVar[Variable]
@@ -78,7 +78,7 @@ class Shape(Term):
                 f"{self.name}_{k}",
                 lambda m, k=k: terms_of(m)[place].coefficients[k],  # pyright: ignore
                 scale=self.size,
-                unit=self.unit,
+                unit=self.written(self.unit),
             )
             for k in range(len(self.coefficients))
         ]
@@ -186,7 +186,7 @@ class SurfaceOfPhase(Harmonics):
     quantity: ClassVar[str] = "surface"
     variable: ClassVar[Variable] = Variable.PHASE
     count: ClassVar[int] = 8
-    unit: ClassVar[str] = "rad"
+    unit: ClassVar[str] = "[q]"
     size: ClassVar[float] = 1e-4
 
     def contact(self, motion: Motion):

@@ -22,10 +22,11 @@ _METHODS = {
 
 
 class Motion(NamedTuple):
-    """What a term sees: time (s), position, velocity, and the drive.
+    """What a term sees: time (s), position, velocity, the drive, and the whole state.
 
-    `phase` is the angle that the drive has turned (rad), or time itself without a
-    drive; `rate` the drive's speed (rad/s), or one.
+    `position` and `velocity` are those of the term's `coordinate`. `phase` is the angle
+    that the drive has turned (rad), or time itself without a drive; `rate` the drive's
+    speed (rad/s), or one. `state` `(n,)` is zero where a term acts on a surface.
     """
 
     t: Any
@@ -33,6 +34,18 @@ class Motion(NamedTuple):
     velocity: Any
     phase: Any
     rate: Any = 1.0
+    state: Any = None
+
+
+#: stands in units for that of the coordinate that a term acts on
+MOTION = "[q]"
+
+
+def _about(default: Any) -> Any:
+    """Where a term acts: not fitted, and left out of files that do not say it."""
+    return eqx.field(
+        default=default, static=True, kw_only=True, metadata={"spare": True}
+    )
 
 
 def strength(
@@ -48,7 +61,7 @@ def strength(
 
     **Arguments:**
 
-    - `unit`: for tables.
+    - `unit`: for tables; `[q]` in it stands for the unit of the coordinate.
     - `size`: a change that matters; it does not influence the result.
     - `lower`, `upper`: signs that physics demands.
     - `inner`: a frequency (Hz), without effect while the strengths are zero; it is
@@ -88,6 +101,10 @@ class Term(eqx.Module):
     the first of `acts`), `region` (of the motion, in words), `source` (literature),
     `listed` (false for one that describes a shape but is not a verdict by itself).
 
+    Fields, given by name: `coordinate`, the number of the coordinate (0 for the first)
+    that is pushed and whose position and velocity are seen; `constraint`, that of the
+    gap whose surface or restitution is another; `motion_unit`, that of the coordinate.
+
     **Raises:** `TypeError` for a subclass whose own `acts` is not what it overrides.
     """
 
@@ -98,6 +115,9 @@ class Term(eqx.Module):
     source: ClassVar[str] = ""
     listed: ClassVar[bool] = True
     acts: ClassVar[tuple[str, ...]] = ()
+    coordinate: int = _about(0)
+    constraint: int = _about(0)
+    motion_unit: str = _about("rad")
 
     def __init_subclass__(cls, **options):
         super().__init_subclass__(**options)
@@ -135,12 +155,17 @@ class Term(eqx.Module):
         for field in dataclasses.fields(self):
             one = field.metadata.get("strength")
             if one is not None:
-                found.append(dataclasses.replace(one, name=field.name))
+                unit = self.written(one.unit)
+                found.append(dataclasses.replace(one, name=field.name, unit=unit))
         return tuple(found)
 
     def numbers(self) -> tuple[Any, ...]:
         """Values of the strengths, in the same order."""
         return tuple(getattr(self, one.name) for one in self.strengths())
+
+    def written(self, unit: str) -> str:
+        """A unit with that of the coordinate in it."""
+        return unit.replace(MOTION, self.motion_unit)
 
     def reported(self, values: Mapping[str, Value]) -> dict[str, Value]:
         """What a report gives for its strengths, by name; here the strengths."""

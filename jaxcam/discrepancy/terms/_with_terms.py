@@ -11,19 +11,24 @@ from ._where import Where
 
 
 class WithTerms(HybridSystem):
-    """A system with one coordinate and one constraint, and terms added to it.
+    """A system and terms added to it.
 
     **Arguments:**
 
-    - `base`: the system; its state is position and velocity.
+    - `base`: the system.
     - `terms`: what is added, each a `Term`. Without effect while strengths are zero.
+    - `coordinates`: for each coordinate, which component of the state it is and which
+        its velocity. A term pushes that of its `coordinate`.
 
-    The gap becomes that of the base less the terms' `contact`, and the restitution
-    coefficient that of the base times their `restitution`.
+    The gap of a term's `constraint` becomes that of the base less the term's `contact`,
+    and the restitution coefficient there that of the base times its `restitution`.
     """
 
     base: HybridSystem
     terms: tuple[Term, ...] = ()
+    coordinates: tuple[tuple[int, int], ...] = eqx.field(
+        default=((0, 1),), static=True, metadata={"spare": True}
+    )
 
     @property
     def state_names(self) -> tuple[str, ...]:  # pyright: ignore
@@ -48,63 +53,134 @@ class WithTerms(HybridSystem):
     def check(self) -> None:
         self.base.check()
 
-    def motion(self, t, state) -> Motion:
-        """What the terms see of a state."""
-        return Motion(t, state[0], state[1], *_turned(self.base, t))
+    def motion(self, t, state, coordinate: int = 0, field=None) -> Motion:
+        """What the terms of a coordinate see of a state.
+
+        **Arguments:** `field` is the rate of change of the state, if it is known.
+        """
+        place, rate = self.coordinates[coordinate]
+        velocity = state[rate] if field is None else field[place]
+        turned = _turned(self.base, t)
+        return Motion(t, state[place], velocity, *turned, state=state)
 
     def vector_field(self, t, state) -> jax.Array:
-        rate = self.base.vector_field(t, state)
-        motion = self.motion(t, state)
+        field = self.base.vector_field(t, state)
+        rate = field
         for term in self._acting(Where.FLIGHT):
-            rate = rate.at[1].add(term.acceleration(motion))
+            motion = self.motion(t, state, term.coordinate, field)
+            pushed = self.coordinates[term.coordinate][1]
+            rate = rate.at[pushed].add(term.acceleration(motion))
         return rate
 
     def gap(self, t, state) -> jax.Array:
         gap = self.base.gap(t, state)
-        if self._acting(Where.CONTACT):
-            gap = gap - self._raised(t)
+        for number in self._numbers(Where.CONTACT):
+            raised = self._raised(t, number)
+            gap = gap - raised if gap.ndim == 0 else gap.at[number].add(-raised)
         return gap
 
     def impact(self, t, state) -> jax.Array:
-        raised, bouncing = self._acting(Where.CONTACT), self._acting(Where.IMPACT)
-        if not raised and not bouncing:
-            return self.base.impact(t, state)
-        speed, push = self._normal(t, state)
+        after = self.base.impact(t, state)
+        changed = {*self._numbers(Where.CONTACT), *self._numbers(Where.IMPACT)}
+        if not changed:
+            return after
+        if after.ndim == 1:
+            return self._landed(t, state, 0)
+        return jnp.stack(
+            [
+                self._landed(t, state, k) if k in changed else after[k]
+                for k in range(after.shape[0])
+            ]
+        )
+
+    def _landed(self, t, state, number: int):
+        """The state after an impact on one constraint, with terms that act there."""
+
+        def law(x):
+            after = self.base.impact(t, x)
+            return after if after.ndim == 1 else after[number]
+
+        speed, push = self._normal(t, state, number)
         seen = state
-        if raised:
+        if self._acting(Where.CONTACT, number):
             # the base knows nothing of the surface's additional rate
-            _, rate = jax.jvp(self._raised, (t,), (jnp.ones_like(t),))
+            _, rate = jax.jvp(
+                lambda t: self._raised(t, number), (t,), (jnp.ones_like(t),)
+            )
             seen = state - rate * push
             speed = speed - rate
-        after = state + self.base.impact(t, seen) - seen
+        landed = law(seen)
+        after = state + landed - seen
+        bouncing = self._acting(Where.IMPACT, number)
         if bouncing:
-            landed = self.base.impact(t, seen)
-            rebound, _ = self._normal(t, landed)
-            motion, factor = self.motion(t, state), 1.0
+            rebound, _ = self._normal(t, landed, number)
+            factor = 1.0
             for term in bouncing:
+                field = self.base.vector_field(t, state)
+                motion = self.motion(t, state, term.coordinate, field)
                 factor = factor * term.restitution(jnp.abs(speed), motion)
+            if len(self.coordinates) > 1:
+                # along the impulse, which is shared out between the bodies: what the
+                # law takes from a normal velocity of one, in units of its own change
+                _, kept = jax.jvp(law, (seen,), (push,))
+                taken = push - kept
+                push = taken / self._along(t, state, number, taken)
             after = after + (factor - 1) * rebound * push
         return after
 
-    def _normal(self, t, state):
+    def _normal(self, t, state, number: int):
         """Normal velocity of the base, and the change of state that adds one to it."""
-        one, none = jnp.ones_like(t), jnp.zeros_like(t)
-        along = jnp.stack([one, none])
-        _, slope = jax.jvp(lambda x: self.base.gap(t, x), (state,), (along,))
-        field = jnp.stack([state[1], none])
-        _, speed = jax.jvp(self.base.gap, (t, state), (one, field))
-        return speed, jnp.stack([none, one]) / slope
+        slopes = self._slopes(t, state, number)
+        one = jnp.ones_like(t)
+        _, rate = jax.jvp(lambda t: self._gap_of(t, state, number), (t,), (one,))
+        field = self.base.vector_field(t, state)
+        speed = rate + sum(
+            slope * field[place] for (place, _), slope in zip(self.coordinates, slopes)
+        )
+        size = sum(slope**2 for slope in slopes)
+        push = jnp.zeros_like(state)
+        for (_, place), slope in zip(self.coordinates, slopes):
+            # where nothing moves the gap there is no impact either
+            push = push.at[place].set(slope / jnp.where(size > 0, size, 1.0))
+        return speed, push
 
-    def _raised(self, t):
+    def _along(self, t, state, number: int, change):
+        """The change of normal velocity that a change of state makes."""
+        slopes = self._slopes(t, state, number)
+        return sum(
+            slope * change[place] for (_, place), slope in zip(self.coordinates, slopes)
+        )
+
+    def _slopes(self, t, state, number: int):
+        """Slope of the gap by each coordinate."""
+        found = []
+        for place, _ in self.coordinates:
+            along = jnp.zeros_like(state).at[place].set(1.0)
+            gap = jax.jvp(lambda x: self._gap_of(t, x, number), (state,), (along,))
+            found.append(gap[1])
+        return found
+
+    def _gap_of(self, t, state, number: int):
+        return jnp.atleast_1d(self.base.gap(t, state))[number]
+
+    def _raised(self, t, number: int):
         none = jnp.zeros_like(t)
         motion = Motion(t, none, none, *_turned(self.base, t))
         total = none
-        for term in self._acting(Where.CONTACT):
+        for term in self._acting(Where.CONTACT, number):
             total = total + term.contact(motion)
         return total
 
-    def _acting(self, where: Where) -> list[Term]:
-        return [term for term in self.terms if where in term.acts]
+    def _numbers(self, where: Where) -> list[int]:
+        """Constraints on which terms act."""
+        return sorted({term.constraint for term in self._acting(where)})
+
+    def _acting(self, where: Where, number: int | None = None) -> list[Term]:
+        return [
+            term
+            for term in self.terms
+            if where in term.acts and number in (None, term.constraint)
+        ]
 
 
 def _turned(base, t):

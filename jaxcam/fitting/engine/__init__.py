@@ -30,6 +30,7 @@ from ._linearise import (
 )
 from ._model import (
     cam_follower_drive as cam_follower_drive,
+    filtered_channels as filtered_channels,
     Input as Input,
     Model as Model,
     Sensor as Sensor,

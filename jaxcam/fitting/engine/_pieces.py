@@ -10,6 +10,7 @@ from jaxtyping import Array, Bool, Float, Int
 from scipy.signal import savgol_coeffs
 
 from ...recordings import RecordingError, Segments
+from ...recordings.cut import measured_noise
 from ._piece_length import bearable_length
 
 
@@ -83,16 +84,19 @@ class Span:
 
 
 def spans(
-    segments: Segments, by_curvature: bool = True
+    segments: Segments, curved: Sequence[str] | None = None, rests: bool = True
 ) -> tuple[list[Span], list[Span]]:
     """The pieces of flight and of contact of one record.
 
-    **Arguments:** `by_curvature` makes pieces of an oscillation shorter.
+    **Arguments:** pieces of an oscillation are shorter, by the channels `curved` (by
+    default the one that was cut). Contacts are left out without `rests`.
     """
     record = segments.recording
     time, interval = record.time, record.interval
     valid = ~np.asarray(record.meta.get("filled", np.zeros(len(time), bool)))
     flown: list[Span] = []
+    curved = (segments.channel,) if curved is None else curved
+    noises = {name: measured_noise(record[name]) for name in curved}
     before = None
     for number, flight in enumerate(segments.flights):
         begin, end = flight.start.time, flight.stop.time
@@ -107,9 +111,10 @@ def spans(
             before = None
             continue
         longest = _PIECE
-        if by_curvature:
-            samples = record[segments.channel][rows[valid[rows]]]
-            longest = bearable_length(samples, segments.noise, _PIECE)
+        for name in curved:
+            samples = record[name][rows[valid[rows]]]
+            noise = segments.noise if name == segments.channel else noises[name]
+            longest = bearable_length(samples, noise, longest)
         count = -(-round((end - begin) / interval) // longest)
         edges = np.linspace(begin, end, max(1, count) + 1)
         where = np.clip(np.searchsorted(edges, time[rows], "right") - 1, 0, count - 1)
@@ -119,7 +124,7 @@ def spans(
             flown.append(Span(a, b, inside[valid[inside]], joint, number))
         before = flight.stop
     rested = []
-    for number, contact in enumerate(segments.contacts):
+    for number, contact in enumerate(segments.contacts if rests else ()):
         rows = np.flatnonzero(segments.resting(contact) & valid)
         # by time: where little of a contact is beyond doubt, samples lie far apart
         whole = np.arange(rows[0], rows[-1] + 1) if len(rows) else rows
@@ -149,15 +154,19 @@ def gather(
     channels: Sequence[str],
     steps: int,
     measured: str | None = None,
+    curved: Sequence[str] | None = None,
+    rests: bool = True,
 ) -> tuple[Pieces, list[tuple[list[Span], list[Span]]]]:
     """Pieces of some records, padded so that similar records share a program.
 
-    **Arguments:** `measured` is the channel of an input, in the place of a drive.
+    **Arguments:** `measured` is the channel of an input, in the place of a drive;
+    `curved` and `rests` are those of `spans`.
 
     **Raises:** `RecordingError` where there is nothing to fit.
     """
     # the curvature that a measured input makes is known
-    cuts = [spans(part, measured is None) for part in segments]
+    curved = curved if measured is None else ()
+    cuts = [spans(part, curved, rests) for part in segments]
     if not any(flown for flown, _ in cuts):
         names = ", ".join(part.recording.name for part in segments)
         raise RecordingError(

@@ -63,7 +63,7 @@ from ._parameter import Parameter
 from ._pieces import gather, Pieces, Span
 from ._problem_checks import parameter_places, refuse_not_finite, refuse_repeated
 from ._sharpness import joint_sharpness
-from ._starts import suggested_starts
+from ._starts import state_size, suggested_starts
 from ._step_size import fine_enough, follows_inputs, longest_flight
 
 
@@ -132,8 +132,14 @@ class Problem:
         values = np.tile(nominal, (len(segments), 1))
         measured = model.drive.channel if isinstance(model.drive, Input) else None
         steps, first, extras = _STEPS, _STEPS, None
+        # filtered channels are smooth where the motion is not
+        curved = [name for name in model.sensors if not model.sensors[name].filtered]
+        # what is at rest in a motion of several coordinates, contact does not tell
+        rests = state_size(model) <= 2
         while True:
-            pieces, cuts = gather(segments, tuple(model.sensors), steps, measured)
+            pieces, cuts = gather(
+                segments, tuple(model.sensors), steps, measured, curved, rests
+            )
             if steps < _MOST_STEPS and not follows_inputs(model, segments, pieces):
                 steps *= 2
                 continue

@@ -13,13 +13,14 @@ from ._model import filtered_channels, Model
 from ._pieces import Pieces, Span
 
 
-def _size(model: Model) -> int:
+def state_size(model: Model) -> int:
+    """Number of components of the system's state."""
     return size_of(model.system, {n: s.observe for n, s in model.sensors.items()})
 
 
 def suggested_starts(model: Model, segments, cuts, pieces: Pieces):
     """States that polynomials through the samples suggest, shape `(r, k, n)`."""
-    size = _size(model)
+    size = state_size(model)
     lags = filtered_channels(model)
     sensors = model.sensors
     direct = [name for name in sensors if name not in lags] or list(sensors)

@@ -1,5 +1,6 @@
 """A recording cut into flights, contacts and impacts, on the surface it shows."""
 
+from ._gaps import segment_gaps as segment_gaps
 from ._padding import padded as padded
 from ._polynomial import fit_local as fit_local, measured_noise as measured_noise
 from ._segment import segment as segment, segment_case as segment_case

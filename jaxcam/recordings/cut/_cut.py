@@ -35,12 +35,12 @@ _FAR_NOISE, _FAR_GAP = 20.0, 0.25
 def cut(
     sides: Sequence[Motion], restitution: float
 ) -> tuple[tuple[Flight, ...], tuple[Contact, ...], Impacts]:
-    """Flights, contacts and impacts of a motion between one surface or two.
+    """Flights, contacts and impacts of a motion within one surface or several.
 
     **Arguments:**
 
     - `sides`: the motion as each surface sees it, its gap positive; that of a surface
-        above the motion is `mirrored`.
+        above the motion is `mirrored`, and that of a body that moves is the distance.
     - `restitution`: expected, for the bounces that are too low to be seen.
     """
     motion = sides[0]
@@ -48,11 +48,12 @@ def cut(
     while True:
         stretches = sorted([*resting, *doubtful])
         spans = _spans(len(motion.time), stretches, sorted(marks))
-        before = {b: motion.fit(a, b, at_end=True) for a, b in spans}
-        after = {a: motion.fit(a, b, at_end=False) for a, b in spans}
+        before = {b: a for a, b in spans}
+        after = dict(spans)
         crossed = {
-            place: _crossed(sides[marks[place]], place, *pair)
-            for place, pair in _sided(sides, marks, before, after).items()
+            place: _crossed(sides[number], before[place], place, after[place])
+            for place, number in marks.items()
+            if place in before and place in after
         }
         # a velocity that jumps while the motion leaves the surface is no impact on it
         long = {last for first, last in spans if last - first >= _LONG}
@@ -74,11 +75,10 @@ def cut(
     for first, last in stretches:
         here = sides[side[first]]
         if first in before:
-            boundaries[first] = _landing(
-                here, first, _as_seen(motion, here, before[first])
-            )
+            fit = here.fit(before[first], first, at_end=True)
+            boundaries[first] = _landing(here, first, fit)
         if last in after:
-            end = next(stop for start, stop in spans if start == last)
+            end = after[last]
             release = _release(here, first, last, end)
             latest = float(motion.time[(last + end) // 2])
             boundaries[last] = _not_before(boundaries.get(first), release, latest)
@@ -108,7 +108,8 @@ def cut(
 
 def _places(sides: Sequence[Motion]):
     """Contacts, doubtful contacts and impacts, each with the number of its side."""
-    nearest = np.argmin(np.stack([side.gap for side in sides]), axis=0)
+    # gaps may have different units
+    nearest = np.argmin(np.stack([side.gap / side.noise for side in sides]), axis=0)
     resting: dict[Span, int] = {}
     doubtful: dict[Span, int] = {}
     marks: dict[int, int] = {}
@@ -137,23 +138,6 @@ def _reach(side: Motion) -> float:
     return max(_FAR_NOISE * side.noise, _FAR_GAP * float(np.max(side.gap)))
 
 
-def _sided(sides, marks, before, after):
-    """Fits before and after each place that has both, as its side sees them."""
-    return {
-        place: tuple(
-            _as_seen(sides[0], sides[marks[place]], fits[place])
-            for fits in (before, after)
-        )
-        for place in before.keys() & after.keys() & marks.keys()
-    }
-
-
-def _as_seen(first: Motion, side: Motion, fit: LocalFit) -> LocalFit:
-    """A fit of the samples of the first side, as another side sees them."""
-    sense = first.sense * side.sense
-    return dataclasses.replace(fit, coefficients=sense * fit.coefficients)
-
-
 def _leaves(found: dict) -> bool:
     """Whether the motion surely went away from the surface that it is to have hit."""
     return found["approach"] < -_SURE * found["before_stderr"]
@@ -170,8 +154,10 @@ def _spans(count: int, resting: list[Span], marks: list[int]) -> list[Span]:
     return spans
 
 
-def _crossed(motion: Motion, place: int, before: LocalFit, after: LocalFit) -> dict:
-    """What the fits on both sides say about an impact; they meet at its time."""
+def _crossed(motion: Motion, first: int, place: int, last: int) -> dict:
+    """What the flights on both sides say about an impact; they meet at its time."""
+    before = motion.fit(first, place, at_end=True)
+    after = motion.fit(place, last, at_end=False)
     origin = float(motion.time[place] - motion.interval / 2)
     reach = 5 * motion.interval
     time, stderr = crossing(before, after, origin, reach)

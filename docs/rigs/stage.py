@@ -1,0 +1,26 @@
+"""A linear stage that a measured voltage drives; it never hits anything."""
+
+import jax.numpy as jnp
+
+from jaxcam.hybrid import HybridSystem
+
+
+class Stage(HybridSystem):
+    """A mass on a rail with a motor."""
+
+    state_names = ("position", "velocity")
+    state_units = ("m", "m/s")
+
+    gain: float = 2.0  # m/s^2 a volt
+    damping: float = 6.0  # 1/s
+    voltage: float = 0.0  # V, measured
+
+    def vector_field(self, t, state):
+        return jnp.stack([state[1], self.gain * self.voltage - self.damping * state[1]])
+
+    def gap(self, t, state):
+        # there is nothing to hit
+        return jnp.ones_like(t)
+
+    def impact(self, t, state):
+        return state

@@ -1,0 +1,49 @@
+"""Which components of a state are coordinates, and which are their velocities."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from ...hybrid import HybridSystem
+
+
+# Places where the field is looked at, drawn about a state of the recordings
+_LOOKS = 3
+
+
+def coordinates(
+    system: HybridSystem, state: Float[np.ndarray, " n"]
+) -> tuple[tuple[int, int], ...]:
+    """For each coordinate of a system, its component of the state and its velocity's.
+
+    A component is a coordinate where its rate of change is another component, apart
+    from a function of time (as where velocities are those in space and positions are
+    not).
+
+    **Arguments:** a state near which the field is defined, shape `(n,)`.
+
+    **Raises:** `ValueError` where there is no coordinate.
+    """
+    state = np.asarray(state, dtype=float)
+    size = np.maximum(np.abs(state), 1e-3)
+    slope = jax.jacfwd(lambda x: system.vector_field(jnp.asarray(0.0), x))
+    random = np.random.default_rng(0)
+    seen = np.stack(
+        [
+            np.asarray(slope(jnp.asarray(state + 0.01 * size * shift)))
+            for shift in random.standard_normal((_LOOKS, len(state)))
+        ]
+    )
+    found = []
+    for place in range(len(state)):
+        rows = seen[:, place]
+        (moved,) = np.nonzero(np.any(rows != 0, axis=0))
+        if len(moved) == 1 and moved[0] != place and np.all(rows[:, moved[0]] == 1):
+            found.append((place, int(moved[0])))
+    if not found:
+        raise ValueError(
+            f"{type(system).__name__} has no coordinate: no component of its state is "
+            f"the rate of change of another one. State positions and velocities."
+        )
+    return tuple(found)

@@ -1,0 +1,155 @@
+"""Recordings of any system cut at its own gaps, as its channels show them."""
+
+import dataclasses
+from collections.abc import Sequence
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from ..recordings import (
+    Drive,
+    read_drive,
+    Recording,
+    RecordingError,
+    segment,
+    Segments,
+)
+from ..recordings.against_model import size_of
+from ..recordings.cut import padded, segment_gaps
+from .engine import Layout, Model, Parameter, parameter_places
+
+
+# Samples at which it is looked up what a gap depends on
+_LOOKS = 64
+
+
+def segment_by_model(
+    model: Model,
+    recordings: Sequence[Recording],
+    parameters: Sequence[Parameter] = (),
+    *,
+    drive_channel: str | None = None,
+    restitution: float = 0.5,
+) -> tuple[Segments, ...]:
+    """Cut recordings at every gap of a model's system, as its channels show them.
+
+    A gap is computed from the measured components of the state, and put to zero where
+    the velocity of the gap jumps, as far as the tolerances of the parameters allow.
+    Without a gap the whole record is one flight.
+
+    **Arguments:**
+
+    - `model`: its system and sensors. Components of the state are seen by sensors whose
+        `observe` is a number and that have no bandwidth.
+    - `parameters`: whose tolerances say how far a gap may be off.
+    - `drive_channel`: the encoder of a drive (rad), of a model with a `Turning` drive.
+    - `restitution`: expected, for the bounces that are too low to be seen.
+
+    **Raises:** `RecordingError` for a missing channel, or a gap that depends on a state
+    that no channel sees.
+    """
+    picks = {
+        sensor.observe: name
+        for name, sensor in reversed(model.sensors.items())
+        if isinstance(sensor.observe, int) and not sensor.filtered
+    }
+    primary = next(iter(model.sensors))
+    found = []
+    for recording in recordings:
+        drive = None if drive_channel is None else read_drive(recording, drive_channel)
+        states = _states(model, picks, recording)
+        gaps, slopes, errors = _gaps(model, tuple(parameters), recording, states, drive)
+        shown = np.any(slopes != 0, axis=-1)
+        if not np.any(shown):
+            part = segment(recording, primary)
+            found.append(dataclasses.replace(part, drive=drive))
+            continue
+        _refuse_unseen(model, picks, recording, slopes)
+        found.append(
+            segment_gaps(
+                recording,
+                primary,
+                gaps[shown],
+                [float(e) for e in errors[shown]],
+                drive=drive,
+                restitution=restitution,
+            )
+        )
+    return tuple(found)
+
+
+def _states(model: Model, picks, recording) -> Float[np.ndarray, "k n"]:
+    """The state as far as it is measured, zero elsewhere."""
+    size = size_of(model.system, {n: s.observe for n, s in model.sensors.items()})
+    states = np.zeros((len(recording), size))
+    for place, name in picks.items():
+        sensor = model.sensors[name]
+        samples = (recording[name] - float(sensor.offset)) / float(sensor.gain)
+        states[:, place] = samples
+    return states
+
+
+def _gaps(model: Model, parameters, recording, states, drive: Drive | None):
+    """Gaps `(g, k)`, their slopes by the state `(g, n)` and their errors `(g,)`."""
+    layout = Layout(model, parameter_places(model, parameters))
+    values = np.array([float(p.where(model)) for p in parameters])
+    tolerances = np.array([p.tolerance for p in parameters])
+    count = len(recording)
+    angle, rate = (
+        (np.zeros(count), np.ones(count))
+        if drive is None
+        else (drive.angle, drive.rate)
+    )
+    columns = [padded(part) for part in (recording.time, states, angle, rate)]
+    gaps = np.asarray(_gap(layout, values, *columns))[:count].T
+    rows = np.linspace(0, count - 1, _LOOKS).astype(int)
+    looks = [part[rows] for part in columns]
+    by_state, by_value = (np.asarray(x) for x in _slopes(layout, values, *looks))
+    slopes = np.max(np.abs(by_state), axis=0)
+    moved = np.max(np.abs(by_value), axis=0)
+    # what is not known at all must not make zero times infinity
+    parts = np.where(moved > 0, moved * np.where(moved > 0, tolerances, 0.0), 0.0)
+    return gaps, slopes, np.sum(parts, axis=-1)
+
+
+@eqx.filter_jit
+def _gap(layout: Layout, values, times, states, angles, rates):
+    return jax.vmap(lambda *at: _gaps_at(layout, values, *at))(
+        *(jnp.asarray(x) for x in (times, states, angles, rates))
+    )
+
+
+@eqx.filter_jit
+def _slopes(layout: Layout, values, times, states, angles, rates):
+    """Slopes of the gaps by the state and by the parameters, sample by sample."""
+
+    def one(time, state, angle, rate):
+        by_state = jax.jacfwd(lambda x: _gaps_at(layout, values, time, x, angle, rate))
+        by_value = jax.jacfwd(lambda v: _gaps_at(layout, v, time, state, angle, rate))
+        return by_state(state), by_value(values)
+
+    values = jnp.asarray(values)
+    return jax.vmap(one)(*(jnp.asarray(x) for x in (times, states, angles, rates)))
+
+
+def _gaps_at(layout: Layout, values, time, state, angle, rate):
+    system = layout.at(jnp.asarray(values)).driven(time, angle, rate)
+    return jnp.atleast_1d(system.gap(time, state))
+
+
+def _refuse_unseen(model: Model, picks, recording, slopes) -> None:
+    """**Raises:** `RecordingError` for a gap that the channels do not show."""
+    names = model.system.state_names
+    for number, row in enumerate(slopes):
+        for place in np.flatnonzero(row):
+            if place in picks:
+                continue
+            name = f"`{names[place]}`" if names else f"component {place} of the state"
+            raise RecordingError(
+                f"{recording.name}: gap {number + 1} depends on {name}, which no "
+                f"channel sees; give a sensor whose `observe` is {place}, without a "
+                f"bandwidth."
+            )

@@ -1,0 +1,59 @@
+"""A recording cut at every gap that it shows, whichever channels show it."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Float
+
+from .._drive import Drive
+from .._recording import Recording
+from ._cut import cut
+from ._motion import Motion
+from ._placed import placed
+from ._polynomial import measured_noise
+from ._segments import Segments
+
+
+def segment_gaps(
+    recording: Recording,
+    channel: str,
+    gaps: Float[np.ndarray, "g k"],
+    tolerances: Sequence[float],
+    *,
+    drive: Drive | None = None,
+    restitution: float = 0.5,
+) -> Segments:
+    """Cut a recording at the impacts on each of its gaps, seen at every sample.
+
+    Any number of bodies and surfaces: where one gap closes, all of the motion is cut.
+
+    **Arguments:**
+
+    - `recording`, and the `channel` that stands for its motion in tables.
+    - `gaps`: each positive where it is open.
+    - `tolerances`: how far each gap may be off by a constant, in its own units. Within
+        it, it is put to zero where the impacts are.
+    - `drive`: of the system, if it has one.
+    - `restitution`: expected, for the bounces that are too low to be seen.
+
+    **Returns:** the parts; `impacts.side` is the gap that closed, and `before` and
+    `after` are its rates of change.
+    """
+    none = np.zeros(len(recording))
+    sides = []
+    for gap, tolerance in zip(gaps, tolerances, strict=True):
+        noise = measured_noise(gap)
+        side = Motion(recording.time, gap, none, none, noise, recording.interval)
+        sides.append(placed(side, tolerance) if tolerance > 0 else side)
+    flights, contacts, impacts = cut(sides, restitution)
+    return Segments(
+        recording,
+        channel,
+        measured_noise(recording[channel]),
+        recording.time,
+        flights,
+        contacts,
+        impacts,
+        gap=np.min([side.gap for side in sides], axis=0),
+        drive=drive,
+    )
