@@ -20,7 +20,7 @@ import jaxcam.recordings
 import jaxcam.sweeps  # noqa: F401  what is patched below
 from jaxcam.cli import app
 from jaxcam.cli._choices import ENGINES, SOLVERS, SYSTEMS
-from jaxcam.data import DEMO_RIG
+from jaxcam.data import DEMO_RIG, NEW_RIG
 from jaxcam.thesis import TARGETS
 
 
@@ -36,6 +36,7 @@ FIRST_WORK = (
     "jaxcam.sweeps.cluster",
     "continuation.orbits._periodic.periodic_orbit",
     "jaxcam.fitting.Problem.build",
+    "jaxcam.fitting._setup.segment_by_model",
     "jaxcam.recordings.against_model.compare_case",
     "jaxcam.cli._reproduce_record.reproduce",
 )
@@ -60,6 +61,9 @@ def places(folder: Path) -> None:
     (folder / "rig.json").write_text(hostile_files.system("rig"))
     (folder / "torn.json").write_text(_torn_system())
     (folder / "result.json").unlink(missing_ok=True)
+    for name in ("cart.py", "cart.toml"):
+        shutil.copy(NEW_RIG / name, folder)
+    (folder / "torn.toml").write_text((folder / "cart.toml").read_text()[:700])
     if not (folder / "case").exists():
         shutil.copytree(DEMO_RIG, folder / "case")
         (folder / "cut").mkdir()
@@ -70,11 +74,17 @@ def places(folder: Path) -> None:
         for k in (1, 2):
             (folder / "short" / f"run{k}_150rpm.csv").write_text(text)
         shutil.copy(DEMO_RIG / "rig.toml", folder / "short")
+        (folder / "carts").mkdir()
+        text = text.replace("follower_angle_rad", "position_m")
+        for k in (1, 2):
+            (folder / "carts" / f"run{k}.csv").write_text(text)
+        shutil.copy(NEW_RIG / "cart.toml", folder / "carts" / "rig.toml")
 
 
 PATHS = st.sampled_from(
     "empty file file/below rubbish ball.json rig.json torn.json case case/rig.toml cut "
-    "short nowhere nowhere/x.json . .. / /dev/null /proc/nowhere".split()
+    "short carts cart.py cart.toml torn.toml cart.py:Cart cart.py:Card cart.toml:Cart "
+    "nowhere nowhere/x.json . .. / /dev/null /proc/nowhere".split()
     + ["", "x" * 300, "a\nb", "a\x1b[31mb", "~", "*"]
 )
 #: what is written; never outside of the folder
@@ -132,7 +142,7 @@ _NAMES = {
     "TARGET": [*sorted(TARGETS)[:3], "all", "table-0"],
 }  # fmt: skip
 _STATED = ("--state", "--low", "--high", "--shape")
-_WRITTEN = ("--out", "--json")
+_WRITTEN = ("--out", "--json", "NAME")
 
 
 def _value(name: str, kind: object) -> st.SearchStrategy[str]:
@@ -154,13 +164,19 @@ def _value(name: str, kind: object) -> st.SearchStrategy[str]:
 
 #: lines that are right, to which others are near
 _RIGHT = {
-    "simulate": [[], ["--speed=140"], ["bouncing-ball", "--t1=3"]],
+    "simulate": [
+        [],
+        ["--speed=140"],
+        ["bouncing-ball", "--t1=3"],
+        ["--rig=cart.toml", "--state=0,1", "--t1=1"],
+    ],
     "diagram": [["--from=150", "--to=154"], ["--from=150"]],
     "basins": [[], ["--speed=150"], ["impact-oscillator", "--shape=9,9"]],
     "continue": [["--from=130", "--to=160", "--at=145"], ["--from=130", "--to=160"]],
     "demo": [[], ["--no-diagnose"], ["--case=case"], ["--case=short"]],
-    "diagnose": [["case"], ["short"], ["cut"], []],
-    "fit": [["case"], ["short"], ["empty"]],
+    "diagnose": [["case"], ["short"], ["cut"], ["carts", "--rig=cart.toml"], []],
+    "fit": [["case"], ["short"], ["empty"], ["carts", "--rig=cart.toml"]],
+    "new-rig": [["cart"], ["other"], []],
     "reproduce": [["table-5.2"], ["--list"], []],
 }  # fmt: skip
 

@@ -21,7 +21,12 @@ from jaxcam.models import BouncingBall
 from jaxcam.recordings import Recording, RigError, segment
 
 
-RIGS = Path(__file__).parent / "own_rigs"
+ROOT = Path(__file__).parents[1]
+RIGS = {
+    name: ROOT / "docs" / "rigs" / f"{name}.toml"
+    for name in ("two_stops", "pendulum_wall", "two_masses", "stage")
+}
+RIGS["cam"] = ROOT / "tests" / "own_rigs" / "cam.toml"
 
 PLAIN = """
 import equinox as eqx
@@ -75,10 +80,10 @@ def refusal(tmp_path, old, new, code=PLAIN):
 
 @pytest.mark.parametrize("name", ["two_stops", "pendulum_wall", "two_masses", "cam"])
 def test_textbook_rigs_with_a_drive_can_be_stated(name):
-    setup = read_setup(RIGS / f"{name}.toml")
+    setup = read_setup(RIGS[name])
     assert isinstance(setup.model.drive, Turning)
     assert setup.drive_channel in setup.channels
-    assert is_setup(RIGS / f"{name}.toml")
+    assert is_setup(RIGS[name])
     for one in setup.parameters:
         assert one.tolerance > 0 and jnp.isfinite(one.where(setup.model))
     model = setup.model
@@ -87,14 +92,14 @@ def test_textbook_rigs_with_a_drive_can_be_stated(name):
 
 
 def test_a_stage_with_a_measured_input_can_be_stated():
-    setup = read_setup(RIGS / "stage.toml")
+    setup = read_setup(RIGS["stage"])
     assert isinstance(setup.model.drive, Input) and setup.drive_channel is None
     assert setup.channels == ("position_m", "input_V")
     assert float(setup.model.system.voltage) == 0.0  # pyright: ignore
 
 
 def test_numbers_arrive_where_they_belong():
-    setup = read_setup(RIGS / "cam.toml")
+    setup = read_setup(RIGS["cam"])
     system = setup.model.system
     assert float(system.profile.eccentricity) == 0.015  # pyright: ignore
     assert float(system.inertia) == 0.043  # pyright: ignore
@@ -109,7 +114,7 @@ def test_numbers_arrive_where_they_belong():
 
 def test_two_readings_of_a_file_are_of_one_class(tmp_path):
     """Programs that were compiled for one serve the other."""
-    one, other = (read_setup(RIGS / "two_stops.toml") for _ in range(2))
+    one, other = (read_setup(RIGS["two_stops"]) for _ in range(2))
     assert type(one.model.system) is type(other.model.system)
     assert one.parameters == other.parameters
     assert one.model.drive == other.model.drive
@@ -164,11 +169,11 @@ def test_nothing_known_beforehand(tmp_path):
 
 
 def test_a_drive_may_have_an_offset_that_is_fitted(tmp_path):
-    text = (RIGS / "two_stops.toml").read_text()
+    text = (RIGS["two_stops"]).read_text()
     text = text.replace(
         "[parameters]", "[parameters]\nphase = {value = 0.1, tolerance = 0.2}"
     )
-    shutil.copy(RIGS / "two_stops.py", tmp_path)
+    shutil.copy(RIGS["two_stops"].with_suffix(".py"), tmp_path)
     (tmp_path / "rig.toml").write_text(text)
     setup = read_setup(tmp_path / "rig.toml")
     assert setup.parameters[0].name == "phase"

@@ -58,8 +58,8 @@ _UNSEEN = (
 )
 _MAPS = (
     "Mean residual of each record by {}, in standard errors, before (left) and after "
-    "(right); flights above, contacts below. Beyond the colours' ends is what chance "
-    "would show in one of a hundred such maps."
+    "(right); flights, and contacts below where there are any. Beyond the colours' "
+    "ends is what chance would show in one of a hundred such maps."
 )
 _SHAPES = (
     "What the data would have the model changed by, as free functions: of the textbook "
@@ -79,14 +79,14 @@ def _unseen(plt, found: Diagnosis):
     for axis, part, label in zip(
         axes, both, ("textbook model, refitted", "with what was found")
     ):
-        for resting, color in ((False, FLIGHT), (True, CONTACT)):
+        for resting in _sides(before):
             keep = part.resting == resting
             axis.plot(
                 part.time[keep],
                 factor * part.value[keep],
                 ".",
                 ms=1.5,
-                color=color,
+                color=CONTACT if resting else FLIGHT,
                 label="contact" if resting else "flight",
                 rasterized=True,
             )
@@ -109,15 +109,21 @@ def _improvement(pair: tuple[Residuals, Residuals]) -> float:
 def _maps(plt, found: Diagnosis):
     from scipy.stats import norm
 
-    figure, axes = plt.subplots(
-        2, 2, figsize=(8.5, 5.0), sharex=True, sharey=True, layout="constrained"
-    )
     every = found.unseen[0]
-    along = Along(every)
+    along, sides = Along(every), _sides(every)
+    figure, axes = plt.subplots(
+        len(sides),
+        2,
+        figsize=(8.5, 0.6 + 2.2 * len(sides)),
+        sharex=True,
+        sharey=True,
+        layout="constrained",
+        squeeze=False,
+    )
     end = float(norm.isf(0.005 / (_BINS * len(every) * 2)))
     image = None
     for column, parts, which in zip(axes.T, found.unseen, ("before", "after")):
-        for axis, resting in zip(column, (False, True)):
+        for axis, resting in zip(column, sides):
             rows = [_binned(part, resting, along) for part in parts]
             image = axis.imshow(
                 np.array(rows),
@@ -135,6 +141,11 @@ def _maps(plt, found: Diagnosis):
         axis.set_xlabel(along.label)
     figure.colorbar(image, ax=axes, label="mean residual (standard errors)")
     return figure
+
+
+def _sides(parts: Sequence[Residuals]) -> tuple[bool, ...]:
+    """Flight, and contact where there is any."""
+    return (False, True) if any(np.any(part.resting) for part in parts) else (False,)
 
 
 def _binned(part: Residuals, resting: bool, along: Along):

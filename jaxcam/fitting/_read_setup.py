@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from ..hybrid import HybridSystem
-from ..recordings import References, RigError
+from ..recordings import RigError
 from ..recordings.files import (
     known_keys,
     printable,
@@ -74,7 +74,7 @@ def read_setup(
         Model(made, _sensors(file, tables, made), drive),
         tuple(_parameter(name, one) for name, one in fitted.items()),
         drive_channel,
-        _references(file, tables),
+        read_references(file, tables, None),
     )
 
 
@@ -84,11 +84,6 @@ def is_setup(path: str | Path) -> bool:
     **Raises:** `RigError` for a file that is no TOML.
     """
     return not {"system", "parameters", "channels"}.isdisjoint(read_tables(Path(path)))
-
-
-def _references(file: Path, tables) -> dict[str, float]:
-    found = read_references(file, tables, References(spring_center=0.0), None)
-    return {name: getattr(found, name) for name in tables.get("references", {})}
 
 
 def _class(file: Path, tables, system) -> type[HybridSystem]:

@@ -15,9 +15,9 @@ class Setup:
     - `model`: the system at its nominal values, with its sensors and its drive.
     - `parameters`: what is fitted, each within its tolerance.
     - `drive_channel`: of the encoder of a turning drive (rad), or `None`.
-    - `references`: constants of the forms of missing physics, by their names in
-        `jaxcam.recordings.References` and in the units of the motion; those that are
-        left out follow from the speeds of the motion.
+    - `references`: constants of the forms of missing physics that are stated, by the
+        names of fields of `jaxcam.recordings.References`, in the units of the motion;
+        the others follow its speeds.
     """
 
     model: Model

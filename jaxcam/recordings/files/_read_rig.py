@@ -38,7 +38,7 @@ def read_rig(file: str | Path) -> Rig:
         spring_elongation=dynamics.quantity("spring_elongation", "m"),
         restitution=impact.quantity("restitution", ""),
         sensors=_sensors(Section(file, "sensors", tables)),
-        references=read_references(file, tables, References(), "rad"),
+        references=References(**read_references(file, tables, "rad")),
     )
     for section in (geometry, dynamics, impact):
         section.done()
@@ -70,9 +70,9 @@ def _sensors(section: Section) -> Sensors:
 
 
 def read_references(
-    file: Path, tables: dict[str, Any], default: References, unit: str | None
-) -> References:
-    """Constants of forms, in `[references]`; what the file leaves out is the default.
+    file: Path, tables: dict[str, Any], unit: str | None
+) -> dict[str, float]:
+    """Constants of forms that the file states in `[references]`, by their names.
 
     **Arguments:** the unit of the motion, of which the speeds have the rate; `None`
     for any.
@@ -80,7 +80,7 @@ def read_references(
     **Raises:** `RigError` for an unknown one, or a speed that is not positive.
     """
     if "references" not in tables:
-        return default
+        return {}
     section = Section(file, "references", tables)
     names = [field.name for field in dataclasses.fields(References)]
     known_keys(file, "references", section.table, names)
@@ -90,4 +90,4 @@ def read_references(
             found[name] = section.positive(name, unit and f"{unit}/s")
         else:
             found[name] = section.quantity(name, unit).value
-    return dataclasses.replace(default, **found)
+    return found

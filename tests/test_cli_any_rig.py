@@ -1,0 +1,267 @@
+"""A user's own system from the command line: an example, recordings, a report."""
+
+import json
+import re
+import shutil
+from pathlib import Path
+
+import hostile_files
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from typer.testing import CliRunner
+
+from jaxcam.cli import app
+from jaxcam.data import DEMO_RIG
+
+
+ROOT = Path(__file__).parents[1]
+TRUTH = {
+    "stiffness": 41.5,
+    "damping": 0.25,
+    "left": -0.0502,
+    "right": 0.0603,
+    "restitution_left": 0.74,
+    "restitution_right": 0.66,
+}
+# what a user sees, whose types nothing checks
+pytestmark = pytest.mark.usefixtures("unchecked_types")
+
+
+@pytest.fixture(autouse=True)
+def keep_the_cache_of_the_tests(monkeypatch):
+    """A command sets the folder of compiled programs; here it is the tests' own."""
+    monkeypatch.setenv("JAX_COMPILATION_CACHE_DIR", "as the tests have it")
+
+
+@pytest.fixture
+def rig(tmp_path, monkeypatch):
+    """The example that new-rig writes, in a folder of its own."""
+    monkeypatch.chdir(tmp_path)
+    run("new-rig", "cart")
+    return tmp_path
+
+
+def run(*words):
+    found = CliRunner().invoke(app, list(words))
+    if found.exception is not None and not isinstance(found.exception, SystemExit):
+        raise found.exception
+    assert found.exit_code == 0, found.output
+    return found.output
+
+
+def refusal(*words):
+    found = CliRunner().invoke(app, list(words))
+    if found.exception is not None and not isinstance(found.exception, SystemExit):
+        raise found.exception
+    assert found.exit_code == 2, found.output
+    (sentence,) = found.stderr.splitlines()
+    hostile_files.said(ValueError(sentence))
+    return sentence
+
+
+def released(velocity: float, rng, duration=1.2) -> np.ndarray:
+    """Times (s) and positions (mm) of a cart of `TRUTH`, flight by flight."""
+    stops = np.array([TRUTH["left"], TRUTH["right"]])
+    r = np.array([TRUTH["restitution_left"], TRUTH["restitution_right"]])
+
+    def field(t, y):
+        return [y[1], -TRUTH["stiffness"] * y[0] - TRUTH["damping"] * y[1]]
+
+    events = [lambda t, y: y[0] - stops[0], lambda t, y: stops[1] - y[0]]
+    for event in events:
+        event.terminal, event.direction = True, -1  # pyright: ignore
+    time = 5e-4 * np.arange(round(duration / 5e-4))
+    x, t, y = np.zeros(len(time)), 0.0, np.array([0.0, velocity])
+    while t < time[-1]:
+        span = (t, time[-1])
+        part = solve_ivp(
+            field, span, y, "DOP853", None, True, events, rtol=1e-11, atol=1e-13
+        )
+        inside = (time >= t) & (time <= part.t[-1])
+        x[inside] = part.sol(time[inside])[0]  # pyright: ignore
+        t = part.t[-1]
+        if part.status == 1:
+            side = int(len(part.t_events[1]) > 0)  # pyright: ignore
+            y = np.array([stops[side], -r[side] * part.y[1, -1]])
+    noisy = np.round((x + 1e-5 * rng.standard_normal(len(x))) / 5e-6) * 5e-6
+    return np.stack([time, 1e3 * noisy], axis=1)
+
+
+def write_case(folder: Path) -> None:
+    folder.mkdir()
+    rng = np.random.default_rng(0)
+    for number, velocity in enumerate((1.2, -1.4, 1.6, -1.0), start=1):
+        np.savetxt(
+            folder / f"run{number}.csv",
+            released(velocity, rng),
+            delimiter=",",
+            header="time_s,position_mm",
+            comments="",
+        )
+
+
+def test_the_example_is_written_once(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    said = run("new-rig", "my-two_stops")
+    assert "jaxcam simulate --rig my-two_stops.toml" in said
+    code = (tmp_path / "my-two_stops.py").read_text()
+    assert "class MyTwoStops(HybridSystem)" in code
+    assert "my-two_stops.py:MyTwoStops" in (tmp_path / "my-two_stops.toml").read_text()
+    assert "exists already" in refusal("new-rig", "my-two_stops")
+    assert (tmp_path / "my-two_stops.py").read_text() == code
+    (tmp_path / "my-two_stops.py").unlink()
+    assert "my-two_stops.toml exists already" in refusal("new-rig", "my-two_stops")
+    assert not (tmp_path / "my-two_stops.py").exists()
+    # no class may be called that
+    run("new-rig", "none")
+    assert "class NoneRig(" in (tmp_path / "none.py").read_text()
+    run("simulate", "--rig", "none.toml", "--state=0,0.8", "--t1=0.1")
+
+
+@pytest.mark.parametrize("name", ["3", "a b", "cart.py", "", "nowhere/cart", "../.."])
+def test_names_that_are_no_names_are_refused(tmp_path, monkeypatch, name):
+    monkeypatch.chdir(tmp_path)
+    refusal("new-rig", name)
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_command_that_new_rig_prints_works(rig):
+    said = run("new-rig", "other")
+    (line,) = re.findall("Try it: jaxcam (.*)", said)
+    assert "Other, from 0 to 3 s: 4 impacts" in run(*line.split())
+
+
+def test_nominal_values_come_from_the_rig_file(rig):
+    text = (rig / "cart.toml").read_text().replace("value = 40.0", "value = 42.0")
+    (rig / "other.toml").write_text(text)
+    line = ["simulate", "--state=0,0.8", "--t1=0.1", "--json=-"]
+
+    def stiffness(*words):
+        return json.loads(run(*line, *words))["parameters"]["stiffness"]
+
+    assert stiffness("--rig=other.toml") == 42.0
+    assert stiffness("--rig=other.toml", "--system=cart.py:Cart") == 42.0
+    assert stiffness("--system=cart.py:Cart") == 40.0
+    assert stiffness("--system=cart.py:Cart", "--set=stiffness=39") == 39.0
+    cam = json.loads(
+        run("simulate", f"--rig={DEMO_RIG / 'rig.toml'}", "--turns=0.1", "--json=-")
+    )
+    assert cam["system"] == "cam-follower"
+
+
+def test_a_driven_system_is_simulated_by_turns(rig):
+    for kind in (".py", ".toml"):
+        shutil.copy(ROOT / "docs" / "rigs" / f"two_stops{kind}", rig)
+    found = json.loads(
+        run(
+            *("simulate", "--rig=two_stops.toml", "--set=speed=12"),
+            *("--state=0,0", "--turns=2", "--json=-"),
+        )
+    )
+    assert found["t1"] == pytest.approx(2 * 2 * np.pi / 12)
+    assert found["system"] == "TwoStops"
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ("simulate --system cart.py:Card --state 0,1 --t1 1", "is `Cart` meant?"),
+        ("simulate --system cart.py --state 0,1 --t1 1", "as in cart.py:Cart"),
+        ("simulate --system card.py:Cart", "no such file"),
+        ("simulate --rig card.toml", "no such file"),
+        ("simulate --rig cart.toml --speed 3", "--speed belongs to cam-follower"),
+        ("simulate --rig cart.toml --state 0,1", "no forcing to count turns of"),
+        ("simulate --rig cart.toml --system a.json", "leave out --rig"),
+        ("simulate cart.py:Cart", "a system of your own as --system"),
+        ("simulate --rig cart.toml --set stifness=1", "the parameters are stiffness"),
+        ("basins --rig cart.toml --turns 30", "needs the corners of the grid"),
+        (
+            "basins --rig cart.toml --low=-0.04,0 --high 0,1 --cluster local",
+            "other processes do not know Cart",
+        ),
+        ("fit case --rig cart.toml", "case: there is no such folder"),
+        ("fit . --rig cart.toml", "there is no recording"),
+        ("fit . --system cart.py:Cart", "no rig.toml in it; name one with --rig"),
+        ("fit runs --rig cart.toml", "the column `position_m` is missing"),
+        ("fit . --system cart.json --rig cart.toml", "name a Python file"),
+        ("diagnose runs --rig cart.toml", "the column `position_m` is missing"),
+        ("diagnose one --rig cart.toml --next", "--next proposes speeds of a cam"),
+        ("diagnose one --rig cart.toml", "There is 1 recording; give at least two"),
+        ("fit one --rig known.toml", "Nothing is to be fitted"),
+        ("demo --case one --rig cart.toml", "is that of a cam-follower"),
+    ],
+)
+def test_what_is_wrong_is_said_in_a_sentence(rig, line, words):
+    for folder, column in (("runs", "place_m"), ("one", "position_m")):
+        (rig / folder).mkdir()
+        rows = "".join(f"{k / 1000},{0.01 * np.sin(k / 30):.6f}\n" for k in range(300))
+        (rig / folder / "run.csv").write_text(f"time_s,{column}\n{rows}")
+    text = (rig / "cart.toml").read_text()
+    (rig / "known.toml").write_text(
+        re.sub(r"tolerance = [\d.]+", "tolerance = 0", text)
+    )
+    assert words in refusal(*line.split())
+
+
+def test_from_recordings_to_a_fitted_system(rig):
+    """Every parameter within 4 standard errors; the file that is written comes back."""
+    write_case(rig / "case")
+    said = run(
+        *("fit", "case", "--system=cart.py:Cart", "--rig=cart.toml"),
+        *("--json=fitted.json", "--out=fit"),
+    )
+    assert "The optimum was reached." in said
+    # laws from the impacts on either stop
+    assert "Gap 1: ConstantRestitution" in said and "Gap 2:" in said
+    assert (rig / "fit" / "residuals_time.png").exists()
+    # there is no drive to draw them by
+    assert not (rig / "fit" / "residuals_phase.png").exists()
+    fitted = json.loads((rig / "fitted.json").read_text())
+    for one in fitted["about"]["parameters"]:
+        off = abs(one["value"] - TRUTH[one["name"]])
+        assert off < 4 * one["stderr"], one
+        assert one["stderr"] < 1e-2 * abs(one["value"])
+    assert fitted["source"] == f"{rig / 'cart.py'}:Cart"
+    line = ["simulate", "--system=fitted.json", "--state=0,1.2", "--t1=1"]
+    again = json.loads(run(*line, "--json=-"))
+    assert again["parameters"]["stiffness"] == pytest.approx(41.5, rel=1e-3)
+    assert again["system"] == "Cart"
+    shutil.move(rig / "cart.py", rig / "moved.py")
+    assert "which is not there; put it back" in refusal(*line)
+
+
+def test_a_system_that_cannot_be_saved_is_fitted_all_the_same(rig):
+    code = (rig / "cart.py").read_text()
+    code = code.replace("import jax.numpy", "import equinox as eqx\nimport jax.numpy")
+    field = "    law: object = eqx.field(default=abs, static=True)\n"
+    code = code.replace("    stiffness: float", f"{field}    stiffness: float")
+    (rig / "cart.py").write_text(code)
+    write_case(rig / "case")
+    said = run("fit", "case", "--rig=cart.toml", "--json=fitted.json")
+    assert "The system is not saved: `law` is a builtin" in " ".join(said.split())
+    fitted = json.loads((rig / "fitted.json").read_text())
+    assert fitted["about"]["parameters"][0]["name"] == "stiffness"
+    assert "lacks" in refusal("simulate", "--system=fitted.json")
+
+
+@pytest.mark.slow
+def test_from_recordings_to_a_report(rig):
+    """The example without its damping lacks damping; all is said in metres."""
+    text = (rig / "cart.toml").read_text()
+    known = text.replace("value = 0.3, tolerance = 0.2", "value = 0.0")
+    (rig / "cart.toml").write_text(known)
+    write_case(rig / "case")
+    said = run("diagnose", "case", "--rig=cart.toml", "--out=report")
+    assert "The model lacks viscous damping" in " ".join(said.split())
+    verdict = json.loads((rig / "report" / "verdict.json").read_text())
+    (effect,) = verdict["effects"]
+    c1 = effect["parameters"]["c1"]
+    assert c1["value"] == pytest.approx(0.25, abs=max(4 * c1["stderr"], 1e-3))
+    assert verdict["fit"]["unit"] == "m"
+    page = (rig / "report" / "index.html").read_text()
+    words = re.sub(r"<style>.*?</style>|<img[^>]*>", "", page, flags=re.DOTALL)
+    for foreign in ("rad/s", "rpm", "cam"):
+        assert not re.search(rf"\b{foreign}\b", words), foreign
+    again = run("simulate", "--system=report/model.json", "--state=0,1.2", "--t1=1")
+    assert "Cart, from 0 to 1 s" in again
