@@ -16,13 +16,13 @@ from ._gains import (
 from ._given_up import given_up as given_up
 from ._kept_trials import KeptTrials as KeptTrials
 from ._local_force import force_blocks as force_blocks, Response as Response
-from ._question import (
-    Question as Question,
-    rig_question as rig_question,
+from ._question import Question as Question
+from ._rig_question import rig_question as rig_question
+from ._search import Search as Search
+from ._system_question import (
     setup_question as setup_question,
     system_question as system_question,
 )
-from ._search import Search as Search
 from ._trials import Trial as Trial, Trials as Trials
 from ._vibration_scan import Periodogram as Periodogram
 from ._within_tolerances import within_tolerances as within_tolerances

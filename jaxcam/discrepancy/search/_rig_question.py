@@ -1,0 +1,100 @@
+"""The question of a cam-follower rig."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ...fitting import cam_follower_model, cam_follower_parameters, Model, Problem
+from ...recordings import Recording, RecordingError, Rig, segment_case
+from ...recordings.cut import Segments
+from ...recordings.files import check_channels, check_drive
+from ..policy import Policy
+from ..terms import base_drive, library, Term, WithTerms
+from ._question import (
+    by_listing,
+    Question,
+    refuse_one,
+    Report,
+    Shown,
+    term_parameters,
+)
+
+
+_FOLLOWER = "follower_angle_rad"
+# Angles at which the nominal cam is looked up, to check the sign of a recording
+_ANGLES = 64
+
+
+def rig_question(
+    rig: Rig,
+    recordings: Sequence[Recording | Segments],
+    candidates: Sequence[Term] | None,
+    report: Report,
+    policy: Policy,
+) -> Question:
+    """The question of a cam-follower rig, which states its sensors and tolerances.
+
+    **Raises:** `RecordingError` for recordings that cannot be those of the rig.
+    """
+    runs = tuple(recordings)
+    refuse_one(runs)
+    _check(rig, [r.recording if isinstance(r, Segments) else r for r in runs])
+    report("finding impacts and contacts", None)
+    cut = [run for run in runs if isinstance(run, Segments)]
+    if len(cut) < len(runs):
+        cut = list(segment_case(runs, rig))  # pyright: ignore
+    if candidates is None:
+        candidates = library(references=rig.references)
+    terms, unlisted = by_listing(tuple(candidates))
+    base = cam_follower_model(rig)
+    model = Model(WithTerms(base.system, terms), base.sensors, base_drive())
+    parameters = cam_follower_parameters(rig, base=lambda s: s.base)
+    names = tuple(p.name for p in parameters)
+    report("preparing the fits", None)
+    problem = Problem.build(
+        model, cut, parameters + term_parameters(terms, cut, policy)
+    )
+    # the recordings tell only the ratio of stiffness and inertia
+    stiffness = Shown("K/J", rig.inertia.value, "1/(m^2 s^2)")
+    return Question(
+        problem,
+        names,
+        terms,
+        unlisted,
+        True,
+        "rad",
+        rig.references,
+        tuple(run.recording for run in cut),
+        rig.sensors.cam_floor,
+        shown={"stiffness": stiffness},
+    )
+
+
+def _check(rig: Rig, runs: Sequence[Recording]) -> None:
+    """Records that cannot be those of the rig.
+
+    **Raises:** `RecordingError` that says what is wrong with which.
+    """
+    surface = rig.system(1.0)
+    angles = np.asarray(surface.contact_angle(np.linspace(0, 2 * np.pi, _ANGLES)))
+    low, high = float(angles.min()), float(angles.max())
+    for run in runs:
+        check_channels(run)
+        check_drive(run)
+        samples = run[_FOLLOWER]
+        least = float(np.min(samples))
+        # the follower cannot be below the cam, by more than tolerances explain
+        room = (high - low) / 2
+        if least >= low - room and least <= high:
+            continue
+        if low - room <= float(np.min(-samples)) <= high:
+            raise RecordingError(
+                f"{run.name}: `{_FOLLOWER}` has the wrong sign for this rig, whose "
+                f"follower is between {low:.3g} and {high:.3g} rad on the cam; "
+                f"multiply the column by -1."
+            )
+        raise RecordingError(
+            f"{run.name}: `{_FOLLOWER}` goes down to {least:.3g} rad where the cam of "
+            f"this rig is between {low:.3g} and {high:.3g} rad; check that the column "
+            f"and the rig file belong to this record, and that it is in radians."
+        )
