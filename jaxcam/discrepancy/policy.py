@@ -77,6 +77,11 @@ class Policy:
         "relative error of a term's form that still counts as that term; its square is "
         "the share of the explained cost that may be left over",
     )
+    corner_share: float = _decides(
+        3e-4,
+        "share of what is explained that the smoothed corner of dry friction may "
+        "leave; a term beside it that explains less is not named",
+    )
     near: float = _decides(
         4.0, "cost per sample below which a fit that has not converged is near the data"
     )

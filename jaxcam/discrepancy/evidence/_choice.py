@@ -4,6 +4,7 @@ import dataclasses
 
 from ..search import Question, Search, Trial, Trials
 from ._held_out import held_out, HeldOut
+from ._masked import unmasked
 from ._redrawn import redrawn, sure
 from ._structure import Structure, structures
 
@@ -16,6 +17,8 @@ class Choice:
     - `inclusion`, `deviation`: of the bootstrap, by term and by parameter.
     - `doubtful`: terms that were dropped, with the share of the bootstrap samples that
         keep them; `needed`: those that are named all the same.
+    - `masked`: terms that were dropped, with their shares of what is explained, because
+        the corner of another one leaves as much.
     - `left_before`, `left_after`: structures in the residuals of `before` and `best`.
     """
 
@@ -29,6 +32,7 @@ class Choice:
     left_before: list[Structure]
     left_after: list[Structure]
     held: HeldOut
+    masked: list[tuple[str, float]] = dataclasses.field(default_factory=list)
 
     @property
     def unexplained(self) -> list[Structure]:
@@ -44,6 +48,7 @@ def choose(question: Question, trials: Trials, seed: int) -> Choice:
     """
     found = Search(trials).run()
     trials.progress("redrawing stretches of the records", None)
+    found, masked = unmasked(trials, found)
     best, inclusion, deviation, doubtful = sure(trials, found, seed)
     before = trials.known[frozenset()]
     trials.progress("looking at what is left over", None)
@@ -72,6 +77,7 @@ def choose(question: Question, trials: Trials, seed: int) -> Choice:
         left_before,
         left_after,
         held or held_out(trials, before, best),
+        masked,
     )
 
 

@@ -14,6 +14,7 @@ class Reason(enum.StrEnum):
 
     SMALL_REMAINDER = "small remainder"
     IN_DOUBT = "in doubt"
+    MASKED = "masked by a corner"
     NAMED_IN_DOUBT = "named in doubt"
     FAR_FROM_DATA = "far from the data"
     TIE = "tie"
@@ -47,6 +48,8 @@ def caveats_of(
     """
     for name, share in choice.doubtful:
         yield _in_doubt(trials, name, share)
+    for name, share in choice.masked:
+        yield _masked(choice, name, share)
     for name, share in choice.needed:
         yield _named_in_doubt(trials, name, share)
     if not trials.settled(choice.found):
@@ -89,6 +92,16 @@ def _in_doubt(trials: Trials, name: str, share: float) -> Caveat:
         Reason.IN_DOUBT,
         f"A term for {name.replace('_', ' ')} gains something, but "
         f"{_against(trials, share)}; record more before you believe it.",
+        (name,),
+    )
+
+
+def _masked(choice: Choice, name: str, share: float) -> Caveat:
+    return Caveat(
+        Reason.MASKED,
+        f"A term for {name.replace('_', ' ')} would explain {share:.1g} of what "
+        f"{listed(sorted(choice.best.names))} explains: no more than the numerical "
+        f"form of dry friction, whose corner is smoothed, may leave over.",
         (name,),
     )
 

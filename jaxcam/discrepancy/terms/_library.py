@@ -45,6 +45,7 @@ class CoulombFriction(Term):
     source: ClassVar[str] = (
         "Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica 1994"
     )
+    corner: ClassVar[bool] = True
     fc: float = strength("[q]/s^2", 0.1, lower=0.0)
     slip: float = _reference(References.slip_speed)
 
@@ -176,6 +177,7 @@ class StribeckFriction(Term):
         "Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica 1994"
     )
     listed: ClassVar[bool] = False
+    corner: ClassVar[bool] = True
     fs: float = strength("[q]/s^2", 0.1, lower=0.0)
     speed: float = _reference(References.stribeck_speed)
     slip: float = _reference(References.slip_speed)
@@ -193,6 +195,7 @@ class AsymmetricFriction(Term):
     region: ClassVar[str] = "in flight, on the way up"
     source: ClassVar[str] = "Armstrong-Helouvry 1991, Control of Machines with Friction"
     listed: ClassVar[bool] = False
+    corner: ClassVar[bool] = True
     fa: float = strength("[q]/s^2", 0.1, lower=0.0)
     slip: float = _reference(References.slip_speed)
 

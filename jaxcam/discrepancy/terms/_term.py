@@ -97,7 +97,7 @@ class Term(eqx.Module):
     model lacks"), `where` (a [`Where`][jaxcam.discrepancy.terms.Where] or its name; by
     default the first of `acts`), `region` (of the motion, in words), `source`
     (literature), `listed` (false for one that describes a shape but is not a verdict by
-    itself).
+    itself), `corner` (whether its force jumps, as that of dry friction, and is smoothed).
 
     Fields, given by name: `coordinate`, the number of the coordinate (0 for the first)
     that is pushed and whose position and velocity are seen; `constraint`, that of the
@@ -112,6 +112,7 @@ class Term(eqx.Module):
     region: ClassVar[str] = "everywhere"
     source: ClassVar[str] = ""
     listed: ClassVar[bool] = True
+    corner: ClassVar[bool] = False
     acts: ClassVar[tuple[str, ...]] = ()
     coordinate: int = eqx.field(default=0, static=True, kw_only=True, metadata=_SPARE)
     constraint: int = eqx.field(default=0, static=True, kw_only=True, metadata=_SPARE)
