@@ -197,7 +197,7 @@ def test_a_cam_that_cannot_be_read():
     rig = read_rig(DEMO_RIG / "rig.toml")
     time = np.arange(8) * 0.1
     channels = {"cam_angle_rad": time, "follower_angle_rad": 0.2 + 0.01 * time}
-    with pytest.raises(RecordingError, match="too few to follow the cam"):
+    with pytest.raises(RecordingError, match="too few to follow the drive"):
         segment_case([Recording("slow", time, channels)], rig)
     assert measure(time, 0.0, 36000, np.random.default_rng(0)).shape == (8,)
 

@@ -1,4 +1,4 @@
-"""The drive of a cam-follower, from its encoder: angle, rate, mean speed, clock."""
+"""The drive of a rig, from its encoder: angle, rate, mean speed, clock."""
 
 import dataclasses
 
@@ -17,7 +17,7 @@ _WINDOW = 0.05
 
 @dataclasses.dataclass(frozen=True)
 class Drive:
-    """What the cam did.
+    """What a drive did, such as the cam of a cam-follower.
 
     - `angle`: smoothed angle (rad), unwrapped, counted in the sense of turning.
     - `rate`: its rate of change (rad/s).
@@ -44,9 +44,9 @@ class Drive:
 
 
 def read_drive(recording: Recording, channel: str = "cam_angle_rad") -> Drive:
-    """Smooth the cam's encoder with local parabolas over 50 ms.
+    """Smooth the encoder of a drive with local parabolas over 50 ms.
 
-    **Raises:** `RecordingError` for a record shorter than that, or a cam that stands.
+    **Raises:** `RecordingError` for a record shorter than that, or a drive that stands.
     """
     raw = recording[channel]
     if np.any(np.abs(np.diff(raw)) > np.pi):
@@ -57,7 +57,7 @@ def read_drive(recording: Recording, channel: str = "cam_angle_rad") -> Drive:
     if count < 5 or count > len(raw):
         raise RecordingError(
             f"{recording.name}: {len(raw)} samples {recording.interval:.3g} s apart "
-            f"are too few to follow the cam; give a record that is longer than "
+            f"are too few to follow the drive; give a record that is longer than "
             f"{_WINDOW:g} s and sampled above {4 / _WINDOW:g} Hz."
         )
     angle = np.asarray(savgol_filter(raw, count, 2))
@@ -66,7 +66,7 @@ def read_drive(recording: Recording, channel: str = "cam_angle_rad") -> Drive:
     speed, phase = np.polyfit(recording.time, raw, 1)
     if abs(angle[-1] - angle[0]) < np.pi:
         raise RecordingError(
-            f"{recording.name}: the cam turns by {abs(angle[-1] - angle[0]):.2g} rad "
+            f"{recording.name}: the drive turns by {abs(angle[-1] - angle[0]):.2g} rad "
             f"only; give a record of at least half a turn."
         )
     noise = float(np.std(raw - angle))
