@@ -265,3 +265,22 @@ def test_from_recordings_to_a_report(rig):
         assert not re.search(rf"\b{foreign}\b", words), foreign
     again = run("simulate", "--system=report/model.json", "--state=0,1.2", "--t1=1")
     assert "Cart, from 0 to 1 s" in again
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        (
+            "diagram --from 11.9 --to 12 --points 2 --turns 20 --keep 5 --state 0,0",
+            "TwoStops: 20 samples, speed from 11.9 to 12",
+        ),
+        ("basins --low=-0.04,-1 --high 0.07,1 --shape 4,4 --turns 30", "TwoStops: of"),
+        ("continue --from 11 --to 13 --at 12 --max-points 2", "TwoStops: 5 points"),
+    ],
+)
+def test_sweeps_and_branches_of_a_rig(rig, line, words):
+    for kind in (".py", ".toml"):
+        shutil.copy(ROOT / "docs" / "rigs" / f"two_stops{kind}", rig)
+    command, *options = line.split()
+    assert words in run(command, "--rig=two_stops.toml", *options)

@@ -1,4 +1,4 @@
-"""The drive of a cam-follower, from its encoder: angle, rate, mean speed, clock."""
+"""The drive of a rig, from its encoder: angle, rate, mean speed, clock."""
 
 import dataclasses
 
@@ -17,7 +17,7 @@ _WINDOW = 0.05
 
 @dataclasses.dataclass(frozen=True)
 class Drive:
-    """What the cam did.
+    """What a drive did, such as the cam of a cam-follower.
 
     - `angle`: smoothed angle (rad), unwrapped, counted in the sense of turning.
     - `rate`: its rate of change (rad/s).
@@ -44,9 +44,9 @@ class Drive:
 
 
 def read_drive(recording: Recording, channel: str = "cam_angle_rad") -> Drive:
-    """Smooth the cam's encoder with local parabolas over 50 ms.
+    """Smooth the encoder of a drive with local parabolas over 50 ms.
 
-    **Raises:** `RecordingError` for a record shorter than that, or a cam that stands.
+    **Raises:** `RecordingError` for a record shorter than that, or a drive that stands.
     """
     raw = recording[channel]
     if np.any(np.abs(np.diff(raw)) > np.pi):
