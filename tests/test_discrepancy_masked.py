@@ -42,6 +42,9 @@ def _asked(first: str, second: str, lost: float, policy=Policy()):
     return set(found.names), dropped
 
 
+pytestmark = pytest.mark.usefixtures("unchecked_types")
+
+
 def test_what_a_corner_leaves_over_is_not_named():
     names, dropped = _asked("coulomb_friction", "external_vibration", 100.0)
     assert names == {"coulomb_friction"}

@@ -16,7 +16,7 @@ _REACH = 10.0
 
 def shown_in(part: Residuals) -> tuple[float, str]:
     """A factor and the unit in which the residuals of a channel are drawn."""
-    from ..plotting import scaled
+    from ..plotting.labels import scaled
 
     return scaled(unit_of(part.channel), _REACH * part.noise)
 

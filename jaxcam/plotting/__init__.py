@@ -18,7 +18,6 @@ from ._lyapunov import lyapunov_convergence as lyapunov_convergence
 from ._motion_program import motion_program as motion_program
 from ._multipliers import multipliers as multipliers
 from ._phase_portrait import phase_portrait as phase_portrait
-from ._prefix import scaled as scaled
 from ._residual_by_mode import residual_by_mode as residual_by_mode
 from ._special_curves import special_curves as special_curves
 from ._style import save_figure as save_figure, style as style

@@ -12,6 +12,10 @@ from ..models import CamFollower, ConstantRestitution, EccentricCircle
 from ._errors import RigError
 
 
+# 19 of 20 speeds of the thesis' cam-follower are below this (rad/s)
+_FAST = 2.0
+
+
 @dataclasses.dataclass(frozen=True)
 class Quantity:
     """A nominal value and how far a real one may differ from it, in SI units."""
@@ -77,6 +81,20 @@ class References:
     stribeck_speed: float = 0.1
     slip_speed: float = 0.015
     free_slip_speed: float = 0.01
+
+    @classmethod
+    def of_speed(cls, fast: float) -> "References":
+        """Constants of a motion whose fast speeds are about `fast`, about its zero.
+
+        Each speed stands to those of the motion as it does in the thesis' rig.
+        """
+        share = fast / _FAST
+        speeds = {
+            field.name: field.default * share
+            for field in dataclasses.fields(cls)
+            if field.name.endswith("_speed")
+        }
+        return cls(spring_center=0.0, **speeds)
 
 
 @dataclasses.dataclass(frozen=True)

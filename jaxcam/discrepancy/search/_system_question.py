@@ -11,17 +11,11 @@ from ...fitting import Input, Model, Parameter, Problem, Sensor, Setup, Turning
 from ...hybrid import HybridSystem
 from ...recordings import Recording, References
 from ...recordings.against_model import size_of
-from ...recordings.cut import measured_noise, Segments
+from ...recordings.cut import fast_speed, measured_noise, Segments
 from ...recordings.files import check_channels, unit_of
 from ..policy import Policy
 from ..terms import coordinates, library, Term, WithTerms
 from ._question import by_listing, Question, refuse_one, Report, term_parameters
-
-
-# Share of the speeds of a motion below its fast ones, and that speed (rad/s) of the
-# thesis' cam-follower, for which the constants of the forms are stated; time (s) over
-# which a speed is measured
-_FAST, _THESIS_FAST, _STRIDE = 0.95, 2.0, 5e-3
 
 
 @dataclasses.dataclass(frozen=True)
@@ -101,7 +95,8 @@ def system_question(
     pairs = coordinates(system, _usual_state(system, sensors, recordings))
     seen = _channel_of(sensors, pairs[0][0])
     unit, turned = unit_of(seen), system.period is not None
-    references = _scaled(recordings, seen, stated or {})
+    usual = References.of_speed(fast_speed([r.recording for r in recordings], seen))
+    references = dataclasses.replace(usual, **(stated or {}))
     if candidates is None:
         clocked = turned or drive is not None
         candidates = library(turned, references, clocked=clocked)
@@ -154,31 +149,6 @@ def _usual_state(system, sensors, recordings) -> Float[np.ndarray, " n"]:
             samples = np.concatenate([part.recording[name] for part in recordings])
             state[pick] = np.nanmedian(samples)
     return state
-
-
-def _scaled(
-    recordings: Sequence[Segments], channel: str, stated: Mapping[str, float]
-) -> References:
-    """Constants of the forms for a motion; those that are not stated, by its speeds.
-
-    The speeds within which dry friction changes sign and rises stand to those of the
-    motion as they do in the thesis' rig.
-    """
-    speeds = []
-    for part in recordings:
-        time, samples = part.recording.time, part.recording[channel]
-        # over so many samples noise is no speed
-        stride = max(1, round(_STRIDE / part.recording.interval))
-        time, samples = time[::stride], samples[::stride]
-        speeds.append(np.abs(np.diff(samples) / np.diff(time)))
-    every = np.concatenate(speeds)
-    fast = float(np.quantile(every[np.isfinite(every)], _FAST))
-    usual, share = References(), fast / _THESIS_FAST if fast > 0 else 1.0
-    scaled = {
-        name: getattr(usual, name) * share
-        for name in ("impact_speed", "stribeck_speed", "slip_speed", "free_slip_speed")
-    }
-    return dataclasses.replace(usual, **{"spring_center": 0.0, **scaled, **stated})
 
 
 def _measured_in(unit: str, terms: Sequence[Term]) -> tuple[Term, ...]:

@@ -97,7 +97,7 @@ class Term(eqx.Module):
     model lacks"), `where` (a [`Where`][jaxcam.discrepancy.terms.Where] or its name; by
     default the first of `acts`), `region` (of the motion, in words), `source`
     (literature), `listed` (false for one that describes a shape but is not a verdict by
-    itself), `corner` (whether its force jumps, as that of dry friction, and is smoothed).
+    itself), `corner` (whether its force jumps, as dry friction does, and is smoothed).
 
     Fields, given by name: `coordinate`, the number of the coordinate (0 for the first)
     that is pushed and whose position and velocity are seen; `constraint`, that of the
