@@ -17,6 +17,7 @@ from jaxcam.fitting import (
     Turning,
 )
 from jaxcam.recordings import Recording, RecordingError
+from jaxcam.recordings.cut._cut import _impact
 
 
 RIGS = Path(__file__).parents[1] / "docs" / "rigs"
@@ -161,3 +162,21 @@ def test_what_is_not_told_by_contact_is_not_asked():
     problem = Problem.build(model(), parts, [REST])
     assert not np.any(np.asarray(problem.pieces.rest_exists))
     assert problem.samples > 1.5 * len(recording)
+
+
+@pytest.mark.parametrize(
+    ("separation", "kind"),
+    [(0.3, "impact"), (-0.02, "impact"), (-0.2, "several impacts")],
+)
+def test_a_jump_that_leads_on_into_the_surface_is_more_than_one(separation, kind):
+    """Three standard errors (0.01) below zero no single impact has a separation."""
+    found = {
+        "time": 1.0,
+        "time_stderr": 1e-5,
+        "before": -0.5,
+        "before_stderr": 0.01,
+        "after": separation,
+        "after_stderr": 0.01,
+        "separation": separation,
+    }
+    assert _impact(found).kind == kind

@@ -88,13 +88,14 @@ class References:
 
         Each speed stands to those of the motion as it does in the thesis' rig.
         """
-        share = fast / _FAST
-        speeds = {
-            field.name: field.default * share
-            for field in dataclasses.fields(cls)
-            if field.name.endswith("_speed")
-        }
-        return cls(spring_center=0.0, **speeds)
+        share, usual = fast / _FAST, cls()
+        return cls(
+            spring_center=0.0,
+            impact_speed=share * usual.impact_speed,
+            stribeck_speed=share * usual.stribeck_speed,
+            slip_speed=share * usual.slip_speed,
+            free_slip_speed=share * usual.free_slip_speed,
+        )
 
 
 @dataclasses.dataclass(frozen=True)

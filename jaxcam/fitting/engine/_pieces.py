@@ -145,6 +145,8 @@ def _margin(edge, interval: float) -> float:
     """Samples closer to a boundary than this may be on its other side."""
     if edge.kind == "end of record":
         return 0.0
+    if edge.kind == "several impacts":
+        return edge.stderr
     error = edge.stderr if np.isfinite(edge.stderr) else interval
     return interval / 2 + 2 * min(error, 2 * interval)
 

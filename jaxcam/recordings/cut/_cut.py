@@ -15,6 +15,7 @@ from ._contact_stretches import (
     Span,
 )
 from ._impact_marks import away, impact_marks
+from ._kinks import WINDOW
 from ._motion import Motion
 from ._polynomial import crossing, LocalFit
 from ._record_ends import clear_of_end, settled_alike
@@ -23,7 +24,7 @@ from ._segments import Boundary, Contact, Flight, Impacts
 
 
 # Standard errors by which a motion must recede from a surface for an impact on it to be
-# refused
+# refused; or go on into it, for there to have been more than one
 _SURE = 3.0
 # Samples of a flight before an impact that show how it curves down
 _LONG = 10
@@ -101,7 +102,9 @@ def cut(
         # a speed of approach that noise makes negative is not known
         ({**crossed[place], "side": marks.get(place, side.get(place, 0))}, number)
         for number, (_, place) in enumerate(spans)
-        if place in crossed and crossed[place]["approach"] > 0
+        if place in crossed
+        and crossed[place]["approach"] > 0
+        and boundaries[place].kind == "impact"
     ]
     return tuple(flights), tuple(contacts), _gather(impacts)
 
@@ -187,6 +190,10 @@ def _crossed(motion: Motion, first: int, place: int, last: int) -> dict:
 
 
 def _impact(found: dict) -> Boundary:
+    if found["separation"] < -_SURE * found["after_stderr"]:
+        evidence = "the velocity jumps, and still leads into the surface"
+        # the windows that show a jump are as long as this on either side
+        return Boundary(found["time"], WINDOW / 2, "several impacts", evidence)
     jump = abs(found["after"] - found["before"])
     error = np.hypot(found["before_stderr"], found["after_stderr"])
     evidence = f"the velocity jumps by {jump:.3g}, {jump / error:.0f} standard errors"

@@ -15,7 +15,8 @@ class Boundary:
     """Where one part ends and the next begins.
 
     - `time`, `stderr`: seconds; the error is not a number at the ends of the record.
-    - `kind`: `"impact"` (flight to flight), `"landing"` (flight to contact, with
+    - `kind`: `"impact"` (flight to flight), `"several impacts"` (too close together to
+        be told apart), `"landing"` (flight to contact, with
         bounces too low to be seen), `"release"` (contact to flight) or `"end of
         record"`.
     - `evidence`: why it is there, in words.
