@@ -1,5 +1,7 @@
 """Rules of the event loop one by one, where whole motions do not tell them apart."""
 
+from types import SimpleNamespace
+
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -8,7 +10,7 @@ from textbook_systems import BallBetweenWalls, parameters
 from jaxcam import Settings
 from jaxcam.hybrid import stroboscope
 from jaxcam.hybrid.loop import Jet
-from jaxcam.hybrid.loop._advance import Plan
+from jaxcam.hybrid.loop._advance import _struck, _together, Plan
 from jaxcam.hybrid.loop._functions import Functions
 from jaxcam.hybrid.loop._loop_state import _presses, first_state
 from jaxcam.hybrid.loop._release import _root, lets_go_before, opens
@@ -42,12 +44,57 @@ def test_impacts_on_each_of_several_constraints_are_remembered():
     assert [float(t) for t in first.struck] == [-np.inf, -np.inf]
 
 
-def test_counted_impacts_are_those_listed():
-    """A ball on a moving table, 30 turns: in each turn and in all."""
-    ball = BouncingBall(amplitude=0.02, frequency=31.0)
-    seen = stroboscope(ball, np.array([[0.3, 0.0], [0.1, 0.5]]), 30)
-    assert np.all(seen.impacts > 5)
-    np.testing.assert_array_equal(seen.impacts, seen.hits.sum(axis=1))
+def test_counted_impacts_are_those_that_happen():
+    """A dropped ball: impact k at t (1 + 2 r + ... + 2 r^k), where t = sqrt(2 h / g).
+
+    They accumulate within the seventh second, whose first one completes the chatter.
+    """
+    r, height = 0.9, 0.5
+    ball = BouncingBall(restitution=r)
+    fall = np.sqrt(2 * height / float(ball.gravity))
+    times = fall * (2 * np.cumsum(r ** np.arange(100)) - 1)
+    assert 6 < times[-1] < fall * (1 + r) / (1 - r) < 7
+    seen = stroboscope(ball, np.array([[height, 0.0]]), 8, period=1.0)
+    listed = [*np.histogram(times, np.arange(7.0))[0], 1, 0]
+    np.testing.assert_array_equal(seen.hits, [listed])
+    np.testing.assert_array_equal(seen.rests, [[0] * 6 + [1, 0]])
+    np.testing.assert_array_equal(seen.impacts, [sum(listed)])
+
+
+@pytest.mark.parametrize("unit", [1e-6, 1.0, 1e6])
+@pytest.mark.parametrize(
+    ("before", "together"), [(0.0, True), (1e-4, True), (1e-2, False), (np.inf, False)]
+)
+def test_two_constraints_are_hit_together(unit, before, together):
+    """Within far less than a natural step, in whatever unit time is."""
+    walls = BallBetweenWalls(**parameters(gravity=9.81, width=1.0, restitution=0.8))
+    functions = Functions(walls.prepared(), 2)
+    lane = first_state(functions, jnp.asarray(0.0), (0.5, 0.0), jnp.asarray(1.0))
+    latest = 5.0 * unit
+    struck = latest, latest - before * unit
+    lane = lane._replace(t=latest, longest=unit, struck=struck)
+    assert bool(_together(lane)) is together
+
+
+@pytest.mark.parametrize(
+    ("good", "lands", "hidden", "hops"),
+    [
+        (True, True, True, 4.0),
+        # a hop that can be seen ends the row
+        (True, True, False, 0.0),
+        # no impact, or one of a step that is not taken
+        (True, False, True, 3.0),
+        (False, True, True, 3.0),
+    ],
+)
+def test_hidden_hops_are_counted_at_impacts_that_happen(good, lands, hidden, hops):
+    carried = SimpleNamespace(struck=(1.0, 2.0), crowded=(3.0,))
+    attempt = SimpleNamespace(
+        good=good, lands=lands, hidden=hidden, hit=[lands, False], t=5.0
+    )
+    struck, (crowded,) = _struck(carried, attempt)
+    assert [float(t) for t in struck] == [5.0 if good and lands else 1.0, 2.0]
+    assert float(crowded) == hops
 
 
 @pytest.mark.parametrize(
@@ -89,7 +136,10 @@ def test_what_is_touched_without_velocity_presses(acceleration, jerk, tiny, pres
 
 
 def test_plan_knows_the_period_that_it_is_given():
-    """Steps are at most a part of it; without, of the system's own period."""
+    """Steps are at most a part of it, of the system's own (1 s) without.
+
+    No whole rise and fall of a surface fits in, which takes half of a period.
+    """
     walls = BallBetweenWalls(**parameters(gravity=9.81, width=1.0, restitution=0.8))
     table = BouncingBall(amplitude=0.02, frequency=2 * np.pi)
     zero, end = jnp.asarray(0.0), jnp.asarray(8.0)
@@ -99,6 +149,7 @@ def test_plan_knows_the_period_that_it_is_given():
         return float(plan.longest_step)
 
     assert longest(walls) == np.inf
+    assert longest(table) < 0.5
     assert longest(table, 2.0) == pytest.approx(2 * longest(table))
     assert longest(walls, 2.0) == pytest.approx(2 * longest(table))
 
