@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from jaxcam.discrepancy.evidence import ripple_of
+from jaxcam.discrepancy import Policy
+from jaxcam.discrepancy.evidence import Ripple, ripple_of
 from jaxcam.recordings import Recording
 
 
@@ -47,3 +48,21 @@ def test_wandering_is_no_ripple():
     assert found.delta_bic > 0
     assert found.p_value > 1e-3
     assert found.eps < 4 * found.eps_stderr
+
+
+def test_a_ripple_that_half_of_the_redrawn_sets_lack_is_none():
+    """As any other term, it must be kept by `Policy.sure` of them."""
+    policy = Policy()
+    known = dict.fromkeys(
+        ("eps", "eps_stderr", "psi", "psi_stderr", "p_value", "dispersion"), 1e-6
+    )
+    for inclusion, named in ((0.5, False), (policy.sure, True)):
+        ripple = Ripple(
+            **known,
+            gain=23.3,
+            count=48000,
+            per_record={},
+            heldout_gain=1.0,
+            inclusion=inclusion,
+        )
+        assert ripple.significant(13, policy) is named

@@ -132,7 +132,11 @@ def test_gains_without_vibration_are_within_chance(build):
 
 
 def test_forces_at_nodes_say_what_terms_in_the_system_say(build):
-    """Score and information of two shapes of force, to 1e-3 of their size."""
+    """Score and information of two shapes of force, to 3e-3 of their size.
+
+    Between nodes a force is linear, and it ends where a piece does: where noise puts an
+    impact a little aside, the force between there and the impact is not that of a term.
+    """
     problem = build(0.15, 23.3, 1)
     found = fit(problem, free=["stiffness"])
     shapes = (
@@ -148,6 +152,6 @@ def test_forces_at_nodes_say_what_terms_in_the_system_say(build):
     for mine, theirs in zip(quick.total(), exact.total()):
         size = np.sqrt(np.diag(exact.total()[0]))
         size = size if theirs.ndim == 1 else np.outer(size, size)
-        assert np.max(np.abs(mine - theirs) / size) < 1e-3 * (
+        assert np.max(np.abs(mine - theirs) / size) < 3e-3 * (
             np.max(np.abs(theirs) / size)
         )

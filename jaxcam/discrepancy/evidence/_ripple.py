@@ -43,9 +43,13 @@ class Ripple:
     inclusion: float
 
     def significant(self, tests: int, policy: Policy) -> bool:
-        """Whether it is more than chance, in one of so many tests, and the BIC ask."""
+        """Whether it is more than chance, in one of so many tests, and the BIC ask.
+
+        And, as of any term that is named, in most of the redrawn sets of records.
+        """
         chance = chi2.isf(policy.false_alarms / tests, 2)
-        return bool(self.gain > max(2 * math.log(self.count), chance))
+        asked = max(2 * math.log(self.count), chance)
+        return bool(self.gain > asked) and self.inclusion >= policy.sure
 
     @property
     def delta_bic(self) -> float:
