@@ -7,8 +7,8 @@ def unmasked(trials: Trials, best: Trial) -> tuple[Trial, list[tuple[str, float]
     """A subset without the terms that the integration of a corner explains as well.
 
     Dry friction jumps where the speed changes sign. Its form is smooth, and steps do
-    not end there, so that a small share of what it explains may be left over; many samples
-    make this share significant, and some other term takes it up.
+    not end there, so that a small share of what it explains may be left over; many
+    samples make this share significant, and some other term takes it up.
 
     **Returns:** the fit, and the terms that were dropped, each with the share of what
     is explained that it had.
