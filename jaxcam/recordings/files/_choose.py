@@ -38,20 +38,22 @@ def read_columns(
     *,
     needed: Sequence[str],
     columns: Columns | None,
-    rate: float | None,
-    split: str | None,
+    rate: float | None = None,
+    split: str | None = None,
+    only: bool = False,
 ) -> Chosen:
     """The channels of a file in SI units, as `read_recordings` is asked for them.
 
+    **Arguments:** `needed` are channels that must be there (SI names); `only` these
+    are read.
+
     **Raises:** `RecordingError`, one sentence that says what to do.
     """
-    in_order = columns is not None and not isinstance(columns, Mapping)
-    source = _source(file, _in_order(file, columns) if in_order else None)
-    mapping = _mapping(file, source, columns) if isinstance(columns, Mapping) else {}
+    source, mapping = _opened(file, columns)
     picks = [(name, *mapping.get(name, (name, 1.0))) for name in source.columns]
-    if mapping:
+    if mapping or only:
         # others stay away, unless they are what is needed
-        wanted = {TIME, *needed}
+        wanted = set(needed)
         picks = [
             pick
             for pick in picks
@@ -68,8 +70,29 @@ def read_columns(
         numbers = source.numbers(name, missing=columns is not None)
         found[renamed] = numbers * (factor * unit)
     found = _timed(source, found, rate)
-    require(file, found, (TIME, *needed, *([split] if split else [])))
-    return _without_missing(file, found)
+    require(file, found, (*needed, *([split] if split else [])))
+    return _without_missing(source, found)
+
+
+def column_names(file: Path, columns: Columns | None) -> tuple[str, ...]:
+    """Names of the channels of a file, in SI units.
+
+    **Raises:** `RecordingError` for a file that cannot be read.
+    """
+    source, mapping = _opened(file, columns)
+    return tuple(si(mapping.get(name, (name, 1.0))[0])[0] for name in source.columns)
+
+
+def _opened(
+    file: Path, columns: Columns | None
+) -> tuple[Source, dict[str, tuple[str, float]]]:
+    """A file, and what some of its columns are called instead."""
+    if columns is None:
+        return _source(file, None), {}
+    if isinstance(columns, Mapping):
+        source = _source(file, None)
+        return source, _mapping(file, source, columns)
+    return _source(file, _in_order(file, columns)), {}
 
 
 def require(file: Path, found: Mapping[str, object], needed: Sequence[str]) -> None:
@@ -146,20 +169,22 @@ def _timed(source: Source, found: dict, rate: float | None) -> dict:
     return {TIME: np.arange(count) / rate, **found}
 
 
-def _without_missing(file: Path, found: dict) -> Chosen:
+def _without_missing(source: Source, found: dict) -> Chosen:
     """Only the rows in which every channel has a number."""
     whole = np.all([np.isfinite(numbers) for numbers in found.values()], axis=0)
     lost = int(np.sum(~whole))
     if not lost:
-        return Chosen(found)
+        return Chosen(found, source.notes)
     if np.sum(whole) < 2:
         raise RecordingError(
-            f"{file}: no two rows have a number in each of {listed(found)}; name other "
-            f"columns."
+            f"{source.file}: no two rows have a number in each of {listed(found)}; "
+            f"name other columns."
         )
     first = np.flatnonzero(~whole)[0] + 1
     note = (
-        f"{file.name}: {lost} rows with an empty cell, the first of them row {first}, "
-        f"are left out."
+        f"{source.file.name}: {lost} rows with an empty cell, the first of them row "
+        f"{first}, are left out."
     )
-    return Chosen({name: numbers[whole] for name, numbers in found.items()}, (note,))
+    return Chosen(
+        {name: numbers[whole] for name, numbers in found.items()}, (*source.notes, note)
+    )

@@ -10,6 +10,7 @@ from .._errors import RecordingError
 from ._bytes import LARGEST, MOST, read_bytes, too_large
 from ._source import listed, Source
 from ._table import table_of_lines
+from ._text import kept_lines
 
 
 def read_excel(file: Path, names: Sequence[str] | None = None) -> Source:
@@ -41,8 +42,8 @@ def read_excel(file: Path, names: Sequence[str] | None = None) -> Source:
         if sheet.size > MOST:
             raise too_large(file)
         rows = (map(_cell, row) for row in sheet.itertuples(index=False))
-        lines = [line for line in map("\t".join, rows) if line.strip()]
-        if len(lines) > 1:
+        lines = list(map("\t".join, rows))
+        if sum(bool(line.strip()) for line in lines) > 1:
             full[str(name)] = lines
     if len(full) != 1:
         which = f"tables on the sheets {listed(full)}" if full else "no table"
@@ -50,7 +51,7 @@ def read_excel(file: Path, names: Sequence[str] | None = None) -> Source:
             f"{file}: the workbook has {which}; save one table a file, as .xlsx or CSV."
         )
     (lines,) = full.values()
-    return table_of_lines(file, lines, True, names)
+    return table_of_lines(file, kept_lines(file, lines), names)
 
 
 def _cell(value: Any) -> str:

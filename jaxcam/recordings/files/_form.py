@@ -82,7 +82,8 @@ def _headed(lines: Sequence[str], separator: str, first: int) -> Form:
     width = len(cells_of(lines[first], separator))
     heads = [k for k in range(first) if _is_head(lines[k], separator, width)]
     if not heads:
-        return Form(separator, None, None, first)
+        wider = [k for k in range(first) if _is_wider(lines[k], separator, width)]
+        return Form(separator, wider[-1] if wider else None, None, first)
     names, units = heads[-1], None
     above = heads[-2] if len(heads) > 1 else None
     if above is not None:
@@ -107,6 +108,12 @@ def _is_head(line: str, separator: str, width: int) -> bool:
     cells = cells_of(bare(line), separator)
     words = [cell for cell in cells[1:] if cell]
     return len(cells) == width and bool(words) and not any(map(is_number, cells))
+
+
+def _is_wider(line: str, separator: str, width: int) -> bool:
+    """Whether a line names more columns than rows have that lost their empty cells."""
+    count = len(cells_of(line, separator))
+    return separator == " " and count > width and _is_head(line, separator, count)
 
 
 def bare(line: str) -> str:

@@ -12,7 +12,7 @@ import numpy as np
 from .._errors import RecordingError
 from .._recording import Case, Recording
 from ._check import check_channels, check_drive, find_gaps
-from ._choose import Columns, read_columns
+from ._choose import Columns, read_columns, TIME
 from ._clock import unrounded
 from ._mend import mend, Mended
 from ._table import SUFFIXES as TEXT
@@ -62,7 +62,7 @@ def read_recordings(
     """
     file = Path(file)
     chosen = read_columns(
-        file, needed=channels, columns=columns, rate=rate, split=split
+        file, needed=(TIME, *channels), columns=columns, rate=rate, split=split
     )
     found = chosen.columns
     stem = _stem(file)

@@ -27,12 +27,14 @@ class Source:
     - `columns`: by their names; text where a file is text.
     - `headings`: other words for them, as the file has them.
     - `rate`: samples a second, where the file states them beside the table.
+    - `notes`: what was left out, in words.
     """
 
     file: Path
     columns: Mapping[str, Any]
     headings: Mapping[str, str] = dataclasses.field(default_factory=dict)
     rate: float | None = None
+    notes: tuple[str, ...] = ()
 
     def name_of(self, word: str) -> str:
         """The column that a word names. **Raises:** `RecordingError` for none."""

@@ -14,7 +14,7 @@ from ._form import bare, cells_of, COMMENTS, Form, form_of, is_number
 from ._heading import channel_name
 from ._qtm import qtm_heading, without_lost
 from ._source import shown, Source
-from ._text import read_lines
+from ._text import Lines, read_lines
 
 
 SUFFIXES = (".csv", ".csv.gz", ".tsv", ".tsv.gz", ".lvm")
@@ -35,14 +35,14 @@ def read_table(file: Path, names: Sequence[str] | None = None) -> Source:
     **Raises:** `RecordingError` for a file that is missing, empty, cut short, not a
     text table, or that names its columns badly.
     """
-    lines, whole = read_lines(file)
-    return table_of_lines(file, lines, whole, names)
+    return table_of_lines(file, read_lines(file), names)
 
 
 def table_of_lines(
-    file: Path, lines: list[str], whole: bool, names: Sequence[str] | None = None
+    file: Path, found: Lines, names: Sequence[str] | None = None
 ) -> Source:
-    """The table in some lines; `whole` is whether the last one is known to be."""
+    """The table in some lines. **Raises:** as `read_table` does."""
+    lines, whole, notes = found
     form = form_of(lines) or _as_it_seems(lines)
     separator = form.separator
     width = len(cells_of(lines[form.first], separator)) if form.names is None else None
@@ -73,11 +73,11 @@ def table_of_lines(
         quoting=csv.QUOTE_NONE,
         skip_blank_lines=False,
     )
-    kept = _kept(file, titles, [table[place] for place in places])
+    kept = _kept(file, titles, [pd.Series(table[place]) for place in places])
     if recorded is not None and names is None:
         kept = without_lost(kept)
     headings = _headings(lines, form) if names is None else {}
-    return Source(file, kept, headings, rate)
+    return Source(file, kept, headings, rate, notes)
 
 
 def _as_it_seems(lines: list[str]) -> Form:
@@ -122,7 +122,7 @@ def _headings(lines: list[str], form: Form) -> dict[str, str]:
     return {word: channel_name(word, unit) for word, unit in zip(words, units)}
 
 
-def _kept(file: Path, titles: list[str], columns: list[pd.Series]):
+def _kept(file: Path, titles: list[str], columns: Sequence[pd.Series]):
     """Columns by their names, without those that are empty, or only number the rows."""
     kept = {}
     for place, (title, column) in enumerate(zip(titles, columns)):
@@ -132,7 +132,7 @@ def _kept(file: Path, titles: list[str], columns: list[pd.Series]):
             numbered = column.str.strip() == pd.Series(range(1, len(column) + 1)).map(
                 str
             )
-            if numbered.all() or not column.str.strip().any():
+            if numbered.all() or not _has_words(column):
                 continue
             raise RecordingError(
                 f"{file}: column {place + 1} has no name; name it in the first line, "
@@ -145,7 +145,11 @@ def _kept(file: Path, titles: list[str], columns: list[pd.Series]):
                 f"(columns=[...] in Python)."
             )
         kept[title] = column
-    return {t: c for t, c in kept.items() if c.str.strip().any()} or kept
+    return {t: c for t, c in kept.items() if _has_words(c)} or kept
+
+
+def _has_words(column: pd.Series) -> bool:
+    return bool((column.str.strip() != "").any())
 
 
 def _refuse_cut_line(file, whole, rows, separator, width, named) -> None:
@@ -173,7 +177,10 @@ def _refuse_cut_line(file, whole, rows, separator, width, named) -> None:
         if separator == "," and counts[row] == 2 * width:
             fix = "if these are decimal commas, save it with semicolons between columns"
         elif separator == " ":
-            fix = "where spaces separate, empty cells are lost: save it with tabs"
+            fix = (
+                "where spaces separate, empty cells are lost: save it with tabs, or "
+                "name the columns that each row has with --columns"
+            )
         raise RecordingError(
             f"{file}: row {row + 1} has {counts[row]} values where {by} {width} "
             f"columns; {fix}."

@@ -1,10 +1,13 @@
 """The lines of a text file, whichever program wrote it."""
 
 import csv
+import re
 from pathlib import Path
+from typing import NamedTuple
 
 from .._errors import RecordingError
 from ._bytes import inflate_gzip, MOST, read_bytes, too_large
+from ._form import is_number
 
 
 _UTF16 = b"\xff\xfe", b"\xfe\xff"
@@ -12,10 +15,17 @@ _UTF16 = b"\xff\xfe", b"\xfe\xff"
 _OLD_EXCEL = b"\xd0\xcf\x11\xe0"
 
 
-def read_lines(file: Path) -> tuple[list[str], bool]:
-    """The lines of a text file, plain or gz, that are not blank.
+class Lines(NamedTuple):
+    """The lines of a file that are not blank; `whole` is whether the last one is known
+    to be, by a newline. `notes` say what was left out."""
 
-    **Returns:** the lines, and whether the last one ends in a newline.
+    text: list[str]
+    whole: bool = True
+    notes: tuple[str, ...] = ()
+
+
+def read_lines(file: Path) -> Lines:
+    """The lines of a text file, plain or gz, as far as its first table goes.
 
     **Raises:** `RecordingError` for a file that is missing, empty, cut short or no
     text.
@@ -26,10 +36,42 @@ def read_lines(file: Path) -> tuple[list[str], bool]:
     text = _decoded(file, raw).replace("\r\n", "\n").replace("\r", "\n")
     if sum(text.count(mark) for mark in "\n,;\t ") > 2 * MOST:
         raise too_large(file)
-    lines = [line for line in text.split("\n") if line.strip()]
+    return kept_lines(file, text.split("\n"), text.endswith("\n"))
+
+
+def kept_lines(file: Path, every: list[str], whole: bool = True) -> Lines:
+    """The lines that are not blank; a second table, after a blank line, is left out.
+
+    **Raises:** `RecordingError` where there is none.
+    """
+    lines, notes, gap = [], (), False
+    for number, line in enumerate(every):
+        if not line.strip():
+            gap = True
+            continue
+        if gap and lines and _is_row(lines[-1]) and not any(_numbers(line)):
+            what = " ".join(line.split())[:40]
+            notes = (
+                f"{file.name}: from line {number + 1} on there is another table "
+                f"({what}), which is left out.",
+            )
+            whole = True
+            break
+        lines.append(line)
+        gap = False
     if not lines:
         raise RecordingError(f"{file}: the file is empty; record the run again.")
-    return _unquoted(lines), text.endswith("\n")
+    return Lines(_unquoted(lines), whole, notes)
+
+
+def _numbers(line: str) -> list[bool]:
+    """Whether each word of a line is a number."""
+    return [is_number(word) for word in re.split(r"[\t; ]+", line) if word]
+
+
+def _is_row(line: str) -> bool:
+    found = _numbers(line.replace(",", " "))
+    return bool(found) and all(found)
 
 
 def _decoded(file: Path, raw: bytes) -> str:
