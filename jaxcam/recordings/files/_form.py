@@ -62,7 +62,7 @@ def _first_row(lines: Sequence[str], separator: str) -> int | None:
     kinds = [_kind(line, separator) for line in lines[: _PREAMBLE + _ROWS]]
     for k, (width, numbers) in enumerate(kinds):
         part = kinds[k : k + _ROWS]
-        same = width > 1 and numbers > 0 and all(w == width for w, _ in part)
+        same = width > 1 and len(part) > 1 and all(w == width for w, _ in part)
         if same and all(n > 0 for _, n in part) and max(n for _, n in part) > 1:
             return k
     return None
@@ -82,8 +82,8 @@ def _headed(lines: Sequence[str], separator: str, first: int) -> Form:
     width = len(cells_of(lines[first], separator))
     heads = [k for k in range(first) if _is_head(lines[k], separator, width)]
     if not heads:
-        wider = [k for k in range(first) if _is_wider(lines[k], separator, width)]
-        return Form(separator, wider[-1] if wider else None, None, first)
+        other = [k for k in range(first) if _is_other(lines[k], separator, width)]
+        return Form(separator, other[-1] if other else None, None, first)
     names, units = heads[-1], None
     above = heads[-2] if len(heads) > 1 else None
     if above is not None:
@@ -106,14 +106,23 @@ def _headed(lines: Sequence[str], separator: str, first: int) -> Form:
 
 def _is_head(line: str, separator: str, width: int) -> bool:
     cells = cells_of(bare(line), separator)
-    words = [cell for cell in cells[1:] if cell]
-    return len(cells) == width and bool(words) and not any(map(is_number, cells))
+    # a note has one word, in its first cell
+    words = any(cells[1:]) or (len(cells) == 2 and bool(cells[0]))
+    return len(cells) == width and words and not any(map(is_number, cells))
 
 
-def _is_wider(line: str, separator: str, width: int) -> bool:
-    """Whether a line names more columns than rows have that lost their empty cells."""
+def _is_other(line: str, separator: str, width: int) -> bool:
+    """Whether a line names the columns of rows that are cut in other places.
+
+    Where spaces separate, empty cells are lost; where commas do, decimal ones cut each
+    number in two.
+    """
     count = len(cells_of(line, separator))
-    return separator == " " and count > width and _is_head(line, separator, count)
+    lost, cut = (
+        separator == " " and count > width,
+        separator == "," and count * 2 == width,
+    )
+    return (lost or cut) and _is_head(line, separator, count)
 
 
 def bare(line: str) -> str:

@@ -42,7 +42,8 @@ class Source:
             return word
         if word in self.headings:
             return self.headings[word]
-        near = difflib.get_close_matches(word, self.columns, n=1)
+        small = {name.lower(): name for name in (*self.columns, *self.headings)}
+        near = [small[one] for one in difflib.get_close_matches(word.lower(), small, 1)]
         hint = f"is {shown(near[0])} meant?" if near else f"it has {self.listed()}."
         raise RecordingError(
             f"{self.file}: there is no column {shown(word)} to be named; {hint}"
@@ -99,7 +100,7 @@ def shown(text: str) -> str:
 
 def _of_text(file: Path, name: str, column: pd.Series):
     """Numbers of a column of text, NaN where it is none, and where it is empty."""
-    column = column.str.strip().str.strip('"')
+    column = column.str.strip().str.replace(r'^"(.*)"$', r"\1", regex=True)
     commas = column.str.contains(",", regex=False)
     if commas.any():
         both = np.flatnonzero(commas & column.str.contains(".", regex=False))
