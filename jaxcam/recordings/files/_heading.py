@@ -49,13 +49,14 @@ def channel_name(heading: str, unit: str = "") -> str:
 
     **Arguments:** the heading, and what stands below it in a line of units.
     """
+    words = heading
     if not unit:
         found = _WITH_UNIT.fullmatch(heading)
         if found is None:
             return heading
-        heading, unit = found[1], next(part for part in found.groups()[1:] if part)
+        words, unit = found[1], next((part for part in found.groups()[1:] if part), "")
     ending = _ending(unit)
-    name = re.sub(r"\W+", "_", heading).strip("_")
+    name = re.sub(r"\W+", "_", words).strip("_")
     if not ending or not name:
         return heading
     return f"{name.lower()}_{ending}"

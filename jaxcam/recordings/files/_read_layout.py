@@ -1,11 +1,13 @@
 """What a rig file says of the files of recordings: names of columns, and the rate."""
 
 import dataclasses
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ._toml import known_keys, Section
+from .._errors import RigError
+from ._toml import known_keys, Section, shown_value
 
 
 #: keys of a rig file that are about files
@@ -28,12 +30,15 @@ def read_layout(file: Path, tables: dict[str, Any]) -> FileLayout:
 
     **Raises:** `RigError`, one sentence that names the file and the key.
     """
-    rate = None
-    if "rate" in tables:
-        # a number beside the tables, in a section of its own making
-        rate = Section(file, "rate", {"rate": {"rate": tables["rate"]}}).positive(
-            "rate", "Hz"
-        )
+    rate = tables.get("rate")
+    if rate is not None:
+        number = isinstance(rate, int | float) and not isinstance(rate, bool)
+        if not number or not 0 < rate < math.inf:
+            raise RigError(
+                f"{file}: `rate` is {shown_value(rate)}, and must be a positive number "
+                f"of samples a second; correct it."
+            )
+        rate = float(rate)
     if "columns" not in tables:
         return FileLayout(None, rate)
     section = Section(file, "columns", tables)
