@@ -126,6 +126,16 @@ def test_a_file_without_a_line_of_names(tmp_path):
             read_recordings(file, columns=names)
 
 
+@pytest.mark.parametrize("where", ["rows", "names", "both"])
+@pytest.mark.parametrize("mark", [";", ",", "\t"])
+def test_a_separator_behind_the_last_column(tmp_path, mark, where):
+    head, *rows = table(mark).splitlines()
+    head += mark if where != "rows" else ""
+    rows = [row + mark if where != "names" else row for row in rows]
+    (run,) = read_recordings(written(tmp_path, "\n".join([head, *rows, ""])))
+    assert is_the_table(run)
+
+
 def test_names_of_the_file_become_channels(tmp_path):
     file = written(tmp_path, table(head="t;Angle of the arm"))
     names = {"t": "time_s", "Angle of the arm": ("angle_deg", 180 / np.pi)}
@@ -329,6 +339,8 @@ HOSTILE = {
     "other_unit.csv": (GOOD.replace("angle_rad", "angle_m"), "`angle_rad` is"),
     "commas.csv": (table(",", comma=True), "decimal commas"),
     "thousands.csv": (table().replace("2.000", "2.000,0"), "point and a comma"),
+    "wider.csv": (GOOD.replace("angle_rad", "angle_rad,f_N"), "header names 3"),
+    "narrower.csv": ("time_s,a_rad\n" + "0,1,2\n1,2,3\n", "header names 2"),
     "mixed.csv": (GOOD.replace("0.02,-1.500", "0.02;-1.500"), "row 3 has 1 values"),
     "quote.csv": (GOOD.replace("-1.500", '"-1.5'), "row 3"),
     "backwards.csv": ("time_s,angle_rad\n2,1\n1,2\n0,3\n", "does not increase"),

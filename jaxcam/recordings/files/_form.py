@@ -83,7 +83,8 @@ def _headed(lines: Sequence[str], separator: str, first: int) -> Form:
     heads = [k for k in range(first) if _is_head(lines[k], separator, width)]
     if not heads:
         other = [k for k in range(first) if _is_other(lines[k], separator, width)]
-        return Form(separator, other[-1] if other else None, None, first)
+        last = first - 1 if _is_any_head(lines, first - 1, separator) else None
+        return Form(separator, other[-1] if other else last, None, first)
     names, units = heads[-1], None
     above = heads[-2] if len(heads) > 1 else None
     if above is not None:
@@ -118,11 +119,17 @@ def _is_other(line: str, separator: str, width: int) -> bool:
     number in two.
     """
     count = len(cells_of(line, separator))
-    lost, cut = (
-        separator == " " and count > width,
-        separator == "," and count * 2 == width,
-    )
+    lost = separator == " " and count > width
+    cut = separator == "," and count * 2 == width
     return (lost or cut) and _is_head(line, separator, count)
+
+
+def _is_any_head(lines: Sequence[str], place: int, separator: str) -> bool:
+    """Whether a line right above the rows has names, if not as many as they need."""
+    if place < 0 or separator == " ":
+        return False
+    count = len(cells_of(lines[place], separator))
+    return count > 1 and _is_head(lines[place], separator, count)
 
 
 def bare(line: str) -> str:

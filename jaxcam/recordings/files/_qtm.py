@@ -8,12 +8,11 @@ import pandas as pd
 
 
 def qtm_heading(
-    preamble: Sequence[str], width: int | None = None
+    preamble: Sequence[str], width: int
 ) -> tuple[list[str], float | None] | None:
     """Names of the columns and samples a second, or `None` for another program's file.
 
-    **Arguments:** the lines above the numbers; how many columns there are where no line
-    names them.
+    **Arguments:** the lines above the numbers, and how many columns there are.
     """
     fields = {}
     for line in preamble:
@@ -23,7 +22,7 @@ def qtm_heading(
         return None
     markers = [re.sub(r"\W+", "_", name) for name in fields["MARKER_NAMES"]]
     axes = [f"{name}_{axis}_mm" for name in markers for axis in "xyz"]
-    if width is None or width == len(axes) + 2:
+    if width == len(axes) + 2:
         # the option by which frame and time are written
         return ["frame", "time_s", *axes], None
     rate = fields["FREQUENCY"]

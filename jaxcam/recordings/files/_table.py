@@ -45,8 +45,9 @@ def table_of_lines(
     lines, whole, notes = found
     form = form_of(lines) or _as_it_seems(lines)
     separator = form.separator
-    width = len(cells_of(lines[form.first], separator)) if form.names is None else None
-    rate, recorded = None, qtm_heading(lines[: form.first], width)
+    first = lines[min(form.first, len(lines) - 1)]
+    rate = None
+    recorded = qtm_heading(lines[: form.first], len(cells_of(first, separator)))
     if names is not None:
         titles = list(names)
     elif recorded is not None:
@@ -59,6 +60,7 @@ def table_of_lines(
             f"{file}: it has {len(rows)} rows of samples below its header, and at "
             f"least two are needed."
         )
+    titles, rows = _without_last(titles, rows, separator)
     if len(rows) * len(titles) > MOST:
         raise too_large(file)
     _refuse_cut_line(file, whole, rows, separator, len(titles), names is not None)
@@ -78,6 +80,18 @@ def table_of_lines(
         kept = without_lost(kept)
     headings = _headings(lines, form) if names is None else {}
     return Source(file, kept, headings, rate, notes)
+
+
+def _without_last(titles: list[str], rows: list[str], separator: str):
+    """Names and rows without a last separator that only one of them has."""
+    count = len(cells_of(rows[0], separator))
+    if count == len(titles) - 1 and not titles[-1]:
+        return titles[:-1], rows
+    if count == len(titles) + 1 and separator != " ":
+        bare_rows = [row.rstrip(" ") for row in rows]
+        if all(row.endswith(separator) for row in bare_rows):
+            return titles, [row[:-1] for row in bare_rows]
+    return titles, rows
 
 
 def _as_it_seems(lines: list[str]) -> Form:
