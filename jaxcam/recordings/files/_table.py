@@ -17,7 +17,7 @@ from ._source import shown, Source
 from ._text import Lines, read_lines
 
 
-SUFFIXES = (".csv", ".csv.gz", ".tsv", ".tsv.gz", ".lvm")
+SUFFIXES = (".csv", ".csv.gz", ".tsv", ".tsv.gz", ".lvm", ".lvm.gz")
 #: what a column is called that is not to be read
 LEFT_OUT = "-"
 
