@@ -190,6 +190,12 @@ def test_what_a_recording_says_wrongly(tmp_path):
         run = dataclasses.replace(recorded()[0], constants=constants)
         with pytest.raises(RecordingError, match=said):
             setup.problem([run])
+    first, second, _ = (
+        dataclasses.replace(run, constants={"mass": mass})
+        for run, mass in zip(recorded(), (0.3, np.inf, 0.5))
+    )
+    with pytest.raises(RecordingError, match="run2: its constant `mass`"):
+        setup.problem([first, second])
     run = dataclasses.replace(recorded()[0], constants={"stiffness": 3.0})
     with pytest.raises(ValueError, match="called 'stiffness'"):
         setup.problem([run])

@@ -29,8 +29,9 @@ def known_constants(
     names = dict.fromkeys(name for run in recordings for name in run.constants)
     found = []
     for name in names:
-        run = next(run for run in recordings if name in run.constants)
-        where = Field(f"system.{_place(model.system, run, name)}")
+        stating = [run for run in recordings if name in run.constants]
+        places = [_place(model.system, run, name) for run in stating]
+        where = Field(f"system.{places[0]}")
         usual = float(where(model))
         values = tuple(float(one.constants.get(name, usual)) for one in recordings)
         found.append(Parameter(name, where, known=values))
