@@ -2,9 +2,11 @@
 
 from pathlib import Path
 
+from ._files_options import Files
 
-def read(case: Path, rig: Path | None, gaps: str, system: str | None = None):
-    """The runs of a folder, and the rig as its maker states it.
+
+def read(case: Path, rig: Path | None, files: Files, system: str | None = None):
+    """The runs of a folder or of one file, and the rig as its maker states it.
 
     **Arguments:** `system` is `FILE.py:CLASS`, in the place of that of the rig file.
 
@@ -13,14 +15,35 @@ def read(case: Path, rig: Path | None, gaps: str, system: str | None = None):
     **Raises:** `ValueError` that names the file at fault and the fix.
     """
     from ..fitting import is_setup, read_setup
-    from ..recordings import read_case, read_rig
+    from ..recordings import read_rig
+    from ..recordings.files import CAM_FOLLOWER, read_layout, read_tables
 
-    usual = case / "rig.toml" if rig is None else rig
+    folder = case.parent if case.is_file() else case
+    usual = folder / "rig.toml" if rig is None else rig
     if system is not None or (usual.is_file() and is_setup(usual)):
-        setup = read_setup(_rig_file(case, rig), system)
-        return read_case(case, channels=setup.channels, gaps=gaps), setup  # pyright: ignore
-    runs = read_case(case, gaps=gaps)  # pyright: ignore
-    return runs, read_rig(_rig_file(case, rig))
+        setup = read_setup(_rig_file(folder, rig), system)
+        return setup.known_of(_runs(case, setup.channels, files, setup.files)), setup
+    layout = read_layout(usual, read_tables(usual) if usual.is_file() else {})
+    runs = _runs(case, CAM_FOLLOWER, files, layout)
+    return runs, read_rig(_rig_file(folder, rig))
+
+
+def _runs(case: Path, channels, files: Files, layout):
+    """The recordings; what the command line says of them comes first."""
+    from ..recordings import read_case
+    from ..recordings.files import Case, read_recordings
+
+    named = files.named()
+    options = {
+        "channels": channels,
+        "split": files.split,
+        "gaps": files.how,
+        "columns": layout.columns if named is None else named,
+        "rate": layout.rate if files.rate is None else files.rate,
+    }
+    if case.is_file():
+        return Case(case.name.partition(".")[0], read_recordings(case, **options))
+    return read_case(case, **options)
 
 
 def notes_of(runs) -> tuple[str, ...]:

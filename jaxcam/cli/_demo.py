@@ -58,11 +58,12 @@ def demo(
     from ._case import read
     from ._demo_branches import follow_branches
     from ._demo_result import compared, print_result, write_result
+    from ._files_options import Files
     from ._output import Output
     from ._progress import progress
 
     keep_compiled_programs()
-    runs, nominal = read(DEMO_RIG if case is None else case, rig, gaps)
+    runs, nominal = read(DEMO_RIG if case is None else case, rig, Files(gaps))
     if not isinstance(nominal, Rig):
         raise ValueError(
             f"{case}: the demonstration is that of a cam-follower; use jaxcam fit or "

@@ -6,14 +6,17 @@ from typing import Annotated
 
 import typer
 
-from ._options import Case, Gaps, OwnSystem, Resume, RigFile
+from ._files_options import Files
+from ._grouped import grouped
+from ._options import Case, OwnSystem, Resume, RigFile
 
 
+@grouped
 def diagnose(
     case: Case,
     rig: RigFile = None,
     system: OwnSystem = None,
-    gaps: Gaps = "mend",
+    files: Files = Files(),
     seed: Annotated[int, typer.Option(help="Of the redrawn stretches.")] = 0,
     predict: Annotated[
         bool,
@@ -48,9 +51,7 @@ def diagnose(
       jaxcam diagnose demo --next --out ./jaxcam-next
       jaxcam diagnose ./case --system two_stops.py:TwoStops --rig two_stops.toml
     """
-    from ._choices import choose
-
-    choose("--gaps", gaps, ("mend", "refuse", "split"))
+    files.check()
 
     from .. import discrepancy
     from ..fitting import Setup
@@ -61,7 +62,7 @@ def diagnose(
     from ._progress import progress
 
     keep_compiled_programs()
-    runs, nominal = read(case, rig, gaps, system)
+    runs, nominal = read(case, rig, files, system)
     if propose and isinstance(nominal, Setup):
         raise ValueError(
             "--next proposes speeds of a cam; leave it out, and give records of your "

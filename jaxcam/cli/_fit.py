@@ -5,14 +5,17 @@ from typing import Annotated
 
 import typer
 
-from ._options import Case, Gaps, OwnSystem, RigFile
+from ._files_options import Files
+from ._grouped import grouped
+from ._options import Case, OwnSystem, RigFile
 
 
+@grouped
 def fit(
     case: Case,
     rig: RigFile = None,
     system: OwnSystem = None,
-    gaps: Gaps = "mend",
+    files: Files = Files(),
     bootstrap: Annotated[
         int,
         typer.Option(
@@ -34,21 +37,33 @@ def fit(
     """
     Fit the parameters of a rig to recordings of it.
 
-    Of a cam-follower, or of any system in a Python file; see jaxcam new-rig.
+    Of a cam-follower, or of any system in a Python file; see jaxcam new-rig. A file
+    with one impact a row, before_m_s and after_m_s, gives a law of restitution.
 
     \b
     Examples:
       jaxcam fit demo --json fitted.json --out ./jaxcam-fit
       jaxcam simulate --system fitted.json --speed 140
       jaxcam fit ./case --system two_stops.py:TwoStops --rig two_stops.toml
+      jaxcam fit impacts.csv
     """
-    from ._choices import choose
-
-    choose("--gaps", gaps, ("mend", "refuse", "split"))
+    files.check()
     if bootstrap < 0 or bootstrap == 1:
         raise ValueError(f"--bootstrap is {bootstrap}; give 0, or at least 2.")
 
     from ._cache import keep_compiled_programs
+    from ._fit_impacts import fit_impacts, is_table
+
+    keep_compiled_programs()
+    if rig is None and system is None and is_table(case, files):
+        if out is not None or bootstrap:
+            raise ValueError(
+                f"{case} is a table of impacts, of which there are no figures and no "
+                f"redrawn flights; leave out --out and --bootstrap."
+            )
+        fit_impacts(case, files, json_file)
+        return
+
     from ._case import notes_of, read
     from ._errors import fail, STOPPED_EARLY
     from ._fit_report import draw
@@ -56,8 +71,7 @@ def fit(
     from ._output import Output
     from ._progress import progress
 
-    keep_compiled_programs()
-    runs, nominal = read(case, rig, gaps, system)
+    runs, nominal = read(case, rig, files, system)
     output = Output(json_file, out)
     with progress("finding impacts and contacts") as report:
         found = fitted(runs, nominal, bootstrap, report)

@@ -4,6 +4,8 @@ import dataclasses
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+import equinox as eqx
+
 from .. import fitting
 from ..recordings import Recording, Rig, segment_case, Segments
 from ._fit_report import correlation_table, parameter_table
@@ -60,6 +62,11 @@ class Result:
         if self.again is not None:
             fit["bootstrap_stderr"] = self.again.stderr
         drive, model = self.segments[0].drive, self.after.model(0)
+        for one in self.problem.parameters:
+            if one.known is not None:
+                # what was so in the first record only
+                usual = one.where(self.problem.model)
+                model = eqx.tree_at(one.where, model, usual)
         system = model.system
         if drive is not None:
             # the rig as a whole: the encoder's zero is the geometry's, the speed free

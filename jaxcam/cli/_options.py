@@ -68,7 +68,7 @@ Case: TypeAlias = Annotated[
     Path,
     typer.Argument(
         metavar="CASE",
-        help="A folder of recordings of one rig; demo: the one that is shipped.",
+        help="A folder of recordings of one rig, or one file; demo: the shipped one.",
         callback=_shipped,
     ),
 ]

@@ -10,6 +10,7 @@ from ._doubts import Doubt as Doubt
 from ._fit import fit as fit, held_out_cost as held_out_cost
 from ._fit_result import Fit as Fit
 from ._identify import Identifiability as Identifiability, identify as identify
+from ._impact_law import impact_law as impact_law, ImpactLaw as ImpactLaw
 from ._profile import excess_cost as excess_cost, profile as profile
 from ._read_setup import is_setup as is_setup, read_setup as read_setup
 from ._residuals import Residuals as Residuals, residuals as residuals

@@ -6,10 +6,13 @@ from pathlib import Path
 from typing import NamedTuple
 
 from ..hybrid import HybridSystem
+from ..parameters import parameter_names
 from ..recordings import RigError
 from ..recordings.files import (
     known_keys,
+    LAYOUT_KEYS,
     printable,
+    read_layout,
     read_references,
     read_tables,
     Section,
@@ -22,7 +25,16 @@ from .engine import Input, Model, Parameter, Sensor, Turning
 from .own_systems import Field, stated_system, system_class
 
 
-_TABLES = ("system", "parameters", "channels", "drive", "input", "references")
+_TABLES = (
+    "system",
+    "parameters",
+    "channels",
+    "drive",
+    "input",
+    "references",
+    "records",
+    *LAYOUT_KEYS,
+)
 # what is written of one number
 _NUMBER = ("value", "tolerance", "lower", "upper", "unit")
 
@@ -75,6 +87,8 @@ def read_setup(
         tuple(_parameter(name, one) for name, one in fitted.items()),
         drive_channel,
         read_references(file, tables, None),
+        _records(file, tables, made, {*fitted, *measured}),
+        read_layout(file, tables),
     )
 
 
@@ -161,6 +175,37 @@ def _parameter(name: str, one: _Stated) -> Parameter:
         upper=one.upper,
         unit=one.unit,
     )
+
+
+def _records(
+    file: Path, tables, system: HybridSystem, taken: set[str]
+) -> dict[str, dict[str, float]]:
+    """The constants of records, by patterns of their names.
+
+    **Arguments:** `taken` are the numbers that are fitted, or that a channel says.
+    """
+    if "records" not in tables:
+        return {}
+    outer = Section(file, "records", tables)
+    known = parameter_names(system)
+    found = {}
+    for pattern in outer.table:
+        section = Section(file, pattern, outer.table, outer.name)
+        known_keys(file, section.name, dict(_entries(section)), known)
+        values = {}
+        for name, inner, key in _flat(section, ""):
+            if name in taken:
+                raise inner.error(
+                    name,
+                    "is fitted or measured, and cannot be known of a record as well",
+                )
+            values[name] = inner.quantity(key, None).value
+        found[pattern] = values
+    return found
+
+
+def _entries(section: Section) -> Iterator[tuple[str, None]]:
+    return ((name, None) for name, _, _ in _flat(section, ""))
 
 
 def _phase_of(drive: Turning | Input | None) -> str | None:

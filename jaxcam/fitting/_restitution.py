@@ -121,12 +121,24 @@ def fit_restitution(
     data = np.stack([speed, *columns])
     fine = np.all(np.isfinite(data), axis=0) & (columns[0] > 3 * columns[2])
     data = data[:, fine]
-    names = tuple(names)
     if data.shape[1] <= len(names):
         raise RecordingError(
             f"There are {data.shape[1]} clear impacts for {len(names)} parameters of "
             f"restitution; give more recordings, or a simpler law."
         )
+    return fit_rows(data, law, names)
+
+
+def fit_rows(
+    data: Float[np.ndarray, "6 k"], law: eqx.Module, names: Sequence[str]
+) -> RestitutionFit:
+    """Fit parameters of a law to impacts, as rows of numbers.
+
+    **Arguments:** speed of the drive, approach speed, separation speed, and the
+    standard errors of approach, separation and surface speed; law and names as for
+    `fit_restitution`.
+    """
+    names = tuple(names)
     start = np.array([float(getattr(law, name)) for name in names])
     found, _ = _solve(law, names, jnp.asarray(start), jnp.asarray(data))
     rows, off = _normal(law, names, found, jnp.asarray(data))

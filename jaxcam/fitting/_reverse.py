@@ -83,7 +83,16 @@ def train(
         m.system.network`.
     - `steps`: of L-BFGS, at most.
     - `progress`: called after each evaluation with its number and its cost.
+
+    **Raises:** `ValueError` for a problem with a number that each record has its own
+    of.
     """
+    own = [p.name for p in problem.parameters if p.per_record or p.known is not None]
+    if own:
+        raise ValueError(
+            f"`train` takes records that share every number, and each has a value of "
+            f"its own of {own[0]!r}; leave it out."
+        )
     values = where(problem.model)
     arrays, rest = eqx.partition(values, eqx.is_inexact_array)
     start, unravel = ravel_pytree(arrays)

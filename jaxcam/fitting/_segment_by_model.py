@@ -12,7 +12,7 @@ from jaxtyping import Float
 from ..recordings import Recording, RecordingError, segment
 from ..recordings.against_model import size_of
 from ..recordings.cut import Drive, padded, read_drive, segment_gaps, Segments
-from .engine import Layout, Model, Parameter, parameter_places
+from .engine import Layout, Model, Parameter, parameter_places, with_constants
 
 
 # Samples at which it is looked up what a gap depends on
@@ -54,7 +54,8 @@ def segment_by_model(
     for recording in recordings:
         drive = None if drive_channel is None else read_drive(recording, drive_channel)
         states = _states(model, picks, recording)
-        gaps, slopes, errors = _gaps(model, tuple(parameters), recording, states, drive)
+        here = with_constants(model, recording)
+        gaps, slopes, errors = _gaps(here, tuple(parameters), recording, states, drive)
         shown = np.any(slopes != 0, axis=-1)
         if not np.any(shown):
             part = segment(recording, primary)

@@ -1,9 +1,14 @@
 """A rig of any kind: its system, what is measured of it, and what is known of it."""
 
 import dataclasses
+import fnmatch
+import re
 from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Literal
 
-from ..recordings import Recording, Segments
+from ..recordings import read_case, Recording, RecordingError, Segments
+from ..recordings.files import Case, FileLayout
 from ._segment_by_model import segment_by_model
 from .engine import Input, Model, Parameter, Problem
 
@@ -18,12 +23,17 @@ class Setup:
     - `references`: constants of the forms of missing physics that are stated, by the
         names of fields of `jaxcam.recordings.References`, in the units of the motion;
         the others follow its speeds.
+    - `records`: what is known of some records alone, by patterns of their names:
+        `{"run3*": {"mass": 0.31}}`; of several that fit, the last one counts.
+    - `files`: how the columns of recordings are called, and their rate.
     """
 
     model: Model
     parameters: tuple[Parameter, ...] = ()
     drive_channel: str | None = None
     references: Mapping[str, float] = dataclasses.field(default_factory=dict)
+    records: Mapping[str, Mapping[str, float]] = dataclasses.field(default_factory=dict)
+    files: FileLayout = FileLayout()
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -31,6 +41,51 @@ class Setup:
         drive = self.model.drive
         measured = drive.channel if isinstance(drive, Input) else self.drive_channel
         return (*self.model.sensors, *([] if measured is None else [measured]))
+
+    def read_case(
+        self,
+        folder: str | Path,
+        *,
+        split: str | None = None,
+        gaps: Literal["refuse", "split", "mend"] = "refuse",
+    ) -> Case:
+        """The recordings in a folder, as `jaxcam.recordings.read_case` does it, with
+        the names of columns and the constants that the rig states.
+
+        **Raises:** `RecordingError`, also for constants of a record that is not there.
+        """
+        case = read_case(
+            folder,
+            channels=self.channels,
+            split=split,
+            gaps=gaps,
+            columns=self.files.columns,
+            rate=self.files.rate,
+        )
+        return self.known_of(case)
+
+    def known_of(self, case: Case) -> Case:
+        """The case with what the rig knows of each record.
+
+        **Raises:** `RecordingError` for constants of a record that is not there.
+        """
+        for pattern in self.records:
+            if not any(_fits(run.name, pattern) for run in case):
+                names = ", ".join(f"`{run.name}`" for run in case)
+                raise RecordingError(
+                    f'{case.name}: [records."{pattern}"] of the rig file fits none of '
+                    f"its recordings; they are {names}."
+                )
+        runs = tuple(self._with_known(run) for run in case)
+        return dataclasses.replace(case, recordings=runs)
+
+    def _with_known(self, run: Recording) -> Recording:
+        found = {}
+        for pattern, constants in self.records.items():
+            if _fits(run.name, pattern):
+                found |= constants
+        # what a recording says of itself is nearer to it
+        return dataclasses.replace(run, constants={**found, **run.constants})
 
     def segments(
         self, recordings: Iterable[Recording | Segments]
@@ -40,7 +95,12 @@ class Setup:
         **Raises:** `RecordingError` for a channel that is missing, or a gap that no
         channel shows.
         """
-        runs = tuple(recordings)
+        runs = tuple(
+            dataclasses.replace(run, recording=self._with_known(run.recording))
+            if isinstance(run, Segments)
+            else self._with_known(run)
+            for run in recordings
+        )
         cut = tuple(run for run in runs if isinstance(run, Segments))
         if len(cut) == len(runs):
             return cut
@@ -55,3 +115,9 @@ class Setup:
         **Raises:** as `segments` and `Problem.build` do.
         """
         return Problem.build(self.model, self.segments(recordings), self.parameters)
+
+
+def _fits(name: str, pattern: str) -> bool:
+    """Whether a record is meant, also a piece of it: `run3_piece2` by `run3`."""
+    whole = re.sub(r"_piece\d+$", "", name)
+    return any(fnmatch.fnmatchcase(one, pattern) for one in (name, whole))

@@ -1,6 +1,7 @@
 """Recordings: reading, sensors, segmentation, and comparison with a model."""
 
 from ._errors import RecordingError as RecordingError, RigError as RigError
+from ._impact_table import ImpactTable as ImpactTable
 from ._recording import Recording as Recording
 from ._rig import References as References, Rig as Rig
 from ._synthetic import record as record, Wandering as Wandering
@@ -13,6 +14,7 @@ from .cut import (
 from .files import (
     mend as mend,
     read_case as read_case,
+    read_impacts as read_impacts,
     read_recording as read_recording,
     read_rig as read_rig,
 )

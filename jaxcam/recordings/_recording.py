@@ -23,6 +23,8 @@ class Recording:
         unit: `follower_angle_rad`, `gyro_rad_s`, `height_m`.
     - `nominal_speed`: speed of the drive as the file name states it (rad/s), or `None`.
     - `meta`: anything else that is known (the file, the piece of it, ...).
+    - `constants`: what is known of this run alone, by names of fields of the system
+        that it is a run of: `{"mass": 0.31}`. A fit takes them as they are.
     """
 
     name: str
@@ -30,6 +32,7 @@ class Recording:
     channels: Mapping[str, Float[np.ndarray, " k"]]
     nominal_speed: float | None = None
     meta: Mapping[str, Any] = dataclasses.field(default_factory=dict)
+    constants: Mapping[str, float] = dataclasses.field(default_factory=dict)
 
     def __getitem__(self, channel: str) -> Float[np.ndarray, " k"]:
         """The samples of one channel, shape `(k,)`.

@@ -17,6 +17,7 @@ from ._eliminate import (
     Reduced as Reduced,
     state_steps as state_steps,
 )
+from ._known_constants import with_constants as with_constants
 from ._linear import linear_pieces as linear_pieces, LinearPieces as LinearPieces
 from ._linearise import (
     assemble as assemble,

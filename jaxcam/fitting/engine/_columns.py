@@ -37,11 +37,17 @@ class Columns:
 def free_columns(problem: Problem, free: Iterable[str] | None) -> Columns:
     """Which numbers of a problem are free, by the names of parameters (`None`: all).
 
-    **Raises:** `ValueError` for an unknown name.
+    **Raises:** `ValueError` for an unknown name, or one whose values are known.
     """
-    wanted = problem.names if free is None else tuple(free)
+    if free is None:
+        free = [one.name for one in problem.parameters if one.known is None]
+    wanted = tuple(free)
     for name in wanted:
-        problem.parameter(name)
+        if problem.parameter(name).known is not None:
+            raise ValueError(
+                f"The parameter {name!r} is known of each record; leave it out of the "
+                f"`constants` of the recordings to fit it."
+            )
     records = len(problem.segments)
     picked = [k for k, p in enumerate(problem.parameters) if p.name in wanted]
     parameter, record, scale = [], [], []

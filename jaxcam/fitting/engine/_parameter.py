@@ -26,6 +26,8 @@ class Parameter:
     - `lower`, `upper`: bounds that hold whatever the data say.
     - `per_record`: whether every record has a value of its own.
     - `unit`: for tables.
+    - `known`: a value for each record, which no fit changes. `Problem.build` makes such
+        parameters of the `constants` of recordings.
     """
 
     name: str
@@ -37,6 +39,7 @@ class Parameter:
     upper: float = math.inf
     per_record: bool = False
     unit: str = ""
+    known: tuple[float, ...] | None = None
 
     def __post_init__(self):
         if not self.tolerance > 0:

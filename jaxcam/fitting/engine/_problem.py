@@ -55,6 +55,7 @@ import numpy as np
 from jaxtyping import Float
 
 from ...recordings import RecordingError, Segments
+from ._known_constants import known_constants
 from ._linear import Extras
 from ._linearise import Layout, Point
 from ._model import Input, Model
@@ -109,27 +110,33 @@ class Problem:
         **Arguments:**
 
         - `model`: a system with its sensors, at nominal parameters.
-        - `segments`: recordings from `jaxcam.recordings.segment_case` or `segment`.
+        - `segments`: recordings from `jaxcam.recordings.segment_case` or `segment`;
+            what is in their `constants` becomes a parameter that no fit changes.
         - `parameters`: those that may be fitted, free or not.
 
-        **Raises:** `RecordingError` for a missing channel or a record without flight;
+        **Raises:** `RecordingError` for a missing channel, a record without flight, or
+        a constant that is no number of the system;
         `ValueError` for a parameter that is not one number of the model, or a model
         that gives none where the data are.
         """
         segments = tuple(segments)
         if not segments:
             raise RecordingError("There is no recording to fit; give at least one.")
-        parameters = tuple(parameters)
-        refuse_repeated(parameters)
         model = jax.tree.map(
             lambda leaf: (
                 jnp.asarray(leaf, dtype=float) if isinstance(leaf, float) else leaf
             ),
             model,
         )
+        constants = known_constants(model, [part.recording for part in segments])
+        parameters = (*parameters, *constants)
+        refuse_repeated(parameters)
         layout = Layout(model, parameter_places(model, parameters))
         nominal = np.array([float(p.where(model)) for p in parameters])
         values = np.tile(nominal, (len(segments), 1))
+        for column, one in enumerate(parameters):
+            if one.known is not None:
+                values[:, column] = one.known
         measured = model.drive.channel if isinstance(model.drive, Input) else None
         steps, first, extras = _STEPS, _STEPS, None
         # filtered channels are smooth where the motion is not

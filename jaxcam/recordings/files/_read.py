@@ -11,17 +11,19 @@ import numpy as np
 
 from .._errors import RecordingError
 from .._recording import Case, Recording
-from ._binary_table import read_mat, read_parquet
 from ._check import check_channels, check_drive, find_gaps
+from ._choose import Columns, read_columns, TIME
 from ._clock import unrounded
 from ._mend import mend, Mended
-from ._table import read_table, shown, SUFFIXES as TEXT
-from ._units import si
+from ._table import SUFFIXES as TEXT
 
 
 #: what a recording of a cam-follower rig must contain
 CAM_FOLLOWER = ("cam_angle_rad", "follower_angle_rad")
-SUFFIXES = (*TEXT, ".mat", ".parquet")
+#: what the files of a case are called
+SUFFIXES = (*TEXT, ".mat", ".parquet", ".xlsx", ".xlsm")
+# text of any kind, read where a folder has nothing else
+_LAST_RESORT = (".txt", ".dat", ".xls", ".txt.gz", ".dat.gz")
 
 
 def read_recordings(
@@ -30,12 +32,14 @@ def read_recordings(
     channels: Sequence[str] = (),
     split: str | None = None,
     gaps: Literal["refuse", "split", "mend"] = "refuse",
+    columns: Columns | None = None,
+    rate: float | None = None,
 ) -> tuple[Recording, ...]:
-    """Every recording in one file: CSV (plain or gz), MATLAB .mat or Parquet.
+    """Every recording in one file: text (plain or gz), .mat, .xlsx or .parquet.
 
     The end of a column's name is its unit; `_deg`, `_rpm`, `_ms`, `_mm` and the like
-    are converted and the column is renamed (`cam_angle_deg` -> `cam_angle_rad`). One
-    column is the time.
+    are converted and the column is renamed (`cam_angle_deg` -> `cam_angle_rad`), and so
+    is one with its unit in brackets (`Time (ms)` -> `time_s`). One column is the time.
 
     **Arguments:**
 
@@ -45,27 +49,26 @@ def read_recordings(
     - `gaps`: `"refuse"` a record with samples missing, `"split"` it in pieces, or
         `"mend"` it: bridge short gaps, split at long ones and undo slips of an encoder
         (see `mend`); what was done is in `meta["notes"]`.
+    - `columns`: names of the columns in their order, `"-"` for one that is not read, of
+        a file without a line of names; or a channel for each column whose name is
+        another, `{"Angle": "angle_deg", "Y1": ("height_m", -8e-4)}`, the second with a
+        factor. Only columns that are named or needed are read then, and rows in which
+        one of them is empty are left out.
+    - `rate`: samples a second, of a file without a time.
 
     **Returns:** a tuple of `Recording`, one for each run and piece.
 
     **Raises:** `RecordingError`, one sentence that says what to do.
     """
     file = Path(file)
-    columns = {}
-    for name, numbers in _columns(file).items():
-        renamed, factor = (name, 1.0) if name == split else si(name)
-        if renamed in columns:
-            raise RecordingError(
-                f"{file}: two columns give `{renamed}` once their units are converted; "
-                f"remove one of them."
-            )
-        columns[renamed] = numbers * factor
-    _require(file, columns, ("time_s", *channels, *([split] if split else [])))
-
+    chosen = read_columns(
+        file, needed=(TIME, *channels), columns=columns, rate=rate, split=split
+    )
+    found = chosen.columns
     stem = _stem(file)
-    runs = {stem: np.arange(len(columns["time_s"]))}
+    runs = {stem: np.arange(len(found["time_s"]))}
     if split is not None:
-        numbers = columns.pop(split)
+        numbers = found.pop(split)
         runs = {
             f"{stem}_{split}{number:g}": np.flatnonzero(numbers == number)
             for number in np.unique(numbers)
@@ -73,8 +76,8 @@ def read_recordings(
     speed = _nominal_speed(file)
     recordings = []
     for name, rows in runs.items():
-        time = unrounded(columns["time_s"][rows])
-        values = {c: v[rows] for c, v in columns.items() if c != "time_s"}
+        time = unrounded(found["time_s"][rows])
+        values = {c: v[rows] for c, v in found.items() if c != "time_s"}
         label = f"{file}: {name}" if split else str(file)
         if gaps == "mend":
             find_gaps(label, time, "split")
@@ -87,18 +90,24 @@ def read_recordings(
         for recording in pieces:
             check_channels(recording)
             check_drive(recording)
-        recordings += pieces
+        recordings += [_noted(piece, chosen.notes) for piece in pieces]
     return tuple(recordings)
 
 
 def read_recording(
-    file: str | Path, *, channels: Sequence[str] = CAM_FOLLOWER
+    file: str | Path,
+    *,
+    channels: Sequence[str] = CAM_FOLLOWER,
+    columns: Columns | None = None,
+    rate: float | None = None,
 ) -> Recording:
-    """The one recording in a file; see `read_recordings` for files with several.
+    """The one recording in a file.
+
+    **Arguments:** as for `read_case`.
 
     **Raises:** `RecordingError`, one sentence that says what to do.
     """
-    (recording,) = read_recordings(file, channels=channels)
+    (recording,) = read_recordings(file, channels=channels, columns=columns, rate=rate)
     return recording
 
 
@@ -108,11 +117,26 @@ def read_case(
     channels: Sequence[str] = CAM_FOLLOWER,
     split: str | None = None,
     gaps: Literal["refuse", "split", "mend"] = "refuse",
+    columns: Columns | None = None,
+    rate: float | None = None,
 ) -> Case:
     """All recordings in a folder, in the order of their names.
 
-    **Arguments:** as for `read_recordings`; `channels=()` for something other than a
-    cam-follower rig.
+    Files are text (CSV of any kind, `.tsv`, `.lvm`, each plain or gz), `.mat`, `.xlsx`
+    or `.parquet`; where there are none of these, `.txt`, `.dat` and `.xls` are read.
+
+    **Arguments:**
+
+    - `channels`: columns that must be there (SI names); `()` for something other than a
+        cam-follower rig.
+    - `split`: a column that numbers the runs in a file that holds several.
+    - `gaps`: `"refuse"` a record with samples missing, `"split"` it in pieces, or
+        `"mend"` it (see `mend`).
+    - `columns`: names of the columns in their order, `"-"` for one that is not read, of
+        files without a line of names; or a channel for each column whose name is
+        another, `{"Angle": "angle_deg", "Y1": ("height_m", -8e-4)}`, the second with a
+        factor. Rows in which one of those is empty are left out.
+    - `rate`: samples a second, of files without a time.
 
     **Raises:** `RecordingError`, one sentence that says what to do.
     """
@@ -124,19 +148,24 @@ def read_case(
             f"{folder}: a case is a folder of recordings, and this is a file; name the "
             f"folder that holds it."
         )
-    files = sorted(
-        file for file in folder.iterdir() if file.is_file() and _is_table(file)
-    )
+    files = _tables(folder, SUFFIXES) or _tables(folder, _LAST_RESORT)
     if not files:
         cases = sorted(sub.name for sub in folder.iterdir() if sub.is_dir())
         hint = f"; name one of its folders ({', '.join(cases[:4])})" if cases else ""
         raise RecordingError(
-            f"{folder}: there is no recording (*.csv, *.csv.gz, *.mat, *.parquet) in "
-            f"this folder{hint}."
+            f"{folder}: there is no recording (*.csv, *.tsv, *.mat, *.xlsx, *.parquet) "
+            f"in this folder{hint}."
         )
     recordings = []
     for file in files:
-        recordings += read_recordings(file, channels=channels, split=split, gaps=gaps)
+        recordings += read_recordings(
+            file,
+            channels=channels,
+            split=split,
+            gaps=gaps,
+            columns=columns,
+            rate=rate,
+        )
     return Case(folder.resolve().name, tuple(recordings), folder)
 
 
@@ -177,32 +206,23 @@ def _turning(label: str, mended: Mended) -> list[Recording]:
     ]
 
 
-def _columns(file: Path):
-    """Columns of a file by their names, read according to its ending."""
-    if file.name.lower().endswith(".mat"):
-        return read_mat(file)
-    if file.name.lower().endswith(".parquet"):
-        return read_parquet(file)
-    return read_table(file)
+def _noted(piece: Recording, notes: tuple[str, ...]) -> Recording:
+    """The piece with what was left out of its file said in its notes."""
+    if not notes:
+        return piece
+    said = (*notes, *piece.meta.get("notes", ()))
+    return dataclasses.replace(piece, meta={**piece.meta, "notes": said})
 
 
-def _require(file, columns, needed) -> None:
-    missing = [name for name in needed if name not in columns]
-    if missing:
-        there = ", ".join(map(shown, list(columns)[:12]))
-        there += f" and {len(columns) - 12} more" if len(columns) > 12 else ""
-        raise RecordingError(
-            f"{file}: the column `{missing[0]}` is missing; the file has {there}."
-        )
-
-
-def _is_table(file: Path) -> bool:
-    return file.name.lower().endswith(SUFFIXES)
+def _tables(folder: Path, suffixes: tuple[str, ...]) -> list[Path]:
+    """Files that end so, in the order of their names."""
+    every = (file for file in folder.iterdir() if file.is_file())
+    return sorted(file for file in every if file.name.lower().endswith(suffixes))
 
 
 def _stem(file: Path) -> str:
-    ending = r"\.((csv|tsv)(\.gz)?|mat|parquet)$"
-    return re.sub(ending, "", file.name, flags=re.IGNORECASE)
+    ending = "|".join(re.escape(end) for end in (*SUFFIXES, *_LAST_RESORT))
+    return re.sub(f"({ending})$", "", file.name, flags=re.IGNORECASE)
 
 
 def _nominal_speed(file: Path) -> float | None:

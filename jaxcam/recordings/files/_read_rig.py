@@ -6,6 +6,7 @@ from typing import Any
 
 from .._errors import RigError
 from .._rig import Gyro, References, Rig, Sensors
+from ._read_layout import LAYOUT_KEYS
 from ._toml import known_keys, read_tables, Section
 
 
@@ -20,7 +21,7 @@ def read_rig(file: str | Path) -> Rig:
     file = Path(file)
     tables = read_tables(file)
     known = ("geometry", "dynamics", "impact", "sensors", "references")
-    known_keys(file, "", tables, known)
+    known_keys(file, "", tables, (*known, *LAYOUT_KEYS))
     geometry = Section(file, "geometry", tables)
     dynamics = Section(file, "dynamics", tables)
     impact = Section(file, "impact", tables)

@@ -1,104 +1,183 @@
-"""From a file to named columns of numbers, with one sentence for what is wrong."""
+"""From a text file to named columns, with one sentence for what is wrong."""
 
 import csv
 import io
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from jaxtyping import Float
 
 from .._errors import RecordingError
-from ._bytes import inflate_gzip, MOST, read_bytes, too_large
+from ._bytes import MOST, too_large
+from ._form import bare, cells_of, COMMENTS, Form, form_of, is_number
+from ._heading import channel_name
+from ._qtm import qtm_heading, without_lost
+from ._source import shown, Source
+from ._text import Lines, read_lines
 
 
-SUFFIXES = (".csv", ".csv.gz", ".tsv", ".tsv.gz")
-# What no sensor measures in any unit, microseconds since 1970 included; the square of a
-# square of it is still a number.
-LARGEST_NUMBER = 1e18
+SUFFIXES = (".csv", ".csv.gz", ".tsv", ".tsv.gz", ".lvm", ".lvm.gz")
+#: what a column is called that is not to be read
+LEFT_OUT = "-"
 
 
-def read_table(file: Path) -> dict[str, Float[np.ndarray, " k"]]:
+def read_table(file: Path, names: Sequence[str] | None = None) -> Source:
     """The columns of a text table, plain or gz, in the order of the file.
 
+    Cells are separated by tabs, semicolons, commas or spaces; numbers have a decimal
+    point or comma. Names are those of the line above the numbers, and units stand in
+    them or in a line below; lines before are passed over, and so are comments.
+
+    **Arguments:** `names` of the columns in their order, instead of those of the file;
+    `"-"` leaves one out.
+
     **Raises:** `RecordingError` for a file that is missing, empty, cut short, not a
-    text table, or has something other than finite numbers in it.
+    text table, or that names its columns badly.
     """
-    text = _text(file)
-    if sum(text.count(mark) for mark in "\n,;\t") > MOST:
-        raise too_large(file)
-    lines = [line for line in text.split("\n") if line.strip()]
-    if not lines:
-        raise RecordingError(f"{file}: the file is empty; record the run again.")
-    separator = next((mark for mark in ",;\t" if mark in lines[0]), ",")
-    names = [name.strip().strip('"').strip() for name in lines[0].split(separator)]
-    if all(_is_number(name) for name in names):
-        raise RecordingError(
-            f"{file}: the first line is numbers; it must name the columns, for example "
-            f"`time_s,cam_angle_rad,follower_angle_rad`."
-        )
-    if "" in names:
-        raise RecordingError(
-            f"{file}: column {names.index('') + 1} has no name; name it in the first "
-            f"line, or remove it."
-        )
-    repeated = {name for name in names if names.count(name) > 1}
-    if repeated:
-        raise RecordingError(
-            f"{file}: the column {shown(min(repeated))} appears twice; remove one of "
-            f"them."
-        )
-    rows = lines[1:]
+    return table_of_lines(file, read_lines(file), names)
+
+
+def table_of_lines(
+    file: Path, found: Lines, names: Sequence[str] | None = None
+) -> Source:
+    """The table in some lines. **Raises:** as `read_table` does."""
+    lines, whole, notes = found
+    form = form_of(lines) or _as_it_seems(lines)
+    separator = form.separator
+    first = lines[min(form.first, len(lines) - 1)]
+    rate = None
+    recorded = qtm_heading(lines[: form.first], len(cells_of(first, separator)))
+    if names is not None:
+        titles = list(names)
+    elif recorded is not None:
+        titles, rate = recorded
+    else:
+        titles = _titles(file, lines, form)
+    rows = [line for line in lines[form.first :] if not line.startswith(COMMENTS)]
     if len(rows) < 2:
         raise RecordingError(
             f"{file}: it has {len(rows)} rows of samples below its header, and at "
             f"least two are needed."
         )
-    whole = text.endswith("\n")
-    del text, lines
-    _refuse_cut_line(file, whole, rows, separator, len(names))
+    titles, rows = _without_last(titles, rows, separator)
+    if len(rows) * len(titles) > MOST:
+        raise too_large(file)
+    _refuse_cut_line(file, whole, rows, separator, len(titles), names is not None)
+    places = [str(k) for k in range(len(titles))]
     table = pd.read_csv(
         io.StringIO("\n".join(rows)),
-        sep=separator,
-        names=names,
+        sep=r"\s+" if separator == " " else separator,
+        names=places,
         dtype=str,
+        index_col=False,
         keep_default_na=False,
         quoting=csv.QUOTE_NONE,
         skip_blank_lines=False,
     )
-    return {name: _numbers(file, name, table[name]) for name in names}
+    kept = _kept(file, titles, [pd.Series(table[place]) for place in places])
+    if recorded is not None and names is None:
+        kept = without_lost(kept)
+    headings = _headings(lines, form) if names is None else {}
+    return Source(file, kept, headings, rate, notes)
 
 
-def shown(text: str) -> str:
-    """A piece of a file between backquotes, short and without control characters."""
-    text = text if len(text) <= 40 else f"{text[:40]}..."
-    printable = "".join(c if c.isprintable() else "?" for c in text)
-    return f"`{printable.replace('`', '?')}`"
+def _without_last(titles: list[str], rows: list[str], separator: str):
+    """Names and rows without a last separator that only one of them has."""
+    count = len(cells_of(rows[0], separator))
+    if count == len(titles) - 1 and not titles[-1]:
+        return titles[:-1], rows
+    if count == len(titles) + 1 and separator != " ":
+        bare_rows = [row.rstrip(" ") for row in rows]
+        if all(row.endswith(separator) for row in bare_rows):
+            return titles, [row[:-1] for row in bare_rows]
+    return titles, rows
 
 
-def _text(file: Path) -> str:
-    """The text of a file; its lines end in one newline each."""
-    raw = read_bytes(file)
-    if file.suffix.lower() == ".gz" and raw:
-        raw = inflate_gzip(file, raw)
-    try:
-        text = raw.decode("utf-8-sig")
-    except UnicodeDecodeError:
+def _as_it_seems(lines: list[str]) -> Form:
+    """The form of a table that is none, so that what is wrong can be said."""
+    separator = next((mark for mark in ",;\t" if mark in lines[0]), "")
+    if not separator:
+        separator = " " if " " in lines[0].strip() else ","
+    return Form(separator, 0, None, 1)
+
+
+def _titles(file: Path, lines: list[str], form: Form) -> list[str]:
+    """Names of the columns, their units at the end."""
+    if form.names is None:
+        count = len(cells_of(lines[form.first], form.separator))
+        where = "the first line is numbers" if form.first == 0 else "no line does so"
         raise RecordingError(
-            f"{file}: this is not a text file; give a table of comma-separated numbers."
-        ) from None
-    return text.replace("\r\n", "\n").replace("\r", "\n")
+            f"{file}: a line above the numbers must name the columns, and {where}; "
+            f"name them in their order, as in --columns time_s,angle_rad "
+            f"(columns=[...] in Python), {LEFT_OUT} for one that is not to be read: "
+            f"there are {count}."
+        )
+    titles = cells_of(bare(lines[form.names]), form.separator)
+    if all(map(is_number, titles)):
+        raise RecordingError(
+            f"{file}: the first line is numbers; it must name the columns, for example "
+            f"`time_s,cam_angle_rad,follower_angle_rad`."
+        )
+    units = [""] * len(titles)
+    if form.units is not None:
+        units = cells_of(lines[form.units], form.separator)
+    return [channel_name(title, unit) for title, unit in zip(titles, units)]
 
 
-def _refuse_cut_line(file, whole, rows, separator, width) -> None:
+def _headings(lines: list[str], form: Form) -> dict[str, str]:
+    """The words of the file for the columns."""
+    if form.names is None:
+        return {}
+    words = cells_of(bare(lines[form.names]), form.separator)
+    units = [""] * len(words)
+    if form.units is not None:
+        units = cells_of(lines[form.units], form.separator)
+    return {word: channel_name(word, unit) for word, unit in zip(words, units)}
+
+
+def _kept(file: Path, titles: list[str], columns: Sequence[pd.Series]):
+    """Columns by their names, without those that are empty, or only number the rows."""
+    kept = {}
+    for place, (title, column) in enumerate(zip(titles, columns)):
+        if title == LEFT_OUT:
+            continue
+        if not title:
+            numbered = column.str.strip() == pd.Series(range(1, len(column) + 1)).map(
+                str
+            )
+            if numbered.all() or not _has_words(column):
+                continue
+            raise RecordingError(
+                f"{file}: column {place + 1} has no name; name it in the first line, "
+                f"or remove it."
+            )
+        if title in kept:
+            raise RecordingError(
+                f"{file}: the column {shown(title)} appears twice; remove one of "
+                f"them, or name all columns in their order with --columns "
+                f"(columns=[...] in Python)."
+            )
+        kept[title] = column
+    return {t: c for t, c in kept.items() if _has_words(c)} or kept
+
+
+def _has_words(column: pd.Series) -> bool:
+    return bool((column.str.strip() != "").any())
+
+
+def _refuse_cut_line(file, whole, rows, separator, width, named) -> None:
     """A writer that was stopped leaves a last line with values or digits missing."""
-    counts = np.array([row.count(separator) + 1 for row in rows])
+    if separator == " ":
+        counts = np.array([len(row.split()) for row in rows])
+    else:
+        counts = np.array([row.count(separator) + 1 for row in rows])
     wrong = np.flatnonzero(counts != width)
     cut = len(wrong) > 0
     if not cut and not whole:
         # All values are there. A number that is shorter than every other one in its
         # column has lost digits: only a file with a fixed format can tell.
-        last = [len(row.rpartition(separator)[2].partition(".")[2]) for row in rows]
+        last = [len(_decimals(cells_of(row, separator)[-1])) for row in rows]
         cut = len(set(last[:-1])) == 1 and last[-1] < last[0]
     if cut and (len(wrong) == 0 or wrong[0] == len(rows) - 1):
         raise RecordingError(
@@ -107,41 +186,20 @@ def _refuse_cut_line(file, whole, rows, separator, width) -> None:
         )
     if cut:
         row = int(wrong[0])
+        by = "--columns names" if named else "the header names"
+        fix = "repair or delete that row"
+        if separator == "," and counts[row] == 2 * width:
+            fix = "if these are decimal commas, save it with semicolons between columns"
+        elif separator == " ":
+            fix = (
+                "where spaces separate, empty cells are lost: save it with tabs, or "
+                "name the columns that each row has with --columns"
+            )
         raise RecordingError(
-            f"{file}: row {row + 1} has {counts[row]} values where the header names "
-            f"{width} columns; repair or delete that row."
+            f"{file}: row {row + 1} has {counts[row]} values where {by} {width} "
+            f"columns; {fix}."
         )
 
 
-def _numbers(file: Path, name: str, column) -> Float[np.ndarray, " k"]:
-    numbers = np.asarray(pd.to_numeric(column, errors="coerce"), dtype=float)
-    bad = np.flatnonzero(~np.isfinite(numbers))
-    if len(bad):
-        row = int(bad[0])
-        word = column.iloc[row].strip()
-        found = shown(word) if word else "nothing"
-        more = f" (and in {len(bad) - 1} more rows)" if len(bad) > 1 else ""
-        raise RecordingError(
-            f"{file}: the column {shown(name)} has {found} where a number should be, "
-            f"in row {row + 1}{more}; remove those rows or the column."
-        )
-    refuse_absurd(file, name, numbers)
-    return numbers
-
-
-def refuse_absurd(file: Path, name: str, numbers: Float[np.ndarray, " k"]) -> None:
-    """**Raises:** `RecordingError` for a number that no sensor measures."""
-    bad = np.flatnonzero(np.abs(numbers) > LARGEST_NUMBER)
-    if len(bad):
-        raise RecordingError(
-            f"{file}: the column {shown(name)} has {numbers[bad[0]]:.3g} in row "
-            f"{bad[0] + 1}, which no sensor measures; remove those rows or the column."
-        )
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
+def _decimals(number: str) -> str:
+    return number.replace(",", ".").partition(".")[2]

@@ -1,0 +1,81 @@
+"""Options of commands that read recordings: how the columns of their files are read."""
+
+import dataclasses
+import math
+from typing import Annotated, Literal
+
+import typer
+
+from ._choices import choose
+from ._options import Gaps
+
+
+@dataclasses.dataclass(frozen=True)
+class Files:
+    """What a file does not say of itself, and what is done with a faulty one."""
+
+    gaps: Gaps = "mend"
+    columns: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAMES",
+            help="Names of the columns in their order, - for one that is not read "
+            "(time_s,-,angle_rad), or pairs (Angle=angle_deg,Y1=height_m*-8e-4).",
+        ),
+    ] = None
+    rate: Annotated[
+        float | None,
+        typer.Option(metavar="HZ", help="Samples a second, of files without a time."),
+    ] = None
+    split: Annotated[
+        str | None,
+        typer.Option(metavar="COLUMN", help="It numbers the runs in one file."),
+    ] = None
+
+    def check(self) -> None:
+        """**Raises:** `ValueError` that names the option at fault."""
+        choose("--gaps", self.gaps, ("mend", "refuse", "split"))
+        if self.rate is not None and not (math.isfinite(self.rate) and self.rate > 0):
+            raise ValueError(
+                f"--rate is {self.rate:g}; give samples a second, such as 200."
+            )
+        self.named()
+
+    @property
+    def how(self) -> Literal["mend", "refuse", "split"]:
+        """`gaps` as readers take it."""
+        return self.gaps  # pyright: ignore
+
+    def named(self) -> list[str] | dict[str, tuple[str, float]] | None:
+        """`--columns` as readers take it.
+
+        **Raises:** `ValueError` for names and pairs together, or a factor that is none.
+        """
+        if self.columns is None:
+            return None
+        parts = [part.strip() for part in self.columns.split(",")]
+        pairs = [part for part in parts if "=" in part]
+        if not pairs:
+            return parts
+        if len(pairs) < len(parts) or not all(_is_pair(one) for one in pairs):
+            raise ValueError(
+                f"--columns is {self.columns[:100]!r}; give names with commas between "
+                f"them, such as time_s,angle_rad, or pairs only, such as "
+                f"t=time_s,Y1=height_m*-8e-4."
+            )
+        found = {}
+        for pair in pairs:
+            word, _, channel = pair.rpartition("=")
+            name, _, factor = channel.partition("*")
+            found[word.strip()] = name.strip(), float(factor or 1.0)
+        return found
+
+
+def _is_pair(part: str) -> bool:
+    word, _, channel = part.rpartition("=")
+    name, star, factor = channel.partition("*")
+    try:
+        known = not star or float(factor) != 0
+    except ValueError:
+        known = False
+    return bool(word.strip() and name.strip()) and known

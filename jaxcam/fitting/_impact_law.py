@@ -1,0 +1,281 @@
+"""The law of restitution of a table of impacts, and how well momentum is kept."""
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+import scipy.stats
+from jaxtyping import Bool, Float
+
+from ..models import ConstantRestitution, PowerLawRestitution
+from ..recordings import ImpactTable, RecordingError
+from ._momentum import momentum_of, MomentumBalance
+from ._restitution import fit_rows, RestitutionFit
+
+
+# Fewer say nothing of a law and of their own scatter
+_LEAST = 4
+# A row so many scatters off is a misread one
+_MISREAD = 6.0
+# Chance that a constant restitution looks as if it depended on the speed
+_CHANCE = 0.01
+# Where more than the rest is far off, nothing is set aside
+_MAJORITY = 0.7
+# standard deviations in the median of the size of a Gaussian number
+_MAD = 1.4826
+# Speeds that differ by less tell nothing of how restitution depends on them
+_RANGE = 1.5
+# Of the squared scatter, which is one where it is any
+_NOTHING = 1e-4
+
+
+@dataclasses.dataclass(frozen=True)
+class ImpactLaw:
+    """What a table of impacts says of their restitution.
+
+    - `laws`: `"constant"`, and the power law as `"falling"` or `"rising"`.
+    - `best`: the name of the one that the impacts support.
+    - `delta_bic`: of each law, less that of the constant one; below zero is better. The
+        power law that the impacts turn away from is the constant with one number more.
+    - `p_value`: chance of what the power law gains where restitution is constant.
+    - `scatter`: standard deviation of an impact, in `scatter_unit`: that of the speed,
+        or, with `"1"`, of the restitution; with `"stated"`, in its standard errors.
+    - `set_aside`: rows (from 1) that are too far off to belong to the others.
+    - `momentum`: of two bodies, how well their momentum is kept; or `None`.
+    """
+
+    table: ImpactTable
+    laws: dict[str, RestitutionFit]
+    best: str
+    delta_bic: dict[str, float]
+    p_value: float
+    scatter: float
+    scatter_unit: str
+    set_aside: tuple[int, ...]
+    momentum: MomentumBalance | None
+
+    @property
+    def law(self) -> RestitutionFit:
+        """The one that the impacts support."""
+        return self.laws[self.best]
+
+    def sentences(self) -> list[str]:
+        """The law, how sure it is, and what is to be known of the table."""
+        return [self._headline(), *self._caveats()]
+
+    def _headline(self) -> str:
+        table, law = self.table, self.law
+        kept = len(table) - len(self.set_aside)
+        count = f"{kept} impacts of {table.name}"
+        if self.best == "constant":
+            r, error = law.values[0], law.stderr[0]
+            other = next((name for name in self.laws if name != "constant"), None)
+            against = (
+                ""
+                if other is None
+                else f" ({other} with speed: p = {self.p_value:.2g}, delta BIC "
+                f"{self.delta_bic[other]:+.1f})"
+            )
+            return (
+                f"Restitution is constant over the {count}: {r:.4g} +- "
+                f"{error:.1g}{against}."
+            )
+        slow, fast = np.quantile(table.approach, (0.05, 0.95))
+        ends = [float(law.law(0.0, speed)) for speed in (slow, fast)]  # pyright: ignore
+        r0, exponent = law.values
+        v_ref = float(law.law.reference_speed)  # pyright: ignore
+        verb = "falls" if self.best == "falling" else "rises"
+        return (
+            f"Restitution {verb} with speed over the {count}, from {ends[0]:.3g} at "
+            f"{slow:.3g} {table.unit} to {ends[1]:.3g} at {fast:.3g} {table.unit}: "
+            f"r = r0 (1 + v / {v_ref:.4g} {table.unit})^-b with r0 = {r0:.4g} +- "
+            f"{law.stderr[0]:.1g} and b = {exponent:.3g} +- {law.stderr[1]:.1g} "
+            f"(p = {self.p_value:.2g}, delta BIC {self.delta_bic[self.best]:+.1f} to a "
+            f"constant one)."
+        )
+
+    def _caveats(self) -> list[str]:
+        table, found = self.table, list(self.table.notes)
+        if self.scatter_unit == "stated":
+            found.append(f"Impacts scatter by {self.scatter:.2g} times their errors.")
+        elif self.scatter_unit == "1":
+            found.append(
+                f"The restitution of an impact scatters by {self.scatter:.2g}."
+            )
+        else:
+            found.append(
+                f"The speed after an impact scatters by {self.scatter:.2g} "
+                f"{self.scatter_unit}."
+            )
+        if self.set_aside:
+            rows = ", ".join(map(str, self.set_aside))
+            found.append(f"Set aside, far from all others: row {rows}; look it up.")
+        span = float(np.max(table.approach) / np.min(table.approach))
+        if span < _RANGE:
+            found.append(
+                f"The fastest impact is {span:.2f} times as fast as the slowest: that "
+                f"tells little of how restitution depends on the speed."
+            )
+        r = float(np.median(table.separation / table.approach))
+        if r > 1:
+            found.append(
+                f"Bodies part {r:.2f} times as fast as they meet; look whether the "
+                f"columns before and after are exchanged."
+            )
+        if self.momentum is not None:
+            found.append(self.momentum.sentence())
+        return found
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain numbers and strings."""
+        return {
+            "table": self.table.name,
+            "impacts": len(self.table),
+            "law": self.best,
+            "parameters": {
+                name: {"value": float(value), "stderr": float(error)}
+                for name, value, error in zip(
+                    self.law.names, self.law.values, self.law.stderr
+                )
+            },
+            "delta_bic": self.delta_bic,
+            "p_value": self.p_value,
+            "scatter": {"value": self.scatter, "unit": self.scatter_unit},
+            "set_aside": list(self.set_aside),
+            "momentum": None if self.momentum is None else self.momentum.to_json(),
+            "sentences": self.sentences(),
+        }
+
+
+def impact_law(table: ImpactTable) -> ImpactLaw:
+    """The law of restitution that a table of impacts supports.
+
+    A constant restitution and a power of the speed, r = r0 (1 + v / v_ref)^-b with the
+    median speed as v_ref, are fitted by least squares. What an impact scatters by is
+    estimated: alike in its speed or alike in its restitution, whichever is likelier;
+    where the table states errors, in proportion to these. The power law is named where
+    an F test finds that a constant one would gain as much in one table of a hundred.
+
+    **Raises:** `RecordingError` for fewer than four impacts.
+    """
+    if len(table) < _LEAST:
+        raise RecordingError(
+            f"{table.name}: there are {len(table)} impacts, and at least {_LEAST} are "
+            f"needed for a law and its error."
+        )
+    weights = _weights(table)
+    every = np.ones(len(table), dtype=bool)
+    kept = {name: _sound(table, one) for name, one in weights.items()}
+    # the same rows for both, or they could not be compared
+    some = np.any(list(kept.values()), axis=0)
+    kind = max(weights, key=lambda name: _likelihood(table, weights[name], some))
+    keep = kept[kind]
+    if np.sum(keep) < max(_LEAST, _MAJORITY * len(table)):
+        keep = every
+    return _chosen(table, kind, weights[kind], keep)
+
+
+def _weights(table: ImpactTable) -> dict[str, Float[np.ndarray, " k"]]:
+    """What an impact scatters by, but for a factor, by the unit of that."""
+    if table.approach_stderr is None and table.separation_stderr is None:
+        return {table.unit: np.ones(len(table)), "1": table.approach}
+    r = float(np.median(table.separation / table.approach))
+    zero = np.zeros(len(table))
+    before = zero if table.approach_stderr is None else table.approach_stderr
+    after = zero if table.separation_stderr is None else table.separation_stderr
+    return {"stated": np.hypot(after, r * before)}
+
+
+def _fits(table: ImpactTable, errors, keep) -> dict[str, RestitutionFit]:
+    """Both laws fitted to some of the impacts."""
+    zero = np.zeros(len(table))
+    rows = (zero, table.approach, table.separation, zero, errors, zero)
+    data = np.stack(rows)[:, keep]
+    start = float(np.median(table.separation / table.approach))
+    usual = float(np.median(table.approach))
+    constant = ConstantRestitution(start)  # pyright: ignore
+    power = PowerLawRestitution(start, usual, 0.0)  # pyright: ignore
+    found = {"constant": fit_rows(data, constant, ("r",))}
+    if np.ptp(table.approach[keep]) > 1e-6 * usual:
+        found["power"] = fit_rows(data, power, ("r0", "exponent"))
+    return found
+
+
+def _sound(table: ImpactTable, weights) -> Bool[np.ndarray, " k"]:
+    """Rows that are not far from what the others say, by the more general law."""
+    every = np.ones(len(table), dtype=bool)
+    typical = _typical(_off(table, np.median(_r(table))) / weights, table, weights)
+    off = np.zeros(len(table))
+    for _ in range(3):
+        off = _misfit(table, weights * typical, every) * typical
+        typical = _typical(off, table, weights)
+    return np.abs(off) <= _MISREAD * typical
+
+
+def _typical(off, table: ImpactTable, weights) -> float:
+    """Scatter without regard to outliers; of a table without any, that of rounding."""
+    least = 1e-9 * float(np.max(table.separation / weights)) + 1e-300
+    return max(_MAD * float(np.median(np.abs(off))), least)
+
+
+def _misfit(table: ImpactTable, errors, keep):
+    """Of each impact from the more general law, in standard errors."""
+    fits = _fits(table, errors, keep)
+    law = fits.get("power", fits["constant"]).law
+    r = np.array([float(law(0.0, v)) for v in table.approach])  # pyright: ignore
+    return _off(table, r) / errors
+
+
+def _likelihood(table: ImpactTable, weights, keep) -> float:
+    """Logarithm of that of a Gaussian scatter in proportion to the weights."""
+    scale = _typical(_misfit(table, weights, keep)[keep], table, weights)
+    off = _misfit(table, weights * scale, keep)[keep] * scale
+    size = max(float(np.sqrt(np.mean(off**2))), 1e-300)
+    return -float(np.sum(np.log(size * weights[keep])))
+
+
+def _r(table: ImpactTable):
+    return table.separation / table.approach
+
+
+def _off(table: ImpactTable, r):
+    return table.separation - r * table.approach
+
+
+def _chosen(table: ImpactTable, kind: str, weights, keep) -> ImpactLaw:
+    count = int(np.sum(keep))
+    scale = 1.0
+    # the size of the scatter is that of the more general law
+    for _ in range(3):
+        fits = _fits(table, weights * scale, keep)
+        most = fits.get("power", fits["constant"])
+        scale *= max(np.sqrt(most.cost / most.freedom), 1e-12)
+        scale = max(scale, 1e-12 * float(np.max(table.separation / weights)) + 1e-300)
+    fits = _fits(table, weights * scale, keep)
+    constant, power = fits["constant"], fits.get("power")
+    laws, delta, p_value, best = {"constant": constant}, {"constant": 0.0}, 1.0, ""
+    if power is not None:
+        direction = "falling" if power.values[1] > 0 else "rising"
+        other = "rising" if direction == "falling" else "falling"
+        laws[direction] = power
+        # where a constant leaves nothing, there is no gain
+        nothing = constant.cost <= _NOTHING * count
+        ratio = 1.0 if nothing else constant.cost / max(power.cost, 1e-300)
+        extra = float(np.log(count))
+        delta |= {direction: extra - count * float(np.log(ratio)), other: extra}
+        f = max(ratio - 1.0, 0.0) * power.freedom
+        p_value = float(scipy.stats.f.sf(f, 1, power.freedom))
+        if p_value < _CHANCE and delta[direction] < 0:
+            best = direction
+    aside = tuple(int(row) + 1 for row in np.flatnonzero(~keep))
+    return ImpactLaw(
+        table,
+        laws,
+        best or "constant",
+        delta,
+        p_value,
+        float(scale),
+        kind,
+        aside,
+        momentum_of(table, keep),
+    )

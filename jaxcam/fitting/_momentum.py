@@ -1,0 +1,91 @@
+"""Whether two bodies that hit each other keep their momentum."""
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from ..recordings import ImpactTable
+
+
+# Standard errors, and share of what is exchanged, beyond which momentum is not kept
+_ERRORS, _SHARE = 3.0, 0.005
+
+
+@dataclasses.dataclass(frozen=True)
+class MomentumBalance:
+    """Momentum of two bodies in their impacts.
+
+    - `change`, `stderr`: of the momentum of both, as a share of what they exchange;
+        not a number where the masses are unknown.
+    - `ratio`, `ratio_stderr`: mass of the second body over that of the first, such that
+        momentum is kept.
+    - `stated`: that ratio of the stated masses, or not a number.
+    """
+
+    change: float
+    stderr: float
+    ratio: float
+    ratio_stderr: float
+    stated: float
+
+    @property
+    def kept(self) -> bool:
+        """Whether a change is within its error, or too small to matter."""
+        size = abs(self.change)
+        return not (size > _ERRORS * self.stderr and size > _SHARE)
+
+    def sentence(self) -> str:
+        """The balance in words."""
+        ratio = f"{self.ratio:.4g} +- {self.ratio_stderr:.1g}"
+        if np.isnan(self.stated):
+            return f"If momentum is kept, the second mass is {ratio} times the first."
+        change = f"{self.change:+.2%} +- {self.stderr:.1%} of what is exchanged"
+        if self.kept:
+            return f"Momentum is kept: both together change by {change}."
+        return (
+            f"Momentum is not kept: both together change by {change}; it would be with "
+            f"masses in the ratio {ratio} where {self.stated:.4g} is stated: look at "
+            f"the masses, the scale of either speed, and what else pushes."
+        )
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain numbers, `None` for what is not known."""
+        fields = dataclasses.asdict(self)
+        return {
+            name: None if np.isnan(value) else value for name, value in fields.items()
+        }
+
+
+def momentum_of(
+    table: ImpactTable, keep: Bool[np.ndarray, " k"]
+) -> MomentumBalance | None:
+    """The balance of some impacts; `None` where there is one body only."""
+    if table.bodies is None:
+        return None
+    bodies = table.bodies
+    change = (bodies.after - bodies.before)[keep]
+    # the first body loses what the second gains
+    sign = np.where(change[:, 0] < 0, 1.0, -1.0)
+    first, second = -sign * change[:, 0], sign * change[:, 1]
+    ratio, error = _ratio(first, second)
+    if bodies.mass is None:
+        return MomentumBalance(np.nan, np.nan, ratio, error, np.nan)
+    mass = bodies.mass[keep]
+    given, taken = mass[:, 0] * first, mass[:, 1] * second
+    share, stderr = _ratio(taken, given)
+    stated = float(np.median(mass[:, 1] / mass[:, 0]))
+    return MomentumBalance(share - 1.0, stderr, ratio, error, stated)
+
+
+def _ratio(
+    above: Float[np.ndarray, " k"], below: Float[np.ndarray, " k"]
+) -> tuple[float, float]:
+    """Of two sums, with the standard error that their scatter gives."""
+    total = float(np.sum(below))
+    if total == 0 or len(above) < 2:
+        return np.nan, np.nan
+    ratio = float(np.sum(above)) / total
+    scatter = float(np.sum((above - ratio * below) ** 2)) * len(above)
+    return ratio, float(np.sqrt(scatter / (len(above) - 1))) / abs(total)

@@ -1,0 +1,190 @@
+"""Which columns of a file are the channels of a recording, in SI units."""
+
+import dataclasses
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TypeAlias
+
+import numpy as np
+from jaxtyping import Float
+
+from .._errors import RecordingError
+from ._excel import read_excel
+from ._mat import read_mat
+from ._parquet import read_parquet
+from ._source import listed, shown, Source
+from ._table import LEFT_OUT, read_table
+from ._units import si
+
+
+#: Names of the columns in their order, `"-"` for one that is not read; or channels by
+#: the names that the file has for them, each with a factor where the unit at its end is
+#: not all: `{"Y1": ("height_mm", -0.8)}`.
+Columns: TypeAlias = Sequence[str] | Mapping[str, str | tuple[str, float]]
+TIME = "time_s"
+
+
+@dataclasses.dataclass(frozen=True)
+class Chosen:
+    """Channels by their names, the time among them, and what was left out, in words."""
+
+    columns: dict[str, Float[np.ndarray, " k"]]
+    notes: tuple[str, ...] = ()
+
+
+def read_columns(
+    file: Path,
+    *,
+    needed: Sequence[str],
+    columns: Columns | None,
+    rate: float | None = None,
+    split: str | None = None,
+    only: bool = False,
+) -> Chosen:
+    """The channels of a file in SI units, as `read_recordings` is asked for them.
+
+    **Arguments:** `needed` are channels that must be there (SI names); `only` these
+    are read.
+
+    **Raises:** `RecordingError`, one sentence that says what to do.
+    """
+    source, mapping = _opened(file, columns)
+    picks = [(name, *mapping.get(name, (name, 1.0))) for name in source.columns]
+    if mapping or only:
+        # others stay away, unless they are what is needed
+        wanted = set(needed)
+        picks = [
+            pick
+            for pick in picks
+            if pick[0] in mapping or pick[0] == split or si(pick[0])[0] in wanted
+        ]
+    found: dict[str, np.ndarray] = {}
+    for name, channel, factor in picks:
+        renamed, unit = (name, 1.0) if name == split else si(channel)
+        if renamed in found:
+            raise RecordingError(
+                f"{file}: two columns give `{renamed}` once their units are converted; "
+                f"remove one of them."
+            )
+        numbers = source.numbers(name, missing=columns is not None)
+        found[renamed] = numbers * (factor * unit)
+    found = _timed(source, found, rate)
+    require(file, found, (*needed, *([split] if split else [])))
+    return _without_missing(source, found)
+
+
+def column_names(file: Path, columns: Columns | None) -> tuple[str, ...]:
+    """Names of the channels of a file, in SI units.
+
+    **Raises:** `RecordingError` for a file that cannot be read.
+    """
+    source, mapping = _opened(file, columns)
+    return tuple(si(mapping.get(name, (name, 1.0))[0])[0] for name in source.columns)
+
+
+def _opened(
+    file: Path, columns: Columns | None
+) -> tuple[Source, dict[str, tuple[str, float]]]:
+    """A file, and what some of its columns are called instead."""
+    if columns is None:
+        return _source(file, None), {}
+    if isinstance(columns, Mapping):
+        source = _source(file, None)
+        return source, _mapping(file, source, columns)
+    return _source(file, _in_order(file, columns)), {}
+
+
+def require(file: Path, found: Mapping[str, object], needed: Sequence[str]) -> None:
+    """**Raises:** `RecordingError` for a channel that is not there."""
+    missing = [name for name in needed if name not in found]
+    if missing:
+        raise RecordingError(
+            f"{file}: the column `{missing[0]}` is missing; the file has "
+            f"{listed(found)}: say which of them it is with --columns or in [columns] "
+            f"of the rig file (columns=... in Python)."
+        )
+
+
+def _source(file: Path, names: Sequence[str] | None) -> Source:
+    """What is in a file, read according to its ending."""
+    name = file.name.lower()
+    if name.endswith((".mat", ".parquet")):
+        if names is not None:
+            raise RecordingError(
+                f"{file}: its columns have names of their own; give pairs, such as "
+                f"--columns angle=angle_rad (columns={{...}} in Python)."
+            )
+        return read_mat(file) if name.endswith(".mat") else read_parquet(file)
+    if name.endswith((".xlsx", ".xlsm")):
+        return read_excel(file, names)
+    return read_table(file, names)
+
+
+def _in_order(file: Path, names) -> list[str]:
+    kept = [name for name in names if name != LEFT_OUT]
+    bad = [name for name in kept if not isinstance(name, str) or not name.strip()]
+    twice = [name for name in kept if kept.count(name) > 1]
+    if bad or twice or not kept:
+        what = f"{twice[0]!r} twice" if twice else "a column without a name"
+        raise RecordingError(
+            f"{file}: --columns names {what}; give each column one name, or "
+            f"{LEFT_OUT} to leave it out."
+        )
+    return list(names)
+
+
+def _mapping(
+    file: Path, source: Source, columns: Mapping
+) -> dict[str, tuple[str, float]]:
+    """The channel and the factor of each column that is named."""
+    found: dict[str, tuple[str, float]] = {}
+    for word, channel in columns.items():
+        name, factor = channel if isinstance(channel, tuple) else (channel, 1.0)
+        if not math.isfinite(factor) or factor == 0:
+            raise RecordingError(
+                f"{file}: the factor of {shown(str(word))} is {factor:g}; give the "
+                f"number that takes it to the unit of `{name}`."
+            )
+        found[source.name_of(str(word))] = (name, float(factor))
+    return found
+
+
+def _timed(source: Source, found: dict, rate: float | None) -> dict:
+    """The columns with a time, made of a rate where the file has none."""
+    if rate is not None and not (math.isfinite(rate) and rate > 0):
+        raise RecordingError(
+            f"{source.file}: the rate is {rate:g} samples a second; give a positive "
+            f"number."
+        )
+    if rate is not None and TIME in found:
+        raise RecordingError(
+            f"{source.file}: it has a time of its own, `{TIME}`; leave out the rate, "
+            f"or that column."
+        )
+    rate = source.rate if rate is None else rate
+    if TIME in found or rate is None or not rate > 0 or not found:
+        return found
+    count = len(next(iter(found.values())))
+    return {TIME: np.arange(count) / rate, **found}
+
+
+def _without_missing(source: Source, found: dict) -> Chosen:
+    """Only the rows in which every channel has a number."""
+    whole = np.all([np.isfinite(numbers) for numbers in found.values()], axis=0)
+    lost = int(np.sum(~whole))
+    if not lost:
+        return Chosen(found, source.notes)
+    if np.sum(whole) < 2:
+        raise RecordingError(
+            f"{source.file}: no two rows have a number in each of {listed(found)}; "
+            f"name other columns."
+        )
+    first = np.flatnonzero(~whole)[0] + 1
+    note = (
+        f"{source.file.name}: {lost} rows with an empty cell, the first of them row "
+        f"{first}, are left out."
+    )
+    return Chosen(
+        {name: numbers[whole] for name, numbers in found.items()}, (*source.notes, note)
+    )

@@ -1,0 +1,78 @@
+"""Tables in workbooks of Excel."""
+
+import io
+import zipfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from .._errors import RecordingError
+from ._bytes import LARGEST, MOST, read_bytes, too_large
+from ._source import listed, Source
+from ._table import table_of_lines
+from ._text import kept_lines
+
+
+def read_excel(file: Path, names: Sequence[str] | None = None) -> Source:
+    """The table on the one sheet of a workbook that has numbers; needs `openpyxl`.
+
+    **Arguments:** as for `read_table`.
+
+    **Raises:** `RecordingError` where that is missing, or for a file that is none.
+    """
+    raw = read_bytes(file)
+    try:
+        import openpyxl  # noqa: F401  # pyright: ignore
+        import pandas as pd
+    except ImportError:
+        raise RecordingError(
+            f"{file}: to read Excel, install the package openpyxl (pip install "
+            f"'jaxcam[excel]'), or save the table as CSV."
+        ) from None
+    _refuse_bomb(file, raw)
+    try:
+        sheets = pd.read_excel(
+            io.BytesIO(raw), sheet_name=None, header=None, dtype=object
+        )
+    except Exception:
+        # a parser on a broken file raises whatever it stumbles over
+        raise _none(file) from None
+    full = {}
+    for name, sheet in sheets.items():
+        if sheet.size > MOST:
+            raise too_large(file)
+        rows = (map(_cell, row) for row in sheet.itertuples(index=False))
+        lines = list(map("\t".join, rows))
+        if sum(bool(line.strip()) for line in lines) > 1:
+            full[str(name)] = lines
+    if len(full) != 1:
+        which = f"tables on the sheets {listed(full)}" if full else "no table"
+        raise RecordingError(
+            f"{file}: the workbook has {which}; save one table a file, as .xlsx or CSV."
+        )
+    (lines,) = full.values()
+    return table_of_lines(file, kept_lines(file, lines), names)
+
+
+def _cell(value: Any) -> str:
+    if value is None or value != value:
+        return ""
+    return " ".join(str(value).split())
+
+
+def _refuse_bomb(file: Path, raw: bytes) -> None:
+    """**Raises:** `RecordingError` for no archive, or one that inflates too far."""
+    try:
+        with zipfile.ZipFile(io.BytesIO(raw)) as archive:
+            size = sum(part.file_size for part in archive.infolist())
+    except (zipfile.BadZipFile, ValueError, OSError, NotImplementedError):
+        raise _none(file) from None
+    # XML takes about five bytes for one of a CSV
+    if size > 5 * LARGEST:
+        raise too_large(file)
+
+
+def _none(file: Path) -> RecordingError:
+    return RecordingError(
+        f"{file}: this is not a workbook of Excel (.xlsx); save it again, or as CSV."
+    )

@@ -1,0 +1,140 @@
+"""Where in a text table the names and the numbers stand, and what is between them."""
+
+import re
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from ._heading import is_time, is_unit
+
+
+#: between cells, the surest first; a space stands for any white space
+SEPARATORS = ("\t", ";", ",", " ")
+#: what begins a line that is no row
+COMMENTS = ("#", "%", "//")
+# lines of a preamble, at most
+_PREAMBLE = 300
+# rows that must agree before they are believed to be the table
+_ROWS = 5
+_NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eEdD][+-]?\d+)?|[+-]?(nan|inf)")
+
+
+class Form(NamedTuple):
+    """The form of a table: what separates its cells, and the lines of its parts.
+
+    `names` and `units` are lines of their own, `None` where there is none; `first` is
+    the first row.
+    """
+
+    separator: str
+    names: int | None
+    units: int | None
+    first: int
+
+
+def cells_of(line: str, separator: str) -> list[str]:
+    """The cells of a line, without blanks and quotes about them."""
+    parts = line.split() if separator == " " else line.split(separator)
+    return [part.strip().strip('"').strip() for part in parts]
+
+
+def form_of(lines: Sequence[str]) -> Form | None:
+    """The form of a table, or `None` where no rows of numbers are found.
+
+    Rows that are broken count as rows, so that what is wrong with them is said.
+    """
+    found = []
+    for rank, separator in enumerate(SEPARATORS):
+        first = _first_row(lines, separator)
+        if first is not None:
+            found.append((first, rank))
+    if not found:
+        return None
+    first, rank = min(found)
+    return _headed(lines, SEPARATORS[rank], first)
+
+
+def is_number(text: str) -> bool:
+    """Whether a cell holds a number, with a point or a comma in it."""
+    return _NUMBER.fullmatch(text.lower()) is not None
+
+
+def _first_row(lines: Sequence[str], separator: str) -> int | None:
+    kinds = [_kind(line, separator) for line in lines[: _PREAMBLE + _ROWS]]
+    for k, (width, numbers) in enumerate(kinds):
+        part = kinds[k : k + _ROWS]
+        same = width > 1 and len(part) > 1 and all(w == width for w, _ in part)
+        if same and all(n > 0 for _, n in part) and max(n for _, n in part) > 1:
+            return k
+    return None
+
+
+def _kind(line: str, separator: str) -> tuple[int, int]:
+    """Cells of a row and numbers among them; none where a cell is another word."""
+    if line.startswith(COMMENTS):
+        return 0, 0
+    cells = cells_of(line, separator)
+    numbers = sum(map(is_number, cells))
+    return len(cells), numbers if numbers + cells.count("") == len(cells) else 0
+
+
+def _headed(lines: Sequence[str], separator: str, first: int) -> Form:
+    """The form of a table whose whole rows begin at `first`."""
+    width = len(cells_of(lines[first], separator))
+    heads = [k for k in range(first) if _is_head(lines[k], separator, width)]
+    if not heads:
+        other = [k for k in range(first) if _is_other(lines[k], separator, width)]
+        last = first - 1 if _is_any_head(lines, first - 1, separator) else None
+        return Form(separator, other[-1] if other else last, None, first)
+    names, units = heads[-1], None
+    above = heads[-2] if len(heads) > 1 else None
+    if above is not None:
+        lower, upper = (cells_of(lines[k], separator) for k in (names, above))
+        if all(map(is_unit, lower)):
+            names, units = above, names
+        elif any(map(is_time, upper)) and not any(map(is_time, lower)):
+            # words where the first row of numbers should be
+            return Form(separator, above, None, names)
+    for k in range((names if units is None else units) + 1, first):
+        cells = cells_of(lines[k], separator)
+        if lines[k].startswith(COMMENTS) or not any(map(is_number, cells)):
+            continue
+        # words beside a number are a note where spaces separate, or nothing does
+        note = len(cells) != width and (separator == " " or len(cells) == 1)
+        if not note:
+            return Form(separator, names, units, k)
+    return Form(separator, names, units, first)
+
+
+def _is_head(line: str, separator: str, width: int) -> bool:
+    cells = cells_of(bare(line), separator)
+    # a note has one word, in its first cell
+    words = any(cells[1:]) or (len(cells) == 2 and bool(cells[0]))
+    return len(cells) == width and words and not any(map(is_number, cells))
+
+
+def _is_other(line: str, separator: str, width: int) -> bool:
+    """Whether a line names the columns of rows that are cut in other places.
+
+    Where spaces separate, empty cells are lost; where commas do, decimal ones cut each
+    number in two.
+    """
+    count = len(cells_of(line, separator))
+    lost = separator == " " and count > width
+    cut = separator == "," and count * 2 == width
+    return (lost or cut) and _is_head(line, separator, count)
+
+
+def _is_any_head(lines: Sequence[str], place: int, separator: str) -> bool:
+    """Whether a line right above the rows has names, if not as many as they need."""
+    if place < 0 or separator == " ":
+        return False
+    count = len(cells_of(lines[place], separator))
+    return count > 1 and _is_head(lines[place], separator, count)
+
+
+def bare(line: str) -> str:
+    """A line without the mark of a comment before it."""
+    for mark in COMMENTS:
+        if line.startswith(mark):
+            return line.lstrip(mark).lstrip(" ")
+    return line

@@ -1,0 +1,76 @@
+"""The heading of a column: its name, with the unit that stands in brackets after it."""
+
+import re
+
+
+# as they are written -> as the end of a channel's name
+_ENDINGS = {
+    "s": "s",
+    "sec": "s",
+    "ms": "ms",
+    "us": "us",
+    "µs": "us",
+    "rad": "rad",
+    "deg": "deg",
+    "°": "deg",
+    "rpm": "rpm",
+    "rad/s": "rad_s",
+    "deg/s": "deg_s",
+    "°/s": "deg_s",
+    "m": "m",
+    "cm": "cm",
+    "mm": "mm",
+    "um": "um",
+    "µm": "um",
+    "m/s": "m_s",
+    "cm/s": "cm_s",
+    "mm/s": "mm_s",
+    "m/s^2": "m_s2",
+    "m/s2": "m_s2",
+    "m/s²": "m_s2",
+    "rad/s^2": "rad_s2",
+    "rad/s²": "rad_s2",
+    "n": "N",
+    "kn": "kN",
+    "v": "V",
+    "mv": "mV",
+    "a": "A",
+    "ma": "mA",
+    "kg": "kg",
+    "g": "g",
+}
+_WITH_UNIT = re.compile(r"(.+?)\s*(?:\(([^()]*)\)|\[([^\[\]]*)\]|/\s*([^\s/]+(/s.?)?))")
+
+
+def channel_name(heading: str, unit: str = "") -> str:
+    """The name of a channel with its unit at the end: `time_s` of `Time (s)`.
+
+    A heading whose unit is unknown stays as it is.
+
+    **Arguments:** the heading, and what stands below it in a line of units.
+    """
+    words = heading
+    if not unit:
+        found = _WITH_UNIT.fullmatch(heading)
+        if found is None:
+            return heading
+        words, unit = found[1], next((part for part in found.groups()[1:] if part), "")
+    ending = _ending(unit)
+    name = re.sub(r"\W+", "_", words).strip("_")
+    if not ending or not name:
+        return heading
+    return f"{name.lower()}_{ending}"
+
+
+def is_unit(cell: str) -> bool:
+    """Whether a cell may stand in a line of units."""
+    return cell in ("", "-", "1") or bool(_ending(cell))
+
+
+def is_time(heading: str) -> bool:
+    """Whether a heading is that of the time, by its first word."""
+    return bool(re.match(r"(time|t|zeit|frame)([^a-z]|$)", heading.lower()))
+
+
+def _ending(unit: str) -> str:
+    return _ENDINGS.get(unit.strip("()[] ").lower().replace("μ", "µ"), "")

@@ -1,0 +1,116 @@
+"""What a file holds before anything is chosen from it: columns by their names."""
+
+import dataclasses
+import difflib
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from jaxtyping import Float
+
+from .._errors import RecordingError
+
+
+# What no sensor measures in any unit, microseconds since 1970 included; the square of a
+# square of it is still a number.
+_LARGEST_NUMBER = 1e18
+# names that a sentence lists
+_LISTED = 12
+
+
+@dataclasses.dataclass(frozen=True)
+class Source:
+    """Columns of a file, as text or as numbers.
+
+    - `columns`: by their names; text where a file is text.
+    - `headings`: other words for them, as the file has them.
+    - `rate`: samples a second, where the file states them beside the table.
+    - `notes`: what was left out, in words.
+    """
+
+    file: Path
+    columns: Mapping[str, Any]
+    headings: Mapping[str, str] = dataclasses.field(default_factory=dict)
+    rate: float | None = None
+    notes: tuple[str, ...] = ()
+
+    def name_of(self, word: str) -> str:
+        """The column that a word names. **Raises:** `RecordingError` for none."""
+        if word in self.columns:
+            return word
+        if word in self.headings:
+            return self.headings[word]
+        small = {name.lower(): name for name in (*self.columns, *self.headings)}
+        near = [small[one] for one in difflib.get_close_matches(word.lower(), small, 1)]
+        hint = f"is {shown(near[0])} meant?" if near else f"it has {self.listed()}."
+        raise RecordingError(
+            f"{self.file}: there is no column {shown(word)} to be named; {hint}"
+        )
+
+    def listed(self) -> str:
+        """The names there are, for a sentence."""
+        return listed(self.columns)
+
+    def numbers(self, name: str, missing: bool = False) -> Float[np.ndarray, " k"]:
+        """A column as numbers; an empty cell is NaN where some may be `missing`.
+
+        **Raises:** `RecordingError` that names the row and the fix.
+        """
+        column = self.columns[name]
+        text = column.dtype.kind not in "fiub"
+        numbers, empty = _of_text(self.file, name, column) if text else (column, None)
+        numbers = np.asarray(numbers, dtype=float)
+        if empty is None:
+            empty = np.isnan(numbers)
+        bad = np.flatnonzero(~(np.isfinite(numbers) | (empty & missing)))
+        if len(bad):
+            row = int(bad[0])
+            word = str(column.iloc[row]).strip() if text else f"{numbers[row]}"
+            found = shown(word) if word else "nothing"
+            more = f" (and in {len(bad) - 1} more rows)" if len(bad) > 1 else ""
+            raise RecordingError(
+                f"{self.file}: the column {shown(name)} has {found} where a number "
+                f"should be, in row {row + 1}{more}; remove those rows or the column."
+            )
+        absurd = np.flatnonzero(np.abs(numbers) > _LARGEST_NUMBER)
+        if len(absurd):
+            raise RecordingError(
+                f"{self.file}: the column {shown(name)} has {numbers[absurd[0]]:.3g} "
+                f"in row {absurd[0] + 1}, which no sensor measures; remove those rows "
+                f"or the column."
+            )
+        return np.where(empty, np.nan, numbers)
+
+
+def listed(names: Iterable[str]) -> str:
+    """Names for a sentence, a few of them where there are many."""
+    every = list(names)
+    there = ", ".join(map(shown, every[:_LISTED])) or "none"
+    return f"{there} and {len(every) - _LISTED} more" if len(every) > _LISTED else there
+
+
+def shown(text: str) -> str:
+    """A piece of a file between backquotes, short and without control characters."""
+    text = text if len(text) <= 40 else f"{text[:40]}..."
+    printable = "".join(c if c.isprintable() else "?" for c in text)
+    return f"`{printable.replace('`', '?')}`"
+
+
+def _of_text(file: Path, name: str, column: pd.Series):
+    """Numbers of a column of text, NaN where it is none, and where it is empty."""
+    column = column.str.strip().str.replace(r'^"(.*)"$', r"\1", regex=True)
+    commas = column.str.contains(",", regex=False)
+    if commas.any():
+        both = np.flatnonzero(commas & column.str.contains(".", regex=False))
+        if len(both):
+            raise RecordingError(
+                f"{file}: the column {shown(name)} has "
+                f"{shown(str(column.iloc[both[0]]))} in row {both[0] + 1}, with a "
+                f"point and a comma; save the numbers without marks of thousands."
+            )
+        column = column.str.replace(",", ".", regex=False)
+    numbers = pd.to_numeric(column, errors="coerce")
+    empty = column.str.lower().isin(("", "nan"))
+    return np.asarray(numbers, dtype=float), np.asarray(empty)
