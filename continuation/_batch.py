@@ -9,12 +9,12 @@ from jaxtyping import ArrayLike, Float, PyTree
 
 from jaxcam.parameters import VectorLike, Where
 
-from ._batch_run import Axes, REASONS, run_lanes
+from ._batch_run import Axes, follow_lanes, REASONS
 from ._follow import checked_bounds
-from ._parameter import as_arrays, leaf_of, pick, with_leaf
+from ._parameter import as_arguments, leaf_of, pick_one, with_leaf
 from ._point import Branch, Point, set_parameters, with_field
 from ._program import Corrected
-from ._settings import as_traced, Settings
+from ._settings import as_traced, BranchSettings
 from .algorithms import AbstractAlgorithm, PseudoArclength
 from .problem import AbstractProblem
 from .special import Context, eigenvalues_at, is_stable, locate, test_values, varied
@@ -110,7 +110,7 @@ def _check_algorithm(algorithm: AbstractAlgorithm) -> None:
     if algorithm.predictor.stations > 1:
         raise ValueError(
             f"{type(algorithm.predictor).__name__} predicts from several points, which "
-            "a batch does not keep; give the algorithm predictor=Tangent()"
+            "a batch does not keep; give the algorithm predictor=TangentPredictor()"
         )
     if algorithm.least_norm:
         raise ValueError(
@@ -127,7 +127,7 @@ def follow_batch(
     algorithm: AbstractAlgorithm | None = None,
     *,
     parameters: PyTree | None = None,
-    settings: Settings | None = None,
+    settings: BranchSettings | None = None,
     direction: ArrayLike = 1,
     points: int = 100,
 ) -> Batch:
@@ -150,10 +150,10 @@ def follow_batch(
 
     **Returns:** a `Batch`; a lane that fails says so in its reason.
     """
-    settings = Settings() if settings is None else settings
+    settings = BranchSettings() if settings is None else settings
     algorithm = PseudoArclength() if algorithm is None else algorithm
     _check_algorithm(algorithm)
-    leaf, name = pick(where, problem.parameters)
+    leaf, name = pick_one(where, problem.parameters)
     low, high = checked_bounds(bounds, name)
     starts = np.asarray(states, float)
     if starts.ndim != 2 or not len(starts):
@@ -162,8 +162,8 @@ def follow_batch(
         raise ValueError(f"points is {points}; a branch needs at least 2")
     lanes = len(starts)
     given = problem.parameters if parameters is None else parameters
-    given = as_arrays(given, leaf)
-    problem = set_parameters(problem, as_arrays(problem.parameters, leaf))
+    given = as_arguments(given, leaf)
+    problem = set_parameters(problem, as_arguments(problem.parameters, leaf))
     axes = Axes.of(problem.parameters, given, lanes)
     p = np.broadcast_to(np.asarray(leaf_of(given, leaf), float), (lanes,))
     if not np.all((low <= p) & (p <= high)):
@@ -173,7 +173,7 @@ def follow_batch(
         )
     z = np.concatenate([starts, p[:, None]], axis=1)
     signs = np.broadcast_to(np.asarray(direction, float), (lanes,))
-    lane = run_lanes(
+    lane = follow_lanes(
         problem, algorithm, given, axes, leaf, z, signs, np.asarray(low),
         np.asarray(high), as_traced(settings), points,
     )  # fmt: skip

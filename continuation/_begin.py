@@ -9,7 +9,7 @@ from .problem import AbstractProblem, Start
 from .special import Context
 
 
-def settle(
+def solved_start(
     problem: AbstractProblem, context: Context, z: np.ndarray, name: str, direction: int
 ) -> Corrected:
     """Solve at the parameter of the start, and find the direction there."""

@@ -8,7 +8,7 @@ from ._point import Point, with_parameter
 from ._program import correct, evaluate
 from ._solution import Solution, solution_at
 from .problem import AbstractProblem
-from .special import between, Context
+from .special import Context, cubic_between
 
 
 # an earlier point is met where the branch is this close to it, in lengths of steps, for
@@ -124,7 +124,7 @@ def _cosine_where_met(
     scale = current.at.scale
     chord = (following.at.z - current.at.z) / scale
     chord = chord / np.linalg.norm(chord)
-    guess = between(current.at, following.at, share) / scale
+    guess = cubic_between(current.at, following.at, share) / scale
     target = passed.z / scale
     # onto the plane in which the earlier point lies
     guess = (guess + chord * float(chord @ (target - guess))) * scale

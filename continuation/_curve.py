@@ -10,10 +10,10 @@ from jaxcam.parameters import Where
 
 from ._branch import branch
 from ._follow import checked_bounds
-from ._parameter import as_arrays, leaf_of, pick
+from ._parameter import as_arguments, leaf_of, pick_one
 from ._point import Branch, Point, set_parameters
 from ._program import evaluate
-from ._settings import Settings
+from ._settings import BranchSettings
 from .algorithms import AbstractAlgorithm
 from .problem import Start
 from .special import (
@@ -38,7 +38,7 @@ def extended(
     point: Point,
     where: Where,
     bounds: tuple[float, float],
-    settings: Settings | None = None,
+    settings: BranchSettings | None = None,
 ) -> SingularPoints | MonitorPoints:
     """The problem whose solutions are special points like this one, the parameter that
     `where` picks among the unknowns (at the end of the state).
@@ -48,12 +48,13 @@ def extended(
     problem = point.problem
     if problem is None:
         raise ValueError(
-            "this point carries no problem; read its file with load(path, problem)"
+            "this point carries no problem; read its file with "
+            "load_branch(path, problem)"
         )
-    leaf, name = pick(where, problem.parameters)
+    leaf, name = pick_one(where, problem.parameters)
     low, high = checked_bounds(bounds, name)
-    problem = set_parameters(problem, as_arrays(problem.parameters, leaf))
-    context = Context(leaf, high - low, (low, high), settings or Settings())
+    problem = set_parameters(problem, as_arguments(problem.parameters, leaf))
+    context = Context(leaf, high - low, (low, high), settings or BranchSettings())
     z = np.append(point.state, leaf_of(problem.parameters, leaf))
     if point.kind in (FOLD, FLIP, HOPF, NEIMARK_SACKER):
         return singular_points(problem, point.kind, context, z)
@@ -89,7 +90,7 @@ def curve(
     bounds: tuple[tuple[float, float], tuple[float, float]],
     algorithm: AbstractAlgorithm | None = None,
     *,
-    settings: Settings | None = None,
+    settings: BranchSettings | None = None,
     direction: int | str = "both",
     callbacks: Iterable[Callable[[Point], Any]] = (),
     out: str | os.PathLike | None = None,
@@ -121,7 +122,7 @@ def curve(
             "of both, ((low, high), (low, high))"
         ) from error
     problem = extended(point, first, bounds_1, settings)
-    leaf, name = pick(second, problem.parameters)
+    leaf, name = pick_one(second, problem.parameters)
     if leaf == problem.leaf:
         raise ValueError(f"both parameters are {name}; pick two different ones")
     u = np.append(point.state, leaf_of(problem.parameters, problem.leaf))
@@ -130,5 +131,5 @@ def curve(
         settings=settings, direction=direction, callbacks=callbacks,
         out=out, resume=resume,
     )  # fmt: skip
-    names = (pick(first, problem.parameters)[1], name)
+    names = (pick_one(first, problem.parameters)[1], name)
     return Branch(found.points, name, found.bounds, found.leaf, names)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ._parameter import leaf_of, with_leaf
+from ._parameter import with_leaf
 from .problem import AbstractProblem
 
 
@@ -167,8 +167,3 @@ def with_field(module: Any, name: str, value: Any) -> Any:
         elif hasattr(module, f.name):
             object.__setattr__(new, f.name, getattr(module, f.name))
     return new
-
-
-def value_of(problem: AbstractProblem, leaf: int) -> float:
-    """The value that the problem has for the parameter."""
-    return float(leaf_of(problem.parameters, leaf))

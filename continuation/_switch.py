@@ -8,10 +8,10 @@ import numpy as np
 from jaxcam.parameters import Where
 
 from ._branch import branch
-from ._parameter import pick, with_leaf
+from ._parameter import pick_one, with_leaf
 from ._point import Branch, Point
 from ._program import evaluate
-from ._settings import Settings
+from ._settings import BranchSettings
 from .algorithms import AbstractAlgorithm
 from .problem import AbstractProblem, Start
 from .special import BRANCH_POINT, FLIP, HOPF, second
@@ -31,9 +31,10 @@ def emanating(point: Point, where: Where, width: float = 1.0) -> tuple[Start, ..
     problem = point.problem
     if problem is None:
         raise ValueError(
-            "this point carries no problem; read its file with load(path, problem)"
+            "this point carries no problem; read its file with "
+            "load_branch(path, problem)"
         )
-    leaf, _ = pick(where, problem.parameters)
+    leaf, _ = pick_one(where, problem.parameters)
     if point.kind == BRANCH_POINT:
         direction = other_direction(problem, leaf, point, width)
         return tuple(
@@ -43,7 +44,7 @@ def emanating(point: Point, where: Where, width: float = 1.0) -> tuple[Start, ..
     start = None
     if point.kind in (FLIP, HOPF):
         z = np.append(point.state, point.parameter)
-        at = evaluate(problem, leaf, z, point.tangent, width, Settings())
+        at = evaluate(problem, leaf, z, point.tangent, width, BranchSettings())
         start = problem.transition(point, at)
     if start is None:
         raise ValueError(
@@ -59,7 +60,7 @@ def switch(
     bounds: tuple[float, float],
     algorithm: AbstractAlgorithm | None = None,
     *,
-    settings: Settings | None = None,
+    settings: BranchSettings | None = None,
 ) -> tuple[Branch, ...]:
     """Follow all branches that leave a special point, besides its own.
 
@@ -96,7 +97,7 @@ def other_direction(
 ) -> np.ndarray:
     """(n+1,) direction of the branch that crosses at a simple branch point, (3.37)."""
     z = np.append(point.state, point.parameter)
-    at = evaluate(problem, leaf, z, point.tangent, width, Settings())
+    at = evaluate(problem, leaf, z, point.tangent, width, BranchSettings())
     left, _, rows = np.linalg.svd(at.jacobian * at.scale[None, :])
     basis = rows[-2:]
     form = np.asarray(

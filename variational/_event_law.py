@@ -45,7 +45,7 @@ def field_of(system: HybridSystem, contact: Bool[Array, " m"] | None) -> Callabl
     return lambda t, x: field_in_force(system, t, x, contact)
 
 
-def crossing(
+def event_crossing(
     law: Callable, gap: Callable, field_before: Callable, field_after: Callable, t, x
 ) -> tuple[Float[Array, "n n"], Float[Array, " n"], Float[Array, " n"], Array]:
     """R_x, w = F+ - R_t - R_x F-, the normal H_x, and the speed v of the gap.

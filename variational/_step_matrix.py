@@ -15,7 +15,7 @@ from jaxcam.hybrid.runge_kutta import step, Tableau
 from ._event_law import (
     completed_law,
     contact_projector,
-    crossing,
+    event_crossing,
     field_of,
     gap_of,
     impact_of,
@@ -33,7 +33,7 @@ class LogRow(NamedTuple):
     contact: tuple
 
 
-class Point(NamedTuple):
+class StepStart(NamedTuple):
     """Where a step begins."""
 
     t: Array
@@ -45,7 +45,7 @@ def step_matrix(
     system: HybridSystem,
     functions: Functions,
     tableau: Tableau,
-    point: Point,
+    point: StepStart,
     row: LogRow,
 ) -> Float[Array, "n n"]:
     """The derivative of one step and of the event at its end; the identity for none.
@@ -99,7 +99,7 @@ def _across(system, row: LogRow, before, held, now, law_of, planar):
     side = row.constraint
     field_before = field_of(system, None if planar else held)
     field_after = field_of(system, None if planar else now)
-    law_x, moved, normal, speed = crossing(
+    law_x, moved, normal, speed = event_crossing(
         law_of(system, side),
         gap_of(system, side),
         field_before,

@@ -11,14 +11,14 @@ from jaxcam.hybrid.codes import Row
 from jaxcam.hybrid.loop import first_state, Functions, Plan, run_raw
 
 from ._event_law import completed_law
-from ._step_matrix import LogRow, Point, step_matrix
+from ._step_matrix import LogRow, step_matrix, StepStart
 
 
 class Carried(NamedTuple):
     """What a lane takes from one chunk of rows to the next."""
 
     lane: Any
-    point: Point
+    point: StepStart
     frame: Float[Array, "n n"]
     logs: Float[Array, " n"]
 
@@ -49,7 +49,7 @@ def first_frames(batched, shared, length, states, t0, turns, settings):
         limits = plan.t1, plan.longest_step, plan.repeat
         lane = first_state(functions, t0, x, *limits)
         lane = jax.tree.map(jnp.asarray, lane)
-        point = Point(lane.t, lane.x, lane.contact)
+        point = StepStart(lane.t, lane.x, lane.contact)
         n = len(x)
         return Carried(lane, point, jnp.eye(n), jnp.zeros(n))
 
@@ -97,7 +97,7 @@ def next_rows(batched, shared, length, t0, turns, settings, carry: Carried):
         flags = first_and(jnp.stack(carry.point.contact), contact)
 
         def point_at(k):
-            return Point(times[k], tuple(states[k].T), tuple(flags[k].T))
+            return StepStart(times[k], tuple(states[k].T), tuple(flags[k].T))
 
         rows = LogRow(kind, side, t, tuple(before.T), tuple(after.T), tuple(contact.T))
         matrices = jax.vmap(

@@ -20,7 +20,7 @@ from variational.orbits import steps_for
 
 from .._parameter import with_leaf
 from .._program import correct
-from .._settings import Settings
+from .._settings import BranchSettings
 from ..problem import Start
 from ._shooting import ImpactingOrbits
 
@@ -112,7 +112,7 @@ def _closed_up(
     z = np.append(rows.ravel(), value)
     across = np.zeros_like(z)
     across[-1] = 1.0
-    at = correct(orbits, point.leaf, z, across, across, width, Settings())
+    at = correct(orbits, point.leaf, z, across, across, width, BranchSettings())
     if not at.success or orbits.refused(at.monitors, at.observed):
         return None
     if not np.all(np.isfinite(at.tangent)):

@@ -9,10 +9,10 @@ import numpy as np
 
 from variational.orbits import lowest_times
 
-from .._parameter import as_arrays
+from .._parameter import as_arguments
 from .._point import set_parameters
 from .._program import evaluate
-from .._settings import Settings
+from .._settings import BranchSettings
 from ..problem import Start
 from ._signature import with_impact, without_impact
 from ._watched import Watched, watched_of
@@ -43,7 +43,12 @@ def orbit_grazing(problem: Any, point: Any) -> Start | None:
     parameters = point.problem.parameters
     z = np.append(point.state, point.parameter)
     at = evaluate(
-        problem, point.leaf, z, np.ones_like(z), np.asarray(point.scale[-1]), Settings()
+        problem,
+        point.leaf,
+        z,
+        np.ones_like(z),
+        np.asarray(point.scale[-1]),
+        BranchSettings(),
     )
     m = len(problem.constraints)
     values = {w: abs(float(at.monitors[name])) for name, w in watched_of(m).items()}
@@ -66,7 +71,7 @@ def orbit_grazing(problem: Any, point: Any) -> Start | None:
         )
         watched = Watched("speed", number + 1 if m else 0)
     changed = problem.of(parameters, equations)
-    changed = set_parameters(changed, as_arrays(changed.parameters, point.leaf))
+    changed = set_parameters(changed, as_arguments(changed.parameters, point.leaf))
     tangent = _direction(changed, np.asarray(state), point, watched.name)
     if tangent is None:
         return None
@@ -80,7 +85,11 @@ def _direction(problem, u, point: Any, watched: str) -> np.ndarray | None:
     for which differences do.
     """
     z = np.append(u, point.parameter)
-    one, width, settings = np.ones_like(z), np.asarray(point.scale[-1]), Settings()
+    one, width, settings = (
+        np.ones_like(z),
+        np.asarray(point.scale[-1]),
+        BranchSettings(),
+    )
     at = evaluate(problem, point.leaf, z, one, width, settings)
     if not np.all(np.isfinite(at.jacobian)):
         return None

@@ -17,7 +17,7 @@ from variational import Orbit, orbit_of
 from variational.orbits import flown, gap_sizes, refuse, seed, Shooting
 
 from .._program import solve
-from .._settings import Settings as WalkSettings
+from .._settings import BranchSettings
 from ._shooting import ImpactingOrbits
 
 
@@ -240,7 +240,7 @@ def _with_impacts_of(system, turn, number, t0, settings):
     except ValueError as error:
         return None, str(error)
     problem = ImpactingOrbits.of(system, equations)
-    u, success, _ = solve(problem, u, WalkSettings(tolerance=1e-11))
+    u, success, _ = solve(problem, u, BranchSettings(tolerance=1e-11))
     if not success:
         return None, (
             f"Newton's method on the {len(problem.constraints)} impacts of the motion "

@@ -12,7 +12,7 @@ from jaxcam.parameters import AnyArray
 
 from .._parameter import with_leaf
 from .._program import evaluate, residual_at, solve
-from .._settings import Settings
+from .._settings import BranchSettings
 from ..problem import AbstractProblem, jacobian_of, Stability
 
 
@@ -67,7 +67,7 @@ _crossing: Any = BranchPoints
 
 
 def solved_crossing(
-    problem: AbstractProblem, leaf: int, width: float, guess, settings: Settings
+    problem: AbstractProblem, leaf: int, width: float, guess, settings: BranchSettings
 ) -> tuple[np.ndarray, bool]:
     """The branch point near z = (u, parameter), by Newton's method with its second
     derivatives, and whether it is one."""
@@ -83,7 +83,7 @@ def solved_crossing(
 
 
 def differenced_crossing(
-    problem: AbstractProblem, leaf: int, width: float, guess, settings: Settings
+    problem: AbstractProblem, leaf: int, width: float, guess, settings: BranchSettings
 ) -> tuple[np.ndarray, bool]:
     """The same with differences of Jacobians, by the program of the corrector.
 
@@ -126,12 +126,12 @@ def differenced_crossing(
     return y * scale, False
 
 
-def _solves(slack, settings: Settings) -> bool:
+def _solves(slack, settings: BranchSettings) -> bool:
     """Whether the point solves the equations, and not only those with slack."""
     return bool(abs(slack) <= max(settings.tolerance, _SLACK))
 
 
-def _at(problem, leaf: int, width, z, settings: Settings):
+def _at(problem, leaf: int, width, z, settings: BranchSettings):
     return evaluate(problem, leaf, z, np.ones_like(z), width, settings)
 
 

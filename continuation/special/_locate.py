@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from .._program import correct, Corrected, solve
-from .._settings import Settings
+from .._settings import BranchSettings
 from ..problem import AbstractProblem
 from ._bialternate import determinant_on_plane, trace_on_plane
 from ._branch_points import differenced_crossing, solved_crossing
@@ -31,7 +31,7 @@ class Context(NamedTuple):
     leaf: int
     width: float
     bounds: tuple[float, float]
-    settings: Settings
+    settings: BranchSettings
 
 
 class Located(NamedTuple):
@@ -88,7 +88,7 @@ def locate(
     leaves the bracket, the bracket is shrunk with points of the branch first.
     """
     low, high = (a.z, values[0]), (b.z, values[1])
-    guess = between(a, b, values[0] / (values[0] - values[1]))
+    guess = cubic_between(a, b, values[0] / (values[0] - values[1]))
     choice = context.settings.localise
     newton = choice == "newton" or (choice == "auto" and not problem.costly)
     monitor = problem.monitors().get(name)
@@ -161,7 +161,7 @@ def _next_guess(low, high, attempt: int) -> np.ndarray:
     return low[0] + share * (high[0] - low[0])
 
 
-def between(a: Corrected, b: Corrected, share: float) -> np.ndarray:
+def cubic_between(a: Corrected, b: Corrected, share: float) -> np.ndarray:
     """Cubic through two points and their tangents."""
     if not np.isfinite(share):
         share = 0.5

@@ -9,7 +9,7 @@ import numpy as np
 
 from .._parameter import with_leaf
 from .._program import Corrected, evaluate
-from .._settings import Settings
+from .._settings import BranchSettings
 from ..problem import AbstractProblem
 from ._differences import along, STEPS
 from ._multilinear import second, third
@@ -56,7 +56,11 @@ class _Derivatives:
     """
 
     def __init__(
-        self, problem: AbstractProblem, leaf: int, z: np.ndarray, settings: Settings
+        self,
+        problem: AbstractProblem,
+        leaf: int,
+        z: np.ndarray,
+        settings: BranchSettings,
     ):
         self.problem = problem
         self.leaf = leaf
@@ -250,7 +254,7 @@ def normal_form(
     leaf: int,
     z: np.ndarray,
     at: Corrected,
-    settings: Settings,
+    settings: BranchSettings,
 ) -> tuple[float | None, str]:
     """Normal-form coefficient of a special point, and what its sign says."""
     if kind not in _FORMS or (kind != FOLD and not problem.normal_forms):

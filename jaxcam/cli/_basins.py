@@ -11,7 +11,7 @@ from ._choices import CAM
 from ._grouped import grouped
 from ._options import JsonFile, Preset, Resume, Settings, Speed, System
 from ._source import Source
-from ._sweep import show, Where
+from ._sweep import Execution, show
 
 
 _FILE = "basins.zarr"
@@ -25,7 +25,7 @@ def basins(
     source: Source = Source(),
     preset: Preset = None,
     set_: Settings = None,
-    where: Where = Where(),
+    where: Execution = Execution(),
     json_file: JsonFile = None,
     out: Annotated[
         Path | None,

@@ -12,7 +12,7 @@ from ._diagram_options import Starts, Sweep
 from ._grouped import grouped
 from ._options import JsonFile, Preset, Resume, Settings, System
 from ._source import Source
-from ._sweep import show, Where
+from ._sweep import Execution, show
 
 
 _FILE = "diagram.zarr"
@@ -26,7 +26,7 @@ def diagram(
     source: Source = Source(),
     preset: Preset = None,
     set_: Settings = None,
-    where: Where = Where(),
+    where: Execution = Execution(),
     json_file: JsonFile = None,
     out: Annotated[
         Path | None,

@@ -1,20 +1,10 @@
 """What happens at the surface: crossing, sliding, and the field in force."""
 
-import enum
-
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ._system import FilippovSystem
-
-
-class Mode(enum.IntEnum):
-    """Which field is in force."""
-
-    BELOW = -1
-    SLIDING = 0
-    ABOVE = 1
 
 
 def surface_rates(

@@ -18,7 +18,7 @@ from .. import breakpoints
 from ..codes import FINISHED, NOT_FINITE, Row, RUNNING, STEP_FAILED, TOGETHER
 from ..loop import Log
 from ._events import Flown, TOO_LONG
-from ._motion import Motion, prepared
+from ._motion import CompiledMotion, prepared
 
 
 # a hop whose lambda = v |j| / a^2 is smaller is one step, not a call of diffrax
@@ -61,7 +61,7 @@ class _Engine:
 
     def __init__(self, system, settings, t0, state, t1):
         self.settings = settings
-        self.motion = Motion(prepared(system), settings, np.ones_like(state))
+        self.motion = CompiledMotion(prepared(system), settings, np.ones_like(state))
         self.span = t1 - t0
         # breakpoints are passed between pieces: this is where the next one lies
         own = system.period
