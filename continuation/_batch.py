@@ -10,14 +10,16 @@ from jaxtyping import ArrayLike, Float, PyTree
 from jaxcam.parameters import VectorLike, Where
 
 from ._batch_run import Axes, follow_lanes, REASONS
+from ._context import Context
 from ._follow import checked_bounds
-from ._parameter import as_arguments, leaf_of, pick_one, with_leaf
+from ._parameter import as_arguments, leaf_of, pick_one
 from ._point import Branch, Point, set_parameters, with_field
 from ._program import Corrected
 from ._settings import as_traced, BranchSettings
+from ._solution import point_of, Solution
 from .algorithms import AbstractAlgorithm, PseudoArclength
 from .problem import AbstractProblem
-from .special import Context, eigenvalues_at, is_stable, locate, test_values, varied
+from .special import locate, test_values
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,8 +52,14 @@ class Batch:
             jax.tree.map(lambda x: x[index, i], self._passed)
             for i in range(int(self.count[index]))
         ]
-        points, before = [], None
-        arclength = 0.0
+        points: list[Point] = []
+        arclength, before = 0.0, None
+
+        def add(at: Corrected, tests: dict, kind: str, converged=True, reason=""):
+            here = Solution(problem, at, tests, 0.0, arclength, ())
+            label = len(points) + 1
+            points.append(point_of(context, here, label, kind, reason, converged))
+
         for i, at in enumerate(rows):
             tests = test_values(problem, context.leaf, at)
             if before is not None:
@@ -64,46 +72,13 @@ class Batch:
                         monitors = problem.monitors()
                         kind = monitors[name].kind if name in monitors else name
                         special = with_field(at, "z", found.z)
-                        points.append(
-                            _point(
-                                problem, special, kind, arclength, {},
-                                found.converged, found.reason, context.leaf,
-                            )
-                        )  # fmt: skip
+                        add(special, {}, kind, found.converged, found.reason)
             last = i == len(rows) - 1
             kind = "start" if i == 0 else "end" if last else "regular"
-            reason = self.reasons[index] if last else ""
-            points.append(
-                _point(problem, at, kind, arclength, tests, True, reason, context.leaf)
-            )
+            add(at, tests, kind, reason=self.reasons[index] if last else "")
             before = at, tests
-        numbered = tuple(with_field(p, "label", i + 1) for i, p in enumerate(points))
-        return Branch(numbered, self.name, context.bounds, context.leaf, (self.name,))
-
-
-def _point(problem, at, kind, arclength, tests, converged, reason, leaf) -> Point:
-    multipliers, why = eigenvalues_at(problem, leaf, at)
-    parameters = with_leaf(problem.parameters, leaf, np.asarray(at.z[-1]))
-    return Point(
-        label=0,
-        kind=kind,
-        parameter=float(at.z[-1]),
-        state=at.z[:-1],
-        multipliers=multipliers,
-        stable=is_stable(problem, multipliers),
-        tangent=at.tangent,
-        scale=at.scale,
-        step=0.0,
-        arclength=arclength,
-        iterations=int(at.iterations),
-        converged=converged,
-        reason=reason or why,
-        observed={k: np.asarray(v) for k, v in at.observed.items()},
-        tests=tests,
-        signature=problem.signature,
-        parameters=varied(problem, at.z),
-        problem=set_parameters(problem, parameters),
-    )
+        name, names = self.name, (self.name,)
+        return Branch(tuple(points), name, context.bounds, context.leaf, names)
 
 
 def _check_algorithm(algorithm: AbstractAlgorithm) -> None:
@@ -193,5 +168,5 @@ def follow_batch(
         name=name,
         _passed=passed,
         _problems=lambda k: set_parameters(problem, axes.of_lane(given, k)),
-        _context=Context(leaf, high - low, (low, high), settings),
+        _context=Context(leaf, high - low, settings, (low, high)),
     )

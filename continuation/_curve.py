@@ -9,6 +9,7 @@ import numpy as np
 from jaxcam.parameters import Where
 
 from ._branch import branch
+from ._context import Context
 from ._follow import checked_bounds
 from ._parameter import as_arguments, leaf_of, pick_one
 from ._point import Branch, Point, set_parameters
@@ -17,7 +18,6 @@ from ._settings import BranchSettings
 from .algorithms import AbstractAlgorithm
 from .problem import Start
 from .special import (
-    Context,
     FLIP,
     FOLD,
     HOPF,
@@ -54,7 +54,7 @@ def extended(
     leaf, name = pick_one(where, problem.parameters)
     low, high = checked_bounds(bounds, name)
     problem = set_parameters(problem, as_arguments(problem.parameters, leaf))
-    context = Context(leaf, high - low, (low, high), settings or BranchSettings())
+    context = Context(leaf, high - low, settings or BranchSettings(), (low, high))
     z = np.append(point.state, leaf_of(problem.parameters, leaf))
     if point.kind in (FOLD, FLIP, HOPF, NEIMARK_SACKER):
         return singular_points(problem, point.kind, context, z)
@@ -64,9 +64,7 @@ def extended(
     if len(same) > 1:
         # several monitors may share a kind: the one that is zero here, and the last
         # where others vanish with it, such as the gap beside an impact without speed
-        at = evaluate(
-            problem, context.leaf, z, np.ones_like(z), context.width, context.settings
-        )
+        at = evaluate(problem, context, z, np.ones_like(z))
         sizes = {k: abs(float(at.monitors[k])) for k in same}
         most = max(min(sizes.values()), _ZERO * (1.0 + float(np.max(np.abs(z)))))
         same = [k for k in same if sizes[k] <= most]

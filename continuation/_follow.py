@@ -7,6 +7,7 @@ import numpy as np
 
 from jaxcam.parameters import real_array, Where
 
+from ._context import Context
 from ._parameter import as_arguments, pick_one
 from ._point import Point, set_parameters
 from ._run import Run
@@ -14,7 +15,6 @@ from ._settings import BranchSettings
 from ._stated import stated
 from .algorithms import AbstractAlgorithm, PseudoArclength
 from .problem import AbstractProblem, Start
-from .special import Context
 
 
 def follow(
@@ -62,7 +62,7 @@ def follow(
     low, high = checked_bounds(bounds, name)
     if direction not in (1, -1):
         raise ValueError(f"direction is {direction!r}; give 1 or -1")
-    context = Context(leaf, high - low, (low, high), settings)
+    context = Context(leaf, high - low, settings, (low, high))
     run = Run(context, algorithm, name, direction)
     # the first point is computed now, so that bad input is reported here
     first = run.begin(begun, at, history)

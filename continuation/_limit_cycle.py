@@ -11,7 +11,7 @@ from jaxtyping import Array, Float, PyTree
 from jaxcam.hybrid.runge_kutta import DOPRI8, fixed_steps
 
 from ._point import with_field
-from .problem import AbstractProblem, Stability, Start
+from .problem import AbstractProblem, StabilityKind, Start
 from .special import FLIP, flip_direction
 
 
@@ -38,7 +38,7 @@ class LimitCycle(AbstractProblem):
     normal: Any
     basis: Any
     steps: int = eqx.field(static=True)
-    stability: ClassVar[Stability] = "map"
+    stability: ClassVar[StabilityKind] = "map"
     normal_forms: ClassVar[bool] = False
 
     def __init__(

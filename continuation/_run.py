@@ -7,6 +7,7 @@ import numpy as np
 
 from ._begin import leave, solved_start
 from ._closed import closed, Past
+from ._context import Context
 from ._parameter import as_arguments, leaf_of
 from ._passed import located_between, sign_changes, special_here
 from ._point import Point, set_parameters, with_field, with_parameter
@@ -15,7 +16,7 @@ from ._solution import point_of, Solution, solution_at
 from ._step import attempt_step
 from .predictors import Station
 from .problem import AbstractProblem
-from .special import ahead, BRANCH_POINT, Context, Located
+from .special import ahead, BRANCH_POINT, Located
 from .step_control import Refusal
 
 
@@ -86,9 +87,7 @@ class Run:
         z = np.append(start.state, start.parameter)
         problem = with_parameter(problem, context.leaf, z[-1])
         problem = problem.refreshed(z[:-1], problem.parameters)
-        at = evaluate(
-            problem, context.leaf, z, start.tangent, context.width, context.settings
-        )
+        at = evaluate(problem, context, z, start.tangent)
         # to the last digit what they were when the point was found
         at = with_field(at, "tangent", np.asarray(start.tangent))
         at = with_field(at, "scale", np.asarray(start.scale))

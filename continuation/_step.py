@@ -5,12 +5,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ._context import Context
 from ._point import with_field
 from ._program import correct, Corrected
 from .algorithms import AbstractAlgorithm
 from .predictors import Station
 from .problem import AbstractProblem
-from .special import AbstractExtended, Context
+from .special import AbstractExtended
 from .step_control import Refusal, way_between
 
 
@@ -42,9 +43,8 @@ def attempt_step(
     if k is None:
         normal = algorithm.normal(stations[-1].tangent) / a.scale
         b = correct(
-            problem, context.leaf, predicted, normal, a.tangent, context.width,
-            context.settings, algorithm.least_norm,
-        )  # fmt: skip
+            problem, context, predicted, normal, a.tangent, algorithm.least_norm
+        )
         guess = predicted
         if b.success:
             k, value = _first_bound(problem, context, a.z, b.z)
@@ -56,10 +56,7 @@ def attempt_step(
     guess[k] = value
     normal = np.zeros_like(guess)
     normal[k] = 1.0 / a.scale[k]
-    b = correct(
-        problem, context.leaf, guess, normal, a.tangent, context.width,
-        context.settings,
-    )  # fmt: skip
+    b = correct(problem, context, guess, normal, a.tangent)
     if b.success:
         # rounding of the corrector
         z = np.array(b.z)

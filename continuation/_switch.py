@@ -8,6 +8,7 @@ import numpy as np
 from jaxcam.parameters import Where
 
 from ._branch import branch
+from ._context import Context
 from ._parameter import pick_one, with_leaf
 from ._point import Branch, Point
 from ._program import evaluate
@@ -35,8 +36,9 @@ def emanating(point: Point, where: Where, width: float = 1.0) -> tuple[Start, ..
             "load_branch(path, problem)"
         )
     leaf, _ = pick_one(where, problem.parameters)
+    context = Context(leaf, width, BranchSettings())
     if point.kind == BRANCH_POINT:
-        direction = other_direction(problem, leaf, point, width)
+        direction = other_direction(problem, context, point)
         return tuple(
             Start(problem, point.state, point.parameter, sign * direction)
             for sign in (1.0, -1.0)
@@ -44,7 +46,7 @@ def emanating(point: Point, where: Where, width: float = 1.0) -> tuple[Start, ..
     start = None
     if point.kind in (FLIP, HOPF):
         z = np.append(point.state, point.parameter)
-        at = evaluate(problem, leaf, z, point.tangent, width, BranchSettings())
+        at = evaluate(problem, context, z, point.tangent)
         start = problem.transition(point, at)
     if start is None:
         raise ValueError(
@@ -93,16 +95,16 @@ def _quadratic(problem: AbstractProblem, leaf: int, z, basis, left):
 
 
 def other_direction(
-    problem: AbstractProblem, leaf: int, point: Point, width: float
+    problem: AbstractProblem, context: Context, point: Point
 ) -> np.ndarray:
     """(n+1,) direction of the branch that crosses at a simple branch point, (3.37)."""
     z = np.append(point.state, point.parameter)
-    at = evaluate(problem, leaf, z, point.tangent, width, BranchSettings())
+    at = evaluate(problem, context, z, point.tangent)
     left, _, rows = np.linalg.svd(at.jacobian * at.scale[None, :])
     basis = rows[-2:]
     form = np.asarray(
         _quadratic(
-            problem, leaf, jnp.asarray(z), jnp.asarray(basis * at.scale),
+            problem, context.leaf, jnp.asarray(z), jnp.asarray(basis * at.scale),
             jnp.asarray(left[:, -1]),
         )
     )  # fmt: skip

@@ -15,7 +15,7 @@ from .representation import AbstractRepresentation, Unique
 
 
 #: what the eigenvalues of `linearisation` mean
-Stability = Literal["equilibrium", "map", "none"]
+StabilityKind = Literal["equilibrium", "map", "none"]
 
 
 class Monitor(eqx.Module):
@@ -113,7 +113,7 @@ class AbstractProblem(eqx.Module):
     """
 
     parameters: eqx.AbstractVar[PyTree]
-    stability: eqx.AbstractClassVar[Stability]
+    stability: eqx.AbstractClassVar[StabilityKind]
     #: whether `local_dynamics` is there, for the coefficients of normal forms
     normal_forms: ClassVar[bool] = True
     #: whether second derivatives of `residual` take long to compile, so that special

@@ -18,7 +18,7 @@ from scipy.interpolate import BPoly
 
 from jaxcam import Settings
 from jaxcam.hybrid.batch._refilled_lanes import costly_first
-from jaxcam.hybrid.codes import Row
+from jaxcam.hybrid.codes import RowKind
 from jaxcam.hybrid.loop._advance import Plan
 from jaxcam.hybrid.loop._flight import earliest, judge, moves_in, StepVerdict
 from jaxcam.hybrid.loop._functions import Functions
@@ -362,7 +362,7 @@ def test_contact_that_is_pulled_at_once_lets_go():
 # --- one attempt as a whole
 
 
-@pytest.mark.parametrize("room, kind", [(2e-6, Row.IMPACT), (5e-7, Row.STEP)])
+@pytest.mark.parametrize("room, kind", [(2e-6, RowKind.IMPACT), (5e-7, RowKind.STEP)])
 def test_an_impact_beyond_the_end_is_left_out(room, kind):
     """The step ends 1e-6 s before the impact, the run `room` after that step."""
     ball = BouncingBall()

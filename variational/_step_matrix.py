@@ -8,7 +8,7 @@ from jaxtyping import Array, Float
 
 from jaxcam.hybrid import HybridSystem
 from jaxcam.hybrid.breakpoints import between
-from jaxcam.hybrid.codes import Row
+from jaxcam.hybrid.codes import RowKind
 from jaxcam.hybrid.loop import Functions
 from jaxcam.hybrid.runge_kutta import step, Tableau
 
@@ -53,7 +53,7 @@ def step_matrix(
     The step is the one the run took, so its derivative needs no control of its own.
     """
     n = functions.n
-    taken = row.kind != float(Row.NOTHING)
+    taken = row.kind != float(RowKind.NOTHING)
     h = jnp.where(taken, row.t - point.t, 0.0)
 
     def inside(t):
@@ -81,8 +81,8 @@ def step_matrix(
         matrix = jnp.where(held[0], 0.0, matrix)
     else:
         matrix = contact_projector(system, row.t, before, held) @ matrix
-    hit = taken & (row.kind == float(Row.IMPACT))
-    last = taken & (row.kind == float(Row.LAST_IMPACT))
+    hit = taken & (row.kind == float(RowKind.IMPACT))
+    last = taken & (row.kind == float(RowKind.LAST_IMPACT))
     event = _across(system, row, before, held, now, impact_of, functions.planar)
     out = jnp.where(hit, _times(event, matrix), matrix)
     if functions.planar:

@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from jaxcam.hybrid.codes import Row
+from jaxcam.hybrid.codes import RowKind
 from jaxcam.hybrid.loop import first_state, Functions, Plan, run_raw
 
 from ._event_law import completed_law
@@ -78,12 +78,12 @@ def next_rows(batched, shared, length, t0, turns, settings, carry: Carried):
         kind, side, t = log[:, 0], log[:, 1].astype(jnp.int32), log[:, 2]
         before, after = log[:, 3 : 3 + n], log[:, 3 + n : 3 + 2 * n]
         contact = log[:, 3 + 2 * n :] > 0.5
-        taken = kind != float(Row.NOTHING)
+        taken = kind != float(RowKind.NOTHING)
         started = after
         if not functions.planar:
             # what follows a chatter starts without normal velocity
             rest = jax.vmap(lambda s, y, k: completed_law(system, k)(s, y))
-            at_rest = (kind == float(Row.LAST_IMPACT))[:, None]
+            at_rest = (kind == float(RowKind.LAST_IMPACT))[:, None]
             started = jnp.where(at_rest, rest(t, before, side), after)
 
         def first_and(old, new):

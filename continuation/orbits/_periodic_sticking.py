@@ -27,7 +27,7 @@ from variational.chatter import (
 )
 from variational.orbits import flight_end
 
-from ..problem import AbstractProblem, Monitor, Stability, Start
+from ..problem import AbstractProblem, Monitor, StabilityKind, Start
 from ._behind_interruption import orbit_behind
 from ._shooting import ImpactingOrbits
 
@@ -66,7 +66,7 @@ class StickingOrbits(AbstractProblem):
     - `beyond`: whether to go on behind an interruption; else it ends the branch.
     """
 
-    stability: ClassVar[Stability] = "map"
+    stability: ClassVar[StabilityKind] = "map"
     normal_forms: ClassVar[bool] = False
     detects: ClassVar[bool] = False
 

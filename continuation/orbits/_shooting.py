@@ -12,7 +12,7 @@ from jaxcam.hybrid import HybridSystem
 from variational import orbits
 from variational.orbits import inadmissible, Shooting
 
-from ..problem import AbstractProblem, LocalDynamics, Monitor, Stability, Start
+from ..problem import AbstractProblem, LocalDynamics, Monitor, StabilityKind, Start
 from ..special import FLIP
 from ._impact_sequences import ImpactSequences
 from ._orbit_grazing import orbit_grazing
@@ -40,7 +40,7 @@ class ImpactingOrbits(AbstractProblem):
     - `steps`: Runge-Kutta steps of order eight in each flight.
     """
 
-    stability: ClassVar[Stability] = "map"
+    stability: ClassVar[StabilityKind] = "map"
     costly: ClassVar[bool] = True
 
     parameters: HybridSystem

@@ -3,7 +3,6 @@
 from ._extended import AbstractExtended as AbstractExtended, varied as varied
 from ._locate import (
     ahead as ahead,
-    Context as Context,
     cubic_between as cubic_between,
     locate as locate,
     Located as Located,

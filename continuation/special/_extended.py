@@ -8,7 +8,7 @@ from jaxtyping import Array, Float, PyTree
 
 from .._parameter import with_leaf
 from .._point import Point, replace
-from ..problem import AbstractProblem, jacobian_of, Stability
+from ..problem import AbstractProblem, jacobian_of, StabilityKind
 
 
 class AbstractExtended(AbstractProblem):
@@ -20,7 +20,7 @@ class AbstractExtended(AbstractProblem):
     bounds: eqx.AbstractVar[Array]
     #: between these
     width: eqx.AbstractVar[Array]
-    stability: ClassVar[Stability] = "none"
+    stability: ClassVar[StabilityKind] = "none"
     normal_forms: ClassVar[bool] = False
     detects: ClassVar[bool] = False
 

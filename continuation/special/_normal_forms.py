@@ -7,9 +7,9 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from .._context import Context
 from .._parameter import with_leaf
 from .._program import Corrected, evaluate
-from .._settings import BranchSettings
 from ..problem import AbstractProblem
 from ._differences import along, STEPS
 from ._multilinear import second, third
@@ -55,18 +55,13 @@ class _Derivatives:
     differences of Jacobians.
     """
 
-    def __init__(
-        self,
-        problem: AbstractProblem,
-        leaf: int,
-        z: np.ndarray,
-        settings: BranchSettings,
-    ):
+    def __init__(self, problem: AbstractProblem, context: Context, z: np.ndarray):
         self.problem = problem
-        self.leaf = leaf
-        self.settings = settings
+        self.context = context
         self.z = z
-        self.parameters = with_leaf(problem.parameters, leaf, jnp.asarray(z[-1]))
+        self.parameters = with_leaf(
+            problem.parameters, context.leaf, jnp.asarray(z[-1])
+        )
         self.u = jnp.asarray(z[:-1])
 
     def a(self, at: Corrected) -> np.ndarray:
@@ -136,12 +131,11 @@ class _Derivatives:
         return np.stack(
             [
                 evaluate(
-                    self.problem, self.leaf, self.z + np.append(move, 0.0), one, 1.0,
-                    self.settings,
+                    self.problem, self.context, self.z + np.append(move, 0.0), one
                 ).jacobian[:, :n]
                 for move in moves
             ]
-        )  # fmt: skip
+        )
 
 
 def _eigen(matrix: np.ndarray) -> tuple[Any, Any]:
@@ -251,16 +245,15 @@ _FORMS = {
 def normal_form(
     kind: str,
     problem: AbstractProblem,
-    leaf: int,
+    context: Context,
     z: np.ndarray,
     at: Corrected,
-    settings: BranchSettings,
 ) -> tuple[float | None, str]:
     """Normal-form coefficient of a special point, and what its sign says."""
     if kind not in _FORMS or (kind != FOLD and not problem.normal_forms):
         return None, ""
     try:
-        coefficient, words = _FORMS[kind](_Derivatives(problem, leaf, z, settings), at)
+        coefficient, words = _FORMS[kind](_Derivatives(problem, context, z), at)
     except np.linalg.LinAlgError:
         return None, ""
     if coefficient is not None and not np.isfinite(coefficient):

@@ -10,7 +10,7 @@ from ._checks import check_resume
 from ._choices import CAM
 from ._continue_options import ALGORITHMS, BranchRange, DIRECTIONS, Following
 from ._grouped import grouped
-from ._options import JsonFile, Preset, Resume, Settings, System
+from ._options import Assignments, JsonFile, Preset, Resume, System
 from ._source import Source
 
 
@@ -23,7 +23,7 @@ def continue_(
     along: BranchRange = BranchRange(),
     preset: Preset = None,
     source: Source = Source(),
-    set_: Settings = None,
+    set_: Assignments = None,
     following: Following = Following(),
     json_file: JsonFile = None,
     out: Annotated[

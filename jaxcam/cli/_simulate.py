@@ -7,7 +7,7 @@ import typer
 
 from ._choices import CAM, make_solver
 from ._grouped import grouped
-from ._options import JsonFile, Preset, Settings, Speed, System
+from ._options import Assignments, JsonFile, Preset, Speed, System
 from ._simulate_options import RunOptions
 from ._source import Source
 
@@ -18,7 +18,7 @@ def simulate(
     source: Source = Source(),
     preset: Preset = None,
     speed: Speed = None,
-    set_: Settings = None,
+    set_: Assignments = None,
     run: RunOptions = RunOptions(),
     json_file: JsonFile = None,
     out: Annotated[

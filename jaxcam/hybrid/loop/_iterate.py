@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import jax.numpy as jnp
 
 from ..breakpoints import after
-from ..codes import Row, RUNNING
+from ..codes import RowKind, RUNNING
 from ._advance import after_attempt, Attempt, Plan
 from ._flight import earliest, judge, StepVerdict
 from ._functions import Functions
@@ -147,7 +147,7 @@ def _iterate(
     )
     kind = _kind(carried, lands, begins, released, stopped)
     record = Record(
-        kind=jnp.where(good & active, kind, float(Row.NOTHING)),
+        kind=jnp.where(good & active, kind, float(RowKind.NOTHING)),
         constraint=jnp.where(released, held.constraint, flown.constraint),
         t=t,
         before=select(lands, landing.impact.before, x),
@@ -234,11 +234,11 @@ def _shorter(functions, end: StepEnd, judged: Judged, held: StepVerdict, converg
 
 
 def _kind(carried, lands, begins, released, stopped):
-    """What an accepted attempt is in the log: see `Row`."""
-    kind = jnp.where(stopped, float(Row.STOP), float(Row.STEP))
-    kind = jnp.where(carried.completing, float(Row.CONTACT), kind)
-    kind = jnp.where(released, float(Row.RELEASE), kind)
-    impact = jnp.where(begins, float(Row.LAST_IMPACT), float(Row.IMPACT))
+    """What an accepted attempt is in the log: see `RowKind`."""
+    kind = jnp.where(stopped, float(RowKind.STOP), float(RowKind.STEP))
+    kind = jnp.where(carried.completing, float(RowKind.CONTACT), kind)
+    kind = jnp.where(released, float(RowKind.RELEASE), kind)
+    impact = jnp.where(begins, float(RowKind.LAST_IMPACT), float(RowKind.IMPACT))
     return jnp.where(lands, impact, kind)
 
 

@@ -8,7 +8,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..codes import Row, RUNNING
+from ..codes import RowKind, RUNNING
 from ..lowering import depend_on, one_kernel, with_kept
 from ._advance import Plan
 from ._functions import Functions
@@ -196,7 +196,7 @@ def _unpack(log, functions: Functions) -> Log:
     )
 
 
-def rows_of_kind(log: Log, *wanted: Row):
+def rows_of_kind(log: Log, *wanted: RowKind):
     """Which rows are of one of the kinds."""
     mask = log.kind == float(wanted[0])
     for w in wanted[1:]:
