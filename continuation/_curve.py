@@ -45,12 +45,7 @@ def extended(
 
     **Raises:** `ValueError` for points that form no curve.
     """
-    problem = point.problem
-    if problem is None:
-        raise ValueError(
-            "this point carries no problem; read its file with "
-            "load_branch(path, problem)"
-        )
+    problem = point.solved
     leaf, name = pick_one(where, problem.parameters)
     low, high = checked_bounds(bounds, name)
     problem = set_parameters(problem, as_arguments(problem.parameters, leaf))

@@ -64,11 +64,20 @@ class Point:
         """Whether this is a special point."""
         return self.kind not in ORDINARY
 
+    @property
+    def solved(self) -> AbstractProblem:
+        """The problem; `ValueError` for a point of a file that was read without it."""
+        if self.problem is None:
+            raise ValueError(
+                "this point carries no problem; read its file with "
+                "load_branch(path, problem)"
+            )
+        return self.problem
+
     def inner(self, base: AbstractProblem, leaf: int) -> "Point":
         """This point of an extended problem as a point of the problem it extends."""
         value = float(self.state[-1])
-        assert self.problem is not None
-        parameters = with_leaf(self.problem.parameters, leaf, np.asarray(value))
+        parameters = with_leaf(self.solved.parameters, leaf, np.asarray(value))
         return replace(
             self,
             state=self.state[:-1],

@@ -97,13 +97,10 @@ class FixedPoint(AbstractProblem):
     def signature(self) -> str:
         return f"period {int(self.period)}"
 
-    def with_signature(self, signature: str) -> "FixedPoint":
+    def with_signature(self, signature: str) -> AbstractProblem:
         word, _, number = signature.partition(" ")
         if word != "period" or not number.isdecimal():
-            raise ValueError(
-                f"the saved branch has signature {signature!r}, which is no period of "
-                "a map; take it up with the problem it was made with"
-            )
+            return super().with_signature(signature)
         return FixedPoint(self.map, self.parameters, int(number))
 
 

@@ -29,12 +29,7 @@ def emanating(point: Point, where: Where, width: float = 1.0) -> tuple[Start, ..
 
     **Raises:** `ValueError` for a point from which no branch is known to leave.
     """
-    problem = point.problem
-    if problem is None:
-        raise ValueError(
-            "this point carries no problem; read its file with "
-            "load_branch(path, problem)"
-        )
+    problem = point.solved
     leaf, _ = pick_one(where, problem.parameters)
     context = Context(leaf, width, BranchSettings())
     if point.kind == BRANCH_POINT:

@@ -84,7 +84,7 @@ def step_matrix(
     hit = taken & (row.kind == float(RowKind.IMPACT))
     last = taken & (row.kind == float(RowKind.LAST_IMPACT))
     event = _across(system, row, before, held, now, impact_of, functions.planar)
-    out = jnp.where(hit, _times(event, matrix), matrix)
+    out = jnp.where(hit, elementwise_product(event, matrix), matrix)
     if functions.planar:
         entry = jnp.zeros((n, n))
     else:
@@ -110,6 +110,6 @@ def _across(system, row: LogRow, before, held, now, law_of, planar):
     return law_x + moved[:, None] * (normal / speed)[None, :]
 
 
-def _times(a, b):
+def elementwise_product(a, b):
     """A matrix product that stays elementwise in a batch."""
     return jnp.sum(a[:, :, None] * b[None, :, :], axis=1)

@@ -11,7 +11,7 @@ from jaxcam.hybrid.codes import RowKind
 from jaxcam.hybrid.loop import first_state, Functions, Plan, run_raw
 
 from ._event_law import completed_law
-from ._step_matrix import LogRow, step_matrix, StepStart
+from ._step_matrix import elementwise_product, LogRow, step_matrix, StepStart
 
 
 class Carried(NamedTuple):
@@ -106,7 +106,7 @@ def next_rows(batched, shared, length, t0, turns, settings, carry: Carried):
 
         def extend(carry, matrix):
             frame, logs = carry
-            frame, growth = orthonormal(_times(matrix, frame))
+            frame, growth = orthonormal(elementwise_product(matrix, frame))
             logs = logs + jnp.log(growth)
             return (frame, logs), logs
 
@@ -115,11 +115,6 @@ def next_rows(batched, shared, length, t0, turns, settings, carry: Carried):
         return Carried(lane, at, frame, logs), (kind, sums, after)
 
     return eqx.filter_vmap(one, in_axes=(eqx.if_array(0), 0))(batched, carry)
-
-
-def _times(a, b):
-    """A matrix product that stays elementwise in a batch."""
-    return jnp.sum(a[:, :, None] * b[None, :, :], axis=1)
 
 
 def orthonormal(matrix: Float[Array, "n n"]):

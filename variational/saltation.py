@@ -7,6 +7,7 @@ from jax.core import Tracer
 from jaxtyping import Array, Float
 
 from jaxcam.hybrid import HybridSystem
+from jaxcam.hybrid.surface import gaps
 
 from ._event_law import (
     completed_law,
@@ -97,7 +98,7 @@ def saltation_into_contact(
     """
     t = jnp.asarray(t, dtype=jnp.float64)
     x = jnp.asarray(state_before, dtype=jnp.float64)
-    number = jnp.atleast_1d(system.gap(t, x)).shape[0]
+    number = gaps(system, t, x).shape[0]
     contact = jnp.arange(number) == constraint
     law_x, moved, normal, speed = event_crossing(
         completed_law(system, constraint),
@@ -125,7 +126,7 @@ def saltation_at_release(
     """
     t = jnp.asarray(t, dtype=jnp.float64)
     x = jnp.asarray(state, dtype=jnp.float64)
-    number = jnp.atleast_1d(system.gap(t, x)).shape[0]
+    number = gaps(system, t, x).shape[0]
     return contact_projector(system, t, x, jnp.arange(number) == constraint)
 
 

@@ -176,11 +176,11 @@ def _somewhere(system, t0):
     state = jnp.zeros(n)
     time = jnp.asarray(float(t0))
     for _ in range(20):
-        gap = jnp.atleast_1d(system.gap(time, state))
+        gap = gaps(system, time, state)
         which = int(jnp.argmin(gap))
         if float(gap[which]) >= 0:
             return np.asarray(state)
-        slope = jax.grad(lambda x, w=which: jnp.atleast_1d(system.gap(time, x))[w])
+        slope = jax.grad(lambda x, w=which: gaps(system, time, x)[w])
         normal = slope(state)
         state = state - 1.001 * gap[which] * normal / jnp.sum(normal * normal)
     raise ValueError("no state outside the constraints was found; give a guess")

@@ -213,13 +213,10 @@ class ImpactingOrbits(AbstractProblem):
         hits = ".".join(map(str, self.constraints)) or "-"
         return f"impacts {hits} periods {self.periods} steps {self.steps}"
 
-    def with_signature(self, signature: str) -> "ImpactingOrbits":
+    def with_signature(self, signature: str) -> AbstractProblem:
         words = signature.split()
         if words[0::2] != ["impacts", "periods", "steps"]:
-            raise ValueError(
-                f"the saved branch has signature {signature!r}, which is no sequence "
-                "of impacts; take it up with the problem it was made with"
-            )
+            return super().with_signature(signature)
         hits = () if words[1] == "-" else tuple(map(int, words[1].split(".")))
         periods, steps = int(words[3]), int(words[5])
         return ImpactingOrbits(self.parameters, hits, periods, self.dimension, steps)

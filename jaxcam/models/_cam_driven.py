@@ -1,6 +1,6 @@
 """What a cam of constant speed does to a follower, whatever holds the follower."""
 
-from typing import Self
+from typing import TypeVar
 
 import equinox as eqx
 import jax
@@ -9,6 +9,9 @@ import jax.numpy as jnp
 from ..hybrid import HybridSystem
 from ._parameters import require_restitution
 from .cams import CamProfile
+
+
+_System = TypeVar("_System", bound="AbstractCamDriven")
 
 
 class AbstractCamDriven(HybridSystem):
@@ -41,7 +44,7 @@ class AbstractCamDriven(HybridSystem):
         """Duration of one turn of the cam (s)."""
         return 2 * jnp.pi / self.speed
 
-    def prepared(self) -> Self:
+    def prepared(self: _System) -> _System:
         """The same system with a profile that is cheaper to evaluate."""
         return eqx.tree_at(lambda s: s.profile, self, self.profile.prepared())
 
