@@ -169,17 +169,9 @@ class ChartJob(AbstractJob):
 
 
 def some_pairs(
-    section,
-    where,
-    pairs,
-    starts,
-    shape,
-    turns,
-    keep,
-    period_tolerance,
-    reruns,
+    section, where, pairs, starts, shape, turns, keep, period_tolerance, reruns,
     exponents,
-) -> Arrays:
+) -> Arrays:  # fmt: skip
     """Labels, and exponents if wanted, at some pairs of values."""
     count, n = starts.shape[1:]
     values = np.repeat(pairs, count, axis=0)

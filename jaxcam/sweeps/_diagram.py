@@ -87,17 +87,8 @@ def diagram(
         many, kept = dwell_turns(section, picked, values, dwell)
         turns, keep = int(many.max()), int(kept.max())
     starts = as_starts(section, states, picked, values)
-    of = (
-        section,
-        picked,
-        values,
-        starts,
-        turns,
-        keep,
-        direction,
-        period_tolerance,
-        block,
-    )
+    length = turns, keep, direction, period_tolerance
+    of = section, picked, values, starts, *length, block
     if dwell is not None:
         job = DwellJob(*of, dwell=dwell)
     else:
