@@ -100,7 +100,9 @@ def _closed_up(
     periods: int, point: Any, value: float, rows, sense: float, width: float
 ) -> Start | None:
     """The periodic orbit near the motion from release, and where the branch leaves."""
-    parameters = with_leaf(point.problem.parameters, point.leaf, np.asarray(value))
+    # an array of JAX: the period is asked of it outside of a program
+    moved = jnp.asarray(value, jnp.float64)
+    parameters = with_leaf(point.problem.parameters, point.leaf, moved)
     count = len(rows)
     length = float(parameters.period)
     starts = rows * np.array([length, 1.0, 1.0])
