@@ -125,7 +125,7 @@ def orbits() -> None:
     problem = continuation.ImpactingOrbits(system, (0,), 1, 2, steps=16)
     start = continuation.Start(problem, np.array([phase, place, -r * speed]))
     bounds = (place - 0.2, place + 0.2)
-    plain = continuation.Settings(special=False, max_step=0.02)
+    plain = continuation.BranchSettings(special=False, max_step=0.02)
 
     def walk():
         return continuation.branch(
@@ -146,7 +146,7 @@ def batches(lanes: int = 100) -> None:
     for value in values:
         roots = np.roots([1.0, 0.0, value, 2.0])
         starts.append([roots[np.argmin(np.abs(roots.imag))].real])
-    plain = continuation.Settings(special=False)
+    plain = continuation.BranchSettings(special=False)
     problem = continuation.Equilibrium(cusp, {"a": 2.0, "b": -1.0})
 
     def together():

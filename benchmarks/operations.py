@@ -17,7 +17,7 @@ import jaxcam  # noqa: F401  64-bit floats
 from jaxcam.hybrid import Settings, stroboscope
 from jaxcam.hybrid.loop._advance import Plan
 from jaxcam.hybrid.loop._functions import Functions
-from jaxcam.hybrid.loop._iterate import iterate
+from jaxcam.hybrid.loop._iterate import iteration
 from jaxcam.hybrid.loop._loop_state import first_state
 from jaxcam.models import CamFollower, rpm_to_rad_s
 
@@ -51,7 +51,9 @@ def program():
     leaves, structure = jax.tree.flatten(jax.tree.map(jnp.asarray, lane))
 
     def attempt(*leaves):
-        after, record = iterate(functions, plan, jax.tree.unflatten(structure, leaves))
+        after, record = iteration(
+            functions, plan, jax.tree.unflatten(structure, leaves)
+        )
         return [*jax.tree.leaves(after), record.kind, record.t, *record.after]
 
     jaxpr = jax.make_jaxpr(attempt)(*leaves).jaxpr

@@ -16,11 +16,11 @@ from ._problems import (
     Equilibrium as Equilibrium,
     FixedPoint as FixedPoint,
 )
-from ._record import load as load, save as save
+from ._record import load_branch as load_branch, save_branch as save_branch
 from ._sensitivity import sensitivity as sensitivity, special_point as special_point
-from ._settings import Settings as Settings
+from ._settings import BranchSettings as BranchSettings
 from ._switch import switch as switch
-from ._table import Progress as Progress, table as table
+from ._table import PointPrinter as PointPrinter, table as table
 from .algorithms import (
     MoorePenrose as MoorePenrose,
     Natural as Natural,
@@ -33,7 +33,7 @@ from .orbits import (
     periodic_orbits as periodic_orbits,
     StickingOrbits as StickingOrbits,
 )
-from .predictors import Polynomial as Polynomial
+from .predictors import PolynomialPredictor as PolynomialPredictor
 from .problem import (
     AbstractProblem as AbstractProblem,
     Monitor as Monitor,

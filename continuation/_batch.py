@@ -9,15 +9,17 @@ from jaxtyping import ArrayLike, Float, PyTree
 
 from jaxcam.parameters import VectorLike, Where
 
-from ._batch_run import Axes, REASONS, run_lanes
+from ._batch_run import Axes, follow_lanes, REASONS
+from ._context import Context
 from ._follow import checked_bounds
-from ._parameter import as_arrays, leaf_of, pick, with_leaf
+from ._parameter import as_arguments, leaf_of, pick_one
 from ._point import Branch, Point, set_parameters, with_field
 from ._program import Corrected
-from ._settings import as_traced, Settings
+from ._settings import as_traced, BranchSettings
+from ._solution import point_of, Solution
 from .algorithms import AbstractAlgorithm, PseudoArclength
 from .problem import AbstractProblem
-from .special import Context, eigenvalues_at, is_stable, locate, test_values, varied
+from .special import locate, test_values
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,8 +52,14 @@ class Batch:
             jax.tree.map(lambda x: x[index, i], self._passed)
             for i in range(int(self.count[index]))
         ]
-        points, before = [], None
-        arclength = 0.0
+        points: list[Point] = []
+        arclength, before = 0.0, None
+
+        def add(at: Corrected, tests: dict, kind: str, converged=True, reason=""):
+            here = Solution(problem, at, tests, 0.0, arclength, ())
+            label = len(points) + 1
+            points.append(point_of(context, here, label, kind, reason, converged))
+
         for i, at in enumerate(rows):
             tests = test_values(problem, context.leaf, at)
             if before is not None:
@@ -64,53 +72,20 @@ class Batch:
                         monitors = problem.monitors()
                         kind = monitors[name].kind if name in monitors else name
                         special = with_field(at, "z", found.z)
-                        points.append(
-                            _point(
-                                problem, special, kind, arclength, {},
-                                found.converged, found.reason, context.leaf,
-                            )
-                        )  # fmt: skip
+                        add(special, {}, kind, found.converged, found.reason)
             last = i == len(rows) - 1
             kind = "start" if i == 0 else "end" if last else "regular"
-            reason = self.reasons[index] if last else ""
-            points.append(
-                _point(problem, at, kind, arclength, tests, True, reason, context.leaf)
-            )
+            add(at, tests, kind, reason=self.reasons[index] if last else "")
             before = at, tests
-        numbered = tuple(with_field(p, "label", i + 1) for i, p in enumerate(points))
-        return Branch(numbered, self.name, context.bounds, context.leaf, (self.name,))
-
-
-def _point(problem, at, kind, arclength, tests, converged, reason, leaf) -> Point:
-    multipliers, why = eigenvalues_at(problem, leaf, at)
-    parameters = with_leaf(problem.parameters, leaf, np.asarray(at.z[-1]))
-    return Point(
-        label=0,
-        kind=kind,
-        parameter=float(at.z[-1]),
-        state=at.z[:-1],
-        multipliers=multipliers,
-        stable=is_stable(problem, multipliers),
-        tangent=at.tangent,
-        scale=at.scale,
-        step=0.0,
-        arclength=arclength,
-        iterations=int(at.iterations),
-        converged=converged,
-        reason=reason or why,
-        observed={k: np.asarray(v) for k, v in at.observed.items()},
-        tests=tests,
-        signature=problem.signature,
-        parameters=varied(problem, at.z),
-        problem=set_parameters(problem, parameters),
-    )
+        name, names = self.name, (self.name,)
+        return Branch(tuple(points), name, context.bounds, context.leaf, names)
 
 
 def _check_algorithm(algorithm: AbstractAlgorithm) -> None:
     if algorithm.predictor.stations > 1:
         raise ValueError(
             f"{type(algorithm.predictor).__name__} predicts from several points, which "
-            "a batch does not keep; give the algorithm predictor=Tangent()"
+            "a batch does not keep; give the algorithm predictor=TangentPredictor()"
         )
     if algorithm.least_norm:
         raise ValueError(
@@ -127,7 +102,7 @@ def follow_batch(
     algorithm: AbstractAlgorithm | None = None,
     *,
     parameters: PyTree | None = None,
-    settings: Settings | None = None,
+    settings: BranchSettings | None = None,
     direction: ArrayLike = 1,
     points: int = 100,
 ) -> Batch:
@@ -150,10 +125,10 @@ def follow_batch(
 
     **Returns:** a `Batch`; a lane that fails says so in its reason.
     """
-    settings = Settings() if settings is None else settings
+    settings = BranchSettings() if settings is None else settings
     algorithm = PseudoArclength() if algorithm is None else algorithm
     _check_algorithm(algorithm)
-    leaf, name = pick(where, problem.parameters)
+    leaf, name = pick_one(where, problem.parameters)
     low, high = checked_bounds(bounds, name)
     starts = np.asarray(states, float)
     if starts.ndim != 2 or not len(starts):
@@ -162,8 +137,8 @@ def follow_batch(
         raise ValueError(f"points is {points}; a branch needs at least 2")
     lanes = len(starts)
     given = problem.parameters if parameters is None else parameters
-    given = as_arrays(given, leaf)
-    problem = set_parameters(problem, as_arrays(problem.parameters, leaf))
+    given = as_arguments(given, leaf)
+    problem = set_parameters(problem, as_arguments(problem.parameters, leaf))
     axes = Axes.of(problem.parameters, given, lanes)
     p = np.broadcast_to(np.asarray(leaf_of(given, leaf), float), (lanes,))
     if not np.all((low <= p) & (p <= high)):
@@ -173,7 +148,7 @@ def follow_batch(
         )
     z = np.concatenate([starts, p[:, None]], axis=1)
     signs = np.broadcast_to(np.asarray(direction, float), (lanes,))
-    lane = run_lanes(
+    lane = follow_lanes(
         problem, algorithm, given, axes, leaf, z, signs, np.asarray(low),
         np.asarray(high), as_traced(settings), points,
     )  # fmt: skip
@@ -193,5 +168,5 @@ def follow_batch(
         name=name,
         _passed=passed,
         _problems=lambda k: set_parameters(problem, axes.of_lane(given, k)),
-        _context=Context(leaf, high - low, (low, high), settings),
+        _context=Context(leaf, high - low, settings, (low, high)),
     )

@@ -75,7 +75,7 @@ class Axes(eqx.Module):
 
 
 @eqx.filter_jit
-def run_lanes(
+def follow_lanes(
     problem, algorithm, given, axes, leaf, z, signs, low, high, s, points,
 ):  # fmt: skip
     """All branches to their ends.

@@ -3,31 +3,28 @@
 import jax.numpy as jnp
 import numpy as np
 
+from ._context import Context
 from ._point import with_field, with_parameter
 from ._program import correct, Corrected, evaluate
 from .problem import AbstractProblem, Start
-from .special import Context
 
 
-def settle(
+def solved_start(
     problem: AbstractProblem, context: Context, z: np.ndarray, name: str, direction: int
 ) -> Corrected:
     """Solve at the parameter of the start, and find the direction there."""
     across = np.zeros_like(z)
     across[-1] = 1.0
-    at = correct(
-        problem, context.leaf, z, across, across, context.width, context.settings
-    )
+    at = correct(problem, context, z, across, across)
     if not at.success:
         # more iterations are another program: compiled only where they are needed
-        patient = with_field(context.settings, "max_iterations", 30)
-        at = correct(problem, context.leaf, z, across, across, context.width, patient)
+        settings = with_field(context.settings, "max_iterations", 30)
+        patient = context._replace(settings=settings)
+        at = correct(problem, patient, z, across, across)
     if not at.success:
         # Newton has no answer where the derivative is singular; the start may
         # still be one
-        given = evaluate(
-            problem, context.leaf, z, across, context.width, context.settings
-        )
+        given = evaluate(problem, context, z, across)
         size = np.abs(_residual(problem, z, context.leaf)) / given.scale[:-1]
         if not np.all(size <= context.settings.tolerance):
             raise ValueError(
@@ -45,25 +42,18 @@ def leave(
     """The first point of a branch that leaves z along a tangent."""
     settings = context.settings
     zero = np.zeros_like(z)
-    scale = evaluate(
-        problem, context.leaf, z, zero + 1.0, context.width, context.settings
-    ).scale
+    scale = evaluate(problem, context, z, zero + 1.0).scale
     tangent = np.asarray(start.tangent, float)
     tangent = tangent / np.linalg.norm(tangent / scale)
     step = settings.step if start.step is None else start.step
     low, high = context.bounds
     while step >= settings.min_step:
         guess = z + step * tangent
-        at = correct(
-            problem, context.leaf, guess, tangent / scale**2, tangent, context.width,
-            settings,
-        )  # fmt: skip
+        at = correct(problem, context, guess, tangent / scale**2, tangent)
         moved = np.linalg.norm((at.z - guess) / scale)
         if at.success and moved <= step and low <= at.z[-1] <= high:
             # the tangent has turned since the start: continue outwards
-            outwards = evaluate(
-                problem, context.leaf, at.z, at.z - z, context.width, context.settings
-            )
+            outwards = evaluate(problem, context, at.z, at.z - z)
             if np.all(np.isfinite(outwards.tangent)):
                 return outwards, step
         step /= 2
@@ -85,14 +75,7 @@ def _oriented(
         tangent = null[-1] * (np.sign(null[-1].sum()) or 1.0)
     tangent = direction * tangent / np.linalg.norm(tangent)
     if len(null) == 1:
-        return evaluate(
-            problem,
-            context.leaf,
-            at.z,
-            tangent * at.scale,
-            context.width,
-            context.settings,
-        )
+        return evaluate(problem, context, at.z, tangent * at.scale)
     at = with_field(at, "determinant", np.zeros(()))
     return with_field(at, "tangent", tangent * at.scale)
 

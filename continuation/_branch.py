@@ -9,10 +9,10 @@ from typing import Any
 from jaxcam.parameters import Where
 
 from ._follow import checked_bounds, follow
-from ._parameter import pick
+from ._parameter import pick_one
 from ._point import Branch, Point, relabelled, replace
-from ._record import header_of, read, Recorder
-from ._settings import Settings
+from ._record import header_of, read_branch, Recorder
+from ._settings import BranchSettings
 from ._stated import stated
 from .algorithms import AbstractAlgorithm, PseudoArclength
 from .problem import AbstractProblem, Start
@@ -25,7 +25,7 @@ def branch(
     bounds: tuple[float, float],
     algorithm: AbstractAlgorithm | None = None,
     *,
-    settings: Settings | None = None,
+    settings: BranchSettings | None = None,
     direction: int | str = 1,
     callbacks: Iterable[Callable[[Point], Any]] = (),
     out: str | os.PathLike | None = None,
@@ -38,8 +38,8 @@ def branch(
     - `callbacks`: called with each point as it comes: progress, saving. One that
       returns True ends the branch.
     - `out`: a file to which each point is appended as it comes; its format is that of
-      [`continuation.load`][]. With both directions the first goes to a file of its own,
-      with `.back` before the suffix.
+      [`continuation.load_branch`][]. With both directions the first goes to a file of
+      its own, with `.back` before the suffix.
     - `resume`: go on where the run that wrote `out` was interrupted. The result is the
       branch that it would have become.
 
@@ -50,7 +50,7 @@ def branch(
     stop = tuple(callbacks)
     problem, start = stated(problem, start)
     begun = start.problem if isinstance(start, Start) else problem
-    leaf, name = pick(where, begun.parameters)
+    leaf, name = pick_one(where, begun.parameters)
     empty = Branch((), name, checked_bounds(bounds, name), leaf, (name,))
 
     def walk(direction: int, path: Path | None) -> list[Point]:
@@ -60,7 +60,7 @@ def branch(
                 empty,
                 direction=direction,
                 algorithm=str(algorithm or PseudoArclength()),
-                settings=str(settings or Settings()),
+                settings=str(settings or BranchSettings()),
             )
             if resume and path.exists():
                 points = _written(path, header, begun)
@@ -103,7 +103,7 @@ def branch(
 
 def _written(path: Path, header: dict, problem: AbstractProblem) -> list[Point]:
     """Points of an interrupted run, up to the last ordinary one."""
-    branch, before = read(path, problem)
+    branch, before = read_branch(path, problem)
     different = [key for key, value in header.items() if before.get(key) != value]
     if different:
         raise ValueError(

@@ -8,9 +8,9 @@ import numpy as np
 from jaxcam.parameters import Where
 
 from ._follow import checked_bounds, follow
-from ._parameter import pick
+from ._parameter import pick_one
 from ._point import Branch, Point, with_field
-from ._settings import Settings
+from ._settings import BranchSettings
 from ._switch import emanating
 from .algorithms import AbstractAlgorithm
 from .problem import AbstractProblem, Start
@@ -58,7 +58,7 @@ def cascade(
     algorithm: AbstractAlgorithm | None = None,
     *,
     flips: int = 6,
-    settings: Settings | None = None,
+    settings: BranchSettings | None = None,
     direction: int = 1,
 ) -> Cascade:
     """Follow a branch to its flip, the doubled branch to its own, and so on.
@@ -71,9 +71,9 @@ def cascade(
     """
     if flips < 1:
         raise ValueError(f"flips is {flips}; give the number of flips, at least 1")
-    walk: Any = Settings() if settings is None else settings
+    walk: Any = BranchSettings() if settings is None else settings
     begun = start.problem if isinstance(start, Start) else problem
-    leaf, name = pick(where, begun.parameters)
+    leaf, name = pick_one(where, begun.parameters)
     bounds = checked_bounds(bounds, name)
     branches = []
     while len(branches) < flips:

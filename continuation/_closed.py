@@ -4,11 +4,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ._context import Context
 from ._point import Point, with_parameter
 from ._program import correct, evaluate
 from ._solution import Solution, solution_at
 from .problem import AbstractProblem
-from .special import between, Context
+from .special import cubic_between
 
 
 # an earlier point is met where the branch is this close to it, in lengths of steps, for
@@ -89,12 +90,7 @@ def closed(
         if cosine is None:
             continue
         back = evaluate(
-            current.problem,
-            context.leaf,
-            passed.z,
-            np.sign(cosine) * passed.tangent,
-            context.width,
-            context.settings,
+            current.problem, context, passed.z, np.sign(cosine) * passed.tangent
         )
         length = float(
             np.linalg.norm((following.at.z - current.at.z) / current.at.scale)
@@ -124,19 +120,11 @@ def _cosine_where_met(
     scale = current.at.scale
     chord = (following.at.z - current.at.z) / scale
     chord = chord / np.linalg.norm(chord)
-    guess = between(current.at, following.at, share) / scale
+    guess = cubic_between(current.at, following.at, share) / scale
     target = passed.z / scale
     # onto the plane in which the earlier point lies
     guess = (guess + chord * float(chord @ (target - guess))) * scale
-    at: Any = correct(
-        current.problem,
-        context.leaf,
-        guess,
-        chord / scale,
-        chord * scale,
-        context.width,
-        context.settings,
-    )
+    at: Any = correct(current.problem, context, guess, chord / scale, chord * scale)
     allowed = min(max(_MISS * context.settings.tolerance, _LEAST), _MOST)
     if not at.success or np.linalg.norm(at.z / scale - target) > allowed:
         return None

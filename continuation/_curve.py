@@ -9,15 +9,15 @@ import numpy as np
 from jaxcam.parameters import Where
 
 from ._branch import branch
+from ._context import Context
 from ._follow import checked_bounds
-from ._parameter import as_arrays, leaf_of, pick
+from ._parameter import as_arguments, leaf_of, pick_one
 from ._point import Branch, Point, set_parameters
 from ._program import evaluate
-from ._settings import Settings
+from ._settings import BranchSettings
 from .algorithms import AbstractAlgorithm
 from .problem import Start
 from .special import (
-    Context,
     FLIP,
     FOLD,
     HOPF,
@@ -38,22 +38,18 @@ def extended(
     point: Point,
     where: Where,
     bounds: tuple[float, float],
-    settings: Settings | None = None,
+    settings: BranchSettings | None = None,
 ) -> SingularPoints | MonitorPoints:
     """The problem whose solutions are special points like this one, the parameter that
     `where` picks among the unknowns (at the end of the state).
 
     **Raises:** `ValueError` for points that form no curve.
     """
-    problem = point.problem
-    if problem is None:
-        raise ValueError(
-            "this point carries no problem; read its file with load(path, problem)"
-        )
-    leaf, name = pick(where, problem.parameters)
+    problem = point.solved
+    leaf, name = pick_one(where, problem.parameters)
     low, high = checked_bounds(bounds, name)
-    problem = set_parameters(problem, as_arrays(problem.parameters, leaf))
-    context = Context(leaf, high - low, (low, high), settings or Settings())
+    problem = set_parameters(problem, as_arguments(problem.parameters, leaf))
+    context = Context(leaf, high - low, settings or BranchSettings(), (low, high))
     z = np.append(point.state, leaf_of(problem.parameters, leaf))
     if point.kind in (FOLD, FLIP, HOPF, NEIMARK_SACKER):
         return singular_points(problem, point.kind, context, z)
@@ -63,9 +59,7 @@ def extended(
     if len(same) > 1:
         # several monitors may share a kind: the one that is zero here, and the last
         # where others vanish with it, such as the gap beside an impact without speed
-        at = evaluate(
-            problem, context.leaf, z, np.ones_like(z), context.width, context.settings
-        )
+        at = evaluate(problem, context, z, np.ones_like(z))
         sizes = {k: abs(float(at.monitors[k])) for k in same}
         most = max(min(sizes.values()), _ZERO * (1.0 + float(np.max(np.abs(z)))))
         same = [k for k in same if sizes[k] <= most]
@@ -89,7 +83,7 @@ def curve(
     bounds: tuple[tuple[float, float], tuple[float, float]],
     algorithm: AbstractAlgorithm | None = None,
     *,
-    settings: Settings | None = None,
+    settings: BranchSettings | None = None,
     direction: int | str = "both",
     callbacks: Iterable[Callable[[Point], Any]] = (),
     out: str | os.PathLike | None = None,
@@ -121,7 +115,7 @@ def curve(
             "of both, ((low, high), (low, high))"
         ) from error
     problem = extended(point, first, bounds_1, settings)
-    leaf, name = pick(second, problem.parameters)
+    leaf, name = pick_one(second, problem.parameters)
     if leaf == problem.leaf:
         raise ValueError(f"both parameters are {name}; pick two different ones")
     u = np.append(point.state, leaf_of(problem.parameters, problem.leaf))
@@ -130,5 +124,5 @@ def curve(
         settings=settings, direction=direction, callbacks=callbacks,
         out=out, resume=resume,
     )  # fmt: skip
-    names = (pick(first, problem.parameters)[1], name)
+    names = (pick_one(first, problem.parameters)[1], name)
     return Branch(found.points, name, found.bounds, found.leaf, names)

@@ -10,10 +10,10 @@ from jaxtyping import ArrayLike
 
 from jaxcam.parameters import VectorLike
 
-from ._parameter import as_arrays
+from ._parameter import as_arguments
 from ._point import set_parameters
 from ._program import newton, solve
-from ._settings import Settings
+from ._settings import BranchSettings
 from .problem import AbstractProblem
 
 
@@ -40,7 +40,7 @@ def deflate(
     guesses: ArrayLike | VectorLike | Sequence[VectorLike],
     known: Sequence[VectorLike] = (),
     *,
-    settings: Settings | None = None,
+    settings: BranchSettings | None = None,
     most: int = 16,
     max_iterations: int = 100,
 ) -> tuple[np.ndarray, ...]:
@@ -59,8 +59,8 @@ def deflate(
 
     **Returns:** the further solutions, each (n,), in the order found.
     """
-    settings = Settings() if settings is None else settings
-    problem = set_parameters(problem, as_arrays(problem.parameters))
+    settings = BranchSettings() if settings is None else settings
+    problem = set_parameters(problem, as_arguments(problem.parameters))
     starts = np.atleast_2d(np.asarray(guesses, float))
     if starts.ndim != 2 or not np.all(np.isfinite(starts)):
         raise ValueError("guesses must be finite numbers of shape (guesses, n)")

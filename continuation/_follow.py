@@ -7,14 +7,14 @@ import numpy as np
 
 from jaxcam.parameters import real_array, Where
 
-from ._parameter import as_arrays, pick
+from ._context import Context
+from ._parameter import as_arguments, pick_one
 from ._point import Point, set_parameters
 from ._run import Run
-from ._settings import Settings
+from ._settings import BranchSettings
 from ._stated import stated
 from .algorithms import AbstractAlgorithm, PseudoArclength
 from .problem import AbstractProblem, Start
-from .special import Context
 
 
 def follow(
@@ -24,7 +24,7 @@ def follow(
     bounds: tuple[float, float],
     algorithm: AbstractAlgorithm | None = None,
     *,
-    settings: Settings | None = None,
+    settings: BranchSettings | None = None,
     direction: int = 1,
     history: Sequence[Point] = (),
 ) -> Iterator[Point]:
@@ -54,15 +54,15 @@ def follow(
     **Raises:** `ValueError` for a start that is no solution, a parameter that does not
     exist, bounds that are the wrong way round or do not contain the start.
     """
-    settings = Settings() if settings is None else settings
+    settings = BranchSettings() if settings is None else settings
     algorithm = PseudoArclength() if algorithm is None else algorithm
     begun, at = _begun(*stated(problem, start))
-    leaf, name = pick(where, begun.parameters)
-    begun = set_parameters(begun, as_arrays(begun.parameters, leaf))
+    leaf, name = pick_one(where, begun.parameters)
+    begun = set_parameters(begun, as_arguments(begun.parameters, leaf))
     low, high = checked_bounds(bounds, name)
     if direction not in (1, -1):
         raise ValueError(f"direction is {direction!r}; give 1 or -1")
-    context = Context(leaf, high - low, (low, high), settings)
+    context = Context(leaf, high - low, settings, (low, high))
     run = Run(context, algorithm, name, direction)
     # the first point is computed now, so that bad input is reported here
     first = run.begin(begun, at, history)

@@ -11,7 +11,7 @@ from jaxtyping import Array, Float, PyTree
 from jaxcam.hybrid.runge_kutta import DOPRI8, fixed_steps
 
 from ._point import with_field
-from .problem import AbstractProblem, Stability, Start
+from .problem import AbstractProblem, StabilityKind, Start
 from .special import FLIP, flip_direction
 
 
@@ -38,7 +38,7 @@ class LimitCycle(AbstractProblem):
     normal: Any
     basis: Any
     steps: int = eqx.field(static=True)
-    stability: ClassVar[Stability] = "map"
+    stability: ClassVar[StabilityKind] = "map"
     normal_forms: ClassVar[bool] = False
 
     def __init__(
@@ -123,13 +123,10 @@ class LimitCycle(AbstractProblem):
     def signature(self) -> str:
         return f"limit cycle of {self.steps} steps"
 
-    def with_signature(self, signature: str) -> "LimitCycle":
+    def with_signature(self, signature: str) -> AbstractProblem:
         words = signature.split()
         if words[:3] != ["limit", "cycle", "of"] or not words[3].isdecimal():
-            raise ValueError(
-                f"the saved branch has signature {signature!r}, which is no limit "
-                "cycle; take it up with the problem it was made with"
-            )
+            return super().with_signature(signature)
         return with_field(self, "steps", int(words[3]))
 
 

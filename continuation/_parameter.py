@@ -10,7 +10,7 @@ from jaxtyping import PyTree
 from jaxcam.parameters import pick as parameter_pick, Where
 
 
-def pick(where: Where, parameters: PyTree) -> tuple[int, str]:
+def pick_one(where: Where, parameters: PyTree) -> tuple[int, str]:
     """Index of the leaf that `where` picks, and its name.
 
     **Raises:** `ValueError` where it picks nothing, or not a single number.
@@ -25,7 +25,7 @@ def pick(where: Where, parameters: PyTree) -> tuple[int, str]:
     return picked.leaves[0], picked.names[0]
 
 
-def as_arrays(parameters: PyTree, *leaves: int) -> PyTree:
+def as_arguments(parameters: PyTree, *leaves: int) -> PyTree:
     """Floats, and the picked leaves, as float64 arrays: arguments of programs."""
     flat, structure = jax.tree.flatten(parameters)
     for i, leaf in enumerate(flat):

@@ -4,12 +4,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ._context import Context
 from ._point import with_field
 from ._program import evaluate
 from ._solution import Solution
 from .special import (
     BRANCH_POINT,
-    Context,
     locate,
     Located,
     normal_form,
@@ -80,9 +80,7 @@ def special_here(
     `chord` points along the branch there.
     """
     problem = current.problem
-    at = evaluate(
-        problem, context.leaf, located.z, chord, context.width, context.settings
-    )
+    at = evaluate(problem, context, located.z, chord)
     if not np.all(np.isfinite(at.tangent)) or name == BRANCH_POINT:
         at = with_field(at, "tangent", chord / np.linalg.norm(chord / at.scale))
     monitors = problem.monitors()
@@ -92,9 +90,7 @@ def special_here(
             return None
     coefficient, words = None, ""
     if name not in monitors and located.converged:
-        coefficient, words = normal_form(
-            kind, problem, context.leaf, located.z, at, context.settings
-        )
+        coefficient, words = normal_form(kind, problem, context, located.z, at)
     length = float(np.linalg.norm((located.z - current.at.z) / current.at.scale))
     following = Solution(problem, at, {}, current.step, current.arclength + length, ())
     return Special(following, kind, located, coefficient, words)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ._parameter import leaf_of, with_leaf
+from ._parameter import with_leaf
 from .problem import AbstractProblem
 
 
@@ -64,11 +64,20 @@ class Point:
         """Whether this is a special point."""
         return self.kind not in ORDINARY
 
+    @property
+    def solved(self) -> AbstractProblem:
+        """The problem; `ValueError` for a point of a file that was read without it."""
+        if self.problem is None:
+            raise ValueError(
+                "this point carries no problem; read its file with "
+                "load_branch(path, problem)"
+            )
+        return self.problem
+
     def inner(self, base: AbstractProblem, leaf: int) -> "Point":
         """This point of an extended problem as a point of the problem it extends."""
         value = float(self.state[-1])
-        assert self.problem is not None
-        parameters = with_leaf(self.problem.parameters, leaf, np.asarray(value))
+        parameters = with_leaf(self.solved.parameters, leaf, np.asarray(value))
         return replace(
             self,
             state=self.state[:-1],
@@ -167,8 +176,3 @@ def with_field(module: Any, name: str, value: Any) -> Any:
         elif hasattr(module, f.name):
             object.__setattr__(new, f.name, getattr(module, f.name))
     return new
-
-
-def value_of(problem: AbstractProblem, leaf: int) -> float:
-    """The value that the problem has for the parameter."""
-    return float(leaf_of(problem.parameters, leaf))

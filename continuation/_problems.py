@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Array, Float, Int, PyTree
 
 from ._limit_cycle import cycle_at_hopf
-from .problem import AbstractProblem, Stability, Start
+from .problem import AbstractProblem, StabilityKind, Start
 from .representation import AbstractRepresentation
 from .special import FLIP, flip_direction, HOPF
 
@@ -27,7 +27,7 @@ class Equations(AbstractProblem):
 
     function: Callable[[Array, Any], Array]
     parameters: PyTree
-    stability: ClassVar[Stability] = "none"
+    stability: ClassVar[StabilityKind] = "none"
 
     def residual(self, u: Float[Array, " n"], parameters: PyTree) -> Float[Array, " n"]:
         return self.function(u, parameters)
@@ -38,7 +38,7 @@ class Equilibrium(AbstractProblem):
 
     vector_field: Callable[[Array, Any], Array]
     parameters: PyTree
-    stability: ClassVar[Stability] = "equilibrium"
+    stability: ClassVar[StabilityKind] = "equilibrium"
 
     def residual(self, u: Float[Array, " n"], parameters: PyTree) -> Float[Array, " n"]:
         return self.vector_field(u, parameters)
@@ -65,7 +65,7 @@ class FixedPoint(AbstractProblem):
     map: Callable[[Array, Any], Array]
     parameters: PyTree
     period: Int[Array, ""]
-    stability: ClassVar[Stability] = "map"
+    stability: ClassVar[StabilityKind] = "map"
 
     def __init__(
         self, map: Callable[[Any, Any], Array], parameters: PyTree, period: int = 1
@@ -97,13 +97,10 @@ class FixedPoint(AbstractProblem):
     def signature(self) -> str:
         return f"period {int(self.period)}"
 
-    def with_signature(self, signature: str) -> "FixedPoint":
+    def with_signature(self, signature: str) -> AbstractProblem:
         word, _, number = signature.partition(" ")
         if word != "period" or not number.isdecimal():
-            raise ValueError(
-                f"the saved branch has signature {signature!r}, which is no period of "
-                "a map; take it up with the problem it was made with"
-            )
+            return super().with_signature(signature)
         return FixedPoint(self.map, self.parameters, int(number))
 
 

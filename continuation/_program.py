@@ -10,6 +10,7 @@ import numpy as np
 import optimistix as optx
 from jaxtyping import Float
 
+from ._context import Context
 from ._parameter import with_leaf
 from .problem import AbstractProblem
 
@@ -148,32 +149,32 @@ def _plain(at: Corrected) -> Corrected:
 
 
 def correct(
-    problem, leaf, guess, normal, old, width, settings, least_norm=False, given=False
+    problem, context: Context, guess, normal, old, least_norm=False, given=False
 ):
     """`correct_`, compiled, with numbers as arguments and NumPy arrays as result."""
     return _plain(
         _correct(
             problem,
-            leaf,
+            context.leaf,
             np.asarray(guess),
             np.asarray(normal),
             np.asarray(old),
-            np.asarray(width),
-            np.asarray(settings.tolerance),
-            settings.max_iterations,
+            np.asarray(context.width),
+            np.asarray(context.settings.tolerance),
+            context.settings.max_iterations,
             least_norm,
             np.asarray(given),
         )
     )
 
 
-def evaluate(problem, leaf, z, old, width, settings) -> Any:
+def evaluate(problem, context: Context, z, old) -> Any:
     """Everything about a point that is taken as it is.
 
     By the program of `correct`, whose iterations cost less than another program does to
     compile.
     """
-    return correct(problem, leaf, z, old, old, width, settings, given=True)
+    return correct(problem, context, z, old, old, given=True)
 
 
 @eqx.filter_jit

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from ._parameter import as_arrays
+from ._parameter import as_arguments
 from ._point import Branch, Point, set_parameters, with_parameter
 from .problem import AbstractProblem
 
@@ -51,8 +51,8 @@ class Recorder:
             file.write(_line(_point_to_json(point)))
 
 
-def save(branch: Branch, path: str | os.PathLike) -> None:
-    """Write a branch to a file; [`continuation.load`][] reads it."""
+def save_branch(branch: Branch, path: str | os.PathLike) -> None:
+    """Write a branch to a file; [`continuation.load_branch`][] reads it."""
     Recorder(path, header_of(branch), branch.points)
 
 
@@ -67,7 +67,9 @@ def header_of(branch: Branch, **more: Any) -> dict:
     }
 
 
-def load(path: str | os.PathLike, problem: AbstractProblem | None = None) -> Branch:
+def load_branch(
+    path: str | os.PathLike, problem: AbstractProblem | None = None
+) -> Branch:
     """Read a branch that was saved, or as much as an interrupted run has written.
 
     **Arguments:** `problem`: what was followed; then the points carry it, at their
@@ -75,10 +77,10 @@ def load(path: str | os.PathLike, problem: AbstractProblem | None = None) -> Bra
 
     **Raises:** `ValueError` where the file is no branch or of a later version.
     """
-    return read(path, problem)[0]
+    return read_branch(path, problem)[0]
 
 
-def read(
+def read_branch(
     path: str | os.PathLike, problem: AbstractProblem | None = None
 ) -> tuple[Branch, dict]:
     """A branch and the header of its file."""
@@ -114,7 +116,7 @@ def _attacher(problem: AbstractProblem | None, leaf: int) -> Callable:
     if problem is None:
         return lambda signature, value: None
     stated: AbstractProblem = set_parameters(
-        problem, as_arrays(problem.parameters, leaf)
+        problem, as_arguments(problem.parameters, leaf)
     )
     known = {stated.signature: stated}
 

@@ -5,17 +5,18 @@ from typing import Any
 
 import numpy as np
 
-from ._begin import leave, settle
+from ._begin import leave, solved_start
 from ._closed import closed, Past
-from ._parameter import as_arrays, leaf_of
+from ._context import Context
+from ._parameter import as_arguments, leaf_of
 from ._passed import located_between, sign_changes, special_here
 from ._point import Point, set_parameters, with_field, with_parameter
 from ._program import Corrected, evaluate
 from ._solution import point_of, Solution, solution_at
-from ._step import attempt
+from ._step import attempt_step
 from .predictors import Station
 from .problem import AbstractProblem
-from .special import ahead, BRANCH_POINT, Context, Located
+from .special import ahead, BRANCH_POINT, Located
 from .step_control import Refusal
 
 
@@ -69,7 +70,7 @@ class Run:
         if start.tangent is not None:
             at, step = leave(problem, self.context, z, start)
         else:
-            at = settle(problem, self.context, z, self.name, self.direction)
+            at = solved_start(problem, self.context, z, self.name, self.direction)
             step = start.step
         step = self.context.settings.step if step is None else step
         current = solution_at(problem, self.context.leaf, at, step, arclength)
@@ -86,9 +87,7 @@ class Run:
         z = np.append(start.state, start.parameter)
         problem = with_parameter(problem, context.leaf, z[-1])
         problem = problem.refreshed(z[:-1], problem.parameters)
-        at = evaluate(
-            problem, context.leaf, z, start.tangent, context.width, context.settings
-        )
+        at = evaluate(problem, context, z, start.tangent)
         # to the last digit what they were when the point was found
         at = with_field(at, "tangent", np.asarray(start.tangent))
         at = with_field(at, "scale", np.asarray(start.scale))
@@ -145,7 +144,7 @@ class Run:
         """The next point, and why the branch ends with it; None: it ends before."""
         step, failures = current.step, 0
         while True:
-            attempted = attempt(
+            attempted = attempt_step(
                 current.problem,
                 self.context,
                 self.algorithm,
@@ -308,7 +307,7 @@ class Run:
         towards = current.at.tangent[-1]
         self.direction = 1 if towards >= 0 else -1
         problem = set_parameters(
-            start.problem, as_arrays(start.problem.parameters, self.context.leaf)
+            start.problem, as_arguments(start.problem.parameters, self.context.leaf)
         )
         try:
             following = self.begin(

@@ -10,7 +10,7 @@ from jaxcam.parameters import Where
 from variational.orbits import implicit_root
 
 from ._curve import extended
-from ._parameter import as_arrays, leaf_of, with_leaf
+from ._parameter import as_arguments, leaf_of, with_leaf
 from ._point import Point
 
 
@@ -34,7 +34,7 @@ def special_point(
     value = point.parameter
     problem = extended(point, where, (value - 0.5, value + 0.5))
     u = jnp.append(jnp.asarray(point.state), leaf_of(problem.parameters, problem.leaf))
-    parameters = as_arrays(parameters, problem.leaf)
+    parameters = as_arguments(parameters, problem.leaf)
     scale = problem.scale(u, problem.parameters)
 
     def equations(y):
@@ -69,7 +69,7 @@ def sensitivity(point: Point, where: Where) -> PyTree:
     """
     value = point.parameter
     problem = extended(point, where, (value - 0.5, value + 0.5))
-    parameters = as_arrays(problem.parameters, problem.leaf)
+    parameters = as_arguments(problem.parameters, problem.leaf)
     u = np.append(point.state, leaf_of(parameters, problem.leaf))
     moving, fixed = eqx.partition(parameters, eqx.is_inexact_array)
     found = jax.device_get(_derivatives(problem, jnp.asarray(u), moving, fixed))

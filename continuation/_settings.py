@@ -6,7 +6,7 @@ import equinox as eqx
 import numpy as np
 
 
-class Settings(eqx.Module):
+class BranchSettings(eqx.Module):
     """Accuracy and step control.
 
     Lengths along a branch are measured with the parameter in units of the width of its
@@ -71,19 +71,19 @@ class Settings(eqx.Module):
 _NOT_OF_A_BATCH = ("max_points", "special", "localise")
 
 
-def as_traced(settings: Settings) -> Settings:
+def as_traced(settings: BranchSettings) -> BranchSettings:
     """The settings of a batch, whose compiled program takes them as they come.
 
     Numbers are arrays (not checked again) but for `max_iterations`, which the loop of
     the corrector wants as an integer of Python's; what a batch does not use has its
     default. So only `max_iterations` compiles another program.
     """
-    unused = {name: getattr(Settings, name) for name in _NOT_OF_A_BATCH}
+    unused = {name: getattr(BranchSettings, name) for name in _NOT_OF_A_BATCH}
     settings = dataclasses.replace(settings, **unused)
     fixed = (*_NOT_OF_A_BATCH, "max_iterations")
     traced = [f.name for f in dataclasses.fields(settings) if f.name not in fixed]
 
-    def numbers(s: Settings) -> list:
+    def numbers(s: BranchSettings) -> list:
         return [getattr(s, name) for name in traced]
 
     arrays = [np.asarray(x, float) for x in numbers(settings)]

@@ -4,10 +4,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ._context import Context
 from ._point import Point, with_parameter
 from ._program import Corrected
 from .problem import AbstractProblem
-from .special import Context, eigenvalues_at, is_stable, test_values, varied
+from .special import eigenvalues_at, is_stable, test_values, varied
 
 
 class Solution(NamedTuple):

@@ -5,16 +5,17 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ._context import Context
 from ._point import with_field
 from ._program import correct, Corrected
 from .algorithms import AbstractAlgorithm
 from .predictors import Station
 from .problem import AbstractProblem
-from .special import Context, varied
+from .special import AbstractExtended
 from .step_control import Refusal, way_between
 
 
-class Attempt(NamedTuple):
+class StepAttempt(NamedTuple):
     """What came of a step."""
 
     #: None where it is not taken
@@ -27,7 +28,7 @@ class Attempt(NamedTuple):
     refusal: Refusal | None = None
 
 
-def attempt(
+def attempt_step(
     problem: AbstractProblem,
     context: Context,
     algorithm: AbstractAlgorithm,
@@ -35,16 +36,15 @@ def attempt(
     stations: Sequence[Station],
     step: float,
     name: str,
-) -> Attempt:
+) -> StepAttempt:
     """Predict and correct; never past a bound, but onto it."""
     predicted = algorithm.predictor(stations, step) * a.scale
     k, value = _first_bound(problem, context, a.z, predicted)
     if k is None:
         normal = algorithm.normal(stations[-1].tangent) / a.scale
         b = correct(
-            problem, context.leaf, predicted, normal, a.tangent, context.width,
-            context.settings, algorithm.least_norm,
-        )  # fmt: skip
+            problem, context, predicted, normal, a.tangent, algorithm.least_norm
+        )
         guess = predicted
         if b.success:
             k, value = _first_bound(problem, context, a.z, b.z)
@@ -56,18 +56,13 @@ def attempt(
     guess[k] = value
     normal = np.zeros_like(guess)
     normal[k] = 1.0 / a.scale[k]
-    b = correct(
-        problem, context.leaf, guess, normal, a.tangent, context.width,
-        context.settings,
-    )  # fmt: skip
+    b = correct(problem, context, guess, normal, a.tangent)
     if b.success:
         # rounding of the corrector
         z = np.array(b.z)
         z[k] = value
         b = with_field(b, "z", z)
-    words = name if k == a.z.size - 1 else f"component {k} of the state"
-    if k == a.z.size - 2 and len(varied(problem, a.z)) > 1:
-        words = "the first parameter"
+    words = name if k == a.z.size - 1 else "the first parameter"
     bound = f"{words} is at its bound {value:g}"
     return _judged(algorithm, context, a, b, guess, step, bound)
 
@@ -80,26 +75,27 @@ def _judged(
     guess: np.ndarray,
     step: float,
     bound: str,
-) -> Attempt:
+) -> StepAttempt:
     if not b.success or not np.all(np.isfinite(b.tangent)):
-        return Attempt(None, refusal=Refusal.NOT_CONVERGED)
+        return StepAttempt(None, refusal=Refusal.NOT_CONVERGED)
     way = way_between(a, b, guess)
     control, settings = algorithm.control, context.settings
     for reason, holds in control.refusals(way, step, settings).items():
         if holds:
-            return Attempt(None, refusal=reason)
-    return Attempt(b, bound, float(control.next_step(way, step, settings)))
+            return StepAttempt(None, refusal=reason)
+    return StepAttempt(b, bound, float(control.next_step(way, step, settings)))
 
 
 def _first_bound(
     problem: AbstractProblem, context: Context, z: np.ndarray, target: np.ndarray
 ) -> tuple[int | None, float]:
-    """The component that leaves its bounds first on the way, and the bound."""
-    limits = {z.size - 1: context.bounds}
-    for k, pair in problem.limits().items():
-        limits[k if k >= 0 else z.size - 1 + k] = pair
+    """The parameter that leaves its bounds first on the way, and the bound."""
+    bounds = {z.size - 1: context.bounds}
+    if isinstance(problem, AbstractExtended):
+        low, high = problem.bounds
+        bounds[z.size - 2] = float(low), float(high)
     first, which = np.inf, (None, 0.0)
-    for k, (low, high) in limits.items():
+    for k, (low, high) in bounds.items():
         for bound, beyond in ((low, target[k] < low), (high, target[k] > high)):
             share = (bound - z[k]) / (target[k] - z[k]) if beyond else np.inf
             if beyond and share < first:

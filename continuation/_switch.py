@@ -8,10 +8,11 @@ import numpy as np
 from jaxcam.parameters import Where
 
 from ._branch import branch
-from ._parameter import pick, with_leaf
+from ._context import Context
+from ._parameter import pick_one, with_leaf
 from ._point import Branch, Point
 from ._program import evaluate
-from ._settings import Settings
+from ._settings import BranchSettings
 from .algorithms import AbstractAlgorithm
 from .problem import AbstractProblem, Start
 from .special import BRANCH_POINT, FLIP, HOPF, second
@@ -28,14 +29,11 @@ def emanating(point: Point, where: Where, width: float = 1.0) -> tuple[Start, ..
 
     **Raises:** `ValueError` for a point from which no branch is known to leave.
     """
-    problem = point.problem
-    if problem is None:
-        raise ValueError(
-            "this point carries no problem; read its file with load(path, problem)"
-        )
-    leaf, _ = pick(where, problem.parameters)
+    problem = point.solved
+    leaf, _ = pick_one(where, problem.parameters)
+    context = Context(leaf, width, BranchSettings())
     if point.kind == BRANCH_POINT:
-        direction = other_direction(problem, leaf, point, width)
+        direction = other_direction(problem, context, point)
         return tuple(
             Start(problem, point.state, point.parameter, sign * direction)
             for sign in (1.0, -1.0)
@@ -43,7 +41,7 @@ def emanating(point: Point, where: Where, width: float = 1.0) -> tuple[Start, ..
     start = None
     if point.kind in (FLIP, HOPF):
         z = np.append(point.state, point.parameter)
-        at = evaluate(problem, leaf, z, point.tangent, width, Settings())
+        at = evaluate(problem, context, z, point.tangent)
         start = problem.transition(point, at)
     if start is None:
         raise ValueError(
@@ -59,7 +57,7 @@ def switch(
     bounds: tuple[float, float],
     algorithm: AbstractAlgorithm | None = None,
     *,
-    settings: Settings | None = None,
+    settings: BranchSettings | None = None,
 ) -> tuple[Branch, ...]:
     """Follow all branches that leave a special point, besides its own.
 
@@ -92,16 +90,16 @@ def _quadratic(problem: AbstractProblem, leaf: int, z, basis, left):
 
 
 def other_direction(
-    problem: AbstractProblem, leaf: int, point: Point, width: float
+    problem: AbstractProblem, context: Context, point: Point
 ) -> np.ndarray:
     """(n+1,) direction of the branch that crosses at a simple branch point, (3.37)."""
     z = np.append(point.state, point.parameter)
-    at = evaluate(problem, leaf, z, point.tangent, width, Settings())
+    at = evaluate(problem, context, z, point.tangent)
     left, _, rows = np.linalg.svd(at.jacobian * at.scale[None, :])
     basis = rows[-2:]
     form = np.asarray(
         _quadratic(
-            problem, leaf, jnp.asarray(z), jnp.asarray(basis * at.scale),
+            problem, context.leaf, jnp.asarray(z), jnp.asarray(basis * at.scale),
             jnp.asarray(left[:, -1]),
         )
     )  # fmt: skip

@@ -76,7 +76,7 @@ def _row(point: Point, parameters: int, n: int, factor: float) -> list[str]:
     ]
 
 
-class Progress:
+class PointPrinter:
     """A callback that prints a line for each point that is worth one.
 
     **Arguments:** `every`: also each ordinary point whose label it divides.

@@ -6,7 +6,7 @@ from typing import Any, ClassVar
 import equinox as eqx
 from jaxtyping import Float
 
-from .predictors import AbstractPredictor, Extrapolation, Tangent
+from .predictors import AbstractPredictor, Extrapolation, TangentPredictor
 from .step_control import AbstractStepControl, EffortAndAngle
 
 
@@ -57,7 +57,7 @@ class Natural(AbstractAlgorithm):
 class PseudoArclength(AbstractAlgorithm):
     """Corrections are orthogonal to the tangent (3.4.3, 2); passes folds."""
 
-    predictor: AbstractPredictor = Tangent()
+    predictor: AbstractPredictor = TangentPredictor()
     control: AbstractStepControl = EffortAndAngle()
     least_norm: ClassVar[bool] = False
 
@@ -72,7 +72,7 @@ class MoorePenrose(AbstractAlgorithm):
     iteration does to first order.
     """
 
-    predictor: AbstractPredictor = Tangent()
+    predictor: AbstractPredictor = TangentPredictor()
     control: AbstractStepControl = EffortAndAngle()
     least_norm: ClassVar[bool] = True
 

@@ -32,7 +32,7 @@ class AbstractPredictor(eqx.Module):
         arrays; traced ones in a batch, for predictors that take one station."""
 
 
-class Tangent(AbstractPredictor):
+class TangentPredictor(AbstractPredictor):
     """Along the tangent, (3.30) and (3.33)."""
 
     stations: ClassVar[int] = 1
@@ -71,7 +71,7 @@ class Extrapolation(AbstractPredictor):
         return current.y + change / chord[-1] * chord
 
 
-class Polynomial(AbstractPredictor):
+class PolynomialPredictor(AbstractPredictor):
     """Polynomial in arclength through the last points, and the last tangent.
 
     **Arguments:** `order`: degree, from 2 up; lower as long as points are missing.

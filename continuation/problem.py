@@ -15,7 +15,7 @@ from .representation import AbstractRepresentation, Unique
 
 
 #: what the eigenvalues of `linearisation` mean
-Stability = Literal["equilibrium", "map", "none"]
+StabilityKind = Literal["equilibrium", "map", "none"]
 
 
 class Monitor(eqx.Module):
@@ -98,8 +98,8 @@ class AbstractProblem(eqx.Module):
     smooth; where an orbit does not exist return NaN, and the step is halved.
 
     **Python** (called between compiled programs with concrete arrays): `monitors`,
-    `limits`, `check`, `transition`, `refreshed`, `eigenvalues`, `representation`,
-    `signature`, `with_signature`. They may compile things of their own.
+    `check`, `transition`, `refreshed`, `eigenvalues`, `representation`, `signature`,
+    `with_signature`. They may compile things of their own.
 
     The order of calls for a step from point a to point b: corrector; `derivatives` and
     `seen` at b in the same program; if a monitor with `ends` changed sign, its zero is
@@ -113,7 +113,7 @@ class AbstractProblem(eqx.Module):
     """
 
     parameters: eqx.AbstractVar[PyTree]
-    stability: eqx.AbstractClassVar[Stability]
+    stability: eqx.AbstractClassVar[StabilityKind]
     #: whether `local_dynamics` is there, for the coefficients of normal forms
     normal_forms: ClassVar[bool] = True
     #: whether second derivatives of `residual` take long to compile, so that special
@@ -206,10 +206,6 @@ class AbstractProblem(eqx.Module):
         return jnp.stack([values[name] for name in self.monitors()])[number]
 
     # -- between compiled programs
-
-    def limits(self) -> Mapping[int, tuple[float, float]]:
-        """Bounds on components of u, by index; a branch ends exactly on them."""
-        return {}
 
     def check(self, point: Any) -> str | None:
         """None where the point is admissible, else the reason why not, in words."""

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import equinox as eqx
 from jaxtyping import Bool
 
-from ._settings import Settings
+from ._settings import BranchSettings
 
 
 class Refusal(enum.StrEnum):
@@ -34,12 +34,12 @@ class AbstractStepControl(eqx.Module):
 
     @abc.abstractmethod
     def refusals(
-        self, way: Way, step: Any, settings: Settings
+        self, way: Way, step: Any, settings: BranchSettings
     ) -> dict[Refusal, Bool[Any, ""]]:
         """For each reason to refuse a step whether it holds; the first is reported."""
 
     @abc.abstractmethod
-    def next_step(self, way: Way, step: Any, settings: Settings) -> Any:
+    def next_step(self, way: Way, step: Any, settings: BranchSettings) -> Any:
         """Length of the step that follows one that is taken."""
 
 
@@ -47,13 +47,13 @@ class EffortAndAngle(AbstractStepControl):
     """Longer steps where the corrector is quick and the branch straight (the thesis,
     3.4.4)."""
 
-    def refusals(self, way: Way, step: Any, settings: Settings):
+    def refusals(self, way: Way, step: Any, settings: BranchSettings):
         return {
             Refusal.FARTHER: way.correction > step,
             Refusal.TURNED: way.angle > settings.max_angle,
         }
 
-    def next_step(self, way: Way, step: Any, settings: Settings) -> Any:
+    def next_step(self, way: Way, step: Any, settings: BranchSettings) -> Any:
         s = settings
         xp = _namespace(way.angle)
         effort = 2.0 ** ((s.iterations - way.iterations) / 2)

@@ -18,7 +18,7 @@ import jaxcam as package
 from jaxcam.cli import app
 from jaxcam.cli._cache import keep_compiled_programs
 from jaxcam.cli._output import to_text
-from jaxcam.cli._parameters import parameters, set_parameters
+from jaxcam.cli._parameters import assign_parameters, parameters
 from jaxcam.cli._source import make_system
 from jaxcam.data import DEMO_RIG
 
@@ -242,12 +242,14 @@ def test_unknown_option_is_refused():
 def test_parameters_by_name():
     system = make_system("cam-follower", "table-4.4", 120.0)
     assert float(system.speed) == pytest.approx(4 * math.pi)  # pyright: ignore
-    changed = set_parameters(system, ["profile.radius=0.04", "restitution.slope=0.01"])
+    changed = assign_parameters(
+        system, ["profile.radius=0.04", "restitution.slope=0.01"]
+    )
     values = parameters(changed)
     assert values["profile.radius"] == 0.04
     assert values["restitution.slope"] == 0.01
     assert values["profile.eccentricity"] == 0.015
-    constant = set_parameters(system, ["restitution.r=0.6", "restitution.r=0.7"])
+    constant = assign_parameters(system, ["restitution.r=0.6", "restitution.r=0.7"])
     assert parameters(constant)["restitution.r"] == 0.7
     assert "restitution.slope" not in parameters(constant)
 

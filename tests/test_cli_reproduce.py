@@ -8,7 +8,7 @@ import pytest
 from typer.testing import CliRunner
 
 from jaxcam.cli import app
-from jaxcam.cli._source_mark import mark_of, source_mark
+from jaxcam.cli._source_mark import source_hash, source_mark
 from jaxcam.thesis import TARGETS
 from jaxcam.thesis.target import Target
 
@@ -151,14 +151,14 @@ def test_mark_of_the_code_sees_every_change(tmp_path):
     """Contents, names and versions count; what Python does not read does not."""
     (tmp_path / "room").mkdir()
     (tmp_path / "room" / "_a.py").write_text("x = 1\n")
-    first = mark_of([tmp_path], ["jax 1"])
+    first = source_hash([tmp_path], ["jax 1"])
     (tmp_path / "room" / "_a.cpython-312.pyc").write_bytes(b"compiled")
-    assert mark_of([tmp_path], ["jax 1"]) == first
-    assert mark_of([tmp_path], ["jax 2"]) != first
+    assert source_hash([tmp_path], ["jax 1"]) == first
+    assert source_hash([tmp_path], ["jax 2"]) != first
     (tmp_path / "room" / "_a.py").write_text("x = 2\n")
-    second = mark_of([tmp_path], ["jax 1"])
+    second = source_hash([tmp_path], ["jax 1"])
     (tmp_path / "room" / "_a.py").rename(tmp_path / "room" / "_b.py")
-    third = mark_of([tmp_path], ["jax 1"])
+    third = source_hash([tmp_path], ["jax 1"])
     assert len({first, second, third}) == 3
     assert source_mark() == source_mark() != first
 

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import continuation
-from continuation import Equations, FixedPoint, Monitor, Settings, Start
+from continuation import BranchSettings, Equations, FixedPoint, Monitor, Start
 from tests.continuation_examples import circle, mu
 from variational.orbits import multipliers_at_grazing
 
@@ -75,7 +75,7 @@ def test_a_spiral_that_passes_near_itself_goes_on():
         angle = jnp.arctan2(p["mu"], u)
         return jnp.sin(jnp.pi * (r - 1.0) / pitch - angle / 2) * pitch
 
-    settings = Settings(step=step, max_step=step, max_points=700)
+    settings = BranchSettings(step=step, max_step=step, max_points=700)
     problem = Equations(spiral, {"mu": 0.0})
     branch = continuation.branch(problem, [1.0], mu, (-1.2, 1.2), settings=settings)
     x, y = branch.states[:, 0], branch.parameters
@@ -123,7 +123,7 @@ def test_a_branch_is_closed_although_its_problem_changed_on_the_way(tmp_path):
     """A start that other unknowns followed is still known, also by a resumed run."""
     problem = Chart({"mu": 0.2}, True)
     state = [np.sqrt(1 - 0.2**2)]
-    settings = Settings(max_points=300)
+    settings = BranchSettings(max_points=300)
     path = tmp_path / "round.jsonl"
     branch = continuation.branch(
         problem, state, mu, BOUNDS, settings=settings, out=path
@@ -202,7 +202,7 @@ def tilted(u, p):
 
 @pytest.mark.parametrize("localise", ["newton", "bracket"])
 def test_pitchforks_are_located_with_and_without_second_derivatives(localise):
-    settings = Settings(localise=localise)
+    settings = BranchSettings(localise=localise)
     trunk = continuation.branch(
         continuation.Equilibrium(tilted, {"mu": -1.7}), [-0.51], mu, BOUNDS,
         settings=settings,

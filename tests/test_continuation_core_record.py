@@ -8,7 +8,7 @@ import rich.console
 from continuation_examples import a, b, CUSP, cusp_start, LOGISTIC, mu
 
 import continuation
-from continuation import Polynomial, PseudoArclength, Settings
+from continuation import BranchSettings, PolynomialPredictor, PseudoArclength
 
 
 def _same(one, other):
@@ -28,15 +28,15 @@ def whole():
         cusp_start(-1.0),
         a,
         (-3.0, 3.0),
-        PseudoArclength(Polynomial(4)),
+        PseudoArclength(PolynomialPredictor(4)),
         direction=-1,
     )
 
 
 def test_a_saved_branch_reads_back_identical(whole, tmp_path):
     path = tmp_path / "cusp.jsonl"
-    continuation.save(whole, path)
-    again = continuation.load(path, CUSP)
+    continuation.save_branch(whole, path)
+    again = continuation.load_branch(path, CUSP)
     _same(whole, again)
     assert (again.name, again.bounds) == ("a", (-3.0, 3.0))
     # points carry the problem, so that they can be followed further
@@ -48,8 +48,8 @@ def test_a_saved_branch_reads_back_identical(whole, tmp_path):
 
 def test_restart_from_any_label_gives_the_identical_branch(whole, tmp_path):
     path = tmp_path / "cusp.jsonl"
-    continuation.save(whole, path)
-    saved = continuation.load(path, CUSP)
+    continuation.save_branch(whole, path)
+    saved = continuation.load_branch(path, CUSP)
     middle = [p for p in saved.points if p.kind == "regular"][len(saved.points) // 2]
     rest = list(
         continuation.follow(
@@ -57,7 +57,7 @@ def test_restart_from_any_label_gives_the_identical_branch(whole, tmp_path):
             saved.at(middle.label),
             a,
             (-3.0, 3.0),
-            PseudoArclength(Polynomial(4)),
+            PseudoArclength(PolynomialPredictor(4)),
             history=saved.points,
         )
     )
@@ -70,12 +70,18 @@ def test_restart_from_any_label_gives_the_identical_branch(whole, tmp_path):
 @pytest.mark.parametrize("share", [0.1, 0.45, 0.8])
 def test_an_interrupted_run_is_resumed(whole, tmp_path, share):
     path = tmp_path / "run.jsonl"
-    arguments = (CUSP, cusp_start(-1.0), a, (-3.0, 3.0), PseudoArclength(Polynomial(4)))
+    arguments = (
+        CUSP,
+        cusp_start(-1.0),
+        a,
+        (-3.0, 3.0),
+        PseudoArclength(PolynomialPredictor(4)),
+    )
     continuation.branch(*arguments, direction=-1, out=path)
     text = path.read_text("utf-8")
     # killed in the middle of a line
     path.write_text(text[: int(share * len(text))], "utf-8")
-    kept = len(continuation.load(path).points)
+    kept = len(continuation.load_branch(path).points)
     new = []
     resumed = continuation.branch(
         *arguments, direction=-1, out=path, resume=True, callbacks=[new.append]
@@ -119,7 +125,7 @@ def test_other_files_are_refused(tmp_path):
     ):
         path.write_text(text, "utf-8")
         with pytest.raises(ValueError, match=words):
-            continuation.load(path)
+            continuation.load_branch(path)
 
 
 def test_the_file_is_plain_json(tmp_path):
@@ -146,7 +152,7 @@ def test_table_and_progress(whole):
     console.print(continuation.table(whole, shown=("a thousandth", 1e3)))
     text = console.export_text()
     assert "a thousandth" in text and "-384.900179" in text
-    show = continuation.Progress(console=console)
+    show = continuation.PointPrinter(console=console)
     for point in whole.points:
         show(point)
     assert console.export_text().count("LP") == 2
@@ -182,7 +188,7 @@ def test_batch_agrees_with_single_branches():
         starts[7],
         a,
         (-3.0, 3.0),
-        settings=Settings(special=False),
+        settings=BranchSettings(special=False),
         direction=-1,
     )
     assert lane.regular[-1].state == pytest.approx(single.points[-1].state, abs=1e-9)

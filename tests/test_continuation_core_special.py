@@ -8,7 +8,7 @@ from continuation_examples import a, b, CUSP, cusp_start, henon, LOGISTIC, mu
 from scipy.optimize import brentq
 
 import continuation
-from continuation import Settings
+from continuation import BranchSettings
 
 
 TWO = ((-5.0, 5.0), (-2.0, 2.0))
@@ -30,7 +30,7 @@ def test_cascade_of_the_logistic_map():
 
 def test_special_points_without_second_derivatives():
     branch = continuation.branch(
-        LOGISTIC, [0.5], mu, (1.5, 4.0), settings=Settings(localise="bracket")
+        LOGISTIC, [0.5], mu, (1.5, 4.0), settings=BranchSettings(localise="bracket")
     )
     (flip,) = branch.special
     assert flip.converged and flip.parameter == pytest.approx(3.0, abs=1e-9)

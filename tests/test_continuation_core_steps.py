@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import continuation
-from continuation import Natural, PseudoArclength, Settings
-from continuation.predictors import Secant, Tangent
+from continuation import BranchSettings, Natural, PseudoArclength
+from continuation.predictors import Secant, TangentPredictor
 from continuation.step_control import AbstractStepControl, EffortAndAngle, Refusal, Way
 
 
@@ -30,16 +30,16 @@ class Short(AbstractStepControl):
 
     kept: ClassVar[float] = 0.03
 
-    def refusals(self, way: Way, step: Any, settings: Settings):
+    def refusals(self, way: Way, step: Any, settings: BranchSettings):
         return {Refusal.TURNED: way.angle > settings.max_angle}
 
-    def next_step(self, way: Way, step: Any, settings: Settings):
+    def next_step(self, way: Way, step: Any, settings: BranchSettings):
         return 0 * step + self.kept
 
 
 def test_length_follows_effort_and_angle():
     """Twice the step at most, half at least; by sqrt 2 for each iteration."""
-    control, settings = EffortAndAngle(), Settings(max_step=1.0)
+    control, settings = EffortAndAngle(), BranchSettings(max_step=1.0)
 
     def factor(iterations, angle):
         way = Way(np.float64(iterations), np.float64(0.0), np.float64(angle))
@@ -68,14 +68,14 @@ def test_a_correction_longer_than_the_step_is_refused():
     [
         PseudoArclength(),
         PseudoArclength(control=Short()),
-        Natural(predictor=Tangent(), component="fastest"),
+        Natural(predictor=TangentPredictor(), component="fastest"),
     ],
     ids=["arclength", "own control", "fastest component"],
 )
 def test_batch_takes_the_steps_of_a_branch(algorithm):
     """The same points to 1e-9 for the same algorithm, around a fold."""
     problem = continuation.Equilibrium(parabola, {"mu": 1.0})
-    bounds, settings = (-1.0, 2.0), Settings(special=False, max_points=60)
+    bounds, settings = (-1.0, 2.0), BranchSettings(special=False, max_points=60)
     branch = continuation.branch(
         problem, [-1.0], mu, bounds, algorithm, settings=settings, direction=-1
     )
@@ -109,7 +109,7 @@ def test_settings_of_a_batch_share_a_program():
         before = len(asked)
         batch = continuation.follow_batch(
             problem, [[-1.0]], mu, (-1.0, 2.0),
-            settings=Settings(**changes), direction=-1, points=200,
+            settings=BranchSettings(**changes), direction=-1, points=200,
         )  # fmt: skip
         return int(batch.count[0]), len(asked) > before
 

@@ -7,14 +7,14 @@ from continuation_examples import a, circle, CUSP, cusp_start, LOGISTIC, logisti
 
 import continuation
 from continuation import (
+    BranchSettings,
     Equations,
     MoorePenrose,
     Natural,
-    Polynomial,
+    PolynomialPredictor,
     PseudoArclength,
-    Settings,
 )
-from continuation.predictors import Extrapolation, Secant, Tangent
+from continuation.predictors import Extrapolation, Secant, TangentPredictor
 
 
 # parameter values of the folds of x^3 - x + a
@@ -26,12 +26,12 @@ FOLD = 2 / np.sqrt(27)
     [
         PseudoArclength(),
         PseudoArclength(Secant()),
-        PseudoArclength(Polynomial(2)),
-        PseudoArclength(Polynomial(5)),
+        PseudoArclength(PolynomialPredictor(2)),
+        PseudoArclength(PolynomialPredictor(5)),
         PseudoArclength(Extrapolation()),
         MoorePenrose(),
-        MoorePenrose(Polynomial()),
-        Natural(Tangent(), component="fastest"),
+        MoorePenrose(PolynomialPredictor()),
+        Natural(TangentPredictor(), component="fastest"),
     ],
     ids=str,
 )
@@ -66,12 +66,12 @@ def test_higher_order_takes_fewer_iterations():
             a,
             (-3.0, 3.0),
             PseudoArclength(predictor),
-            settings=Settings(special=False, max_step=0.01),
+            settings=BranchSettings(special=False, max_step=0.01),
             direction=-1,
         )
         return np.mean([point.iterations for point in branch.points])
 
-    assert effort(Polynomial(4)) < effort(Tangent())
+    assert effort(PolynomialPredictor(4)) < effort(TangentPredictor())
 
 
 def test_back_and_forth():
@@ -243,6 +243,6 @@ def test_bad_settings():
         {"max_points": 0},
     ):
         with pytest.raises(ValueError):
-            Settings(**wrong)
+            BranchSettings(**wrong)
     with pytest.raises(ValueError, match="period"):
         continuation.FixedPoint(logistic, {"mu": 2.0}, period=0)

@@ -77,7 +77,7 @@ def special():
     for problem, start in (impacting(145.0, ONE), sticking(145.0)):
         branch = continuation.branch(problem, start, speed, SPEEDS, direction="both")
         found |= {point.kind: point for point in branch.special}
-    plain = continuation.Settings(special=False)
+    plain = continuation.BranchSettings(special=False)
     six = impacting(152.69, SIX)
     for point in continuation.follow(*six, speed, SPEEDS, settings=plain):
         if point.kind == "grazing":

@@ -141,7 +141,7 @@ def test_ball_on_a_table(k):
             lambda system: system.amplitude,
             (0.01, 1.0),
             direction=direction,
-            settings=continuation.Settings(step=0.002, max_step=0.01),
+            settings=continuation.BranchSettings(step=0.002, max_step=0.01),
         ):
             found = point
             if point.special:

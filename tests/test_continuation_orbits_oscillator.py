@@ -79,7 +79,7 @@ def first(problem, start, kinds, bounds, direction, **settings):
         wall,
         bounds,
         direction=direction,
-        settings=continuation.Settings(**settings),
+        settings=continuation.BranchSettings(**settings),
     ):
         seen.append(point)
         if point.kind in kinds:

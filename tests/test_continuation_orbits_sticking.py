@@ -53,7 +53,7 @@ def test_sticks_every_second_period_between_two_interruptions():
         points = []
         for point in continuation.follow(
             start.problem, start, omega, (2.5, 3.5), direction=direction,
-            settings=continuation.Settings(max_step=0.02),
+            settings=continuation.BranchSettings(max_step=0.02),
         ):  # fmt: skip
             points.append(point)
             if point.special or len(points) > 100:

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxcam.cli._parameters import parameters, set_parameters
+from jaxcam.cli._parameters import assign_parameters, parameters
 from jaxcam.cli._source import make_system, Source
 from jaxcam.discrepancy import diagnose, library, Policy, strength, Term
 from jaxcam.discrepancy.search import _search, _trials, added_gain, given_up
@@ -241,7 +241,7 @@ def test_a_diagnosed_system_is_saved_and_read_again(tmp_path):
     faster = make_system("cam-follower", None, 150.0, Source(tmp_path / "model.json"))
     assert float(faster.base.speed) == pytest.approx(5 * np.pi)
     assert parameters(faster)["speed"] == pytest.approx(5 * np.pi)
-    changed = set_parameters(faster, ["terms[0].c1=0.3"])
+    changed = assign_parameters(faster, ["terms[0].c1=0.3"])
     assert float(changed.terms[0].c1) == 0.3
     with pytest.raises(ValueError, match="WithTerms"):
         load_system(tmp_path / "model.json")

@@ -15,7 +15,7 @@ import pytest
 
 import continuation
 from jaxcam.data import DEMO_RIG
-from jaxcam.sweeps import load
+from jaxcam.sweeps import load_sweep
 
 
 #: each takes a few seconds once it is compiled, and stores what it has as it goes
@@ -59,10 +59,10 @@ def finish(process: subprocess.Popen) -> str:
 def content(name: str, out: Path):
     """What a command stored, as something that can be compared."""
     if name == "continue":
-        points = continuation.load(out / STORED[name]).points
-        back = continuation.load(out / "branch.back.jsonl").points
+        points = continuation.load_branch(out / STORED[name]).points
+        back = continuation.load_branch(out / "branch.back.jsonl").points
         return [(p.label, p.kind, p.parameter, p.state.tolist()) for p in back + points]
-    made = load(out / STORED[name]).dataset
+    made = load_sweep(out / STORED[name]).dataset
     return {str(k): np.asarray(v) for k, v in made.variables.items()}
 
 

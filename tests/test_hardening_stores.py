@@ -17,11 +17,11 @@ import continuation
 from jaxcam.cli._reproduce_record import (
     by_other_code,
     earlier,
-    Record,
-    Settings,
+    Origin,
+    TargetRecord,
     write,
 )
-from jaxcam.sweeps import basins, Grid, load
+from jaxcam.sweeps import basins, Grid, load_sweep
 
 
 # what a user sees, whose types nothing checks
@@ -54,7 +54,7 @@ def test_any_branch(branch_text, tmp_path_factory, data):
     file = tmp_path_factory.getbasetemp() / "branch.jsonl"
     file.write_bytes(raw)
     try:
-        continuation.load(file)
+        continuation.load_branch(file)
     except ValueError as error:
         sentence = str(error)
         assert str(file) in sentence and "\n" not in sentence
@@ -71,7 +71,7 @@ def test_a_point_with_a_field_of_another_type(branch_text, tmp_path, name, value
     file = tmp_path / "branch.jsonl"
     file.write_text("\n".join([header, altered, *rest]) + "\n")
     with pytest.raises(ValueError, match="is damaged"):
-        continuation.load(file)
+        continuation.load_branch(file)
 
 
 @pytest.fixture(scope="module")
@@ -101,7 +101,7 @@ def test_any_store(stored, tmp_path_factory, data):
         file.unlink()
     changed = not file.exists() or file.read_bytes() != raw
     try:
-        found = load(folder)
+        found = load_sweep(folder)
         # what is no part of the numbers may be lost, such as an attribute
         assert np.array_equal(found.attractor, attractor) or not changed
     except ValueError as error:
@@ -125,7 +125,7 @@ def test_a_store_without_its_axes_is_damaged(stored, tmp_path, axis, how):
         group = zarr.open_group(str(folder), mode="r+")
         group[axis][:1] = 0.5
     with pytest.raises(ValueError, match="coordinates"):
-        load(folder)
+        load_sweep(folder)
     with pytest.raises(ValueError, match="coordinates"):
         basins(SQUARE_ROOT, GRID, out=folder, resume=True, **OPTIONS)
 
@@ -136,10 +136,10 @@ def test_a_store_without_its_axes_is_damaged(stored, tmp_path, axis, how):
 def test_any_record_of_a_table(tmp_path_factory, data):
     """What is not a complete record of the same settings is computed again."""
     folder = tmp_path_factory.getbasetemp()
-    wanted = Settings("1", "calibrated", "full", code="mark")
+    wanted = Origin("1", "calibrated", "full", code="mark")
     row = dict.fromkeys(("printed", "computed", "difference", "relative"), 1.0)
     rows = [{"quantity": "speed", **row, "unit": "rpm"}]
-    write(Record("table", wanted, 1.0, rows), folder)
+    write(TargetRecord("table", wanted, 1.0, rows), folder)
     if data is None:
         found = earlier(folder, "table", wanted)
         assert found is not None and found.rows == rows

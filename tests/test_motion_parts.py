@@ -18,9 +18,9 @@ from scipy.interpolate import BPoly
 
 from jaxcam import Settings
 from jaxcam.hybrid.batch._refilled_lanes import costly_first
-from jaxcam.hybrid.codes import Row
+from jaxcam.hybrid.codes import RowKind
 from jaxcam.hybrid.loop._advance import Plan
-from jaxcam.hybrid.loop._flight import earliest, judge, moves_in, Verdict
+from jaxcam.hybrid.loop._flight import earliest, judge, moves_in, StepVerdict
 from jaxcam.hybrid.loop._functions import Functions
 from jaxcam.hybrid.loop._gap_polynomial import (
     Bernstein,
@@ -35,7 +35,7 @@ from jaxcam.hybrid.loop._gap_polynomial import (
     time_to_release,
     time_to_root,
 )
-from jaxcam.hybrid.loop._iterate import iterate
+from jaxcam.hybrid.loop._iterate import iteration
 from jaxcam.hybrid.loop._loop_state import first_state
 from jaxcam.hybrid.loop._release import judge_contact
 from jaxcam.hybrid.lowering._jaxprs import calls_library
@@ -212,7 +212,7 @@ def test_time_to_root_errs_by_the_fifth_power(g):
 H, ROOM = jnp.asarray(0.1), jnp.asarray(np.inf)
 
 
-def flight(path, h=0.1, room=np.inf) -> Verdict:
+def flight(path, h=0.1, room=np.inf) -> StepVerdict:
     ends = jet_of(path, 0.0), jet_of(path, h)
     rest = (1e-12, 1e-15, 1.0, room, h)
     return judge(*ends, *(jnp.asarray(float(v)) for v in (h, *rest)))
@@ -287,7 +287,7 @@ def test_moves_in(gap, velocity, acceleration, wanted):
 
 def verdict(retake, length, lands, offset):
     values = (retake, float(length), lands, float(offset), 0.0)
-    return Verdict(*map(jnp.asarray, values))
+    return StepVerdict(*map(jnp.asarray, values))
 
 
 def test_the_earliest_of_several():
@@ -303,7 +303,7 @@ def test_the_earliest_of_several():
 
 def contact(
     a0, s0, a1, s1, *, h=0.1, room=np.inf, completing=False, locating=False
-) -> Verdict:
+) -> StepVerdict:
     """Verdict on pressures `a` at the ends of a step and their rates per step `s`."""
     ends = (jet(0, 0, a, s / h if h else s) for a, s in ((a0, s0), (a1, s1)))
     rest = map(jnp.asarray, (h, 1.0, 1e-15, room))
@@ -362,7 +362,7 @@ def test_contact_that_is_pulled_at_once_lets_go():
 # --- one attempt as a whole
 
 
-@pytest.mark.parametrize("room, kind", [(2e-6, Row.IMPACT), (5e-7, Row.STEP)])
+@pytest.mark.parametrize("room, kind", [(2e-6, RowKind.IMPACT), (5e-7, RowKind.STEP)])
 def test_an_impact_beyond_the_end_is_left_out(room, kind):
     """The step ends 1e-6 s before the impact, the run `room` after that step."""
     ball = BouncingBall()
@@ -374,7 +374,7 @@ def test_an_impact_beyond_the_end_is_left_out(room, kind):
     def attempt(t1):
         lane = first_state(functions, t0, (jnp.asarray(1.0), jnp.asarray(0.0)), t1)
         lane = lane._replace(step=jnp.asarray(length), longest=jnp.asarray(1.0))
-        return iterate(functions, Plan.of(ball, Settings(), t0, t1), lane)[1]
+        return iteration(functions, Plan.of(ball, Settings(), t0, t1), lane)[1]
 
     record = attempt(t1)
     assert int(record.kind) == kind and float(record.t) <= float(t1)

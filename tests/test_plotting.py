@@ -16,7 +16,7 @@ from jaxcam.hybrid import HybridSystem, Settings, Trajectory
 from jaxcam.hybrid.record import Contacts, Impacts, Steps
 from jaxcam.models import BouncingBall
 from jaxcam.plotting._prefix import scaled
-from jaxcam.plotting.curves import curve
+from jaxcam.plotting.curves import trajectory_curve
 from jaxcam.recordings import Recording
 from jaxcam.recordings.against_model import Comparison, Residuals
 
@@ -180,7 +180,7 @@ def test_time_history_of_several_constraints(walls):
 
 
 def test_a_curve_ends_in_the_state_before_an_impact(ball):
-    drawn = curve(ball)
+    drawn = trajectory_curve(ball)
     ends = np.flatnonzero(np.isnan(drawn.time)) - 1
     first = ends[0]
     assert drawn.time[first] == pytest.approx(0.2, abs=1e-15)
@@ -219,7 +219,7 @@ def test_phase_portrait_turns_round_and_takes_axes(ball, walls):
 
 
 def test_impact_map_has_a_point_for_every_pair(ball):
-    figure = plotting.impact_map(ball)
+    figure = plotting.impact_return_map(ball)
     figure.canvas.draw()
     phase, speed = figure.axes
     points = line(speed, "constraint 0")
@@ -233,14 +233,14 @@ def test_impact_map_has_a_point_for_every_pair(ball):
 
 @pytest.mark.usefixtures("unchecked_types")
 def test_impact_map_against_time_and_without_a_period(ball, walls):
-    left, _ = plotting.impact_map(ball, against="time").axes
+    left, _ = plotting.impact_return_map(ball, against="time").axes
     assert left.get_xlabel() == "time of impact $k$ (s)"
-    left, right = plotting.impact_map(walls).axes
+    left, right = plotting.impact_return_map(walls).axes
     assert left.get_xlabel().startswith("time of impact")
     first, second = line(right, "constraint 0"), line(right, "constraint 1")
     assert len(first.get_xdata()) == 2 and len(second.get_xdata()) == 2
     with pytest.raises(ValueError, match='choose "phase" or "time"'):
-        plotting.impact_map(ball, against="speed")
+        plotting.impact_return_map(ball, against="speed")
 
 
 def test_figures_of_a_simulated_trajectory(ball):
@@ -250,14 +250,14 @@ def test_figures_of_a_simulated_trajectory(ball):
     assert number > 10
     assert len(line(gap, "impact").get_xdata()) == number
     assert len(height.patches) == 1
-    drawn = curve(simulated)
+    drawn = trajectory_curve(simulated)
     flying = ~np.isnan(drawn.time) & (drawn.time < 0.55)
     np.testing.assert_allclose(
         drawn.gap[flying, 0], ball.gap(drawn.time[flying]), atol=1e-9
     )
     ax = plotting.phase_portrait(simulated)
     assert len(line(ax, "once a period").get_xdata()) == 4
-    _, speed = plotting.impact_map(simulated).axes
+    _, speed = plotting.impact_return_map(simulated).axes
     assert len(line(speed, "constraint 0").get_xdata()) == number - 1
 
 
@@ -266,7 +266,7 @@ def test_figures_of_a_flight_without_impacts(ball):
     for figure in (
         plotting.time_history(ball, between=alone),
         plotting.phase_portrait(ball, between=alone).figure,
-        plotting.impact_map(ball, between=alone),
+        plotting.impact_return_map(ball, between=alone),
     ):
         figure.canvas.draw()
 
@@ -283,7 +283,7 @@ def test_own_axes_are_used(ball):
     own, axes = plt.subplots(3, 1)
     assert plotting.time_history(ball, axes) is own
     own, axes = plt.subplots(1, 2)
-    assert plotting.impact_map(ball, axes) is own
+    assert plotting.impact_return_map(ball, axes) is own
 
 
 def test_compare_recording_in_turns_of_the_cam(recording):

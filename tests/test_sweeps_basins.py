@@ -13,7 +13,7 @@ from jaxcam.sweeps import (
     follow_basins,
     Grid,
     largest_exponents,
-    load,
+    load_sweep,
     Stroboscopic,
 )
 from jaxcam.sweeps._basins_job import default_scale
@@ -148,7 +148,7 @@ def test_attractors_are_matched_along_a_parameter(tmp_path):
         [b.shares[str(name)].share for b, name in zip(found.basins, first, strict=True)]
     )
     assert found.names[0, 1] == "P(6,6)" and found.shares[2, 1] == 0
-    assert load(tmp_path / "0001").names == found.basins[1].names
+    assert load_sweep(tmp_path / "0001").names == found.basins[1].names
 
 
 def test_nobody_can_start():

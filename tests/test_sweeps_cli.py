@@ -10,7 +10,7 @@ from typer.main import get_command
 from typer.testing import CliRunner
 
 from jaxcam.cli import app
-from jaxcam.sweeps import load
+from jaxcam.sweeps import load_sweep
 
 
 @pytest.fixture(autouse=True)
@@ -48,7 +48,7 @@ def test_a_diagram_of_the_oscillator(tmp_path):
     ]
     assert "P(1,1)" in found.stdout
     assert (folder / "diagram.png").stat().st_size > 5000
-    assert np.array_equal(load(folder / "diagram.zarr").values, data["values"])
+    assert np.array_equal(load_sweep(folder / "diagram.zarr").values, data["values"])
     refused = jaxcam(*arguments, "--out", folder)
     assert refused.exit_code == 2 and "--resume" in refused.stderr
     again = jaxcam(*arguments, "--json", file, "--out", folder, "--resume")

@@ -8,7 +8,7 @@ from jaxcam.models import ImpactOscillator, preset, rad_s_to_rpm, rpm_to_rad_s
 from jaxcam.sweeps import (
     diagram,
     ImpactSection,
-    load,
+    load_sweep,
     monte_carlo,
     Stroboscopic,
 )
@@ -31,7 +31,7 @@ def test_one_direction_is_what_single_runs_say(tmp_path):
     run = jaxcam.simulate(own, START, 0.0, 40 * float(own.period))
     wanted = np.asarray(run.stroboscopic())[-10:]
     assert np.abs(made.states[3, 0] - wanted).max() < 1e-7
-    assert np.array_equal(load(tmp_path / "d").states, made.states)
+    assert np.array_equal(load_sweep(tmp_path / "d").states, made.states)
 
 
 def test_carried_states_start_where_the_last_value_ended():
@@ -128,7 +128,7 @@ def test_random_starts_show_what_one_start_hides():
         ({"states": np.zeros((3, 2, 2))}, "for 2 points"),
         ({"states": (0.5, 0.0)}, "behind the constraint"),
         ({"system": 3}, "cannot be swept"),
-        ({"tolerance": 0.0}, "tolerance is 0"),
+        ({"period_tolerance": 0.0}, "period_tolerance is 0"),
         ({"block": 0}, "block is 0"),
         ({"workers": 0}, "workers is 0"),
         ({"dwell": (60, 10)}, "choose the direction up"),

@@ -16,7 +16,7 @@ import pytest
 import zarr
 from sweep_maps import LOGISTIC, SQUARE_ROOT
 
-from jaxcam.sweeps import basins, diagram, Grid, load
+from jaxcam.sweeps import basins, diagram, Grid, load_sweep
 from jaxcam.sweeps.blocks._disk import OnDisk
 
 
@@ -54,7 +54,7 @@ def same(one, other) -> bool:
 
 
 def test_on_disk_as_in_memory(whole, stored):
-    assert same(whole, load(stored))
+    assert same(whole, load_sweep(stored))
 
 
 def test_read_without_jaxcam(stored, whole):
@@ -100,15 +100,15 @@ def test_a_damaged_chunk_is_named_and_computed_again(copy, whole, name):
     content[-3] ^= 0x55
     file.write_bytes(bytes(content))
     with pytest.raises(ValueError, match="block 2 (is damaged|cannot be read).*resume"):
-        load(copy)
-    assert same(again(copy), whole) and same(load(copy), whole)
+        load_sweep(copy)
+    assert same(again(copy), whole) and same(load_sweep(copy), whole)
 
 
 def test_a_missing_chunk_is_named_and_computed_again(copy, whole):
     _cells(copy, "fingerprint", 5).unlink()
     _cells(copy, "fingerprint", 6).write_bytes(b"")
     with pytest.raises(ValueError, match="block 5 .*2 of 8 blocks are wrong: 5, 6"):
-        load(copy)
+        load_sweep(copy)
     assert same(again(copy), whole)
 
 
@@ -123,8 +123,8 @@ def test_attractors_that_are_damaged_are_named_and_found_again(copy, whole, how)
         group = zarr.open_group(str(copy), mode="r+")
         del group.attrs["together"]
     with pytest.raises(ValueError, match="resume=True to .*attractor"):
-        load(copy)
-    assert same(again(copy), whole) and same(load(copy), whole)
+        load_sweep(copy)
+    assert same(again(copy), whole) and same(load_sweep(copy), whole)
 
 
 def test_the_disk_is_full(tmp_path, whole, monkeypatch):
@@ -179,7 +179,7 @@ def test_killed_in_the_middle(tmp_path, whole):
                 break
     assert child.returncode == -signal.SIGKILL
     with pytest.raises(ValueError, match="is not finished"):
-        load(folder)
+        load_sweep(folder)
     seen = []
     found = basins(
         SQUARE_ROOT, GRID, out=folder, resume=True, progress=seen.append, **OPTIONS

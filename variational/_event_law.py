@@ -7,17 +7,23 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
 from jaxcam.hybrid import HybridSystem
-from jaxcam.hybrid.surface import field_in_force, normal_directions, normal_velocity
+from jaxcam.hybrid.surface import (
+    field_in_force,
+    gaps,
+    impacts,
+    normal_directions,
+    normal_velocity,
+)
 
 
 def gap_of(system: HybridSystem, constraint) -> Callable:
     """The gap of one constraint as a function of (t, x)."""
-    return lambda t, x: jnp.atleast_1d(system.gap(t, x))[constraint]
+    return lambda t, x: gaps(system, t, x)[constraint]
 
 
 def impact_of(system: HybridSystem, constraint) -> Callable:
     """The impact law of one constraint as a function of (t, x)."""
-    return lambda t, x: jnp.atleast_2d(system.impact(t, x))[constraint]
+    return lambda t, x: impacts(system, t, x)[constraint]
 
 
 def completed_law(system: HybridSystem, constraint) -> Callable:
@@ -45,7 +51,7 @@ def field_of(system: HybridSystem, contact: Bool[Array, " m"] | None) -> Callabl
     return lambda t, x: field_in_force(system, t, x, contact)
 
 
-def crossing(
+def event_crossing(
     law: Callable, gap: Callable, field_before: Callable, field_after: Callable, t, x
 ) -> tuple[Float[Array, "n n"], Float[Array, " n"], Float[Array, " n"], Array]:
     """R_x, w = F+ - R_t - R_x F-, the normal H_x, and the speed v of the gap.
@@ -69,11 +75,11 @@ def onto_contact(
     what contact takes: the rank falls by two for each constraint, and what remains is
     how the state of contact follows the parameters.
     """
-    values = jnp.atleast_1d(system.gap(t, x))
-    normals = jax.jacfwd(lambda y: jnp.atleast_1d(system.gap(t, y)))(x)
+    values = gaps(system, t, x)
+    normals = jax.jacfwd(lambda y: gaps(system, t, y))(x)
     for k in range(values.shape[0]):
         lift = normals[k] / jnp.sum(normals[k] * normals[k])
-        lifted = x - jnp.atleast_1d(system.gap(t, x))[k] * lift
+        lifted = x - gaps(system, t, x)[k] * lift
         slip = normal_velocity(system, t, lifted)[k]
         settled = lifted - slip * normal_directions(system, t, x)[k]
         x = jnp.where(contact[k], settled, x)

@@ -14,7 +14,7 @@ from jaxcam.hybrid.runge_kutta import adaptive_steps, DOPRI8
 TOLERANCE = 1e-14
 
 
-class Flight(NamedTuple):
+class LinearisedFlight(NamedTuple):
     """The end of a flight and how it depends on its start."""
 
     #: (n,) state at the end
@@ -25,7 +25,9 @@ class Flight(NamedTuple):
     log_volume: Float[Array, ""]
 
 
-def fly(field: Callable, parameters: Float[Array, " q"], t0, x, t1) -> Flight:
+def fly_linearised(
+    field: Callable, parameters: Float[Array, " q"], t0, x, t1
+) -> LinearisedFlight:
     """Integrate the motion and its variational equations from `t0` to `t1`.
 
     **Arguments:** `field(parameters, t, x)`, smooth on the way: no event is looked for.
@@ -44,4 +46,4 @@ def fly(field: Callable, parameters: Float[Array, " q"], t0, x, t1) -> Flight:
 
     start = jnp.concatenate([x, jnp.eye(n, n + q).ravel(), jnp.zeros(1)])
     end = adaptive_steps(DOPRI8, rates, t0, start, t1, TOLERANCE)
-    return Flight(end[:n], end[n:-1].reshape(n, n + q), end[-1])
+    return LinearisedFlight(end[:n], end[n:-1].reshape(n, n + q), end[-1])

@@ -14,7 +14,7 @@ from jaxtyping import Array, Float
 
 from jaxcam.hybrid import HybridSystem, Settings
 from jaxcam.hybrid.checks import refuse_tracers
-from jaxcam.hybrid.codes import Row, RUNNING
+from jaxcam.hybrid.codes import RowKind, RUNNING
 from jaxcam.hybrid.surface import check_restitution, restitutions
 from jaxcam.parameters import as_arrays, pick, real_array, Where
 
@@ -167,9 +167,9 @@ class _Seen:
         self._hits = np.zeros(lanes)
 
     def take(self, kind, logs, after) -> None:
-        hit = (kind == Row.IMPACT) | (kind == Row.LAST_IMPACT)
+        hit = (kind == RowKind.IMPACT) | (kind == RowKind.LAST_IMPACT)
         hits = self._hits[:, None] + np.cumsum(hit, axis=1)
-        stop = kind == Row.STOP
+        stop = kind == RowKind.STOP
         rank = self._filled[:, None] + np.cumsum(stop, axis=1) - 1
         who, row = np.nonzero(stop)
         # rounding may set the end of the run apart from its last stop

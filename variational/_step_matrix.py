@@ -8,14 +8,14 @@ from jaxtyping import Array, Float
 
 from jaxcam.hybrid import HybridSystem
 from jaxcam.hybrid.breakpoints import between
-from jaxcam.hybrid.codes import Row
+from jaxcam.hybrid.codes import RowKind
 from jaxcam.hybrid.loop import Functions
 from jaxcam.hybrid.runge_kutta import step, Tableau
 
 from ._event_law import (
     completed_law,
     contact_projector,
-    crossing,
+    event_crossing,
     field_of,
     gap_of,
     impact_of,
@@ -33,7 +33,7 @@ class LogRow(NamedTuple):
     contact: tuple
 
 
-class Point(NamedTuple):
+class StepStart(NamedTuple):
     """Where a step begins."""
 
     t: Array
@@ -45,7 +45,7 @@ def step_matrix(
     system: HybridSystem,
     functions: Functions,
     tableau: Tableau,
-    point: Point,
+    point: StepStart,
     row: LogRow,
 ) -> Float[Array, "n n"]:
     """The derivative of one step and of the event at its end; the identity for none.
@@ -53,7 +53,7 @@ def step_matrix(
     The step is the one the run took, so its derivative needs no control of its own.
     """
     n = functions.n
-    taken = row.kind != float(Row.NOTHING)
+    taken = row.kind != float(RowKind.NOTHING)
     h = jnp.where(taken, row.t - point.t, 0.0)
 
     def inside(t):
@@ -81,10 +81,10 @@ def step_matrix(
         matrix = jnp.where(held[0], 0.0, matrix)
     else:
         matrix = contact_projector(system, row.t, before, held) @ matrix
-    hit = taken & (row.kind == float(Row.IMPACT))
-    last = taken & (row.kind == float(Row.LAST_IMPACT))
+    hit = taken & (row.kind == float(RowKind.IMPACT))
+    last = taken & (row.kind == float(RowKind.LAST_IMPACT))
     event = _across(system, row, before, held, now, impact_of, functions.planar)
-    out = jnp.where(hit, _times(event, matrix), matrix)
+    out = jnp.where(hit, elementwise_product(event, matrix), matrix)
     if functions.planar:
         entry = jnp.zeros((n, n))
     else:
@@ -99,7 +99,7 @@ def _across(system, row: LogRow, before, held, now, law_of, planar):
     side = row.constraint
     field_before = field_of(system, None if planar else held)
     field_after = field_of(system, None if planar else now)
-    law_x, moved, normal, speed = crossing(
+    law_x, moved, normal, speed = event_crossing(
         law_of(system, side),
         gap_of(system, side),
         field_before,
@@ -110,6 +110,6 @@ def _across(system, row: LogRow, before, held, now, law_of, planar):
     return law_x + moved[:, None] * (normal / speed)[None, :]
 
 
-def _times(a, b):
+def elementwise_product(a, b):
     """A matrix product that stays elementwise in a batch."""
     return jnp.sum(a[:, :, None] * b[None, :, :], axis=1)

@@ -7,18 +7,18 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from jaxcam.hybrid.codes import Row
+from jaxcam.hybrid.codes import RowKind
 from jaxcam.hybrid.loop import first_state, Functions, Plan, run_raw
 
 from ._event_law import completed_law
-from ._step_matrix import LogRow, Point, step_matrix
+from ._step_matrix import elementwise_product, LogRow, step_matrix, StepStart
 
 
 class Carried(NamedTuple):
     """What a lane takes from one chunk of rows to the next."""
 
     lane: Any
-    point: Point
+    point: StepStart
     frame: Float[Array, "n n"]
     logs: Float[Array, " n"]
 
@@ -49,7 +49,7 @@ def first_frames(batched, shared, length, states, t0, turns, settings):
         limits = plan.t1, plan.longest_step, plan.repeat
         lane = first_state(functions, t0, x, *limits)
         lane = jax.tree.map(jnp.asarray, lane)
-        point = Point(lane.t, lane.x, lane.contact)
+        point = StepStart(lane.t, lane.x, lane.contact)
         n = len(x)
         return Carried(lane, point, jnp.eye(n), jnp.zeros(n))
 
@@ -78,12 +78,12 @@ def next_rows(batched, shared, length, t0, turns, settings, carry: Carried):
         kind, side, t = log[:, 0], log[:, 1].astype(jnp.int32), log[:, 2]
         before, after = log[:, 3 : 3 + n], log[:, 3 + n : 3 + 2 * n]
         contact = log[:, 3 + 2 * n :] > 0.5
-        taken = kind != float(Row.NOTHING)
+        taken = kind != float(RowKind.NOTHING)
         started = after
         if not functions.planar:
             # what follows a chatter starts without normal velocity
             rest = jax.vmap(lambda s, y, k: completed_law(system, k)(s, y))
-            at_rest = (kind == float(Row.LAST_IMPACT))[:, None]
+            at_rest = (kind == float(RowKind.LAST_IMPACT))[:, None]
             started = jnp.where(at_rest, rest(t, before, side), after)
 
         def first_and(old, new):
@@ -97,7 +97,7 @@ def next_rows(batched, shared, length, t0, turns, settings, carry: Carried):
         flags = first_and(jnp.stack(carry.point.contact), contact)
 
         def point_at(k):
-            return Point(times[k], tuple(states[k].T), tuple(flags[k].T))
+            return StepStart(times[k], tuple(states[k].T), tuple(flags[k].T))
 
         rows = LogRow(kind, side, t, tuple(before.T), tuple(after.T), tuple(contact.T))
         matrices = jax.vmap(
@@ -106,7 +106,7 @@ def next_rows(batched, shared, length, t0, turns, settings, carry: Carried):
 
         def extend(carry, matrix):
             frame, logs = carry
-            frame, growth = orthonormal(_times(matrix, frame))
+            frame, growth = orthonormal(elementwise_product(matrix, frame))
             logs = logs + jnp.log(growth)
             return (frame, logs), logs
 
@@ -115,11 +115,6 @@ def next_rows(batched, shared, length, t0, turns, settings, carry: Carried):
         return Carried(lane, at, frame, logs), (kind, sums, after)
 
     return eqx.filter_vmap(one, in_axes=(eqx.if_array(0), 0))(batched, carry)
-
-
-def _times(a, b):
-    """A matrix product that stays elementwise in a batch."""
-    return jnp.sum(a[:, :, None] * b[None, :, :], axis=1)
 
 
 def orthonormal(matrix: Float[Array, "n n"]):

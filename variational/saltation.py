@@ -7,11 +7,12 @@ from jax.core import Tracer
 from jaxtyping import Array, Float
 
 from jaxcam.hybrid import HybridSystem
+from jaxcam.hybrid.surface import gaps
 
 from ._event_law import (
     completed_law,
     contact_projector,
-    crossing,
+    event_crossing,
     field_of,
     gap_of,
     impact_of,
@@ -78,7 +79,7 @@ def saltation_parts(
     x = jnp.asarray(state_before, dtype=jnp.float64)
     field = system.vector_field
     law, gap = impact_of(system, constraint), gap_of(system, constraint)
-    regular, moved, normal, speed = crossing(law, gap, field, field, t, x)
+    regular, moved, normal, speed = event_crossing(law, gap, field, field, t, x)
     return SaltationParts(regular, jnp.outer(moved, normal), speed)
 
 
@@ -97,9 +98,9 @@ def saltation_into_contact(
     """
     t = jnp.asarray(t, dtype=jnp.float64)
     x = jnp.asarray(state_before, dtype=jnp.float64)
-    number = jnp.atleast_1d(system.gap(t, x)).shape[0]
+    number = gaps(system, t, x).shape[0]
     contact = jnp.arange(number) == constraint
-    law_x, moved, normal, speed = crossing(
+    law_x, moved, normal, speed = event_crossing(
         completed_law(system, constraint),
         gap_of(system, constraint),
         system.vector_field,
@@ -125,7 +126,7 @@ def saltation_at_release(
     """
     t = jnp.asarray(t, dtype=jnp.float64)
     x = jnp.asarray(state, dtype=jnp.float64)
-    number = jnp.atleast_1d(system.gap(t, x)).shape[0]
+    number = gaps(system, t, x).shape[0]
     return contact_projector(system, t, x, jnp.arange(number) == constraint)
 
 

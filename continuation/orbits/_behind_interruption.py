@@ -18,9 +18,10 @@ from jaxcam.hybrid import HybridSystem
 from variational.chatter import next_impact, orbit_from, prepared_frame
 from variational.orbits import steps_for
 
+from .._context import Context
 from .._parameter import with_leaf
 from .._program import correct
-from .._settings import Settings
+from .._settings import BranchSettings
 from ..problem import Start
 from ._shooting import ImpactingOrbits
 
@@ -39,9 +40,9 @@ def orbit_behind(point: Any, periods: int) -> Start | None:
     `point` is the interruption, its tangent pointing to where the branch goes; the
     orbit repeats after so many `periods` of the forcing.
     """
-    width = np.asarray(point.scale[-1])
+    width = float(point.scale[-1])
     sense = 1.0 if point.tangent[-1] >= 0 else -1.0
-    distances = float(width) * 2.0 ** np.arange(_NEAREST, 1)
+    distances = width * 2.0 ** np.arange(_NEAREST, 1)
     values = point.parameter + sense * distances
     rows, counts, slowest = (
         np.asarray(found)
@@ -96,10 +97,12 @@ def _from_release(parameters: HybridSystem, leaf: int, values, periods: int):
 
 
 def _closed_up(
-    periods: int, point: Any, value: float, rows, sense: float, width
+    periods: int, point: Any, value: float, rows, sense: float, width: float
 ) -> Start | None:
     """The periodic orbit near the motion from release, and where the branch leaves."""
-    parameters = with_leaf(point.problem.parameters, point.leaf, np.asarray(value))
+    # an array of JAX: the period is asked of it outside of a program
+    moved = jnp.asarray(value, jnp.float64)
+    parameters = with_leaf(point.problem.parameters, point.leaf, moved)
     count = len(rows)
     length = float(parameters.period)
     starts = rows * np.array([length, 1.0, 1.0])
@@ -109,10 +112,11 @@ def _closed_up(
     except ValueError:
         return None
     orbits = ImpactingOrbits(parameters, (0,) * count, periods, 2, steps)
+    context = Context(point.leaf, width, BranchSettings())
     z = np.append(rows.ravel(), value)
     across = np.zeros_like(z)
     across[-1] = 1.0
-    at = correct(orbits, point.leaf, z, across, across, width, Settings())
+    at = correct(orbits, context, z, across, across)
     if not at.success or orbits.refused(at.monitors, at.observed):
         return None
     if not np.all(np.isfinite(at.tangent)):

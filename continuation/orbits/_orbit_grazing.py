@@ -9,10 +9,11 @@ import numpy as np
 
 from variational.orbits import lowest_times
 
-from .._parameter import as_arrays
+from .._context import Context
+from .._parameter import as_arguments
 from .._point import set_parameters
 from .._program import evaluate
-from .._settings import Settings
+from .._settings import BranchSettings
 from ..problem import Start
 from ._signature import with_impact, without_impact
 from ._watched import Watched, watched_of
@@ -42,9 +43,8 @@ def orbit_grazing(problem: Any, point: Any) -> Start | None:
     u = jnp.asarray(point.state)
     parameters = point.problem.parameters
     z = np.append(point.state, point.parameter)
-    at = evaluate(
-        problem, point.leaf, z, np.ones_like(z), np.asarray(point.scale[-1]), Settings()
-    )
+    context = Context(point.leaf, float(point.scale[-1]), BranchSettings())
+    at = evaluate(problem, context, z, np.ones_like(z))
     m = len(problem.constraints)
     values = {w: abs(float(at.monitors[name])) for name, w in watched_of(m).items()}
     zero = min(values, key=values.__getitem__)
@@ -66,29 +66,29 @@ def orbit_grazing(problem: Any, point: Any) -> Start | None:
         )
         watched = Watched("speed", number + 1 if m else 0)
     changed = problem.of(parameters, equations)
-    changed = set_parameters(changed, as_arrays(changed.parameters, point.leaf))
-    tangent = _direction(changed, np.asarray(state), point, watched.name)
+    changed = set_parameters(changed, as_arguments(changed.parameters, point.leaf))
+    tangent = _direction(changed, context, np.asarray(state), point, watched.name)
     if tangent is None:
         return None
     return Start(changed, state, float(point.parameter), tangent)
 
 
-def _direction(problem, u, point: Any, watched: str) -> np.ndarray | None:
+def _direction(
+    problem, context: Context, u, point: Any, watched: str
+) -> np.ndarray | None:
     """The direction of the branch in which a monitor grows.
 
     By the program that the branch goes on with; only the sign of the slope is wanted,
     for which differences do.
     """
     z = np.append(u, point.parameter)
-    one, width, settings = np.ones_like(z), np.asarray(point.scale[-1]), Settings()
-    at = evaluate(problem, point.leaf, z, one, width, settings)
+    one = np.ones_like(z)
+    at = evaluate(problem, context, z, one)
     if not np.all(np.isfinite(at.jacobian)):
         return None
     tangent = np.linalg.svd(at.jacobian)[2][-1]
     ahead, behind = (
-        evaluate(
-            problem, point.leaf, z + sign * _NUDGE * tangent, one, width, settings
-        ).monitors[watched]
+        evaluate(problem, context, z + sign * _NUDGE * tangent, one).monitors[watched]
         for sign in (1, -1)
     )
     slope = float(ahead - behind)

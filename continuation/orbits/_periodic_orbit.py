@@ -17,7 +17,7 @@ from variational import Orbit, orbit_of
 from variational.orbits import flown, gap_sizes, refuse, seed, Shooting
 
 from .._program import solve
-from .._settings import Settings as WalkSettings
+from .._settings import BranchSettings
 from ._shooting import ImpactingOrbits
 
 
@@ -176,11 +176,11 @@ def _somewhere(system, t0):
     state = jnp.zeros(n)
     time = jnp.asarray(float(t0))
     for _ in range(20):
-        gap = jnp.atleast_1d(system.gap(time, state))
+        gap = gaps(system, time, state)
         which = int(jnp.argmin(gap))
         if float(gap[which]) >= 0:
             return np.asarray(state)
-        slope = jax.grad(lambda x, w=which: jnp.atleast_1d(system.gap(time, x))[w])
+        slope = jax.grad(lambda x, w=which: gaps(system, time, x)[w])
         normal = slope(state)
         state = state - 1.001 * gap[which] * normal / jnp.sum(normal * normal)
     raise ValueError("no state outside the constraints was found; give a guess")
@@ -240,7 +240,7 @@ def _with_impacts_of(system, turn, number, t0, settings):
     except ValueError as error:
         return None, str(error)
     problem = ImpactingOrbits.of(system, equations)
-    u, success, _ = solve(problem, u, WalkSettings(tolerance=1e-11))
+    u, success, _ = solve(problem, u, BranchSettings(tolerance=1e-11))
     if not success:
         return None, (
             f"Newton's method on the {len(problem.constraints)} impacts of the motion "

@@ -27,7 +27,7 @@ from variational.chatter import (
 )
 from variational.orbits import flight_end
 
-from ..problem import AbstractProblem, Monitor, Stability, Start
+from ..problem import AbstractProblem, Monitor, StabilityKind, Start
 from ._behind_interruption import orbit_behind
 from ._shooting import ImpactingOrbits
 
@@ -66,7 +66,7 @@ class StickingOrbits(AbstractProblem):
     - `beyond`: whether to go on behind an interruption; else it ends the branch.
     """
 
-    stability: ClassVar[Stability] = "map"
+    stability: ClassVar[StabilityKind] = "map"
     normal_forms: ClassVar[bool] = False
     detects: ClassVar[bool] = False
 
@@ -151,16 +151,11 @@ class StickingOrbits(AbstractProblem):
         return f"sticks once in {self.periods} periods"
 
     def with_signature(self, signature: str) -> AbstractProblem:
-        if signature == self.signature:
-            return self
         if signature.startswith("impacts"):
             # a branch that has gone on behind the interruption
             orbits = ImpactingOrbits(self.parameters, (), self.periods, 2)
             return orbits.with_signature(signature)
-        raise ValueError(
-            f"the saved branch has signature {signature!r}, this problem "
-            f"{self.signature!r}; take it up with the problem it was made with"
-        )
+        return super().with_signature(signature)
 
 
 def _stroboscopic(system, turn: ChatterOrbit, periods: int) -> Float[Array, "m n"]:

@@ -12,7 +12,7 @@ from jaxcam.hybrid import HybridSystem
 from variational import orbits
 from variational.orbits import inadmissible, Shooting
 
-from ..problem import AbstractProblem, LocalDynamics, Monitor, Stability, Start
+from ..problem import AbstractProblem, LocalDynamics, Monitor, StabilityKind, Start
 from ..special import FLIP
 from ._impact_sequences import ImpactSequences
 from ._orbit_grazing import orbit_grazing
@@ -40,7 +40,7 @@ class ImpactingOrbits(AbstractProblem):
     - `steps`: Runge-Kutta steps of order eight in each flight.
     """
 
-    stability: ClassVar[Stability] = "map"
+    stability: ClassVar[StabilityKind] = "map"
     costly: ClassVar[bool] = True
 
     parameters: HybridSystem
@@ -213,13 +213,10 @@ class ImpactingOrbits(AbstractProblem):
         hits = ".".join(map(str, self.constraints)) or "-"
         return f"impacts {hits} periods {self.periods} steps {self.steps}"
 
-    def with_signature(self, signature: str) -> "ImpactingOrbits":
+    def with_signature(self, signature: str) -> AbstractProblem:
         words = signature.split()
         if words[0::2] != ["impacts", "periods", "steps"]:
-            raise ValueError(
-                f"the saved branch has signature {signature!r}, which is no sequence "
-                "of impacts; take it up with the problem it was made with"
-            )
+            return super().with_signature(signature)
         hits = () if words[1] == "-" else tuple(map(int, words[1].split(".")))
         periods, steps = int(words[3]), int(words[5])
         return ImpactingOrbits(self.parameters, hits, periods, self.dimension, steps)

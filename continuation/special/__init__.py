@@ -1,10 +1,9 @@
 """Special points of a branch: seen, located, and their normal forms."""
 
-from ._extended import varied as varied
+from ._extended import AbstractExtended as AbstractExtended, varied as varied
 from ._locate import (
     ahead as ahead,
-    between as between,
-    Context as Context,
+    cubic_between as cubic_between,
     locate as locate,
     Located as Located,
     pair_is_complex as pair_is_complex,

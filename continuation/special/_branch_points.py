@@ -10,10 +10,10 @@ from jaxtyping import Array, Float, PyTree
 
 from jaxcam.parameters import AnyArray
 
+from .._context import Context
 from .._parameter import with_leaf
 from .._program import evaluate, residual_at, solve
-from .._settings import Settings
-from ..problem import AbstractProblem, jacobian_of, Stability
+from ..problem import AbstractProblem, jacobian_of, StabilityKind
 
 
 # displacement for the second derivatives of the correction, of unknowns of size one:
@@ -36,7 +36,7 @@ class BranchPoints(AbstractProblem):
     base: AbstractProblem
     leaf: int = eqx.field(static=True)
     width: AnyArray
-    stability: ClassVar[Stability] = "none"
+    stability: ClassVar[StabilityKind] = "none"
 
     @property
     def parameters(self) -> PyTree:
@@ -67,23 +67,23 @@ _crossing: Any = BranchPoints
 
 
 def solved_crossing(
-    problem: AbstractProblem, leaf: int, width: float, guess, settings: Settings
+    problem: AbstractProblem, context: Context, guess
 ) -> tuple[np.ndarray, bool]:
     """The branch point near z = (u, parameter), by Newton's method with its second
     derivatives, and whether it is one."""
-    at = _at(problem, leaf, width, guess, settings)
+    at = _at(problem, context, guess)
     if not np.all(np.isfinite(at.jacobian)):
         return guess, False
     left, _, _ = np.linalg.svd(at.jacobian * at.scale[None, :])
-    extended = _crossing(problem, leaf, np.asarray(width))
+    extended = _crossing(problem, context.leaf, np.asarray(context.width))
     u = np.concatenate([guess, [0.0], left[:, -1]])
-    value, success, _ = solve(extended, u, settings)
+    value, success, _ = solve(extended, u, context.settings)
     k = guess.size
-    return value[:k], success and _solves(value[k], settings)
+    return value[:k], success and _solves(value[k], context)
 
 
 def differenced_crossing(
-    problem: AbstractProblem, leaf: int, width: float, guess, settings: Settings
+    problem: AbstractProblem, context: Context, guess
 ) -> tuple[np.ndarray, bool]:
     """The same with differences of Jacobians, by the program of the corrector.
 
@@ -91,7 +91,7 @@ def differenced_crossing(
     to the branch point, where bracketing ends because the equations are singular.
     """
     guess = np.asarray(guess, float)
-    at = _at(problem, leaf, width, guess, settings)
+    at = _at(problem, context, guess)
     if not np.all(np.isfinite(at.jacobian)):
         return guess, False
     # rows and columns scaled as the corrector does it
@@ -99,7 +99,7 @@ def differenced_crossing(
     rows = scale[:-1, None]
 
     def jacobian(y):
-        found = _at(problem, leaf, width, y * scale, settings)
+        found = _at(problem, context, y * scale)
         return found.jacobian * scale[None, :] / rows
 
     y, psi, slack = guess / scale, np.linalg.svd(jacobian(guess / scale))[0][:, -1], 0.0
@@ -109,7 +109,7 @@ def differenced_crossing(
     ).T
     for _ in range(_MOST):
         j = jacobian(y)
-        g = np.asarray(_residual(problem, leaf, y * scale)) / rows[:, 0]
+        g = np.asarray(_residual(problem, context.leaf, y * scale)) / rows[:, 0]
         wrong = np.concatenate([g + slack * psi, j.T @ psi, [psi @ psi - 1.0]])
         matrix = np.zeros((2 * n + 2, 2 * n + 2))
         matrix[:n, : n + 1], matrix[:n, n + 1] = j, psi
@@ -121,18 +121,18 @@ def differenced_crossing(
         change = np.linalg.lstsq(matrix, -wrong, rcond=None)[0]
         y, slack = y + change[: n + 1], slack + float(change[n + 1])
         psi = psi + change[n + 2 :]
-        if np.linalg.norm(change[: n + 1]) <= settings.tolerance:
-            return y * scale, _solves(slack, settings)
+        if np.linalg.norm(change[: n + 1]) <= context.settings.tolerance:
+            return y * scale, _solves(slack, context)
     return y * scale, False
 
 
-def _solves(slack, settings: Settings) -> bool:
+def _solves(slack, context: Context) -> bool:
     """Whether the point solves the equations, and not only those with slack."""
-    return bool(abs(slack) <= max(settings.tolerance, _SLACK))
+    return bool(abs(slack) <= max(context.settings.tolerance, _SLACK))
 
 
-def _at(problem, leaf: int, width, z, settings: Settings):
-    return evaluate(problem, leaf, z, np.ones_like(z), width, settings)
+def _at(problem, context: Context, z):
+    return evaluate(problem, context, z, np.ones_like(z))
 
 
 @eqx.filter_jit

@@ -8,7 +8,7 @@ from jaxtyping import Array, Float, PyTree
 
 from .._parameter import with_leaf
 from .._point import Point, replace
-from ..problem import AbstractProblem, jacobian_of, Stability
+from ..problem import AbstractProblem, jacobian_of, StabilityKind
 
 
 class AbstractExtended(AbstractProblem):
@@ -16,10 +16,11 @@ class AbstractExtended(AbstractProblem):
 
     base: eqx.AbstractVar[AbstractProblem]
     leaf: eqx.AbstractVar[int]
-    #: width of the bounds of the parameter that is an unknown here
-    width: eqx.AbstractVar[Array]
+    #: (2,) of the parameter that is an unknown here: the branch ends exactly on them
     bounds: eqx.AbstractVar[Array]
-    stability: ClassVar[Stability] = "none"
+    #: between these
+    width: eqx.AbstractVar[Array]
+    stability: ClassVar[StabilityKind] = "none"
     normal_forms: ClassVar[bool] = False
     detects: ClassVar[bool] = False
 
@@ -39,12 +40,6 @@ class AbstractExtended(AbstractProblem):
     def scale(self, u: Float[Array, " n"], parameters: PyTree):
         sizes = self.base.scale(*self.inside(u, parameters))
         return jnp.concatenate([sizes, jnp.reshape(self.width, (1,))])
-
-    def limits(self) -> dict[int, tuple[float, float]]:
-        return {
-            **self.base.limits(),
-            -1: (float(self.bounds[0]), float(self.bounds[1])),
-        }
 
     def check(self, point: Point) -> str | None:
         inner = point.inner(self.base, self.leaf)

@@ -5,8 +5,8 @@ from typing import Any, NamedTuple
 import jax.numpy as jnp
 import numpy as np
 
+from .._context import Context
 from .._program import correct, Corrected, solve
-from .._settings import Settings
 from ..problem import AbstractProblem
 from ._bialternate import determinant_on_plane, trace_on_plane
 from ._branch_points import differenced_crossing, solved_crossing
@@ -23,15 +23,6 @@ from ._test_functions import (
 
 # their `parameters` is a property, which type checkers take for an argument
 _singular: Any = SingularPoints
-
-
-class Context(NamedTuple):
-    """What stays the same along a branch."""
-
-    leaf: int
-    width: float
-    bounds: tuple[float, float]
-    settings: Settings
 
 
 class Located(NamedTuple):
@@ -63,11 +54,9 @@ def singular_points(
 def _newton(problem, name: str, context: Context, guess: np.ndarray):
     """Newton on the extended system: (z, success)."""
     if name == BRANCH_POINT:
-        return solved_crossing(
-            problem, context.leaf, context.width, guess, context.settings
-        )
+        return solved_crossing(problem, context, guess)
     if name in problem.monitors():
-        extended = monitor_level(problem, name, context.leaf, context.width)
+        extended = monitor_level(problem, name, context)
     else:
         extended = singular_points(problem, name, context, guess)
     value, success, _ = solve(extended, guess, context.settings)
@@ -88,7 +77,7 @@ def locate(
     leaves the bracket, the bracket is shrunk with points of the branch first.
     """
     low, high = (a.z, values[0]), (b.z, values[1])
-    guess = between(a, b, values[0] / (values[0] - values[1]))
+    guess = cubic_between(a, b, values[0] / (values[0] - values[1]))
     choice = context.settings.localise
     newton = choice == "newton" or (choice == "auto" and not problem.costly)
     monitor = problem.monitors().get(name)
@@ -106,10 +95,7 @@ def locate(
         if length < context.settings.tolerance:
             break
         guess = _next_guess(low, high, attempt)
-        middle = correct(
-            problem, context.leaf, guess, chord / a.scale, a.tangent, context.width,
-            context.settings,
-        )  # fmt: skip
+        middle = correct(problem, context, guess, chord / a.scale, a.tangent)
         if not middle.success or not _inside(middle.z, low[0], high[0], a.scale):
             if name == BRANCH_POINT:
                 # the equations are singular there, and the corrector fails first
@@ -139,9 +125,7 @@ def _between_branches(
     guess: np.ndarray,
 ) -> Located:
     """The branch point near where bracketing has come to its end."""
-    z, success = differenced_crossing(
-        problem, context.leaf, context.width, guess, context.settings
-    )
+    z, success = differenced_crossing(problem, context, guess)
     if success and _inside(z, a.z, b.z, a.scale):
         return Located(z, True, "")
     return Located(
@@ -161,7 +145,7 @@ def _next_guess(low, high, attempt: int) -> np.ndarray:
     return low[0] + share * (high[0] - low[0])
 
 
-def between(a: Corrected, b: Corrected, share: float) -> np.ndarray:
+def cubic_between(a: Corrected, b: Corrected, share: float) -> np.ndarray:
     """Cubic through two points and their tangents."""
     if not np.isfinite(share):
         share = 0.5
@@ -198,7 +182,7 @@ def ahead(
     z, level, failures = a.z, value, 0
 
     def reached(target: float):
-        extended = monitor_level(problem, name, context.leaf, context.width, target)
+        extended = monitor_level(problem, name, context, target)
         found, success, _ = solve(extended, z, context.settings)
         way = (found - a.z) / a.scale
         forward = float(way @ (a.tangent / a.scale)) > 0

@@ -9,8 +9,9 @@ from jaxtyping import Array, Float, PyTree
 
 from jaxcam.parameters import AnyArray
 
+from .._context import Context
 from .._parameter import with_leaf
-from ..problem import AbstractProblem, Monitor, Stability
+from ..problem import AbstractProblem, Monitor, StabilityKind
 from ._extended import AbstractExtended
 
 
@@ -22,7 +23,7 @@ class MonitorPoints(AbstractExtended):
     leaf: int = eqx.field(static=True)
     width: AnyArray
     bounds: AnyArray
-    stability: ClassVar[Stability] = "none"
+    stability: ClassVar[StabilityKind] = "none"
 
     def residual(self, u: Float[Array, " n"], parameters: PyTree):
         inner, inside = self.inside(u, parameters)
@@ -61,7 +62,7 @@ class MonitorLevel(AbstractProblem):
     width: AnyArray
     number: int | AnyArray
     level: AnyArray
-    stability: ClassVar[Stability] = "none"
+    stability: ClassVar[StabilityKind] = "none"
 
     @property
     def parameters(self) -> PyTree:
@@ -86,11 +87,13 @@ _level: Any = MonitorLevel
 
 
 def monitor_level(
-    problem: AbstractProblem, name: str, leaf: int, width, level: float = 0.0
+    problem: AbstractProblem, name: str, context: Context, level: float = 0.0
 ) -> MonitorLevel:
     """The problem of the point where a monitor has this value."""
     monitors = problem.monitors()
     number: Any = list(monitors).index(name)
     if not any(monitor.bracket for monitor in monitors.values()):
         number = np.asarray(number)
-    return _level(problem, leaf, np.asarray(width), number, np.asarray(level))
+    return _level(
+        problem, context.leaf, np.asarray(context.width), number, np.asarray(level)
+    )

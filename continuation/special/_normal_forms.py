@@ -1,5 +1,6 @@
 """Normal-form coefficients at special points (Kuznetsov, chapters 3 to 5)."""
 
+from collections.abc import Callable
 from typing import Any
 
 import equinox as eqx
@@ -7,9 +8,9 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from .._context import Context
 from .._parameter import with_leaf
 from .._program import Corrected, evaluate
-from .._settings import Settings
 from ..problem import AbstractProblem
 from ._differences import along, STEPS
 from ._multilinear import second, third
@@ -55,14 +56,13 @@ class _Derivatives:
     differences of Jacobians.
     """
 
-    def __init__(
-        self, problem: AbstractProblem, leaf: int, z: np.ndarray, settings: Settings
-    ):
+    def __init__(self, problem: AbstractProblem, context: Context, z: np.ndarray):
         self.problem = problem
-        self.leaf = leaf
-        self.settings = settings
+        self.context = context
         self.z = z
-        self.parameters = with_leaf(problem.parameters, leaf, jnp.asarray(z[-1]))
+        self.parameters = with_leaf(
+            problem.parameters, context.leaf, jnp.asarray(z[-1])
+        )
         self.u = jnp.asarray(z[:-1])
 
     def a(self, at: Corrected) -> np.ndarray:
@@ -132,18 +132,29 @@ class _Derivatives:
         return np.stack(
             [
                 evaluate(
-                    self.problem, self.leaf, self.z + np.append(move, 0.0), one, 1.0,
-                    self.settings,
+                    self.problem, self.context, self.z + np.append(move, 0.0), one
                 ).jacobian[:, :n]
                 for move in moves
             ]
-        )  # fmt: skip
+        )
 
 
-def _eigen(matrix: np.ndarray) -> tuple[Any, Any]:
-    """Complex eigenvalues and eigenvectors."""
-    values, vectors = np.linalg.eig(matrix)
-    return values.astype(complex), vectors.astype(complex)
+def _critical_pair(a: np.ndarray, distance: Callable) -> tuple[Any, Any] | None:
+    """The eigenvalue of a complex pair that has the least distance, and its unit
+    eigenvector; None where there is no such pair."""
+    found: Any = np.linalg.eig(a)
+    values, vectors = (x.astype(complex) for x in found)
+    critical = values.imag > 0
+    if not np.any(critical):
+        return None
+    k = int(np.argmin(np.where(critical, distance(values), np.inf)))
+    return values[k], vectors[:, k] / np.linalg.norm(vectors[:, k])
+
+
+def _adjoint(matrix: np.ndarray, q: np.ndarray) -> np.ndarray:
+    """The left null vector p with <p, q> = 1."""
+    _, p = null_vectors(matrix)
+    return p / np.conj(np.vdot(p, q))
 
 
 def null_vectors(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -193,17 +204,14 @@ def flip_form(d: _Derivatives, at: Corrected) -> tuple[float | None, str]:
 def hopf_form(d: _Derivatives, at: Corrected) -> tuple[float | None, str]:
     """First Lyapunov coefficient; negative: the limit cycle is stable."""
     a = d.a(at)
-    values, vectors = _eigen(a)
-    critical = values.imag > 0
-    if not np.any(critical):
-        return None, ""
-    k = int(np.argmin(np.where(critical, np.abs(values.real), np.inf)))
-    omega = float(values[k].imag)
-    q = vectors[:, k] / np.linalg.norm(vectors[:, k])
-    _, p = null_vectors(a - 1j * omega * np.eye(a.shape[0]))
-    p = p / np.conj(np.vdot(p, q))
-    qc = q.conj()
     one = np.eye(a.shape[0])
+    pair = _critical_pair(a, lambda values: np.abs(values.real))
+    if pair is None:
+        return None, ""
+    value, q = pair
+    omega = float(value.imag)
+    p = _adjoint(a - 1j * omega * one, q)
+    qc = q.conj()
     total = (
         np.vdot(p, d.c(q, q, qc))
         - 2 * np.vdot(p, d.b(q, np.linalg.solve(a + 0j, d.b(q, qc))))
@@ -216,16 +224,13 @@ def hopf_form(d: _Derivatives, at: Corrected) -> tuple[float | None, str]:
 def neimark_sacker_form(d: _Derivatives, at: Corrected) -> tuple[float | None, str]:
     """Real part of the cubic coefficient; negative: the invariant curve is stable."""
     a = d.a(at)
-    values, vectors = _eigen(a)
-    critical = values.imag > 0
-    if not np.any(critical):
-        return None, ""
-    k = int(np.argmin(np.where(critical, np.abs(np.abs(values) - 1), np.inf)))
-    turn = values[k] / abs(values[k])
-    q = vectors[:, k] / np.linalg.norm(vectors[:, k])
     one = np.eye(a.shape[0])
-    _, p = null_vectors(a - turn * one)
-    p = p / np.conj(np.vdot(p, q))
+    pair = _critical_pair(a, lambda values: np.abs(np.abs(values) - 1))
+    if pair is None:
+        return None, ""
+    value, q = pair
+    turn = value / abs(value)
+    p = _adjoint(a - turn * one, q)
     qc = q.conj()
     total = (
         np.vdot(p, d.c(q, q, qc))
@@ -247,16 +252,15 @@ _FORMS = {
 def normal_form(
     kind: str,
     problem: AbstractProblem,
-    leaf: int,
+    context: Context,
     z: np.ndarray,
     at: Corrected,
-    settings: Settings,
 ) -> tuple[float | None, str]:
     """Normal-form coefficient of a special point, and what its sign says."""
     if kind not in _FORMS or (kind != FOLD and not problem.normal_forms):
         return None, ""
     try:
-        coefficient, words = _FORMS[kind](_Derivatives(problem, leaf, z, settings), at)
+        coefficient, words = _FORMS[kind](_Derivatives(problem, context, z), at)
     except np.linalg.LinAlgError:
         return None, ""
     if coefficient is not None and not np.isfinite(coefficient):

@@ -11,7 +11,7 @@ from jaxcam.parameters import AnyArray
 
 from .._parameter import with_leaf
 from .._point import set_parameters, with_field
-from ..problem import AbstractProblem, jacobian_of, Monitor, Stability
+from ..problem import AbstractProblem, jacobian_of, Monitor, StabilityKind
 from ._bialternate import (
     additive,
     determinant_on_plane,
@@ -69,7 +69,7 @@ class SingularPoints(AbstractExtended):
     bounds: AnyArray
     b: AnyArray
     c: AnyArray
-    stability: ClassVar[Stability] = "none"
+    stability: ClassVar[StabilityKind] = "none"
 
     def _matrix(self, u, parameters):
         inner, parameters = self.inside(u, parameters)

@@ -38,7 +38,7 @@ class Axis(NamedTuple):
         return ("speed", "rpm") if self.in_rpm else (self.parameter, "-")
 
 
-def ordered(low: float | None, high: float | None) -> tuple[float, float]:
+def ordered_bounds(low: float | None, high: float | None) -> tuple[float, float]:
     """`--from` and `--to`, both given and in order. **Raises:** `ValueError`."""
     if low is None or high is None:
         raise ValueError(

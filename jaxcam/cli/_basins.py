@@ -9,9 +9,9 @@ from ._basins_options import Cells
 from ._checks import check_resume
 from ._choices import CAM
 from ._grouped import grouped
-from ._options import JsonFile, Preset, Resume, Settings, Speed, System
+from ._options import Assignments, JsonFile, Preset, Resume, Speed, System
 from ._source import Source
-from ._sweep import show, Where
+from ._sweep import Execution, show
 
 
 _FILE = "basins.zarr"
@@ -24,8 +24,8 @@ def basins(
     speed: Speed = None,
     source: Source = Source(),
     preset: Preset = None,
-    set_: Settings = None,
-    where: Where = Where(),
+    set_: Assignments = None,
+    where: Execution = Execution(),
     json_file: JsonFile = None,
     out: Annotated[
         Path | None,

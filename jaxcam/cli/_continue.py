@@ -8,9 +8,9 @@ import typer
 from ._axis import Axis
 from ._checks import check_resume
 from ._choices import CAM
-from ._continue_options import ALGORITHMS, Along, DIRECTIONS, Following
+from ._continue_options import ALGORITHMS, BranchRange, DIRECTIONS, Following
 from ._grouped import grouped
-from ._options import JsonFile, Preset, Resume, Settings, System
+from ._options import Assignments, JsonFile, Preset, Resume, System
 from ._source import Source
 
 
@@ -20,10 +20,10 @@ _FILE = "branch.jsonl"
 @grouped
 def continue_(
     system: System = CAM,
-    along: Along = Along(),
+    along: BranchRange = BranchRange(),
     preset: Preset = None,
     source: Source = Source(),
-    set_: Settings = None,
+    set_: Assignments = None,
     following: Following = Following(),
     json_file: JsonFile = None,
     out: Annotated[
@@ -52,7 +52,7 @@ def continue_(
 
     from ._cache import keep_compiled_programs
     from ._output import Output
-    from ._parameters import make_model, parameters, pick
+    from ._parameters import make_model, parameters, pick_by_name
     from ._progress import progress
 
     keep_compiled_programs()
@@ -70,10 +70,10 @@ def continue_(
         branch = continuation.branch(
             start.problem,
             start,
-            pick(along.parameter),
+            pick_by_name(along.parameter),
             (axis.unit * low, axis.unit * high),
             getattr(continuation, ALGORITHMS[following.algorithm])(),
-            settings=continuation.Settings(max_points=following.max_points),
+            settings=continuation.BranchSettings(max_points=following.max_points),
             direction=DIRECTIONS[following.direction],
             callbacks=[show],
             out=None if out is None else out / _FILE,
@@ -111,7 +111,7 @@ def _refuse_interrupted(path: Path) -> None:
 
     for file in (path, path.with_suffix(f".back{path.suffix}")):
         try:
-            points = continuation.load(file).points if file.is_file() else ()
+            points = continuation.load_branch(file).points if file.is_file() else ()
         except ValueError:
             # no branch, so nothing is lost
             continue

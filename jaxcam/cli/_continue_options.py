@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from ._axis import Axis, ordered
+from ._axis import Axis, ordered_bounds
 from ._checks import at_least, numbers
 from ._choices import choose
 from ._options import Highest, Lowest
@@ -20,7 +20,7 @@ DIRECTIONS = {"up": 1, "down": -1, "both": "both"}
 
 
 @dataclasses.dataclass(frozen=True)
-class Along:
+class BranchRange:
     """The parameter, its bounds, and where the branch starts."""
 
     parameter: Annotated[
@@ -43,7 +43,7 @@ class Along:
     @property
     def bounds(self) -> tuple[float, float]:
         """Lowest and highest value."""
-        return ordered(self.low, self.high)
+        return ordered_bounds(self.low, self.high)
 
     def started(self, model, axis: Axis):
         """The system with the parameter at its first value.
@@ -53,7 +53,7 @@ class Along:
         import equinox as eqx
         import jax.numpy as jnp
 
-        from ._parameters import parameters, pick
+        from ._parameters import parameters, pick_by_name
 
         name, (low, high) = self.parameter, self.bounds
         known = {k: v for k, v in parameters(model).items() if not isinstance(v, list)}
@@ -69,7 +69,7 @@ class Along:
                 f"{high:g}; choose the start with --at, or other bounds."
             )
         first = jnp.asarray(axis.unit * value, dtype=float)
-        return eqx.tree_at(pick(name), model, first)
+        return eqx.tree_at(pick_by_name(name), model, first)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -16,7 +16,7 @@ from ._rests import rest_table, Rests, rests, simulate_run
 
 
 @dataclasses.dataclass(frozen=True)
-class Result:
+class DemoResult:
     """Recordings beside the simulation of their rig, and what that lacks."""
 
     case: str
@@ -28,7 +28,7 @@ class Result:
     branches: Branches | None = None
 
 
-def compared(runs, nominal: Rig, folder: Path, report) -> Result:
+def compared(runs, nominal: Rig, folder: Path, report) -> DemoResult:
     """Cut the runs, simulate their flights and the whole rig, and draw all that."""
     segments = segment_case(tuple(runs), nominal)
     parts, simulated = [], []
@@ -42,10 +42,10 @@ def compared(runs, nominal: Rig, folder: Path, report) -> Result:
     found = [rests(run, motion) for run, motion in zip(segments, simulated)]
     report("drawing", None)
     figures = draw(folder, segments, comparison, simulated)
-    return Result(runs.name, segments, comparison, found, figures)
+    return DemoResult(runs.name, segments, comparison, found, figures)
 
 
-def write_result(folder: Path, found: Result) -> dict[str, Any]:
+def write_result(folder: Path, found: DemoResult) -> dict[str, Any]:
     """Write index.html and result.json; what is in the latter."""
     lacks, branches = found.lacks, found.branches
     result = {
@@ -81,7 +81,7 @@ def write_result(folder: Path, found: Result) -> dict[str, Any]:
     return result
 
 
-def print_result(output: Output, found: Result) -> None:
+def print_result(output: Output, found: DemoResult) -> None:
     """Tables and sentences for the terminal."""
     for run in found.segments:
         output.print(run.sentence())

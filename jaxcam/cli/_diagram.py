@@ -10,9 +10,9 @@ from ._checks import check_resume
 from ._choices import CAM
 from ._diagram_options import Starts, Sweep
 from ._grouped import grouped
-from ._options import JsonFile, Preset, Resume, Settings, System
+from ._options import Assignments, JsonFile, Preset, Resume, System
 from ._source import Source
-from ._sweep import show, Where
+from ._sweep import Execution, show
 
 
 _FILE = "diagram.zarr"
@@ -25,8 +25,8 @@ def diagram(
     starts: Starts = Starts(),
     source: Source = Source(),
     preset: Preset = None,
-    set_: Settings = None,
-    where: Where = Where(),
+    set_: Assignments = None,
+    where: Execution = Execution(),
     json_file: JsonFile = None,
     out: Annotated[
         Path | None,

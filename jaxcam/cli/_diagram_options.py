@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from ._axis import ordered
+from ._axis import ordered_bounds
 from ._checks import at_least, check_size, numbers
 from ._choices import choose
 from ._options import Highest, Lowest
@@ -58,7 +58,7 @@ class Sweep:
         """**Raises:** `ValueError` that names the option at fault."""
         choose("--direction", self.direction, DIRECTIONS)
         choose("--section", self.section, SECTIONS)
-        ordered(self.low, self.high)
+        ordered_bounds(self.low, self.high)
         at_least("--points", self.points, 1)
         at_least("--keep", self.keep, 1)
         at_least("--turns", self.turns, self.keep)
@@ -66,7 +66,7 @@ class Sweep:
     @property
     def bounds(self) -> tuple[float, float]:
         """Lowest and highest value."""
-        return ordered(self.low, self.high)
+        return ordered_bounds(self.low, self.high)
 
     @property
     def seconds(self) -> tuple[float, ...] | None:

@@ -29,7 +29,7 @@ Preset: TypeAlias = Annotated[
     str | None,
     typer.Option(metavar="NAME", help="The cam-follower: table-4.4 or calibrated."),
 ]
-Settings: TypeAlias = Annotated[
+Assignments: TypeAlias = Annotated[
     list[str] | None,
     typer.Option(
         "--set",

@@ -31,7 +31,7 @@ def make_model(
 
     **Raises:** `ValueError` that names the fix.
     """
-    return set_parameters(make_system(name, preset, rpm, source), assignments or ())
+    return assign_parameters(make_system(name, preset, rpm, source), assignments or ())
 
 
 def parameters(system: HybridSystem) -> dict[str, float]:
@@ -39,7 +39,7 @@ def parameters(system: HybridSystem) -> dict[str, float]:
     return {name: _plain(leaf) for name, leaf in _leaves(system).items()}
 
 
-def set_parameters(system: HybridSystem, assignments: Sequence[str]) -> HybridSystem:
+def assign_parameters(system: HybridSystem, assignments: Sequence[str]) -> HybridSystem:
     """The system with `name=value` for some of its parameters.
 
     `restitution.r=0.6` gives a cam-follower a constant restitution.
@@ -61,11 +61,11 @@ def set_parameters(system: HybridSystem, assignments: Sequence[str]) -> HybridSy
                 f"are {', '.join(_names(system, leaves))}."
             )
         number = jnp.full_like(leaves[name], value)
-        system = eqx.tree_at(pick(name), system, number)
+        system = eqx.tree_at(pick_by_name(name), system, number)
     return system
 
 
-def pick(name: str) -> Callable[[Any], Any]:
+def pick_by_name(name: str) -> Callable[[Any], Any]:
     """What picks a parameter out of a system by its name, as `terms[0].c1`."""
 
     def where(system):

@@ -86,11 +86,11 @@ def _compute(names, preset, size, output, resume, several: bool) -> None:
     from ._errors import fail, STOPPED_EARLY
     from ._progress import progress
     from ._reproduce_page import write_page
-    from ._reproduce_record import by_other_code, earlier, make, Settings, write
+    from ._reproduce_record import by_other_code, earlier, make, Origin, write
 
     keep_compiled_programs()
     system = models.preset(preset)
-    settings = Settings.of(preset, size)
+    settings = Origin.of(preset, size)
     out = output.folder
     if resume and out is not None:
         changed = by_other_code(out, names, settings)

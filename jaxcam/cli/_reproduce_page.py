@@ -8,7 +8,7 @@ from pathlib import Path
 
 from ..thesis import TARGETS
 from ._page import figure_html, STYLE, table_html
-from ._reproduce_record import Record, Settings
+from ._reproduce_record import Origin, TargetRecord
 
 
 HEADINGS = ("quantity", "printed", "computed", "difference", "relative", "unit")
@@ -46,7 +46,7 @@ def cells(row) -> tuple[str, ...]:
 
 
 def write_page(
-    folder: Path, records: Sequence[Record], settings: Settings, of: int
+    folder: Path, records: Sequence[TargetRecord], settings: Origin, of: int
 ) -> Path:
     """Write `index.html`, replacing one that is there at once.
 
@@ -88,7 +88,7 @@ def _page(folder, records, settings, of) -> str:
     )
 
 
-def _overview(record: Record) -> tuple[str, ...]:
+def _overview(record: TargetRecord) -> tuple[str, ...]:
     title = TARGETS[record.name].title
     if record.error is not None:
         return record.name, title, "failed", "", f"{record.seconds:.0f} s"
@@ -99,7 +99,7 @@ def _overview(record: Record) -> tuple[str, ...]:
     return record.name, title, largest, str(compared), f"{record.seconds:.0f} s"
 
 
-def _section(folder: Path, record: Record) -> str:
+def _section(folder: Path, record: TargetRecord) -> str:
     target = TARGETS[record.name]
     parts = [f"<h2>{escape(record.name)}: {escape(target.title)}</h2>"]
     if record.error is not None:

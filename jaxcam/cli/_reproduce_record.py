@@ -20,7 +20,7 @@ _BROKEN = (OSError, ValueError, TypeError, LookupError, AttributeError, Recursio
 
 
 @dataclasses.dataclass(frozen=True)
-class Settings:
+class Origin:
     """What decides a result, besides its target."""
 
     version: str
@@ -30,18 +30,18 @@ class Settings:
     code: str
 
     @staticmethod
-    def of(preset: str, size: str) -> "Settings":
+    def of(preset: str, size: str) -> "Origin":
         from importlib.metadata import version
 
-        return Settings(version("jaxcam"), preset, size, source_mark())
+        return Origin(version("jaxcam"), preset, size, source_mark())
 
 
 @dataclasses.dataclass(frozen=True)
-class Record:
+class TargetRecord:
     """One target: its numbers and how long they took (s), or why there are none."""
 
     name: str
-    settings: Settings
+    settings: Origin
     seconds: float
     rows: list[dict[str, Any]]
     error: str | None = None
@@ -60,10 +60,10 @@ class Record:
 def make(
     name: str,
     system: CamFollower,
-    settings: Settings,
+    settings: Origin,
     out: Path | None,
     keep_going: bool,
-) -> Record:
+) -> TargetRecord:
     """Compute a target, and draw it where there is a folder for that.
 
     **Arguments:** `keep_going`: an exception becomes part of the record.
@@ -81,7 +81,7 @@ def make(
             raise
         error = f"{type(problem).__name__}: {problem}"
     seconds = time.perf_counter() - begin
-    return Record(name, settings, seconds, rows, error, drawn)
+    return TargetRecord(name, settings, seconds, rows, error, drawn)
 
 
 def _draw(name: str, system, size: str, out: Path) -> bool:
@@ -95,7 +95,7 @@ def _draw(name: str, system, size: str, out: Path) -> bool:
     return figure is not None
 
 
-def write(record: Record, out: Path | None) -> None:
+def write(record: TargetRecord, out: Path | None) -> None:
     """Store a record; a run that is killed leaves the old one or the new one."""
     if out is None:
         return
@@ -105,7 +105,7 @@ def write(record: Record, out: Path | None) -> None:
     os.replace(part, out / f"{record.name}.json")
 
 
-def earlier(out: Path, name: str, settings: Settings) -> Record | None:
+def earlier(out: Path, name: str, settings: Origin) -> TargetRecord | None:
     """The record of a run before with the same settings, if it is complete."""
     try:
         record = _read(out, name)
@@ -123,7 +123,7 @@ def earlier(out: Path, name: str, settings: Settings) -> Record | None:
     return dataclasses.replace(record, rows=rows)
 
 
-def by_other_code(out: Path, names: Iterable[str], settings: Settings) -> list[str]:
+def by_other_code(out: Path, names: Iterable[str], settings: Origin) -> list[str]:
     """The targets that were computed with the same settings, but by other code."""
     found = []
     for name in names:
@@ -137,10 +137,10 @@ def by_other_code(out: Path, names: Iterable[str], settings: Settings) -> list[s
     return found
 
 
-def _read(out: Path, name: str) -> Record:
+def _read(out: Path, name: str) -> TargetRecord:
     found = json.loads((out / f"{name}.json").read_text(encoding="utf-8"))
     # records of versions that had no mark are those of other code
-    found["settings"] = Settings(**{"code": "", **found["settings"]})
+    found["settings"] = Origin(**{"code": "", **found["settings"]})
     if found["name"] != name or not isinstance(found.get("figure", False), bool):
         raise ValueError("the record of another target, or damaged")
-    return Record(**{**found, "seconds": float(found["seconds"])})
+    return TargetRecord(**{**found, "seconds": float(found["seconds"])})

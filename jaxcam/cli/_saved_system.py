@@ -29,7 +29,7 @@ def as_saved(system: HybridSystem, about: dict[str, Any]) -> dict[str, Any]:
     return found if source is None else {**found, _SOURCE: source}
 
 
-def load(file: Path) -> HybridSystem:
+def load_saved(file: Path) -> HybridSystem:
     """The system in a file of `jaxcam fit` or `jaxcam diagnose`.
 
     The Python file that a system of a user's own comes from is run.

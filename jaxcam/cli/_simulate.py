@@ -7,8 +7,8 @@ import typer
 
 from ._choices import CAM, make_solver
 from ._grouped import grouped
-from ._options import JsonFile, Preset, Settings, Speed, System
-from ._simulate_options import Run
+from ._options import Assignments, JsonFile, Preset, Speed, System
+from ._simulate_options import RunOptions
 from ._source import Source
 
 
@@ -18,8 +18,8 @@ def simulate(
     source: Source = Source(),
     preset: Preset = None,
     speed: Speed = None,
-    set_: Settings = None,
-    run: Run = Run(),
+    set_: Assignments = None,
+    run: RunOptions = RunOptions(),
     json_file: JsonFile = None,
     out: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Write figures there.")

@@ -10,7 +10,7 @@ from ._choices import choose, ENGINES, ready, SOLVERS
 
 
 @dataclasses.dataclass(frozen=True)
-class Run:
+class RunOptions:
     """Where a motion starts, when it ends, and how it is integrated."""
 
     state: Annotated[

@@ -34,14 +34,14 @@ class Source:
         """
         from ..fitting import is_setup, read_setup
         from ..fitting.own_systems import stated_system, system_class
-        from ._saved_system import load
+        from ._saved_system import load_saved
 
         named = None if self.saved is None else str(self.saved)
         coded = named is not None and _is_code(named)
         if self.rig is None:
             assert self.saved is not None
             if not coded:
-                return load(self.saved)
+                return load_saved(self.saved)
             return stated_system(self.saved, system_class(str(self.saved)), {})
         if named is not None and not coded:
             raise ValueError(

@@ -21,10 +21,10 @@ def source_mark() -> str:
     """
     folders = [folder for name in _PACKAGES for folder in _folders(name)]
     versions = [f"{name} {_version(name)}" for name in _BENEATH]
-    return mark_of(folders, versions)
+    return source_hash(folders, versions)
 
 
-def mark_of(folders: list[Path], words: list[str]) -> str:
+def source_hash(folders: list[Path], words: list[str]) -> str:
     """Hash of all that Python reads in some folders: names, contents; and of words."""
     found = hashlib.sha256("\n".join(words).encode())
     for folder in folders:

@@ -15,7 +15,7 @@ from ._options import Cluster, Workers
 
 
 @dataclasses.dataclass(frozen=True)
-class Where:
+class Execution:
     """Where a sweep runs: threads here, or a cluster."""
 
     workers: Workers = None

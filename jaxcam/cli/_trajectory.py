@@ -137,7 +137,7 @@ def draw(trajectory: Trajectory, folder: Path) -> list[Path]:
     portrait = plotting.phase_portrait(trajectory, between=last(trajectory, _PORTRAIT))
     figures = {"time_history": history, "phase_portrait": portrait.figure}
     if int(trajectory.impacts.count) > 1:
-        figures["impact_map"] = plotting.impact_map(trajectory)
+        figures["impact_map"] = plotting.impact_return_map(trajectory)
     return [
         plotting.save_figure(figure, folder / f"{name}.png")  # pyright: ignore
         for name, figure in figures.items()

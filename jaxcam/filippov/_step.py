@@ -23,7 +23,7 @@ _CLOSE = 1e-5
 _RETAKES = 80
 
 
-class LoopState(NamedTuple):
+class FilippovState(NamedTuple):
     """A motion on its way."""
 
     t: Any
@@ -36,7 +36,7 @@ class LoopState(NamedTuple):
     status: Any
 
 
-class Row(NamedTuple):
+class StepRow(NamedTuple):
     """What an attempt has made: its kind, and time, state, mode and level after it."""
 
     kind: Any
@@ -59,8 +59,8 @@ def in_mode(system: FilippovSystem, mode, t, x, h):
 
 
 def attempt(
-    system: FilippovSystem, tolerance, t1, carried: LoopState
-) -> tuple[LoopState, Row]:
+    system: FilippovSystem, tolerance, t1, carried: FilippovState
+) -> tuple[FilippovState, StepRow]:
     """Try one step towards `t1`; a motion that has ended stays as it is."""
     active = carried.status == RUNNING
     wanted = jax.lax.stop_gradient(carried.step)
@@ -134,7 +134,7 @@ def attempt(
     def keep(new, old):
         return jnp.where(good, new, old)
 
-    moved = LoopState(
+    moved = FilippovState(
         t=keep(t2, carried.t),
         x=keep(landed, carried.x),
         mode=keep(mode2, carried.mode),
@@ -143,7 +143,7 @@ def attempt(
         failures=jnp.where(active, failures, carried.failures),
         status=jnp.where(active, status, carried.status),
     )
-    return moved, Row(kind, moved.t, moved.x, moved.mode, which)
+    return moved, StepRow(kind, moved.t, moved.x, moved.mode, which)
 
 
 def _dip(value0, slope0, value1, slope1):

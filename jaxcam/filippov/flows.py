@@ -7,7 +7,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..hybrid.lowering import while_loop
-from ._step import attempt, DONE, in_mode, LoopState, RUNNING
+from ._step import attempt, DONE, FilippovState, in_mode, RUNNING
 from ._system import FilippovSystem
 from .modes import first_mode
 
@@ -16,22 +16,22 @@ from .modes import first_mode
 CHUNK = 256
 
 
-def first_state(system: FilippovSystem, state, t0, t1) -> LoopState:
+def first_filippov_state(system: FilippovSystem, state, t0, t1) -> FilippovState:
     whole = t1 - t0
     step = jax.lax.stop_gradient(whole / 64)
     zero = jnp.zeros_like(t0)
-    return LoopState(
+    return FilippovState(
         t0, state, first_mode(system, t0, state), step, step, zero, zero + RUNNING
     )
 
 
 @eqx.filter_jit
-def start(system, state, t0, t1) -> LoopState:
-    return first_state(system, state, t0, t1)
+def start(system, state, t0, t1) -> FilippovState:
+    return first_filippov_state(system, state, t0, t1)
 
 
 @eqx.filter_jit
-def chunk(system, tolerance, t1, carried: LoopState):
+def chunk(system, tolerance, t1, carried: FilippovState):
     """Many attempts, with a row for each."""
 
     def one(carried, _):
@@ -56,7 +56,7 @@ def filippov_flow(
     reached within `max_steps` attempted steps.
     """
     t0, t1 = jnp.asarray(t0, dtype=float), jnp.asarray(t1, dtype=float)
-    carried = first_state(system, state, t0, t1)
+    carried = first_filippov_state(system, state, t0, t1)
     carried = jax.tree.map(jnp.asarray, carried)
 
     def running(carry):

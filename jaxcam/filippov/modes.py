@@ -1,20 +1,10 @@
 """What happens at the surface: crossing, sliding, and the field in force."""
 
-import enum
-
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ._system import FilippovSystem
-
-
-class Mode(enum.IntEnum):
-    """Which field is in force."""
-
-    BELOW = -1
-    SLIDING = 0
-    ABOVE = 1
 
 
 def surface_rates(
@@ -82,7 +72,7 @@ def region(system: FilippovSystem, t, state: Float[Array, " n"]) -> str:
 
 
 def mode_field(system: FilippovSystem, mode, t, state) -> Float[Array, " n"]:
-    """The field in force in a [`jaxcam.filippov.modes.Mode`][]."""
+    """The field in force: mode 1 above the surface, -1 below it, 0 sliding on it."""
     share = jnp.where(mode == 0, sliding_share(system, t, state), (mode + 1.0) / 2)
     return share * system.above(t, state) + (1 - share) * system.below(t, state)
 

@@ -15,7 +15,7 @@ from ._system import HybridSystem
 from ._types import RealScalar
 from .checks import check_system, is_traced, is_tracing
 from .codes import RUNNING
-from .loop import first_state, Functions, iterate, Plan
+from .loop import first_state, Functions, iteration, Plan
 from .lowering import depend_on, one_kernel, whole, with_kept
 
 
@@ -87,7 +87,7 @@ def _flow(system, settings, state, t0, t1, max_steps: int) -> Arrival:
     carried = first_state(functions, t0, x, t1, plan.longest_step, plan.repeat)
     carried = jax.tree.map(jnp.asarray, carried)
     body, kept = with_kept(
-        lambda carried: (iterate(functions, plan, carried)[0], jnp.zeros(())),
+        lambda carried: (iteration(functions, plan, carried)[0], jnp.zeros(())),
         carried,
         on=not settings.plain,
     )

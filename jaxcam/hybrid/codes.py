@@ -5,7 +5,7 @@ import enum
 import equinox as eqx
 
 
-class Row(enum.IntEnum):
+class RowKind(enum.IntEnum):
     """The kind of one row of the log."""
 
     NOTHING = 0

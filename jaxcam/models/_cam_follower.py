@@ -6,12 +6,11 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 
-from ..hybrid import HybridSystem
+from ._cam_driven import AbstractCamDriven
 from ._parameters import (
     parameter,
     require_finite,
     require_positive,
-    require_restitution,
 )
 from ._restitution import LinearInSpeed
 from ._units import rpm_to_rad_s
@@ -21,7 +20,7 @@ from .cams import CamProfile, EccentricCircle
 _SENSE = {"clockwise": -1.0, "counterclockwise": 1.0}
 
 
-class CamFollower(HybridSystem):
+class CamFollower(AbstractCamDriven):
     """A hinged follower, pressed by a spring onto a cam that turns at constant speed.
 
     The state is the follower's angle and velocity (rad, rad/s); the gap is the angle
@@ -87,16 +86,16 @@ class CamFollower(HybridSystem):
 
     def impact(self, t, state) -> jax.Array:
         """State after an impact: the relative velocity v becomes -r v. (6.111)"""
-        cam_angle = self.cam_angle(t)
-        cam_velocity = _SENSE[self.rotation] * self.speed
-        _, contact_velocity = jax.jvp(self.contact_angle, (cam_angle,), (cam_velocity,))
-        velocity = state[1] - contact_velocity
-        r = self.restitution(self.speed, jnp.abs(velocity))  # pyright: ignore
-        return jnp.stack([state[0], state[1] - (1 + r) * velocity])
+        return self.after_impact(t, state)
 
     def cam_angle(self, t) -> jax.Array:
         """Angle of the cam (rad), counted counterclockwise, at `t` (s), elementwise."""
         return _SENSE[self.rotation] * (self.speed * t + self.phase)
+
+    @property
+    def cam_velocity(self) -> jax.Array:
+        """Rate of change of the cam's angle (rad/s)."""
+        return _SENSE[self.rotation] * self.speed
 
     def contact_angle(self, cam_angle) -> jax.Array:
         """Follower angle (rad) in contact at `cam_angle` (rad), elementwise. (4.23)"""
@@ -116,15 +115,6 @@ class CamFollower(HybridSystem):
         spring = -self.inertia * self.vector_field(0.0, at_rest)[1]
         return self.inertia * curvature, jnp.zeros_like(slope), spring
 
-    @property
-    def period(self) -> jax.Array:
-        """Duration of one turn of the cam (s)."""
-        return 2 * jnp.pi / self.speed
-
-    def prepared(self) -> "CamFollower":
-        """The same system with a profile that is cheaper to evaluate."""
-        return eqx.tree_at(lambda s: s.profile, self, self.profile.prepared())
-
     def check(self) -> None:
         """Raise `ValueError` where a parameter has no physical meaning."""
         require_positive(
@@ -136,10 +126,7 @@ class CamFollower(HybridSystem):
             spring_elongation=self.spring_elongation,
             spring_half_height=self.spring_half_height,
         )
-        for approach_speed in (0.0, 1.0):
-            r = self.restitution(self.speed, jnp.asarray(approach_speed))  # pyright: ignore
-            require_restitution(r, f" at an approach speed of {approach_speed:g} rad/s")
-        self.profile.check()
+        self.check_cam()
 
     def _reach(self, sine, secant):
         # x_A tan(theta) + d / cos(theta), the spring's end on the follower

@@ -6,20 +6,19 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 
-from ..hybrid import HybridSystem
+from ._cam_driven import AbstractCamDriven
 from ._parameters import (
     as_parameter,
     parameter,
     require_finite,
     require_not_negative,
     require_positive,
-    require_restitution,
 )
 from ._restitution import ConstantRestitution
 from .cams import CamProfile
 
 
-class DesmodromicCam(HybridSystem):
+class DesmodromicCam(AbstractCamDriven):
     """A sliding follower between two flanks that move with the cam.
 
     The flanks ask for the same lift, one from below and one from above, a clearance
@@ -65,31 +64,12 @@ class DesmodromicCam(HybridSystem):
 
     def impact(self, t, state) -> jax.Array:
         """States after an impact on either flank, shape `(2, 2)`."""
-        _, moved = jax.jvp(self.profile, (self.cam_angle(t),), (self.speed,))
-        velocity = state[1] - moved
-        r = self.restitution(self.speed, jnp.abs(velocity))  # pyright: ignore
-        after = jnp.stack([state[0], state[1] - (1 + r) * velocity])
+        after = self.after_impact(t, state)
         return jnp.stack([after, after])
-
-    def cam_angle(self, t) -> jax.Array:
-        """Angle of the cam (rad) at `t` (s), elementwise."""
-        return self.speed * t + self.phase
-
-    @property
-    def period(self) -> jax.Array:
-        """Duration of one turn of the cam (s)."""
-        return 2 * jnp.pi / self.speed
-
-    def prepared(self) -> "DesmodromicCam":
-        """The same system with a profile that is cheaper to evaluate."""
-        return eqx.tree_at(lambda s: s.profile, self, self.profile.prepared())
 
     def check(self) -> None:
         """Raise `ValueError` where a parameter has no physical meaning."""
         require_positive(speed=self.speed, clearance=self.clearance, mass=self.mass)
         require_not_negative(stiffness=self.stiffness, damping=self.damping)
         require_finite(preload=self.preload, phase=self.phase)
-        for approach_speed in (0.0, 1.0):
-            r = self.restitution(self.speed, jnp.asarray(approach_speed))  # pyright: ignore
-            require_restitution(r, f" at an approach speed of {approach_speed:g} m/s")
-        self.profile.check()
+        self.check_cam()

@@ -6,20 +6,19 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 
-from ..hybrid import HybridSystem
+from ._cam_driven import AbstractCamDriven
 from ._parameters import (
     as_parameter,
     parameter,
     require_finite,
     require_not_negative,
     require_positive,
-    require_restitution,
 )
 from ._restitution import ConstantRestitution
 from .cams import CamProfile
 
 
-class ValveTrain(HybridSystem):
+class ValveTrain(AbstractCamDriven):
     """A sliding follower on a cam of constant speed: m x'' + c x' + k x + F0 = contact.
 
     The state is the follower's lift and velocity (m, m/s); the gap is the distance
@@ -65,14 +64,7 @@ class ValveTrain(HybridSystem):
 
     def impact(self, t, state) -> jax.Array:
         """State after an impact: the relative velocity v becomes -r v."""
-        _, moved = jax.jvp(self.profile, (self.cam_angle(t),), (self.speed,))
-        velocity = state[1] - moved
-        r = self.restitution(self.speed, jnp.abs(velocity))  # pyright: ignore
-        return jnp.stack([state[0], state[1] - (1 + r) * velocity])
-
-    def cam_angle(self, t) -> jax.Array:
-        """Angle of the cam (rad) at `t` (s), elementwise."""
-        return self.speed * t + self.phase
+        return self.after_impact(t, state)
 
     def load_terms(self, lift, slope, curvature):
         """Contact force (N) at speed w as `a w^2 + b w + c`: a, b and c.
@@ -85,15 +77,6 @@ class ValveTrain(HybridSystem):
             self.stiffness * lift + self.preload,
         )
 
-    @property
-    def period(self) -> jax.Array:
-        """Duration of one turn of the cam (s)."""
-        return 2 * jnp.pi / self.speed
-
-    def prepared(self) -> "ValveTrain":
-        """The same system with a profile that is cheaper to evaluate."""
-        return eqx.tree_at(lambda s: s.profile, self, self.profile.prepared())
-
     def check(self) -> None:
         """Raise `ValueError` where a parameter has no physical meaning."""
         require_positive(speed=self.speed, mass=self.mass)
@@ -101,7 +84,4 @@ class ValveTrain(HybridSystem):
             stiffness=self.stiffness, preload=self.preload, damping=self.damping
         )
         require_finite(phase=self.phase)
-        for approach_speed in (0.0, 1.0):
-            r = self.restitution(self.speed, jnp.asarray(approach_speed))  # pyright: ignore
-            require_restitution(r, f" at an approach speed of {approach_speed:g} m/s")
-        self.profile.check()
+        self.check_cam()

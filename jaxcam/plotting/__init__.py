@@ -8,11 +8,11 @@ from ._chatter_maps import (
     lambda_cobweb as lambda_cobweb,
     lobe_scaling as lobe_scaling,
 )
-from ._chatter_region import chattering_region as chattering_region
+from ._chatter_region import chattering_picture as chattering_picture
 from ._compare_recording import compare_recording as compare_recording
 from ._diagram import sweep_chart as sweep_chart, sweep_diagram as sweep_diagram
 from ._grazing_map import cobweb as cobweb
-from ._impact_map import impact_map as impact_map
+from ._impact_map import impact_return_map as impact_return_map
 from ._local_map import local_map as local_map
 from ._lyapunov import lyapunov_convergence as lyapunov_convergence
 from ._motion_program import motion_program as motion_program

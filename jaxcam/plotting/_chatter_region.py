@@ -10,7 +10,7 @@ from ._style import BAND, FLIGHT, IMPACT, SECTION, styled
 
 
 @styled
-def chattering_region(
+def chattering_picture(
     frame: ChatterFrame,
     region: ImpactCurve,
     manifold: GrazingManifold | None = None,

@@ -19,7 +19,7 @@ _MANY_SCALES = 1e3
 
 
 @styled
-def impact_map(
+def impact_return_map(
     trajectory: Trajectory,
     axes: Sequence[Axes] | np.ndarray | None = None,
     *,

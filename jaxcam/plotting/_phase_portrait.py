@@ -6,7 +6,7 @@ from matplotlib.axes import Axes
 from ..hybrid import Trajectory
 from ._axes import legend_above, one_axes
 from ._style import CONTACT, FLIGHT, IMPACT, SECTION, styled
-from .curves import Curve, curve, window
+from .curves import Curve, trajectory_curve, window
 from .labels import state_label
 
 
@@ -39,7 +39,7 @@ def phase_portrait(
 
     **Returns:** the axes.
     """
-    drawn = curve(trajectory, between, samples)
+    drawn = trajectory_curve(trajectory, between, samples)
     ax = one_axes(ax)
     _draw_motion(ax, drawn, *components)
     _draw_jumps(ax, drawn, *components)

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from ..hybrid import Trajectory
 from ._axes import legend_above, several_axes
 from ._style import CONTACT, FLIGHT, IMPACT, styled
-from .curves import Curve, curve
+from .curves import Curve, trajectory_curve
 from .labels import gap_label, state_label, time_label
 
 
@@ -40,7 +40,7 @@ def time_history(
     **Raises:** `ValueError` for a wrong number of axes, or a span that the trajectory
     does not cover.
     """
-    drawn = curve(trajectory, between, samples)
+    drawn = trajectory_curve(trajectory, between, samples)
     system = trajectory.system
     if components is None:
         components = range(drawn.state.shape[1])

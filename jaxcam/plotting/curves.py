@@ -92,7 +92,7 @@ def contact_spans(
     return spans[spans[:, 1] > spans[:, 0]]
 
 
-def curve(
+def trajectory_curve(
     trajectory: Trajectory,
     between: tuple[float, float] | None = None,
     samples: int = 1500,

@@ -14,7 +14,7 @@ from ._diagram_result import Diagram as Diagram
 from ._exponents import largest_exponents as largest_exponents
 from ._follow import follow_basins as follow_basins
 from ._grid import Grid as Grid
-from ._load import load as load
+from ._load import load_sweep as load_sweep
 from ._starts import monte_carlo as monte_carlo
 from .blocks import cluster as cluster
 from .sections import (

@@ -20,7 +20,7 @@ def basins(
     turns: int = 100,
     *,
     keep: int = 24,
-    tolerance: float = 1e-6,
+    period_tolerance: float = 1e-6,
     same: float = 1e-3,
     reruns: int = 1,
     scale=None,
@@ -45,7 +45,7 @@ def basins(
         are left out.
     - `turns`: how many are simulated, of which the last `keep` are looked at; periods
         up to `keep / 2` are found.
-    - `tolerance`: for finding periods.
+    - `period_tolerance`: for finding periods.
     - `same`: orbits that differ by less, in units of `scale`, are one.
     - `reruns`: how often motions that do not repeat yet go on, each time for twice as
         many turns.
@@ -63,7 +63,7 @@ def basins(
     **Raises:** `ValueError` that names the fix; `RuntimeError` where workers were lost.
     """
     section = as_section(system)
-    check_turns(turns, keep, tolerance, reruns)
+    check_turns(turns, keep, period_tolerance, reruns)
     if not section.regular:
         raise ValueError(
             f"basins need a section that is taken once a turn; a "
@@ -81,7 +81,9 @@ def basins(
             f"scale is {scale}; give a positive number for each of {len(grid.shape)} "
             "components"
         )
-    job = BasinsJob(section, grid, turns, keep, tolerance, same, reruns, scale, block)
+    job = BasinsJob(
+        section, grid, turns, keep, period_tolerance, same, reruns, scale, block
+    )
     store = run_blocks(
         job,
         out=out,

@@ -8,7 +8,7 @@ import numpy as np
 from ._grid import Grid
 from ._inputs import LANES
 from .attractors import APERIODIC, cell_codes, fingerprint_size, fingerprints, settle
-from .blocks import about_section, AbstractJob, Arrays, Layout, Variable
+from .blocks import about_section, AbstractJob, Arrays, StoredVariable, StoreLayout
 from .sections import AbstractSection
 
 
@@ -25,27 +25,27 @@ class BasinsJob(AbstractJob):
         grid: Grid,
         turns: int,
         keep: int,
-        tolerance: float,
+        period_tolerance: float,
         same: float,
         reruns: int,
         scale: np.ndarray,
         block: int | None,
     ):
         self.section, self.grid, self.same, self.scale = section, grid, same, scale
-        self.settings = (turns, keep, tolerance, reruns)
+        self.settings = (turns, keep, period_tolerance, reruns)
         n = len(grid.shape)
         row = int(np.prod(grid.shape[1:]))
         names = section.names(n)
         dims = tuple(name.replace(" ", "_") for name, _ in names)
         tail = grid.shape[1:]
         variables = {
-            "impacts": Variable(dims, tail, "int32"),
-            "turns": Variable(dims, tail, "int32"),
-            "fingerprint": Variable(
+            "impacts": StoredVariable(dims, tail, "int32"),
+            "turns": StoredVariable(dims, tail, "int32"),
+            "fingerprint": StoredVariable(
                 (*dims, "mean"), (*tail, fingerprint_size(n)), "float64"
             ),
             # zero for motions that repeat, and then next to nothing on disk
-            "cells": Variable((*dims, "sample"), (*tail, keep), "int64"),
+            "cells": StoredVariable((*dims, "sample"), (*tail, keep), "int64"),
         }
         coordinates = {
             dim: (dim, grid.centres(i), {"long_name": name, "units": unit})
@@ -59,13 +59,13 @@ class BasinsJob(AbstractJob):
             "grid": {"low": grid.low, "high": grid.high, "shape": grid.shape},
             "turns": turns,
             "keep": keep,
-            "tolerance": tolerance,
+            "period_tolerance": period_tolerance,
             "same": same,
             "reruns": reruns,
             "scale": scale.tolist(),
             "block": rows,
         }
-        self.layout = Layout(grid.shape[0], rows, variables, coordinates, identity)
+        self.layout = StoreLayout(grid.shape[0], rows, variables, coordinates, identity)
 
     def work(self, block: int, before: Arrays | None) -> Callable[[], Arrays]:
         del before
@@ -82,11 +82,13 @@ def default_scale(grid: Grid) -> np.ndarray:
     return np.where(found > 0, found, 1.0)
 
 
-def some_rows(section, grid, scale, bounds, turns, keep, tolerance, reruns) -> Arrays:
+def some_rows(
+    section, grid, scale, bounds, turns, keep, period_tolerance, reruns
+) -> Arrays:
     """The motions from some rows of the grid."""
     states = grid.states(*bounds)
     samples, labels = settle(
-        section, states, turns, keep, tolerance=tolerance, reruns=reruns
+        section, states, turns, keep, period_tolerance=period_tolerance, reruns=reruns
     )
     origin = np.array(grid.low)
     cells = cell_codes(samples.states, origin, scale, _FINE)

@@ -17,10 +17,10 @@ from .blocks import (
     AbstractJob,
     Arrays,
     digest,
-    Layout,
     Progress,
     run_blocks,
-    Variable,
+    StoredVariable,
+    StoreLayout,
 )
 from .sections import AbstractSection
 
@@ -38,7 +38,7 @@ def chart(
     *,
     turns: int = 300,
     keep: int = 32,
-    tolerance: float = 1e-6,
+    period_tolerance: float = 1e-6,
     reruns: int = 0,
     exponents: int = 0,
     out: str | Path | None = None,
@@ -57,7 +57,7 @@ def chart(
     - `first`, `second`: their values, shapes `(k,)` and `(l,)`.
     - `states`: where motions start: `(n,)`, or `(starts, n)`; in contact at rest
         without.
-    - `turns`, `keep`, `tolerance`, `reruns`: as for [`jaxcam.sweeps.basins`][].
+    - `turns`, `keep`, `period_tolerance`, `reruns`: as for [`jaxcam.sweeps.basins`][].
     - `exponents`: with it, the largest Lyapunov exponent over so many further turns.
     - `out`, `resume`, `executor`, `workers`, `progress`: as for
         [`jaxcam.sweeps.blocks.run_blocks`][].
@@ -68,7 +68,7 @@ def chart(
     **Raises:** `ValueError` that names the fix; `RuntimeError` where workers were lost.
     """
     section = as_section(system)
-    check_turns(turns, keep, tolerance, reruns)
+    check_turns(turns, keep, period_tolerance, reruns)
     if not isinstance(where, tuple) or len(where) != 2:
         raise ValueError("where must be a tuple of two parameters: (one, other)")
     if exponents and exponents < 16:
@@ -80,7 +80,7 @@ def chart(
     picked = pick(where, section.system)
     first, second = as_values(first, 1), as_values(second, 1)
     job = ChartJob(
-        section, picked, first, second, states, turns, keep, tolerance, reruns,
+        section, picked, first, second, states, turns, keep, period_tolerance, reruns,
         exponents, block,
     )  # fmt: skip
     store = run_blocks(
@@ -106,7 +106,7 @@ class ChartJob(AbstractJob):
         states,
         turns: int,
         keep: int,
-        tolerance: float,
+        period_tolerance: float,
         reruns: int,
         exponents: int,
         block: int | None,
@@ -114,19 +114,19 @@ class ChartJob(AbstractJob):
         self.section, self.where = section, where
         self.first, self.second = first, second
         self.starts = as_starts(section, states, where, self._pairs(0, len(second)))
-        self.settings = (turns, keep, tolerance, reruns, exponents)
+        self.settings = (turns, keep, period_tolerance, reruns, exponents)
         count = self.starts.shape[1]
         x, y = (name.replace(".", "_") for name in where.names)
         tail, dims = (len(first), count), (y, x, "start")
         variables = {
-            "impacts": Variable(dims, tail, "int32"),
-            "turns": Variable(dims, tail, "int32"),
-            "code": Variable(dims, tail, "int32"),
+            "impacts": StoredVariable(dims, tail, "int32"),
+            "turns": StoredVariable(dims, tail, "int32"),
+            "code": StoredVariable(dims, tail, "int32"),
         }
         if exponents:
             about = {"units": "1/s", "about": "largest Lyapunov exponent"}
-            variables["exponent"] = Variable(dims, tail, "float64", about)
-            variables["exponent_stderr"] = Variable(dims, tail, "float64", about)
+            variables["exponent"] = StoredVariable(dims, tail, "float64", about)
+            variables["exponent_stderr"] = StoredVariable(dims, tail, "float64", about)
         rows = max(1, _LANES // (len(first) * count)) if block is None else block
         rows = min(rows, len(second))
         identity = {
@@ -138,7 +138,7 @@ class ChartJob(AbstractJob):
             "starts": digest(self.starts),
             "turns": turns,
             "keep": keep,
-            "tolerance": tolerance,
+            "period_tolerance": period_tolerance,
             "reruns": reruns,
             "exponents": exponents,
             "block": rows,
@@ -147,7 +147,7 @@ class ChartJob(AbstractJob):
             x: (x, first, {"role": "first"}),
             y: (y, second, {"role": "second"}),
         }
-        self.layout = Layout(len(second), rows, variables, coordinates, identity)
+        self.layout = StoreLayout(len(second), rows, variables, coordinates, identity)
 
     def work(self, block: int, before: Arrays | None) -> Callable[[], Arrays]:
         del before
@@ -169,8 +169,9 @@ class ChartJob(AbstractJob):
 
 
 def some_pairs(
-    section, where, pairs, starts, shape, turns, keep, tolerance, reruns, exponents
-) -> Arrays:
+    section, where, pairs, starts, shape, turns, keep, period_tolerance, reruns,
+    exponents,
+) -> Arrays:  # fmt: skip
     """Labels, and exponents if wanted, at some pairs of values."""
     count, n = starts.shape[1:]
     values = np.repeat(pairs, count, axis=0)
@@ -179,7 +180,7 @@ def some_pairs(
         starts.reshape(-1, n),
         turns,
         keep,
-        tolerance=tolerance,
+        period_tolerance=period_tolerance,
         reruns=reruns,
         where=where,
         values=values,

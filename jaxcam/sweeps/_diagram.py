@@ -30,7 +30,7 @@ def diagram(
     keep: int = 100,
     direction: Direction = "each",
     dwell: tuple[float, float] | None = None,
-    tolerance: float = 1e-6,
+    period_tolerance: float = 1e-6,
     out: str | Path | None = None,
     resume: bool = False,
     executor: Executor | None = None,
@@ -55,7 +55,7 @@ def diagram(
         with the state carried from one value to the next, which shows hysteresis.
     - `dwell`: s to wait at each value and s to store, as a rig is driven up or down, in
         place of `turns` and `keep`. Samples that a value has no turns for are NaN.
-    - `tolerance`: for finding periods, up to `keep / 2`.
+    - `period_tolerance`: for finding periods, up to `keep / 2`.
     - `out`, `resume`, `executor`, `workers`, `progress`: as for
         [`jaxcam.sweeps.blocks.run_blocks`][].
     - `block`: values that are computed together and stored at once.
@@ -65,7 +65,7 @@ def diagram(
     **Raises:** `ValueError` that names the fix; `RuntimeError` where workers were lost.
     """
     section = as_section(system)
-    check_turns(turns, keep, tolerance)
+    check_turns(turns, keep, period_tolerance)
     if direction not in _DIRECTIONS:
         raise ValueError(
             f"direction is {direction!r}; choose one of {', '.join(_DIRECTIONS)}"
@@ -87,7 +87,8 @@ def diagram(
         many, kept = dwell_turns(section, picked, values, dwell)
         turns, keep = int(many.max()), int(kept.max())
     starts = as_starts(section, states, picked, values)
-    of = section, picked, values, starts, turns, keep, direction, tolerance, block
+    length = turns, keep, direction, period_tolerance
+    of = section, picked, values, starts, *length, block
     if dwell is not None:
         job = DwellJob(*of, dwell=dwell)
     else:

@@ -8,7 +8,14 @@ import numpy as np
 from ..parameters import Pick
 from ._inputs import LANES
 from .attractors import label, settle
-from .blocks import about_section, AbstractJob, Arrays, digest, Layout, Variable
+from .blocks import (
+    about_section,
+    AbstractJob,
+    Arrays,
+    digest,
+    StoredVariable,
+    StoreLayout,
+)
 from .sections import AbstractSection, component_coordinates, filled
 
 
@@ -30,11 +37,11 @@ class DiagramJob(AbstractJob):
         turns: int,
         keep: int,
         direction: str,
-        tolerance: float,
+        period_tolerance: float,
         block: int | None,
     ):
         self.section, self.where = section, where
-        self.turns, self.keep, self.tolerance = turns, keep, tolerance
+        self.turns, self.keep, self.period_tolerance = turns, keep, period_tolerance
         self.values, self.starts, going = self._ordered(values, starts, direction)
         self.layout = self._layout(going, direction, block)
 
@@ -55,25 +62,29 @@ class DiagramJob(AbstractJob):
             self.starts[first:last],
             self.turns,
             self.keep,
-            self.tolerance,
+            self.period_tolerance,
         )
 
-    def _layout(self, going, direction: str, block: int | None) -> Layout:
+    def _layout(self, going, direction: str, block: int | None) -> StoreLayout:
         points, starts, n = self.starts.shape
         keep = self.keep
         components = self.section.names(n)
         each, sampled = ("point", "start"), ("point", "start", "sample")
         variables = {
-            "state": Variable((*sampled, "component"), (starts, keep, n), "float64"),
-            "hits": Variable(sampled, (starts, keep), "int32"),
-            "impacts": Variable(each, (starts,), "int32"),
-            "turns": Variable(each, (starts,), "int32"),
-            "code": Variable(each, (starts,), "int32"),
+            "state": StoredVariable(
+                (*sampled, "component"), (starts, keep, n), "float64"
+            ),
+            "hits": StoredVariable(sampled, (starts, keep), "int32"),
+            "impacts": StoredVariable(each, (starts,), "int32"),
+            "turns": StoredVariable(each, (starts,), "int32"),
+            "code": StoredVariable(each, (starts,), "int32"),
         }
         if not self.section.regular:
             tail = (starts, keep)
-            variables["time"] = Variable(sampled, tail, "float64", {"units": "s"})
-            variables["phase"] = Variable(sampled, tail, "float64", {"units": "turns"})
+            variables["time"] = StoredVariable(sampled, tail, "float64", {"units": "s"})
+            variables["phase"] = StoredVariable(
+                sampled, tail, "float64", {"units": "turns"}
+            )
         values = self.values[:, None] if self.values.ndim == 1 else self.values
         coordinates = {
             name: ("point", values[:, i], {"role": "parameter"})
@@ -92,12 +103,12 @@ class DiagramJob(AbstractJob):
             "turns": self.turns,
             "keep": keep,
             "direction": direction,
-            "tolerance": self.tolerance,
+            "period_tolerance": self.period_tolerance,
         }
         size = self._block(starts) if block is None else block
         size = min(size, points)
         identity["block"] = size
-        return Layout(points, size, variables, coordinates, identity)
+        return StoreLayout(points, size, variables, coordinates, identity)
 
 
 class CarriedJob(DiagramJob):
@@ -131,17 +142,17 @@ class CarriedJob(DiagramJob):
             np.full(last - first, self.turns),
             np.full(last - first, self.keep),
             self.keep,
-            self.tolerance,
+            self.period_tolerance,
         )
 
-    def _layout(self, going, direction: str, block: int | None) -> Layout:
+    def _layout(self, going, direction: str, block: int | None) -> StoreLayout:
         layout = super()._layout(going, direction, block)
         starts, n = self.starts.shape[1:]
-        final = Variable(("point", "start", "component"), (starts, n), "float64")
+        final = StoredVariable(("point", "start", "component"), (starts, n), "float64")
         return layout._replace(variables={**layout.variables, "final": final})
 
 
-def each_value(section, where, values, starts, turns, keep, tolerance) -> Arrays:
+def each_value(section, where, values, starts, turns, keep, period_tolerance) -> Arrays:
     """All motions of some values at once."""
     points, count, n = starts.shape
     lanes = np.repeat(values, count, axis=0)
@@ -150,7 +161,7 @@ def each_value(section, where, values, starts, turns, keep, tolerance) -> Arrays
         starts.reshape(-1, n),
         turns,
         keep,
-        tolerance=tolerance,
+        period_tolerance=period_tolerance,
         where=where,
         values=lanes,
     )
@@ -159,7 +170,7 @@ def each_value(section, where, values, starts, turns, keep, tolerance) -> Arrays
 
 
 def one_after_the_other(
-    section, where, values, starts, first, carried, turns, keep, room, tolerance
+    section, where, values, starts, first, carried, turns, keep, room, period_tolerance
 ) -> Arrays:
     """Some values in order; `first` says which of them begin anew.
 
@@ -179,7 +190,7 @@ def one_after_the_other(
         samples = section.sample(state, many, kept, where=where, values=lanes)
         counted = section.impacting and section.regular
         sizes = section.sizes(state, samples, where, lanes)
-        labels = label(samples, tolerance, counted, sizes)
+        labels = label(samples, period_tolerance, counted, sizes)
         carried = samples.final
         turn = section.turn(where, lanes)
         samples = filled(samples, room)

@@ -68,7 +68,7 @@ class DwellJob(CarriedJob):
             turns,
             keep,
             self.keep,
-            self.tolerance,
+            self.period_tolerance,
         )
 
     def _layout(self, going, direction: str, block: int | None):

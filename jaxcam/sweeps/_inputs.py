@@ -34,15 +34,18 @@ def as_section(system) -> AbstractSection:
     return section
 
 
-def check_turns(turns: int, keep: int, tolerance: float, reruns: int = 0) -> None:
+def check_turns(
+    turns: int, keep: int, period_tolerance: float, reruns: int = 0
+) -> None:
     """Raise `ValueError` for numbers that make no sense together."""
     if not 1 <= keep <= turns:
         raise ValueError(
             f"keep is {keep} and turns {turns}; keep 1 or more of the turns"
         )
-    if not 0 < tolerance < 1:
+    if not 0 < period_tolerance < 1:
         raise ValueError(
-            f"tolerance is {tolerance:g}; give a number in (0, 1), such as 1e-6"
+            f"period_tolerance is {period_tolerance:g}; give a number in (0, 1), "
+            "such as 1e-6"
         )
     if reruns < 0:
         raise ValueError(f"reruns is {reruns}; give 0 or more")

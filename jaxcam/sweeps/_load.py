@@ -10,7 +10,7 @@ from ._grid import Grid
 from .blocks import checked, SWEEP
 
 
-def load(path: str | Path) -> Diagram | Basins | Chart:
+def load_sweep(path: str | Path) -> Diagram | Basins | Chart:
     """A stored sweep, after a look at the checksums of all of its blocks.
 
     Without jaxcam, `xarray.open_dataset(path, engine="zarr", consolidated=False)` reads

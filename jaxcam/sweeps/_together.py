@@ -75,13 +75,13 @@ def together(job: BasinsJob, store: Store, known: Basins | None) -> xarray.Datas
 
 def _orbits(section: AbstractSection, starts, job: BasinsJob) -> np.ndarray:
     """The last points of the motions that stand for the attractors, in order."""
-    turns, keep, tolerance, reruns = job.settings
+    turns, keep, period_tolerance, reruns = job.settings
     n = len(job.grid.shape)
     made = np.full((len(starts), min(_SHOWN, turns), n), np.nan)
     if not len(starts):
         return made
     samples, labels = settle(
-        section, starts, turns, keep, tolerance=tolerance, reruns=reruns
+        section, starts, turns, keep, period_tolerance=period_tolerance, reruns=reruns
     )
     longer = section.sample(samples.final, turns, made.shape[1]).states
     for k, length in enumerate(labels.turns):

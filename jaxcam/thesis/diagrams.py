@@ -27,7 +27,7 @@ class Events(NamedTuple):
     doubled_to: Any
 
 
-def spans(made: Diagram, label: str, way: int) -> list[tuple[float, float]]:
+def label_spans(made: Diagram, label: str, way: int) -> list[tuple[float, float]]:
     """Ranges (rpm) of a label in one direction (0: in any), the widest first."""
     found = [
         (float(rad_s_to_rpm(r.low)), float(rad_s_to_rpm(r.high)))
@@ -47,10 +47,10 @@ def events(up: Diagram, down: Diagram) -> Events:
     the way up from which the motion is on the period-doubling cascade; without one, at
     the last speed.
     """
-    contact = spans(up, "contact", 1)[0]
-    sticking = spans(up, "P(inf,1)", 1)[0]
-    two = spans(down, "P(2,2)", -1)[0]
-    ones = spans(down, "P(1,1)", -1)
+    contact = label_spans(up, "contact", 1)[0]
+    sticking = label_spans(up, "P(inf,1)", 1)[0]
+    two = label_spans(down, "P(2,2)", -1)[0]
+    ones = label_spans(down, "P(1,1)", -1)
     one = next((span for span in ones if not span[1] > two[0]), (np.nan, np.nan))
     speeds, labels = _way(up, 1)
     behind = speeds > sticking[1]

@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 from ..hybrid import Trajectory
 from ..models import CamFollower
 from ..plotting.colours import CAM, FLIGHT, IMPACT
-from ..plotting.curves import curve
-from .settled import Motion, run_of
+from ..plotting.curves import trajectory_curve
+from .settled import run_of, SettledMotion
 
 
 #: turns drawn, at least
@@ -26,7 +26,7 @@ def _cam(run: Trajectory, times):
 
 def draw_angles(ax, run: Trajectory) -> None:
     """Cam, dashed, and follower against time."""
-    drawn = curve(run, None, 3000)
+    drawn = trajectory_curve(run, None, 3000)
     ax.plot(drawn.time, drawn.state[:, 0], color=FLIGHT, lw=1.3, label="follower")
     times = np.linspace(float(run.t0), float(run.t1), 1500)
     ax.plot(times, _cam(run, times), "--", color=CAM, lw=1.2, label="cam")
@@ -35,7 +35,7 @@ def draw_angles(ax, run: Trajectory) -> None:
 
 def draw_gap(ax, run: Trajectory) -> None:
     """Follower less cam against time."""
-    drawn = curve(run, None, 3000)
+    drawn = trajectory_curve(run, None, 3000)
     ax.plot(drawn.time, drawn.gap[:, 0], color=FLIGHT, lw=1.1)
     ax.axhline(0, color="0.4", lw=0.7)
     if np.nanmax(np.abs(drawn.gap)) < 1e-9:
@@ -44,9 +44,9 @@ def draw_gap(ax, run: Trajectory) -> None:
     ax.set_ylabel("over cam (rad)")
 
 
-def draw_portrait(ax, run: Trajectory, motion: Motion) -> None:
+def draw_portrait(ax, run: Trajectory, motion: SettledMotion) -> None:
     """Velocity over angle, with the samples once a turn."""
-    drawn = curve(run, None, 3000)
+    drawn = trajectory_curve(run, None, 3000)
     ax.plot(drawn.state[:, 0], drawn.state[:, 1], color=FLIGHT, lw=0.9)
     for before, after in zip(drawn.before, drawn.after, strict=True):
         ax.plot(*np.stack([before, after], 1), "--", color=IMPACT, lw=0.5)
@@ -57,11 +57,11 @@ def draw_portrait(ax, run: Trajectory, motion: Motion) -> None:
     ax.set_ylabel("velocity (rad/s)")
 
 
-def _turns(motion: Motion) -> int:
+def _turns(motion: SettledMotion) -> int:
     return 40 if motion.turns == 0 else max(_TURNS, motion.turns)
 
 
-def motion_figure(system: CamFollower, found: Sequence[Motion]) -> Figure:
+def motion_figure(system: CamFollower, found: Sequence[SettledMotion]) -> Figure:
     """A row for each motion: angles, the gap beneath, and the phase portrait."""
     rows = len(found)
     figure = plt.figure(figsize=(9.6, 3.6 * rows))
@@ -86,7 +86,7 @@ def motion_figure(system: CamFollower, found: Sequence[Motion]) -> Figure:
     return figure
 
 
-def series_figure(system: CamFollower, found: Sequence[Motion]) -> Figure:
+def series_figure(system: CamFollower, found: Sequence[SettledMotion]) -> Figure:
     """Angles alone, a panel for each motion. (Figure 5.2)"""
     rows = -(-len(found) // 2)
     figure, axes = plt.subplots(rows, 2, figsize=(9.6, 2.4 * rows), squeeze=False)

@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 
 from ..models import CamFollower
 from .motion_drawing import motion_figure
-from .settled import Case, Motion, motion_rows, settled
+from .settled import motion_rows, settled, SettledMotion, ShownMotion
 from .target import Rows, Target
 
 
@@ -25,10 +25,10 @@ WINDOW = (
 class MotionTarget(Target):
     """A figure of motions that have settled."""
 
-    cases: tuple[Case, ...] = ()
+    cases: tuple[ShownMotion, ...] = ()
 
 
-def motions(system: CamFollower, cases: tuple[Case, ...]) -> list[Motion]:
+def motions(system: CamFollower, cases: tuple[ShownMotion, ...]) -> list[SettledMotion]:
     """The motions of a figure; those of all figures are computed together, once."""
     from .registry import TARGETS
 
@@ -40,9 +40,9 @@ def motions(system: CamFollower, cases: tuple[Case, ...]) -> list[Motion]:
 
 def motion_target(
     title: str,
-    *cases: Case,
+    *cases: ShownMotion,
     note: str = "",
-    layout: Callable[[CamFollower, Sequence[Motion]], Figure] = motion_figure,
+    layout: Callable[[CamFollower, Sequence[SettledMotion]], Figure] = motion_figure,
 ) -> MotionTarget:
     """A figure that shows motions; they are drawn one below the other.
 

@@ -40,10 +40,10 @@ def orbit_at(system: CamFollower, start: ImpactOrbit, rpm: float) -> ImpactOrbit
 def multipliers_at(system: CamFollower, start: ImpactOrbit, rpm: float) -> np.ndarray:
     """The two multipliers of P(1,1); NaN where it is lost."""
     orbit = orbit_at(system, start, rpm)
-    return multipliers_of(monodromy_of(at_rpm(system, rpm), orbit))
+    return ordered_multipliers(compiled_monodromy(at_rpm(system, rpm), orbit))
 
 
-def multipliers_of(matrix) -> np.ndarray:
+def ordered_multipliers(matrix) -> np.ndarray:
     """Eigenvalues, the larger in magnitude last; complex pairs as -, +."""
     matrix = np.asarray(matrix)
     if not np.all(np.isfinite(matrix)):
@@ -77,7 +77,7 @@ def along_traces(
     """
     point = SpecialPoint(jnp.asarray(rpm_to_rad_s(SEARCH)), start)
     moved = at_rpm(system, SEARCH)
-    first = float(np.trace(np.asarray(monodromy_of(moved, start))))
+    first = float(np.trace(np.asarray(compiled_monodromy(moved, start))))
     strides = max(1, int(np.ceil(abs(trace - first) / stride)))
     for value in np.linspace(first, trace, strides + 1)[1:]:
         point = point_on_line(system, point, (float(value), 0.0))
@@ -90,7 +90,7 @@ def next_orbit(system, guess):
 
 
 @eqx.filter_jit
-def monodromy_of(system, orbit):
+def compiled_monodromy(system, orbit):
     return orbit_monodromy(system, orbit)
 
 

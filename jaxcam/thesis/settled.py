@@ -20,7 +20,7 @@ from .target import Rows
 _TURNS, _KEEP, _RERUNS = 300, 64, 2
 
 
-class Case(NamedTuple):
+class ShownMotion(NamedTuple):
     """A motion that the thesis shows: where it starts, and what it is said to be."""
 
     rpm: float
@@ -37,10 +37,10 @@ class Case(NamedTuple):
         return f"{self.name + ', ' if self.name else ''}{self.rpm:g} rpm"
 
 
-class Motion(NamedTuple):
+class SettledMotion(NamedTuple):
     """What it settles on."""
 
-    case: Case
+    case: ShownMotion
     #: as in `jaxcam.sweeps.attractors.Labels`
     impacts: int
     turns: int
@@ -56,7 +56,7 @@ class Motion(NamedTuple):
 
 
 @remembered
-def settled(system: CamFollower, cases: tuple[Case, ...]) -> list[Motion]:
+def settled(system: CamFollower, cases: tuple[ShownMotion, ...]) -> list[SettledMotion]:
     """Follow the cases until they repeat, or for 2100 turns."""
     section = Stroboscopic(system)
     speeds = np.asarray(rpm_to_rad_s(np.array([case.rpm for case in cases])))
@@ -68,7 +68,7 @@ def settled(system: CamFollower, cases: tuple[Case, ...]) -> list[Motion]:
         section, states, _TURNS, _KEEP, reruns=_RERUNS, where=speed_of, values=speeds
     )
     return [
-        Motion(
+        SettledMotion(
             case,
             int(labels.impacts[k]),
             int(labels.turns[k]),
@@ -79,7 +79,7 @@ def settled(system: CamFollower, cases: tuple[Case, ...]) -> list[Motion]:
     ]
 
 
-def run_of(system: CamFollower, motion: Motion, turns: float) -> Trajectory:
+def run_of(system: CamFollower, motion: SettledMotion, turns: float) -> Trajectory:
     """The settled motion itself, over some turns from time zero."""
     rig = at_rpm(system, motion.case.rpm)
     touching = motion.impacts == CONTACT
@@ -87,7 +87,7 @@ def run_of(system: CamFollower, motion: Motion, turns: float) -> Trajectory:
     return simulate(rig, state, 0.0, turns * float(rig.period))
 
 
-def motion_rows(found: Sequence[Motion]) -> Rows:
+def motion_rows(found: Sequence[SettledMotion]) -> Rows:
     """Rows that compare labels, as numbers, with those that are printed."""
     rows: Rows = []
     for motion in found:

@@ -61,8 +61,8 @@ from ._reversed import Reversed as Reversed
 from ._scaling_law import scaling_law as scaling_law, ScalingLaw as ScalingLaw
 from ._section_turn import (
     release_impacts as release_impacts,
-    Section as Section,
     section_to_impact as section_to_impact,
     section_turn as section_turn,
+    SectionArrival as SectionArrival,
     to_section as to_section,
 )

@@ -31,8 +31,8 @@ from ._scalar import check_chatter_system
 from ._scaling_law import scaling_law
 from ._section_turn import (
     impact_after,
-    Section,
     section_to_impact,
+    SectionArrival,
     to_section,
 )
 
@@ -217,13 +217,15 @@ def _compose(along, value, rank, phase) -> ComposedMap:
     )
 
 
-def simulated_at_section(system: HybridSystem, composed: ComposedMap, speed) -> Section:
+def simulated_at_section(
+    system: HybridSystem, composed: ComposedMap, speed
+) -> SectionArrival:
     """What `ComposedMap.at_section` predicts, by the exact motion.
 
     **Arguments:** `system` at the interruption; `speed`, changes of the rebound speed
     of D*, shape `(k,)`.
 
-    **Returns:** a [`variational.chatter.Section`][] with a leading axis.
+    **Returns:** a [`variational.chatter.SectionArrival`][] with a leading axis.
     """
     system = as_arrays(system).prepared()
     speeds = composed.speed + jnp.asarray(speed, jnp.float64)
@@ -233,7 +235,7 @@ def simulated_at_section(system: HybridSystem, composed: ComposedMap, speed) -> 
 
 def simulated_by_parameter(
     system: HybridSystem, where: Where, changes, phase=0.0
-) -> Section:
+) -> SectionArrival:
     """The orbit from release, followed over a turn at other values of the parameter.
 
     What [`variational.chatter.ComposedMap.along_parameter`][] predicts.
@@ -241,8 +243,8 @@ def simulated_by_parameter(
     **Arguments:** `system` at the interruption; `where` picks the parameter; `changes`
     of it, shape `(k,)`; `phase` of the section, in periods.
 
-    **Returns:** a [`variational.chatter.Section`][] with a leading axis, at the section
-    after the next release.
+    **Returns:** a [`variational.chatter.SectionArrival`][] with a leading axis, at the
+    section after the next release.
     """
     system = as_arrays(system)
     value = jnp.asarray(pick(where, system)(system), jnp.float64)

@@ -12,7 +12,7 @@ from jaxcam.hybrid.surface import contact_state, normal_directions, normal_veloc
 from jaxcam.parameters import as_arrays
 
 from ._free_flight import flight_rates, runge_kutta_step
-from ._impact_search import frozen, leave, longest_step, step
+from ._impact_search import frozen, longest_step, search_step, take_off
 from ._scalar import one_constraint
 
 
@@ -57,7 +57,7 @@ def next_impact(
     """
     time = jnp.asarray(time, jnp.float64)
     longest = longest_step(system, horizon)
-    start = leave(system, time, state, speed, longest, height)
+    start = take_off(system, time, state, speed, longest, height)
 
     def searching(carry):
         f, count = carry
@@ -66,7 +66,7 @@ def next_impact(
 
     def look(carry):
         f, count = carry
-        return step(system, f)[0], count + 1
+        return search_step(system, f)[0], count + 1
 
     f, _ = while_loop(searching, look, (start, 0))
     rates = flight_rates(system)

@@ -35,7 +35,7 @@ _SEARCH, _LAND, _LAST, _BOTTOM = range(4)
 frozen = jax.lax.stop_gradient
 
 
-class Flight(NamedTuple):
+class SearchState(NamedTuple):
     """Where the motion is, and what the next step is for."""
 
     time: Float[Array, ""]
@@ -68,9 +68,9 @@ class Flight(NamedTuple):
         return (self.mode == _LAST) | ((self.mode == _LAND) & (self.tries >= _LANDINGS))
 
 
-def leave(
+def take_off(
     system: HybridSystem, time, state, speed, longest, height: ArrayLike = 0.0
-) -> Flight:
+) -> SearchState:
     """The start of a flight from an impact, from release, or at a `height`.
 
     `longest` is the step that is taken at most.
@@ -80,7 +80,7 @@ def leave(
     # a parabola returns after 2 u / pull
     parabola = _BEHIND * frozen(speed) / jnp.where(pull > 0, pull, 1.0)
     short = (pull > 0) & (frozen(speed) > 0)
-    return Flight(
+    return SearchState(
         time=time,
         y=on_flight(state, speed, height),
         since=frozen(time),
@@ -102,7 +102,9 @@ def longest_step(system: HybridSystem, horizon=jnp.inf) -> Float[Array, ""]:
     return jnp.minimum(part, horizon)
 
 
-def step(system: HybridSystem, f: Flight) -> tuple[Flight, Bool[Array, ""]]:
+def search_step(
+    system: HybridSystem, f: SearchState
+) -> tuple[SearchState, Bool[Array, ""]]:
     """One step, and whether it ends in an impact: the motion is then just before it."""
 
     rates = flight_rates(system)
@@ -126,7 +128,7 @@ def step(system: HybridSystem, f: Flight) -> tuple[Flight, Bool[Array, ""]]:
     )
 
 
-def _next(f: Flight, end, wrong, rate) -> tuple[Flight, Bool[Array, ""]]:
+def _next(f: SearchState, end, wrong, rate) -> tuple[SearchState, Bool[Array, ""]]:
     """What the next step is for, and how long; whether this one is taken."""
     size = jnp.max(jnp.abs(wrong) / (TOLERANCE * (1 + jnp.abs(end))))
     fall, rise, gap, pull = frozen(f.y[-2]), end[-2], end[-1], rate[-2]

@@ -13,7 +13,7 @@ from jaxcam.hybrid.surface import normal_acceleration
 from .._one_jacobian import with_one_jacobian
 from ._chatter_frame import ChatterFrame
 from ._impact_map import rebound_speed
-from ._impact_search import Flight, frozen, leave, longest_step, step
+from ._impact_search import frozen, longest_step, search_step, SearchState, take_off
 from ._lambda_map import koenigs
 from ._scalar import one_constraint
 from ._scaling_law import scaling_law
@@ -86,7 +86,7 @@ def _margin(system, frame: ChatterFrame, *, periods: int) -> Float[Array, ""]:
 
     def look(carry):
         flight, said, count = carry
-        flight, lands = step(system, flight)
+        flight, lands = search_step(system, flight)
         flight, said = jax.lax.cond(
             lands,
             lambda f, s: (
@@ -107,7 +107,7 @@ def _margin(system, frame: ChatterFrame, *, periods: int) -> Float[Array, ""]:
 
     zero, none = jnp.zeros(()), jnp.asarray(0)
     silence = _Sequence(jnp.asarray(False), none + 1, -period, zero, none - 1, none)
-    flight = leave(system, frame.release, frame.state, zero, longest_step(system))
+    flight = take_off(system, frame.release, frame.state, zero, longest_step(system))
     start = (flight, silence, none)
     said = jax.lax.while_loop(goes_on, look, start)[1]
     known = said.rank >= 0
@@ -118,7 +118,7 @@ def _margin(system, frame: ChatterFrame, *, periods: int) -> Float[Array, ""]:
     return jnp.where(known, margin, jnp.nan)
 
 
-def _heard(system, frame, periods: int, s: _Sequence, f: Flight) -> _Sequence:
+def _heard(system, frame, periods: int, s: _Sequence, f: SearchState) -> _Sequence:
     """What the impact says that the flight has just left."""
     period = jnp.asarray(system.period, jnp.float64)
     law = scaling_law(frozen(frame.restitution))
@@ -148,9 +148,9 @@ def _heard(system, frame, periods: int, s: _Sequence, f: Flight) -> _Sequence:
     )
 
 
-def _bounced(system: HybridSystem, f: Flight) -> Flight:
+def _bounced(system: HybridSystem, f: SearchState) -> SearchState:
     """Just after the impact that the motion is just before."""
     x, approach = f.y[:-2], f.y[-2]
     after = one_constraint(system.impact(f.time, x), 1)
     speed = rebound_speed(system, f.time, x, approach)
-    return leave(system, f.time, after, speed, f.longest)
+    return take_off(system, f.time, after, speed, f.longest)

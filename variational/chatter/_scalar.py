@@ -19,6 +19,6 @@ def check_chatter_system(system: HybridSystem) -> None:
         )
 
 
-def gap_of(system: HybridSystem, time, state):
+def scalar_gap(system: HybridSystem, time, state):
     """The gap of a system with one constraint, a scalar."""
     return one_constraint(system.gap(time, state), 0)

@@ -15,7 +15,7 @@ from jaxcam.parameters import as_arrays
 from ._chatter_frame import ChatterFrame, prepared_frame
 from ._free_flight import fly
 from ._impact_map import ImpactPoint, next_impact
-from ._scalar import check_chatter_system, gap_of
+from ._scalar import check_chatter_system, scalar_gap
 
 
 _IMPACTS = 2000
@@ -23,7 +23,7 @@ _IMPACTS = 2000
 _SMALL = 1e-12
 
 
-class Section(eqx.Module):
+class SectionArrival(eqx.Module):
     """Arrival at a section."""
 
     #: (n,) state; gap and normal velocity there, known better than the state's own
@@ -52,7 +52,7 @@ def to_section(
     start: ImpactPoint,
     section,
     height: ArrayLike = 0.0,
-) -> Section:
+) -> SectionArrival:
     """Follow a motion, impact by impact, to the time `section`.
 
     A sequence that becomes negligible before release has completed: the motion goes on
@@ -62,7 +62,7 @@ def to_section(
     start and the section; `start`, of which time, state and speed are used; `section`,
     a time; `height`, the gap at the start, > 0 in flight.
 
-    **Returns:** a [`variational.chatter.Section`][].
+    **Returns:** a [`variational.chatter.SectionArrival`][].
     """
     section = jnp.asarray(section, jnp.float64)
 
@@ -102,10 +102,10 @@ def to_section(
     speed = jnp.where(run.stuck, 0.0, run.speed)
     height = jnp.where(run.stuck, 0.0, run.height)
     state, gap, velocity = fly(system, time, from_state, speed, section - time, height)
-    return Section(state, gap, velocity, run.count, run.stuck)
+    return SectionArrival(state, gap, velocity, run.count, run.stuck)
 
 
-def section_turn(system: HybridSystem, state, phase=0.0) -> Section:
+def section_turn(system: HybridSystem, state, phase=0.0) -> SectionArrival:
     """The stroboscopic map through chattering: state at a phase to that a turn later.
 
     Exact to rounding however many and however low the impacts, unlike a simulation
@@ -115,27 +115,27 @@ def section_turn(system: HybridSystem, state, phase=0.0) -> Section:
     `(2,)`, in flight at time `phase` x period. Pure; may be compiled, batched and
     differentiated forward.
 
-    **Returns:** a [`variational.chatter.Section`][].
+    **Returns:** a [`variational.chatter.SectionArrival`][].
     """
     check_chatter_system(system)
     return _turn(as_arrays(system), jnp.asarray(state, jnp.float64), phase)
 
 
 @eqx.filter_jit
-def _turn(system, state, phase) -> Section:
+def _turn(system, state, phase) -> SectionArrival:
     system = system.prepared()
     time = jnp.asarray(phase * system.period, jnp.float64)
     frame = prepared_frame(system, time)
-    start, height = in_flight(system, time, state)
+    start, height = flight_start(system, time, state)
     return to_section(system, frame, start, time + system.period, height)
 
 
-def in_flight(system, time, state):
+def flight_start(system, time, state):
     """A state off the surface as the start of a flight, and its gap."""
     state = jnp.asarray(state, jnp.float64)
     speed = normal_velocity(system, time, state)[0]
     yes = jnp.asarray(True)
-    return ImpactPoint(time, state, speed, speed, yes), gap_of(system, time, state)
+    return ImpactPoint(time, state, speed, speed, yes), scalar_gap(system, time, state)
 
 
 def release_impacts(system: HybridSystem, count: int, time=0.0) -> ImpactPoint:
@@ -197,5 +197,5 @@ def section_to_impact(system: HybridSystem, state, phase, rank) -> ImpactPoint:
     check_chatter_system(system)
     system = as_arrays(system).prepared()
     time = jnp.asarray(phase * system.period, jnp.float64)
-    start, height = in_flight(system, time, state)
+    start, height = flight_start(system, time, state)
     return impact_after(system, time, start.state, start.speed, height, rank)

@@ -17,7 +17,7 @@ from ._gap_sizes import gap_sizes
 _ZERO = 1e-11
 
 
-class Start(NamedTuple):
+class ImpactStart(NamedTuple):
     """The impact that an orbit starts at."""
 
     constraint: int
@@ -27,7 +27,7 @@ class Start(NamedTuple):
     window: float
 
 
-def start_at_impact(system: HybridSystem, t, state, period) -> Start | None:
+def start_at_impact(system: HybridSystem, t, state, period) -> ImpactStart | None:
     """The impact at `state`, or nothing where no constraint is touched with a speed."""
     # as arrays: numbers would be compiled in
     t, period = (jnp.asarray(x, dtype=jnp.float64) for x in (t, period))
@@ -42,7 +42,7 @@ def start_at_impact(system: HybridSystem, t, state, period) -> Start | None:
     pulled = float(np.abs(fall[side]))
     slow = abs(float(speed[side]))
     window = slow / pulled if pulled > 0 else np.inf
-    return Start(side, state if speed[side] > 0 else after[side], window)
+    return ImpactStart(side, state if speed[side] > 0 else after[side], window)
 
 
 @eqx.filter_jit

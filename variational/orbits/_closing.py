@@ -15,7 +15,7 @@ from jaxtyping import ArrayLike, Float, Int
 
 from jaxcam.hybrid import HybridSystem
 
-from .._flight import fly
+from .._flight import fly_linearised
 from ._links import landed, matrix_of
 
 
@@ -75,7 +75,7 @@ def _newton(system, rows, sides, real, following, period, scale):
 
     def one(start, end, which, is_real):
         time = jnp.where(is_real, end, start[0])
-        flight = fly(
+        flight = fly_linearised(
             lambda _, t, x: system.vector_field(t, x),
             jnp.zeros(0),
             start[0],

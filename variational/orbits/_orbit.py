@@ -13,11 +13,11 @@ from jaxcam.hybrid.record import Contacts, Impacts
 from jaxcam.hybrid.sizes import component_sizes
 from jaxcam.parameters import real_array, VectorLike
 
-from ._at_impact import after_and_speeds, Start, start_at_impact
+from ._at_impact import after_and_speeds, ImpactStart, start_at_impact
 from ._closing import close, Knots
 from ._gap_sizes import gap_sizes
 from ._multipliers import eigenvalues
-from ._pieces import cut, Pieces
+from ._pieces import cut_turn, TurnPieces
 from ._turn_derivative import by_product, flown
 
 
@@ -46,7 +46,7 @@ class Orbit(eqx.Module):
     #: its determinant, from flights and impacts one by one
     determinant: Float[Array, ""]
     #: the turn cut at its events
-    pieces: Pieces
+    pieces: TurnPieces
     #: whether there is contact in the turn
     sticks: bool = eqx.field(static=True)
 
@@ -144,7 +144,7 @@ def orbit_of(
             "an orbit with contact cannot start at an impact; give a state in flight "
             "or in contact"
         )
-    pieces, sticks = cut(impacts, contacts, state, t0, t0 + period)
+    pieces, sticks = cut_turn(impacts, contacts, state, t0, t0 + period)
     made = by_product(system, jnp.zeros(0), None, state, pieces, sticks)
     return Orbit(
         state=state,
@@ -169,7 +169,7 @@ def _check_closure(miss, closure, period) -> None:
         )
 
 
-def _knots(system, impacts: Impacts, start: Start | None, t0, period, scale):
+def _knots(system, impacts: Impacts, start: ImpactStart | None, t0, period, scale):
     """The impacts as a boundary value problem, and which constraints they hit."""
     time, after = np.asarray(impacts.time), np.asarray(impacts.after)
     sides = np.asarray(impacts.constraint)

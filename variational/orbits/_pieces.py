@@ -12,7 +12,7 @@ from jaxcam.hybrid.record import Contacts, Impacts
 NOTHING, IMPACT, LAST_IMPACT = 0, 1, 2
 
 
-class Pieces(eqx.Module):
+class TurnPieces(eqx.Module):
     """Pieces of flight or contact, each with the event at its end.
 
     Those beyond the last event take no time and do nothing. Kept as numpy arrays.
@@ -30,9 +30,9 @@ class Pieces(eqx.Module):
     contact_after: Bool[np.ndarray, "k m"]
 
 
-def cut(
+def cut_turn(
     impacts: Impacts, contacts: Contacts, state, t0: float, t1: float
-) -> tuple[Pieces, bool]:
+) -> tuple[TurnPieces, bool]:
     """The pieces of the turn from t0 to t1, and whether there is any contact.
 
     **Arguments:** the events of the turn, and the state at t0.
@@ -77,7 +77,7 @@ def cut(
         return np.concatenate([values, more])
 
     after = np.concatenate([modes[1:], modes[-1:]])
-    pieces = Pieces(
+    pieces = TurnPieces(
         start=filled(times[:-1], t1),
         end=filled(times[1:], t1),
         kind=filled([event[1] for event in events], NOTHING),

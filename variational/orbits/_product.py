@@ -11,14 +11,14 @@ from jaxtyping import Array, Float
 from .._event_law import (
     completed_law,
     contact_projector,
-    crossing,
+    event_crossing,
     field_of,
     gap_of,
     impact_of,
     onto_contact,
 )
-from .._flight import fly
-from ._pieces import IMPACT, LAST_IMPACT, Pieces
+from .._flight import fly_linearised
+from ._pieces import IMPACT, LAST_IMPACT, TurnPieces
 
 
 class Product(NamedTuple):
@@ -38,7 +38,7 @@ def product_of(
     build: Callable,
     parameters: Float[Array, " q"],
     state: Float[Array, " n"],
-    pieces: Pieces,
+    pieces: TurnPieces,
     sticks: bool,
 ) -> Product:
     """Multiply transition matrices of the flights and saltation matrices between.
@@ -53,8 +53,10 @@ def product_of(
         mode = contact if sticks else None
         return lambda p, t, x: field_of(build(p), mode)(t, x)
 
-    def one(x, piece: Pieces):
-        flight = fly(field(piece.contact), parameters, piece.start, x, piece.end)
+    def one(x, piece: TurnPieces):
+        flight = fly_linearised(
+            field(piece.contact), parameters, piece.start, x, piece.end
+        )
         matrix = flight.matrix
         if sticks:
             held = _held(build, parameters, piece.end, flight.state, piece.contact)
@@ -78,7 +80,7 @@ def product_of(
     )
 
 
-def with_all_constraints(system, pieces: Pieces, state) -> Pieces:
+def with_all_constraints(system, pieces: TurnPieces, state) -> TurnPieces:
     """The flags of contact for every constraint of the system."""
     gap = jax.eval_shape(system.gap, pieces.start[0], state)
     missing = (gap.shape[0] if gap.shape else 1) - pieces.contact.shape[1]
@@ -107,7 +109,7 @@ def _held(build, parameters, t, x, contact):
     return jnp.concatenate([by_state, by_parameter], axis=1)
 
 
-def _event(build, parameters, piece: Pieces, x, sticks):
+def _event(build, parameters, piece: TurnPieces, x, sticks):
     """The derivative across the event of a piece, the state after it, and the
     determinant of the derivative."""
     n = x.shape[0]
@@ -124,7 +126,7 @@ def _event(build, parameters, piece: Pieces, x, sticks):
     return matrix, after, jnp.where(stuck, 0.0, change)
 
 
-def _across(build, parameters, piece: Pieces, law_of, sticks):
+def _across(build, parameters, piece: TurnPieces, law_of, sticks):
     t, x, side = piece.end, piece.before, piece.constraint
 
     def law(p):
@@ -138,7 +140,7 @@ def _across(build, parameters, piece: Pieces, law_of, sticks):
     if sticks:
         before = field_of(system, jnp.asarray(piece.contact))
         after = field_of(system, jnp.asarray(piece.contact_after))
-    law_x, moved, normal, speed = crossing(
+    law_x, moved, normal, speed = event_crossing(
         law(parameters), gap_of(system, side), before, after, t, x
     )
     hit = piece.kind != 0

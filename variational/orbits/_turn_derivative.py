@@ -10,8 +10,8 @@ from jaxtyping import Array, Float
 from jaxcam.hybrid.surface import field_in_force
 from jaxcam.parameters import Pick
 
-from .._flight import fly
-from ._pieces import Pieces
+from .._flight import fly_linearised
+from ._pieces import TurnPieces
 from ._product import product_of, with_all_constraints
 
 
@@ -56,7 +56,7 @@ def builder(system, where: Pick | None) -> Callable:
 
 
 @eqx.filter_jit
-def by_product(system, values, where, state, pieces: Pieces, sticks):
+def by_product(system, values, where, state, pieces: TurnPieces, sticks):
     n = state.shape[0]
     build = builder(system, where)
     made = product_of(build, values, state, pieces, sticks)
@@ -80,6 +80,6 @@ def by_product(system, values, where, state, pieces: Pieces, sticks):
 def flown(system, t0, state, t1) -> Float[Array, " n"]:
     """The end of a flight that meets nothing."""
     system = system.prepared()
-    return fly(
+    return fly_linearised(
         lambda _, t, x: system.vector_field(t, x), jnp.zeros(0), t0, state, t1
     ).state

@@ -75,7 +75,7 @@ class Horizon(NamedTuple):
     number: int
 
 
-class Start(NamedTuple):
+class LaneStart(NamedTuple):
     """Lanes as they start, one column each, and what they are run with."""
 
     slots: LaneLayout
@@ -86,7 +86,7 @@ class Start(NamedTuple):
     static: Any
 
 
-def start_lanes(lanes: Lanes, horizon: Horizon, settings, width: int) -> Start:
+def start_lanes(lanes: Lanes, horizon: Horizon, settings, width: int) -> LaneStart:
     """The start of lanes; `width` of them will run at a time."""
     pieces, count = [], len(lanes.states)
     whole = jnp.asarray(float(horizon.number))
@@ -104,10 +104,10 @@ def start_lanes(lanes: Lanes, horizon: Horizon, settings, width: int) -> Start:
     numbers = np.concatenate([numbers for _, numbers, _, _ in pieces], axis=1)
     each = [own for _, _, own, _ in pieces]
     own = jax.tree.map(lambda *parts: np.concatenate(parts)[:count], *each)
-    return Start(slots, numbers[:, :count], pack(own, count), pack(shared), static)
+    return LaneStart(slots, numbers[:, :count], pack(own, count), pack(shared), static)
 
 
-def compiled_chunk(start: Start, rows: int, row: Callable):
+def compiled_chunk(start: LaneStart, rows: int, row: Callable):
     """The compiled loop: own and shared parts, each as numbers and what is apart, and
     the numbers of the lanes, to numbers and log.
 

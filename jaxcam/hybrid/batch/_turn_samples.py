@@ -3,7 +3,7 @@
 import jax.numpy as jnp
 import numpy as np
 
-from ..codes import Row
+from ..codes import RowKind
 
 
 class TurnSamples:
@@ -18,7 +18,7 @@ class TurnSamples:
     @staticmethod
     def row(record, lane):
         # the number of a stop, 0 for whatever else happened
-        stop = jnp.where(record.kind == float(Row.STOP), lane.stops, 0.0)
+        stop = jnp.where(record.kind == float(RowKind.STOP), lane.stops, 0.0)
         return [stop, lane.impacts, lane.chatters, *map(jnp.asarray, record.after)]
 
     def take(self, work, log) -> None:

@@ -26,7 +26,7 @@ _TRUST = 0.02
 _SHORT = 1e-3
 
 
-class Verdict(NamedTuple):
+class StepVerdict(NamedTuple):
     """What became of a step; for one constraint, or the earliest of several."""
 
     retake: Any
@@ -36,7 +36,9 @@ class Verdict(NamedTuple):
     constraint: Any
 
 
-def judge(left: Jet, right: Jet, h, slack, rounding, scale, room, longest) -> Verdict:
+def judge(
+    left: Jet, right: Jet, h, slack, rounding, scale, room, longest
+) -> StepVerdict:
     """Judge the step of one free constraint.
 
     **Arguments:** the jets at both ends, the length of the step, the gap below zero
@@ -71,7 +73,7 @@ def judge(left: Jet, right: Jet, h, slack, rounding, scale, room, longest) -> Ve
     fraction = jnp.where(behind, crossing(c), lowest_point(polynomial, c))
     fraction = jnp.where(vague, 0.5, fraction)
     length = jnp.where(retake, fraction * h, jnp.inf)
-    return Verdict(retake, length, lands, offset, jnp.zeros_like(h))
+    return StepVerdict(retake, length, lands, offset, jnp.zeros_like(h))
 
 
 def moves_in(jet: Jet, rounding):
@@ -86,12 +88,12 @@ def moves_in(jet: Jet, rounding):
     return falls | ((jet.velocity == 0) & (jet.acceleration < 0))
 
 
-def earliest(verdicts: list[Verdict]) -> Verdict:
+def earliest(verdicts: list[StepVerdict]) -> StepVerdict:
     """The verdict on the step as a whole: the first thing that happens in it."""
     best = verdicts[0]
     for k, v in enumerate(verdicts[1:], start=1):
         sooner = v.lands & (~best.lands | (v.offset < best.offset))
-        best = Verdict(
+        best = StepVerdict(
             best.retake | v.retake,
             jnp.minimum(best.length, v.length),
             best.lands | v.lands,

@@ -11,17 +11,17 @@ from typing import Any, NamedTuple
 import jax.numpy as jnp
 
 from ..breakpoints import after
-from ..codes import Row, RUNNING
+from ..codes import RowKind, RUNNING
 from ._advance import after_attempt, Attempt, Plan
-from ._flight import earliest, judge, Verdict
+from ._flight import earliest, judge, StepVerdict
 from ._functions import Functions
 from ._gap_polynomial import Jet
 from ._landing import land, Landing
 from ._loop_state import LoopState
 from ._release import judge_contact, lets_go_before
-from ._select import any_of, pick, select
+from ._select import any_of, of_constraint, select
 from ._series import off_rounding, taylor_of_release
-from ._step import End, end_of_step, make_step, Step
+from ._step import end_of_step, make_step, Step, StepEnd
 
 
 class Record(NamedTuple):
@@ -38,7 +38,7 @@ class Record(NamedTuple):
 class Judged(NamedTuple):
     """What became of the flights of a step."""
 
-    flown: Verdict
+    flown: StepVerdict
     lands: Any
     # whether the step is accepted, as far as its flights are concerned
     good: Any
@@ -51,7 +51,7 @@ class Judged(NamedTuple):
     tiny: list
 
 
-def iterate(
+def iteration(
     functions: Functions, plan: Plan, carried: LoopState
 ) -> tuple[LoopState, Record]:
     """One attempt at a step."""
@@ -147,7 +147,7 @@ def _iterate(
     )
     kind = _kind(carried, lands, begins, released, stopped)
     record = Record(
-        kind=jnp.where(good & active, kind, float(Row.NOTHING)),
+        kind=jnp.where(good & active, kind, float(RowKind.NOTHING)),
         constraint=jnp.where(released, held.constraint, flown.constraint),
         t=t,
         before=select(lands, landing.impact.before, x),
@@ -158,7 +158,7 @@ def _iterate(
 
 
 def _judge_flights(
-    plan: Plan, carried: LoopState, end: End, made: Step, rounding
+    plan: Plan, carried: LoopState, end: StepEnd, made: Step, rounding
 ) -> Judged:
     """What happened to the gaps that are open."""
     h, jets = end.length, made.jets
@@ -193,15 +193,15 @@ def _judge_flights(
     waits = _waits_for_release(carried, jets, flown, natural, tiny)
     lands = flown.lands & fits & active & ~waits
     # the step to a release does not end behind the constraint hit after it
-    behind = pick([j.gap for j in jets], flown.constraint)
-    over = waits & (behind < -pick(slack, flown.constraint))
+    behind = of_constraint([j.gap for j in jets], flown.constraint)
+    over = waits & (behind < -of_constraint(slack, flown.constraint))
     good = fits & ~flown.retake & ~over & active
     return Judged(flown, lands, good, over, natural, held, tiny)
 
 
 def _judge_contacts(
-    carried: LoopState, end: End, landing: Landing, judged: Judged
-) -> Verdict:
+    carried: LoopState, end: StepEnd, landing: Landing, judged: Judged
+) -> StepVerdict:
     """What happened to the gaps that are closed."""
     return earliest(
         [
@@ -223,7 +223,7 @@ def _judge_contacts(
     )
 
 
-def _shorter(functions, end: End, judged: Judged, held: Verdict, converged):
+def _shorter(functions, end: StepEnd, judged: Judged, held: StepVerdict, converged):
     """The length to try instead, where the step is not accepted."""
     shorter = jnp.minimum(judged.flown.length, held.length)
     to_impact = jnp.minimum(shorter, end.length + judged.flown.offset)
@@ -234,11 +234,11 @@ def _shorter(functions, end: End, judged: Judged, held: Verdict, converged):
 
 
 def _kind(carried, lands, begins, released, stopped):
-    """What an accepted attempt is in the log: see `Row`."""
-    kind = jnp.where(stopped, float(Row.STOP), float(Row.STEP))
-    kind = jnp.where(carried.completing, float(Row.CONTACT), kind)
-    kind = jnp.where(released, float(Row.RELEASE), kind)
-    impact = jnp.where(begins, float(Row.LAST_IMPACT), float(Row.IMPACT))
+    """What an accepted attempt is in the log: see `RowKind`."""
+    kind = jnp.where(stopped, float(RowKind.STOP), float(RowKind.STEP))
+    kind = jnp.where(carried.completing, float(RowKind.CONTACT), kind)
+    kind = jnp.where(released, float(RowKind.RELEASE), kind)
+    impact = jnp.where(begins, float(RowKind.LAST_IMPACT), float(RowKind.IMPACT))
     return jnp.where(lands, impact, kind)
 
 

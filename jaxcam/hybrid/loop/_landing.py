@@ -5,13 +5,13 @@ from typing import Any, NamedTuple
 import jax.numpy as jnp
 
 from ._advance import Plan
-from ._flight import Verdict
+from ._flight import StepVerdict
 from ._functions import Functions
 from ._loop_state import LoopState
 from ._rest_of_chatter import Impact, Rest, rest_of_chatter
-from ._select import pick, select
+from ._select import of_constraint, select
 from ._series import taylor
-from ._step import End, seen_from_inside, Step
+from ._step import seen_from_inside, Step, StepEnd
 
 
 class Landing(NamedTuple):
@@ -38,10 +38,10 @@ def land(
     functions: Functions,
     plan: Plan,
     carried: LoopState,
-    end: End,
+    end: StepEnd,
     made: Step,
     lands,
-    flown: Verdict,
+    flown: StepVerdict,
     rounding,
 ) -> Landing:
     """The state after the impact if the step `lands`, at its end if not."""
@@ -53,7 +53,7 @@ def land(
     after = after_each[0]
     for k in range(1, functions.m):
         after = select(flown.constraint == k, after_each[k], after)
-    approach = pick(
+    approach = of_constraint(
         [
             j.velocity + offset * (j.acceleration + offset * j.jerk / 2)
             for j in made.jets
@@ -66,17 +66,21 @@ def land(
 
     # does the rest of the impacts follow in no time?
     hit = [lands & (flown.constraint == k) for k in range(functions.m)]
-    rebound = jnp.maximum(pick([j.velocity for j in jets], flown.constraint), 0.0)
+    rebound = jnp.maximum(
+        of_constraint([j.velocity for j in jets], flown.constraint), 0.0
+    )
     fastest = jnp.where(lands, jnp.maximum(carried.fastest, rebound), carried.fastest)
     impact = Impact(t, landed, after, approach, rebound, flown.constraint)
     chatter = rest_of_chatter(functions, plan, impact, jets, contact, end.stop)
     # deep enough into the sequence, or so low that rounding hides the next hop
-    pulled = jnp.abs(pick([j.acceleration for j in jets], flown.constraint))
+    pulled = jnp.abs(of_constraint([j.acceleration for j in jets], flown.constraint))
     deep = rebound <= plan.depth * fastest
     # a hop is v^2 / 2a high: hidden below 250 times the rounding
-    low = 500 * pick(carried.blur, flown.constraint)
+    low = 500 * of_constraint(carried.blur, flown.constraint)
     begins = lands & chatter.possible & (deep | (rebound * rebound <= low * pulled))
-    hidden = _hides(carried, t, impact, pulled, pick(rounding, flown.constraint))
+    hidden = _hides(
+        carried, t, impact, pulled, of_constraint(rounding, flown.constraint)
+    )
     return Landing(
         t, seen, x, contact, jets, hit, impact, chatter, begins, fastest, hidden
     )
@@ -106,5 +110,5 @@ def _hides(carried, t, impact, pulled, rounding):
     after = impact.rebound * impact.rebound <= 500 * rounding * pulled
     if not carried.struck:
         return after
-    since = t - pick(carried.struck, impact.constraint)
+    since = t - of_constraint(carried.struck, impact.constraint)
     return after | (-impact.approach * since <= 500 * rounding)

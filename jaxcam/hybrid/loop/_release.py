@@ -2,7 +2,7 @@
 
 import jax.numpy as jnp
 
-from ._flight import Verdict
+from ._flight import StepVerdict
 from ._gap_polynomial import end_curvature, Jet
 
 
@@ -13,7 +13,7 @@ CLOSE = 1e-7
 
 def judge_contact(
     left: Jet, right: Jet, h, scale, rounding, room, completing, locating
-) -> Verdict:
+) -> StepVerdict:
     """Judge the step of one constraint in contact.
 
     The multiplier (the acceleration a that contact suppresses) is negative while the
@@ -62,7 +62,7 @@ def judge_contact(
     share = jnp.where(early, jnp.minimum(share, 0.5), share)
     length = jnp.where(retake, h * share, jnp.inf)
     offset = jnp.where(near & (h > 0), offset, 0.0)
-    return Verdict(retake, length, lets_go, offset, jnp.zeros_like(h))
+    return StepVerdict(retake, length, lets_go, offset, jnp.zeros_like(h))
 
 
 def opens(jet: Jet, scale, rounding):

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import jax.numpy as jnp
 
 from ..surface import completion_time
-from ._select import pick, select
+from ._select import of_constraint, select
 
 
 class Rest(NamedTuple):
@@ -38,13 +38,13 @@ def rest_of_chatter(functions, plan, impact: Impact, jets, contact, stop) -> Res
     """
     t, before, after, approach, rebound, constraint = impact
     dampings, restitutions, states = functions.chatter(t, before, after)
-    damping = pick(dampings, constraint)
-    r0 = pick(restitutions, constraint)
+    damping = of_constraint(dampings, constraint)
+    r0 = of_constraint(restitutions, constraint)
     state = states[0]
     for k in range(1, functions.m):
         state = select(constraint == k, states[k], state)
-    a = pick([j.acceleration for j in jets], constraint)
-    j = pick([j.jerk for j in jets], constraint)
+    a = of_constraint([j.acceleration for j in jets], constraint)
+    j = of_constraint([j.jerk for j in jets], constraint)
     small = rebound * jnp.abs(j) <= plan.smallness * (1 - r0) * a * a
     possible = (a < 0) & small & (r0 < 1)
     # quantities of the state without normal velocity

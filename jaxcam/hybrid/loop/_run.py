@@ -8,11 +8,11 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..codes import Row, RUNNING
+from ..codes import RowKind, RUNNING
 from ..lowering import depend_on, one_kernel, with_kept
 from ._advance import Plan
 from ._functions import Functions
-from ._iterate import iterate, Record
+from ._iterate import iteration, Record
 from ._loop_state import LoopState
 
 
@@ -67,7 +67,7 @@ def run_raw(
     carried = jax.tree.map(jnp.asarray, carried)
 
     def body(carried):
-        carried, record = iterate(functions, plan, carried)
+        carried, record = iteration(functions, plan, carried)
         return carried, jnp.stack(row(record, carried))
 
     # scalars of one run are never computed twice, and to keep them costs compile time
@@ -105,7 +105,7 @@ def attempts(functions: Functions, plan: Plan, carried: LoopState, row):
     """
 
     def body(carried):
-        carried, record = iterate(functions, plan, carried)
+        carried, record = iteration(functions, plan, carried)
         return carried, tuple(row(record, carried))
 
     keeping, kept = with_kept(body, carried, on=not functions.plain)
@@ -161,7 +161,7 @@ def run_reversible(
     blocks = -(-rows // block)
 
     def one(carried, _):
-        carried, record = iterate(functions, plan, carried)
+        carried, record = iteration(functions, plan, carried)
         return carried, jnp.stack(_row(record, carried))
 
     @jax.checkpoint
@@ -196,7 +196,7 @@ def _unpack(log, functions: Functions) -> Log:
     )
 
 
-def kinds(log: Log, *wanted: Row):
+def rows_of_kind(log: Log, *wanted: RowKind):
     """Which rows are of one of the kinds."""
     mask = log.kind == float(wanted[0])
     for w in wanted[1:]:

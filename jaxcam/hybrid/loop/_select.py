@@ -25,7 +25,7 @@ def select(condition, when_true, when_false) -> tuple:
     )
 
 
-def pick(values, constraint) -> Any:
+def of_constraint(values, constraint) -> Any:
     out = values[0]
     for k, v in enumerate(values[1:], start=1):
         out = jnp.where(constraint == k, v, out)

@@ -16,7 +16,7 @@ from ._scale import error_allowed, error_norm, held_scales, scales
 from ._select import any_of, select
 
 
-class End(NamedTuple):
+class StepEnd(NamedTuple):
     """Where a step ends."""
 
     length: Any
@@ -47,7 +47,7 @@ class Step(NamedTuple):
     scale: tuple
 
 
-def end_of_step(plan: Plan, carried: LoopState, rounding) -> End:
+def end_of_step(plan: Plan, carried: LoopState, rounding) -> StepEnd:
     """Where the next step ends; `rounding` is what cannot be told from a zero gap."""
     asked = jnp.minimum(plan.t0 + (carried.stops + 1) * plan.stop_period, plan.t1)
     sides = neighbours(plan.breaks, plan.repeat, carried.t)
@@ -66,10 +66,10 @@ def end_of_step(plan: Plan, carried: LoopState, rounding) -> End:
     h = jnp.where(carried.status == RUNNING, h, 0.0)
     t = jnp.where(at_stop, stop, carried.t + h)
     room = jnp.where(at_stop, 0.0, stop - t)
-    return End(h, t, stop, asked, at_stop, room, sides)
+    return StepEnd(h, t, stop, asked, at_stop, room, sides)
 
 
-def seen_from_inside(plan: Plan, end: End):
+def seen_from_inside(plan: Plan, end: StepEnd):
     """How the times of a step are seen: inside the breakpoints on its sides."""
     if not plan.breaks:
         return lambda t: t
@@ -77,7 +77,9 @@ def seen_from_inside(plan: Plan, end: End):
     return lambda t: between(t, low, high, span)
 
 
-def make_step(functions: Functions, plan: Plan, carried: LoopState, end: End) -> Step:
+def make_step(
+    functions: Functions, plan: Plan, carried: LoopState, end: StepEnd
+) -> Step:
     """The step to that end, in the modes that are in force."""
     inside, h = seen_from_inside(plan, end), end.length
     x, error, stages = step(

@@ -42,7 +42,7 @@ def join_known(elements: np.ndarray):
     return np.stack(flat).reshape(elements.shape) if flat else np.zeros(elements.shape)
 
 
-def compute(equation, arrays) -> list[np.ndarray]:
+def computed(equation, arrays) -> list[np.ndarray]:
     """An operation on known numbers, done while tracing."""
     name, outputs = equation.primitive.name, equation.outvars
     params = equation.params

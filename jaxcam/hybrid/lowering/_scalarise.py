@@ -19,7 +19,7 @@ from jax.core import Tracer
 from jax.extend.core import Literal
 
 from ._jaxprs import has_saving_rule, opened
-from ._known import compute, is_known, join_known
+from ._known import computed, is_known, join_known
 from ._sincos import sincos
 
 
@@ -151,7 +151,7 @@ def _apply(equation, inputs, memory):
         cuts = np.cumsum(params["sizes"])[:-1]
         return list(np.split(inputs[0], cuts, axis=params["axis"]))
     if all(is_known(e) for i in inputs for e in i.ravel()):
-        return [split(a) for a in compute(equation, [join_known(i) for i in inputs])]
+        return [split(a) for a in computed(equation, [join_known(i) for i in inputs])]
     if name in _SUMS:
         return [_reduce(_SUMS[name], inputs[0], params["axes"], outputs[0].shape)]
     if name == "dot_general" and _plain_product(params):

@@ -8,8 +8,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from ..codes import Row
-from ..loop import kinds, Log
+from ..codes import RowKind
+from ..loop import Log, rows_of_kind
 from ..surface import normal_velocity
 from ._events import Contacts, Impacts, Steps
 
@@ -47,7 +47,7 @@ def assemble(
     kept = first(contact, log.contact > 0.5, False)
     steps = Steps(time, first(state, log.after, xp.nan), kept, count + 1)
 
-    hits = kinds(log, Row.IMPACT, Row.LAST_IMPACT)
+    hits = rows_of_kind(log, RowKind.IMPACT, RowKind.LAST_IMPACT)
     number = xp.sum(hits)
     index = _places(xp, hits, max_impacts, 0)
     real = xp.arange(max_impacts) < number

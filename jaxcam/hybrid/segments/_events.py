@@ -9,10 +9,10 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float
 
-from ._motion import FRACTIONS, Motion
+from ._motion import CompiledMotion, FRACTIONS
 
 
-class Event(NamedTuple):
+class PieceEnd(NamedTuple):
     """What ends a piece: the constraint, the row of the last point before, and the
     time from there (s)."""
 
@@ -22,7 +22,7 @@ class Event(NamedTuple):
 
 
 #: the step after an event was longer than the flight: try again with a shorter one
-TOO_LONG = Event(-1, 0, 0.0)
+TOO_LONG = PieceEnd(-1, 0, 0.0)
 
 
 class Flown(NamedTuple):
@@ -33,13 +33,13 @@ class Flown(NamedTuple):
     rounding can tell of each gap, and of a contact a part of the largest level.
     """
 
-    motion: Motion
+    motion: CompiledMotion
     contact: Bool[np.ndarray, " m"]
     times: Float[np.ndarray, " k"]
     states: Float[np.ndarray, "k n"]
     tiny: Float[np.ndarray, " m"]
 
-    def first_event(self, count, fired, first, first_rate, t1) -> Event | None:
+    def first_event(self, count, fired, first, first_rate, t1) -> PieceEnd | None:
         """The first event among the steps; `TOO_LONG` where the first step hid one.
 
         **Arguments:** the number of points, whether diffrax `fired` an event at the
@@ -48,7 +48,7 @@ class Flown(NamedTuple):
         times = self.times
         scan = self.motion.scan(times, self.states, self.contact, count - 1)
         level, rate = np.asarray(scan.level), np.asarray(scan.rate)
-        found: list[Event] = []
+        found: list[PieceEnd] = []
         for k in range(len(self.contact)):
             curve = level[: count - 1, :, k], rate[: count - 1, :, k]
             largest = np.max(np.abs(curve[0]), initial=np.abs(first[k]))
@@ -93,7 +93,7 @@ class Flown(NamedTuple):
                 before, slope, low = levels[p], rates[p], high
         return None
 
-    def _locate(self, k, i, low, high, start=None) -> Event:
+    def _locate(self, k, i, low, high, start=None) -> PieceEnd:
         """Newton on the length (s) from point `i`, kept between `low` and `high`."""
         h = high if start is None else start
         change, span = np.inf, float(self.times[i + 1] - self.times[i])
@@ -111,7 +111,7 @@ class Flown(NamedTuple):
             change, h = abs(moved - h), moved
             if change <= 1e-15 * h or (not smaller and change < 1e-12 * (span + h)):
                 break
-        return Event(k, i, float(h))
+        return PieceEnd(k, i, float(h))
 
     def _bottom(self, k, i, low, high):
         """Where the level is lowest between two lengths, by halving its rate."""

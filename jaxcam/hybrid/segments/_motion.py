@@ -39,7 +39,7 @@ _BATCH = 64
 FRACTIONS = np.arange(1, 9) / 8
 
 
-class Point(NamedTuple):
+class PathPoint(NamedTuple):
     """A state on the way, and for each constraint how far it is from its event.
 
     The level is the gap of a free constraint and the pressure (minus the multiplier)
@@ -52,7 +52,7 @@ class Point(NamedTuple):
 
 
 class Hop(NamedTuple):
-    """The end of a short hop: a `Point`, normal velocity, height climbed, error."""
+    """The end of a short hop: a `PathPoint`, normal velocity, height climbed, error."""
 
     state: jax.Array
     level: jax.Array
@@ -62,7 +62,7 @@ class Hop(NamedTuple):
     effort: jax.Array
 
 
-class End(NamedTuple):
+class ChatterEnd(NamedTuple):
     """The end of a chatter, and whether the series for it may be used."""
 
     possible: jax.Array
@@ -86,7 +86,7 @@ def _compiled(method):
     return call
 
 
-class Motion(eqx.Module):
+class CompiledMotion(eqx.Module):
     """The compiled functions: of time, state and the constraints in contact."""
 
     system: HybridSystem
@@ -104,7 +104,7 @@ class Motion(eqx.Module):
         self.smallness = jnp.asarray(settings.chatter_smallness, dtype=jnp.float64)
         self.solver = settings.solver
 
-    def measured(self, scale) -> "Motion":
+    def measured(self, scale) -> "CompiledMotion":
         """The same with errors relative to another scale."""
         return eqx.tree_at(lambda m: m.scale, self, jnp.asarray(scale))
 
@@ -155,12 +155,12 @@ class Motion(eqx.Module):
         return times, states, jnp.sum(real), solution.stats["num_steps"], fired
 
     @_compiled
-    def probe(self, t, x, contact, h) -> Point:
+    def probe(self, t, x, contact, h) -> PathPoint:
         """The point a step of length `h` after `(t, x)`."""
         return self._point(t, x, contact, h)
 
     @_compiled
-    def scan(self, times, states, contact, count) -> Point:
+    def scan(self, times, states, contact, count) -> PathPoint:
         """Points inside the first `count` steps: `(steps, fractions, m)`."""
         real = jnp.arange(times.shape[0] - 1) < count
         lengths = jnp.where(real, jnp.diff(times), 0.0)
@@ -249,7 +249,7 @@ class Motion(eqx.Module):
         return impacts(self.system, t, x)
 
     @_compiled
-    def completion(self, t, x, contact, k, speed, incoming) -> End:
+    def completion(self, t, x, contact, k, speed, incoming) -> ChatterEnd:
         """The rest of the chatter on constraint `k` after a rebound at `speed`.
 
         As [`jaxcam.hybrid.surface.chatter_completion`][], for one of several
@@ -276,7 +276,9 @@ class Motion(eqx.Module):
         small = speed * jnp.abs(jerk) <= self.smallness * (1 - r0) * acceleration**2
         duration = completion_time(speed, a, rate, damping, r0, softening)
         possible = small & (r0 < 1) & (a < 0) & (a + rate * duration < 0)
-        return End(possible, duration, self._point(t, rest, held, duration).state)
+        return ChatterEnd(
+            possible, duration, self._point(t, rest, held, duration).state
+        )
 
     def _field(self, t, x, contact):
         # free flight does not pay for the multipliers of contact
@@ -297,14 +299,14 @@ class Motion(eqx.Module):
             self.scale,
         )
 
-    def _point(self, t, x, contact, h) -> Point:
+    def _point(self, t, x, contact, h) -> PathPoint:
         after, _ = self._step(t, x, contact, h)
         after = jax.lax.cond(
             jnp.any(contact),
             lambda: self._onto(t + h, self._onto(t + h, after, contact), contact),
             lambda: after,
         )
-        return Point(after, *self._levels(t + h, after, contact))
+        return PathPoint(after, *self._levels(t + h, after, contact))
 
     def _levels(self, t, x, contact):
         gap = self._free_series(1)(t, x)

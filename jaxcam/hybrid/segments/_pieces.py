@@ -15,10 +15,10 @@ import jax.numpy as jnp
 import numpy as np
 
 from .. import breakpoints
-from ..codes import FINISHED, NOT_FINITE, Row, RUNNING, STEP_FAILED, TOGETHER
+from ..codes import FINISHED, NOT_FINITE, RowKind, RUNNING, STEP_FAILED, TOGETHER
 from ..loop import Log
 from ._events import Flown, TOO_LONG
-from ._motion import Motion, prepared
+from ._motion import CompiledMotion, prepared
 
 
 # a hop whose lambda = v |j| / a^2 is smaller is one step, not a call of diffrax
@@ -61,7 +61,7 @@ class _Engine:
 
     def __init__(self, system, settings, t0, state, t1):
         self.settings = settings
-        self.motion = Motion(prepared(system), settings, np.ones_like(state))
+        self.motion = CompiledMotion(prepared(system), settings, np.ones_like(state))
         self.span = t1 - t0
         # breakpoints are passed between pieces: this is where the next one lies
         own = system.period
@@ -159,14 +159,14 @@ class _Engine:
         if points > 1 or event is not None:
             self.released = None
         for i in range(1, points):
-            self._row(Row.STEP, 0, times[i], states[i])
+            self._row(RowKind.STEP, 0, times[i], states[i])
         if event is None:
             i = points - 1
             self.t, self.x = float(times[i]), states[i]
             if np.any(self.contact):
                 self.x = flown.probe(i, 0.0).state
             if self.t >= self.t1:
-                self.rows[-1] = (Row.STOP, *self.rows[-1][1:])
+                self.rows[-1] = (RowKind.STOP, *self.rows[-1][1:])
             return
         there = flown.probe(event.row, event.length)
         t = float(times[event.row]) + event.length
@@ -180,7 +180,7 @@ class _Engine:
 
         The height is taken from the integral of the normal velocity instead.
         """
-        if not self.rows or self.rows[-1][0] != Row.IMPACT:
+        if not self.rows or self.rows[-1][0] != RowKind.IMPACT:
             return False
         k = int(self.rows[-1][1])
         _, u, a, j = jets[k]
@@ -230,11 +230,11 @@ class _Engine:
             if bool(end.possible) and t + float(end.duration) <= self.end:
                 self.contact = self.contact.copy()
                 self.contact[k] = True
-                self._row(Row.LAST_IMPACT, k, t, after, before)
+                self._row(RowKind.LAST_IMPACT, k, t, after, before)
                 self.t, self.x = t + float(end.duration), np.asarray(end.state)
-                self._row(Row.CONTACT, k, self.t, self.x)
+                self._row(RowKind.CONTACT, k, self.t, self.x)
                 return
-        self._row(Row.IMPACT, k, t, after, before)
+        self._row(RowKind.IMPACT, k, t, after, before)
 
     def _no_step(self) -> float:
         """Why no step is short enough."""
@@ -246,7 +246,7 @@ class _Engine:
         self.released = k
         self.fastest = 0.0
         self.t, self.x = t, np.asarray(x)
-        self._row(Row.RELEASE, k, self.t, self.x)
+        self._row(RowKind.RELEASE, k, self.t, self.x)
 
     def _row(self, kind, k, t, after, before=None):
         before = after if before is None else before
@@ -268,8 +268,8 @@ class _Engine:
         """Go on from the far side of a breakpoint; the row there says when it was."""
         last, here, time = self.rows[-1] if self.rows else None, self.t, self.ahead
         self.x = self.x + (time - here) * self._rates()
-        if last is not None and last[0] == Row.STEP and last[2] == here:
-            kind = Row.STOP if time >= self.t1 else Row.STEP
+        if last is not None and last[0] == RowKind.STEP and last[2] == here:
+            kind = RowKind.STOP if time >= self.t1 else RowKind.STEP
             self.rows[-1] = (kind, last[1], time, self.x, self.x, last[-1])
         self.released = None
         self._look_ahead(time)

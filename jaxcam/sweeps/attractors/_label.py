@@ -30,14 +30,14 @@ class Labels(NamedTuple):
     turns: np.ndarray
 
 
-def periods(states, tolerance: float = 1e-6, sizes=None) -> np.ndarray:
+def periods(states, period_tolerance: float = 1e-6, sizes=None) -> np.ndarray:
     """Smallest number of points after which each lane repeats; 0 where none does.
 
     **Arguments:**
 
     - `states`: shape `(lanes, keep, n)`; periods up to `keep / 2` are found, so that
         each is seen twice.
-    - `tolerance`: allowed difference of two states, relative to `sizes`.
+    - `period_tolerance`: allowed difference of two states, relative to `sizes`.
     - `sizes`: shape `(lanes, n)`, of each component; by default its largest value.
 
     A motion that spirals in towards an orbit looks, for a while, as if it had a
@@ -51,7 +51,7 @@ def periods(states, tolerance: float = 1e-6, sizes=None) -> np.ndarray:
     found = np.zeros(lanes, dtype=int)
     if sizes is None:
         sizes = np.abs(states).max(axis=1)
-    room = np.broadcast_to(tolerance * sizes[:, None], states.shape)
+    room = np.broadcast_to(period_tolerance * sizes[:, None], states.shape)
     left = np.arange(lanes)
     for n in range(1, keep // 2 + 1):
         if not len(left):
@@ -82,14 +82,14 @@ def _still_nearing(states, n: int) -> np.ndarray:
 
 
 def label(
-    samples: Samples, tolerance: float = 1e-6, impacting: bool = True, sizes=None
+    samples: Samples, period_tolerance: float = 1e-6, impacting: bool = True, sizes=None
 ) -> Labels:
     """The label of each lane.
 
     **Arguments:** `impacting`: whether impacts are counted; they are not for a map;
-    `tolerance`, `sizes`: as of [`jaxcam.sweeps.attractors.periods`][].
+    `period_tolerance`, `sizes`: as of [`jaxcam.sweeps.attractors.periods`][].
     """
-    turns = periods(samples.states, tolerance, sizes)
+    turns = periods(samples.states, period_tolerance, sizes)
     index = np.maximum(turns, 1)[:, None] - 1
 
     def in_the_orbit(counts):

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..sections import AbstractSection, joined, Samples
+from ..sections import AbstractSection, Samples, with_lanes
 from ._label import APERIODIC, label, Labels
 
 
@@ -12,7 +12,7 @@ def settle(
     turns: int,
     keep: int,
     *,
-    tolerance: float = 1e-6,
+    period_tolerance: float = 1e-6,
     reruns: int = 0,
     where=None,
     values=None,
@@ -25,7 +25,7 @@ def settle(
     samples = section.sample(states, turns, keep, where=where, values=values)
     counted = section.impacting and section.regular
     sizes = section.sizes(states, samples, where, values)
-    labels = label(samples, tolerance, counted, sizes)
+    labels = label(samples, period_tolerance, counted, sizes)
     for _ in range(reruns):
         turns *= 2
         (open_,) = np.nonzero(labels.turns == APERIODIC)
@@ -34,6 +34,6 @@ def settle(
         some = None if values is None else values[open_]
         start = samples.final[open_]
         again = section.sample(start, turns, keep, where=where, values=some)
-        samples = joined(samples, open_, again)
-        labels = label(samples, tolerance, counted, sizes)
+        samples = with_lanes(samples, open_, again)
+        labels = label(samples, period_tolerance, counted, sizes)
     return samples, labels

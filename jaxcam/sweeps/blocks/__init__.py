@@ -10,8 +10,8 @@ from ._run import (
     run_blocks as run_blocks,
 )
 from ._store import (
-    Layout as Layout,
     Store as Store,
+    StoredVariable as StoredVariable,
+    StoreLayout as StoreLayout,
     SWEEP as SWEEP,
-    Variable as Variable,
 )

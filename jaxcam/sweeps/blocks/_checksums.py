@@ -53,7 +53,7 @@ def checksum(arrays: Mapping[str, np.ndarray]) -> int:
     return value
 
 
-def opened(path: str | Path) -> xarray.Dataset:
+def open_store(path: str | Path) -> xarray.Dataset:
     """The dataset on disk, read when it is used.
 
     **Raises:** `ValueError` where its description or a coordinate is damaged.
@@ -103,7 +103,7 @@ def checked(path: str | Path) -> xarray.Dataset:
             f"blocks are wrong: {names_of(bad)}); run the sweep again with resume=True "
             "to compute them anew"
         )
-    dataset = opened(path)
+    dataset = open_store(path)
     _check_together(path, dataset)
     return dataset
 

@@ -20,14 +20,14 @@ from ._checksums import (
     checksums,
     damaged,
     faults,
-    opened,
+    open_store,
     read_block,
     stored_identity,
     TOGETHER,
     UNFINISHED,
     UNREADABLE,
 )
-from ._store import Layout, ordered, plain, template
+from ._store import ordered, plain, StoreLayout, template
 
 
 class OnDisk:
@@ -36,7 +36,7 @@ class OnDisk:
     **Raises:** `ValueError` where there is something else at the path.
     """
 
-    def __init__(self, path: str | Path, layout: Layout, resume: bool):
+    def __init__(self, path: str | Path, layout: StoreLayout, resume: bool):
         self.layout = layout
         self.path = Path(path)
         if self.path.exists() and any(self.path.iterdir() if self.path.is_dir()
@@ -60,7 +60,7 @@ class OnDisk:
         return read_block(self._group, block)
 
     def dataset(self) -> xarray.Dataset:
-        return opened(self.path)
+        return open_store(self.path)
 
     def add(self, extra: xarray.Dataset) -> None:
         if TOGETHER in self._group.attrs:
@@ -146,7 +146,7 @@ class OnDisk:
                 for name in wanted
             }
             sizes = (group.attrs["units"], group.attrs["block"], group.attrs["stored"])
-            opened(self.path).close()
+            open_store(self.path).close()
         except UNREADABLE:
             raise damaged(self.path) from None
         if found != wanted or sizes != (

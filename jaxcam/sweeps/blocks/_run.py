@@ -20,7 +20,7 @@ import numpy as np
 
 from ._checksums import names_of
 from ._disk import OnDisk
-from ._store import Layout, Memory, Store
+from ._store import Memory, Store, StoreLayout
 
 
 Arrays = dict[str, np.ndarray]
@@ -45,7 +45,7 @@ class AbstractJob(abc.ABC):
     the block before it.
     """
 
-    layout: Layout
+    layout: StoreLayout
     chained: bool = False
 
     @abc.abstractmethod

@@ -13,7 +13,7 @@ SWEEP = "sweep"
 FORMAT, VERSION = "jaxcam sweep", 1
 
 
-class Variable(NamedTuple):
+class StoredVariable(NamedTuple):
     """One array of a sweep: its first dimension is that of the blocks."""
 
     dims: tuple[str, ...]
@@ -23,12 +23,12 @@ class Variable(NamedTuple):
     attributes: Mapping[str, Any] = {}
 
 
-class Layout(NamedTuple):
+class StoreLayout(NamedTuple):
     """What a sweep stores: `units` along the first dimension, `block` at a time."""
 
     units: int
     block: int
-    variables: Mapping[str, Variable]
+    variables: Mapping[str, StoredVariable]
     coordinates: Mapping[str, tuple[str, Any, Mapping[str, Any]]]
     #: what the sweep is of, as JSON; two sweeps are the same where this is
     identity: Mapping[str, Any]
@@ -45,7 +45,7 @@ class Layout(NamedTuple):
 class Store(Protocol):
     """What the blocks are put into and read from."""
 
-    layout: Layout
+    layout: StoreLayout
 
     def finished(self) -> list[bool]: ...
     def write(self, block: int, arrays: Mapping[str, np.ndarray]) -> None: ...
@@ -57,7 +57,7 @@ class Store(Protocol):
 class Memory:
     """Blocks in memory."""
 
-    def __init__(self, layout: Layout):
+    def __init__(self, layout: StoreLayout):
         self.layout = layout
         self._arrays = {
             name: np.zeros((layout.units, *v.tail), dtype=v.dtype)
@@ -87,14 +87,14 @@ class Memory:
         self._extra = extra
 
 
-def ordered(layout: Layout, arrays) -> dict[str, np.ndarray]:
+def ordered(layout: StoreLayout, arrays) -> dict[str, np.ndarray]:
     return {
         name: np.ascontiguousarray(arrays[name], dtype=v.dtype)
         for name, v in layout.variables.items()
     }
 
 
-def template(layout: Layout, arrays: Mapping[str, np.ndarray]) -> xarray.Dataset:
+def template(layout: StoreLayout, arrays: Mapping[str, np.ndarray]) -> xarray.Dataset:
     """Coordinates and attributes, and the arrays that there are."""
     data = {}
     for name, array in arrays.items():

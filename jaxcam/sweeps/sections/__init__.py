@@ -9,8 +9,8 @@ from ._poincare_section import (
 from ._samples import (
     BEHIND as BEHIND,
     filled as filled,
-    joined as joined,
     Samples as Samples,
+    with_lanes as with_lanes,
 )
 from ._section import (
     AbstractSection as AbstractSection,

@@ -57,7 +57,7 @@ def lifted(system: HybridSystem, t0, states, where=None, values=None) -> np.ndar
     return np.asarray(_lifted(batched, shared, jnp.asarray(t0, float), _rows(states)))
 
 
-def in_contact(system: HybridSystem, t0, where=None, values=None) -> np.ndarray:
+def state_in_contact(system: HybridSystem, t0, where=None, values=None) -> np.ndarray:
     """The state in contact, without velocity relative to the constraint, at `t0`.
 
     **Raises:** `ValueError` where a state has not two components or there are several

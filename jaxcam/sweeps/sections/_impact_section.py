@@ -6,7 +6,7 @@ import numpy as np
 
 from ...hybrid import HybridSystem, Settings
 from ...hybrid.batch import Chunking, Horizon, Lanes, run_refilled
-from ...hybrid.codes import Row
+from ...hybrid.codes import RowKind
 from ...parameters import as_arrays
 from ._hybrid_lanes import chunk_rows, run_lanes
 from ._samples import Samples
@@ -84,7 +84,7 @@ class _Impacts:
 
     def take(self, work, log) -> None:
         kind = log[0].astype(np.int8)
-        hit = (kind == Row.IMPACT) | (kind == Row.LAST_IMPACT)
+        hit = (kind == RowKind.IMPACT) | (kind == RowKind.LAST_IMPACT)
         rank = self._number[work] + np.cumsum(hit, axis=0) - 1
         # attempt by attempt, so that the latest is what stays in a place
         at = np.nonzero(hit)
@@ -92,7 +92,7 @@ class _Impacts:
         self._ring[place] = np.stack([part[at] for part in log], axis=1)
         # slots that do not run show a lane of another slot
         np.add.at(self._number, work, hit.sum(axis=0))
-        at = np.nonzero(kind == Row.STOP)
+        at = np.nonzero(kind == RowKind.STOP)
         self._final[work[at[1]]] = np.stack([part[at] for part in log[2:]], axis=1)
 
     def found(self):
@@ -101,5 +101,5 @@ class _Impacts:
         # the newest impact goes last; a ring that is not full starts with NaN
         order = (number[:, None] + np.arange(keep)) % keep
         rows = np.take_along_axis(self._ring, order[..., None], axis=1)
-        rests = (rows[..., 0] == float(Row.LAST_IMPACT)).astype(float)
+        rests = (rows[..., 0] == float(RowKind.LAST_IMPACT)).astype(float)
         return rows[..., 2:], rows[..., 1], rests, self._final

@@ -27,7 +27,7 @@ class Samples(NamedTuple):
 BEHIND = -1
 
 
-def joined(old: Samples, which, new: Samples) -> Samples:
+def with_lanes(old: Samples, which, new: Samples) -> Samples:
     """The samples with those of some lanes replaced."""
 
     def put(before, after):

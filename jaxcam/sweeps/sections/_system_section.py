@@ -4,7 +4,7 @@ import numpy as np
 from equinox import AbstractVar
 
 from ...hybrid import HybridSystem
-from ._hybrid_lanes import in_contact, lane_sizes, lifted, turn_lengths
+from ._hybrid_lanes import lane_sizes, lifted, state_in_contact, turn_lengths
 from ._section import AbstractSection, system_names
 
 
@@ -18,7 +18,7 @@ class AbstractSystemSection(AbstractSection):
     period: AbstractVar[float | None]
 
     def starts(self, where=None, values=None) -> np.ndarray:
-        return in_contact(self.system, self.t0, where, values)
+        return state_in_contact(self.system, self.t0, where, values)
 
     def turn(self, where=None, values=None) -> np.ndarray:
         return turn_lengths(self.system, self.period, where, values)

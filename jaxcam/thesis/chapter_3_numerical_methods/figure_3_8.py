@@ -15,13 +15,13 @@ from ...plotting.colours import CONTACT, FLIGHT
 from ..chapter_5_bifurcations.table_5_2 import FLIP_SPEED, FOLD_SPEED, TRACES
 from ..orbits import (
     along_traces,
+    compiled_monodromy,
     first_orbit,
     FLIP,
     FOLD,
-    monodromy_of,
-    multipliers_of,
     next_orbit,
     orbit_at,
+    ordered_multipliers,
     point_on_line,
     SEARCH,
 )
@@ -67,7 +67,7 @@ def smooth_branch(system: CamFollower, points: int = 16) -> SmoothBranch:
             rig = at_rpm(system, speeds[k])
             orbit = next_orbit(rig, orbit)
             angles[k] = float(orbit.states[0, 0])
-            values[k] = multipliers_of(monodromy_of(rig, orbit))
+            values[k] = ordered_multipliers(compiled_monodromy(rig, orbit))
         below = list(_around_the_fold(system, orbit, speeds[0]))[::-1]
     speeds = np.concatenate([[row[0] for row in below], speeds])
     angles = np.concatenate([[row[1] for row in below], angles])
@@ -85,12 +85,12 @@ def _around_the_fold(system: CamFollower, orbit, rpm: float):
     Around it the sum of the multipliers goes on, where the speed turns back.
     """
     point = SpecialPoint(jnp.asarray(rpm_to_rad_s(rpm)), orbit)
-    matrix = np.asarray(monodromy_of(at_rpm(system, rpm), orbit))
+    matrix = np.asarray(compiled_monodromy(at_rpm(system, rpm), orbit))
     end = 1 + np.linalg.det(matrix) + _BEYOND
     for value in np.linspace(np.trace(matrix), end, _NEAR_FOLD + 1)[1:]:
         point = point_on_line(system, point, (float(value), 0.0))
         rig = at_rpm(system, rad_s_to_rpm(point.parameter))
-        values = multipliers_of(monodromy_of(rig, point.orbit))
+        values = ordered_multipliers(compiled_monodromy(rig, point.orbit))
         yield (
             float(rad_s_to_rpm(point.parameter)),
             float(point.orbit.states[0, 0]),

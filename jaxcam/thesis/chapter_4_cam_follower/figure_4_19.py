@@ -1,8 +1,8 @@
 """Figure 4.19: permanent contact at 120 rpm."""
 
-from ..motions import Case, motion_target, RECORDED_NOTE
+from ..motions import motion_target, RECORDED_NOTE, ShownMotion
 
 
 TARGET = motion_target(
-    "Permanent contact at 120 rpm", Case(120.0, None, 0, 1), note=RECORDED_NOTE
+    "Permanent contact at 120 rpm", ShownMotion(120.0, None, 0, 1), note=RECORDED_NOTE
 )

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from ..motions import Case, motion_target, RECORDED_NOTE
+from ..motions import motion_target, RECORDED_NOTE, ShownMotion
 
 
 TARGET = motion_target(
-    "P(inf,1) at 150 rpm", Case(150.0, None, np.inf, 1), note=RECORDED_NOTE
+    "P(inf,1) at 150 rpm", ShownMotion(150.0, None, np.inf, 1), note=RECORDED_NOTE
 )

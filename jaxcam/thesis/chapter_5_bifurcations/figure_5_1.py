@@ -6,7 +6,7 @@ from matplotlib.figure import Figure
 
 from ... import sweeps
 from ...models import CamFollower, rpm_to_rad_s
-from ..diagrams import draw_diagram, spans
+from ..diagrams import draw_diagram, label_spans
 from ..remember import remembered
 from ..target import Rows, Target
 
@@ -41,7 +41,7 @@ def compute(system: CamFollower, size: str) -> Rows:
     rows: Rows = []
     for way, word in ((1, "upwards"), (-1, "downwards")):
         for label in ("contact", "P(inf,1)", "P(1,1)", "P(2,2)", "P(4,4)"):
-            low, high = spans(made, label, way)[0]
+            low, high = label_spans(made, label, way)[0]
             if np.isfinite(low):
                 for end, value in (("from", low), ("to", high)):
                     printed = _SAID.get((way, label, end), np.nan)

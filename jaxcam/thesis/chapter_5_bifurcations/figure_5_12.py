@@ -20,7 +20,7 @@ BOX = (0.34, -3.0), (0.55, 3.0)
 
 
 @remembered
-def monte_carlo(system: CamFollower, size: str) -> sweeps.Diagram:
+def drawn_diagram(system: CamFollower, size: str) -> sweeps.Diagram:
     """The diagram of Figure 5.12, with starts drawn anew at each speed."""
     speeds = np.linspace(*_MONTE_CARLO, _DRAWN[size])
     states = sweeps.monte_carlo(*BOX, _STARTS, 0, len(speeds))
@@ -30,7 +30,7 @@ def monte_carlo(system: CamFollower, size: str) -> sweeps.Diagram:
 
 
 def compute(system: CamFollower, size: str) -> Rows:
-    made = monte_carlo(system, size)
+    made = drawn_diagram(system, size)
     speeds = np.asarray(rad_s_to_rpm(made.values))
     rows: Rows = []
     cascades = {
@@ -50,7 +50,7 @@ def compute(system: CamFollower, size: str) -> Rows:
 
 
 def draw(system: CamFollower, size: str) -> Figure:
-    made = monte_carlo(system, size)
+    made = drawn_diagram(system, size)
     figure, axes = plt.subplots(2, 1, figsize=(8.4, 7.2), sharex=True)
     for k, ax in enumerate(axes):
         draw_diagram(made, ax, component=k)

@@ -2,10 +2,12 @@
 
 import numpy as np
 
-from ..motions import Case, motion_target
+from ..motions import motion_target, ShownMotion
 from .figure_5_14 import A, B
 
 
 TARGET = motion_target(
-    "Motions from A and B", Case(145.0, A, 1, 1, "A"), Case(145.0, B, np.inf, 1, "B")
+    "Motions from A and B",
+    ShownMotion(145.0, A, 1, 1, "A"),
+    ShownMotion(145.0, B, np.inf, 1, "B"),
 )

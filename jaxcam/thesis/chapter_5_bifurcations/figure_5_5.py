@@ -1,7 +1,7 @@
 """Figure 5.5: P(4,4) at 158 rpm."""
 
-from ..motions import Case, motion_target
+from ..motions import motion_target, ShownMotion
 from .figure_5_16 import D1
 
 
-TARGET = motion_target("P(4,4) at 158 rpm", Case(158.0, D1, 4, 4))
+TARGET = motion_target("P(4,4) at 158 rpm", ShownMotion(158.0, D1, 4, 4))

@@ -1,6 +1,6 @@
 """Figure 5.6: permanent contact at 120 rpm."""
 
-from ..motions import Case, motion_target
+from ..motions import motion_target, ShownMotion
 
 
-TARGET = motion_target("Permanent contact at 120 rpm", Case(120.0, None, 0, 1))
+TARGET = motion_target("Permanent contact at 120 rpm", ShownMotion(120.0, None, 0, 1))

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..motions import Case, motion_target
+from ..motions import motion_target, ShownMotion
 
 
-TARGET = motion_target("P(inf,1) at 148 rpm", Case(148.0, None, np.inf, 1))
+TARGET = motion_target("P(inf,1) at 148 rpm", ShownMotion(148.0, None, np.inf, 1))

@@ -6,7 +6,7 @@ The two printed rows of the route to chaos and of chaos are not told apart here.
 import numpy as np
 
 from ...models import CamFollower
-from ..diagrams import Events, events, spans
+from ..diagrams import Events, events, label_spans
 from ..target import Rows, Target
 from .figure_5_1 import both_ways
 
@@ -35,7 +35,7 @@ def compute(system: CamFollower, size: str) -> Rows:
         for words, printed, value in zip(WORDS, MODEL, found, strict=True)
     ]
     rows.insert(1, ("detachment", MODEL.sticking_from, found.sticking_from, "rpm"))
-    last = spans(made, "P(2,2)", -1)[0][1]
+    last = label_spans(made, "P(2,2)", -1)[0][1]
     rows.append(("P(2,2) itself, to", np.nan, last, "rpm"))
     return rows
 

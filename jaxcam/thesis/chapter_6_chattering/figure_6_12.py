@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from ...hybrid.surface import contact_state, normal_acceleration
 from ...models import CamFollower
 from ...plotting.colours import FLIGHT, IMPACT, RECORDED, SECTION
-from ...plotting.curves import curve
+from ...plotting.curves import trajectory_curve
 from ..orbits import NEAR_CAM
 from ..remember import remembered
 from ..target import Rows, Target
@@ -50,7 +50,7 @@ def compute(system: CamFollower) -> Rows:
 
 def draw(system: CamFollower) -> Figure:
     times, acceleration, jerk = contact_derivatives(system)
-    drawn = curve(sticking_turn(system), None, 3000)
+    drawn = trajectory_curve(sticking_turn(system), None, 3000)
     found = sequence(system)
     period = float(found.system.period)
     release = float(found.frame.release) % period

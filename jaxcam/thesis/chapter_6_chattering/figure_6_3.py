@@ -13,7 +13,7 @@ from ...hybrid import simulate, Trajectory
 from ...hybrid.surface import contact_state
 from ...models import CamFollower
 from ...plotting.colours import FLIGHT, IMPACT, RECORDED
-from ...plotting.curves import curve
+from ...plotting.curves import trajectory_curve
 from ..orbits import NEAR_CAM
 from ..releases import sticking_time
 from ..remember import remembered
@@ -93,7 +93,7 @@ def draw(system: CamFollower) -> Figure:
     motions = series(system)
     figure, axes = plt.subplots(3, 2, figsize=(9.6, 7.2))
     for ax, one in zip(axes.flat, motions, strict=True):
-        drawn = curve(one.run, None, 3000)
+        drawn = trajectory_curve(one.run, None, 3000)
         start = float(one.run.t0)
         ax.plot(drawn.time - start, drawn.gap[:, 0], color=FLIGHT, lw=1.2)
         hit = drawn.impact_time - start

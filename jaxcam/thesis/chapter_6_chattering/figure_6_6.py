@@ -9,7 +9,7 @@ from variational.chatter import hop_ratio
 
 from ...models import CamFollower
 from ...plotting.colours import FLIGHT, IMPACT, SECTION
-from ...plotting.curves import curve
+from ...plotting.curves import trajectory_curve
 from ..target import Rows, Target
 from .sequence import sequence, sticking_turn
 
@@ -36,7 +36,7 @@ def draw(system: CamFollower) -> Figure:
     found = sequence(system)
     run = sticking_turn(system)
     figure, ax = plt.subplots(figsize=(8.4, 4.4))
-    drawn = curve(run, None, 6000)
+    drawn = trajectory_curve(run, None, 6000)
     release = float(found.frame.release) % float(found.system.period)
     ax.plot(drawn.time - release, 1e3 * drawn.gap[:, 0], color=FLIGHT, lw=1.3)
     tau = found.tau[:12]

@@ -84,7 +84,7 @@ def draw_manifold(found: Manifold, most: float | None) -> Figure:
     """Both in the plane of time and rebound speed; `most`: highest speed drawn."""
     figure, ax = plt.subplots(figsize=(7.8, 5.2))
     period = float(found.system.period)
-    plotting.chattering_region(
+    plotting.chattering_picture(
         found.frame, found.region, found.manifold, ax, period=period, most=most
     )
     ax.set_ylabel("rebound speed (rad/s)")

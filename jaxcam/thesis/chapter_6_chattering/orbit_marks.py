@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from ...hybrid.surface import contact_state
 from ...models import CamFollower
 from ...plotting.colours import FLIGHT, IMPACT
-from ...plotting.curves import curve
+from ...plotting.curves import trajectory_curve
 from ..orbits import NEAR_CAM
 from ..target import Rows
 from .sequence import sequence, sticking_turn
@@ -46,7 +46,7 @@ def _marked(system: CamFollower):
     release = float(found.frame.release) % period
     times = np.array([release + found.accumulation, release, period])
     states = np.asarray(run.at(times))
-    drawn = curve(run, None, 8000)
+    drawn = trajectory_curve(run, None, 8000)
     cam = states[:, 1] - _cam_velocity(run, times)
     gaps = np.asarray(run.gap(times)).ravel()
     # of the curve: gap, its rate, without the jumps
