@@ -186,6 +186,19 @@ def test_a_force_that_no_term_has_is_unknown():
     assert found.effects[0].where == "flight"
     shapes = {one.name: one for one in found.left_before}
     assert shapes["force_of_angle"].significant
+    # it is modelled, up to what the spring of the system can do as well
+    (function,) = found.missing
+    assert function.kind == "force"
+    assert function.arguments == ("position",)
+    (at,) = function.grid
+    line = np.stack([np.ones_like(at), at], axis=-1)
+    straight = line @ np.linalg.pinv(line)
+    off = (np.eye(len(at)) - straight) @ (function.value - _magnet(0.0, at, 0.0))
+    true = (np.eye(len(at)) - straight) @ _magnet(0.0, at, 0.0)
+    assert np.sqrt(np.mean(off**2)) < 0.4 * np.sqrt(np.mean(true**2))
+    assert found.heldout_after < 1.1 * found.noise_floor
+    # and is part of the system that was found
+    assert "FreeForce" in str(found.system())
 
 
 def test_a_term_of_ones_own_is_named():

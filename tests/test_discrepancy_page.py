@@ -1,5 +1,7 @@
 """The report of a diagnosis: complete in itself, the sentence first."""
 
+import dataclasses
+
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
@@ -8,7 +10,13 @@ from jaxcam.cli._diagnose_page import _shapes, diagnosis_page, draw, unit_along
 from jaxcam.cli._output import to_text
 from jaxcam.discrepancy import Diagnosis, Verdict
 from jaxcam.discrepancy.evidence import Structure
-from jaxcam.discrepancy.report import Alternative, Caveat, Effect, Reason
+from jaxcam.discrepancy.report import (
+    Alternative,
+    Caveat,
+    Effect,
+    MissingFunction,
+    Reason,
+)
 from jaxcam.discrepancy.terms import shapes, Value, Variable
 from jaxcam.fitting import Residuals
 
@@ -66,6 +74,28 @@ def _diagnosis(verdict, effects):
     )
 
 
+FUNCTIONS = (
+    MissingFunction(
+        "force",
+        ("position",),
+        (np.linspace(0.2, 0.4, 9),),
+        -np.linspace(0.0, 2.0, 9),
+        np.full(9, 0.1),
+        "rad/s^2",
+        "a force that depends on the position",
+        ("run1",),
+    ),
+    MissingFunction(
+        "force",
+        ("position", "velocity"),
+        (np.linspace(0.2, 0.4, 9), np.linspace(-1.0, 1.0, 5)),
+        np.outer(np.ones(9), np.linspace(-1.0, 1.0, 5)),
+        np.full((9, 5), 0.1),
+        "rad/s^2",
+        "damping that depends on the position",
+        ("run1",),
+    ),
+)
 EFFECT = Effect(
     "viscous_damping",
     "damping",
@@ -94,6 +124,18 @@ def test_the_page_is_complete(tmp_path, verdict, effects):
     assert "One caveat." in page
     assert ("viscous damping" in page) == bool(effects)
     assert '"verdict"' in to_text(found.to_json())
+
+
+@pytest.mark.usefixtures("unchecked_types")
+def test_functions_without_a_name_are_drawn_and_written(tmp_path):
+    found = dataclasses.replace(_diagnosis("unknown", ()), missing=FUNCTIONS)
+    page = diagnosis_page(found, draw(tmp_path, found), ())
+    assert page.count("data:image/png;base64,") == 5
+    first, second = found.to_json()["missing"]
+    assert first["arguments"] == ["position"]
+    assert len(first["table"]["value"]) == len(first["table"]["position"]) == 9
+    assert [len(row) for row in second["table"]["value"]] == [5] * 9
+    assert second["kind"] == "force"
 
 
 @pytest.mark.usefixtures("unchecked_types")

@@ -43,7 +43,12 @@ def draw(folder: Path, found: Diagnosis) -> list[tuple[Path, str]]:
 
     maps = _MAPS.format(Along(found.unseen[0]).word)
     with style():
+        missing = folder / "missing.png"
+        nameless = []
+        if found.missing:
+            nameless = [(save_figure(_missing(plt, found), missing), _MISSING)]
         return [
+            *nameless,
             (save_figure(_unseen(plt, found), folder / "unseen.png"), _UNSEEN),
             (save_figure(_maps(plt, found), folder / "maps.png"), maps),
             (save_figure(_shapes(plt, found), folder / "shapes.png"), _SHAPES),
@@ -51,6 +56,11 @@ def draw(folder: Path, found: Diagnosis) -> list[tuple[Path, str]]:
         ]
 
 
+_MISSING = (
+    "What has no name, as it was fitted together with the rig, with twice the standard "
+    "error. Of two arguments, the function along the first at several values of the "
+    "other. What the parameters of the rig can do as well may be in them instead."
+)
 _UNSEEN = (
     "Residuals on a record that no parameter has seen, one flight ahead: the textbook "
     "model refitted to the other records (above), and with what was found (below). The "
@@ -157,6 +167,32 @@ def _binned(part: Residuals, resting: bool, along: Along):
     return np.where(count > 0, total / np.sqrt(np.maximum(count, 1)), np.nan)
 
 
+def _missing(plt, found: Diagnosis):
+    count = len(found.missing)
+    figure, axes = plt.subplots(
+        1, count, figsize=(4.5 * count, 3.2), layout="constrained", squeeze=False
+    )
+    for axis, one in zip(axes.flat, found.missing):
+        name, along = one.arguments[0], one.grid[0]
+        value, error = (np.atleast_2d(x.T) for x in (one.value, one.stderr))
+        rows = [0] if len(value) == 1 else np.linspace(0, len(value) - 1, 5).astype(int)
+        for row in rows:
+            color = IMPACT if len(rows) == 1 else plt.cm.viridis(row / len(value))
+            label = None
+            if len(rows) > 1:
+                label = f"{one.arguments[1]} {one.grid[1][row]:.2g}"
+            low, high = value[row] - 2 * error[row], value[row] + 2 * error[row]
+            axis.fill_between(along, low, high, color=color, alpha=0.25, lw=0)
+            axis.plot(along, value[row], color=color, label=label)
+        neutral = 1.0 if one.kind == "restitution" else 0.0
+        axis.axhline(neutral, color="k", lw=0.6)
+        axis.set_xlabel(labelled(name, unit_along(name, found.unit)))
+        axis.set_ylabel(labelled(one.kind, one.unit.replace("^2", "²")))
+        if len(rows) > 1:
+            axis.legend(fontsize=8)
+    return figure
+
+
 def _shapes(plt, found: Diagnosis):
     before = {one.name: one for one in found.left_before if len(one.grid)}
     after = {one.name: one for one in found.left_after if len(one.grid)}
@@ -166,7 +202,8 @@ def _shapes(plt, found: Diagnosis):
         axis.axis("off")
     for axis, name in zip(axes.flat, before):
         _band(axis, before[name], RECORDED, "textbook")
-        _band(axis, after[name], IMPACT, "found")
+        if name in after:
+            _band(axis, after[name], IMPACT, "found")
         axis.axhline(0.0, color="k", lw=0.6)
         one = before[name]
         axis.set_title(name.replace("_", " "), fontsize=11)

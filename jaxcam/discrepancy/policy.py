@@ -162,6 +162,29 @@ class Policy:
         0.01, "share of the cost to be explained that they gained at most"
     )
     late: int = _bounds(8, "attempts after which a fit must have beaten another one")
+    functions: int = _bounds(
+        2, "free functions at most, where what is missing has no name; 0 for none"
+    )
+    function_lengths: tuple[float, ...] = _bounds(
+        (0.05, 0.1, 0.2, 0.4, 0.8, 1.6),
+        "lengths of correlation tried for a free function: shares of the range of its "
+        "argument, radians of a phase",
+    )
+    function_sizes: tuple[float, ...] = _bounds(
+        (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 300.0, 1e3, 3e3, 1e4, 1e5, 1e6),
+        "sizes tried for it, in units of what the data tell of it",
+    )
+    promising: float = _bounds(
+        0.5, "share of the best promise that a free function must make to be fitted"
+    )
+    rivalling: float = _bounds(
+        0.9, "that share where another one explains the data already"
+    )
+    followed: int = _bounds(3, "free functions and terms that are fitted at each turn")
+    heats: int = _bounds(4, "fits of a free function while its prior settles")
+    heated: float = _bounds(
+        1.5, "ratio of costs per sample below which its prior has settled"
+    )
     bootstrap: int = _bounds(200, "bootstrap samples of blocks, and of drive records")
     frequency_grid: int = _bounds(4, "frequencies per resolution cell of a scan")
     cause_strengths: tuple[float, float, int] = _bounds(
@@ -224,6 +247,8 @@ class Policy:
                     f"Policy: `{name}` is {value!r}; give a number between 0 and 1."
                 )
         for setting in self.settings():
+            if setting.name == "functions":
+                continue
             low = min(setting.value) if _several(setting.value) else setting.value
             if not low > 0 or not math.isfinite(low):
                 raise ValueError(

@@ -2,11 +2,12 @@
 
 import dataclasses
 
-from ..search import Question, Search, Trial, Trials
+from ..search import FreeSearch, Missing, Question, Search, Trial, Trials
+from ..terms import families
 from ._held_out import held_out, HeldOut
 from ._masked import unmasked
 from ._redrawn import redrawn, sure
-from ._structure import Structure, structures
+from ._structure import ranges_of, Structure, structures
 
 
 @dataclasses.dataclass(frozen=True)
@@ -19,6 +20,7 @@ class Choice:
         keep them; `needed`: those that are named all the same.
     - `masked`: terms that were dropped, with their shares of what is explained, because
         the corner of another one leaves as much.
+    - `missing`: functions without a name that explain more than terms that have one.
     - `left_before`, `left_after`: structures in the residuals of `before` and `best`.
     """
 
@@ -33,6 +35,7 @@ class Choice:
     left_after: list[Structure]
     held: HeldOut
     masked: list[tuple[str, float]] = dataclasses.field(default_factory=list)
+    missing: Missing | None = None
 
     @property
     def unexplained(self) -> list[Structure]:
@@ -66,6 +69,16 @@ def choose(question: Question, trials: Trials, seed: int) -> Choice:
                 best, left_after, held = found, with_all, whole
                 needed, doubtful = doubtful, []
                 inclusion, deviation = redrawn(trials, best, seed)
+    held = held or held_out(trials, before, best)
+    missing = None
+    left = [one for one in left_after if one.significant]
+    if left and trials.policy.functions:
+        missing = _without_a_name(question, trials, best, left)
+    if missing is not None:
+        nameless = Trial(
+            missing.names | {"functions"}, missing.fit, missing.score, 0, False
+        )
+        held = held_out(trials, before, nameless)
     return Choice(
         found,
         best,
@@ -76,9 +89,46 @@ def choose(question: Question, trials: Trials, seed: int) -> Choice:
         needed,
         left_before,
         left_after,
-        held or held_out(trials, before, best),
+        held,
         masked,
+        missing,
     )
+
+
+def _without_a_name(
+    question: Question, trials: Trials, best: Trial, left: list[Structure]
+) -> Missing | None:
+    """Functions that explain what the named terms leave over, by their evidence.
+
+    What is left after a named term but is small beside what that explains is none.
+    """
+    policy, bare = trials.policy, trials.known[frozenset()].fit.cost
+    small = policy.small * (bare - best.fit.cost)
+    if best.names and max(one.gain for one in left) < small:
+        return None
+    problem = question.problem
+    positions, velocities, approach, duration = ranges_of(problem, policy)
+    found = FreeSearch(
+        problem,
+        question.rig,
+        question.terms,
+        families(
+            positions,
+            velocities,
+            approach,
+            duration,
+            turned=question.turned,
+            impacting=any(len(part.impacts.approach) for part in problem.segments),
+            slip=question.references.slip_speed,
+            motion_unit=question.unit,
+        ),
+        policy,
+        trials.progress,
+        bare,
+    ).run()
+    if found is None or found.score > best.bic:
+        return None
+    return found
 
 
 def _left(question: Question, trials: Trials, trial: Trial) -> list[Structure]:

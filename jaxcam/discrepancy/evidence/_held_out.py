@@ -46,15 +46,16 @@ def held_out(trials: Trials, before: Trial, after: Trial) -> HeldOut:
         for which, trial in enumerate((before, after)):
             done = (2 * fold + which) / (2 * len(folds))
             trials.progress("predicting records not seen", done)
+            own = trial.fit.problem
             known = fit(
-                problem,
+                own,
                 free=trial.fit.free,
                 start=trial.fit.point,
                 weights=seen,
                 iterations=trials.policy.heldout_iterations,
                 stop=given_up(problem.samples, trials.policy),
             )
-            test = with_states(problem, known, unseen, trials.policy)
+            test = with_states(own, known, unseen, trials.policy)
             parts = _parts(test, unseen)
             unseen_parts[which].extend(parts)
             square, count = _square(parts)

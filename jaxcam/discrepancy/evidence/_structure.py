@@ -120,7 +120,7 @@ def structures(
         *(
             dataclasses.replace(shape, motion_unit=unit)
             for shape in shapes(
-                *_ranges(problem, policy), turned=turned, references=references
+                *ranges_of(problem, policy), turned=turned, references=references
             )
         ),
     )
@@ -271,7 +271,7 @@ def _coloured(found: Fit, tests: int, policy: Policy) -> Structure:
     )
 
 
-def _ranges(problem: Problem, policy: Policy):
+def ranges_of(problem: Problem, policy: Policy):
     """Least and largest position, velocity and approach speed, and the duration."""
     states = np.asarray(problem.start.states)[np.asarray(problem.pieces.exists)]
     place, rate = problem.model.system.coordinates[0]  # pyright: ignore

@@ -7,5 +7,6 @@ from ._diagnosis import (
     Effect as Effect,
     Verdict as Verdict,
 )
+from ._missing import MissingFunction as MissingFunction
 from ._words import listed as listed, number as number
 from ._write import diagnosis_of as diagnosis_of

@@ -87,6 +87,15 @@ def small_remainder(choice: Choice, share: float) -> Caveat:
     )
 
 
+def functions_fall_short(left: float) -> Caveat:
+    """That functions without a name do not explain the records to the noise."""
+    return Caveat(
+        Reason.FAR_FROM_DATA,
+        f"With these functions the fit still misses by {left:.2g} times the noise: "
+        f"they are a part of what is missing, and their form is rough.",
+    )
+
+
 def _in_doubt(trials: Trials, name: str, share: float) -> Caveat:
     return Caveat(
         Reason.IN_DOUBT,

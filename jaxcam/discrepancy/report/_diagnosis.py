@@ -10,8 +10,9 @@ from ...fitting import Fit, Model, Residuals
 from ...hybrid import HybridSystem
 from ..evidence import Ripple, Structure
 from ..policy import Policy
-from ..terms import Value, WithTerms
+from ..terms import FreeFunction, Value, WithTerms
 from ._caveats import Caveat
+from ._missing import MissingFunction
 
 
 class Verdict(enum.StrEnum):
@@ -94,6 +95,8 @@ class Diagnosis:
         would take up most of each term.
     - `caveats`: each a `Caveat`, a reason with its sentence.
     - `policy`: by which it was decided.
+    - `missing`: what has no name, as functions that were fitted with the rig; `after`
+        is the model with them.
     """
 
     case: str
@@ -117,6 +120,7 @@ class Diagnosis:
     hides: dict[str, str]
     caveats: tuple[Caveat, ...]
     policy: Policy = Policy()
+    missing: tuple[MissingFunction, ...] = ()
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -136,7 +140,15 @@ class Diagnosis:
         system = model.system
         if not isinstance(system, WithTerms):
             return system
-        terms = [t for t in system.terms if t.name in self.names and t.acts]
+        used = {name.rsplit("_", 1)[0] for name in self.after.free}
+        terms = [
+            term
+            for term in system.terms
+            if isinstance(term, FreeFunction)
+            and term.label in used
+            or term.acts
+            and term.name in self.names
+        ]
         row = record if isinstance(record, int) else self.records.index(record)
         drive = self.after.problem.segments[row].drive
         if drive is not None:
@@ -160,6 +172,7 @@ class Diagnosis:
                 {"name": one.name, "delta_bic_to_best": one.delta_bic}
                 for one in self.alternatives
             ],
+            "missing": [one.to_json() for one in self.missing],
             "fit": {
                 "heldout_rmse_before": self.heldout_before,
                 "heldout_rmse_after": self.heldout_after,

@@ -1,15 +1,17 @@
 """What is reported of an effect: its numbers, where it is seen, and the evidence."""
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from scipy.stats import chi2
 
 from ..evidence import Choice, Ripple
 from ..policy import Policy
-from ..search import Trial, Trials, value_of
+from ..search import Missing, Trial, Trials, value_of
 from ..terms import DriveRipple, Value
 from ._diagnosis import Effect, Verdict
+from ._missing import MissingFunction, sentence_of
 
 
 def term_effect(trials: Trials, choice: Choice, name: str) -> Effect:
@@ -72,6 +74,46 @@ def drive_effect(ripple: Ripple, policy: Policy) -> Effect:
         ripple.delta_bic,
         ripple.heldout_gain,
         ripple.inclusion,
+    )
+
+
+def free_effect(
+    functions: Sequence[MissingFunction], missing: Missing, choice: Choice
+) -> Effect:
+    """What has no name, all functions together."""
+    return Effect(
+        Verdict.UNKNOWN,
+        sentence_of(functions),
+        {},
+        missing.functions[0].family.where,
+        "; ".join(one.words for one in functions),
+        functions[0].records,
+        missing.score - choice.before.bic,
+        choice.held.total,
+        1.0,
+        term=False,
+    )
+
+
+def named_effect(trials: Trials, missing: Missing, choice: Choice, name: str) -> Effect:
+    """A term that is named beside functions without a name."""
+    term = trials.term(name)
+    parameters = {
+        one.name: Value(
+            missing.fit[one.name].value, missing.fit[one.name].stderr, one.unit
+        )
+        for one in term.strengths()
+    }
+    return Effect(
+        name,
+        term.sentence,
+        term.reported(parameters),
+        term.where,
+        term.region,
+        missing.fit.problem.records,
+        -missing.gains.get(name, 0.0),
+        choice.held.total,
+        1.0,
     )
 
 

@@ -1,13 +1,22 @@
 """The diagnosis of a choice: verdict, effects, alternatives, caveats, numbers."""
 
+from collections.abc import Mapping
+
 from ...fitting import Fit
-from ..evidence import Choice, limits, Ripple
-from ..search import Question, Trial, Trials, within_tolerances
+from ..evidence import Choice, limits, ranges_of, Ripple, rms_of
+from ..search import Missing, Question, Trial, Trials, within_tolerances
 from ..terms import Value
-from ._caveats import Caveat, caveats_of, small_remainder
+from ._caveats import Caveat, caveats_of, functions_fall_short, small_remainder
 from ._diagnosis import Alternative, Diagnosis, Verdict
-from ._effects import drive_effect, term_effect, unknown_effect
-from ._summary import summary_of
+from ._effects import (
+    drive_effect,
+    free_effect,
+    named_effect,
+    term_effect,
+    unknown_effect,
+)
+from ._missing import missing_functions
+from ._summary import summary_of, summary_of_functions
 
 
 def diagnosis_of(
@@ -19,6 +28,8 @@ def diagnosis_of(
 ) -> Diagnosis:
     """Put into words and numbers what was chosen, and why."""
     policy, held, best = trials.policy, choice.held, choice.best
+    if choice.missing is not None:
+        return _of_functions(case, question, trials, choice, choice.missing, ripple)
     effects = [term_effect(trials, choice, name) for name in sorted(best.names)]
     if ripple is not None and ripple.significant(len(trials.terms) + 1, policy):
         effects.append(drive_effect(ripple, policy))
@@ -42,7 +53,7 @@ def diagnosis_of(
         held.after * floor,
         floor,
         question.unit,
-        _rig_values(question, choice),
+        _rig_values(question, choice.best.fit, choice.deviation),
         summary_of(verdict, effects, choice, within, question.rig, least, policy),
         choice.before.fit,
         best.fit,
@@ -60,6 +71,66 @@ def diagnosis_of(
         tuple(caveats),
         policy,
     )
+
+
+def _of_functions(
+    case: str,
+    question: Question,
+    trials: Trials,
+    choice: Choice,
+    missing: Missing,
+    ripple: Ripple | None,
+) -> Diagnosis:
+    """The diagnosis where functions without a name were found."""
+    policy, held, found = trials.policy, choice.held, missing.fit
+    positions, velocities, _, _ = ranges_of(question.problem, policy)
+    functions = missing_functions(missing, velocities, positions, policy.shape_points)
+    bare = choice.before
+    effects = [
+        free_effect(functions, missing, choice),
+        *(named_effect(trials, missing, choice, n) for n in sorted(missing.names)),
+    ]
+    if ripple is not None and ripple.significant(len(trials.terms) + 1, policy):
+        effects.append(drive_effect(ripple, policy))
+    floor = float(next(iter(question.problem.model.sensors.values())).floor)
+    others = sorted(trials.known.values(), key=lambda trial: trial.bic)
+    within = within_tolerances(bare.fit, found, question.rig, policy)
+    return Diagnosis(
+        case,
+        Verdict.UNKNOWN,
+        tuple(effects),
+        tuple(
+            Alternative(one.name, trial.bic - missing.score, one.terms)
+            for trial in others[: policy.alternatives]
+            for one in [_alternative(trial, trial)]
+        ),
+        held.before * floor,
+        held.after * floor,
+        floor,
+        question.unit,
+        _rig_values(question, found, {}),
+        summary_of_functions(functions, effects, held, floor, question.unit),
+        bare.fit,
+        found,
+        tuple(choice.left_before),
+        (),
+        held.residuals,
+        ripple,
+        _pulls(question, within, found),
+        {},
+        {},
+        tuple(_doubts_of(missing, policy)),
+        policy,
+        functions,
+    )
+
+
+def _doubts_of(missing: Missing, policy) -> list[Caveat]:
+    """That what was found does not explain everything."""
+    left = rms_of(missing.fit)
+    if left < policy.as_noise:
+        return []
+    return [functions_fall_short(left)]
 
 
 def _verdict(choice: Choice, named: bool, small: float) -> tuple[Verdict, list[Caveat]]:
@@ -88,13 +159,15 @@ def _alternative(trial: Trial, best: Trial) -> Alternative:
     return Alternative("+".join(terms) or "none", trial.bic - best.bic, terms)
 
 
-def _rig_values(question: Question, choice: Choice) -> dict[str, Value]:
+def _rig_values(
+    question: Question, fitted: Fit, deviation: Mapping[str, float]
+) -> dict[str, Value]:
     """Fitted parameters of the system, as they are reported."""
     found = {}
-    for one in choice.best.fit.estimates:
+    for one in fitted.estimates:
         if one.name not in question.rig:
             continue
-        stderr = max(one.stderr, choice.deviation.get(one.name, 0.0))
+        stderr = max(one.stderr, deviation.get(one.name, 0.0))
         name, value, unit = one.name, one.value, one.unit
         if name in question.shown:
             shown = question.shown[name]

@@ -7,6 +7,8 @@ from ._blocks import (
     values_of as values_of,
 )
 from ._extended import extended as extended, with_states as with_states
+from ._free_fits import Missing as Missing
+from ._free_search import FreeSearch as FreeSearch
 from ._gains import (
     added_gain as added_gain,
     gain as gain,
@@ -18,7 +20,9 @@ from ._kept_trials import KeptTrials as KeptTrials
 from ._local_force import force_blocks as force_blocks, Response as Response
 from ._question import Question as Question
 from ._rig_question import rig_question as rig_question
+from ._roughness import occam as occam, Roughness as Roughness, roughness as roughness
 from ._search import Search as Search
+from ._slots import Free as Free
 from ._system_question import (
     setup_question as setup_question,
     system_question as system_question,

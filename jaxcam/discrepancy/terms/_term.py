@@ -150,6 +150,10 @@ class Term(eqx.Module):
         del approach, motion
         return 1.0
 
+    def prepared(self) -> "Term":
+        """The term with whatever it needs at every step worked out once."""
+        return self
+
     def strengths(self) -> tuple[Strength, ...]:
         """The numbers that are fitted, in the order of the fields."""
         found = []

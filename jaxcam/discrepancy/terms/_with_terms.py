@@ -48,7 +48,9 @@ class WithTerms(HybridSystem):
         return self.base.speed  # pyright: ignore
 
     def prepared(self) -> "WithTerms":
-        return eqx.tree_at(lambda s: s.base, self, self.base.prepared())
+        terms = tuple(term.prepared() for term in self.terms)
+        new = self.base.prepared(), terms
+        return eqx.tree_at(lambda s: (s.base, s.terms), self, new)
 
     def check(self) -> None:
         self.base.check()

@@ -44,4 +44,4 @@ from ._pieces import FLIGHT as FLIGHT, IMPACT as IMPACT
 from ._predict import runge_kutta as runge_kutta
 from ._problem import Problem as Problem, Weights as Weights
 from ._problem_checks import parameter_places as parameter_places
-from ._sharpness import loosened as loosened
+from ._sharpness import loosened as loosened, separated as separated

@@ -11,7 +11,7 @@ from ._eliminate import eliminate_states, LEAST
 from ._linearise import Blocks, Point
 from ._parameter import Parameter
 from ._problem import Problem
-from ._sharpness import width_of
+from ._sharpness import shared_width
 
 
 @dataclasses.dataclass(frozen=True)
@@ -51,8 +51,8 @@ def free_columns(problem: Problem, free: Iterable[str] | None) -> Columns:
     records = len(problem.segments)
     picked = [k for k, p in enumerate(problem.parameters) if p.name in wanted]
     parameter, record, scale = [], [], []
-    # as wide for any choice of them, which is one program then
-    place = -np.ones((records, width_of(len(problem.names))), dtype=int)
+    width = shared_width(len(picked), len(problem.names))
+    place = -np.ones((records, width), dtype=int)
     local = np.zeros_like(place)
     for column, k in enumerate(picked):
         one = problem.parameters[k]

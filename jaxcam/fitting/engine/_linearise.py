@@ -44,7 +44,8 @@ class Layout(eqx.Module):
         leaves, tree = jax.tree.flatten(self.model)
         for column, place in enumerate(self.places):
             leaves[place] = values[column]
-        return jax.tree.unflatten(tree, leaves)
+        model = jax.tree.unflatten(tree, leaves)
+        return eqx.tree_at(lambda m: m.system, model, model.system.prepared())
 
 
 class Blocks(NamedTuple):

@@ -19,11 +19,23 @@ JOINT = 1e-3
 # small faults of the model make of the past
 _IMPACT = 10**-0.5
 _WIDTH = 4
+# Columns above which programs are as wide as what is free, and by how many they differ
+_MANY, _STRIDE = 64, 64
 
 
 def width_of(number: int) -> int:
     """Columns that programs are compiled for: a multiple of four, to share them."""
     return _WIDTH * max(1, -(-number // _WIDTH))
+
+
+def shared_width(free: int, most: int) -> int:
+    """Columns of a program for some of so many numbers.
+
+    Few are all computed at once, whichever are free, so that one program serves every
+    choice; of many, no more than a multiple of sixty-four.
+    """
+    whole = width_of(most)
+    return whole if whole <= _MANY else min(whole, _STRIDE * -(-free // _STRIDE))
 
 
 def joint_sharpness(layout: Layout, pieces: Pieces, point: Point, guess) -> Extras:
@@ -80,6 +92,20 @@ def loosened(extras: Extras) -> Extras:
     """
     sharpness = extras.sharpness
     return extras._replace(sharpness=sharpness._replace(flight=sharpness.piece))
+
+
+def separated(extras: Extras) -> Extras:
+    """Joints that tie next to nothing, so that what each piece shows speaks alone.
+
+    A force that the model lacks is in every piece; what becomes of it through impacts
+    and other flights is far from linear.
+    """
+    sharp = extras.sharpness
+    return extras._replace(
+        sharpness=sharp._replace(
+            flight=sharp.piece, impact=sharp.impact / JOINT, gap=sharp.gap / JOINT
+        )
+    )
 
 
 def _variances(ss, before):

@@ -1,0 +1,157 @@
+"""Physics without a name, as a table, in words, and as a part of the verdict."""
+
+import dataclasses
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from ...fitting import Fit
+from ..search import Free, Missing
+from ..terms import Factor, Family, free_basis, Variable, Where
+
+
+_KINDS = {
+    Where.FLIGHT: "force",
+    Where.IMPACT: "restitution",
+    Where.CONTACT: "surface",
+}
+_VERBS = {
+    "force": "a force",
+    "restitution": "a restitution",
+    "surface": "a surface",
+}
+_ARGUMENT_NAMES = {Variable.APPROACH: "speed"}
+
+
+@dataclasses.dataclass(frozen=True)
+class MissingFunction:
+    """What has no name: a function that was fitted together with the rig.
+
+    - `kind`: `"force"`, what is to be added to the acceleration; `"restitution"`, what
+        the coefficient is to be multiplied with; `"surface"`, what is to be added to
+        the surface.
+    - `arguments`: what it depends on, each with its `grid`: `"position"`,
+        `"velocity"`, `"phase"`, `"time"` or `"speed"` (of approach).
+    - `value`, `stderr`: in `unit`, at the points of the grid, `(n,)` or `(n, m)`.
+    - `words`: what it is, for an engineer. `records` in which it was looked for.
+    """
+
+    kind: str
+    arguments: tuple[str, ...]
+    grid: tuple[Float[np.ndarray, " _"], ...]
+    value: Float[np.ndarray, "..."]
+    stderr: Float[np.ndarray, "..."]
+    unit: str
+    words: str
+    records: tuple[str, ...]
+
+    def to_json(self) -> dict[str, Any]:
+        table = {name: at.tolist() for name, at in zip(self.arguments, self.grid)}
+        table |= {"value": self.value.tolist(), "stderr": self.stderr.tolist()}
+        return {
+            "kind": self.kind,
+            "arguments": list(self.arguments),
+            "table": table,
+            "unit": self.unit,
+            "formula": None,
+            "words": self.words,
+            "records": list(self.records),
+        }
+
+
+def missing_functions(
+    missing: Missing,
+    velocities: tuple[float, float],
+    positions: tuple[float, float],
+    points: int,
+) -> tuple[MissingFunction, ...]:
+    """The functions that were found, each with its errors.
+
+    **Arguments:** what was found, and the ranges of the motion, for the tables of
+    functions of two arguments, and the number of points of each grid.
+    """
+    return tuple(
+        _one(missing.fit, one, velocities, positions, points)
+        for one in missing.functions
+    )
+
+
+def _one(found: Fit, one: Free, velocities, positions, points: int) -> MissingFunction:
+    family, kind = one.family, _KINDS[one.family.where]
+    along = np.linspace(family.low, family.high, points)
+    basis = free_basis(family, along, _count(found, one))
+    names = [f"{one.slot}_{k}" for k in range(basis.shape[1])]
+    labels = [estimate.name for estimate in found.estimates]
+    rows = [labels.index(name) for name in names]
+    coefficients = np.array([found.estimates[row].value for row in rows])
+    covariance = found.covariance[np.ix_(rows, rows)]
+    value = basis @ coefficients
+    error = np.sqrt(np.maximum(np.einsum("kp,pq,kq->k", basis, covariance, basis), 0.0))
+    arguments = tuple(_ARGUMENT_NAMES.get(a, str(a)) for a in family.arguments)  # pyright: ignore
+    words = _words(family, kind, along, value, error)
+    if kind == "restitution":
+        value, error = np.exp(value), np.exp(value) * error
+    grid: tuple[np.ndarray, ...] = (along,)
+    if len(arguments) == 2:
+        ends = positions if family.factor is Factor.DEFLECTION else velocities
+        across = np.linspace(ends[0], ends[1], points)
+        factor = {
+            Factor.VELOCITY: across,
+            Factor.DIRECTION: np.tanh(across / family.slip),
+            Factor.DEFLECTION: across - family.middle,
+        }[family.factor]
+        grid = (along, across)
+        value, error = np.outer(value, factor), np.outer(error, np.abs(factor))
+    return MissingFunction(
+        kind,
+        arguments,
+        grid,
+        value,
+        error,
+        _unit(family),
+        words,
+        found.problem.records,
+    )
+
+
+def _count(found: Fit, one: Free) -> int:
+    stem = f"{one.slot}_"
+    return sum(name.startswith(stem) for name in found.free)
+
+
+def _unit(family: Family) -> str:
+    if family.where is Where.FLIGHT:
+        return f"{family.motion_unit}/s^2"
+    return "-" if family.where is Where.IMPACT else family.motion_unit
+
+
+def _words(family: Family, kind: str, along, value, error) -> str:
+    """What a function is and where it is largest beside its error."""
+    of = " and ".join(family.arguments)
+    if family.factor is Factor.VELOCITY:
+        what = f"damping that depends on the {family.argument}"
+    elif family.factor is Factor.DIRECTION:
+        what = f"dry friction that depends on the {family.argument}"
+    elif family.factor is Factor.DEFLECTION:
+        what = f"a stiffness that depends on the {family.argument}"
+    else:
+        what = f"{_VERBS[kind]} that depends on the {of}"
+    # what the rig's own parameters might do as well says nothing of a place
+    degree = 0 if family.periodic or family.argument is Variable.TIME else 1
+    level = value - np.polyval(np.polyfit(along, value, degree), along)
+    sure = np.abs(level) > 2 * error
+    k = int(np.argmax(np.where(sure, np.abs(level), -1.0)))
+    if not np.any(sure):
+        return f"{what}; no place of it is clear"
+    usual = "a constant" if degree == 0 else "a straight line"
+    return (
+        f"{what}; it is furthest from {usual} at {family.argument} {along[k]:.3g}, by "
+        f"{level[k]:.2g} +- {error[k]:.1g}"
+    )
+
+
+def sentence_of(functions: Sequence[MissingFunction]) -> str:
+    """All of them in one phrase."""
+    return " and ".join(one.words.split(";")[0] for one in functions)

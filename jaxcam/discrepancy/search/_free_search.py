@@ -1,0 +1,236 @@
+"""Functions without a name beside the terms that have one, by their evidence.
+
+What is missing is looked for in single pieces of flight first, which no impact and no
+other flight can spoil, and then in whole records.
+"""
+
+import dataclasses
+import math
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from scipy.stats import chi2
+
+from ...fitting import Problem
+from ...fitting.engine import Point, separated
+from ..policy import Policy
+from ..terms import Family, Term, Where
+from ._blocks import blocks_of
+from ._free_fits import FreeFits, heat_of, heated, Missing, Subset, unscaled
+from ._gains import added_gain
+from ._local_force import force_blocks, force_response
+from ._roughness import Roughness, roughness
+from ._slots import (
+    coefficients_of,
+    emptied,
+    filled,
+    Free,
+    free_term,
+    roomy,
+    slots_of,
+)
+
+
+class _Lead(NamedTuple):
+    """One more function or term, and how much it promises."""
+
+    gain: float
+    name: str | None = None
+    family: Family | None = None
+    rough: Roughness | None = None
+    slot: str = ""
+
+    @property
+    def label(self) -> str:
+        return self.name or (self.family.name if self.family else "")
+
+
+class FreeSearch:
+    """Adds functions and terms one by one, as long as the evidence grows.
+
+    **Arguments:** the problem, names of the rig's own parameters, terms that may be
+    named, families of functions, whether there are impacts, the policy, and
+    `progress(sentence, fraction)`, and the cost of the model without any of them.
+    """
+
+    def __init__(
+        self,
+        problem: Problem,
+        rig: Sequence[str],
+        terms: Sequence[Term],
+        families: Sequence[Family],
+        policy: Policy,
+        progress: Callable[[str, float | None], None],
+        cost: float,
+    ):
+        self.cost = cost
+        self.policy, self.progress = policy, progress
+        self.terms = [t for t in terms if not any(s.inner for s in t.strengths())]
+        self.fits = FreeFits(rig, self.terms, policy)
+        self.families = tuple(families)
+        self.impacting = any(f.where is not Where.FLIGHT for f in families)
+        self.problem = roomy(problem, self.families[0], self.impacting)
+        self.apart = dataclasses.replace(
+            self.problem, extras=separated(self.problem.extras)
+        )
+
+    def run(self) -> Missing | None:
+        """The functions and terms found, or `None` where nothing is worth it."""
+        found = self._grown(self._bare(self.apart, self.problem.start), True)
+        most = self.policy.iterations
+        found = self.fits.fitted(self._tight(found), found.fit.point, most)
+        found = self._grown(found, False)
+        return self._pruned(found) if found.functions else None
+
+    def _bare(self, problem: Problem, start: Point) -> Missing:
+        return self.fits.fitted(
+            Subset(problem, (), frozenset(), {}), start, self.policy.iterations
+        )
+
+    def _tight(self, found: Missing) -> Subset:
+        return Subset(self.problem, found.functions, found.names, found.gains)
+
+    def _grown(self, found: Missing, apart: bool) -> Missing:
+        """One function or term after the other."""
+        problem = self.apart if apart else self.problem
+        while len(found.functions) + len(found.names) < self.policy.most_terms:
+            if apart and heat_of(found.fit) < self.policy.as_noise:
+                # single pieces know little of what is small
+                break
+            leads = self._leads(problem, found, apart)
+            best = found
+            for lead in leads:
+                if self._done(best, lead, leads[0]):
+                    break
+                said = lead.label.replace("_", " ")
+                self.progress(f"fitting {said}", None)
+                trial = self._with(problem, found, lead)
+                if trial is not None and trial.score < best.score:
+                    best = trial
+            grown = found.score - best.score
+            if best is found or grown < heat_of(best.fit) * self._least():
+                break
+            if not apart and found.functions and grown < self._small(found):
+                break
+            found = best
+        return found
+
+    def _done(self, best: Missing, lead: _Lead, first: _Lead) -> bool:
+        """Whether what explains the data leaves a lead without a chance."""
+        close = lead.gain > self.policy.rivalling * first.gain
+        return heat_of(best.fit) < self.policy.as_noise and not close
+
+    def _small(self, found: Missing) -> float:
+        """What may be left over of what was explained."""
+        return self.policy.small * max(self.cost - found.fit.cost, 0.0)
+
+    def _least(self) -> float:
+        """Growth of twice the logarithm of the evidence that is asked for."""
+        chance = self.policy.false_alarms / (len(self.families) + len(self.terms))
+        least = max(float(chi2.isf(chance, 1)), math.log(self.problem.samples))
+        return (math.sqrt(least) + self.policy.beyond) ** 2
+
+    def _leads(self, problem: Problem, found: Missing, apart: bool) -> list[_Lead]:
+        """What promises most, by a quadratic likelihood about a fit."""
+        self.progress("looking for functions of what is left over", None)
+        policy = self.policy
+        heat = heat_of(found.fit)
+        problem = heated(filled(problem, found.functions), heat)
+        point, free = found.fit.point, self.fits.free(problem, found)
+        leads = []
+        used = {one.slot for one in found.functions}
+        slots = {
+            where: [s for s in slots_of(problem, where) if s not in used]
+            if len(used) < self.policy.functions
+            else []
+            for where in (Where.FLIGHT, Where.IMPACT, Where.CONTACT)
+        }
+        forces = [f for f in self.families if f.where is Where.FLIGHT]
+        if slots[Where.FLIGHT]:
+            response = force_response(problem, point, free)
+            new = [free_term(f, f"new_{k}") for k, f in enumerate(forces)]
+            blocks = force_blocks(problem, response, new)
+            information, score = (x / heat for x in blocks.total())
+            rows = blocks.rows(response.free)
+            for family, term in zip(forces, new):
+                own = blocks.rows([p.name for p in term.parameters(0)])
+                rough = roughness(
+                    information, score, rows, own, family, np.zeros(len(own)), policy
+                )
+                slot = slots[Where.FLIGHT][0]
+                leads.append(_Lead(rough.gain, None, family, rough, slot))
+        for family in () if apart else self.families:
+            if family.where is Where.FLIGHT or not slots[family.where]:
+                continue
+            slot = slots[family.where][0]
+            put = filled(problem, [Free(family, Roughness(), slot)], prior=False)
+            names = coefficients_of(put, slot)
+            blocks = blocks_of(put, point, names=[*free, *names])
+            information, score = unscaled(blocks, names, heat)
+            rows, own = blocks.rows(free), blocks.rows(names)
+            zero = np.zeros(len(own))
+            rough = roughness(information, score, rows, own, family, zero, policy)
+            leads.append(_Lead(rough.gain, None, family, rough, slot))
+        terms = [t for t in self.terms if t.name not in found.names]
+        if terms:
+            strengths = [one.name for t in terms for one in t.strengths()]
+            blocks = blocks_of(problem, point, names=[*free, *strengths])
+            information, score = blocks.total()
+            rows = blocks.rows(free)
+            for term in terms:
+                own = blocks.rows([one.name for one in term.strengths()])
+                grown = added_gain(information, score, rows, own, self.policy.alike)
+                price = len(own) * math.log(problem.samples)
+                leads.append(_Lead(grown / heat - price, term.name))
+        leads.sort(key=lambda lead: -lead.gain)
+        least = max(self._least(), self.policy.promising * leads[0].gain)
+        if not apart and found.functions:
+            least = max(least, self._small(found) / heat)
+        return [lead for lead in leads if lead.gain > least][: self.policy.followed]
+
+    def _with(self, problem: Problem, found: Missing, lead: _Lead) -> Missing | None:
+        functions, names = found.functions, found.names
+        point = found.fit.point
+        if lead.family is not None:
+            assert lead.rough is not None
+            functions = (*functions, Free(lead.family, lead.rough, lead.slot))
+            values = emptied(problem, point.values, lead.slot)
+            point = point._replace(values=values)
+        else:
+            assert lead.name is not None
+            names = names | {lead.name}
+        gains = {**found.gains, lead.label: lead.gain}
+        if lead.family is None or lead.family.where is Where.FLIGHT:
+            # what acts in flight is next to linear where impacts tie nothing
+            first = self.fits.fitted(Subset(self.apart, functions, names, gains), point)
+            point, functions = first.fit.point, first.functions
+            if problem is self.apart:
+                return first if math.isfinite(first.score) else None
+        trial = self.fits.fitted(Subset(problem, functions, names, gains), point)
+        return trial if math.isfinite(trial.score) else None
+
+    def _pruned(self, found: Missing) -> Missing:
+        """Without what the rest can do without."""
+        problem = self.problem
+        for one in (*found.functions, *sorted(found.names)):
+            functions = tuple(f for f in found.functions if f is not one)
+            names = found.names - {one} if isinstance(one, str) else found.names
+            if len(found.functions) + len(found.names) < 2:
+                break
+            values = found.fit.point.values
+            if isinstance(one, Free):
+                values = emptied(problem, values, one.slot)
+            else:
+                term = next(t for t in self.terms if t.name == one)
+                rows = [problem.names.index(s.name) for s in term.strengths()]
+                values = np.asarray(values).copy()
+                values[:, rows] = 0.0
+            point = found.fit.point._replace(values=values)
+            label = one.family.name if isinstance(one, Free) else one
+            gains = {k: v for k, v in found.gains.items() if k != label}
+            less = self.fits.fitted(Subset(problem, functions, names, gains), point)
+            heat = heat_of(found.fit)
+            if less.score - found.score < max(heat * self._least(), self._small(found)):
+                found = less
+        return found

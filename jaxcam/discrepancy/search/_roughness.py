@@ -1,0 +1,100 @@
+"""How rough a free function is: by the marginal likelihood of its coefficients."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Float
+
+from ...fitting.engine import invert_information
+from ..policy import Policy
+from ..terms import Family
+
+
+class Roughness(NamedTuple):
+    """What prior suits a function best.
+
+    - `gain`: twice the logarithm of the marginal likelihood, less that of no function.
+    - `length`: of correlation. `size`: standard deviation of the function.
+    """
+
+    gain: float = 0.0
+    length: float = 1.0
+    size: float = 1.0
+
+
+def roughness(
+    information,
+    score,
+    free,
+    own,
+    family: Family,
+    value: Float[np.ndarray, " k"],
+    policy: Policy,
+) -> Roughness:
+    """The prior of a function, from the quadratic likelihood about a point.
+
+    With the `free` parameters eliminated, coefficients c of a Gaussian prior with
+    variances V have the marginal likelihood of Rasmussen and Williams, Gaussian
+    Processes for Machine Learning 2006, eq. 2.30, written for information and score.
+
+    **Arguments:** information and score without the prior of the coefficients; rows of
+    the free parameters, and of the function's coefficients, its jump last; their values
+    at the point; the policy. The gain is that over the likelihood there.
+    """
+    inside, pull = beside(information, score, free, own, policy.alike)
+    count = len(own) - 1
+    seen = float(np.trace(inside))
+    if not seen > 0:
+        return Roughness(-math.inf, max(policy.function_lengths), 1.0)
+    unit = math.sqrt(len(own) / seen)
+    best = Roughness(-math.inf, max(policy.function_lengths), unit)
+    for length in policy.function_lengths:
+        variances = np.append(family.variances(count, length), float(family.jumps))
+        for size in unit * np.asarray(policy.function_sizes):
+            found = _gain(inside, pull, size * np.sqrt(variances), value)
+            if found > best.gain:
+                best = Roughness(found, length, float(size))
+    return best
+
+
+def occam(
+    information, free, own, spread: Float[np.ndarray, " k"], alike: float
+) -> float:
+    """What the freedom of a function costs: `log det(1 + S A S)` for prior errors S."""
+    inside, _ = beside(information, np.zeros(len(information)), free, own, alike)
+    values = np.linalg.eigvalsh(inside * np.outer(spread, spread))
+    return float(np.sum(np.log1p(np.maximum(values, 0.0))))
+
+
+def beside(information, score, free, own, alike: float):
+    """Information and score of some rows, the free ones eliminated.
+
+    Combinations that the free ones imitate to within `alike` of their information have
+    neither, as rounding would decide what.
+    """
+    free = np.setdiff1d(free, own)
+    free = free[np.diag(information)[free] > 0]
+    inverse = invert_information(information[np.ix_(free, free)])
+    across = information[np.ix_(own, free)]
+    inside = information[np.ix_(own, own)] - across @ inverse @ across.T
+    pull = score[own] - across @ (inverse @ score[free])
+    size = np.sqrt(np.diag(information)[own])
+    unit = np.where(size > 0, 1 / np.where(size > 0, size, 1.0), 0.0)
+    values, vectors = np.linalg.eigh(inside * np.outer(unit, unit))
+    seen = values > alike
+    kept = vectors[:, seen]
+    inside = np.outer(size, size) * ((kept * values[seen]) @ kept.T)
+    return inside, size * (kept @ (kept.T @ (unit * pull)))
+
+
+def _gain(inside, pull, spread, value) -> float:
+    used = spread > 0
+    spread, value = spread[used], value[used]
+    inside, pull = inside[np.ix_(used, used)], pull[used]
+    # in units of the prior errors; rounding must not make information negative
+    values, vectors = np.linalg.eigh(inside * np.outer(spread, spread))
+    values = 1 + np.maximum(values, 0.0)
+    here = value / spread
+    along = vectors.T @ (spread * pull - here)
+    return float(np.sum(along**2 / values) - here @ here - np.sum(np.log(values)))

@@ -1,0 +1,120 @@
+"""Free functions in a problem: which family each one is, and how rough it may be."""
+
+import dataclasses
+import math
+from collections.abc import Sequence
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+
+from ...fitting import Model, Problem
+from ..terms import Family, FREE, FreeFunction, terms_of, Where
+from ._extended import extended
+from ._roughness import Roughness
+
+
+# Sines of a function, and one more coefficient for its jump
+_SINES = {Where.FLIGHT: 20, Where.IMPACT: 10, Where.CONTACT: 24}
+# Functions of each kind that a problem has room for
+_ROOM = ((Where.FLIGHT, "force_a"), (Where.FLIGHT, "force_b"))
+_ROOM_OF_IMPACTS = ((Where.IMPACT, "restitution_a"), (Where.CONTACT, "surface_a"))
+
+
+@dataclasses.dataclass(frozen=True)
+class Free:
+    """A free function that is fitted: its family, its roughness, and its slot."""
+
+    family: Family
+    roughness: Roughness
+    slot: str
+
+
+def roomy(problem: Problem, family: Family, impacting: bool) -> Problem:
+    """The problem with room for free functions, all of them zero.
+
+    One program serves whatever is put into the slots.
+
+    **Arguments:** any family, which fills the slots to begin with.
+    """
+    room = (*_ROOM, *_ROOM_OF_IMPACTS) if impacting else _ROOM
+    empty = [
+        FREE[where].of(family, label, [0.0] * (_SINES[where] + 1))
+        for where, label in room
+    ]
+    return extended(problem, empty, problem.start)
+
+
+def slots_of(problem: Problem, where: Where) -> list[str]:
+    """Labels of the slots for functions that act somewhere."""
+    return [
+        term.label
+        for term in terms_of(problem.model)
+        if isinstance(term, FreeFunction) and where in term.acts
+    ]
+
+
+def free_term(family: Family, label: str) -> FreeFunction:
+    """A function of a family that is zero."""
+    return FREE[family.where].of(family, label, [0.0] * (_SINES[family.where] + 1))
+
+
+def spread_of(family: Family, roughness: Roughness) -> np.ndarray:
+    """Prior standard errors of the coefficients of a function, its jump last."""
+    variances = family.variances(_SINES[family.where], roughness.length)
+    return roughness.size * np.sqrt(np.append(variances, float(family.jumps)))
+
+
+def filled(problem: Problem, functions: Sequence[Free], prior: bool = True) -> Problem:
+    """The problem with some functions in their slots, `prior` by their roughness."""
+    for one in functions:
+        place = _place(problem, one.slot)
+        fresh = free_term(one.family, one.slot)
+
+        def put(model: Model, place=place, fresh=fresh) -> Model:
+            old = terms_of(model)[place]
+            assert isinstance(old, FreeFunction)
+            new = eqx.tree_at(lambda t: t.coefficients, fresh, old.coefficients)
+            return eqx.tree_at(lambda m: terms_of(m)[place], model, new)
+
+        spread = spread_of(one.family, one.roughness)
+        # what has no effect needs some prior, so that it stays where it is
+        spread = np.where(spread > 0, spread, one.roughness.size)
+        known = {
+            f"{one.slot}_{k}": math.sqrt(3) * float(value) if prior else math.inf
+            for k, value in enumerate(spread)
+        }
+        scales = {f"{one.slot}_{k}": float(value) for k, value in enumerate(spread)}
+        problem = dataclasses.replace(
+            problem,
+            model=put(problem.model),
+            layout=eqx.tree_at(
+                lambda part: part.model, problem.layout, put(problem.layout.model)
+            ),
+            parameters=tuple(
+                dataclasses.replace(p, tolerance=known[p.name], scale=scales[p.name])
+                if p.name in known
+                else p
+                for p in problem.parameters
+            ),
+        )
+    return problem
+
+
+def coefficients_of(problem: Problem, slot: str) -> list[str]:
+    """Names of the coefficients in a slot."""
+    term = terms_of(problem.model)[_place(problem, slot)]
+    return [p.name for p in term.parameters(0)]
+
+
+def emptied(problem: Problem, values, slot: str):
+    """Values of parameters with those in a slot at zero."""
+    rows = [problem.names.index(name) for name in coefficients_of(problem, slot)]
+    return jnp.asarray(values).at[:, jnp.asarray(rows)].set(0.0)
+
+
+def _place(problem: Problem, slot: str) -> int:
+    for place, term in enumerate(terms_of(problem.model)):
+        if isinstance(term, FreeFunction) and term.label == slot:
+            return place
+    raise ValueError(f"There is no slot {slot!r} for a free function.")

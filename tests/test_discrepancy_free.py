@@ -1,0 +1,172 @@
+"""Free functions: their spline, their prior, and what a diagnosis makes of them."""
+
+import math
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from jaxcam.discrepancy import Policy
+from jaxcam.discrepancy.search import occam, Roughness, roughness
+from jaxcam.discrepancy.terms import (
+    Factor,
+    families,
+    Family,
+    FREE,
+    free_basis,
+    Motion,
+    Variable,
+    Where,
+)
+
+
+SINES = 20
+POLICY = Policy()
+
+
+def _family(argument, low, high, factor=Factor.ONE):
+    return Family(Where.FLIGHT, argument, low, high, factor, middle=0.5, slip=1e-3)
+
+
+@pytest.mark.parametrize(
+    "family",
+    [
+        _family(Variable.POSITION, 0.2, 0.36),
+        _family(Variable.TIME, 0.0, 4.0),
+        _family(Variable.PHASE, 0.0, 2 * math.pi),
+    ],
+    ids=lambda one: one.name,
+)
+def test_the_spline_is_the_sum_of_sines(family):
+    """To 0.5 % of its size, with coefficients that are as large for all sines."""
+    coefficients = np.random.default_rng(0).normal(size=SINES + 1)
+    term = FREE[Where.FLIGHT].of(family, "a", coefficients).prepared()
+    at = np.linspace(family.low, family.high, 57)
+    found = np.array([float(term.smooth(x)) for x in at])
+    expected = free_basis(family, at, SINES + 1) @ np.append(coefficients[:-1], 0.0)
+    assert np.max(np.abs(found - expected)) < 5e-3 * np.max(np.abs(expected))
+
+
+def test_a_function_of_the_phase_is_periodic_and_others_end():
+    coefficients = np.random.default_rng(1).normal(size=SINES + 1)
+    phase = FREE[Where.FLIGHT].of(
+        _family(Variable.PHASE, 0.0, 2 * math.pi), "a", coefficients
+    )
+    assert float(phase.smooth(1.0)) == pytest.approx(
+        float(phase.smooth(1.0 - 6 * math.pi)), abs=1e-12
+    )
+    angle = FREE[Where.FLIGHT].of(
+        _family(Variable.POSITION, 0.2, 0.3), "a", coefficients
+    )
+    assert float(angle.smooth(0.4)) == float(angle.smooth(0.3))
+
+
+@pytest.mark.parametrize(
+    ("factor", "expected"),
+    [
+        (Factor.ONE, 1.0),
+        (Factor.VELOCITY, -0.7),
+        (Factor.DIRECTION, -1.0),
+        (Factor.DEFLECTION, 0.3 - 0.5),
+    ],
+)
+def test_a_force_is_its_function_times_its_factor(factor, expected):
+    family = _family(Variable.POSITION, 0.2, 0.4, factor)
+    coefficients = [1.0, 0.5, *[0.0] * (SINES - 2), 9.0]
+    term = FREE[Where.FLIGHT].of(family, "a", coefficients)
+    numbers = (jnp.asarray(x) for x in (0.1, 0.3, -0.7, 2.0))
+    force = term.acceleration(Motion(*numbers))
+    assert float(force) == pytest.approx(expected * float(term.smooth(0.3)), rel=1e-12)
+
+
+def test_a_function_of_the_velocity_may_jump():
+    family = _family(Variable.VELOCITY, -1.0, 1.0)
+    term = FREE[Where.FLIGHT].of(family, "a", [*[0.0] * SINES, 2.0])
+    for velocity in (-0.3, 0.4):
+        numbers = (jnp.asarray(x) for x in (0.1, 0.3, velocity, 2.0))
+        force = float(term.acceleration(Motion(*numbers)))
+        assert force == pytest.approx(math.copysign(2.0, velocity), rel=1e-12)
+
+
+@pytest.mark.parametrize("length", [0.1, 0.4, 1.6])
+def test_the_prior_has_variance_one_on_average(length):
+    family = _family(Variable.POSITION, 0.2, 0.4)
+    at = np.linspace(0.2, 0.4, 400)
+    basis = free_basis(family, at, SINES + 1)[:, :-1]
+    variance = basis**2 @ family.variances(SINES, length)
+    # the sines vanish outside the range, so that inside there is a little more
+    assert 0.9 < np.mean(variance) < 1.4
+
+
+def test_the_gain_is_the_marginal_likelihood():
+    """Against a Gaussian likelihood written down directly, to 1e-8."""
+    rng = np.random.default_rng(2)
+    family = _family(Variable.POSITION, 0.0, 1.0)
+    at = rng.uniform(0.0, 1.0, 300)
+    basis = free_basis(family, at, SINES + 1)
+    data = np.sin(7 * at) + 0.1 * rng.normal(size=300)
+    design = basis / 0.1
+    information, score = design.T @ design, design.T @ (data / 0.1)
+    own, none = np.arange(SINES + 1), np.zeros(0, dtype=int)
+    found = roughness(
+        information, score, none, own, family, np.zeros(SINES + 1), POLICY
+    )
+    spread = found.size * np.sqrt(family.variances(SINES, found.length))
+    covariance = 0.01 * np.eye(300) + (basis[:, :-1] * spread**2) @ basis[:, :-1].T
+    direct = data @ data / 0.01 - data @ np.linalg.solve(covariance, data)
+    direct -= np.linalg.slogdet(covariance)[1] - 300 * math.log(0.01)
+    assert found.gain == pytest.approx(direct, rel=1e-8)
+    price = occam(information, none, own[:-1], spread, POLICY.alike)
+    assert price == pytest.approx(np.linalg.slogdet(covariance / 0.01)[1], rel=1e-8)
+    # a smooth function is not taken for a rough one, nor for a small one
+    assert found.length >= 0.1
+    assert 0.3 < found.size < 10.0
+
+
+def test_the_gain_does_not_depend_on_the_point():
+    rng = np.random.default_rng(3)
+    family = _family(Variable.POSITION, 0.0, 1.0)
+    design = rng.normal(size=(200, SINES + 1))
+    information = design.T @ design
+    score = design.T @ rng.normal(size=200)
+    own, none = np.arange(SINES + 1), np.zeros(0, dtype=int)
+    value = rng.normal(size=SINES + 1)
+    value[-1] = 0.0
+    here = roughness(information, score, none, own, family, np.zeros(SINES + 1), POLICY)
+    moved = score - information @ value
+    there = roughness(information, moved, none, own, family, value, POLICY)
+    # twice the logarithm of the likelihood that the move has lost
+    lost = 2 * score @ value - value @ information @ value
+    assert (there.length, there.size) == (here.length, here.size)
+    assert there.gain + lost == pytest.approx(here.gain, abs=1e-6)
+
+
+def test_what_free_parameters_imitate_is_no_function():
+    rng = np.random.default_rng(4)
+    family = _family(Variable.POSITION, 0.0, 1.0)
+    at = rng.uniform(0.0, 1.0, 300)
+    basis = free_basis(family, at, SINES + 1)
+    # the rig can do whatever the sines can
+    design = np.column_stack([basis[:, :-1], basis])
+    information, score = design.T @ design, design.T @ rng.normal(size=300)
+    free, own = np.arange(SINES), np.arange(SINES, 2 * SINES + 1)
+    found = roughness(
+        information, score, free, own, family, np.zeros(SINES + 1), POLICY
+    )
+    assert found == Roughness(-math.inf, found.length, 1.0) or found.gain < 1e-6
+
+
+def test_families_have_one_place_each_and_different_names():
+    both = families(
+        (0.0, 1.0), (-1.0, 1.0), (0.0, 2.0), 4.0,
+        turned=True, impacting=True, slip=0.01, motion_unit="m",
+    )  # fmt: skip
+    names = [one.name for one in both]
+    assert len(set(names)) == len(names)
+    assert {one.where for one in both} == {Where.FLIGHT, Where.IMPACT, Where.CONTACT}
+    free = families(
+        (0.0, 1.0), (-1.0, 1.0), (0.0, 2.0), 4.0,
+        turned=False, impacting=False, slip=0.01, motion_unit="m",
+    )  # fmt: skip
+    assert {one.where for one in free} == {Where.FLIGHT}
+    assert all(one.argument is not Variable.PHASE for one in free)
