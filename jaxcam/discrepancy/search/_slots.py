@@ -42,7 +42,15 @@ def roomy(problem: Problem, family: Family, impacting: bool) -> Problem:
         FREE[where].of(family, label, [0.0] * (_SINES[where] + 1))
         for where, label in room
     ]
-    return extended(problem, empty, problem.start)
+    wide = extended(problem, empty, problem.start)
+    layout = dataclasses.replace(wide.layout, ready=_with_splines)
+    return dataclasses.replace(wide, layout=layout)
+
+
+def _with_splines(model: Model) -> Model:
+    """The model with the splines of its functions, the rest of it as it is."""
+    terms = tuple(term.prepared() for term in terms_of(model))
+    return eqx.tree_at(terms_of, model, terms)
 
 
 def slots_of(problem: Problem, where: Where) -> list[str]:

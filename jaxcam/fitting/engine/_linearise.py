@@ -1,5 +1,6 @@
 """Scores and information of every piece and joint about a point."""
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import equinox as eqx
@@ -33,19 +34,26 @@ class Point(NamedTuple):
     states: Float[Array, "r k n"]
 
 
+def _as_it_is(model: Model) -> Model:
+    return model
+
+
 class Layout(eqx.Module):
-    """Where the parameters are in a model: its leaves, and which of them are fitted."""
+    """Where the parameters are in a model: its leaves, and which of them are fitted.
+
+    `ready` works out what a model needs at every step, once for all of them.
+    """
 
     model: Model
     places: tuple[int, ...] = eqx.field(static=True)
+    ready: Callable[[Model], Model] = eqx.field(static=True, default=_as_it_is)
 
     def at(self, values: Float[Array, " q"]) -> Model:
         """The model with the parameters at some values."""
         leaves, tree = jax.tree.flatten(self.model)
         for column, place in enumerate(self.places):
             leaves[place] = values[column]
-        model = jax.tree.unflatten(tree, leaves)
-        return eqx.tree_at(lambda m: m.system, model, model.system.prepared())
+        return self.ready(jax.tree.unflatten(tree, leaves))
 
 
 class Blocks(NamedTuple):
