@@ -6,6 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from jaxcam import simulate
 from jaxcam.discrepancy import Policy
 from jaxcam.discrepancy.search import occam, Roughness, roughness
 from jaxcam.discrepancy.terms import (
@@ -15,9 +16,12 @@ from jaxcam.discrepancy.terms import (
     FREE,
     free_basis,
     Motion,
+    saved_classes,
     Variable,
     Where,
+    WithTerms,
 )
+from jaxcam.models import ImpactOscillator, load_system, save_system
 
 
 SINES = 20
@@ -77,6 +81,20 @@ def test_a_force_is_its_function_times_its_factor(factor, expected):
     numbers = (jnp.asarray(x) for x in (0.1, 0.3, -0.7, 2.0))
     force = term.acceleration(Motion(*numbers))
     assert float(force) == pytest.approx(expected * float(term.smooth(0.3)), rel=1e-12)
+
+
+def test_a_saved_system_moves_as_the_one_that_was_found(tmp_path):
+    family = _family(Variable.POSITION, -2.0, 0.0)
+    coefficients = 0.1 * np.random.default_rng(5).normal(size=SINES + 1)
+    term = FREE[Where.FLIGHT].of(family, "a", coefficients)
+    system = WithTerms(ImpactOscillator(), (term,))
+    save_system(system, tmp_path / "model.json")
+    again = load_system(tmp_path / "model.json", classes=saved_classes())
+    start = jnp.array([-1.0, 0.0])
+    one, other = (simulate(s, start, 0.0, 3.0) for s in (system, again))
+    np.testing.assert_array_equal(one.final, other.final)
+    without = simulate(ImpactOscillator(), start, 0.0, 3.0)
+    assert abs(float(one.final[0] - without.final[0])) > 1e-3
 
 
 def test_a_function_of_the_velocity_may_jump():

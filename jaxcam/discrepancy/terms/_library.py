@@ -8,6 +8,7 @@ import equinox as eqx
 import jax.numpy as jnp
 
 from ...recordings import References
+from ._free_function import FREE
 from ._term import Motion, SensorTerm, strength, Term
 from ._value import Value
 from ._where import Where
@@ -298,4 +299,5 @@ def library(
 
 def saved_classes() -> tuple[type, ...]:
     """Classes that a saved system with terms may name, for `load_system`."""
-    return (WithTerms, DriveRipple, *(type(term) for term in library()))
+    terms = (type(term) for term in library())
+    return (WithTerms, DriveRipple, *terms, *FREE.values())
