@@ -50,8 +50,8 @@ class FreeSearch:
     """Adds functions and terms one by one, as long as the evidence grows.
 
     **Arguments:** the problem, names of the rig's own parameters, terms that may be
-    named, families of functions, whether there are impacts, the policy, and
-    `progress(sentence, fraction)`, and the cost of the model without any of them.
+    named, families of functions, the policy, `progress(sentence, fraction)`, and the
+    cost of the model without any of them.
     """
 
     def __init__(
@@ -69,8 +69,8 @@ class FreeSearch:
         self.terms = [t for t in terms if not any(s.inner for s in t.strengths())]
         self.fits = FreeFits(rig, self.terms, policy)
         self.families = tuple(families)
-        self.impacting = any(f.where is not Where.FLIGHT for f in families)
-        self.problem = roomy(problem, self.families[0], self.impacting)
+        impacting = any(family.where is not Where.FLIGHT for family in families)
+        self.problem = roomy(problem, self.families[0], impacting)
         self.apart = dataclasses.replace(
             self.problem, extras=separated(self.problem.extras)
         )
@@ -115,6 +115,13 @@ class FreeSearch:
                 break
             found = best
         return found
+
+    def _in_flight(self, lead: _Lead) -> bool:
+        """Whether pieces of flight show what a lead adds."""
+        if lead.family is not None:
+            return lead.family.where is Where.FLIGHT
+        term = next(term for term in self.terms if term.name == lead.name)
+        return Where.FLIGHT in term.acts
 
     def _done(self, best: Missing, lead: _Lead, first: _Lead) -> bool:
         """Whether what explains the data leaves a lead without a chance."""
@@ -183,6 +190,8 @@ class FreeSearch:
                 grown = added_gain(information, score, rows, own, self.policy.alike)
                 price = len(own) * math.log(problem.samples)
                 leads.append(_Lead(grown / heat - price, term.name))
+        if not leads:
+            return []
         leads.sort(key=lambda lead: -lead.gain)
         least = max(self._least(), self.policy.promising * leads[0].gain)
         if not apart and found.functions:
@@ -201,7 +210,7 @@ class FreeSearch:
             assert lead.name is not None
             names = names | {lead.name}
         gains = {**found.gains, lead.label: lead.gain}
-        if lead.family is None or lead.family.where is Where.FLIGHT:
+        if self._in_flight(lead):
             # what acts in flight is next to linear where impacts tie nothing
             first = self.fits.fitted(Subset(self.apart, functions, names, gains), point)
             point, functions = first.fit.point, first.functions
