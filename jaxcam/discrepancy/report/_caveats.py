@@ -4,7 +4,7 @@ import dataclasses
 import enum
 from collections.abc import Iterator
 
-from ..evidence import Choice, rms_of
+from ..evidence import Choice, HeldOut, rms_of
 from ..search import Trial, Trials
 from ._words import listed
 
@@ -68,12 +68,17 @@ def caveats_of(
         )
     held = choice.held
     if named and held.after > max(held.before, trials.policy.as_noise):
-        yield Caveat(
-            Reason.POOR_PREDICTION,
-            "A part of the records does not pin the parameters down well enough to "
-            f"predict the others: it misses by {held.after:.2g} times the noise, the "
-            f"textbook model by {held.before:.2g}. Record at more speeds.",
-        )
+        yield poor_prediction(held)
+
+
+def poor_prediction(held: HeldOut) -> Caveat:
+    """That a part of the records does not tell what the others need."""
+    return Caveat(
+        Reason.POOR_PREDICTION,
+        "A part of the records does not pin the parameters down well enough to "
+        f"predict the others: it misses by {held.after:.2g} times the noise, the "
+        f"textbook model by {held.before:.2g}. Record at more speeds.",
+    )
 
 
 def small_remainder(choice: Choice, share: float) -> Caveat:

@@ -55,18 +55,29 @@ def summary_of_functions(
     functions: Sequence[MissingFunction],
     effects: Sequence[Effect],
     held: HeldOut,
+    left: float,
     floor: float,
     unit: str,
 ) -> str:
-    """What has no name, what stands beside it, and by how much the fit improves."""
+    """What has no name, what stands beside it, and by how much the fit improves.
+
+    **Arguments:** the functions, all effects, records that were not seen, what is left
+    in units of the noise, the noise and its unit.
+    """
     named = [effect.sentence for effect in effects if effect.term]
     beside = f" beside {listed(named)}" if named else ""
     words = " and ".join(one.words for one in functions)
+    found = f"Something is missing that has no name{beside}: {words}."
+    if held.after < held.before:
+        return (
+            f"{found} Fitted with the rig it lowers the error on unseen flights from "
+            f"{held.before * floor:.3g} to "
+            f"{quantity(f'{held.after * floor:.3g}', unit)}, where the noise is "
+            f"{floor:.3g}."
+        )
     return (
-        f"Something is missing that has no name{beside}: {words}. Fitted with the rig "
-        f"it lowers the error on unseen flights from {held.before * floor:.3g} to "
-        f"{quantity(f'{held.after * floor:.3g}', unit)}, where the noise is "
-        f"{floor:.3g}."
+        f"{found} Fitted with the rig it explains the records to {left:.3g} times the "
+        f"noise; a part of them does not tell enough of it to predict the others."
     )
 
 

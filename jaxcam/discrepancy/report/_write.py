@@ -1,12 +1,19 @@
 """The diagnosis of a choice: verdict, effects, alternatives, caveats, numbers."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 from ...fitting import Fit
-from ..evidence import Choice, limits, ranges_of, Ripple, rms_of
+from ..evidence import Choice, HeldOut, limits, ranges_of, Ripple, rms_of
+from ..policy import Policy
 from ..search import Missing, Question, Trial, Trials, within_tolerances
 from ..terms import Value
-from ._caveats import Caveat, caveats_of, functions_fall_short, small_remainder
+from ._caveats import (
+    Caveat,
+    caveats_of,
+    functions_fall_short,
+    poor_prediction,
+    small_remainder,
+)
 from ._diagnosis import Alternative, Diagnosis, Verdict
 from ._effects import (
     drive_effect,
@@ -109,7 +116,9 @@ def _of_functions(
         floor,
         question.unit,
         _rig_values(question, found, {}),
-        summary_of_functions(functions, effects, held, floor, question.unit),
+        summary_of_functions(
+            functions, effects, held, rms_of(found), floor, question.unit
+        ),
         bare.fit,
         found,
         tuple(choice.left_before),
@@ -119,18 +128,19 @@ def _of_functions(
         _pulls(question, within, found),
         {},
         {},
-        tuple(_doubts_of(missing, policy)),
+        tuple(_doubts_of(missing, held, policy)),
         policy,
         functions,
     )
 
 
-def _doubts_of(missing: Missing, policy) -> list[Caveat]:
-    """That what was found does not explain everything."""
+def _doubts_of(missing: Missing, held: HeldOut, policy: Policy) -> Iterator[Caveat]:
+    """That what was found does not explain everything, or not what it has not seen."""
     left = rms_of(missing.fit)
-    if left < policy.as_noise:
-        return []
-    return [functions_fall_short(left)]
+    if left > policy.as_noise:
+        yield functions_fall_short(left)
+    if held.after > max(held.before, policy.as_noise):
+        yield poor_prediction(held)
 
 
 def _verdict(choice: Choice, named: bool, small: float) -> tuple[Verdict, list[Caveat]]:
