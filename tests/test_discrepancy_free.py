@@ -46,7 +46,7 @@ def test_the_spline_is_the_sum_of_sines(family):
     coefficients = np.random.default_rng(0).normal(size=SINES + 1)
     term = FREE[Where.FLIGHT].of(family, "a", coefficients).prepared()
     at = np.linspace(family.low, family.high, 57)
-    found = np.array([float(term.smooth(x)) for x in at])
+    found = np.array([float(term.at(x)) for x in at])
     expected = free_basis(family, at, SINES + 1) @ np.append(coefficients[:-1], 0.0)
     assert np.max(np.abs(found - expected)) < 5e-3 * np.max(np.abs(expected))
 
@@ -56,13 +56,13 @@ def test_a_function_of_the_phase_is_periodic_and_others_end():
     phase = FREE[Where.FLIGHT].of(
         _family(Variable.PHASE, 0.0, 2 * math.pi), "a", coefficients
     )
-    assert float(phase.smooth(1.0)) == pytest.approx(
-        float(phase.smooth(1.0 - 6 * math.pi)), abs=1e-12
+    assert float(phase.at(1.0)) == pytest.approx(
+        float(phase.at(1.0 - 6 * math.pi)), abs=1e-12
     )
     angle = FREE[Where.FLIGHT].of(
         _family(Variable.POSITION, 0.2, 0.3), "a", coefficients
     )
-    assert float(angle.smooth(0.4)) == float(angle.smooth(0.3))
+    assert float(angle.at(0.4)) == float(angle.at(0.3))
 
 
 @pytest.mark.parametrize(
@@ -80,7 +80,7 @@ def test_a_force_is_its_function_times_its_factor(factor, expected):
     term = FREE[Where.FLIGHT].of(family, "a", coefficients)
     numbers = (jnp.asarray(x) for x in (0.1, 0.3, -0.7, 2.0))
     force = term.acceleration(Motion(*numbers))
-    assert float(force) == pytest.approx(expected * float(term.smooth(0.3)), rel=1e-12)
+    assert float(force) == pytest.approx(expected * float(term.at(0.3)), rel=1e-12)
 
 
 def test_a_saved_system_moves_as_the_one_that_was_found(tmp_path):

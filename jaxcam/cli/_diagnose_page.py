@@ -260,7 +260,7 @@ def diagnosis_page(
             effect.where,
             f"{effect.delta_bic:.0f}",
             f"{effect.heldout_gain_nats:.0f}",
-            f"{effect.inclusion:.0%}",
+            "" if effect.inclusion is None else f"{effect.inclusion:.0%}",
         )
         for effect in found.effects
     ]
@@ -295,7 +295,7 @@ def diagnosis_page(
             table_html(headings, effects, text=(0, 1, 2)),
         ]
     parts += [
-        "<h2>Before and after, on records not seen</h2>",
+        "<h2>Before and after, on flights not seen</h2>",
         f"<p>{found.heldout_before:.3e} {found.unit} before, "
         f"{found.heldout_after:.3e} after; noise and rounding of the sensor are "
         f"{found.noise_floor:.3e}.</p>",

@@ -98,8 +98,10 @@ class Policy:
         1e-3, "share of the information of all records that one half must hold"
     )
     stretches: int = _decides(4, "bootstrap blocks per record at most")
-    stretch_pieces: int = _decides(8, "pieces of flight per bootstrap block at least")
-    folds: int = _decides(3, "parts of the records, each predicted by the others")
+    stretch_pieces: int = _decides(
+        8, "pieces of flight per block at least, redrawn or held out"
+    )
+    folds: int = _decides(3, "parts of the data, each predicted by the others")
     fewest_periods: float = _decides(
         4.0, "periods in the longest record, at the lowest frequency of a vibration"
     )

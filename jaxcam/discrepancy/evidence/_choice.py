@@ -6,7 +6,7 @@ from ..search import FreeSearch, Missing, Question, Search, Trial, Trials
 from ..terms import families
 from ._held_out import held_out, HeldOut
 from ._masked import unmasked
-from ._redrawn import redrawn, sure
+from ._redrawn import Needs, needs, redrawn, sure
 from ._structure import ranges_of, Structure, structures
 
 
@@ -20,7 +20,8 @@ class Choice:
         keep them; `needed`: those that are named all the same.
     - `masked`: terms that were dropped, with their shares of what is explained, because
         the corner of another one leaves as much.
-    - `missing`: functions without a name that explain more than terms that have one.
+    - `missing`: functions without a name that explain more than terms that have one;
+        `needs`: how much they are needed, by their labels.
     - `left_before`, `left_after`: structures in the residuals of `before` and `best`.
     """
 
@@ -36,6 +37,7 @@ class Choice:
     held: HeldOut
     masked: list[tuple[str, float]] = dataclasses.field(default_factory=list)
     missing: Missing | None = None
+    needs: Needs | None = None
 
     @property
     def unexplained(self) -> list[Structure]:
@@ -69,16 +71,16 @@ def choose(question: Question, trials: Trials, seed: int) -> Choice:
                 best, left_after, held = found, with_all, whole
                 needed, doubtful = doubtful, []
                 inclusion, deviation = redrawn(trials, best, seed)
-    held = held or held_out(trials, before, best)
-    missing = None
+    missing, needed_parts = None, None
     left = [one for one in left_after if one.significant]
     if left and trials.policy.functions:
-        missing = _without_a_name(question, trials, best, left)
+        missing, needed_parts = _without_a_name(question, trials, best, left, seed)
     if missing is not None:
         nameless = Trial(
             missing.names | {"functions"}, missing.fit, missing.score, 0, False
         )
         held = held_out(trials, before, nameless)
+    held = held or held_out(trials, before, best)
     return Choice(
         found,
         best,
@@ -92,23 +94,25 @@ def choose(question: Question, trials: Trials, seed: int) -> Choice:
         held,
         masked,
         missing,
+        needed_parts,
     )
 
 
 def _without_a_name(
-    question: Question, trials: Trials, best: Trial, left: list[Structure]
-) -> Missing | None:
+    question: Question, trials: Trials, best: Trial, left: list[Structure], seed: int
+) -> tuple[Missing, Needs] | tuple[None, None]:
     """Functions that explain what the named terms leave over, by their evidence.
 
-    What is left after a named term but is small beside what that explains is none.
+    What is left after a named term but is small beside what that explains is none, and
+    what the redrawn sets can do without is not needed.
     """
     policy, bare = trials.policy, trials.known[frozenset()].fit.cost
     small = policy.small * (bare - best.fit.cost)
     if best.names and max(one.gain for one in left) < small:
-        return None
+        return None, None
     problem = question.problem
     positions, velocities, approach, duration = ranges_of(problem, policy)
-    found = FreeSearch(
+    search = FreeSearch(
         problem,
         question.rig,
         question.terms,
@@ -125,10 +129,21 @@ def _without_a_name(
         policy,
         trials.progress,
         bare,
-    ).run()
-    if found is None or found.score > best.bic:
-        return None
-    return found
+    )
+    found = search.run()
+    while found is not None and found.functions and found.score < best.bic:
+        parts, prices = search.fits.parts(found), search.fits.prices(found)
+        fitted = found.fit
+        needed = needs(
+            fitted.problem, fitted, parts, prices, policy, seed, names=fitted.free
+        )
+        least = min(needed.inclusion, key=lambda one: needed.inclusion[one])
+        if needed.inclusion[least] >= policy.sure:
+            return found, needed
+        if len(parts) < 2:
+            break
+        found = search.without(found, least)
+    return None, None
 
 
 def _left(question: Question, trials: Trials, trial: Trial) -> list[Structure]:

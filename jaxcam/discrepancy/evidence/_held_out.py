@@ -1,17 +1,20 @@
-"""Records that no parameter has seen, predicted by two models."""
+"""Stretches of records that no parameter has seen, predicted by two models."""
 
 import dataclasses
 import math
 from typing import NamedTuple
 
 import numpy as np
+from jaxtyping import Float
 
 from ...fitting import Fit, fit, Problem, Residuals, residuals
+from ...fitting.engine import Weights
+from ..policy import Policy
 from ..search import given_up, Trial, Trials, with_states
 
 
 class HeldOut(NamedTuple):
-    """Two models on records that their parameters have not seen.
+    """Two models on stretches of the records that their parameters have not seen.
 
     - `before`, `after`: rms of the residuals in units of the noise, without and with
         the terms.
@@ -31,21 +34,21 @@ class HeldOut(NamedTuple):
 
 
 def held_out(trials: Trials, before: Trial, after: Trial) -> HeldOut:
-    """Predict records that the parameters of two models have not seen.
+    """Predict what the parameters of two models have not seen.
 
-    Records are dealt out to a few parts, two records to two, and each part is predicted
-    with what the others say. One record alone is cut in two.
+    Every record is cut into short stretches, which are dealt out to a few parts (two
+    for a record alone), each predicted with what the others say.
     """
     problem = trials.problem
     unseen_parts: tuple[list[Residuals], list[Residuals]] = ([], [])
-    folds = _folds(problem, trials.policy.folds)
+    folds = _folds(problem, trials.policy)
     squares, counts = np.zeros(2), np.zeros(2)
     gained: dict[str, float] = {}
     for fold, (seen, unseen) in enumerate(folds):
         costs = []
         for which, trial in enumerate((before, after)):
             done = (2 * fold + which) / (2 * len(folds))
-            trials.progress("predicting records not seen", done)
+            trials.progress("predicting stretches not seen", done)
             own = trial.fit.problem
             known = fit(
                 own,
@@ -61,17 +64,7 @@ def held_out(trials: Trials, before: Trial, after: Trial) -> HeldOut:
             square, count = _square(parts)
             squares[which] += square
             counts[which] += count
-            flown = np.sum(
-                np.asarray(unseen.flown)
-                * (np.asarray(test.costs.flown) + np.asarray(test.costs.joints)),
-                axis=1,
-            )
-            rested = np.sum(
-                np.asarray(unseen.rested)
-                * np.nan_to_num(np.asarray(test.costs.rested)),
-                axis=1,
-            )
-            costs.append(flown + rested)
+            costs.append(_by_record(test, unseen))
             if before.names == after.names:
                 squares[1], counts[1] = squares[0], counts[0]
                 unseen_parts[1].extend(parts)
@@ -83,6 +76,15 @@ def held_out(trials: Trials, before: Trial, after: Trial) -> HeldOut:
         parts.sort(key=lambda part: problem.records.index(part.record))
     rms = np.sqrt(squares / np.maximum(counts, 1))
     return HeldOut(float(rms[0]), float(rms[1]), gained, unseen_parts)
+
+
+def _by_record(test: Fit, unseen: Weights) -> Float[np.ndarray, " r"]:
+    """Cost of what was not seen; a joint counts where both its pieces do."""
+    flown, joints, rested = (np.asarray(part) for part in test.costs)
+    before = np.concatenate([unseen.flown[:, :1], unseen.flown[:, :-1]], axis=1)
+    shared = np.minimum(unseen.flown, before)
+    in_flight = np.sum(unseen.flown * flown + shared * joints, axis=1)
+    return in_flight + np.sum(unseen.rested * np.nan_to_num(rested), axis=1)
 
 
 def rms_of(fitted: Fit) -> float:
@@ -97,19 +99,30 @@ def _square(parts: list[Residuals]) -> tuple[float, int]:
     return square, sum(len(part.value) for part in parts)
 
 
-def _folds(problem: Problem, most: int):
-    """Weights of what is seen and what is not, for each part of the records."""
-    names = problem.records
-    if len(names) == 1:
-        middle = problem.segments[0].recording.time.mean()
-        halves = problem.between(-np.inf, middle), problem.between(middle, np.inf)
-        return [halves, halves[::-1]]
-    count = min(most, len(names))
-    dealt = [names[k::count] for k in range(count)]
-    return [
-        (problem.only([n for n in names if n not in part]), problem.only(part))
-        for part in dealt
-    ]
+def _folds(problem: Problem, policy: Policy) -> list[tuple[Weights, Weights]]:
+    """Weights of what is seen and what is not, for each part of the data.
+
+    Every record is cut into short stretches that are dealt out in turn, so that a place
+    that is visited a few times is in each part.
+    """
+    count = policy.folds if len(problem.records) > 1 else 2
+    every = problem.everything()
+    found = []
+    for fold in range(count):
+        flown, rested = np.zeros_like(every.flown), np.zeros_like(every.rested)
+        for row, segments in enumerate(problem.segments):
+            time = segments.recording.time
+            pieces = len(problem.spans[row][0])
+            rounds = max(1, pieces // (count * policy.stretch_pieces))
+            edges = np.linspace(time[0], time[-1], count * rounds + 1)
+            edges[0], edges[-1] = -np.inf, np.inf
+            for number in range((fold + row) % count, count * rounds, count):
+                stretch = problem.between(edges[number], edges[number + 1])
+                flown[row] += stretch.flown[row]
+                rested[row] += stretch.rested[row]
+        seen = Weights(every.flown - flown, every.rested - rested)
+        found.append((seen, Weights(flown, rested)))
+    return found
 
 
 def _parts(test: Fit, unseen) -> list[Residuals]:

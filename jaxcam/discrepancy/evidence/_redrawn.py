@@ -1,11 +1,14 @@
 """How sure a named term is: the bootstrap of blocks of the records."""
 
 import math
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 from scipy.stats import chi2
 
-from ...fitting import Fit
+from ...fitting import Fit, Problem
+from ..policy import Policy
 from ..search import blocks_of, gain, newton_step, Trial, Trials, values_of
 
 
@@ -44,6 +47,19 @@ def _size(trials: Trials, best: Trial, name: str, deviation) -> float:
     return float(size / chi2.isf(trials.policy.false_alarms, len(own)))
 
 
+class Needs(NamedTuple):
+    """What parts of a model are needed, by the redrawn sets and by all data.
+
+    - `inclusion`: share of the redrawn sets that would keep a part.
+    - `deviation`: of each free parameter, over the redrawn sets.
+    - `lost`: what all data lose without a part, less its price.
+    """
+
+    inclusion: dict[str, float]
+    deviation: dict[str, float]
+    lost: dict[str, float]
+
+
 def redrawn(
     trials: Trials, best: Trial, seed: int = 0
 ) -> tuple[dict[str, float], dict[str, float]]:
@@ -53,34 +69,61 @@ def redrawn(
     because a fit without it is worse by BIC; and the standard deviation of each
     parameter.
     """
-    problem, policy = trials.problem, trials.policy
+    own = {
+        name: [one.name for one in trials.term(name).strengths()]
+        for name in sorted(best.names)
+    }
+    price = math.log(trials.problem.samples)
+    prices = {name: len(names) * price for name, names in own.items()}
+    found = needs(trials.problem, best.fit, own, prices, trials.policy, seed)
+    return found.inclusion, found.deviation
+
+
+def needs(
+    problem: Problem,
+    found: Fit,
+    own: Mapping[str, Sequence[str]],
+    prices: Mapping[str, float],
+    policy: Policy,
+    seed: int = 0,
+    names: Sequence[str] | None = None,
+) -> Needs:
+    """Draw stretches of the records again, and see which parts they need.
+
+    **Arguments:** the problem and a fit; the parameters of each part, and what a part
+    must gain to be kept; the policy, a seed, and the parameters to look at (all).
+    """
     # what ties one stretch to the next is in neither, so they must hold many ties
     pieces = max(len(flown) for flown, _ in problem.spans)
     slices = min(policy.stretches, max(1, pieces // policy.stretch_pieces))
-    blocks = blocks_of(problem, best.fit.point, slices)
-    free = blocks.rows(_inside(best.fit))
-    value = values_of(best.fit, blocks)
+    blocks = blocks_of(problem, found.point, slices, names)
+    free = blocks.rows(_inside(found))
+    value = values_of(found, blocks)
     rng = np.random.default_rng(seed)
-    kept = dict.fromkeys(sorted(best.names), 0)
-    own = {
-        name: blocks.rows([one.name for one in trials.term(name).strengths()])
-        for name in kept
-    }
-    estimates = []
+    rows = {name: blocks.rows(parameters) for name, parameters in own.items()}
+
+    def lost(weight) -> tuple[np.ndarray, dict[str, float]]:
+        information, score = blocks.total(weight)
+        step, _ = newton_step(information, score, free)
+        top = gain(information, score, free)
+        return step, {
+            name: _lost(information, score, value, free, gone, top) - prices[name]
+            for name, gone in rows.items()
+        }
+
+    estimates, kept = [], dict.fromkeys(own, 0)
     number = len(blocks.record)
     for _ in range(policy.bootstrap):
         weight = np.bincount(rng.integers(0, number, number), minlength=number)
-        information, score = blocks.total(weight.astype(float))
-        step, _ = newton_step(information, score, free)
+        step, left = lost(weight.astype(float))
         estimates.append((value[free] + step) * blocks.scale[free])
-        top = gain(information, score, free)
         for name in kept:
-            lost = _lost(information, score, value, free, own[name], top)
-            kept[name] += bool(lost > len(own[name]) * math.log(problem.samples))
+            kept[name] += bool(left[name] > 0)
     spread = np.std(np.array(estimates), axis=0)
-    deviation = dict.fromkeys(best.fit.free, 0.0)
+    deviation = dict.fromkeys(found.free, 0.0)
     deviation |= {blocks.names[k]: float(s) for k, s in zip(free, spread)}
-    return {name: k / policy.bootstrap for name, k in kept.items()}, deviation
+    shares = {name: k / policy.bootstrap for name, k in kept.items()}
+    return Needs(shares, deviation, lost(None)[1])
 
 
 def _inside(found: Fit) -> list[str]:

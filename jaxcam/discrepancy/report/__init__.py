@@ -7,6 +7,7 @@ from ._diagnosis import (
     Effect as Effect,
     Verdict as Verdict,
 )
+from ._formula import formula_of as formula_of
 from ._missing import MissingFunction as MissingFunction
 from ._words import listed as listed, number as number
 from ._write import diagnosis_of as diagnosis_of

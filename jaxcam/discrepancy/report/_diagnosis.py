@@ -43,7 +43,8 @@ class Effect:
     - `term`: whether it is one that has a name; otherwise it is the unknown.
     - `delta_bic`: of the model with it, less that of the model without it.
     - `heldout_gain_nats`: log-likelihood gained on data that no parameter has seen.
-    - `inclusion`: part of the redrawn data sets in which it would be named.
+    - `inclusion`: part of the redrawn data sets in which it would be named; `None`
+        where that was not asked, of what is unknown and has no function.
     """
 
     name: str
@@ -54,7 +55,7 @@ class Effect:
     records: tuple[str, ...]
     delta_bic: float
     heldout_gain_nats: float
-    inclusion: float
+    inclusion: float | None
     term: bool = True
 
     def to_json(self) -> dict[str, Any]:
@@ -84,11 +85,11 @@ class Diagnosis:
     - `effects`: what is missing.
     - `alternatives`: other subsets, each an `Alternative`, the best first.
     - `heldout_before`, `heldout_after`, `noise_floor`: rms of the residuals (`unit`) on
-        records that no parameter has seen, one flight ahead.
+        stretches that no parameter has seen, one flight ahead.
     - `rig`: fitted parameters with what is missing in the model.
     - `before`, `after`: the fits of the textbook model and of the one chosen.
     - `left_before`, `left_after`: shapes that the residuals were asked for.
-    - `unseen`: residuals of both on records not seen.
+    - `unseen`: residuals of both on stretches not seen.
     - `ripple`: of the drive. `pulls`: how far each parameter went without the effects,
         held within the tolerances, and with them, in tolerances. `limits`: least
         strength of each term that would have been named. `hides`: the parameter that

@@ -1,56 +1,132 @@
 """What is reported of an effect: its numbers, where it is seen, and the evidence."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from scipy.stats import chi2
 
-from ..evidence import Choice, Ripple
+from ...fitting import Fit
+from ..evidence import Choice, Needs, Ripple
 from ..policy import Policy
-from ..search import Missing, Trial, Trials, value_of
-from ..terms import DriveRipple, Value
+from ..search import Blocks, blocks_of, Missing, Trials, value_of
+from ..terms import DriveRipple, Term, Value
 from ._diagnosis import Effect, Verdict
 from ._missing import MissingFunction, sentence_of
 
 
-def term_effect(trials: Trials, choice: Choice, name: str) -> Effect:
-    """A term that is named."""
-    term, best = trials.term(name), choice.best
-    less = trials.known.get(best.names - {name}, choice.before)
+def term_effects(trials: Trials, choice: Choice) -> list[Effect]:
+    """The terms that are named, in the order of their names."""
+    best, blocks = choice.best, trials.blocks(choice.best)
+    found = []
+    for name in sorted(best.names):
+        less = trials.known.get(best.names - {name}, choice.before)
+        found.append(
+            _of_term(
+                trials.term(name),
+                best.fit,
+                blocks,
+                choice.deviation,
+                best.bic - less.bic,
+                choice.held.total,
+                choice.inclusion[name],
+                trials.policy,
+            )
+        )
+    return found
+
+
+def missing_effects(
+    trials: Trials,
+    functions: Sequence[MissingFunction],
+    missing: Missing,
+    needs: Needs,
+    choice: Choice,
+) -> list[Effect]:
+    """What has no name, all functions together, and the terms named beside it."""
+    fitted, held, policy = missing.fit, choice.held.total, trials.policy
+    blocks = blocks_of(fitted.problem, fitted.point, names=fitted.free)
+    labels = [one.label for one in missing.functions]
+    seen = [
+        record
+        for one in missing.functions
+        for record in _seen_in(blocks, fitted, coefficients(fitted, one.slot), policy)
+    ]
+    whole = Effect(
+        Verdict.UNKNOWN,
+        sentence_of(functions),
+        {},
+        missing.functions[0].family.where,
+        "; ".join(one.words for one in functions),
+        tuple(dict.fromkeys(seen)),
+        missing.score - choice.before.bic,
+        held,
+        min(needs.inclusion[label] for label in labels),
+        term=False,
+    )
+    return [whole] + [
+        _of_term(
+            trials.term(name),
+            fitted,
+            blocks,
+            needs.deviation,
+            -needs.lost[name],
+            held,
+            needs.inclusion[name],
+            policy,
+        )
+        for name in sorted(missing.names)
+    ]
+
+
+def coefficients(found: Fit, slot: str) -> list[str]:
+    """Names of the coefficients of a free function that was fitted."""
+    return [name for name in found.free if name.startswith(f"{slot}_")]
+
+
+def _of_term(
+    term: Term,
+    found: Fit,
+    blocks: Blocks,
+    deviation: Mapping[str, float],
+    delta_bic: float,
+    gained: float,
+    inclusion: float,
+    policy: Policy,
+) -> Effect:
+    strengths = term.strengths()
     parameters = {
         one.name: Value(
-            best.fit[one.name].value,
-            max(best.fit[one.name].stderr, choice.deviation.get(one.name, 0.0)),
+            found[one.name].value,
+            max(found[one.name].stderr, deviation.get(one.name, 0.0)),
             one.unit,
         )
-        for one in term.strengths()
+        for one in strengths
     }
     return Effect(
-        name,
+        term.name,
         term.sentence,
         term.reported(parameters),
         term.where,
         term.region,
-        _seen_in(trials, best, [one.name for one in term.strengths()]),
-        best.bic - less.bic,
-        choice.held.total,
-        choice.inclusion[name],
+        _seen_in(blocks, found, [one.name for one in strengths], policy),
+        delta_bic,
+        gained,
+        inclusion,
     )
 
 
-def _seen_in(trials: Trials, best: Trial, names) -> tuple[str, ...]:
+def _seen_in(blocks: Blocks, found: Fit, names, policy: Policy) -> tuple[str, ...]:
     """Records in which the effect is more than chance."""
-    blocks = trials.blocks(best)
     rows = blocks.rows(names)
-    found = []
+    seen = []
     for k, record in enumerate(blocks.record):
-        value = np.array([value_of(best.fit, blocks.names[r]) for r in rows])
+        value = np.array([value_of(found, blocks.names[r]) for r in rows])
         value = value / blocks.scale[rows]
         inside = blocks.information[k][np.ix_(rows, rows)]
-        if value @ inside @ value > chi2.isf(trials.policy.shown_chance, len(rows)):
-            found.append(record)
-    return tuple(found)
+        if value @ inside @ value > chi2.isf(policy.shown_chance, len(rows)):
+            seen.append(record)
+    return tuple(seen)
 
 
 def drive_effect(ripple: Ripple, policy: Policy) -> Effect:
@@ -77,46 +153,6 @@ def drive_effect(ripple: Ripple, policy: Policy) -> Effect:
     )
 
 
-def free_effect(
-    functions: Sequence[MissingFunction], missing: Missing, choice: Choice
-) -> Effect:
-    """What has no name, all functions together."""
-    return Effect(
-        Verdict.UNKNOWN,
-        sentence_of(functions),
-        {},
-        missing.functions[0].family.where,
-        "; ".join(one.words for one in functions),
-        functions[0].records,
-        missing.score - choice.before.bic,
-        choice.held.total,
-        1.0,
-        term=False,
-    )
-
-
-def named_effect(trials: Trials, missing: Missing, choice: Choice, name: str) -> Effect:
-    """A term that is named beside functions without a name."""
-    term = trials.term(name)
-    parameters = {
-        one.name: Value(
-            missing.fit[one.name].value, missing.fit[one.name].stderr, one.unit
-        )
-        for one in term.strengths()
-    }
-    return Effect(
-        name,
-        term.sentence,
-        term.reported(parameters),
-        term.where,
-        term.region,
-        missing.fit.problem.records,
-        -missing.gains.get(name, 0.0),
-        choice.held.total,
-        1.0,
-    )
-
-
 def unknown_effect(trials: Trials, choice: Choice) -> Effect:
     """What is left over and has no name."""
     first, problem = choice.unexplained[0], trials.problem
@@ -129,6 +165,6 @@ def unknown_effect(trials: Trials, choice: Choice) -> Effect:
         problem.records,
         -first.gain + first.count * math.log(problem.samples),
         choice.held.total,
-        1.0,
+        None,
         term=False,
     )

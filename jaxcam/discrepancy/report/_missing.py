@@ -4,12 +4,16 @@ import dataclasses
 from collections.abc import Sequence
 from typing import Any
 
+import equinox as eqx
+import jax
+import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
 from ...fitting import Fit
-from ..search import Free, Missing
-from ..terms import Factor, Family, free_basis, Variable, Where
+from ..search import Free, free_term, Missing
+from ..terms import Factor, Family, Variable, Where
+from ._formula import formula_of
 
 
 _KINDS = {
@@ -36,6 +40,7 @@ class MissingFunction:
         `"velocity"`, `"phase"`, `"time"` or `"speed"` (of approach).
     - `value`, `stderr`: in `unit`, at the points of the grid, `(n,)` or `(n, m)`.
     - `words`: what it is, for an engineer. `records` in which it was looked for.
+    - `formula`: of what the value is, where a form with a few numbers explains as much.
     """
 
     kind: str
@@ -46,6 +51,7 @@ class MissingFunction:
     unit: str
     words: str
     records: tuple[str, ...]
+    formula: str | None = None
 
     def to_json(self) -> dict[str, Any]:
         table = {name: at.tolist() for name, at in zip(self.arguments, self.grid)}
@@ -55,7 +61,7 @@ class MissingFunction:
             "arguments": list(self.arguments),
             "table": table,
             "unit": self.unit,
-            "formula": None,
+            "formula": self.formula,
             "words": self.words,
             "records": list(self.records),
         }
@@ -81,16 +87,16 @@ def missing_functions(
 def _one(found: Fit, one: Free, velocities, positions, points: int) -> MissingFunction:
     family, kind = one.family, _KINDS[one.family.where]
     along = np.linspace(family.low, family.high, points)
-    basis = free_basis(family, along, _count(found, one))
-    names = [f"{one.slot}_{k}" for k in range(basis.shape[1])]
     labels = [estimate.name for estimate in found.estimates]
-    rows = [labels.index(name) for name in names]
-    coefficients = np.array([found.estimates[row].value for row in rows])
+    rows = [labels.index(name) for name in one.coefficients]
+    numbers = np.array([found.estimates[row].value for row in rows])
     covariance = found.covariance[np.ix_(rows, rows)]
-    value = basis @ coefficients
+    value, basis = _curve(one, along, numbers)
     error = np.sqrt(np.maximum(np.einsum("kp,pq,kq->k", basis, covariance, basis), 0.0))
     arguments = tuple(_ARGUMENT_NAMES.get(a, str(a)) for a in family.arguments)  # pyright: ignore
-    words = _words(family, kind, along, value, error)
+    words, formula = _words(family, kind, along, value, error), None
+    if one.primitive is not None:
+        formula, words = formula_of(family, one.primitive, numbers, kind)
     if kind == "restitution":
         value, error = np.exp(value), np.exp(value) * error
     grid: tuple[np.ndarray, ...] = (along,)
@@ -113,12 +119,23 @@ def _one(found: Fit, one: Free, velocities, positions, points: int) -> MissingFu
         _unit(family),
         words,
         found.problem.records,
+        formula,
     )
 
 
-def _count(found: Fit, one: Free) -> int:
-    stem = f"{one.slot}_"
-    return sum(name.startswith(stem) for name in found.free)
+def _curve(one: Free, along, numbers):
+    """The function without its factor, and its derivatives to its numbers."""
+    family = one.family
+    direction = np.tanh(along / family.slip) if family.jumps else np.zeros(len(along))
+    free = free_term(family, one.slot, one.primitive)
+
+    def curve(numbers):
+        every = (*numbers, *free.coefficients[len(numbers) :])
+        term = eqx.tree_at(lambda f: f.coefficients, free, tuple(every)).prepared()
+        return jax.vmap(term.at)(jnp.asarray(along), jnp.asarray(direction))
+
+    start = jnp.asarray(numbers)
+    return np.asarray(curve(start)), np.asarray(jax.jacfwd(curve)(start))
 
 
 def _unit(family: Family) -> str:

@@ -61,8 +61,8 @@ def summary_of_functions(
 ) -> str:
     """What has no name, what stands beside it, and by how much the fit improves.
 
-    **Arguments:** the functions, all effects, records that were not seen, what is left
-    in units of the noise, the noise and its unit.
+    **Arguments:** the functions, all effects, stretches that were not seen, what is
+    left in units of the noise, the noise and its unit.
     """
     named = [effect.sentence for effect in effects if effect.term]
     beside = f" beside {listed(named)}" if named else ""

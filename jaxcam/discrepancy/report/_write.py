@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping
 
 from ...fitting import Fit
-from ..evidence import Choice, HeldOut, limits, ranges_of, Ripple, rms_of
+from ..evidence import Choice, HeldOut, limits, Needs, ranges_of, Ripple, rms_of
 from ..policy import Policy
 from ..search import Missing, Question, Trial, Trials, within_tolerances
 from ..terms import Value
@@ -17,9 +17,8 @@ from ._caveats import (
 from ._diagnosis import Alternative, Diagnosis, Verdict
 from ._effects import (
     drive_effect,
-    free_effect,
-    named_effect,
-    term_effect,
+    missing_effects,
+    term_effects,
     unknown_effect,
 )
 from ._missing import missing_functions
@@ -35,9 +34,11 @@ def diagnosis_of(
 ) -> Diagnosis:
     """Put into words and numbers what was chosen, and why."""
     policy, held, best = trials.policy, choice.held, choice.best
-    if choice.missing is not None:
-        return _of_functions(case, question, trials, choice, choice.missing, ripple)
-    effects = [term_effect(trials, choice, name) for name in sorted(best.names)]
+    if choice.missing is not None and choice.needs is not None:
+        return _of_functions(
+            case, question, trials, choice, choice.missing, choice.needs, ripple
+        )
+    effects = term_effects(trials, choice)
     if ripple is not None and ripple.significant(len(trials.terms) + 1, policy):
         effects.append(drive_effect(ripple, policy))
     named = bool(effects)
@@ -86,6 +87,7 @@ def _of_functions(
     trials: Trials,
     choice: Choice,
     missing: Missing,
+    needs: Needs,
     ripple: Ripple | None,
 ) -> Diagnosis:
     """The diagnosis where functions without a name were found."""
@@ -93,10 +95,7 @@ def _of_functions(
     positions, velocities, _, _ = ranges_of(question.problem, policy)
     functions = missing_functions(missing, velocities, positions, policy.shape_points)
     bare = choice.before
-    effects = [
-        free_effect(functions, missing, choice),
-        *(named_effect(trials, missing, choice, n) for n in sorted(missing.names)),
-    ]
+    effects = missing_effects(trials, functions, missing, needs, choice)
     if ripple is not None and ripple.significant(len(trials.terms) + 1, policy):
         effects.append(drive_effect(ripple, policy))
     floor = float(next(iter(question.problem.model.sensors.values())).floor)
@@ -115,7 +114,7 @@ def _of_functions(
         held.after * floor,
         floor,
         question.unit,
-        _rig_values(question, found, {}),
+        _rig_values(question, found, needs.deviation),
         summary_of_functions(
             functions, effects, held, rms_of(found), floor, question.unit
         ),

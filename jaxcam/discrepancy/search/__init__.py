@@ -22,7 +22,7 @@ from ._question import Question as Question
 from ._rig_question import rig_question as rig_question
 from ._roughness import occam as occam, Roughness as Roughness, roughness as roughness
 from ._search import Search as Search
-from ._slots import Free as Free
+from ._slots import Free as Free, free_term as free_term
 from ._system_question import (
     setup_question as setup_question,
     system_question as system_question,

@@ -14,7 +14,7 @@ from ..terms import Term
 from ._blocks import blocks_of
 from ._given_up import given_up
 from ._roughness import occam, roughness
-from ._slots import coefficients_of, filled, Free, spread_of
+from ._slots import filled, Free
 
 
 class Missing(NamedTuple):
@@ -22,14 +22,14 @@ class Missing(NamedTuple):
 
     - `score`: minus twice the logarithm of the evidence (the BIC where there is no
         function).
-    - `gains`: growth of the evidence by each function or term, when it was found.
+    - `problem`: with room for the functions; that of `fit` holds their priors.
     """
 
     functions: tuple[Free, ...]
     names: frozenset[str]
     fit: Fit
     score: float
-    gains: dict[str, float]
+    problem: Problem
 
 
 class Subset(NamedTuple):
@@ -38,7 +38,6 @@ class Subset(NamedTuple):
     problem: Problem
     functions: tuple[Free, ...]
     names: frozenset[str]
-    gains: dict[str, float]
 
 
 class FreeFits:
@@ -54,14 +53,14 @@ class FreeFits:
     def __init__(self, rig: Sequence[str], terms: Sequence[Term], policy: Policy):
         self.rig, self.terms, self.policy = tuple(rig), tuple(terms), policy
 
-    def free(self, problem: Problem, found: Missing | Subset) -> list[str]:
+    def free(self, found: Missing | Subset) -> list[str]:
         """Names of the parameters that are free: of the rig, terms and functions."""
         names = list(self.rig)
         for term in self.terms:
             if term.name in found.names:
                 names += [one.name for one in term.strengths()]
         for one in found.functions:
-            names += coefficients_of(problem, one.slot)
+            names += one.coefficients
         return names
 
     def fitted(
@@ -71,8 +70,9 @@ class FreeFits:
         policy, functions = self.policy, subset.functions
         heat, point, found = 1.0, start, None
         for turn in range(policy.heats):
+            last = turn + 1 == policy.heats
             problem = filled(subset.problem, functions)
-            free = self.free(problem, subset)
+            free = self.free(subset)
             found = fit(
                 heated(problem, heat),
                 free=free,
@@ -84,17 +84,16 @@ class FreeFits:
             if not math.isfinite(found.cost):
                 break
             settled = max(heat, before) < policy.heated * min(heat, before)
-            if functions:
-                fresh = self._rougher(problem, subset, functions, point, heat)
+            if functions and not last:
+                fresh = self._rougher(subset, functions, point, heat)
                 settled = settled and _alike(fresh, functions)
                 functions = functions if settled else fresh
             if settled:
                 break
         assert found is not None
         subset = subset._replace(functions=functions)
-        return Missing(
-            functions, subset.names, found, self.score(subset, found), subset.gains
-        )
+        score = self.score(subset, found)
+        return Missing(functions, subset.names, found, score, subset.problem)
 
     def _stop(self, samples: int, heat: float) -> Callable[[Sequence[float]], bool]:
         """Ends a fit that is given up, or whose steps no longer change a choice."""
@@ -107,59 +106,105 @@ class FreeFits:
 
         return stop
 
-    def _rougher(self, problem, subset, functions, point, heat) -> tuple[Free, ...]:
-        """The functions with the roughness that a fit of them suggests."""
-        bare = filled(problem, functions, prior=False)
-        free = self.free(bare, subset)
+    def quadratic(self, subset: Subset, point: Point, heat: float, one: Free):
+        """The likelihood about a point for one function, without its own prior.
+
+        **Returns:** information and score, with the coefficients of that function in
+        their own units, the rows of all free parameters, and its own.
+        """
+        bare = heated(filled(subset.problem, subset.functions, prior=False), heat)
+        free = self.free(subset)
         blocks = blocks_of(bare, point, names=free)
+        information, score = unscaled(blocks, one.coefficients, heat)
+        for other in subset.functions:
+            if other is not one:
+                _known(information, blocks, other)
+        return information, score, blocks.rows(free), blocks.rows(one.coefficients)
+
+    def _rougher(self, subset, functions, point, heat) -> tuple[Free, ...]:
+        """The functions with the roughness that a fit of them suggests."""
         found = []
         for one in functions:
-            names = coefficients_of(bare, one.slot)
-            own, rows = blocks.rows(names), blocks.rows(free)
-            information, score = unscaled(blocks, names, heat)
-            value = np.asarray(point.values)[0][
-                [bare.names.index(blocks.names[k]) for k in own]
-            ]
-            # the others keep their priors
-            for other in functions:
-                if other is not one:
-                    others = blocks.rows(coefficients_of(bare, other.slot))
-                    spread = spread_of(other.family, other.roughness)
-                    spread = np.where(spread > 0, spread, other.roughness.size)
-                    information[others, others] += (blocks.scale[others] / spread) ** 2
-            rough = roughness(
-                information, score, rows, own, one.family, value, self.policy
+            if one.primitive is not None:
+                found.append(one)
+                continue
+            quadratic = self.quadratic(
+                subset._replace(functions=functions), point, heat, one
             )
+            columns = [subset.problem.names.index(name) for name in one.coefficients]
+            value = np.asarray(point.values)[0][columns]
+            rough = roughness(*quadratic, one.family, value, self.policy)
             found.append(dataclasses.replace(one, roughness=rough))
         return tuple(found)
 
+    def parts(self, found: Missing | Subset) -> dict[str, list[str]]:
+        """The parameters of each term and function, by its label."""
+        own = {
+            t.name: [one.name for one in t.strengths()]
+            for t in self.terms
+            if t.name in found.names
+        }
+        for one in found.functions:
+            own[one.label] = one.coefficients
+        return own
+
+    def prices(self, found: Missing) -> dict[str, float]:
+        """What each term and function of a fit must gain to be worth its freedom."""
+        heat = heat_of(found.fit)
+        number = heat * math.log(found.problem.samples)
+        prices = {
+            t.name: number * len(t.strengths())
+            for t in self.terms
+            if t.name in found.names
+        }
+        for one in found.functions:
+            if one.primitive is None:
+                freedom = heat * self._freedom(found, found.fit, [one])
+            else:
+                freedom = number * one.primitive.count
+            prices[one.label] = freedom
+        return prices
+
     def score(self, subset: Subset, found: Fit) -> float:
         """Minus twice the logarithm of the evidence, up to a constant."""
-        price = sum(
-            len(t.strengths()) * math.log(found.problem.samples)
-            for t in self.terms
-            if t.name in subset.names
-        )
-        if not subset.functions:
-            return found.cost + price
+        count = sum(len(t.strengths()) for t in self.terms if t.name in subset.names)
+        count += sum(f.primitive.count for f in subset.functions if f.primitive)
+        price = count * math.log(found.problem.samples)
+        rough = [one for one in subset.functions if one.primitive is None]
+        return found.cost + price + self._freedom(subset, found, rough)
+
+    def _freedom(
+        self, subset: Missing | Subset, found: Fit, functions: Sequence[Free]
+    ) -> float:
+        """The share of some sums of sines in the logarithm of the evidence."""
+        if not functions:
+            return 0.0
         heat = heat_of(found)
         bare = filled(subset.problem, subset.functions, prior=False)
-        free = self.free(bare, subset)
+        bare = heated(bare, heat)
+        free = self.free(subset)
         blocks = blocks_of(bare, found.point, names=free)
-        names = [n for f in subset.functions for n in coefficients_of(bare, f.slot)]
+        names = [name for one in functions for name in one.coefficients]
         information, _ = unscaled(blocks, names, heat)
+        for other in subset.functions:
+            if other not in functions:
+                _known(information, blocks, other)
         own, rows = blocks.rows(names), blocks.rows(free)
 
         def first(one: Free) -> int:
-            return int(blocks.rows(coefficients_of(bare, one.slot))[0])
+            return int(blocks.rows(one.coefficients)[0])
 
-        ordered = sorted(subset.functions, key=first)
-        spread = np.concatenate([spread_of(f.family, f.roughness) for f in ordered])
-        return (
-            found.cost
-            + price
-            + occam(information, rows, own, spread, self.policy.alike)
-        )
+        ordered = sorted(functions, key=first)
+        spread = np.concatenate([one.spread for one in ordered])
+        return occam(information, rows, own, spread, self.policy.alike)
+
+
+def _known(information, blocks, one: Free) -> None:
+    """Add what the roughness of a function says of its coefficients."""
+    if one.primitive is None:
+        rows = blocks.rows(one.coefficients)
+        spread = np.where(one.spread > 0, one.spread, one.roughness.size)
+        information[rows, rows] += (blocks.scale[rows] / spread) ** 2
 
 
 def heat_of(found: Fit) -> float:
@@ -192,7 +237,8 @@ def unscaled(blocks, names, heat: float):
 def _alike(fresh: Sequence[Free], functions: Sequence[Free]) -> bool:
     """Whether the roughness of functions has settled."""
     return all(
-        a.roughness.length == b.roughness.length
+        a.primitive is not None
+        or a.roughness.length == b.roughness.length
         and abs(math.log(a.roughness.size / b.roughness.size)) < 1.0
         for a, b in zip(fresh, functions)
     )

@@ -16,13 +16,13 @@ from ...fitting import Problem
 from ...fitting.engine import Point, separated
 from ..policy import Policy
 from ..terms import Family, Term, Where
-from ._blocks import blocks_of
+from ._blocks import blocks_of, values_of
+from ._formulas import formulated
 from ._free_fits import FreeFits, heat_of, heated, Missing, Subset, unscaled
-from ._gains import added_gain
+from ._gains import added_gain, gain
 from ._local_force import force_blocks, force_response
 from ._roughness import Roughness, roughness
 from ._slots import (
-    coefficients_of,
     emptied,
     filled,
     Free,
@@ -81,15 +81,20 @@ class FreeSearch:
         most = self.policy.iterations
         found = self.fits.fitted(self._tight(found), found.fit.point, most)
         found = self._grown(found, False)
-        return self._pruned(found) if found.functions else None
+        swapped = self._swapped(found)
+        if swapped is not found:
+            found = self._grown(swapped, False)
+        if not found.functions:
+            return None
+        return formulated(self.fits, self._pruned(found), self.progress)
 
     def _bare(self, problem: Problem, start: Point) -> Missing:
         return self.fits.fitted(
-            Subset(problem, (), frozenset(), {}), start, self.policy.iterations
+            Subset(problem, (), frozenset()), start, self.policy.iterations
         )
 
     def _tight(self, found: Missing) -> Subset:
-        return Subset(self.problem, found.functions, found.names, found.gains)
+        return Subset(self.problem, found.functions, found.names)
 
     def _grown(self, found: Missing, apart: bool) -> Missing:
         """One function or term after the other."""
@@ -116,12 +121,15 @@ class FreeSearch:
             found = best
         return found
 
-    def _in_flight(self, lead: _Lead) -> bool:
-        """Whether pieces of flight show what a lead adds."""
+    def _shows_apart(self, lead: _Lead) -> bool:
+        """Whether pieces that are tied to none show what a lead adds."""
         if lead.family is not None:
-            return lead.family.where is Where.FLIGHT
-        term = next(term for term in self.terms if term.name == lead.name)
-        return Where.FLIGHT in term.acts
+            return lead.family.where is not Where.IMPACT
+        acts = self._term(lead.name).acts
+        return Where.FLIGHT in acts or Where.CONTACT in acts
+
+    def _term(self, name: str | None) -> Term:
+        return next(term for term in self.terms if term.name == name)
 
     def _done(self, best: Missing, lead: _Lead, first: _Lead) -> bool:
         """Whether what explains the data leaves a lead without a chance."""
@@ -144,7 +152,7 @@ class FreeSearch:
         policy = self.policy
         heat = heat_of(found.fit)
         problem = heated(filled(problem, found.functions), heat)
-        point, free = found.fit.point, self.fits.free(problem, found)
+        point, free = found.fit.point, self.fits.free(found)
         leads = []
         used = {one.slot for one in found.functions}
         slots = {
@@ -156,23 +164,25 @@ class FreeSearch:
         forces = [f for f in self.families if f.where is Where.FLIGHT]
         if slots[Where.FLIGHT]:
             response = force_response(problem, point, free)
-            new = [free_term(f, f"new_{k}") for k, f in enumerate(forces)]
-            blocks = force_blocks(problem, response, new)
-            information, score = (x / heat for x in blocks.total())
-            rows = blocks.rows(response.free)
-            for family, term in zip(forces, new):
+            slot = slots[Where.FLIGHT][0]
+            for family in forces:
+                # one at a time: all of them at once would take gigabytes
+                term = free_term(family, "new")
+                blocks = force_blocks(problem, response, [term])
+                information, score = (x / heat for x in blocks.total())
+                rows = blocks.rows(response.free)
                 own = blocks.rows([p.name for p in term.parameters(0)])
-                rough = roughness(
-                    information, score, rows, own, family, np.zeros(len(own)), policy
-                )
-                slot = slots[Where.FLIGHT][0]
+                zero = np.zeros(len(own))
+                rough = roughness(information, score, rows, own, family, zero, policy)
                 leads.append(_Lead(rough.gain, None, family, rough, slot))
-        for family in () if apart else self.families:
-            if family.where is Where.FLIGHT or not slots[family.where]:
+        # impacts say nothing where they tie nothing
+        elsewhere = (Where.CONTACT,) if apart else (Where.CONTACT, Where.IMPACT)
+        for family in self.families:
+            if family.where not in elsewhere or not slots[family.where]:
                 continue
             slot = slots[family.where][0]
-            put = filled(problem, [Free(family, Roughness(), slot)], prior=False)
-            names = coefficients_of(put, slot)
+            one = Free(family, Roughness(), slot)
+            put, names = filled(problem, [one], prior=False), one.coefficients
             blocks = blocks_of(put, point, names=[*free, *names])
             information, score = unscaled(blocks, names, heat)
             rows, own = blocks.rows(free), blocks.rows(names)
@@ -209,36 +219,92 @@ class FreeSearch:
         else:
             assert lead.name is not None
             names = names | {lead.name}
-        gains = {**found.gains, lead.label: lead.gain}
-        if self._in_flight(lead):
+        if self._shows_apart(lead):
             # what acts in flight is next to linear where impacts tie nothing
-            first = self.fits.fitted(Subset(self.apart, functions, names, gains), point)
+            first = self.fits.fitted(Subset(self.apart, functions, names), point)
             point, functions = first.fit.point, first.functions
             if problem is self.apart:
                 return first if math.isfinite(first.score) else None
-        trial = self.fits.fitted(Subset(problem, functions, names, gains), point)
+        trial = self.fits.fitted(Subset(problem, functions, names), point)
         return trial if math.isfinite(trial.score) else None
+
+    def _swapped(self, found: Missing) -> Missing:
+        """Terms in the place of what was found first, where they explain more.
+
+        Early on, far from the data, a function may make up for two things.
+        """
+        for out in (*found.functions, *sorted(found.names)):
+            rest, point = self._without(found, out)
+            rival = self._rival(found, out)
+            if rival is None:
+                continue
+            self.progress(f"fitting {rival.replace('_', ' ')}", None)
+            names = rest.names | {rival}
+            for problem in (self.apart, self.problem):
+                trial = self.fits.fitted(Subset(problem, rest.functions, names), point)
+                point = trial.fit.point
+            if trial.score < found.score:
+                return self._swapped(trial)
+        return found
+
+    def _rival(self, found: Missing, out: Free | str) -> str | None:
+        """The term that would do most in the place of something, if it would do.
+
+        By the quadratic likelihood about the fit.
+        """
+        names = [t.name for t in self.terms if t.name not in found.names]
+        problem = filled(self.problem, found.functions)
+        free = self.fits.free(found)
+        kept = self.fits.free(self._without(found, out)[0])
+        strengths = {t: [s.name for s in self._term(t).strengths()] for t in names}
+        every = [name for own in strengths.values() for name in own]
+        blocks = blocks_of(problem, found.fit.point, names=[*free, *every])
+        information, score = blocks.total()
+        step = np.zeros(len(blocks.names))
+        gone = blocks.rows(set(free) - set(kept))
+        step[gone] = -values_of(found.fit, blocks)[gone]
+        worse = step @ information @ step - 2 * step @ score
+        moved = score - information @ step
+        rows = blocks.rows(kept)
+        alike = self.policy.alike
+        gains = {
+            t: added_gain(information, moved, rows, blocks.rows(own), alike)
+            for t, own in strengths.items()
+        }
+        if not gains:
+            return None
+        name = max(gains, key=lambda one: gains[one])
+        left = worse - gain(information, moved, rows) - gains[name]
+        allowed = self.policy.leads * heat_of(found.fit)
+        return name if left < allowed + self._small(found) else None
+
+    def without(self, found: Missing, label: str) -> Missing:
+        """The fit without the function or term of a label."""
+        labels = {one.label: one for one in found.functions}
+        return self.fits.fitted(*self._without(found, labels.get(label, label)))
+
+    def _without(self, found: Missing, out: Free | str) -> tuple[Subset, Point]:
+        """What is left without a function or a term, and where to fit it from."""
+        functions = tuple(f for f in found.functions if f is not out)
+        names = found.names - {out} if isinstance(out, str) else found.names
+        values = found.fit.point.values
+        if isinstance(out, Free):
+            values = emptied(self.problem, values, out.slot)
+        else:
+            rows = [
+                self.problem.names.index(s.name) for s in self._term(out).strengths()
+            ]
+            values = np.asarray(values).copy()
+            values[:, rows] = 0.0
+        point = found.fit.point._replace(values=values)
+        return Subset(self.problem, functions, names), point
 
     def _pruned(self, found: Missing) -> Missing:
         """Without what the rest can do without."""
-        problem = self.problem
         for one in (*found.functions, *sorted(found.names)):
-            functions = tuple(f for f in found.functions if f is not one)
-            names = found.names - {one} if isinstance(one, str) else found.names
             if len(found.functions) + len(found.names) < 2:
                 break
-            values = found.fit.point.values
-            if isinstance(one, Free):
-                values = emptied(problem, values, one.slot)
-            else:
-                term = next(t for t in self.terms if t.name == one)
-                rows = [problem.names.index(s.name) for s in term.strengths()]
-                values = np.asarray(values).copy()
-                values[:, rows] = 0.0
-            point = found.fit.point._replace(values=values)
-            label = one.family.name if isinstance(one, Free) else one
-            gains = {k: v for k, v in found.gains.items() if k != label}
-            less = self.fits.fitted(Subset(problem, functions, names, gains), point)
+            less = self.fits.fitted(*self._without(found, one))
             heat = heat_of(found.fit)
             if less.score - found.score < max(heat * self._least(), self._small(found)):
                 found = less

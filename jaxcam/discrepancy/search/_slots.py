@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from ...fitting import Model, Problem
-from ..terms import Family, FREE, FreeFunction, terms_of, Where
+from ..terms import Family, FREE, FreeFunction, Primitive, terms_of, Where
 from ._extended import extended
 from ._roughness import Roughness
 
@@ -23,11 +23,34 @@ _ROOM_OF_IMPACTS = ((Where.IMPACT, "restitution_a"), (Where.CONTACT, "surface_a"
 
 @dataclasses.dataclass(frozen=True)
 class Free:
-    """A free function that is fitted: its family, its roughness, and its slot."""
+    """A free function that is fitted: its family, its roughness, and its slot.
+
+    With a `primitive` it has that form, and no roughness.
+    """
 
     family: Family
     roughness: Roughness
     slot: str
+    primitive: Primitive | None = None
+
+    @property
+    def label(self) -> str:
+        return self.family.name
+
+    @property
+    def coefficients(self) -> list[str]:
+        """Names of the parameters that are its own."""
+        sines = _SINES[self.family.where] + 1
+        count = self.primitive.count if self.primitive else sines
+        return [f"{self.slot}_{k}" for k in range(count)]
+
+    @property
+    def spread(self) -> np.ndarray:
+        """Prior standard errors of the coefficients of a sum of sines, or a change of
+        those of a form that matters."""
+        if self.primitive is None:
+            return spread_of(self.family, self.roughness)
+        return np.array([self.roughness.size, *self.primitive.scales])
 
 
 def roomy(problem: Problem, family: Family, impacting: bool) -> Problem:
@@ -62,9 +85,12 @@ def slots_of(problem: Problem, where: Where) -> list[str]:
     ]
 
 
-def free_term(family: Family, label: str) -> FreeFunction:
-    """A function of a family that is zero."""
-    return FREE[family.where].of(family, label, [0.0] * (_SINES[family.where] + 1))
+def free_term(
+    family: Family, label: str, primitive: Primitive | None = None
+) -> FreeFunction:
+    """A function of a family that is zero, with some form."""
+    zero = [0.0] * (_SINES[family.where] + 1)
+    return FREE[family.where].of(family, label, zero, primitive)
 
 
 def spread_of(family: Family, roughness: Roughness) -> np.ndarray:
@@ -77,7 +103,7 @@ def filled(problem: Problem, functions: Sequence[Free], prior: bool = True) -> P
     """The problem with some functions in their slots, `prior` by their roughness."""
     for one in functions:
         place = _place(problem, one.slot)
-        fresh = free_term(one.family, one.slot)
+        fresh = free_term(one.family, one.slot, one.primitive)
 
         def put(model: Model, place=place, fresh=fresh) -> Model:
             old = terms_of(model)[place]
@@ -85,14 +111,14 @@ def filled(problem: Problem, functions: Sequence[Free], prior: bool = True) -> P
             new = eqx.tree_at(lambda t: t.coefficients, fresh, old.coefficients)
             return eqx.tree_at(lambda m: terms_of(m)[place], model, new)
 
-        spread = spread_of(one.family, one.roughness)
         # what has no effect needs some prior, so that it stays where it is
-        spread = np.where(spread > 0, spread, one.roughness.size)
+        spread = np.where(one.spread > 0, one.spread, one.roughness.size)
+        smooth = prior and one.primitive is None
+        scales = dict(zip(one.coefficients, map(float, spread)))
         known = {
-            f"{one.slot}_{k}": math.sqrt(3) * float(value) if prior else math.inf
-            for k, value in enumerate(spread)
+            name: math.sqrt(3) * value if smooth else math.inf
+            for name, value in scales.items()
         }
-        scales = {f"{one.slot}_{k}": float(value) for k, value in enumerate(spread)}
         problem = dataclasses.replace(
             problem,
             model=put(problem.model),
@@ -109,15 +135,10 @@ def filled(problem: Problem, functions: Sequence[Free], prior: bool = True) -> P
     return problem
 
 
-def coefficients_of(problem: Problem, slot: str) -> list[str]:
-    """Names of the coefficients in a slot."""
-    term = terms_of(problem.model)[_place(problem, slot)]
-    return [p.name for p in term.parameters(0)]
-
-
 def emptied(problem: Problem, values, slot: str):
     """Values of parameters with those in a slot at zero."""
-    rows = [problem.names.index(name) for name in coefficients_of(problem, slot)]
+    term = terms_of(problem.model)[_place(problem, slot)]
+    rows = [problem.names.index(one.name) for one in term.parameters(0)]
     return jnp.asarray(values).at[:, jnp.asarray(rows)].set(0.0)
 
 

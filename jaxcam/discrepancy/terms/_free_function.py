@@ -9,14 +9,16 @@ fitted, and its smoothness is one number.
 import dataclasses
 import enum
 import math
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, Bool, Float, Int
 
 from ...fitting import Parameter
+from ._primitives import OF_PHASE, OF_SPEED, ON_A_LINE, Place, Primitive, PRIMITIVES
 from ._shapes import Variable
 from ._term import Motion, Term, terms_of
 from ._where import Where
@@ -94,6 +96,13 @@ class Family:
             and self.factor is Factor.ONE
         )
 
+    @property
+    def primitives(self) -> tuple[Primitive, ...]:
+        """Forms that a function of this family may turn out to have."""
+        if self.periodic:
+            return OF_PHASE
+        return (*ON_A_LINE, *OF_SPEED) if self.jumps else ON_A_LINE
+
     def waves(self, count: int) -> tuple[Array, Array]:
         """Rates and shifts of `count` sines of the argument, each `(count,)`."""
         if self.periodic:
@@ -125,7 +134,9 @@ def _numbers(values) -> tuple[Array, ...]:
 class FreeFunction(Term):
     """A function of some family; which one, its arrays say.
 
-    All functions of one class are one compiled program.
+    It is a sum of sines, or the form of that number (less one) in `PRIMITIVES`, whose
+    numbers are then the first of its coefficients. All functions of one class are one
+    compiled program.
 
     **Arguments:** `label` of the parameters; `coefficients` of the sines and of a
     jump; `rates`, `shifts` of the sines; `low`, `high` of the argument; `picks` and
@@ -146,6 +157,9 @@ class FreeFunction(Term):
     slip: Float[Array, ""]
     jumping: Float[Array, ""]
     periodic: Bool[Array, ""]
+    form: Int[Array, ""] = eqx.field(
+        default=0, converter=lambda value: jnp.asarray(value, dtype=int)
+    )
     table: Float[Array, " n"] | None = None
 
     def prepared(self):
@@ -163,8 +177,17 @@ class FreeFunction(Term):
         return eqx.tree_at(lambda f: f.table, self, table, is_leaf=lambda x: x is None)
 
     @classmethod
-    def of(cls, family: Family, label: str, coefficients):
-        """A member of a family by the coefficients of its sines, then of its jump."""
+    def of(
+        cls,
+        family: Family,
+        label: str,
+        coefficients,
+        primitive: Primitive | None = None,
+    ):
+        """A member of a family by the coefficients of its sines, then of its jump.
+
+        With a `primitive`, the first of them are its numbers.
+        """
         rates, shifts = family.waves(len(coefficients) - 1)
 
         def chosen(options, one):
@@ -189,12 +212,35 @@ class FreeFunction(Term):
             periodic=jnp.asarray(family.periodic),
             jumping=jnp.asarray(float(family.jumps)),
             motion_unit=family.motion_unit,
+            form=0 if primitive is None else 1 + PRIMITIVES.index(primitive),
         )
 
-    def smooth(self, argument):
+    def place(self, argument, direction) -> Place:
+        """What a form sees of an argument, and of the direction of the motion."""
+        width = self.high - self.low
+        share = (argument - self.low) / width
+        return Place(argument, share, argument / width, direction)
+
+    def at(self, argument, direction: Any = 0.0):
+        """The function without its factor.
+
+        **Arguments:** its argument, and the direction of the motion.
+        """
+        place = self.place(argument, direction)
+
+        def sines():
+            jump = self.jumping * self.coefficients[-1] * direction
+            return self._sines(argument) + jump
+
+        def of(one: Primitive):
+            return lambda: one.function(place, self.coefficients) + jnp.zeros(())
+
+        return jax.lax.switch(self.form, [sines, *map(of, PRIMITIVES)])
+
+    def _sines(self, argument):
         """The sum of the sines, that of the ends beyond them."""
         if self.table is None:
-            return self.prepared().smooth(argument)
+            return self.prepared()._sines(argument)
         width = self.high - self.low
         along = argument - self.low
         along = jnp.where(self.periodic, along % width, jnp.clip(along, 0.0, width))
@@ -240,8 +286,7 @@ class FreeForce(FreeFunction):
         deflection = motion.position - self.middle
         options = (1.0, motion.velocity, direction, deflection)
         factor = sum(w * option for w, option in zip(self.factors, options))
-        jump = self.jumping * self.coefficients[-1] * direction
-        return self.smooth(argument) * factor + jump
+        return self.at(argument, direction) * factor
 
 
 class FreeRestitution(FreeFunction):
@@ -250,7 +295,7 @@ class FreeRestitution(FreeFunction):
     name: ClassVar[str] = "free_restitution"
 
     def restitution(self, approach, motion: Motion):
-        return jnp.exp(self.smooth(self._argument(motion, approach)))
+        return jnp.exp(self.at(self._argument(motion, approach)))
 
 
 class FreeSurface(FreeFunction):
@@ -259,7 +304,7 @@ class FreeSurface(FreeFunction):
     name: ClassVar[str] = "free_surface"
 
     def contact(self, motion: Motion):
-        return self.smooth(self._argument(motion, motion.velocity))
+        return self.at(self._argument(motion, motion.velocity))
 
 
 def free_basis(

@@ -20,7 +20,7 @@ JOINT = 1e-3
 _IMPACT = 10**-0.5
 _WIDTH = 4
 # Columns above which programs are as wide as what is free, and by how many they differ
-_MANY, _STRIDE = 64, 64
+_MANY, _STRIDE = 64, 32
 
 
 def width_of(number: int) -> int:
@@ -32,7 +32,7 @@ def shared_width(free: int, most: int) -> int:
     """Columns of a program for some of so many numbers.
 
     Few are all computed at once, whichever are free, so that one program serves every
-    choice; of many, no more than a multiple of sixty-four.
+    choice; of many, no more than a multiple of thirty-two.
     """
     whole = width_of(most)
     return whole if whole <= _MANY else min(whole, _STRIDE * -(-free // _STRIDE))

@@ -1,0 +1,97 @@
+"""Forms with a few numbers in the place of free functions, fitted to the recordings.
+
+Where a form may start from, the curve says; whether it stays, the evidence of a fit of
+whole trajectories does.
+"""
+
+import dataclasses
+import itertools
+import math
+
+import jax.numpy as jnp
+import numpy as np
+
+from ..terms import Family, free_basis, Primitive
+from ._free_fits import FreeFits, heat_of, Missing, Subset
+from ._roughness import beside, Roughness
+from ._slots import emptied, Free, free_term
+
+
+# Points at which a form and the sines that stand for it are compared
+_GRID = 400
+
+
+def formulated(fits: FreeFits, found: Missing, progress) -> Missing:
+    """The functions of a fit as forms, where these have more evidence."""
+    for one in found.functions:
+        if one.primitive is not None:
+            continue
+        best = found
+        for primitive, numbers in _promising(fits, found, one):
+            progress(f"fitting a formula: {primitive.name}", None)
+            trial = _fitted(fits, found, one, primitive, numbers)
+            if math.isfinite(trial.score) and trial.score < best.score:
+                best = trial
+        found = best
+    return found
+
+
+def _fitted(
+    fits: FreeFits, found: Missing, one: Free, primitive: Primitive, numbers
+) -> Missing:
+    """A fit with a form in the place of a function, from some of its numbers."""
+    problem = found.problem
+    size = Roughness(size=abs(float(numbers[0])))
+    form = dataclasses.replace(one, primitive=primitive, roughness=size)
+    functions = tuple(form if f is one else f for f in found.functions)
+    values = emptied(problem, found.fit.point.values, one.slot)
+    rows = jnp.asarray([problem.names.index(name) for name in form.coefficients])
+    values = values.at[:, rows].set(jnp.asarray(numbers))
+    point = found.fit.point._replace(values=values)
+    return fits.fitted(Subset(problem, functions, found.names), point)
+
+
+def _promising(
+    fits: FreeFits, found: Missing, one: Free
+) -> list[tuple[Primitive, np.ndarray]]:
+    """Forms that resemble a function most where the data tell it, with their numbers.
+
+    By the quadratic likelihood about the fit: a form with size s and sines b has the
+    cost of `s b` there.
+    """
+    heat, labels = heat_of(found.fit), one.coefficients
+    subset = Subset(found.problem, found.functions, found.names)
+    quadratic = fits.quadratic(subset, found.fit.point, heat, one)
+    inside, pull = beside(*quadratic, fits.policy.alike)
+    columns = [found.problem.names.index(name) for name in labels]
+    value = np.asarray(found.fit.point.values)[0, columns]
+    slope = inside @ value + pull
+    price = math.log(found.problem.samples)
+    ranked = []
+    for primitive in one.family.primitives:
+        starts = np.array(list(itertools.product(*primitive.starts)))
+        starts = starts.reshape(len(starts), primitive.count - 1)
+        sines = _sines_of(one.family, primitive, starts, len(labels))
+        told = sines @ slope
+        seen = np.einsum("ka,ab,kb->k", sines, inside, sines)
+        seen = np.where(seen > 0, seen, np.inf)
+        gains = told**2 / seen
+        k = int(np.argmax(gains))
+        size = told[k] / seen[k]
+        if size != 0:
+            numbers = np.array([size, *starts[k]])
+            ranked.append((gains[k] - primitive.count * price, primitive, numbers))
+    ranked.sort(key=lambda each: -each[0])
+    return [(form, numbers) for _, form, numbers in ranked[: fits.policy.followed]]
+
+
+def _sines_of(family: Family, primitive: Primitive, starts, count: int) -> np.ndarray:
+    """Coefficients of the sums of sines nearest to a form of size one, `(k, count)`."""
+    along = np.linspace(family.low, family.high, _GRID)
+    basis = free_basis(family, along, count)
+    direction = np.tanh(along / family.slip) if family.jumps else np.zeros(_GRID)
+    place = free_term(family, "form").place(along[None], direction[None])
+    numbers = [np.ones((len(starts), 1)), *starts.T[:, :, None]]
+    values = primitive.function(place, [jnp.asarray(one) for one in numbers])
+    values = np.broadcast_to(np.asarray(values), (len(starts), _GRID))
+    return np.linalg.lstsq(basis, values.T, rcond=1e-6)[0].T

@@ -1,0 +1,145 @@
+"""Forms that a free function may turn out to have, each with a few numbers.
+
+A form is a function of `u`, its argument as a share of the range that was visited, or
+of a phase; the first number is its size. Edges are smoothed over a hundredth of the
+range, so that a fit can move them.
+"""
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import jax.numpy as jnp
+import numpy as np
+
+
+_EDGE = 0.01
+
+
+class Place(NamedTuple):
+    """Where a form is evaluated.
+
+    `x`: the argument; `u`: its share of the range, and `v`: the argument itself in
+    ranges; `direction`: of the motion, between -1 and 1, smoothed at the slip speed.
+    """
+
+    x: Any
+    u: Any
+    v: Any
+    direction: Any
+
+
+class Primitive(NamedTuple):
+    """A form: its `name`, `function(place, numbers)`, and what the numbers may be.
+
+    - `starts`: for each number but the first, values from which a fit may start.
+    - `scales`: for each number but the first, a change that matters.
+    """
+
+    name: str
+    function: Callable
+    starts: tuple[tuple[float, ...], ...] = ()
+    scales: tuple[float, ...] = ()
+
+    @property
+    def count(self) -> int:
+        return 1 + len(self.starts)
+
+
+def _step(x):
+    return (1 + jnp.tanh(x / _EDGE)) / 2
+
+
+def _wrapped(x):
+    return jnp.mod(x + jnp.pi, 2 * jnp.pi) - jnp.pi
+
+
+def _shares(low: float, high: float, count: int) -> tuple[float, ...]:
+    return tuple(np.linspace(low, high, count).tolist())
+
+
+_INSIDE = _shares(0.02, 0.98, 49)
+_EVERY = _shares(0.0, 2 * np.pi, 73)[:-1]
+
+STRAIGHT = Primitive("straight", lambda at, p: p[0] * at.u)
+ABOVE = Primitive(
+    "above", lambda at, p: p[0] * jnp.maximum(at.u - p[1], 0.0), (_INSIDE,), (0.05,)
+)
+BELOW = Primitive(
+    "below", lambda at, p: p[0] * jnp.maximum(p[1] - at.u, 0.0), (_INSIDE,), (0.05,)
+)
+STEP = Primitive("step", lambda at, p: p[0] * _step(at.u - p[1]), (_INSIDE,), (0.05,))
+WINDOW = Primitive(
+    "window",
+    lambda at, p: p[0] * (_step(at.u - p[1]) - _step(at.u - p[2])),
+    (_INSIDE, _INSIDE),
+    (0.05, 0.05),
+)
+BUMP = Primitive(
+    "bump",
+    lambda at, p: p[0] * jnp.exp(-(((at.u - p[1]) / p[2]) ** 2)),
+    (_INSIDE, (0.03, 0.05, 0.08, 0.12, 0.2, 0.3)),
+    (0.05, 0.03),
+)
+SQUARE = Primitive("square", lambda at, p: p[0] * (at.u - 0.5) ** 2)
+CUBE = Primitive("cube", lambda at, p: p[0] * (at.u - 0.5) ** 3)
+EXPONENTIAL = Primitive(
+    "exponential",
+    lambda at, p: p[0] * jnp.exp(p[1] * (at.u - 0.5)),
+    ((-16.0, -8.0, -4.0, -2.0, 2.0, 4.0, 8.0, 16.0),),
+    (1.0,),
+)
+WAVE = Primitive(
+    "wave",
+    lambda at, p: p[0] * jnp.cos(2 * jnp.pi * p[1] * at.u - p[2]),
+    (_shares(0.75, 8.0, 30), _EVERY[::3]),
+    (0.1, 0.3),
+)
+FORWARD = Primitive("forward", lambda at, p: p[0] * (1 + at.direction) / 2)
+FALLING = Primitive(
+    "falling",
+    lambda at, p: p[0] * at.direction * jnp.exp(-((at.v / p[1]) ** 2)),
+    ((0.03, 0.05, 0.08, 0.12, 0.2, 0.3, 0.5),),
+    (0.05,),
+)
+HARMONICS = tuple(
+    Primitive(
+        f"harmonic {n}",
+        lambda at, p, n=n: p[0] * jnp.cos(n * at.x - p[1]),
+        (_EVERY[::3],),
+        (0.3,),
+    )
+    for n in (1, 2, 3)
+)
+HALF_TURN = Primitive(
+    "half turn", lambda at, p: p[0] * _step(jnp.sin(at.x - p[1])), (_EVERY,), (0.1,)
+)
+ARC = Primitive(
+    "arc",
+    lambda at, p: p[0] * _step(jnp.cos(at.x - p[1]) - jnp.cos(p[2])),
+    (_EVERY, _shares(0.2, 2.9, 19)),
+    (0.1, 0.1),
+)
+BUMP_IN_TURN = Primitive(
+    "bump in turn",
+    lambda at, p: p[0] * jnp.exp(-((_wrapped(at.x - p[1]) / p[2]) ** 2)),
+    (_EVERY, (0.1, 0.15, 0.2, 0.3, 0.5, 0.8)),
+    (0.1, 0.1),
+)
+
+ON_A_LINE = (
+    STRAIGHT,
+    ABOVE,
+    BELOW,
+    STEP,
+    WINDOW,
+    BUMP,
+    SQUARE,
+    CUBE,
+    EXPONENTIAL,
+    WAVE,
+)
+OF_SPEED = (FORWARD, FALLING)
+OF_PHASE = (*HARMONICS, HALF_TURN, ARC, BUMP_IN_TURN)
+
+#: all forms, in the order of their numbers in a compiled program
+PRIMITIVES = (*ON_A_LINE, *OF_SPEED, *OF_PHASE)
