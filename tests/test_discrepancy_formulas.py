@@ -51,8 +51,8 @@ def _wrapped(x):
 
 @pytest.mark.parametrize("family, primitive", list(_forms()))
 def test_the_formula_is_the_function_that_was_fitted(family, primitive):
-    """To four digits in 95 % of the range: edges are smooth over 1 % of it, a formula's
-    are sharp."""
+    """To 0.2 % of its size in 85 % of the range: an edge is smooth over 3 % of it on
+    either side to this accuracy, that of a formula is sharp."""
     numbers = np.array(NUMBERS[primitive.name])
     coefficients = np.zeros(21)
     coefficients[: len(numbers)] = numbers
@@ -66,7 +66,7 @@ def test_the_formula_is_the_function_that_was_fitted(family, primitive):
     written = eval(text, names | {str(family.argument): at})
     size = np.max(np.abs(found))
     close = np.abs(found - written) < 2e-3 * size
-    assert size > 0 and np.mean(close) > 0.9
+    assert size > 0 and np.mean(close) > 0.85
 
 
 def test_every_form_has_as_many_numbers_as_it_says():

@@ -21,18 +21,23 @@ from ._slots import emptied, Free, free_term
 _GRID = 400
 
 
-def formulated(fits: FreeFits, found: Missing, progress) -> Missing:
-    """The functions of a fit as forms, where these have more evidence."""
+def formulated(fits: FreeFits, found: Missing, small: float, progress) -> Missing:
+    """The functions of a fit as forms, where these explain as much.
+
+    **Arguments:** `small`, by how much less evidence a form may have: an edge that the
+    steps of a flight cross costs them a little of their accuracy.
+    """
     for one in found.functions:
         if one.primitive is not None:
             continue
-        best = found
+        trials = []
         for primitive, numbers in _promising(fits, found, one):
             progress(f"fitting a formula: {primitive.name}", None)
-            trial = _fitted(fits, found, one, primitive, numbers)
-            if math.isfinite(trial.score) and trial.score < best.score:
-                best = trial
-        found = best
+            trials.append(_fitted(fits, found, one, primitive, numbers))
+        sound = [trial for trial in trials if math.isfinite(trial.score)]
+        best = min(sound, key=lambda trial: trial.score, default=found)
+        if best.score < found.score + small:
+            found = best
     return found
 
 
@@ -90,8 +95,8 @@ def _sines_of(family: Family, primitive: Primitive, starts, count: int) -> np.nd
     along = np.linspace(family.low, family.high, _GRID)
     basis = free_basis(family, along, count)
     direction = np.tanh(along / family.slip) if family.jumps else np.zeros(_GRID)
-    place = free_term(family, "form").place(along[None], direction[None])
+    place = free_term(family, "form").place(along[None])
     numbers = [np.ones((len(starts), 1)), *starts.T[:, :, None]]
-    values = primitive.function(place, [jnp.asarray(one) for one in numbers])
+    values = primitive.value(place, [jnp.asarray(one) for one in numbers], direction)
     values = np.broadcast_to(np.asarray(values), (len(starts), _GRID))
     return np.linalg.lstsq(basis, values.T, rcond=1e-6)[0].T

@@ -86,7 +86,8 @@ class FreeSearch:
             found = self._grown(swapped, False)
         if not found.functions:
             return None
-        return formulated(self.fits, self._pruned(found), self.progress)
+        found = self._pruned(found)
+        return formulated(self.fits, found, self._small(found), self.progress)
 
     def _bare(self, problem: Problem, start: Point) -> Missing:
         return self.fits.fitted(

@@ -5,14 +5,13 @@ missing and what it looks like.
 """
 
 from ._coordinates import coordinates as coordinates
-from ._free_function import (
+from ._families import (
     Factor as Factor,
     families as families,
     Family as Family,
-    FREE as FREE,
     free_basis as free_basis,
-    FreeFunction as FreeFunction,
 )
+from ._free_function import FREE as FREE, FreeFunction as FreeFunction
 from ._library import (
     DriveRipple as DriveRipple,
     library as library,

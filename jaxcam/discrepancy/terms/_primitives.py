@@ -19,13 +19,12 @@ class Place(NamedTuple):
     """Where a form is evaluated.
 
     `x`: the argument; `u`: its share of the range, and `v`: the argument itself in
-    ranges; `direction`: of the motion, between -1 and 1, smoothed at the slip speed.
+    ranges.
     """
 
     x: Any
     u: Any
     v: Any
-    direction: Any
 
 
 class Primitive(NamedTuple):
@@ -33,16 +32,26 @@ class Primitive(NamedTuple):
 
     - `starts`: for each number but the first, values from which a fit may start.
     - `scales`: for each number but the first, a change that matters.
+    - `jump`: of the form where the velocity changes sign, in halves of its size.
+    - `odd`: whether the form is multiplied with the direction of the motion.
     """
 
     name: str
     function: Callable
     starts: tuple[tuple[float, ...], ...] = ()
     scales: tuple[float, ...] = ()
+    jump: float = 0.0
+    odd: bool = False
 
     @property
     def count(self) -> int:
         return 1 + len(self.starts)
+
+    def value(self, place: Place, numbers, direction):
+        """The whole form: with its jump, where the motion has a direction."""
+        smooth = self.function(place, numbers)
+        turned = smooth * direction if self.odd else smooth
+        return turned + self.jump * numbers[0] * direction
 
 
 def _step(x):
@@ -94,12 +103,13 @@ WAVE = Primitive(
     (_shares(0.75, 8.0, 30), _EVERY[::3]),
     (0.1, 0.3),
 )
-FORWARD = Primitive("forward", lambda at, p: p[0] * (1 + at.direction) / 2)
+FORWARD = Primitive("forward", lambda at, p: p[0] / 2 + 0.0 * at.u, jump=0.5)
 FALLING = Primitive(
     "falling",
-    lambda at, p: p[0] * at.direction * jnp.exp(-((at.v / p[1]) ** 2)),
+    lambda at, p: p[0] * jnp.exp(-((at.v / p[1]) ** 2)),
     ((0.03, 0.05, 0.08, 0.12, 0.2, 0.3, 0.5),),
     (0.05,),
+    odd=True,
 )
 HARMONICS = tuple(
     Primitive(

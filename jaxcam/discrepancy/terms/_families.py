@@ -1,0 +1,180 @@
+"""Families of free functions: what they depend on, and where they act."""
+
+import dataclasses
+import enum
+import math
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from ._primitives import OF_PHASE, OF_SPEED, ON_A_LINE, Primitive
+from ._shapes import Variable
+from ._where import Where
+
+
+# The domain of the sines is longer than that of the data by this share on either side,
+# as they all vanish at its ends
+_MARGIN = 0.15
+
+
+class Factor(enum.StrEnum):
+    """What a free function is multiplied with; equal to its name as a string."""
+
+    ONE = "one"
+    VELOCITY = "velocity"
+    DIRECTION = "direction"
+    DEFLECTION = "deflection"
+
+
+@dataclasses.dataclass(frozen=True)
+class Family:
+    """All functions of one argument, times a factor, that act in one place.
+
+    - `where`: flight (a force), impact (a factor on the restitution) or contact (a
+        surface). `argument` between `low` and `high`; `factor` of a force.
+    - `middle`: of the positions, which a deflection is measured from. `slip`: speed
+        below which a direction is smoothed.
+    - `motion_unit`: of the coordinate.
+    """
+
+    where: Where
+    argument: Variable
+    low: float
+    high: float
+    factor: Factor = Factor.ONE
+    middle: float = 0.0
+    slip: float = 0.01
+    motion_unit: str = "rad"
+
+    @property
+    def name(self) -> str:
+        """Where and what of, such as `flight position velocity`."""
+        parts = [self.where, self.argument]
+        if self.factor is not Factor.ONE:
+            parts.append(self.factor)
+        return " ".join(parts)
+
+    @property
+    def periodic(self) -> bool:
+        return self.argument is Variable.PHASE
+
+    @property
+    def arguments(self) -> tuple[str, ...]:
+        """Names of what the function depends on, the factor included."""
+        names = [str(self.argument)]
+        if self.factor in (Factor.VELOCITY, Factor.DIRECTION):
+            names.append("velocity")
+        elif self.factor is Factor.DEFLECTION:
+            names.append("position")
+        return tuple(dict.fromkeys(names))
+
+    @property
+    def jumps(self) -> bool:
+        """Whether the function may jump where the velocity changes sign."""
+        return (
+            self.where is Where.FLIGHT
+            and self.argument is Variable.VELOCITY
+            and self.factor is Factor.ONE
+        )
+
+    @property
+    def primitives(self) -> tuple[Primitive, ...]:
+        """Forms that a function of this family may turn out to have."""
+        if self.periodic:
+            return OF_PHASE
+        return (*ON_A_LINE, *OF_SPEED) if self.jumps else ON_A_LINE
+
+    def waves(self, count: int) -> tuple[Array, Array]:
+        """Rates and shifts of `count` sines of the argument, each `(count,)`."""
+        if self.periodic:
+            half = count // 2
+            orders = np.arange(1.0, half + 1)
+            rates = np.concatenate([orders, orders])
+            shifts = np.repeat([math.pi / 2, 0.0], half)
+        else:
+            width = (self.high - self.low) * (1 + 2 * _MARGIN)
+            rates = math.pi * np.arange(1.0, count + 1) / width
+            shifts = rates * (_MARGIN * (self.high - self.low) - self.low)
+        return jnp.asarray(rates), jnp.asarray(shifts)
+
+    def variances(self, count: int, length: float) -> Float[np.ndarray, " count"]:
+        """Of the coefficients of a function of variance one, with this length of
+        correlation, a share of the range (of a radian, for a phase)."""
+        rates = np.asarray(self.waves(count)[0])
+        unit = 1.0 if self.periodic else self.high - self.low
+        # spectral density of a Matern kernel of order 3/2, for one dimension
+        density = (1 + (rates * unit * length) ** 2 / 3) ** -2.0
+        mean = 1.0 if self.periodic else 0.5
+        return density / (mean * np.sum(density))
+
+
+def free_basis(
+    family: Family, at: Float[np.ndarray, " n"], count: int
+) -> Float[np.ndarray, "n count"]:
+    """What each coefficient of a function adds to it, without its factor."""
+    rates, shifts = (np.asarray(x) for x in family.waves(count - 1))
+    sines = np.sin(np.outer(at, rates) + shifts)
+    jump = np.tanh(at / family.slip) if family.jumps else np.zeros(len(at))
+    return np.column_stack([sines, jump])
+
+
+def families(
+    positions: tuple[float, float],
+    velocities: tuple[float, float],
+    approach: tuple[float, float],
+    duration: float,
+    *,
+    turned: bool,
+    impacting: bool,
+    slip: float,
+    motion_unit: str,
+) -> tuple[Family, ...]:
+    """All families over the ranges that some recordings visit.
+
+    **Arguments:** least and largest position, velocity and approach speed, the length
+    of the records (s), whether there is a drive with a phase and whether there are
+    impacts, the slip speed, and the unit of the motion.
+    """
+    ranges = {
+        Variable.POSITION: positions,
+        Variable.VELOCITY: velocities,
+        Variable.TIME: (0.0, duration),
+        Variable.APPROACH: approach,
+        Variable.PHASE: (0.0, 2 * math.pi),
+    }
+
+    def one(where: Where, argument: Variable, factor: Factor = Factor.ONE) -> Family:
+        return Family(
+            where,
+            argument,
+            *ranges[argument],
+            factor,
+            sum(positions) / 2,
+            slip,
+            motion_unit,
+        )
+
+    phase = (Variable.PHASE,) if turned else ()
+    found = [
+        one(Where.FLIGHT, argument, factor)
+        for argument in (*_TIMELESS, Variable.TIME, *phase)
+        for factor in Factor
+        if (argument, factor) not in _DOUBLED
+    ]
+    if impacting:
+        found += [
+            one(Where.IMPACT, argument)
+            for argument in (Variable.APPROACH, Variable.TIME, *phase)
+        ]
+        found += [one(Where.CONTACT, argument) for argument in (Variable.TIME, *phase)]
+    return tuple(found)
+
+
+_TIMELESS = (Variable.POSITION, Variable.VELOCITY)
+# a function of the argument alone can do as much
+_DOUBLED = {
+    (Variable.POSITION, Factor.DEFLECTION),
+    (Variable.VELOCITY, Factor.VELOCITY),
+    (Variable.VELOCITY, Factor.DIRECTION),
+}
