@@ -8,6 +8,8 @@ import pytest
 from fitting_rigs import DraggedBall
 
 from jaxcam import fitting
+from jaxcam.discrepancy import Policy
+from jaxcam.discrepancy.evidence._held_out import folds_of
 from jaxcam.fitting.engine._likelihood import score
 from jaxcam.fitting.engine._linearise import cost_of
 from jaxcam.hybrid import HybridSystem
@@ -49,6 +51,20 @@ def balls():
     runs = [ball_record(TRUE, 0, name="a"), ball_record(other, 1, name="b")]
     model = fitting.Model(DraggedBall(), SENSORS)
     return fitting.Problem.build(model, runs, PARAMETERS)
+
+
+def test_every_piece_is_held_out_once_and_every_part_holds_out_of_every_record(balls):
+    """The parts of a test on unseen data, in stretches that are dealt out in turn."""
+    parts = folds_of(balls, Policy(folds=3, stretch_pieces=2))
+    every = balls.everything()
+    for side in ("flown", "rested"):
+        unseen = np.array([getattr(out, side) for _, out in parts])
+        np.testing.assert_array_equal(unseen.sum(axis=0), getattr(every, side))
+        for seen, out in parts:
+            both = getattr(seen, side) + getattr(out, side)
+            np.testing.assert_array_equal(both, getattr(every, side))
+    flown = np.array([out.flown for _, out in parts])
+    assert np.all(flown.sum(axis=2) > 0)
 
 
 def test_a_readers_system_with_values_of_each_record(balls):

@@ -41,7 +41,7 @@ def held_out(trials: Trials, before: Trial, after: Trial) -> HeldOut:
     """
     problem = trials.problem
     unseen_parts: tuple[list[Residuals], list[Residuals]] = ([], [])
-    folds = _folds(problem, trials.policy)
+    folds = folds_of(problem, trials.policy)
     squares, counts = np.zeros(2), np.zeros(2)
     gained: dict[str, float] = {}
     for fold, (seen, unseen) in enumerate(folds):
@@ -99,7 +99,7 @@ def _square(parts: list[Residuals]) -> tuple[float, int]:
     return square, sum(len(part.value) for part in parts)
 
 
-def _folds(problem: Problem, policy: Policy) -> list[tuple[Weights, Weights]]:
+def folds_of(problem: Problem, policy: Policy) -> list[tuple[Weights, Weights]]:
     """Weights of what is seen and what is not, for each part of the data.
 
     Every record is cut into short stretches that are dealt out in turn, so that a place
