@@ -8,7 +8,7 @@ import pytest
 
 from jaxcam import simulate
 from jaxcam.discrepancy import Policy
-from jaxcam.discrepancy.search import occam, Roughness, roughness
+from jaxcam.discrepancy.search import occam, roughness
 from jaxcam.discrepancy.terms import (
     Factor,
     families,
@@ -160,6 +160,7 @@ def test_the_gain_does_not_depend_on_the_point():
 
 
 def test_what_free_parameters_imitate_is_no_function():
+    """Its gain is nothing beside chi-square one, that of a parameter by chance."""
     rng = np.random.default_rng(4)
     family = _family(Variable.POSITION, 0.0, 1.0)
     at = rng.uniform(0.0, 1.0, 300)
@@ -171,7 +172,7 @@ def test_what_free_parameters_imitate_is_no_function():
     found = roughness(
         information, score, free, own, family, np.zeros(SINES + 1), POLICY
     )
-    assert found == Roughness(-math.inf, found.length, 1.0) or found.gain < 1e-6
+    assert found.gain < 1e-6
 
 
 def test_families_have_one_place_each_and_different_names():

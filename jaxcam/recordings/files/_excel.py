@@ -22,6 +22,7 @@ def read_excel(file: Path, names: Sequence[str] | None = None) -> Source:
     """
     raw = read_bytes(file)
     try:
+        # pandas reads workbooks by it, and names it only when it does
         import openpyxl  # noqa: F401  # pyright: ignore
         import pandas as pd
     except ImportError:
