@@ -21,8 +21,6 @@ from jaxcam.recordings import (
     segment,
     segment_case,
 )
-from jaxcam.recordings.cut._surface import nominal_surface
-from jaxcam.recordings.cut._surface_fit import _solve
 
 
 RIG = RealRig()
@@ -323,17 +321,3 @@ def test_a_cam_seen_in_bounces_alone_stays_near_them(seed):
     waves = [w * np.exp(1j * k * phases) for k, w in enumerate(real.profile())]
     off = slow.surface.angle(phases) - np.sum(waves, axis=0).real
     assert np.max(np.abs(off)) < 3.5 * rig.sensors.follower_floor
-
-
-def test_a_dent_of_the_cam_is_followed_where_it_is():
-    """To half the noise wherever the cam is touched, for a dent of 1.5e-4 rad over a
-    quarter of a radian: what cannot follow it is bent elsewhere, too."""
-    rng = np.random.default_rng(3)
-    rig = read_rig(DEMO_RIG / "rig.toml")
-    nominal, noise = nominal_surface(rig), 9e-5
-    turned = rng.uniform(0.0, 4.1, 6000)
-    true = nominal.angle(turned) + 1.5e-4 * np.exp(-(((turned - 3.7) / 0.245) ** 2))
-    angle = true + noise * rng.standard_normal(len(turned))
-    error = np.full(len(turned), noise)
-    fitted = _solve(nominal, rig, turned, angle, error).angle(turned)
-    assert np.max(np.abs(fitted - true)) < 0.5 * noise

@@ -16,9 +16,8 @@ from .._rig import Rig
 from ._padding import padded
 
 
-# What remains of a cam besides its geometry: run-out, bearings, a bent shaft, dents
-# (rad), the less the higher the harmonic
-_HARMONICS = tuple(range(2, 13))
+# What remains of a cam besides its geometry: run-out, bearings, a bent shaft (rad)
+_HARMONICS = (2, 3)
 _HARMONIC_SIZE = 2e-4
 # What the zero of the cam's angle may be off, and what a sensor that lags by half a
 # millisecond makes of it (rad)
@@ -32,7 +31,7 @@ class Surface(eqx.Module):
 
     - `profile`: the eccentric circle that fits best.
     - `phase`: how far ahead of its measured angle the cam seems to be (rad).
-    - `cosines`, `sines`: amplitudes of harmonics 2 to 12 on top of it (rad).
+    - `cosines`, `sines`: amplitudes of harmonics 2 and 3 on top of it (rad).
     - `covariance`: of radius, eccentricity, centre, phase and amplitudes together.
     - `sense`: -1 for a clockwise cam; the angle given is counted as it turns.
     """
@@ -85,9 +84,7 @@ def prior_sizes(rig: Rig) -> np.ndarray:
         rig.cam_center_x.tolerance,
         rig.cam_center_y.tolerance,
     ]
-    # as if the second derivative of what remains were white noise
-    falling = _HARMONIC_SIZE * np.minimum(1.0, (3 / np.array(_HARMONICS)) ** 2)
-    harmonics = np.tile(falling, 2)
+    harmonics = np.full(2 * len(_HARMONICS), _HARMONIC_SIZE)
     geometry = np.maximum(geometry, _LEAST_TOLERANCE)
     return np.concatenate([geometry, [_PHASE_SIZE], harmonics])
 
