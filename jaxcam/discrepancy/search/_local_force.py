@@ -177,9 +177,10 @@ def _onto(response: Response, forces: Float[np.ndarray, "r k l p"]) -> LinearPie
 def _linear(layout, pieces, extras, point, columns, scales, nodes) -> LinearPieces:
     def record(pieces, extras, values, states, columns, scales):
         size = columns.shape[0]
+        near = layout.about(values).by(columns, scales)
 
         def model_at(change, start, step):
-            model = layout.at(values.at[columns].add(change[:size] * scales))
+            model = near.at(change[:size])
             force = LocalForce(change[size:], start, step / 2)
             system = WithTerms(
                 model.system.base,

@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from ._likelihood import score_all
@@ -74,13 +75,10 @@ def linear_pieces(
     origin = jnp.zeros(width)
 
     def piece(state, start, step, *inputs):
-        def predicted(both):
-            model = model_at(both[size:], start, step)
-            end, seen = flown(model, both[:size], start, step, *inputs)
-            return (end, seen), (end, seen)
+        def predicted(state, change):
+            return flown(model_at(change, start, step), state, start, step, *inputs)
 
-        both = jnp.concatenate([state, origin])
-        (end_rows, rows), (end, seen) = jax.jacfwd(predicted, has_aux=True)(both)
+        (end, seen), (end_rows, rows) = _columns(predicted, state, origin)
         return end_rows, rows, end, seen
 
     end_rows, rows, end, seen = jax.vmap(piece)(states, *flight_inputs(pieces))
@@ -98,12 +96,11 @@ def linear_pieces(
     def contact(guess, start, step, *inputs):
         def predicted(change):
             model = model_at(change, start, step)
-            seen = rested(model, guess, start, step, *inputs)
-            return seen, seen
+            return rested(model, guess, start, step, *inputs)
 
-        return jax.jacfwd(predicted, has_aux=True)(origin)
+        return _columns(predicted, origin)
 
-    rest_rows, rest_seen = jax.vmap(contact)(*rest_inputs(pieces, extras))
+    rest_seen, rest_rows = jax.vmap(contact)(*rest_inputs(pieces, extras))
     part = pieces.rested
     found = score_all(sensors, part.value, rest_seen)
     weight = jnp.where(part.known, extras.rest_weight[:, None, None, None], 0.0)
@@ -119,18 +116,15 @@ def linear_pieces(
 
     # rows for the earlier state, the later state and what else varies
     def joint_of(before, state, t, *inputs):
-        def off(all_):
-            model = model_at(all_[2 * size :], t, jnp.ones_like(t))
-            found = joint(
-                model, pieces.reach, all_[:size], all_[size : 2 * size], t, *inputs
-            )
-            return found, found
+        def off(before, state, change):
+            model = model_at(change, t, jnp.ones_like(t))
+            return joint(model, pieces.reach, before, state, t, *inputs)
 
-        return jax.jacfwd(off, has_aux=True)(jnp.concatenate([before, state, origin]))
+        return _columns(off, before, state, origin)
 
     before = jnp.concatenate([states[:1], end[:-1]])
     turned = jnp.concatenate([jnp.zeros_like(end_rows[:1]), end_rows[:-1]])
-    joint_rows, off = jax.vmap(joint_of)(before, states, *joint_inputs(pieces))
+    off, joint_rows = jax.vmap(joint_of)(before, states, *joint_inputs(pieces))
     joint_rows = joint_rows * strength(extras.sharpness, pieces.joint)[..., None]
     shared = jnp.sqrt(jnp.minimum(extras.weight, _previous(extras.weight)))[:, None]
     earlier, later, direct = (
@@ -156,6 +150,22 @@ def linear_pieces(
         joint_cost,
         rested_cost,
     )
+
+
+def _columns(function, *args):
+    """Value and Jacobian of a function of some vectors, its columns side by side.
+
+    Vectors stay apart: what depends on one of them alone is then worked out once, for
+    all the pieces that share it.
+    """
+    count = sum(len(one) for one in args)
+    edges = np.cumsum([len(one) for one in args])[:-1]
+    unit = jnp.split(jnp.eye(count), edges, axis=1)
+
+    def pushed(*tangents):
+        return jax.jvp(function, args, tangents)
+
+    return jax.vmap(pushed, out_axes=(None, -1))(*unit)
 
 
 def flown(model: Model, state, start, step, angle, rate, place):

@@ -1,7 +1,7 @@
 """Scores and information of every piece and joint about a point."""
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
@@ -55,6 +55,59 @@ class Layout(eqx.Module):
             leaves[place] = values[column]
         return self.ready(jax.tree.unflatten(tree, leaves))
 
+    @eqx.filter_jit
+    def about(self, values: Float[Array, " q"]) -> "Expansion":
+        """The model near some values."""
+        origin = self.at(values)
+        given = jax.tree.leaves(self.model)
+        leaves, tree = jax.tree.flatten(origin)
+        known = {id(leaf) for leaf in given}
+        moving = [k for k, leaf in enumerate(leaves) if id(leaf) not in known]
+
+        def pushed(unit):
+            def moved(values):
+                leaves = jax.tree.leaves(self.at(values))
+                return [leaves[k] for k in moving]
+
+            return jax.jvp(moved, (values,), (unit,))[1]
+
+        rows = jax.vmap(pushed)(jnp.eye(len(values)))
+        slopes: list[Any] = [None] * len(leaves)
+        for k, row in zip(moving, rows):
+            slopes[k] = row
+        return Expansion(origin, tuple(slopes))
+
+
+class Expansion(eqx.Module):
+    """A model to first order in its parameters.
+
+    What it needs at every step is worked out and differentiated once, instead of in
+    each of the pieces.
+
+    - `slopes`: of each leaf, a row for each parameter; None where it depends on none.
+    """
+
+    model: Model
+    slopes: tuple[Float[Array, "..."] | None, ...]
+
+    def by(self, columns: Int[Array, " m"], scales: Float[Array, " m"]) -> "Expansion":
+        """The same, by some of the parameters in units of their scales."""
+
+        def rows(slope):
+            return slope[columns] * scales.reshape(-1, *[1] * (slope.ndim - 1))
+
+        slopes = tuple(None if s is None else rows(s) for s in self.slopes)
+        return Expansion(self.model, slopes)
+
+    def at(self, change: Float[Array, " m"]) -> Model:
+        """The model after a small change of the parameters."""
+        leaves, tree = jax.tree.flatten(self.model)
+        moved = [
+            leaf if slope is None else leaf + jnp.tensordot(change, slope, 1)
+            for leaf, slope in zip(leaves, self.slopes)
+        ]
+        return jax.tree.unflatten(tree, moved)
+
 
 class Blocks(NamedTuple):
     """Normal equations of the pieces of one record: information and score.
@@ -95,16 +148,26 @@ def assemble(
 
     def record(row):
         row = jnp.asarray(row)
-        return assemble_one(layout, pieces, extras, point, columns, scales, row)
+        near = layout.about(jnp.asarray(point.values)[row])
+        return assemble_one(near, pieces, extras, point.states, columns, scales, row)
 
     return each_record(record, columns.shape[0])
 
 
 @eqx.filter_jit
-def assemble_one(layout, pieces, extras, point, columns, scales, row):
+def assemble_one(near, pieces, extras, states, columns, scales, row):
     """`assemble` of one record: its number is not part of the program."""
-    one = pieces, extras, point.values, point.states, columns, scales
-    return _record(layout, *jax.tree.map(lambda leaf: leaf[row], one))
+    one = pieces, extras, states, columns, scales
+    pieces, extras, states, columns, scales = jax.tree.map(lambda leaf: leaf[row], one)
+    near = near.by(columns, scales)
+
+    def model_at(change, start, step):
+        del start, step
+        return near.at(change)
+
+    found = linear_pieces(model_at, pieces, extras, states, columns.shape[0])
+    costs = Costs(found.flown_cost, found.joint_cost, found.rested_cost)
+    return chained(found), costs
 
 
 @eqx.filter_jit
@@ -142,16 +205,6 @@ def cost_of(layout: Layout, pieces: Pieces, extras: Extras, point: Point) -> Cos
         jnp.sum(missed**2, axis=-1),
         total(pieces.rested, resting),
     )
-
-
-def _record(layout, pieces: Pieces, extras, values, states, columns, scales):
-    def model_at(change, start, step):
-        del start, step
-        return layout.at(values.at[columns].add(change * scales))
-
-    found = linear_pieces(model_at, pieces, extras, states, columns.shape[0])
-    costs = Costs(found.flown_cost, found.joint_cost, found.rested_cost)
-    return chained(found), costs
 
 
 def chained(found: LinearPieces) -> Blocks:

@@ -65,12 +65,11 @@ def runge_kutta(model: Model, system, t, x, h):
 def rest(model: Model, guess, start, step, angle, rate):
     """`Nodes` of one piece of contact; `guess` `(n,)` is a state near the surface."""
 
-    def channel(t, a, w):
-        def at(time):
-            x = contact_state(model.driven(t, a, w), time, guess)
-            return jnp.stack([s.seen(x) for s in model.sensors.values()])
+    def seen(x):
+        return jnp.stack([s.seen(x) for s in model.sensors.values()])
 
-        return jax.jvp(at, (t,), (jnp.ones_like(t),))
+    def channel(t, a, w):
+        return jax.jvp(seen, *contact_state(model.driven(t, a, w), t, guess))
 
     times = start + step * jnp.arange(angle.shape[0], dtype=float)
     values, rates = jax.vmap(channel)(times, angle, rate)
@@ -78,9 +77,12 @@ def rest(model: Model, guess, start, step, angle, rate):
 
 
 def contact_state(system, t, guess):
-    """State with gap and normal velocity zero that is nearest to `guess`."""
+    """State with gap and normal velocity zero that is nearest to `guess`, and its rate.
 
-    def conditions(x):
+    **Returns:** two tuples of one array `(n,)`, as `jax.jvp` takes them.
+    """
+
+    def conditions(t, x):
         def gap(t, x):
             return _nearest(system, t, x)
 
@@ -89,15 +91,32 @@ def contact_state(system, t, guess):
         )
         return jnp.stack([value, speed])
 
-    def newton(_, x):
-        jacobian = jax.jacfwd(conditions)(x)
-        (a, b), (_, d) = jacobian @ jacobian.T
-        c = conditions(x)
-        det = a * d - b * b
-        push = jnp.stack([d * c[0] - b * c[1], a * c[1] - b * c[0]]) / det
-        return x - jacobian.T @ push
+    def newton(_, carried):
+        def twice(t, x):
+            found = conditions(t, x)
+            return found, found
 
-    return jax.lax.fori_loop(0, _NEWTON, newton, guess)
+        x, *_ = carried
+        (by_time, slopes), found = jax.jacfwd(twice, (0, 1), has_aux=True)(t, x)
+        return x - _least(slopes, found), by_time, slopes
+
+    nothing = jnp.zeros(2), jnp.zeros((2, guess.shape[0]))
+    found = jax.lax.fori_loop(0, _NEWTON, newton, (guess, *nothing))
+    # slopes at the root need no derivatives: the residuals below carry them all
+    root, by_time, slopes = jax.lax.stop_gradient(found)
+    x = root - _least(slopes, conditions(t, root))
+    rate = -_least(slopes, by_time)
+    _, changing = jax.jvp(conditions, (t, x), (jnp.ones_like(t), rate))
+    return (x,), (rate - _least(slopes, changing),)
+
+
+def _least(slopes, residual):
+    """The least step that changes two conditions by a residual."""
+    (a, b), (_, d) = slopes @ slopes.T
+    det = a * d - b * b
+    first, second = residual
+    push = jnp.stack([d * first - b * second, a * second - b * first]) / det
+    return slopes.T @ push
 
 
 def samples(model: Model, nodes: Nodes, step, place):
@@ -147,24 +166,38 @@ def impact_joint(model: Model, end, state, t, angle, rate, reach) -> Joint:
     size = end.shape[0] - len(filtered_channels(model))
     system = model.driven(t, angle, rate)
 
-    def move(x, shift):
-        return runge_kutta(model, system, t, x, shift)[0]
+    flights = jnp.stack([end, state])
 
-    def gap(x, shift):
-        return _nearest(system, t + shift, move(x, shift)[:size])
+    def gap(t, x):
+        return _nearest(system, t, x[:size])
 
-    def difference(shift):
-        return gap(state, shift) - gap(end, shift)
+    def moved(shift):
+        """Both flights at another time: states, their rates, gaps and their rates."""
+
+        def move(x):
+            x = runge_kutta(model, system, t, x, shift)[0]
+            field = augmented_field(model, system, t + shift, x)
+            along = jnp.ones_like(t), field
+            return x, field, *jax.jvp(gap, (t + shift, x), along)
+
+        return jax.vmap(move)(flights)
+
+    def step(gaps, speeds):
+        slope = speeds[1] - speeds[0]
+        slope = jnp.where(slope == 0, jnp.inf, slope)
+        return -(gaps[1] - gaps[0]) / jax.lax.stop_gradient(slope)
 
     def newton(_, shift):
-        value, slope = jax.jvp(difference, (shift,), (jnp.ones_like(t),))
-        slope = jnp.where(slope == 0, jnp.inf, jax.lax.stop_gradient(slope))
-        return jnp.clip(shift - value / slope, -reach, reach)
+        _, _, gaps, speeds = moved(shift)
+        return jnp.clip(shift + step(gaps, speeds), -reach, reach)
 
+    shift = jax.lax.fori_loop(0, _NEWTON, newton, jnp.zeros_like(t))
+    shift = jax.lax.stop_gradient(shift)
     # the last step, from a fixed start, carries the derivatives of the event
-    shift = jax.lax.fori_loop(0, _NEWTON - 1, newton, jnp.zeros_like(t))
-    shift = newton(0, jax.lax.stop_gradient(shift))
-    before, after = move(end, shift), move(state, shift)
+    states, fields, gaps, speeds = moved(shift)
+    last = jnp.clip(shift + step(gaps, speeds), -reach, reach) - shift
+    before, after = states + last * fields
+    shift = shift + last
     landed = system.impact(t + shift, before[:size])
     if landed.ndim == 2:
         landed = landed[jnp.argmin(system.gap(t + shift, before[:size]))]
