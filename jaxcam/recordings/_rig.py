@@ -97,6 +97,14 @@ class References:
             free_slip_speed=share * usual.free_slip_speed,
         )
 
+    def sharper(self, share: float) -> "References":
+        """The same with dry friction that changes sign within a share of the speed."""
+        return dataclasses.replace(
+            self,
+            slip_speed=share * self.slip_speed,
+            free_slip_speed=share * self.free_slip_speed,
+        )
+
 
 @dataclasses.dataclass(frozen=True)
 class Rig:

@@ -4,6 +4,9 @@ import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+import equinox as eqx
+import jax
+import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
@@ -11,11 +14,21 @@ from ...fitting import Input, Model, Parameter, Problem, Sensor, Setup, Turning
 from ...hybrid import HybridSystem
 from ...recordings import Recording, References
 from ...recordings.against_model import size_of
-from ...recordings.cut import fast_speed, measured_noise, Segments
+from ...recordings.cut import (
+    fast_speed,
+    measured_noise,
+    Segments,
+    usual_acceleration,
+)
 from ...recordings.files import check_channels, unit_of
 from ..policy import Policy
-from ..terms import coordinates, library, Term, WithTerms
+from ..terms import coordinates, library, Term, terms_of, WithTerms
 from ._question import by_listing, Question, refuse_one, Report, term_parameters
+
+
+# Share of the usual change of the speed in a step within which dry friction changes
+# sign: its impulse is then integrated well enough
+_RESOLVED = 0.3
 
 
 @dataclasses.dataclass(frozen=True)
@@ -97,10 +110,14 @@ def system_question(
     unit, turned = unit_of(seen), system.period is not None
     usual = References.of_speed(fast_speed([r.recording for r in recordings], seen))
     references = dataclasses.replace(usual, **(stated or {}))
-    if candidates is None:
-        clocked = turned or drive is not None
-        candidates = library(turned, references, clocked=clocked)
-    terms, unlisted = by_listing(_measured_in(unit, candidates))
+    clocked = turned or drive is not None
+
+    def listed(references: References):
+        usual = library(turned, references, clocked=clocked)
+        offered = usual if candidates is None else candidates
+        return by_listing(_measured_in(unit, offered))
+
+    terms, unlisted = listed(references)
     if isinstance(drive, Input):
         drive = Input(drive.channel, _OfBase(drive.value))
     elif drive is not None:
@@ -111,6 +128,11 @@ def system_question(
     problem = Problem.build(
         model, recordings, inside + term_parameters(terms, recordings, policy)
     )
+    slip = _resolved_slip(problem, seen)
+    if "slip_speed" not in (stated or {}) and slip < references.slip_speed:
+        references = references.sharper(slip / references.slip_speed)
+        terms, unlisted = listed(references)
+        problem = _with_terms(problem, terms)
     return Question(
         problem,
         tuple(p.name for p in inside),
@@ -130,6 +152,33 @@ def _drives(recordings: Sequence[Segments], channel: str | None) -> dict[str, An
     runs = tuple(part.recording for part in recordings)
     noise = float(np.median([measured_noise(run[channel]) for run in runs]))
     return {"drives": runs, "drive_noise": noise, "drive_channel": channel}
+
+
+def _resolved_slip(problem: Problem, channel: str) -> float:
+    """A speed within which the steps of a flight resolve a change of its sign.
+
+    Where friction holds a body, a force that changes sign over a slip speed lets it
+    creep: a slip speed is to be as low as the steps allow.
+    """
+    pieces = problem.pieces
+    step = float(np.median(np.asarray(pieces.flown.step)[np.asarray(pieces.exists)]))
+    runs = [part.recording for part in problem.segments]
+    return _RESOLVED * step * usual_acceleration(runs, channel)
+
+
+def _with_terms(problem: Problem, terms: Sequence[Term]) -> Problem:
+    """The same problem with other constants in the forms of its terms."""
+
+    def put(model: Model) -> Model:
+        fresh = jax.tree.map(jnp.asarray, tuple(terms))
+        return eqx.tree_at(terms_of, model, fresh)
+
+    layout = problem.layout
+    return dataclasses.replace(
+        problem,
+        model=put(problem.model),
+        layout=eqx.tree_at(lambda part: part.model, layout, put(layout.model)),
+    )
 
 
 def _channel_of(sensors: Mapping[str, Sensor], place: int) -> str:

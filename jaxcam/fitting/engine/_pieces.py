@@ -148,7 +148,9 @@ def _margin(edge, interval: float) -> float:
     if edge.kind == "several impacts":
         return edge.stderr
     error = edge.stderr if np.isfinite(edge.stderr) else interval
-    return interval / 2 + 2 * min(error, 2 * interval)
+    least = interval / 2 + 2 * min(error, 2 * interval)
+    # a flight that seems to begin too early would be asked to follow a contact
+    return max(least, error) if edge.kind == "release" else least
 
 
 def gather(

@@ -1,7 +1,10 @@
 """A recording cut into flights, contacts and impacts, on the surface it shows."""
 
 from .._drive import Drive as Drive, read_drive as read_drive
-from ._fast_speed import fast_speed as fast_speed
+from ._fast_speed import (
+    fast_speed as fast_speed,
+    usual_acceleration as usual_acceleration,
+)
 from ._gaps import segment_gaps as segment_gaps
 from ._padding import padded as padded
 from ._polynomial import fit_local as fit_local, measured_noise as measured_noise

@@ -1,8 +1,10 @@
-"""How fast a motion is."""
+"""How fast a motion is, and how fast its speed changes."""
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.signal import savgol_filter
 
 from .._recording import Recording
 
@@ -10,6 +12,8 @@ from .._recording import Recording
 # Time (s) over which a speed is measured, so that noise is none; share of the speeds
 # that are lower
 _STRIDE, _SHARE = 5e-3, 0.95
+# Samples of a parabola that shows an acceleration
+_WINDOW = 51
 
 
 def fast_speed(recordings: Sequence[Recording], channel: str) -> float:
@@ -25,3 +29,18 @@ def fast_speed(recordings: Sequence[Recording], channel: str) -> float:
     every = np.concatenate(speeds)
     fast = float(np.quantile(every[np.isfinite(every)], _SHARE))
     return fast if fast > 0 else 1.0
+
+
+def usual_acceleration(recordings: Sequence[Recording], channel: str) -> float:
+    """The median size of a channel's second derivative, in its units a second squared.
+
+    Infinite where the records are too short to show it.
+    """
+    found = []
+    for recording in recordings:
+        samples = recording[channel]
+        if len(samples) >= _WINDOW:
+            bent = savgol_filter(samples, _WINDOW, 2, 2, recording.interval)
+            found.append(np.abs(bent[np.isfinite(bent)]))
+    every = np.concatenate(found) if found else np.empty(0)
+    return float(np.median(every)) if len(every) else math.inf
