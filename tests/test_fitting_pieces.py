@@ -2,9 +2,16 @@
 
 import dataclasses
 
+import jax
+import jax.numpy as jnp
 import numpy as np
+import pytest
 
+from jaxcam.fitting.engine._linearise import Layout
+from jaxcam.fitting.engine._model import Model
 from jaxcam.fitting.engine._pieces import _PIECE, spans
+from jaxcam.fitting.engine._predict import contact_state
+from jaxcam.models import BouncingBall
 from jaxcam.recordings import Recording, segment
 
 
@@ -26,3 +33,68 @@ def test_a_contact_of_which_little_is_sure_is_cut_by_time():
     assert np.array_equal(np.sort(kept), expected) and len(kept) == len(set(kept))
     longest = max(span.stop - span.start for span in rested)
     assert longest <= _PIECE * 5e-4 * (1 + 1e-9)
+
+
+def test_a_flight_begins_where_its_release_is_sure():
+    """Samples within the standard error of a release belong to the contact perhaps."""
+    time = 5e-4 * np.arange(3000)
+    floor = np.zeros(3000)
+    height = np.maximum(0.0, 2.0 * (time - 0.5) * (1.2 - time))
+    height = height + 1e-5 * np.random.default_rng(1).standard_normal(3000)
+    found = segment(Recording("hop", time, {"height": height}), "height", floor)
+    (flight,) = (one for one in found.flights if one.start.kind == "release")
+    for stderr in (5e-4, 0.05):
+        start = dataclasses.replace(flight.start, stderr=stderr)
+        changed = dataclasses.replace(flight, start=start)
+        flown, _ = spans(dataclasses.replace(found, flights=(changed,)))
+        first = time[min(int(span.rows[0]) for span in flown)]
+        assert start.time + stderr <= first < start.time + stderr + 2e-3
+
+
+def _on_the_floor(values):
+    """State and rate of a ball that rests on a floor, by amplitude and frequency."""
+    amplitude, frequency = values
+    ball = BouncingBall(amplitude=amplitude, frequency=frequency)
+    (state,), (rate,) = contact_state(ball, jnp.asarray(0.3), jnp.array([0.1, 0.2]))
+    return jnp.concatenate([state, rate])
+
+
+def test_a_state_in_contact_moves_with_the_surface():
+    """Against the closed form, values and derivatives to 1e-12."""
+
+    def exact(values):
+        a, w = values
+        high, fast = a * jnp.sin(0.3 * w), a * w * jnp.cos(0.3 * w)
+        return jnp.stack([high, fast, fast, -(w**2) * high])
+
+    values = jnp.array([0.02, 7.0])
+    for of in (lambda f: f, jax.jacfwd):
+        found, expected = (np.asarray(of(f)(values)) for f in (_on_the_floor, exact))
+        assert found == pytest.approx(expected, abs=1e-12)
+
+
+def test_a_model_to_first_order_has_the_derivatives_of_the_model():
+    """Also of what is worked out for every step; columns in units of their scales."""
+    model = Model(BouncingBall(), {}, None)
+
+    def squared(model):
+        gravity = model.system.gravity
+        moved = dataclasses.replace(model.system, gravity=gravity**2)
+        return dataclasses.replace(model, system=moved)
+
+    leaves = jax.tree.leaves(model)
+    layout = Layout(model, tuple(range(len(leaves))), squared)
+    values = jnp.arange(1.0, 1.0 + len(leaves))
+    columns, scales = jnp.array([2, 0]), jnp.array([0.5, 3.0])
+    near = layout.about(values).by(columns, scales)
+
+    def direct(change):
+        return jax.tree.leaves(layout.at(values.at[columns].add(change * scales)))
+
+    def expanded(change):
+        return jax.tree.leaves(near.at(change))
+
+    origin = jnp.zeros(2)
+    assert np.array(direct(origin)) == pytest.approx(np.array(expanded(origin)))
+    slopes = (np.array(jax.jacfwd(f)(origin)) for f in (direct, expanded))
+    assert next(slopes) == pytest.approx(next(slopes), rel=1e-14)

@@ -129,7 +129,7 @@ def system_question(
         model, recordings, inside + term_parameters(terms, recordings, policy)
     )
     slip = _resolved_slip(problem, seen)
-    if "slip_speed" not in (stated or {}) and slip < references.slip_speed:
+    if "slip_speed" not in (stated or {}) and 0 < slip < references.slip_speed:
         references = references.sharper(slip / references.slip_speed)
         terms, unlisted = listed(references)
         problem = _with_terms(problem, terms)
@@ -157,8 +157,8 @@ def _drives(recordings: Sequence[Segments], channel: str | None) -> dict[str, An
 def _resolved_slip(problem: Problem, channel: str) -> float:
     """A speed within which the steps of a flight resolve a change of its sign.
 
-    Where friction holds a body, a force that changes sign over a slip speed lets it
-    creep: a slip speed is to be as low as the steps allow.
+    Where a body stops, a force that changes sign over a slip speed is too small for a
+    while: a slip speed is to be as low as the steps allow.
     """
     pieces = problem.pieces
     step = float(np.median(np.asarray(pieces.flown.step)[np.asarray(pieces.exists)]))

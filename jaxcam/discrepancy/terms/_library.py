@@ -20,6 +20,11 @@ def _reference(default: float):
     return eqx.field(default=default, static=True, metadata={"spare": True})
 
 
+# Share of dry friction up to which a push is balanced exactly; over which share that
+# fades away beyond it; a push that is far beyond
+_HELD, _FADE, _MANY = 0.99, 0.5, 1e3
+
+
 class ViscousDamping(Term):
     """Damping proportional to the velocity, `-c1 v`."""
 
@@ -34,10 +39,11 @@ class ViscousDamping(Term):
 
 
 class CoulombFriction(Term):
-    """Dry friction, `-fc sign(v)`.
+    """Dry friction, `-fc sign(v)`, which holds a body that is pushed by less than `fc`.
 
     The sign is `tanh(v / slip)`, so that it can be integrated; `slip` (rad/s) is far
-    below the speeds that friction is told from.
+    below the speeds that friction is told from. Where friction holds, it is moved so
+    that it balances the push at rest: the body does not creep.
     """
 
     name: ClassVar[str] = "coulomb_friction"
@@ -51,7 +57,18 @@ class CoulombFriction(Term):
     slip: float = _reference(References.slip_speed)
 
     def acceleration(self, motion: Motion):
-        return -self.fc * jnp.tanh(motion.velocity / self.slip)
+        share = _share_of(motion.pushed, self.fc)
+        size = jnp.abs(share)
+        # what is pushed by more than its friction changes direction evenly
+        held = jnp.where(size < 1, size, jnp.clip((1 + _FADE - size) / _FADE, 0.0, 1.0))
+        balance = jnp.sign(share) * jnp.arctanh(jnp.minimum(held, _HELD))
+        return -self.fc * jnp.tanh(motion.velocity / self.slip + balance)
+
+
+def _share_of(push, friction):
+    """A push in units of the friction; many of them where there is none."""
+    some = friction > 0
+    return jnp.where(some, push / jnp.where(some, friction, 1.0), _MANY)
 
 
 class QuadraticDrag(Term):

@@ -27,6 +27,7 @@ class Motion(NamedTuple):
     `position` and `velocity` are those of the term's `coordinate`. `phase` is the angle
     that the drive has turned (rad), or time itself without a drive; `rate` the drive's
     speed (rad/s), or one. `state` `(n,)` is zero where a term acts on a surface.
+    `pushed` is the acceleration of the position without any terms.
     """
 
     t: Any
@@ -35,6 +36,7 @@ class Motion(NamedTuple):
     phase: Any
     rate: Any = 1.0
     state: Any = None
+    pushed: Any = 0.0
 
 
 #: stands in units for that of the coordinate that a term acts on

@@ -62,8 +62,9 @@ class WithTerms(HybridSystem):
         """
         place, rate = self.coordinates[coordinate]
         velocity = state[rate] if field is None else field[place]
+        pushed = 0.0 if field is None else field[rate]
         turned = _turned(self.base, t)
-        return Motion(t, state[place], velocity, *turned, state=state)
+        return Motion(t, state[place], velocity, *turned, state, pushed)
 
     def vector_field(self, t, state) -> jax.Array:
         field = self.base.vector_field(t, state)

@@ -110,6 +110,9 @@ def spans(
         if np.sum(valid[rows]) < (_TIED if between else _LEAST):
             before = None
             continue
+        if flight.start.kind == "release":
+            # no piece without samples, where the time of release is uncertain
+            begin = float(time[rows[0]])
         longest = _PIECE
         for name in curved:
             samples = record[name][rows[valid[rows]]]

@@ -32,15 +32,16 @@ def fast_speed(recordings: Sequence[Recording], channel: str) -> float:
 
 
 def usual_acceleration(recordings: Sequence[Recording], channel: str) -> float:
-    """The median size of a channel's second derivative, in its units a second squared.
+    """A size of a channel's second derivative that one sample in ten exceeds.
 
-    Infinite where the records are too short to show it.
+    In its units a second squared; infinite where the records are too short to show it.
     """
     found = []
     for recording in recordings:
         samples = recording[channel]
         if len(samples) >= _WINDOW:
-            bent = savgol_filter(samples, _WINDOW, 2, 2, recording.interval)
+            step = recording.interval
+            bent = np.asarray(savgol_filter(samples, _WINDOW, 2, 2, step))
             found.append(np.abs(bent[np.isfinite(bent)]))
     every = np.concatenate(found) if found else np.empty(0)
-    return float(np.median(every)) if len(every) else math.inf
+    return float(np.quantile(every, 0.9)) if len(every) else math.inf
