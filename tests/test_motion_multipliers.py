@@ -145,7 +145,6 @@ def test_products_of_zeros(kind, sign, zeros):
     _check(trajectory, sign, zeros)
 
 
-@pytest.mark.xfail(strict=True, reason="the flight after the release finds no step")
 def test_release_at_a_triple_zero_after_a_double_one():
     """A force of t^2 (t - 1/4)^3, from rest without a force."""
     zeros = [0.0, 0.0, 0.25, 0.25, 0.25]

@@ -166,10 +166,10 @@ def _release_point(system, t0):
     return jnp.where(nowhere, jnp.nan, point.state), point.time, nowhere
 
 
-def _prepare(system, settings, t0, state, t1):
+def _prepare(system, settings, t0, state, t1, differentiable):
     system = system.prepared()
     functions = Functions(system, state.shape[0], settings.plain)
-    plan = Plan.of(system, settings, t0, t1)
+    plan = Plan.of(system, settings, t0, t1, differentiable=differentiable)
     x = tuple(state[i] for i in range(state.shape[0]))
     carried = first_state(functions, t0, x, t1, plan.longest_step, plan.repeat)
     return functions, plan, carried
@@ -188,7 +188,7 @@ def _reversible(system, settings, t0, state, t1, rows: int):
 
 
 def _of_rows(runner, system, settings, t0, state, t1, rows):
-    functions, plan, carried = _prepare(system, settings, t0, state, t1)
+    functions, plan, carried = _prepare(system, settings, t0, state, t1, True)
     contact = jnp.stack(carried.contact)
     # a start that is refused leads nowhere
     state = jnp.where(carried.status == RUNNING, state, jnp.nan)
@@ -198,7 +198,7 @@ def _of_rows(runner, system, settings, t0, state, t1, rows):
 
 @eqx.filter_jit
 def _begin(system, settings, t0, state, t1, rows):
-    functions, plan, carried = _prepare(system, settings, t0, state, t1)
+    functions, plan, carried = _prepare(system, settings, t0, state, t1, False)
     contact = jnp.stack(carried.contact)
     carried, log = run(functions, plan, carried, rows, "one")
     return carried, log, contact
@@ -206,7 +206,7 @@ def _begin(system, settings, t0, state, t1, rows):
 
 @eqx.filter_jit
 def _go_on(system, settings, t0, state, t1, carried: LoopState, rows):
-    functions, plan, _ = _prepare(system, settings, t0, state, t1)
+    functions, plan, _ = _prepare(system, settings, t0, state, t1, False)
     return run(functions, plan, carried, rows, "one")
 
 

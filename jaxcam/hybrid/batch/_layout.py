@@ -175,7 +175,15 @@ def _start(batched, shared, period, t0, turns, settings, states):
         system = eqx.combine(batched, shared).prepared()
         length = system.period if period is None else period
         t1 = t0 + turns * length
-        plan = Plan.of(system, settings, t0, t1, period=length, stop_period=length)
+        plan = Plan.of(
+            system,
+            settings,
+            t0,
+            t1,
+            period=length,
+            stop_period=length,
+            differentiable=False,
+        )
         return system, plan
 
     if batched is None:

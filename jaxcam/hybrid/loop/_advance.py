@@ -50,9 +50,21 @@ class Plan(NamedTuple):
     tableau: Tableau
     # without what makes the loop fast
     plain: bool
+    # whether a step ends exactly at a release, which only derivatives need: the state
+    # follows by a series over the little time left
+    exact_release: bool
 
     @staticmethod
-    def of(system, settings, t0, t1, *, period=None, stop_period=jnp.inf) -> "Plan":
+    def of(
+        system,
+        settings,
+        t0,
+        t1,
+        *,
+        period=None,
+        stop_period=jnp.inf,
+        differentiable=True,
+    ) -> "Plan":
         """The plan of a run from `t0` to `t1`; `period` is the system's own without."""
         own = system.period
         period = own if period is None else period
@@ -76,6 +88,7 @@ class Plan(NamedTuple):
             depth=settings.chatter_depth,
             tableau=tableau_of(settings.solver),
             plain=settings.plain,
+            exact_release=differentiable,
         )
 
 

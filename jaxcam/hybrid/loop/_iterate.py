@@ -81,8 +81,8 @@ def _iterate(
     converged = ~sticking | ~any_of([~n for n in near])
     held = _judge_contacts(carried, end, landing, judged)
     reached = held.lands & judged.good & ~lands & converged
-    released = reached & carried.locating
-    locates = reached & ~carried.locating
+    locates = reached & ~carried.locating & plan.exact_release
+    released = reached & ~locates
     good = judged.good & ~locates
     good = good & ~(held.retake & sticking & ~lands) & converged
 
