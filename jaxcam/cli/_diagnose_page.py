@@ -76,6 +76,7 @@ _SHAPES = (
     "model (grey) and of the model found (colour), with twice the standard error. A "
     "function that stays within its band of zero is not needed."
 )
+_PARTS = {"flight": "in flight", "impact": "at impacts", "contact": "in contact"}
 _RANKING = "How much worse other explanations are, by their BIC (a logarithmic scale)."
 
 
@@ -230,7 +231,7 @@ def _band(axis, one: Structure, color, label) -> None:
 
 
 def _ranking(plt, found: Diagnosis):
-    pairs = [(name, delta) for name, delta, _ in found.alternatives] or [("none", 0.0)]
+    pairs = [(o.name, o.delta_bic) for o in found.alternatives] or [("none", 0.0)]
     figure, axis = plt.subplots(figsize=(8, 0.35 * len(pairs) + 1.0))
     names = [name.replace("_", " ").replace("+", " + ") for name, _ in pairs]
     axis.barh(names, [max(delta, 0.1) for _, delta in pairs], color=FLIGHT)
@@ -261,6 +262,7 @@ def diagnosis_page(
             f"{effect.delta_bic:.0f}",
             f"{effect.heldout_gain_nats:.0f}",
             "" if effect.inclusion is None else f"{effect.inclusion:.0%}",
+            "" if effect.share is None else f"{effect.share:.1%}",
         )
         for effect in found.effects
     ]
@@ -289,7 +291,15 @@ def diagnosis_page(
         *(f'<p class="note">{escape(note)}</p>' for note in notes),
     ]
     if effects:
-        headings = ("effect", "parameters", "where", "BIC", "unseen (nats)", "redrawn")
+        headings = (
+            "effect",
+            "parameters",
+            "where",
+            "BIC",
+            "held-out (nats)",
+            "bootstrap",
+            "share",
+        )
         parts += [
             "<h2>What is missing</h2>",
             table_html(headings, effects, text=(0, 1, 2)),
@@ -299,6 +309,7 @@ def diagnosis_page(
         f"<p>{found.heldout_before:.3e} {found.unit} before, "
         f"{found.heldout_after:.3e} after; noise and rounding of the sensor are "
         f"{found.noise_floor:.3e}.</p>",
+        *_misfit(found),
         *(figure_html(file, caption) for file, caption in figures),
     ]
     if found.caveats:
@@ -306,6 +317,20 @@ def diagnosis_page(
             f"<li>{escape(caveat.sentence)}</li>" for caveat in found.caveats
         )
         parts += ["<h2>Caveats</h2>", f"<ul>{items}</ul>"]
+    if found.alternatives:
+        others = [
+            (
+                one.name.replace("_", " ").replace("+", " + "),
+                f"{one.delta_bic:+.3g}",
+                one.reason,
+            )
+            for one in found.alternatives
+        ]
+        parts += [
+            "<h2>Other explanations</h2>",
+            table_html(("terms", "BIC", "why not"), others, text=(0, 2)),
+            '<p class="note">BIC above that of the verdict.</p>',
+        ]
     for one in outlook.tables():
         parts += [
             f"<h2>{one.title}</h2>",
@@ -334,6 +359,14 @@ def diagnosis_page(
         f"<title>{escape(title)}</title>\n<style>{STYLE}</style>\n</head>\n"
         "<body>\n" + "\n".join(parts) + "\n</body>\n</html>\n"
     )
+
+
+def _misfit(found: Diagnosis) -> list[str]:
+    """Where the misfit of the textbook model is, in a sentence."""
+    if not found.misfit:
+        return []
+    said = listed(f"{share:.0%} {_PARTS[part]}" for part, share in found.misfit.items())
+    return [f"<p>What the textbook model does not explain is {said}.</p>"]
 
 
 def _title(found: Diagnosis) -> str:

@@ -174,6 +174,8 @@ def _questions(found: Diagnosis, asked) -> dict[str, list[str]]:
         part
         for other in found.alternatives
         if other.delta_bic < found.policy.rival
+        # one more term in addition to those named is no rival of them
+        and not (named and set(named) <= set(other.terms))
         for part in other.terms
         if part in own
     }

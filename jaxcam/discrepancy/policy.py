@@ -238,6 +238,11 @@ class Policy:
     absent_errors: float = _shows(
         10.0, "standard errors that an event speed counts which no longer exists"
     )
+    visited: float = _shows(
+        0.1,
+        "share of an even density of data that a place must have for a function to be "
+        "shown there",
+    )
     shape_points: int = _shows(48, "points at which a free function is shown")
     alternatives: int = _shows(8, "alternatives that are listed")
 

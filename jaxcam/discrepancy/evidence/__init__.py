@@ -1,12 +1,17 @@
 """How sure a verdict is: bootstrap, held-out records, what is left over, limits."""
 
-from ._choice import Choice as Choice, choose as choose
+from ._choice import Choice as Choice, choose as choose, Outside as Outside
 from ._held_out import HeldOut as HeldOut, rms_of as rms_of
 from ._limits import Limit as Limit, limits as limits
 from ._redrawn import Needs as Needs
 from ._ripple import Ripple as Ripple, ripple_of as ripple_of
+from ._shares import (
+    misfit_by_part as misfit_by_part,
+    Shares as Shares,
+    shares as shares,
+)
 from ._structure import (
     Form as Form,
-    ranges_of as ranges_of,
     Structure as Structure,
 )
+from ._visited import Visited as Visited, visited as visited

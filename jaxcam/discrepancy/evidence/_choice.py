@@ -1,13 +1,37 @@
 """The subset that is named, once it has been doubted."""
 
 import dataclasses
+from typing import NamedTuple
 
-from ..search import FreeSearch, Missing, Question, Search, Trial, Trials
+from ...fitting import Fit
+from ..search import (
+    FreeSearch,
+    Missing,
+    Question,
+    Search,
+    Trial,
+    Trials,
+    within_tolerances,
+)
 from ..terms import families
+from ._beyond_tolerance import acting_alike, Beyond, beyond_tolerance
 from ._held_out import held_out, HeldOut
 from ._masked import unmasked
 from ._redrawn import Needs, needs, redrawn, sure
-from ._structure import ranges_of, Structure, structures
+from ._structure import Structure, structures
+from ._visited import visited
+
+
+class Outside(NamedTuple):
+    """A parameter outside its tolerance, and the term named in its place.
+
+    `term` is empty where no term acts like the parameter; `lost` is the growth of the
+    cost where neither the term nor the excess is allowed.
+    """
+
+    parameter: Beyond
+    term: str = ""
+    lost: float = 0.0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -20,6 +44,7 @@ class Choice:
         keep them; `needed`: those that are named all the same.
     - `masked`: terms that were dropped, with their shares of what is explained, because
         the corner of another one leaves as much.
+    - `beyond`: parameters of the rig that are outside their tolerances.
     - `missing`: functions without a name that explain more than terms that have one;
         `needs`: how much they are needed, by their labels.
     - `left_before`, `left_after`: structures in the residuals of `before` and `best`.
@@ -36,6 +61,7 @@ class Choice:
     left_after: list[Structure]
     held: HeldOut
     masked: list[tuple[str, float]] = dataclasses.field(default_factory=list)
+    beyond: list[Outside] = dataclasses.field(default_factory=list)
     missing: Missing | None = None
     needs: Needs | None = None
 
@@ -71,6 +97,12 @@ def choose(question: Question, trials: Trials, seed: int) -> Choice:
                 best, left_after, held = found, with_all, whole
                 needed, doubtful = doubtful, []
                 inclusion, deviation = redrawn(trials, best, seed)
+    beyond, best = _instead(trials, best, deviation)
+    replaced = [one for one in beyond if one.term]
+    if replaced:
+        # the textbook model has its parameters where the rig file allows them
+        before = dataclasses.replace(before, fit=_bounded(trials, before, best))
+        inclusion |= {one.term: one.parameter.chance for one in replaced}
     missing, needed_parts = None, None
     left = [one for one in left_after if one.significant]
     if left and trials.policy.functions:
@@ -93,9 +125,35 @@ def choose(question: Question, trials: Trials, seed: int) -> Choice:
         left_after,
         held,
         masked,
+        beyond,
         missing,
         needed_parts,
     )
+
+
+def _instead(trials: Trials, best: Trial, deviation) -> tuple[list[Outside], Trial]:
+    """Parameters outside their tolerances, and terms named in their place.
+
+    **Returns:** these, and the fit with the terms.
+    """
+    found = []
+    for one in beyond_tolerance(trials, best, deviation):
+        outside = Outside(one)
+        for name in acting_alike(trials, best, one.name):
+            trial = trials.attempt(best.names | {name}, best, trials.policy.iterations)
+            # the term takes up the excess: the parameter is back in its tolerance
+            if trial is None or not one.low <= trial.fit[one.name].value <= one.high:
+                continue
+            lost = _bounded(trials, best, trial).cost - trial.fit.cost
+            outside, best = Outside(one, name, lost), trial
+            break
+        found.append(outside)
+    return found, best
+
+
+def _bounded(trials: Trials, less: Trial, best: Trial) -> Fit:
+    """A fit with the parameters of the rig held within their tolerances."""
+    return within_tolerances(less.fit, best.fit, trials.rig, trials.policy)
 
 
 def _without_a_name(
@@ -111,7 +169,7 @@ def _without_a_name(
     if best.names and max(one.gain for one in left) < small:
         return None, None
     problem = question.problem
-    positions, velocities, approach, duration = ranges_of(problem, policy)
+    positions, velocities, approach, duration = visited(problem).ranges(policy)
     search = FreeSearch(
         problem,
         question.rig,

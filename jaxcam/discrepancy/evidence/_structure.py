@@ -26,12 +26,11 @@ from ..search import (
     Response,
 )
 from ..terms import Shape, shapes, Term, terms_of, Where
+from ._visited import Visited, visited
 
 
 # A standard error that may be zero is at least this
 _TINY = 1e-300
-# Approach speed at the end of a range in which there is no impact
-_SLOWEST = 1e-3
 
 
 class Form(enum.StrEnum):
@@ -114,13 +113,13 @@ def structures(
     are no verdicts, the periodogram of what is left, whether there is a drive, the
     constants of forms, the unit of the motion, and the policy.
     """
-    problem = found.problem
+    problem, seen = found.problem, visited(found.problem)
     more: tuple[Term, ...] = (
         *unlisted,
         *(
             dataclasses.replace(shape, motion_unit=unit)
             for shape in shapes(
-                *ranges_of(problem, policy), turned=turned, references=references
+                *seen.ranges(policy), turned=turned, references=references
             )
         ),
     )
@@ -140,7 +139,7 @@ def structures(
             own = blocks.rows([p.name for p in term.parameters(place + k)])
             grown = added_gain(information, score, free, own, policy.alike)
             threshold = _threshold(len(own), problem.samples, tests, policy)
-            shape = _shape(term, blocks, information, score, free, own, policy)
+            shape = _shape(term, blocks, information, score, free, own, seen, policy)
             predicted = math.inf
             if grown > threshold:
                 predicted = predicted_gain(blocks, free, own, policy)
@@ -171,7 +170,14 @@ def structures(
 
 
 def _shape(
-    term: Term, blocks: Blocks, information, score, free, own, policy: Policy
+    term: Term,
+    blocks: Blocks,
+    information,
+    score,
+    free,
+    own,
+    seen: Visited,
+    policy: Policy,
 ) -> dict[str, Any]:
     """What a shape looks like, once it is fitted."""
     if not isinstance(term, Shape):
@@ -183,7 +189,7 @@ def _shape(
     covariance = covariance[np.ix_(pick, pick)]
     if not np.isfinite(covariance).all():
         return {}
-    return _function(term, step[pick] * scale, covariance, scale, policy)
+    return _function(term, step[pick] * scale, covariance, scale, seen, policy)
 
 
 def _threshold(
@@ -196,9 +202,13 @@ def _threshold(
 
 
 def _function(
-    term: Shape, coefficients, covariance, scale, policy: Policy
+    term: Shape, coefficients, covariance, scale, seen: Visited, policy: Policy
 ) -> dict[str, Any]:
+    """The function where there are data; elsewhere its polynomials mean nothing."""
     grid = np.linspace(*term.ends, policy.shape_points)
+    grid = grid[seen.near(term.variable, grid, policy)]
+    if not len(grid):
+        return {}
     basis = np.asarray(jax.vmap(term.basis)(grid))
     spread = basis * scale
     error = np.sqrt(np.maximum(np.einsum("kp,pq,kq->k", spread, covariance, spread), 0))
@@ -268,25 +278,4 @@ def _coloured(found: Fit, tests: int, policy: Policy) -> Structure:
         (math.sqrt(max(chance, bic)) + policy.beyond) ** 2,
         1,
         form=Form.COLOURED,
-    )
-
-
-def ranges_of(problem: Problem, policy: Policy):
-    """Least and largest position, velocity and approach speed, and the duration."""
-    states = np.asarray(problem.start.states)[np.asarray(problem.pieces.exists)]
-    place, rate = problem.model.system.coordinates[0]  # pyright: ignore
-    channels = [n for n, s in problem.model.sensors.items() if s.observe == place]
-    position, velocity = states[:, place], states[:, rate]
-    if channels:
-        name = channels[0]
-        position = np.concatenate([p.recording[name] for p in problem.segments])
-    speeds = np.concatenate([part.impacts.approach for part in problem.segments])
-    speeds = speeds[np.isfinite(speeds) & (speeds > 0)]
-    top = float(np.max(speeds, initial=_SLOWEST))
-    tail = policy.velocity_tail
-    return (
-        (float(position.min()), float(position.max())),
-        (float(np.quantile(velocity, tail)), float(np.quantile(velocity, 1 - tail))),
-        (0.0, top),
-        max(part.recording.duration for part in problem.segments),
     )

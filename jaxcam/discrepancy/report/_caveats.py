@@ -4,9 +4,9 @@ import dataclasses
 import enum
 from collections.abc import Iterator
 
-from ..evidence import Choice, HeldOut, rms_of
+from ..evidence import Choice, HeldOut, Outside, rms_of
 from ..search import Trial, Trials
-from ._words import listed
+from ._words import listed, number, quantity
 
 
 class Reason(enum.StrEnum):
@@ -20,6 +20,8 @@ class Reason(enum.StrEnum):
     TIE = "tie"
     NOT_SHARED = "not shared by the records"
     POOR_PREDICTION = "poor prediction"
+    ABOVE_NOISE = "above the noise"
+    BEYOND_TOLERANCE = "beyond tolerance"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -52,6 +54,8 @@ def caveats_of(
         yield _masked(choice, name, share)
     for name, share in choice.needed:
         yield _named_in_doubt(trials, name, share)
+    for outside in choice.beyond:
+        yield _beyond(outside)
     if not trials.settled(choice.found):
         yield _far(trials)
     for trial in ties:
@@ -67,8 +71,20 @@ def caveats_of(
             f"they were recorded.",
         )
     held = choice.held
-    if named and held.after > max(held.before, trials.policy.as_noise):
-        yield poor_prediction(held)
+    if held.after > trials.policy.as_noise:
+        yield above_noise(held, named)
+
+
+def above_noise(held: HeldOut, named: bool) -> Caveat:
+    """That held-out data are not predicted to within the noise, and why that may be."""
+    if named and held.after > held.before:
+        return poor_prediction(held)
+    return Caveat(
+        Reason.ABOVE_NOISE,
+        f"On held-out data the model still misses by {held.after:.2g} times the noise "
+        f"of the sensors (the textbook model: {held.before:.2g}): it is not complete, "
+        f"or the noise is larger than stated.",
+    )
 
 
 def poor_prediction(held: HeldOut) -> Caveat:
@@ -106,6 +122,27 @@ def _in_doubt(trials: Trials, name: str, share: float) -> Caveat:
         Reason.IN_DOUBT,
         f"A term for {name.replace('_', ' ')} gains something, but "
         f"{_against(trials, share)}; record more before you believe it.",
+        (name,),
+    )
+
+
+def _beyond(outside: Outside) -> Caveat:
+    """That a parameter is outside its tolerance, or that a term was named instead."""
+    one, name = outside.parameter, outside.term
+    label = one.name.replace("_", " ")
+    said = number(one.value, one.stderr, one.unit)
+    ends = f"{one.low:.4g} to {quantity(f'{one.high:.4g}', one.unit)}"
+    if not name:
+        return Caveat(
+            Reason.BEYOND_TOLERANCE,
+            f"The fitted {label} is {said}, outside its tolerance ({ends}): correct "
+            f"the rig file if it may be so, or look for something that acts like it.",
+        )
+    return Caveat(
+        Reason.BEYOND_TOLERANCE,
+        f"The records show the sum of {label} and {name.replace('_', ' ')}, {said}. "
+        f"The tolerance allows {ends}; what is beyond it is named, and its strength is "
+        f"known only as well as the tolerance.",
         (name,),
     )
 

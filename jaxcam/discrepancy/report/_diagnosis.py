@@ -26,12 +26,14 @@ class Verdict(enum.StrEnum):
 class Alternative(NamedTuple):
     """Another subset of terms, and how much worse its BIC is.
 
-    `name` puts the names of its `terms` together, or is `"none"`.
+    `name` puts the names of its `terms` together, or is `"none"`; `reason` says why it
+    was not named.
     """
 
     name: str
     delta_bic: float
     terms: tuple[str, ...]
+    reason: str = ""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -45,6 +47,8 @@ class Effect:
     - `heldout_gain_nats`: log-likelihood gained on data that no parameter has seen.
     - `inclusion`: part of the redrawn data sets in which it would be named; `None`
         where that was not asked, of what is unknown and has no function.
+    - `share`: part of what is missing that it explains; `None` for the drive, which is
+        judged by its own channel. Of what is unknown, the part that nothing explains.
     """
 
     name: str
@@ -57,6 +61,7 @@ class Effect:
     heldout_gain_nats: float
     inclusion: float | None
     term: bool = True
+    share: float | None = None
 
     def to_json(self) -> dict[str, Any]:
         return {
@@ -74,6 +79,7 @@ class Effect:
                 "heldout_gain_nats": self.heldout_gain_nats,
                 "inclusion": self.inclusion,
             },
+            "share": self.share,
         }
 
 
@@ -98,6 +104,8 @@ class Diagnosis:
     - `policy`: by which it was decided.
     - `missing`: what has no name, as functions that were fitted with the rig; `after`
         is the model with them.
+    - `misfit`: shares of what the textbook model leaves unexplained that are in
+        `"flight"`, at an `"impact"` and in `"contact"`; empty where it is noise.
     """
 
     case: str
@@ -122,6 +130,7 @@ class Diagnosis:
     caveats: tuple[Caveat, ...]
     policy: Policy = Policy()
     missing: tuple[MissingFunction, ...] = ()
+    misfit: dict[str, float] = dataclasses.field(default_factory=dict)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -170,7 +179,11 @@ class Diagnosis:
             "verdict": self.verdict,
             "effects": [effect.to_json() for effect in self.effects],
             "alternatives": [
-                {"name": one.name, "delta_bic_to_best": one.delta_bic}
+                {
+                    "name": one.name,
+                    "delta_bic_to_best": one.delta_bic,
+                    "reason": one.reason,
+                }
                 for one in self.alternatives
             ],
             "missing": [one.to_json() for one in self.missing],

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from ...fitting import Fit
-from ..evidence import Choice, Needs, Ripple
+from ..evidence import Choice, Needs, Ripple, Shares
 from ..policy import Policy
 from ..search import Blocks, blocks_of, Missing, Trials, value_of
 from ..terms import DriveRipple, Term, Value
@@ -15,22 +15,33 @@ from ._diagnosis import Effect, Verdict
 from ._missing import MissingFunction, sentence_of
 
 
-def term_effects(trials: Trials, choice: Choice) -> list[Effect]:
-    """The terms that are named, in the order of their names."""
+def term_effects(
+    trials: Trials, choice: Choice, share: Mapping[str, float]
+) -> list[Effect]:
+    """The terms that are named, in the order of their names.
+
+    **Arguments:** `share`, the part of what is missing that each of them explains.
+    """
     best, blocks = choice.best, trials.blocks(choice.best)
+    instead = {one.term: one.lost for one in choice.beyond if one.term}
     found = []
     for name in sorted(best.names):
         less = trials.known.get(best.names - {name}, choice.before)
+        delta = best.bic - less.bic
+        if name in instead:
+            delta = trials.count([name]) * math.log(trials.problem.samples)
+            delta -= instead[name]
         found.append(
             _of_term(
                 trials.term(name),
                 best.fit,
                 blocks,
                 choice.deviation,
-                best.bic - less.bic,
+                delta,
                 choice.held.total,
                 choice.inclusion[name],
                 trials.policy,
+                share[name],
             )
         )
     return found
@@ -42,6 +53,7 @@ def missing_effects(
     missing: Missing,
     needs: Needs,
     choice: Choice,
+    divided: Shares,
 ) -> list[Effect]:
     """What has no name, all functions together, and the terms named beside it."""
     fitted, held, policy = missing.fit, choice.held.total, trials.policy
@@ -63,6 +75,7 @@ def missing_effects(
         held,
         min(needs.inclusion[label] for label in labels),
         term=False,
+        share=sum(divided.of[label] for label in labels),
     )
     return [whole] + [
         _of_term(
@@ -74,6 +87,7 @@ def missing_effects(
             held,
             needs.inclusion[name],
             policy,
+            divided.of[name],
         )
         for name in sorted(missing.names)
     ]
@@ -93,6 +107,7 @@ def _of_term(
     gained: float,
     inclusion: float,
     policy: Policy,
+    share: float,
 ) -> Effect:
     strengths = term.strengths()
     parameters = {
@@ -113,6 +128,7 @@ def _of_term(
         delta_bic,
         gained,
         inclusion,
+        share=share,
     )
 
 
@@ -153,8 +169,8 @@ def drive_effect(ripple: Ripple, policy: Policy) -> Effect:
     )
 
 
-def unknown_effect(trials: Trials, choice: Choice) -> Effect:
-    """What is left over and has no name."""
+def unknown_effect(trials: Trials, choice: Choice, share: float) -> Effect:
+    """What is left over and has no name; `share` of what is missing."""
     first, problem = choice.unexplained[0], trials.problem
     return Effect(
         Verdict.UNKNOWN,
@@ -167,4 +183,5 @@ def unknown_effect(trials: Trials, choice: Choice) -> Effect:
         choice.held.total,
         None,
         term=False,
+        share=share,
     )

@@ -8,7 +8,7 @@ from ..policy import Policy
 from ..search import Trial
 from ._diagnosis import Effect, Verdict
 from ._missing import MissingFunction
-from ._words import listed, number, quantity
+from ._words import listed, number, percent, quantity
 
 
 # A standard error that may be zero is at least this
@@ -34,20 +34,29 @@ def summary_of(
         return _nothing(choice, least, policy)
     named = [effect for effect in effects if effect.term]
     parts = []
+    several = len([one for one in effects if one.share is not None]) > 1
     for effect in named:
         values = ", ".join(
             f"{name} = {number(v.value, v.stderr, v.unit)}"
             for name, v in effect.parameters.items()
         )
-        parts.append(f"{effect.sentence} ({values}; {effect.region})")
+        share = (
+            f"{percent(effect.share)} of the misfit; "
+            if several and effect.share
+            else ""
+        )
+        parts.append(f"{effect.sentence} ({share}{values}; {effect.region})")
     if verdict is Verdict.EFFECT:
         moved = _moved(choice.best, within, rig, policy)
         return f"The model lacks {' and '.join(parts)}.{moved}"
     what = effects[0]
-    more = f" It resembles {listed(e.name for e in named)} in part." if named else ""
+    acts = f"it acts like {what.sentence}, {what.region}."
+    explained = sum(effect.share or 0.0 for effect in named)
+    if not explained:
+        return f"Something is missing that is none of the known effects: {acts}"
     return (
-        "Something is missing that is none of the known effects: it acts like "
-        f"{what.sentence}, {what.region}.{more}"
+        f"{percent(explained)} of what is missing is {' and '.join(parts)}. What is "
+        f"left ({percent(1 - explained)}) is none of the known effects: {acts}"
     )
 
 

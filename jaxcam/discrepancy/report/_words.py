@@ -18,3 +18,12 @@ def quantity(text: str, unit: str) -> str:
 def number(value: float, stderr: float, unit: str) -> str:
     """A number with its standard error and unit."""
     return quantity(f"{value:.4g} +- {stderr:.1g}", unit)
+
+
+def percent(share: float) -> str:
+    """A share as an engineer writes it: never more digits than it has."""
+    if 0 < share < 0.01:
+        return "less than 1 %"
+    if 0.99 < share < 1:
+        return "more than 99 %"
+    return f"{100 * share:.0f} %"

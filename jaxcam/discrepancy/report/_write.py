@@ -3,15 +3,27 @@
 from collections.abc import Iterator, Mapping
 
 from ...fitting import Fit
-from ..evidence import Choice, HeldOut, limits, Needs, ranges_of, Ripple, rms_of
+from ..evidence import (
+    Choice,
+    HeldOut,
+    limits,
+    misfit_by_part,
+    Needs,
+    Ripple,
+    rms_of,
+    Shares,
+    shares,
+    visited,
+)
 from ..policy import Policy
-from ..search import Missing, Question, Trial, Trials, within_tolerances
+from ..search import Missing, Question, Trials, within_tolerances
 from ..terms import Value
+from ._alternatives import alternatives_of, fitted_alternatives
 from ._caveats import (
+    above_noise,
     Caveat,
     caveats_of,
     functions_fall_short,
-    poor_prediction,
     small_remainder,
 )
 from ._diagnosis import Alternative, Diagnosis, Verdict
@@ -38,14 +50,15 @@ def diagnosis_of(
         return _of_functions(
             case, question, trials, choice, choice.missing, choice.needs, ripple
         )
-    effects = term_effects(trials, choice)
+    divided = _shares_of(trials, choice)
+    effects = term_effects(trials, choice, divided.of)
     if ripple is not None and ripple.significant(len(trials.terms) + 1, policy):
         effects.append(drive_effect(ripple, policy))
     named = bool(effects)
     verdict, caveats = _verdict(choice, named, policy.small)
     if verdict is Verdict.UNKNOWN:
-        effects.insert(0, unknown_effect(trials, choice))
-    others = _others(trials, best, policy.alternatives)
+        effects.insert(0, unknown_effect(trials, choice, divided.left))
+    others = fitted_alternatives(trials, best)[: policy.alternatives]
     ties = [trial for trial in others if abs(trial.bic - best.bic) < policy.tie]
     caveats += caveats_of(trials, choice, ties, bool(effects))
     floor = float(next(iter(question.problem.model.sensors.values())).floor)
@@ -56,7 +69,7 @@ def diagnosis_of(
         case,
         verdict,
         tuple(effects),
-        tuple(_alternative(trial, best) for trial in others),
+        alternatives_of(trials, choice),
         held.before * floor,
         held.after * floor,
         floor,
@@ -78,7 +91,23 @@ def diagnosis_of(
         {name: one.hidden for name, one in least.items()},
         tuple(caveats),
         policy,
+        misfit=misfit_by_part(choice.before.fit),
     )
+
+
+def _shares_of(trials: Trials, choice: Choice) -> Shares:
+    """What each named term explains of the misfit, and what nothing explains."""
+    best, before = choice.best, choice.before
+    instead = {one.term: one.lost for one in choice.beyond if one.term}
+    lost = {
+        name: instead.get(
+            name,
+            trials.known.get(best.names - {name}, before).fit.cost - best.fit.cost,
+        )
+        for name in best.names
+    }
+    left = max((one.gain for one in choice.unexplained), default=0.0)
+    return shares(before.fit, best.fit, lost, left)
 
 
 def _of_functions(
@@ -92,10 +121,11 @@ def _of_functions(
 ) -> Diagnosis:
     """The diagnosis where functions without a name were found."""
     policy, held, found = trials.policy, choice.held, missing.fit
-    positions, velocities, _, _ = ranges_of(question.problem, policy)
+    positions, velocities, _, _ = visited(question.problem).ranges(policy)
     functions = missing_functions(missing, velocities, positions, policy.shape_points)
     bare = choice.before
-    effects = missing_effects(trials, functions, missing, needs, choice)
+    divided = shares(bare.fit, found, needs.lost, 0.0)
+    effects = missing_effects(trials, functions, missing, needs, choice, divided)
     if ripple is not None and ripple.significant(len(trials.terms) + 1, policy):
         effects.append(drive_effect(ripple, policy))
     floor = float(next(iter(question.problem.model.sensors.values())).floor)
@@ -106,9 +136,13 @@ def _of_functions(
         Verdict.UNKNOWN,
         tuple(effects),
         tuple(
-            Alternative(one.name, trial.bic - missing.score, one.terms)
+            Alternative(
+                "+".join(sorted(trial.names)) or "none",
+                trial.bic - missing.score,
+                tuple(sorted(trial.names)),
+                "named terms alone explain less than the function",
+            )
             for trial in others[: policy.alternatives]
-            for one in [_alternative(trial, trial)]
         ),
         held.before * floor,
         held.after * floor,
@@ -130,6 +164,7 @@ def _of_functions(
         tuple(_doubts_of(missing, held, policy)),
         policy,
         functions,
+        misfit_by_part(bare.fit),
     )
 
 
@@ -138,8 +173,8 @@ def _doubts_of(missing: Missing, held: HeldOut, policy: Policy) -> Iterator[Cave
     left = rms_of(missing.fit)
     if left > policy.as_noise:
         yield functions_fall_short(left)
-    if held.after > max(held.before, policy.as_noise):
-        yield poor_prediction(held)
+    elif held.after > policy.as_noise:
+        yield above_noise(held, True)
 
 
 def _verdict(choice: Choice, named: bool, small: float) -> tuple[Verdict, list[Caveat]]:
@@ -151,21 +186,6 @@ def _verdict(choice: Choice, named: bool, small: float) -> tuple[Verdict, list[C
     if choice.best.names and left < small * explained:
         return Verdict.EFFECT, [small_remainder(choice, left / explained)]
     return Verdict.UNKNOWN, []
-
-
-def _others(trials: Trials, best: Trial, most: int) -> list[Trial]:
-    """Other subsets, the best first; a superset is the same explanation with more."""
-    found = [
-        trial
-        for names, trial in trials.known.items()
-        if names != best.names and not names > best.names
-    ]
-    return sorted(found, key=lambda trial: trial.bic - best.bic)[:most]
-
-
-def _alternative(trial: Trial, best: Trial) -> Alternative:
-    terms = tuple(sorted(trial.names))
-    return Alternative("+".join(terms) or "none", trial.bic - best.bic, terms)
 
 
 def _rig_values(

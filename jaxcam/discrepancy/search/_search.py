@@ -49,7 +49,20 @@ class Search:
                 break
         if self.trials.settled(best):
             return self._swapped(self._smallest(best))
-        return best if best.fit.cost < self.policy.explains * bare.fit.cost else bare
+        if best.fit.cost < self.policy.explains * bare.fit.cost:
+            return best
+        return self._sound(bare)
+
+    def _sound(self, bare: Trial) -> Trial:
+        """The best subset whose fit can be judged, where the best of all cannot.
+
+        A candidate on which fits do not end must not hide one on which they do.
+        """
+        sound = [one for one in self.trials.known.values() if self.trials.settled(one)]
+        best = min(sound, key=_bic, default=bare)
+        if not best.names or best.bic >= bare.bic:
+            return bare
+        return self._swapped(self._smallest(best))
 
     def _leads(self, before: Trial, best: Trial) -> bool:
         """Whether to look for more; far from the data only where terms help a lot."""

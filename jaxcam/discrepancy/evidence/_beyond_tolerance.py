@@ -1,0 +1,92 @@
+"""Parameters of a rig that a fit finds outside the tolerances stated for them.
+
+The tolerance says where a parameter can be. What the data put beyond it is something
+that acts like the parameter, or a rig file that is wrong.
+"""
+
+import math
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+from scipy.stats import norm
+
+from ...fitting.engine import invert_information
+from ..search import Trial, Trials
+
+
+class Beyond(NamedTuple):
+    """A parameter outside its tolerance.
+
+    - `value`, `stderr`, `unit`: of the fit; `low`, `high`: the ends of the tolerance.
+    - `excess`: distance beyond the nearer end, positive.
+    - `chance`: share of the bootstrap distribution that is beyond it.
+    """
+
+    name: str
+    value: float
+    stderr: float
+    unit: str
+    low: float
+    high: float
+    excess: float
+    chance: float
+
+
+def beyond_tolerance(trials: Trials, best: Trial, deviation) -> list[Beyond]:
+    """The rig's parameters that are surely outside their tolerances, furthest first.
+
+    **Arguments:** the fit of the terms that are named, and the standard deviations of
+    its parameters over the bootstrap samples, by name.
+    """
+    found = []
+    for name in trials.rig:
+        parameter = trials.problem.parameter(name)
+        if not math.isfinite(parameter.tolerance) or parameter.per_record:
+            continue
+        nominal = parameter.nominal
+        if nominal is None:
+            place = trials.problem.names.index(name)
+            nominal = float(np.asarray(trials.problem.start.values)[0, place])
+        one = best.fit[name]
+        stderr = max(one.stderr, deviation.get(name, 0.0))
+        low, high = nominal - parameter.tolerance, nominal + parameter.tolerance
+        excess = max(one.value - high, low - one.value)
+        level = norm.isf(trials.policy.false_alarms / (2 * len(trials.rig)))
+        if math.isfinite(stderr) and excess > level * stderr:
+            chance = float(norm.cdf(excess / max(stderr, 1e-300)))
+            found.append(
+                Beyond(name, one.value, stderr, one.unit, low, high, excess, chance)
+            )
+    return sorted(found, key=lambda one: -one.excess / one.stderr)
+
+
+def acting_alike(trials: Trials, best: Trial, name: str) -> Iterator[str]:
+    """Terms that the data cannot tell from a parameter of the rig.
+
+    A term is alike where next to nothing of its information is left once that parameter
+    is free, though most of it is left beside all the other ones.
+    """
+    blocks = trials.blocks(best)
+    information = np.sum(blocks.information, axis=0)
+    free = blocks.rows(trials.parameters(best.names))
+    own = blocks.rows([name])
+    others = np.setdiff1d(free, own)
+    for term in trials.terms:
+        strengths = term.strengths()
+        if term.name in best.names or len(strengths) != 1 or strengths[0].inner:
+            continue
+        row = int(blocks.rows([strengths[0].name])[0])
+        alone = _left(information, row, others)
+        if alone > trials.policy.untold * information[row, row]:
+            beside = _left(information, row, free)
+            if beside < trials.policy.untold * alone:
+                yield term.name
+
+
+def _left(information, row: int, free) -> float:
+    """Information of one number beside others."""
+    free = free[np.diag(information)[free] > 0]
+    inside = invert_information(information[np.ix_(free, free)])
+    across = information[row, free]
+    return float(information[row, row] - across @ inside @ across)

@@ -1,0 +1,83 @@
+"""Shares of the misfit: of what explains it, and of the parts of a motion it is in."""
+
+import math
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from ...fitting import Fit
+from ...fitting.engine import FLIGHT, IMPACT
+
+
+# Standard deviations of a cost beyond which it is more than noise makes it
+_CHANCE = 3.0
+
+
+class Shares(NamedTuple):
+    """Shares of what the textbook model leaves unexplained; together they are one.
+
+    - `of`: the share of each named term or function, by its label.
+    - `left`: the share that nothing explains.
+    """
+
+    of: dict[str, float]
+    left: float
+
+
+def shares(before: Fit, after: Fit, lost: Mapping[str, float], left: float) -> Shares:
+    """Divide the misfit of a model among what explains it.
+
+    What all parts explain together is the fall of the cost from `before` to `after`; it
+    is divided in proportion to what is lost without each of them.
+
+    **Arguments:** fits without and with what was found; growth of the cost without each
+    part; what a further function would still gain (0 where nothing is left over).
+    """
+    samples = after.problem.samples
+    surplus = after.cost - samples - _CHANCE * math.sqrt(2 * samples)
+    left = max(left, surplus, 0.0)
+    explained = max(before.cost - after.cost, 0.0)
+    whole = explained + left
+    if not whole > 0 or not math.isfinite(whole):
+        return Shares(dict.fromkeys(lost, 0.0), 0.0)
+    weights = {name: max(value, 0.0) for name, value in lost.items()}
+    total = sum(weights.values())
+    if not total > 0:
+        weights, total = dict.fromkeys(lost, 1.0), float(max(len(lost), 1))
+    part = explained / whole
+    return Shares(
+        {name: part * value / total for name, value in weights.items()},
+        left / whole if lost else 1.0,
+    )
+
+
+def misfit_by_part(found: Fit) -> dict[str, float]:
+    """Shares of a misfit that are in flights, impacts and contacts, by their names.
+
+    The misfit of a part is its cost above what noise makes of it: one a sample, and one
+    a component of a joint. Empty where no part has more than chance explains.
+    """
+    pieces, costs = found.problem.pieces, found.costs
+    exists = np.asarray(pieces.exists)
+    joint, joints = np.asarray(pieces.joint), np.asarray(costs.joints)
+    size = found.problem.start.states.shape[-1]
+    inside, met = exists & (joint == FLIGHT), exists & (joint == IMPACT)
+    flown = int(np.sum(np.asarray(pieces.flown.known)))
+    rested = int(np.sum(np.asarray(pieces.rested.known)))
+    # the state of a piece takes up as many samples as it has components
+    parts = {
+        "flight": (
+            float(np.sum(np.asarray(costs.flown)[exists]) + np.sum(joints[inside])),
+            flown - size * int(np.sum(exists & ~inside)),
+        ),
+        "impact": (float(np.sum(joints[met])), (size + 1) * int(np.sum(met))),
+        "contact": (float(np.nansum(np.asarray(costs.rested))), rested),
+    }
+    excess = {
+        name: cost - number
+        for name, (cost, number) in parts.items()
+        if number > 0 and cost - number > _CHANCE * math.sqrt(2 * number)
+    }
+    total = sum(excess.values())
+    return {name: value / total for name, value in excess.items()} if excess else {}

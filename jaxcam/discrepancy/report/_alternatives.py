@@ -1,0 +1,96 @@
+"""Other explanations, the best first, each with the reason why it was not named."""
+
+import math
+from collections.abc import Iterator
+
+from ..evidence import Choice
+from ..search import added_gain, Trial, Trials
+from ._diagnosis import Alternative
+
+
+def fitted_alternatives(trials: Trials, best: Trial) -> list[Trial]:
+    """Other subsets that were fitted, the best first.
+
+    A subset that contains the one chosen is the same explanation with more in it.
+    """
+    found = [
+        trial
+        for names, trial in trials.known.items()
+        if names != best.names and not names > best.names
+    ]
+    return sorted(found, key=lambda trial: trial.bic - best.bic)
+
+
+def alternatives_of(trials: Trials, choice: Choice) -> tuple[Alternative, ...]:
+    """Everything that was considered in the place of what was chosen, ranked by BIC.
+
+    Subsets that were fitted, each term in addition to those chosen, and single terms
+    that promised too little to be fitted.
+    """
+    best = choice.best
+    found = [
+        Alternative(_name(trial), trial.bic - best.bic, _terms(trial), reason)
+        for trial in fitted_alternatives(trials, best)
+        for reason in [_worse(trials, choice, trial)]
+    ]
+    found += _additions(trials, choice)
+    found.sort(key=lambda one: one.delta_bic)
+    most = trials.policy.alternatives
+    # a single term is never left out for the many subsets that contain it
+    singles = [one for one in found[most:] if len(one.terms) == 1]
+    return (*found[:most], *singles)
+
+
+def _additions(trials: Trials, choice: Choice) -> Iterator[Alternative]:
+    """Each further term next to those chosen, by what its score promises."""
+    best, price = choice.best, math.log(trials.problem.samples)
+    blocks = trials.blocks(best)
+    information, score = blocks.total()
+    free = blocks.rows(trials.parameters(best.names))
+    dropped = dict((*choice.doubtful, *choice.masked))
+    for term in trials.terms:
+        if term.name in best.names:
+            continue
+        names = best.names | {term.name}
+        known = trials.known.get(names)
+        inner = any(one.inner for one in term.strengths())
+        if known is not None:
+            gain = best.fit.cost - known.fit.cost
+        elif inner:
+            gain = trials.scan(best.names).best[1]
+        else:
+            own = blocks.rows([one.name for one in term.strengths()])
+            gain = added_gain(information, score, free, own, trials.policy.alike)
+        asked = trials.threshold(term.name)
+        reason = (
+            f"would gain {max(gain, 0.0):.3g} in twice the log-likelihood, where "
+            f"{asked:.3g} are asked for"
+        )
+        if term.name in dropped:
+            reason += "; it is in doubt, as a caveat says"
+        delta = trials.count([term.name]) * price - gain
+        terms = tuple(sorted(names))
+        yield Alternative("+".join(terms), delta, terms, reason)
+
+
+def _worse(trials: Trials, choice: Choice, trial: Trial) -> str:
+    """Why a subset that was fitted is not the one named."""
+    best, samples = choice.best, trials.problem.samples
+    if not trials.settled(trial):
+        return "its fit did not come near the data"
+    if abs(trial.bic - best.bic) < trials.policy.tie:
+        return "explains as much: the records cannot tell them apart"
+    if trial.bic < best.bic:
+        return "fits better, but not all of its terms are sure"
+    return (
+        f"explains less: its cost per sample is {trial.fit.cost / samples:.4g}, that "
+        f"of the choice {best.fit.cost / samples:.4g}"
+    )
+
+
+def _name(trial: Trial) -> str:
+    return "+".join(_terms(trial)) or "none"
+
+
+def _terms(trial: Trial) -> tuple[str, ...]:
+    return tuple(sorted(trial.names))
