@@ -63,10 +63,11 @@ def diagnose(
 
     keep_compiled_programs()
     runs, nominal = read(case, rig, files, system)
-    if propose and isinstance(nominal, Setup):
+    if propose and isinstance(nominal, Setup) and nominal.drive_channel is None:
         raise ValueError(
-            "--next proposes speeds of a cam; leave it out, and give records of your "
-            "own rig that you simulated to jaxcam.discrepancy.compare_experiments."
+            "--next proposes speeds of a drive, and this rig has none that turns; "
+            "leave it out, and give records that you simulated to "
+            "jaxcam.discrepancy.compare_experiments."
         )
     output = Output(json_file, out)
     keep = _kept_fits(out, resume)

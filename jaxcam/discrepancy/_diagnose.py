@@ -6,10 +6,19 @@ from pathlib import Path
 from ..fitting import Input, Parameter, Sensor, Setup, Turning
 from ..hybrid import HybridSystem
 from ..recordings import Recording, Rig, Segments
+from ._set_aside import odd_record, set_aside
 from .evidence import choose, ripple_of
 from .policy import Policy
 from .report import Diagnosis, diagnosis_of
-from .search import KeptTrials, rig_question, setup_question, system_question, Trials
+from .search import (
+    KeptTrials,
+    Question,
+    Report,
+    rig_question,
+    setup_question,
+    system_question,
+    Trials,
+)
 from .terms import Term
 
 
@@ -50,21 +59,56 @@ def diagnose(
     sentence that says why; `ValueError` for a term that acts nowhere.
     """
     report = progress or (lambda sentence, fraction: None)
-    if isinstance(system, Rig):
-        question = rig_question(system, recordings, candidates, report, policy)
-    elif isinstance(system, Setup):
-        question = setup_question(system, recordings, candidates, report, policy)
-    else:
-        question = system_question(
-            system,
-            tuple(recordings),  # pyright: ignore
-            candidates,
-            sensors,
-            parameters,
-            drive,
-            report,
-            policy,
+
+    def asked(runs: Sequence[Recording | Segments], folder: Path | None) -> Diagnosis:
+        question = _question(
+            system, runs, candidates, sensors, parameters, drive, report, policy
         )
+        return _answered(question, case, seed, report, folder, policy)
+
+    found = asked(recordings, keep)
+    odd = odd_record(found)
+    if odd is not None:
+        report(f"setting {odd} aside", None)
+        others = [run for run in recordings if _name_of(run) != odd]
+        folder = None if keep is None else keep / "without_one"
+        found = set_aside(found, asked(others, folder), odd)
+    return found
+
+
+def _name_of(run: Recording | Segments) -> str:
+    return run.recording.name if isinstance(run, Segments) else run.name
+
+
+def _question(
+    system, recordings, candidates, sensors, parameters, drive, report, policy
+) -> Question:
+    """What is asked of a rig, a setup or a bare system."""
+    if isinstance(system, Rig):
+        return rig_question(system, recordings, candidates, report, policy)
+    if isinstance(system, Setup):
+        return setup_question(system, recordings, candidates, report, policy)
+    return system_question(
+        system,
+        tuple(recordings),
+        candidates,
+        sensors,
+        parameters,
+        drive,
+        report,
+        policy,
+    )
+
+
+def _answered(
+    question: Question,
+    case: str,
+    seed: int,
+    report: Report,
+    keep: Path | None,
+    policy: Policy,
+) -> Diagnosis:
+    """Search, doubt, and write down."""
     ripple = None
     if question.drives:
         report("reading the drive", None)

@@ -8,8 +8,17 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
-from ..fitting import Problem
-from ..recordings import record, RecordingError, Rig, segment_case, Segments, Wandering
+from ..fitting import Problem, Setup, Turning
+from ..recordings import (
+    record,
+    Recording,
+    RecordingError,
+    Rig,
+    segment_case,
+    Segments,
+    Wandering,
+)
+from ..recordings.cut import measured_noise
 from .report import Diagnosis
 from .search import Blocks, blocks_of, newton_step
 from .terms import Term, WithTerms
@@ -80,7 +89,7 @@ def compare_experiments(
 
 def next_experiments(
     found: Diagnosis,
-    rig: Rig,
+    rig: Rig | Setup,
     *,
     speeds: Sequence[float] | None = None,
     duration: float | None = None,
@@ -88,22 +97,25 @@ def next_experiments(
     seed: int = 0,
     progress: Callable[[str, float | None], None] | None = None,
 ) -> tuple[Experiment, ...]:
-    """The speed at which to run a cam-follower rig next, the best first.
+    """The speed at which to run a driven rig next, the best first.
 
     **Arguments:**
 
     - `found`: what `diagnose` said of its records so far.
-    - `speeds`: of the cam (rad/s) that can be had; by default some between those of
+    - `rig`: as given to `diagnose`.
+    - `speeds`: of the drive (rad/s) that can be had; by default some between those of
         the records and a little beyond.
     - `duration`: of a record (s); by default as before.
     - `asked`: as in [`jaxcam.discrepancy.compare_experiments`][].
 
-    **Raises:** `ValueError` for a system that is no rig with a drive; `RecordingError`
-    where none of the speeds makes the follower fly.
+    **Raises:** `ValueError` for a rig whose drive does not turn; `RecordingError` where
+    nothing flies at any of the speeds.
     """
     parts = found.after.problem.segments
     drives = [part.drive for part in parts if part.drive is not None]
-    if not drives:
+    model = found.model(0)
+    turning = model.drive
+    if not drives or not isinstance(turning, Turning):
         raise ValueError(
             "The next experiment is proposed for a rig with a drive; simulate the "
             "experiments that you can make and give them to `compare_experiments`."
@@ -117,44 +129,63 @@ def next_experiments(
     length = parts[0].recording.duration if duration is None else duration
     report = progress or (lambda sentence, fraction: None)
     rng = np.random.default_rng(seed)
-    model = found.model(0)
-    base = model.system.base  # pyright: ignore
+    whole: WithTerms = model.system  # pyright: ignore
     terms = tuple(t for t in _terms(found) if t.name in found.names and t.acts)
-    system = WithTerms(base, terms)
-    sensors = rig.sensors
-    encoder = sensors.cam_noise, 2 * math.pi / sensors.cam_counts_per_turn
+    system = WithTerms(whole.base, terms, whole.coordinates)
+    channel, encoder = _encoder(rig, parts)
+    states = np.asarray(found.after.point.states)[:, 0]
     made = []
     for k, speed in enumerate(speeds):
         report("simulating experiments", k / len(speeds))
-        moved = eqx.tree_at(_speed, system, jnp.asarray(float(speed)))
+        moved = eqx.tree_at(turning.speed, system, jnp.asarray(float(speed)))
+        nearest = int(np.argmin([abs(drive.speed - speed) for drive in drives]))
         made.append(
             record(
-                Wandering(moved, speed=_speed, phase=_phase),
+                Wandering(moved, speed=turning.speed, phase=turning.phase),
                 model.sensors,
                 length,
                 rng=rng,
+                # a follower starts from its release, anything else as it was recorded
+                state=None if isinstance(rig, Rig) else jnp.asarray(states[nearest]),
                 settle=found.policy.next_settle,
                 interval=parts[0].recording.interval,
                 drive=encoder,
-                name=f"{float(speed) * 30 / math.pi:.1f} rpm",
+                drive_channel=channel,
+                name=_named(rig, float(speed)),
             )
         )
     report("weighing experiments", None)
-    flying = [part for part in segment_case(made, rig) if part.flights]
+    flying = [part for part in _cut(rig, made) if part.flights]
     if not flying:
         raise RecordingError(
-            "The follower would rest on the cam at all of these speeds; give `speeds` "
+            "Nothing would leave its constraint at any of these speeds; give `speeds` "
             "at which it flies."
         )
     return compare_experiments(found, flying, asked)
 
 
-def _speed(system: WithTerms):
-    return system.base.speed  # pyright: ignore
+def _encoder(
+    rig: Rig | Setup, parts: Sequence[Segments]
+) -> tuple[str, tuple[float, float]]:
+    """The channel of the drive, with its noise and resolution (rad)."""
+    if isinstance(rig, Rig):
+        sensors = rig.sensors
+        counts = sensors.cam_counts_per_turn
+        return "cam_angle_rad", (sensors.cam_noise, 2 * math.pi / counts)
+    assert rig.drive_channel is not None
+    noises = [measured_noise(part.recording[rig.drive_channel]) for part in parts]
+    return rig.drive_channel, (float(np.median(noises)), 0.0)
 
 
-def _phase(system: WithTerms):
-    return system.base.phase  # pyright: ignore
+def _cut(rig: Rig | Setup, made: Sequence[Recording]) -> Sequence[Segments]:
+    return segment_case(made, rig) if isinstance(rig, Rig) else rig.segments(made)
+
+
+def _named(rig: Rig | Setup, speed: float) -> str:
+    """A record by its speed, as a cam's is given by convention in rpm."""
+    if isinstance(rig, Rig):
+        return f"{speed * 30 / math.pi:.1f} rpm"
+    return f"{speed / (2 * math.pi):.4g} Hz"
 
 
 def _terms(found: Diagnosis) -> tuple[Term, ...]:

@@ -131,6 +131,18 @@ class Policy:
         "multiples of the drive's rate, no harmonics, at which leakage is measured",
     )
 
+    odd: float = _decides(
+        10.0,
+        "ratio of a record's cost per sample to that of every other one, above which "
+        "it is set aside",
+    )
+    records_apart: int = _decides(4, "records at least, for one to be set aside")
+    noisier: float = _decides(
+        1.2,
+        "ratio of the noise that recordings show to that which is stated, above which "
+        "the former counts",
+    )
+
     # what bounds the search
     quick_iterations: int = _bounds(15, "iterations of the first fit of a subset")
     iterations: int = _bounds(60, "iterations of a fit that may win")

@@ -98,6 +98,7 @@ def record(
     settle: float = 0.0,
     interval: float = 5e-4,
     drive: tuple[float, float] | None = None,
+    drive_channel: str = "cam_angle_rad",
     name: str = "synthetic",
 ) -> Recording:
     """Simulate a system and read it through sensors.
@@ -111,7 +112,7 @@ def record(
     - `state`: to start from `(n,)`; `None` for the release point.
     - `interval`: between samples (s).
     - `drive`: noise and resolution (rad) of an encoder on the drive of a `Wandering`,
-        recorded as `cam_angle_rad`.
+        recorded as `drive_channel`.
 
     **Raises:** `RecordingError` where the simulation did not come to its end.
     """
@@ -131,7 +132,7 @@ def record(
             angle = np.asarray(system.angle(jnp.asarray(settle + time)))
             angle = angle - 2 * np.pi * np.floor(angle[0] / (2 * np.pi))
             noisy = angle + drive[0] * rng.standard_normal(count)
-            channels = {"cam_angle_rad": _round(noisy, drive[1]), **channels}
+            channels = {drive_channel: _round(noisy, drive[1]), **channels}
     return Recording(name, time, channels, speed)
 
 

@@ -8,15 +8,18 @@ from ..search import added_gain, Trial, Trials
 from ._diagnosis import Alternative
 
 
-def fitted_alternatives(trials: Trials, best: Trial) -> list[Trial]:
+def fitted_alternatives(trials: Trials, choice: Choice) -> list[Trial]:
     """Other subsets that were fitted, the best first.
 
-    A subset that contains the one chosen is the same explanation with more in it.
+    A subset that contains the one chosen is the same explanation with more in it; one
+    that lacks what stands in the place of an impossible parameter is none.
     """
+    best = choice.best
+    needed = {one.term for one in choice.beyond if one.term}
     found = [
         trial
         for names, trial in trials.known.items()
-        if names != best.names and not names > best.names
+        if names != best.names and not names > best.names and needed <= names
     ]
     return sorted(found, key=lambda trial: trial.bic - best.bic)
 
@@ -30,7 +33,7 @@ def alternatives_of(trials: Trials, choice: Choice) -> tuple[Alternative, ...]:
     best = choice.best
     found = [
         Alternative(_name(trial), trial.bic - best.bic, _terms(trial), reason)
-        for trial in fitted_alternatives(trials, best)
+        for trial in fitted_alternatives(trials, choice)
         for reason in [_worse(trials, choice, trial)]
     ]
     found += _additions(trials, choice)

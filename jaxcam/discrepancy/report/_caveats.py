@@ -5,7 +5,7 @@ import enum
 from collections.abc import Iterator
 
 from ..evidence import Choice, HeldOut, Outside, rms_of
-from ..search import Trial, Trials
+from ..search import Question, Trial, Trials
 from ._words import listed, number, quantity
 
 
@@ -22,6 +22,8 @@ class Reason(enum.StrEnum):
     POOR_PREDICTION = "poor prediction"
     ABOVE_NOISE = "above the noise"
     BEYOND_TOLERANCE = "beyond tolerance"
+    NOISIER = "noisier than stated"
+    SET_ASIDE = "record set aside"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -73,6 +75,17 @@ def caveats_of(
     held = choice.held
     if held.after > trials.policy.as_noise:
         yield above_noise(held, named)
+
+
+def noisier_than_stated(question: Question) -> Iterator[Caveat]:
+    """That the noise of a channel was stated too small."""
+    for one in question.noisier:
+        yield Caveat(
+            Reason.NOISIER,
+            f"The recordings show a noise of {one.seen:.3g} in `{one.channel}`, "
+            f"{one.seen / one.stated:.2g} times what is stated ({one.stated:.3g}); the "
+            f"larger figure was used.",
+        )
 
 
 def above_noise(held: HeldOut, named: bool) -> Caveat:

@@ -24,6 +24,7 @@ from ._caveats import (
     Caveat,
     caveats_of,
     functions_fall_short,
+    noisier_than_stated,
     small_remainder,
 )
 from ._diagnosis import Alternative, Diagnosis, Verdict
@@ -58,8 +59,9 @@ def diagnosis_of(
     verdict, caveats = _verdict(choice, named, policy.small)
     if verdict is Verdict.UNKNOWN:
         effects.insert(0, unknown_effect(trials, choice, divided.left))
-    others = fitted_alternatives(trials, best)[: policy.alternatives]
+    others = fitted_alternatives(trials, choice)[: policy.alternatives]
     ties = [trial for trial in others if abs(trial.bic - best.bic) < policy.tie]
+    caveats += noisier_than_stated(question)
     caveats += caveats_of(trials, choice, ties, bool(effects))
     floor = float(next(iter(question.problem.model.sensors.values())).floor)
     least = limits(trials, best)
@@ -161,7 +163,7 @@ def _of_functions(
         _pulls(question, within, found),
         {},
         {},
-        tuple(_doubts_of(missing, held, policy)),
+        (*noisier_than_stated(question), *_doubts_of(missing, held, policy)),
         policy,
         functions,
         misfit_by_part(bare.fit),

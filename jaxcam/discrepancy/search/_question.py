@@ -5,9 +5,12 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
-from ...fitting import Parameter, Problem
+import jax.numpy as jnp
+import numpy as np
+
+from ...fitting import Parameter, Problem, Sensor
 from ...recordings import Recording, RecordingError, References
-from ...recordings.cut import Segments
+from ...recordings.cut import least_noise, Segments
 from ..policy import Policy
 from ..terms import SensorTerm, Term
 
@@ -34,6 +37,7 @@ class Question:
     - `drives`: recordings of a drive in the channel `drive_channel`, whose noise is
         `drive_noise`.
     - `shown`: parameters that are reported in another way.
+    - `noisier`: channels whose recordings show more noise than was stated for them.
     """
 
     problem: Problem
@@ -47,6 +51,35 @@ class Question:
     drive_noise: float = math.nan
     drive_channel: str = "cam_angle_rad"
     shown: Mapping[str, Shown] = dataclasses.field(default_factory=dict)
+    noisier: tuple["Noisier", ...] = ()
+
+
+class Noisier(NamedTuple):
+    """A channel whose noise is `seen` to be larger than what was `stated`."""
+
+    channel: str
+    stated: float
+    seen: float
+
+
+def with_seen_noise(
+    sensors: Mapping[str, Sensor], recordings: Sequence[Recording], policy: Policy
+) -> tuple[dict[str, Sensor], tuple[Noisier, ...]]:
+    """Sensors with the noise that the recordings show, where more was not stated.
+
+    A noise that is stated too small would make physics of every fault of a sensor.
+    """
+    found, noisier = dict(sensors), []
+    for name, sensor in sensors.items():
+        stated = float(sensor.floor)
+        levels = [least_noise(run[name]) for run in recordings]
+        seen = float(np.median(levels))
+        if sensor.filtered or not seen > policy.noisier * stated:
+            continue
+        white = math.sqrt(seen**2 - sensor.resolution**2 / 12)
+        found[name] = dataclasses.replace(sensor, noise=jnp.asarray(white))
+        noisier.append(Noisier(name, stated, seen))
+    return found, tuple(noisier)
 
 
 def refuse_one(runs: Sequence[Recording | Segments]) -> None:

@@ -17,6 +17,7 @@ from ._question import (
     Report,
     Shown,
     term_parameters,
+    with_seen_noise,
 )
 
 
@@ -47,7 +48,10 @@ def rig_question(
         candidates = library(references=rig.references)
     terms, unlisted = by_listing(tuple(candidates))
     base = cam_follower_model(rig)
-    model = Model(WithTerms(base.system, terms), base.sensors, base_drive())
+    sensors, noisier = with_seen_noise(
+        base.sensors, [run.recording for run in cut], policy
+    )
+    model = Model(WithTerms(base.system, terms), sensors, base_drive())
     parameters = cam_follower_parameters(rig, base=lambda s: s.base)
     names = tuple(p.name for p in parameters)
     report("preparing the fits", None)
@@ -67,6 +71,7 @@ def rig_question(
         tuple(run.recording for run in cut),
         rig.sensors.cam_floor,
         shown={"stiffness": stiffness},
+        noisier=noisier,
     )
 
 

@@ -23,7 +23,14 @@ from ...recordings.cut import (
 from ...recordings.files import check_channels, unit_of
 from ..policy import Policy
 from ..terms import coordinates, library, Term, terms_of, WithTerms
-from ._question import by_listing, Question, refuse_one, Report, term_parameters
+from ._question import (
+    by_listing,
+    Question,
+    refuse_one,
+    Report,
+    term_parameters,
+    with_seen_noise,
+)
 
 
 # Share of the usual change of the speed in a step within which dry friction changes
@@ -105,10 +112,12 @@ def system_question(
                 "Cut the recordings first: `jaxcam.recordings.segment(recording, "
                 "channel)` for each of them."
             )
+    runs = [part.recording for part in recordings]
+    sensors, noisier = with_seen_noise(sensors, runs, policy)
     pairs = coordinates(system, _usual_state(system, sensors, recordings))
     seen = _channel_of(sensors, pairs[0][0])
     unit, turned = unit_of(seen), system.period is not None
-    usual = References.of_speed(fast_speed([r.recording for r in recordings], seen))
+    usual = References.of_speed(fast_speed(runs, seen))
     references = dataclasses.replace(usual, **(stated or {}))
     clocked = turned or drive is not None
 
@@ -141,6 +150,7 @@ def system_question(
         turned,
         unit,
         references,
+        noisier=noisier,
         **_drives(recordings, drive_channel),
     )
 

@@ -7,7 +7,11 @@ from ._fast_speed import (
 )
 from ._gaps import segment_gaps as segment_gaps
 from ._padding import padded as padded
-from ._polynomial import fit_local as fit_local, measured_noise as measured_noise
+from ._polynomial import (
+    fit_local as fit_local,
+    least_noise as least_noise,
+    measured_noise as measured_noise,
+)
 from ._segment import segment as segment, segment_case as segment_case
 from ._segments import (
     Boundary as Boundary,

@@ -1,6 +1,7 @@
 """Polynomials through one side of a boundary, with the errors of what they say."""
 
 import dataclasses
+import math
 
 import numpy as np
 from jaxtyping import Float
@@ -84,15 +85,26 @@ def crossing(
     return float(time), float(error / abs(jump)) if jump else float("inf")
 
 
-def measured_noise(samples: Float[np.ndarray, " k"]) -> float:
-    """Standard deviation of white noise on a smooth signal, from third differences.
+def measured_noise(samples: Float[np.ndarray, " k"], order: int = 3) -> float:
+    """Standard deviation of white noise on a smooth signal, from its differences.
 
     The few differences that stand out, as those across an impact do, are left out.
+
+    **Arguments:** the `order` of the differences, three by default.
     """
-    if len(samples) < 8:
+    if len(samples) < 2 * order + 2:
         return float("nan")
-    third = np.diff(samples, 3)
-    spread = np.median(np.abs(third)) / 0.6745
-    usual = third[np.abs(third) <= 5 * spread]
-    # a third difference of white noise has the variance 1 + 9 + 9 + 1
-    return float(np.sqrt(np.mean(usual**2) / 20))
+    each = np.diff(samples, order)
+    spread = np.median(np.abs(each)) / 0.6745
+    usual = each[np.abs(each) <= 5 * spread]
+    # a difference of white noise has the sum of the squared binomials as its variance
+    return float(np.sqrt(np.mean(usual**2) / math.comb(2 * order, order)))
+
+
+def least_noise(samples: Float[np.ndarray, " k"]) -> float:
+    """A lower bound of `measured_noise` that few samples per period do not raise.
+
+    What differences of a low order show of the motion itself, those of a high order do
+    not; white noise is the same in all of them.
+    """
+    return min(measured_noise(samples, order) for order in range(3, 9))

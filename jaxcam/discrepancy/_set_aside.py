@@ -1,0 +1,59 @@
+"""One record that does not belong to the others: found, set aside and said.
+
+A misread record (another gain, another rig, a wrong unit) is explained by no physics
+that the others share, and would hide what is missing in all of them.
+"""
+
+import dataclasses
+
+import numpy as np
+
+from ..fitting import Fit
+from .report import Caveat, Diagnosis, Reason
+
+
+def odd_record(found: Diagnosis) -> str | None:
+    """The record that a diagnosis leaves unexplained while it explains all others.
+
+    It is one of at least `policy.records_apart`; its cost per sample is not `near` the
+    data, and exceeds that of every other record by a factor of `policy.odd`.
+    """
+    policy, costs = found.policy, cost_by_record(found.after)
+    if len(costs) < policy.records_apart:
+        return None
+    worst, second = sorted(costs.values(), reverse=True)[:2]
+    if worst < policy.near or worst < policy.odd * max(second, 1.0):
+        return None
+    return max(costs, key=lambda name: costs[name])
+
+
+def cost_by_record(found: Fit) -> dict[str, float]:
+    """Cost per sample of each record; one where nothing but noise is left."""
+    problem, costs = found.problem, found.costs
+    exists = np.asarray(problem.pieces.exists)
+    flown = np.where(exists, np.asarray(costs.flown) + np.asarray(costs.joints), 0.0)
+    total = flown.sum(axis=1) + np.nan_to_num(np.asarray(costs.rested)).sum(axis=1)
+    known = [
+        np.asarray(part.known).reshape(len(problem.records), -1).sum(axis=1)
+        for part in (problem.pieces.flown, problem.pieces.rested)
+    ]
+    samples = np.maximum(known[0] + known[1], 1)
+    return dict(zip(problem.records, (total / samples).tolist()))
+
+
+def set_aside(found: Diagnosis, again: Diagnosis, name: str) -> Diagnosis:
+    """The diagnosis of the other records, if it explains what the first one did not.
+
+    **Arguments:** the diagnosis of all records, that without one, and its name.
+    """
+    costs = cost_by_record(found.after)
+    better = max(cost_by_record(again.after).values()) < costs[name] / found.policy.odd
+    chosen = again if better else found
+    done = "is set aside" if better else "is explained by nothing that was tried"
+    sentence = (
+        f"The record {name} {done}: it misses the model of all records by "
+        f"{np.sqrt(costs[name]):.2g} times the noise, every other one by less than "
+        f"{np.sqrt(sorted(costs.values())[-2]):.2g}. Check how it was made and read."
+    )
+    caveat = Caveat(Reason.SET_ASIDE, sentence)
+    return dataclasses.replace(chosen, caveats=(caveat, *chosen.caveats))
