@@ -31,6 +31,10 @@ from ..terms import Motion, Term, WithTerms
 from ._blocks import Blocks
 
 
+# Nodes of a force in a piece, less one: a step has two, or fewer where steps are short
+_NODES = 20
+
+
 class LocalForce(Term):
     """A force given at times `start + k spacing`, linear between them."""
 
@@ -71,13 +75,26 @@ class Response(NamedTuple):
     pull: Float[np.ndarray, " g"]
 
 
+def stride_of(problem: Problem) -> int:
+    """Half steps from one node of a force to the next.
+
+    Steps may be shorter than anything that a force is asked for: they follow a measured
+    input, or errors that add up over a flight of many pieces.
+    """
+    halves = 2 * problem.pieces.angle.shape[-1]
+    stride = max(1, halves // _NODES)
+    return stride if halves % stride == 0 else 1
+
+
 def force_response(problem: Problem, point: Point, free: Sequence[str]) -> Response:
     """Linearise about a point, with some parameters free and a force at every node.
 
-    The nodes are where the steps of the flights evaluate their field.
+    The nodes are where the steps of the flights evaluate their field, or every
+    `stride` of these.
     """
     columns = free_columns(problem, free)
-    nodes = 2 * problem.pieces.angle.shape[-1] + 1
+    stride = stride_of(problem)
+    nodes = 2 * problem.pieces.angle.shape[-1] // stride + 1
     found = _linear(
         problem.layout,
         problem.pieces,
@@ -86,9 +103,10 @@ def force_response(problem: Problem, point: Point, free: Sequence[str]) -> Respo
         jnp.asarray(columns.local),
         jnp.asarray(columns.scales),
         nodes,
+        stride,
     )
     part = problem.pieces.flown
-    half = np.asarray(part.step)[..., None] / 2
+    half = stride * np.asarray(part.step)[..., None] / 2
     prior = prior_information(problem, columns, True)
     return Response(
         point,
@@ -114,7 +132,7 @@ def force_blocks(problem: Problem, response: Response, terms: Sequence[Term]) ->
     strengths = [p for k, term in enumerate(terms) for p in term.parameters(k)]
     scale = np.array([p.scale for p in strengths], dtype=float)
     forces = _forces(problem.layout, problem.pieces, response.point, tuple(terms))
-    forces = np.asarray(forces) * scale
+    forces = np.asarray(forces)[:, :, :: stride_of(problem)] * scale
     width, size = forces.shape[-1], len(response.prior)
     chain = jax.vmap(chained)(_onto(response, forces))
     found = eliminate_states(jax.tree.map(jnp.asarray, chain))
@@ -174,14 +192,16 @@ def _onto(response: Response, forces: Float[np.ndarray, "r k l p"]) -> LinearPie
 
 
 @eqx.filter_jit
-def _linear(layout, pieces, extras, point, columns, scales, nodes) -> LinearPieces:
+def _linear(
+    layout, pieces, extras, point, columns, scales, nodes, stride
+) -> LinearPieces:
     def record(pieces, extras, values, states, columns, scales):
         size = columns.shape[0]
         near = layout.about(values).by(columns, scales)
 
         def model_at(change, start, step):
             model = near.at(change[:size])
-            force = LocalForce(change[size:], start, step / 2)
+            force = LocalForce(change[size:], start, stride * step / 2)
             system = WithTerms(
                 model.system.base,
                 (*model.system.terms, force),

@@ -16,7 +16,7 @@ from jaxtyping import Complex, Float
 from ...fitting import Problem
 from ...fitting.engine import invert_information
 from ..policy import Policy
-from ._local_force import Response
+from ._local_force import Response, stride_of
 
 
 # Parts of a diagonal that keep a matrix definite against rounding
@@ -96,6 +96,7 @@ def _frequencies(problem: Problem, policy: Policy) -> Float[np.ndarray, " k"]:
     interval = max(part.recording.interval for part in problem.segments)
     exists = np.asarray(problem.pieces.exists)
     step = float(np.max(np.asarray(problem.pieces.flown.step)[exists]))
+    step *= stride_of(problem)
     top = min(1 / (policy.period_samples * interval), 1 / (policy.period_steps * step))
     grid = 1 / (policy.frequency_grid * length)
     return np.arange(policy.fewest_periods / length, top, grid)

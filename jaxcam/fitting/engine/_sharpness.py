@@ -21,6 +21,8 @@ _IMPACT = 10**-0.5
 _WIDTH = 4
 # Columns above which programs are as wide as what is free, and by how many they differ
 _MANY, _STRIDE = 64, 32
+# Steps of a piece up to which one program serves states and parameters
+_FEW_STEPS = 20
 
 
 def width_of(number: int) -> int:
@@ -77,8 +79,11 @@ def joint_sharpness(layout: Layout, pieces: Pieces, point: Point, guess) -> Extr
 
 def states_only(layout: Layout, pieces: Pieces, extras: Extras, point: Point):
     """Normal equations of the states, with all parameters held, and the costs."""
-    # as wide as a fit of everything, which then is compiled already
-    none = jnp.zeros((pieces.joint.shape[0], width_of(len(layout.places))), dtype=int)
+    # as wide as a fit of everything, which then is compiled already; of many steps, a
+    # program of its own is soon worth the time that it takes to compile
+    few = pieces.angle.shape[-1] <= _FEW_STEPS
+    width = width_of(len(layout.places)) if few else _WIDTH
+    none = jnp.zeros((pieces.joint.shape[0], width), dtype=int)
     scales = jnp.zeros(none.shape, dtype=float)
     return assemble(layout, pieces, extras, point, none, scales)
 
