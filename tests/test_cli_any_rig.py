@@ -186,7 +186,7 @@ def test_a_driven_system_is_simulated_by_turns(rig):
         ("fit runs --rig cart.toml", "the column `position_m` is missing"),
         ("fit . --system cart.json --rig cart.toml", "name a Python file"),
         ("diagnose runs --rig cart.toml", "the column `position_m` is missing"),
-        ("diagnose one --rig cart.toml --next", "--next proposes speeds of a cam"),
+        ("diagnose one --rig cart.toml --next", "--next proposes speeds of a drive"),
         ("diagnose one --rig cart.toml", "There is 1 recording; give at least two"),
         ("fit one --rig known.toml", "Nothing is to be fitted"),
         ("demo --case one --rig cart.toml", "is that of a cam-follower"),

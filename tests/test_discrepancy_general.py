@@ -119,9 +119,21 @@ def test_damping_is_named_with_its_strength():
     assert found.heldout_after < 1.05 * _NOISE < 1.2 * _NOISE < found.heldout_before
     written = found.to_json()
     assert written["effects"][0]["located"]["where"] == "flight"
-    assert {"case", "verdict", "effects", "alternatives", "fit", "rig", "summary"} == (
-        set(written)
-    )
+    assert set(written) == {
+        "case",
+        "verdict",
+        "effects",
+        "alternatives",
+        "missing",
+        "fit",
+        "rig",
+        "summary",
+    }
+    assert written["effects"][0]["share"] > 0.99
+    # every other term is ranked, with the reason why it was not named
+    named = {one.terms for one in found.alternatives}
+    assert ("quadratic_drag", "viscous_damping") in named
+    assert all(one.reason for one in found.alternatives)
     # the model that comes back is the one with damping
     field = found.model().system.vector_field(0.0, jnp.array([0.0, 1.0]))
     assert float(field[1]) == pytest.approx(-one.value)

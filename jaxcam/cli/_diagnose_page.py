@@ -1,19 +1,15 @@
-"""The report of `jaxcam diagnose`: figures and one HTML file with everything in it."""
+"""The figures of a report of `jaxcam diagnose`."""
 
 from collections.abc import Sequence
-from html import escape
 from pathlib import Path
 
 import matplotlib
 import numpy as np
 
-from ..discrepancy import Diagnosis, Verdict
+from ..discrepancy import Diagnosis
 from ..discrepancy.evidence import Structure
-from ..discrepancy.report import listed, number
 from ..discrepancy.terms import Variable
 from ..fitting import Residuals
-from ._outlook import Outlook
-from ._page import figure_html, sentences, STYLE, table_html
 from ._residual_axes import Along, residual_label, shown_in, title_of
 
 
@@ -76,7 +72,6 @@ _SHAPES = (
     "model (grey) and of the model found (colour), with twice the standard error. A "
     "function that stays within its band of zero is not needed."
 )
-_PARTS = {"flight": "in flight", "impact": "at impacts", "contact": "in contact"}
 _RANKING = "How much worse other explanations are, by their BIC (a logarithmic scale)."
 
 
@@ -241,136 +236,3 @@ def _ranking(plt, found: Diagnosis):
     axis.invert_yaxis()
     axis.set_xlabel("BIC above that of the verdict")
     return figure
-
-
-def diagnosis_page(
-    found: Diagnosis,
-    figures: Sequence[tuple[Path, str]],
-    notes: Sequence[str],
-    outlook: Outlook = Outlook(),
-) -> str:
-    """The page as text; nothing in it is loaded from elsewhere."""
-    title = f"{found.case or 'Recordings'}: {_title(found)}"
-    effects = [
-        (
-            effect.name.replace("_", " "),
-            ", ".join(
-                f"{name} = {number(v.value, v.stderr, v.unit)}"
-                for name, v in effect.parameters.items()
-            ),
-            effect.where,
-            f"{effect.delta_bic:.0f}",
-            f"{effect.heldout_gain_nats:.0f}",
-            "" if effect.inclusion is None else f"{effect.inclusion:.0%}",
-            "" if effect.share is None else f"{effect.share:.1%}",
-        )
-        for effect in found.effects
-    ]
-    rows = [(name, f"{a:+.2f}", f"{b:+.2f}") for name, (a, b) in found.pulls.items()]
-    limits = [
-        (
-            name,
-            f"{one.value:.2g} {'' if one.unit == '-' else one.unit}",
-            found.hides.get(name, "").replace("_", " "),
-        )
-        for name, one in found.limits.items()
-    ]
-    left = [
-        (
-            one.name.replace("_", " "),
-            one.where,
-            f"{one.gain:.1f}",
-            f"{one.threshold:.1f}",
-            "yes" if one.significant else "no",
-        )
-        for one in found.left_after
-    ]
-    parts = [
-        f"<h1>{escape(title)}</h1>",
-        *(f'<p class="sentence">{escape(s)}</p>' for s in sentences(found.summary)),
-        *(f'<p class="note">{escape(note)}</p>' for note in notes),
-    ]
-    if effects:
-        headings = (
-            "effect",
-            "parameters",
-            "where",
-            "BIC",
-            "held-out (nats)",
-            "bootstrap",
-            "share",
-        )
-        parts += [
-            "<h2>What is missing</h2>",
-            table_html(headings, effects, text=(0, 1, 2)),
-        ]
-    parts += [
-        "<h2>Before and after, on flights not seen</h2>",
-        f"<p>{found.heldout_before:.3e} {found.unit} before, "
-        f"{found.heldout_after:.3e} after; noise and rounding of the sensor are "
-        f"{found.noise_floor:.3e}.</p>",
-        *_misfit(found),
-        *(figure_html(file, caption) for file, caption in figures),
-    ]
-    if found.caveats:
-        items = "".join(
-            f"<li>{escape(caveat.sentence)}</li>" for caveat in found.caveats
-        )
-        parts += ["<h2>Caveats</h2>", f"<ul>{items}</ul>"]
-    if found.alternatives:
-        others = [
-            (
-                one.name.replace("_", " ").replace("+", " + "),
-                f"{one.delta_bic:+.3g}",
-                one.reason,
-            )
-            for one in found.alternatives
-        ]
-        parts += [
-            "<h2>Other explanations</h2>",
-            table_html(("terms", "BIC", "why not"), others, text=(0, 2)),
-            '<p class="note">BIC above that of the verdict.</p>',
-        ]
-    for one in outlook.tables():
-        parts += [
-            f"<h2>{one.title}</h2>",
-            table_html(one.headings, one.rows, text=(0,)),
-            f'<p class="note">{one.note}</p>',
-        ]
-    parts += [
-        "<h2>Is anything left over?</h2>",
-        table_html(("form", "where", "gain", "threshold", "left"), left, text=(0, 1)),
-        '<p class="note">Growth of twice the log-likelihood if the model were allowed '
-        "each of these free functions, and what chance and the number of their "
-        "coefficients ask for.</p>",
-        "<h2>Parameters of the rig</h2>",
-        table_html(("parameter", "textbook", "with what was found"), rows, text=(0,)),
-        '<p class="note">Distance from the rig file in units of the tolerance stated '
-        "there. A parameter that moves far in the first column and not in the second "
-        "was hiding what is missing.</p>",
-        "<h2>What would have been seen</h2>",
-        table_html(
-            ("parameter", "least strength", "would hide in"), limits, text=(0, 2)
-        ),
-    ]
-    return (
-        '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        f"<title>{escape(title)}</title>\n<style>{STYLE}</style>\n</head>\n"
-        "<body>\n" + "\n".join(parts) + "\n</body>\n</html>\n"
-    )
-
-
-def _misfit(found: Diagnosis) -> list[str]:
-    """Where the misfit of the textbook model is, in a sentence."""
-    if not found.misfit:
-        return []
-    said = listed(f"{share:.0%} {_PARTS[part]}" for part, share in found.misfit.items())
-    return [f"<p>What the textbook model does not explain is {said}.</p>"]
-
-
-def _title(found: Diagnosis) -> str:
-    if found.verdict == Verdict.EFFECT:
-        return listed(found.names)
-    unknown = found.verdict == Verdict.UNKNOWN
-    return "something unknown" if unknown else "nothing is missing"

@@ -250,6 +250,12 @@ class Policy:
     absent_errors: float = _shows(
         10.0, "standard errors that an event speed counts which no longer exists"
     )
+    cost_errors: float = _shows(
+        3.0, "standard deviations beyond which a cost is more than noise makes it"
+    )
+    nearby: float = _shows(
+        0.03, "how far from a place data are near it, as a share of the range"
+    )
     visited: float = _shows(
         0.1,
         "share of an even density of data that a place must have for a function to be "

@@ -8,10 +8,7 @@ import numpy as np
 
 from ...fitting import Fit
 from ...fitting.engine import FLIGHT, IMPACT
-
-
-# Standard deviations of a cost beyond which it is more than noise makes it
-_CHANCE = 3.0
+from ..policy import Policy
 
 
 class Shares(NamedTuple):
@@ -25,17 +22,24 @@ class Shares(NamedTuple):
     left: float
 
 
-def shares(before: Fit, after: Fit, lost: Mapping[str, float], left: float) -> Shares:
+def shares(
+    before: Fit,
+    after: Fit,
+    lost: Mapping[str, float],
+    left: float,
+    policy: Policy = Policy(),
+) -> Shares:
     """Divide the misfit of a model among what explains it.
 
     What all parts explain together is the fall of the cost from `before` to `after`; it
     is divided in proportion to what is lost without each of them.
 
     **Arguments:** fits without and with what was found; growth of the cost without each
-    part; what a further function would still gain (0 where nothing is left over).
+    part; what a further function would still gain (0 where nothing is left over); the
+    policy.
     """
     samples = after.problem.samples
-    surplus = after.cost - samples - _CHANCE * math.sqrt(2 * samples)
+    surplus = after.cost - samples - policy.cost_errors * math.sqrt(2 * samples)
     left = max(left, surplus, 0.0)
     explained = max(before.cost - after.cost, 0.0)
     whole = explained + left
@@ -52,7 +56,7 @@ def shares(before: Fit, after: Fit, lost: Mapping[str, float], left: float) -> S
     )
 
 
-def misfit_by_part(found: Fit) -> dict[str, float]:
+def misfit_by_part(found: Fit, policy: Policy = Policy()) -> dict[str, float]:
     """Shares of a misfit that are in flights, impacts and contacts, by their names.
 
     The misfit of a part is its cost above what noise makes of it: one a sample, and one
@@ -77,7 +81,7 @@ def misfit_by_part(found: Fit) -> dict[str, float]:
     excess = {
         name: cost - number
         for name, (cost, number) in parts.items()
-        if number > 0 and cost - number > _CHANCE * math.sqrt(2 * number)
+        if number > 0 and cost - number > policy.cost_errors * math.sqrt(2 * number)
     }
     total = sum(excess.values())
     return {name: value / total for name, value in excess.items()} if excess else {}

@@ -12,8 +12,6 @@ from ..terms import Variable
 
 # Approach speed at the end of a range in which there is no impact
 _SLOWEST = 1e-3
-# Half-width of the neighbourhood of a grid point, as a share of the range
-_NEAR = 0.03
 
 
 class Visited(NamedTuple):
@@ -55,11 +53,11 @@ class Visited(NamedTuple):
         }.get(Variable(variable))
         if values is None or not len(values):
             return np.ones(len(grid), dtype=bool)
-        reach = _NEAR * (grid[-1] - grid[0])
+        reach = policy.nearby * (grid[-1] - grid[0])
         ordered = np.sort(values)
         count = np.searchsorted(ordered, grid + reach, side="right")
         count -= np.searchsorted(ordered, grid - reach, side="left")
-        enough = max(2.0, policy.visited * 2 * _NEAR * len(values))
+        enough = max(2.0, policy.visited * 2 * policy.nearby * len(values))
         return count >= enough
 
 

@@ -93,7 +93,7 @@ def diagnosis_of(
         {name: one.hidden for name, one in least.items()},
         tuple(caveats),
         policy,
-        misfit=misfit_by_part(choice.before.fit),
+        misfit=misfit_by_part(choice.before.fit, policy),
     )
 
 
@@ -109,7 +109,7 @@ def _shares_of(trials: Trials, choice: Choice) -> Shares:
         for name in best.names
     }
     left = max((one.gain for one in choice.unexplained), default=0.0)
-    return shares(before.fit, best.fit, lost, left)
+    return shares(before.fit, best.fit, lost, left, trials.policy)
 
 
 def _of_functions(
@@ -126,7 +126,7 @@ def _of_functions(
     positions, velocities, _, _ = visited(question.problem).ranges(policy)
     functions = missing_functions(missing, velocities, positions, policy.shape_points)
     bare = choice.before
-    divided = shares(bare.fit, found, needs.lost, 0.0)
+    divided = shares(bare.fit, found, needs.lost, 0.0, policy)
     effects = missing_effects(trials, functions, missing, needs, choice, divided)
     if ripple is not None and ripple.significant(len(trials.terms) + 1, policy):
         effects.append(drive_effect(ripple, policy))
@@ -166,7 +166,7 @@ def _of_functions(
         (*noisier_than_stated(question), *_doubts_of(missing, held, policy)),
         policy,
         functions,
-        misfit_by_part(bare.fit),
+        misfit_by_part(bare.fit, policy),
     )
 
 

@@ -1,0 +1,171 @@
+"""The report of `jaxcam diagnose` as one HTML file, section by section."""
+
+from collections.abc import Sequence
+from html import escape
+from pathlib import Path
+
+from ..discrepancy import Diagnosis, Verdict
+from ..discrepancy.report import listed, number
+from ._outlook import Outlook
+from ._page import figure_html, sentences, STYLE, table_html
+
+
+_PARTS = {"flight": "in flight", "impact": "at impacts", "contact": "in contact"}
+
+
+def diagnosis_page(
+    found: Diagnosis,
+    figures: Sequence[tuple[Path, str]],
+    notes: Sequence[str],
+    outlook: Outlook = Outlook(),
+) -> str:
+    """The page as text; nothing in it is loaded from elsewhere."""
+    title = f"{found.case or 'Recordings'}: {_title(found)}"
+    parts = [
+        f"<h1>{escape(title)}</h1>",
+        *(f'<p class="sentence">{escape(s)}</p>' for s in sentences(found.summary)),
+        *(f'<p class="note">{escape(note)}</p>' for note in notes),
+        *_effects(found),
+        *_before_and_after(found),
+        *(figure_html(file, caption) for file, caption in figures),
+        *_caveats(found),
+        *_alternatives(found),
+    ]
+    for one in outlook.tables():
+        parts += [
+            f"<h2>{one.title}</h2>",
+            table_html(one.headings, one.rows, text=(0,)),
+            f'<p class="note">{one.note}</p>',
+        ]
+    parts += [*_left_over(found), *_parameters(found), *_limits(found)]
+    return (
+        '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        f"<title>{escape(title)}</title>\n<style>{STYLE}</style>\n</head>\n"
+        "<body>\n" + "\n".join(parts) + "\n</body>\n</html>\n"
+    )
+
+
+def _title(found: Diagnosis) -> str:
+    if found.verdict == Verdict.EFFECT:
+        return listed(found.names)
+    if found.verdict == Verdict.NONE:
+        return "nothing is missing"
+    named = [effect.name for effect in found.effects if effect.term]
+    return listed(
+        [*named, "something that has no name" if named else "unknown physics"]
+    )
+
+
+def _effects(found: Diagnosis) -> list[str]:
+    if not found.effects:
+        return []
+    headings = (
+        "effect",
+        "parameters",
+        "where",
+        "share of the misfit",
+        "BIC",
+        "held-out (nats)",
+        "bootstrap",
+    )
+    rows = [
+        (
+            effect.name.replace("_", " "),
+            ", ".join(
+                f"{name} = {number(v.value, v.stderr, v.unit)}"
+                for name, v in effect.parameters.items()
+            ),
+            effect.where,
+            "" if effect.share is None else f"{effect.share:.1%}",
+            f"{effect.delta_bic:.0f}",
+            f"{effect.heldout_gain_nats:.0f}",
+            "" if effect.inclusion is None else f"{effect.inclusion:.0%}",
+        )
+        for effect in found.effects
+    ]
+    return ["<h2>What is missing</h2>", table_html(headings, rows, text=(0, 1, 2))]
+
+
+def _before_and_after(found: Diagnosis) -> list[str]:
+    parts = [
+        "<h2>Before and after, on held-out flights</h2>",
+        f"<p>{found.heldout_before:.3e} {found.unit} before, "
+        f"{found.heldout_after:.3e} after; noise and rounding of the sensor are "
+        f"{found.noise_floor:.3e}.</p>",
+    ]
+    if found.misfit:
+        where = listed(f"{s:.0%} {_PARTS[part]}" for part, s in found.misfit.items())
+        parts.append(f"<p>The misfit of the textbook model is {where}.</p>")
+    return parts
+
+
+def _caveats(found: Diagnosis) -> list[str]:
+    if not found.caveats:
+        return []
+    items = "".join(f"<li>{escape(caveat.sentence)}</li>" for caveat in found.caveats)
+    return ["<h2>Caveats</h2>", f"<ul>{items}</ul>"]
+
+
+def _alternatives(found: Diagnosis) -> list[str]:
+    if not found.alternatives:
+        return []
+    rows = [
+        (
+            one.name.replace("_", " ").replace("+", " + "),
+            f"{one.delta_bic:+.3g}",
+            one.reason,
+        )
+        for one in found.alternatives
+    ]
+    return [
+        "<h2>Other explanations</h2>",
+        table_html(("terms", "BIC", "why it is not named"), rows, text=(0, 2)),
+        '<p class="note">BIC above that of the verdict.</p>',
+    ]
+
+
+def _left_over(found: Diagnosis) -> list[str]:
+    rows = [
+        (
+            one.name.replace("_", " "),
+            one.where,
+            f"{one.gain:.1f}",
+            f"{one.threshold:.1f}",
+            "yes" if one.significant else "no",
+        )
+        for one in found.left_after
+    ]
+    headings = ("form", "where", "gain", "threshold", "left")
+    return [
+        "<h2>Is anything left over?</h2>",
+        table_html(headings, rows, text=(0, 1)),
+        '<p class="note">Growth of twice the log-likelihood if the model were allowed '
+        "each of these free functions, and what chance and the number of their "
+        "coefficients ask for.</p>",
+    ]
+
+
+def _parameters(found: Diagnosis) -> list[str]:
+    rows = [(name, f"{a:+.2f}", f"{b:+.2f}") for name, (a, b) in found.pulls.items()]
+    headings = ("parameter", "textbook", "with what was found")
+    return [
+        "<h2>Parameters of the rig</h2>",
+        table_html(headings, rows, text=(0,)),
+        '<p class="note">Distance from the rig file in units of the tolerance stated '
+        "there. A parameter that moves far in the first column and not in the second "
+        "was hiding what is missing.</p>",
+    ]
+
+
+def _limits(found: Diagnosis) -> list[str]:
+    rows = [
+        (
+            name,
+            f"{one.value:.2g} {'' if one.unit == '-' else one.unit}",
+            found.hides.get(name, "").replace("_", " "),
+        )
+        for name, one in found.limits.items()
+    ]
+    headings = ("parameter", "least strength", "would hide in")
+    return ["<h2>Detection limits</h2>", table_html(headings, rows, text=(0, 2))]

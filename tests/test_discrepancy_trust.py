@@ -1,0 +1,206 @@
+"""Verdicts in the face of faults: noise, records, tolerances and candidates."""
+
+from types import SimpleNamespace
+from typing import ClassVar
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from jaxcam import HybridSystem
+from jaxcam.discrepancy import diagnose, Policy, strength, Term, Verdict
+from jaxcam.discrepancy.evidence import shares, Visited
+from jaxcam.discrepancy.report import Reason
+from jaxcam.fitting import Parameter, Sensor
+from jaxcam.recordings import Recording, segment
+from jaxcam.recordings.cut import least_noise, measured_noise
+
+
+_NOISE = 1e-4
+_STIFFNESS = 150.0
+_TIME = 1e-3 * np.arange(2500)
+
+
+class DampedSwing(HybridSystem):
+    """A damped mass on a spring, far from any stop."""
+
+    stiffness: float = 149.0
+    damping: float = 0.1
+
+    def vector_field(self, t, state):
+        force = self.stiffness * state[0] + self.damping * state[1]
+        return jnp.stack([state[1], -force])
+
+    def gap(self, t, state):
+        return state[0] + 100.0
+
+    def impact(self, t, state):
+        return state * jnp.array([1.0, -0.5])
+
+
+_PARAMETERS = (
+    Parameter("stiffness", lambda m: m.system.stiffness, 3.0, unit="1/s^2"),
+    Parameter("damping", lambda m: m.system.damping, 0.05, unit="1/s"),
+)
+
+
+class SharpFriction(Term):
+    """Dry friction with a corner that no step of a flight resolves."""
+
+    name: ClassVar[str] = "sharp_friction"
+    sentence: ClassVar[str] = "sharp dry friction"
+    sharp: float = strength("[q]/s^2", 0.1, lower=0.0)
+
+    def acceleration(self, motion):
+        return -self.sharp * jnp.sign(motion.velocity)
+
+
+class Sail(Term):
+    """Drag of a sail, with the square of the velocity."""
+
+    name: ClassVar[str] = "sail"
+    sentence: ClassVar[str] = "drag of a sail"
+    drag: float = strength("1/[q]", 0.1, lower=0.0)
+
+    def acceleration(self, motion):
+        return -self.drag * jnp.abs(motion.velocity) * motion.velocity
+
+
+def _free(x0, c):
+    """A damped oscillation that starts at rest, in closed form."""
+    w = np.sqrt(_STIFFNESS - c * c / 4)
+    decay = np.exp(-c * _TIME / 2)
+    return x0 * decay * (np.cos(w * _TIME) + c / (2 * w) * np.sin(w * _TIME))
+
+
+def _sailing(x0, drag):
+    from scipy.integrate import solve_ivp
+
+    def field(t, y):
+        return [y[1], -_STIFFNESS * y[0] - 0.1 * y[1] - drag * abs(y[1]) * y[1]]
+
+    found = solve_ivp(
+        field, (0, _TIME[-1]), [x0, 0.0], "DOP853", _TIME, rtol=1e-10, atol=1e-12
+    )
+    return found.y[0]
+
+
+def _diagnosed(motions, *, noise=_NOISE, stated=_NOISE, seed=1, **options):
+    rng = np.random.default_rng(seed)
+    runs = [
+        Recording(
+            f"run{k}", _TIME, {"angle_rad": x + noise * rng.standard_normal(len(x))}
+        )
+        for k, x in enumerate(motions)
+    ]
+    return diagnose(
+        DampedSwing(),
+        [segment(run, "angle_rad", noise=stated) for run in runs],
+        sensors={"angle_rad": Sensor(0, noise=stated)},
+        parameters=list(_PARAMETERS),
+        **options,
+    )
+
+
+def test_noise_is_told_from_a_motion_with_few_samples_per_period():
+    """White noise within 10 %, at 20 samples per period of a motion 300 times it."""
+    rng = np.random.default_rng(3)
+    motion = 0.3 * np.cos(2 * np.pi * np.arange(4000) / 20)
+    noisy = motion + 1e-3 * rng.standard_normal(4000)
+    assert measured_noise(noisy) > 1.5e-3
+    assert least_noise(noisy) == pytest.approx(1e-3, rel=0.1)
+
+
+def test_places_are_shown_where_data_are():
+    """Positions on two islands: what is between them has no data."""
+    islands = np.concatenate([np.linspace(0, 1, 500), np.linspace(3, 4, 500)])
+    seen = Visited(islands, islands, np.zeros(0), 4.0)
+    grid = np.linspace(0, 4, 41)
+    near = seen.near("position", grid, Policy())
+    assert near[(grid < 1) | (grid > 3)].all()
+    assert not near[(grid > 1.2) & (grid < 2.8)].any()
+    assert seen.near("phase", grid, Policy()).all()
+
+
+def test_shares_add_up(unchecked_types):
+    """Two parts in proportion to what is lost without them; the rest is left."""
+    problem = SimpleNamespace(samples=1000)
+    before = SimpleNamespace(cost=9000.0, problem=problem)
+    after = SimpleNamespace(cost=1000.0, problem=problem)
+    found = shares(before, after, {"a": 3000.0, "b": 1000.0}, 2000.0)
+    assert found.of == pytest.approx({"a": 0.6, "b": 0.2})
+    assert found.left == pytest.approx(0.2)
+    nothing = shares(after, after, {}, 0.0)
+    assert (nothing.of, nothing.left) == ({}, 0.0)
+
+
+@pytest.mark.slow
+def test_a_noise_that_is_stated_too_small_is_measured():
+    found = _diagnosed([_free(0.3, 0.1), _free(0.2, 0.1)], stated=_NOISE / 3)
+    assert found.verdict is Verdict.NONE
+    assert found.noise_floor == pytest.approx(_NOISE, rel=0.1)
+    assert Reason.NOISIER in {caveat.reason for caveat in found.caveats}
+
+
+@pytest.mark.slow
+def test_a_parameter_beyond_its_tolerance_is_named_by_what_acts_like_it():
+    """Damping of 0.3 1/s where the rig file allows 0.05 to 0.15.
+
+    The tolerance tells the part of the rig to 0.05 / sqrt(3).
+    """
+    found = _diagnosed([_free(0.3, 0.3), _free(0.2, 0.3)])
+    assert (found.verdict, found.names) == (Verdict.EFFECT, ("viscous_damping",))
+    one = found.effects[0].parameters["c1"]
+    assert one.value == pytest.approx(0.2, abs=0.01)
+    assert one.stderr == pytest.approx(0.05 / np.sqrt(3), rel=0.1)
+    assert found.heldout_after < 1.1 * _NOISE < found.heldout_before
+    assert Reason.BEYOND_TOLERANCE in {caveat.reason for caveat in found.caveats}
+
+
+@pytest.mark.slow
+def test_a_parameter_beyond_its_tolerance_that_nothing_acts_like_is_said():
+    """A stiffness of 150 where the rig file allows 145 +- 3: no term is a spring."""
+    soft = Parameter(
+        "stiffness", lambda m: m.system.stiffness, 3.0, nominal=145.0, unit="1/s^2"
+    )
+    found = _diagnosed([_free(0.3, 0.1), _free(0.2, 0.1)], candidates=(Sail(),))
+    assert not found.caveats
+    rng = np.random.default_rng(2)
+    runs = [
+        Recording(f"r{k}", _TIME, {"angle_rad": x + _NOISE * rng.standard_normal(2500)})
+        for k, x in enumerate([_free(0.3, 0.1), _free(0.2, 0.1)])
+    ]
+    found = diagnose(
+        DampedSwing(),
+        [segment(run, "angle_rad", noise=_NOISE) for run in runs],
+        sensors={"angle_rad": Sensor(0, noise=_NOISE)},
+        parameters=[soft, _PARAMETERS[1]],
+        candidates=(Sail(),),
+    )
+    assert found.verdict is Verdict.NONE
+    (caveat,) = [c for c in found.caveats if c.reason is Reason.BEYOND_TOLERANCE]
+    assert "stiffness is 150" in caveat.sentence
+
+
+@pytest.mark.slow
+def test_one_misread_record_does_not_hide_the_answer():
+    """Drag in five records, and a sixth that is another oscillator altogether."""
+    motions = [_sailing(x, 0.3) for x in (0.3, 0.25, 0.2, 0.35, 0.28)]
+    other = 0.2 * np.cos(9.0 * _TIME) * (1 + 0.3 * np.sin(2 * _TIME))
+    found = _diagnosed([*motions[:3], other, *motions[3:]], candidates=(Sail(),))
+    assert (found.verdict, found.names) == (Verdict.EFFECT, ("sail",))
+    one = found.effects[0].parameters["drag"]
+    assert one.value == pytest.approx(0.3, abs=4 * one.stderr)
+    aside = [c for c in found.caveats if c.reason is Reason.SET_ASIDE]
+    assert len(aside) == 1 and "run3" in aside[0].sentence
+    assert "run3" not in found.records
+
+
+@pytest.mark.slow
+def test_a_candidate_that_cannot_be_fitted_hides_no_other():
+    motions = [_sailing(0.3, 0.3), _sailing(0.2, 0.3)]
+    alone = _diagnosed(motions, candidates=(Sail(),))
+    both = _diagnosed(motions, candidates=(Sail(), SharpFriction()))
+    assert alone.names == both.names == ("sail",)
+    (value,) = (one.effects[0].parameters["drag"].value for one in (both,))
+    assert value == pytest.approx(alone.effects[0].parameters["drag"].value, rel=1e-3)
