@@ -32,6 +32,8 @@ def formulated(fits: FreeFits, found: Missing, small: float, progress) -> Missin
             continue
         trials = []
         for primitive, numbers in _promising(fits, found, one):
+            if any(_enough(fits, found, trial) for trial in trials):
+                break
             progress(f"fitting a formula: {primitive.name}", None)
             trials.append(_fitted(fits, found, one, primitive, numbers))
         sound = [trial for trial in trials if math.isfinite(trial.score)]
@@ -39,6 +41,13 @@ def formulated(fits: FreeFits, found: Missing, small: float, progress) -> Missin
         if best.score < found.score + small:
             found = best
     return found
+
+
+def _enough(fits: FreeFits, found: Missing, trial: Missing) -> bool:
+    """Whether a form leaves noise alone, by better evidence than the curve."""
+    samples = found.problem.samples
+    surplus = fits.policy.cost_errors * math.sqrt(2 * samples)
+    return trial.score < found.score and trial.fit.cost < samples + surplus
 
 
 def _fitted(

@@ -187,6 +187,8 @@ class Search:
             )
             if any(one.inner for one in term.strengths()):
                 grown = max(grown, scan.best[1])
+                if grown < self._least_of_vibrations(trial):
+                    continue
             if grown < self.trials.threshold(term.name):
                 continue
             cost = trial.fit.cost - grown
@@ -194,6 +196,19 @@ class Search:
             bic = cost + count * math.log(self.trials.problem.samples)
             found[trial.names | {term.name}] = bic
         return found
+
+
+    def _least_of_vibrations(self, trial: Trial) -> float:
+        """What a vibration must promise to be fitted.
+
+        Far from the data whatever is missing has some of its motion at any frequency; a
+        vibration that is there alone explains most of what is left, and its fits take
+        longest.
+        """
+        samples = self.trials.problem.samples
+        if trial.fit.cost < self.policy.near * samples:
+            return 0.0
+        return (1 - self.policy.helped) * (trial.fit.cost - samples)
 
 
 def _bic(trial: Trial) -> float:
