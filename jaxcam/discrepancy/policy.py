@@ -250,7 +250,7 @@ class Policy:
     absent_errors: float = _shows(
         10.0, "standard errors that an event speed counts which no longer exists"
     )
-    cost_errors: float = _shows(
+    cost_errors: float = _bounds(
         3.0, "standard deviations beyond which a cost is more than noise makes it"
     )
     nearby: float = _shows(
