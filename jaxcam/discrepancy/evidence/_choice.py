@@ -38,7 +38,8 @@ class Outside(NamedTuple):
 class Choice:
     """What a search ended with, and the evidence for it.
 
-    - `found`: the best subset; `best`: the part of it that is named; `before`: none.
+    - `found`: the best subset; `best`: the part of it that is named; `before`: no term,
+        the parameters of the rig held within their tolerances.
     - `inclusion`, `deviation`: of the bootstrap, by term and by parameter.
     - `doubtful`: terms that were dropped, with the share of the bootstrap samples that
         keep them; `needed`: those that are named all the same.
@@ -98,15 +99,15 @@ def choose(question: Question, trials: Trials, seed: int) -> Choice:
                 needed, doubtful = doubtful, []
                 inclusion, deviation = redrawn(trials, best, seed)
     beyond, best = _instead(trials, best, deviation)
-    replaced = [one for one in beyond if one.term]
-    if replaced:
-        # the textbook model has its parameters where the rig file allows them
-        before = dataclasses.replace(before, fit=_bounded(trials, before, best))
-        inclusion |= {one.term: one.parameter.chance for one in replaced}
+    inclusion |= {one.term: one.parameter.chance for one in beyond if one.term}
     missing, needed_parts = None, None
     left = [one for one in left_after if one.significant]
     if left and trials.policy.functions:
         missing, needed_parts = _without_a_name(question, trials, best, left, seed)
+    after = best.fit if missing is None else missing.fit
+    if after is not before.fit:
+        # the textbook model has its parameters where the rig file allows them
+        before = dataclasses.replace(before, fit=_bounded(trials, before.fit, after))
     if missing is not None:
         nameless = Trial(
             missing.names | {"functions"}, missing.fit, missing.score, 0, False
@@ -144,16 +145,16 @@ def _instead(trials: Trials, best: Trial, deviation) -> tuple[list[Outside], Tri
             # the term takes up the excess: the parameter is back in its tolerance
             if trial is None or not one.low <= trial.fit[one.name].value <= one.high:
                 continue
-            lost = _bounded(trials, best, trial).cost - trial.fit.cost
+            lost = _bounded(trials, best.fit, trial.fit).cost - trial.fit.cost
             outside, best = Outside(one, name, lost), trial
             break
         found.append(outside)
     return found, best
 
 
-def _bounded(trials: Trials, less: Trial, best: Trial) -> Fit:
+def _bounded(trials: Trials, less: Fit, best: Fit) -> Fit:
     """A fit with the parameters of the rig held within their tolerances."""
-    return within_tolerances(less.fit, best.fit, trials.rig, trials.policy)
+    return within_tolerances(less, best, trials.rig, trials.policy)
 
 
 def _without_a_name(

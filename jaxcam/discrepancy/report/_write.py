@@ -16,7 +16,7 @@ from ..evidence import (
     visited,
 )
 from ..policy import Policy
-from ..search import Missing, Question, Trials, within_tolerances
+from ..search import Missing, Question, Trials
 from ..terms import Value
 from ._alternatives import alternatives_of, fitted_alternatives
 from ._caveats import (
@@ -65,7 +65,7 @@ def diagnosis_of(
     caveats += caveats_of(trials, choice, ties, bool(effects))
     floor = float(next(iter(question.problem.model.sensors.values())).floor)
     least = limits(trials, best)
-    within = within_tolerances(choice.before.fit, best.fit, question.rig, policy)
+    within = choice.before.fit
     names = [effect.name for effect in effects]
     return Diagnosis(
         case,
@@ -132,7 +132,7 @@ def _of_functions(
         effects.append(drive_effect(ripple, policy))
     floor = float(next(iter(question.problem.model.sensors.values())).floor)
     others = sorted(trials.known.values(), key=lambda trial: trial.bic)
-    within = within_tolerances(bare.fit, found, question.rig, policy)
+    within = bare.fit
     return Diagnosis(
         case,
         Verdict.UNKNOWN,

@@ -197,7 +197,6 @@ class Search:
             found[trial.names | {term.name}] = bic
         return found
 
-
     def _least_of_vibrations(self, trial: Trial) -> float:
         """What a vibration must promise to be fitted.
 

@@ -23,6 +23,8 @@ _FEW = 24
 _FAR = 9.0
 # Damped steps from each start
 _STEPS = 12
+# Steps that lower the cost of no piece by more than this share, after which it ends
+_QUIET, _LITTLE = 3, 1e-3
 _FIRST_DAMPING, _LEAST_DAMPING = 1e-3, 1e-9
 
 
@@ -87,10 +89,15 @@ def _descended(layout, alone, extras, point, start):
     blocks, costs = states_only(layout, alone, extras, Point(point.values, states))
     cost = jnp.where(jnp.isfinite(costs.flown), costs.flown, jnp.inf)
     damping = jnp.full(cost.shape, _FIRST_DAMPING)
+    quiet = 0
     for _ in range(_STEPS):
+        if quiet == _QUIET:
+            break
         moved = states + _step(blocks, damping)
         tried, costs = states_only(layout, alone, extras, Point(point.values, moved))
         better = costs.flown < cost
+        gain = float(jnp.nanmax(jnp.where(better, 1 - costs.flown / cost, 0.0)))
+        quiet = quiet + 1 if gain < _LITTLE else 0
         states = jnp.where(better[..., None], moved, states)
         cost = jnp.where(better, costs.flown, cost)
         blocks = blocks._replace(
