@@ -8,8 +8,9 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from scipy.ndimage import zoom
 
-from ._axes import one_axes
+from ._axes import figure_of, one_axes
 from ._diagram import COLOURS, NOTHING
 from ._style import SECTION, styled
 from .labels import labelled
@@ -22,6 +23,8 @@ if TYPE_CHECKING:
 # attractors with a colour and a line of the legend of their own
 _SHOWN = len(COLOURS) - 1
 _OTHERS = "#D9D9D9"
+# cells of a picture along its shorter side, at least
+_FINE = 500
 _MARKS = "osD^vP*X"
 
 
@@ -65,7 +68,7 @@ def basin_picture(
     # white below, one colour an attractor, grey for those without
     index = np.where(number < 0, 0, np.minimum(number, len(colours) - 2) + 1)
     image = ax.imshow(
-        index.T,
+        _finer(index, len(colours)).T,
         origin="lower",
         extent=(low[0], high[0], low[1], high[1]),
         cmap=ListedColormap(colours),
@@ -91,7 +94,29 @@ def basin_picture(
         bbox_to_anchor=(0.0, 1.0),
         ncols=min(len(handles), 3),
     )
-    return ax.figure  # pyright: ignore
+    return figure_of(ax)
+
+
+def _finer(index, count: int) -> np.ndarray:
+    """The same regions in smaller cells, so that slanting boundaries are no stairs.
+
+    A small cell belongs to the region that has most of it when each region's share is
+    interpolated between the centres of the cells; nothing moves by more than a cell.
+    """
+    factor = -(-_FINE // min(index.shape))
+    if factor == 1:
+        return index
+    best = np.full([factor * size for size in index.shape], -1.0)
+    finer = np.zeros(best.shape, dtype=int)
+    for region in range(count):
+        if np.any(index == region):
+            share = zoom(
+                (index == region).astype(float), factor, order=1, mode="nearest",
+                grid_mode=True,
+            )  # fmt: skip
+            finer = np.where(share > best, region, finer)
+            best = np.maximum(share, best)
+    return finer
 
 
 def _colours(basins, orbits: bool):

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 
-from ._axes import legend_above, one_axes
+from ._axes import figure_of, legend_above, one_axes
 from ._style import CONTACT, FLIGHT, IMPACT, SECTION, styled
 from .labels import labelled
 
@@ -88,7 +88,7 @@ def branch_diagram(
     ax.set_ylabel(labelled(*y_label))
     ax.margins(x=0.03, y=0.08)
     legend_above(ax)
-    return ax.figure  # pyright: ignore
+    return figure_of(ax)
 
 
 def _first_component(point) -> np.ndarray:

@@ -2,16 +2,17 @@
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
 from variational import beta_map, lambda_inverse, lambda_map, scaling_law
 
-from ._axes import legend_above, one_axes
+from ._axes import figure_of, legend_above, one_axes
 from ._style import FLIGHT, IMPACT, RECORDED, SECTION, styled
 
 
 @styled
-def lambda_cobweb(r: float, ax: Axes | None = None, *, start=None) -> Axes:
+def lambda_cobweb(r: float, ax: Axes | None = None, *, start=None) -> Figure:
     """Draw f(lambda) with its fixed point. (Figure 6.5)
 
     **Arguments:**
@@ -21,7 +22,7 @@ def lambda_cobweb(r: float, ax: Axes | None = None, *, start=None) -> Axes:
     - `start`: first values of lambda to draw cobwebs from; without, one either side of
       the fixed point, where chattering completes and where it is interrupted.
 
-    **Returns:** the axes.
+    **Returns:** the figure.
     """
     ax = one_axes(ax)
     law = scaling_law(r)
@@ -44,7 +45,7 @@ def lambda_cobweb(r: float, ax: Axes | None = None, *, start=None) -> Axes:
         xlim=(0, 0.4), ylim=(0, top), xlabel=r"$\lambda_k$", ylabel=r"$\lambda_{k+1}$"
     )
     legend_above(ax)
-    return ax
+    return figure_of(ax)
 
 
 def _cobweb(lam, r, most=40):
@@ -61,7 +62,7 @@ def _cobweb(lam, r, most=40):
 @styled
 def beta_lobes(
     r: float, ax: Axes | None = None, *, measured=None, lobes: int = 4
-) -> Axes:
+) -> Figure:
     """Draw beta over lambda - lambda_bar, with its corners. (Figures 6.14, 6.15)
 
     **Arguments:**
@@ -72,7 +73,7 @@ def beta_lobes(
       the theory.
     - `lobes`: how many of them, from the largest.
 
-    **Returns:** the axes.
+    **Returns:** the figure.
     """
     ax = one_axes(ax)
     bar = float(scaling_law(r).lambda_bar)
@@ -94,17 +95,17 @@ def beta_lobes(
     ax.axhline(0, color=RECORDED, lw=0.8)
     ax.set(xlabel=r"$\lambda - \bar\lambda$", ylabel=r"$\beta$")
     legend_above(ax)
-    return ax
+    return figure_of(ax)
 
 
 @styled
-def lobe_scaling(distance, height, kappa: float, ax: Axes | None = None) -> Axes:
+def lobe_scaling(distance, height, kappa: float, ax: Axes | None = None) -> Figure:
     """Draw heights of lobes over their distance from the interruption. (6.53)
 
     **Arguments:** `distance` and `height`, each `(k,)`, positive; `kappa`, the exponent
     of the theory; `ax`, a new figure without.
 
-    **Returns:** the axes.
+    **Returns:** the figure.
     """
     ax = one_axes(ax)
     distance, height = np.asarray(distance), np.asarray(height)
@@ -124,4 +125,4 @@ def lobe_scaling(distance, height, kappa: float, ax: Axes | None = None) -> Axes
     ax.xaxis.set_minor_formatter(NullFormatter())
     ax.set(xlabel="distance from the interruption", ylabel="height of the lobe")
     legend_above(ax)
-    return ax
+    return figure_of(ax)

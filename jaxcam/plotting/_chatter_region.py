@@ -2,10 +2,11 @@
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from variational.chatter import ChatterFrame, GrazingManifold, ImpactCurve
 
-from ._axes import legend_above, one_axes
+from ._axes import figure_of, legend_above, one_axes
 from ._style import BAND, FLIGHT, IMPACT, SECTION, styled
 
 
@@ -18,7 +19,7 @@ def chattering_picture(
     *,
     period: float,
     most: float | None = None,
-) -> Axes:
+) -> Figure:
     """Draw the chattering region D and the grazing manifold. (Figures 6.2 and 6.4)
 
     **Arguments:**
@@ -29,7 +30,7 @@ def chattering_picture(
     - `period`: of the forcing (s).
     - `most`: largest speed drawn; that of the region without.
 
-    **Returns:** the axes: rebound speed over time from release, modulo the period.
+    **Returns:** the figure: rebound speed over time from release, modulo the period.
     """
     ax = one_axes(ax)
     release = float(frame.release)
@@ -49,7 +50,7 @@ def chattering_picture(
     ax.set_xlabel("time from release / period")
     ax.set_ylabel("rebound speed (gap / s)")
     legend_above(ax)
-    return ax
+    return figure_of(ax)
 
 
 def _draw(ax, curves, release, period, colour, name):

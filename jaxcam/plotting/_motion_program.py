@@ -2,6 +2,7 @@
 
 import jax.numpy as jnp
 import numpy as np
+from matplotlib.figure import Figure
 
 from ..models import MotionProgram
 from ._axes import several_axes
@@ -13,7 +14,7 @@ _POINTS = 200
 
 
 @styled
-def motion_program(program: MotionProgram, axes=None, *, unit: str = "rad"):
+def motion_program(program: MotionProgram, axes=None, *, unit: str = "rad") -> Figure:
     """Draw lift, velocity, acceleration and jerk, for each radian of the cam.
 
     Where a derivative jumps the curve is broken: the values on both sides are marked by
@@ -26,10 +27,9 @@ def motion_program(program: MotionProgram, axes=None, *, unit: str = "rad"):
     - `axes`: four of them; a new figure without.
     - `unit`: of the lift, "rad" or "m".
 
-    **Returns:** the four axes.
+    **Returns:** the figure.
     """
     figure, axes = several_axes(axes, (4, 1), sharex=True, figsize=(6.4, 8.4))
-    del figure
     axes = axes[:, 0]
     pieces = program.prepared()
     starts, ends = np.asarray(pieces.starts), np.asarray(pieces.ends())
@@ -51,4 +51,4 @@ def motion_program(program: MotionProgram, axes=None, *, unit: str = "rad"):
     axes[-1].set_xlabel("cam angle (degrees)")
     axes[-1].set_xlim(0, 360)
     axes[-1].set_xticks(np.arange(0, 361, 30))
-    return axes
+    return figure

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 
-from ._axes import one_axes
+from ._axes import figure_of, one_axes
 from ._branch import mark_of
 from ._style import styled
 from .labels import labelled
@@ -71,7 +71,7 @@ def special_curves(
     ax.legend(
         unique.values(), unique.keys(), loc="center left", bbox_to_anchor=(1.0, 0.5)
     )
-    return ax.figure  # pyright: ignore
+    return figure_of(ax)
 
 
 def _mark(ax: Axes, place: np.ndarray, kind: str) -> None:
