@@ -149,7 +149,9 @@ def _maps(plt, found: Diagnosis):
             axis.grid(False)
     for axis in axes[-1]:
         axis.set_xlabel(along.label)
-    figure.colorbar(image, ax=axes, label="mean residual (standard errors)")
+    figure.colorbar(
+        image, ax=axes, label="mean residual (standard errors)", extend="both"
+    )
     return figure
 
 

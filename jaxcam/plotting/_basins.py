@@ -8,7 +8,7 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from scipy.ndimage import zoom
+from scipy.ndimage import gaussian_filter
 
 from ._axes import figure_of, one_axes
 from ._diagram import COLOURS, NOTHING
@@ -25,6 +25,8 @@ _SHOWN = len(COLOURS) - 1
 _OTHERS = "#D9D9D9"
 # cells of a picture along its shorter side, at least
 _FINE = 500
+# neighbourhood of a small cell, in computed ones
+_BLUR = 1.2
 _MARKS = "osD^vP*X"
 
 
@@ -100,23 +102,29 @@ def basin_picture(
 def _finer(index, count: int) -> np.ndarray:
     """The same regions in smaller cells, so that slanting boundaries are no stairs.
 
-    A small cell belongs to the region that has most of it when each region's share is
-    interpolated between the centres of the cells; nothing moves by more than a cell.
+    A small cell belongs to the region that has most of its neighbourhood. Where that
+    would change what was computed, at the centre of a cell, the cell stays as it was:
+    thin and fractal regions are not smoothed away.
     """
     factor = -(-_FINE // min(index.shape))
     if factor == 1:
         return index
-    best = np.full([factor * size for size in index.shape], -1.0)
-    finer = np.zeros(best.shape, dtype=int)
-    for region in range(count):
+    # odd, so that a cell has a centre
+    factor += 1 - factor % 2
+    cells = np.kron(index, np.ones((factor, factor), dtype=int))
+    finer, most = np.zeros_like(cells), np.zeros(cells.shape)
+    for region in (*range(1, count), 0):
         if np.any(index == region):
-            share = zoom(
-                (index == region).astype(float), factor, order=1, mode="nearest",
-                grid_mode=True,
-            )  # fmt: skip
-            finer = np.where(share > best, region, finer)
-            best = np.maximum(share, best)
-    return finer
+            share = gaussian_filter(
+                (cells == region).astype(float), _BLUR * factor, mode="nearest"
+            )
+            # where no motion starts, more than all basins together, not than each
+            least = 0.5 if region == 0 else most
+            finer = np.where(share > least, region, finer)
+            most = np.where(share > least, share, most)
+    centres = finer[factor // 2 :: factor, factor // 2 :: factor]
+    wrong = np.kron(centres != index, np.ones((factor, factor), dtype=bool))
+    return np.where(wrong, cells, finer)
 
 
 def _colours(basins, orbits: bool):
