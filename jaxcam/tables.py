@@ -1,13 +1,17 @@
-"""Short tables: results as text on a screen and as HTML in a notebook."""
+"""How results are shown: short tables, and units that suit the size of a number."""
 
 from collections.abc import Sequence
 from html import escape
 from typing import NamedTuple
 
+import numpy as np
+
 
 # rows shown of a longer table: the first and the last
 _MOST = 20
 _CELL = 'style="text-align: {}"'
+# units that a prefix can be put before; others (rpm, -) keep their numbers
+_TAKES_PREFIX = ("rad", "m", "s", "N", "V")
 
 
 class ShortTable(NamedTuple):
@@ -57,3 +61,12 @@ class ShortTable(NamedTuple):
             return list(self.rows)
         half, gap = _MOST // 2, tuple("…" for _ in self.headings)
         return [*self.rows[:half], gap, *self.rows[-half:]]
+
+
+def scaled(unit: str, largest: float) -> tuple[float, str]:
+    """A factor and a unit in which `largest` (in `unit`) is not far from one."""
+    if unit.partition("/")[0] not in _TAKES_PREFIX or not 0 < largest < 0.05:
+        return 1.0, unit
+    if not np.isfinite(largest) or largest > 2e-5:
+        return 1e3, f"m{unit}"
+    return 1e6, f"µ{unit}"

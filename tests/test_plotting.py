@@ -15,10 +15,10 @@ from jaxcam import plotting, simulate
 from jaxcam.hybrid import HybridSystem, Settings, Trajectory
 from jaxcam.hybrid.record import Contacts, Impacts, Steps
 from jaxcam.models import BouncingBall
-from jaxcam.plotting._prefix import scaled
 from jaxcam.plotting.curves import trajectory_curve
 from jaxcam.recordings import Recording
 from jaxcam.recordings.against_model import Comparison, Residuals
+from jaxcam.tables import scaled
 
 
 pytestmark = pytest.mark.filterwarnings("error")

@@ -12,9 +12,10 @@ from ..discrepancy.evidence import Structure
 from ..discrepancy.report import listed, number
 from ..discrepancy.terms import Variable
 from ..fitting import Residuals
+from ..tables import scaled
 from ._outlook import Outlook
 from ._page import figure_html, sentences, STYLE, table_html
-from ._residual_axes import Along, residual_label, shown_in, title_of
+from ._residual_axes import Along, REACH, residual_label, shown_in, title_of
 
 
 matplotlib.use("Agg")
@@ -101,12 +102,12 @@ def _unseen(plt, found: Diagnosis):
                 rasterized=True,
             )
         band = 2 * factor * part.noise
-        axis.axhspan(-band, band, color="0.5", alpha=0.25, lw=0)
+        axis.axhspan(-band, band, color="0.5", alpha=0.25, lw=0, label="noise ± 2σ")
         axis.set_title(f"{title_of(part, before)}: {label}")
         axis.set_ylabel(residual_label(part))
     axes[-1].set_xlabel("time (s)")
     handles, labels = axes[0].get_legend_handles_labels()
-    figure.legend(handles, labels, markerscale=6, ncols=2, loc="outside upper right")
+    figure.legend(handles, labels, markerscale=6, ncols=3, loc="outside upper right")
     return figure
 
 
@@ -235,10 +236,18 @@ def _ranking(plt, found: Diagnosis):
     pairs = [(name, delta) for name, delta, _ in found.alternatives] or [("none", 0.0)]
     figure, axis = plt.subplots(figsize=(8, 0.35 * len(pairs) + 1.0))
     names = [name.replace("_", " ").replace("+", " + ") for name, _ in pairs]
-    axis.barh(names, [max(delta, 0.1) for _, delta in pairs], color=FLIGHT)
+    # dots, not bars: a logarithmic axis has no zero to measure a length from
+    for row, (_, delta) in enumerate(pairs):
+        axis.plot(max(delta, 0.1), row, "o", color=FLIGHT)
+        axis.annotate(
+            f"{delta:.3g}", (max(delta, 0.1), row), (7, 0), va="center",
+            textcoords="offset points", fontsize="small",
+        )  # fmt: skip
+    axis.set_yticks(range(len(names)), names)
+    axis.set_ylim(-0.6, len(names) - 0.4)
     axis.set_xscale("log")
     # from the same value in every report, so that a single bar has a scale too
-    axis.set_xlim(0.05, max(1e2, 2 * max(delta for _, delta in pairs)))
+    axis.set_xlim(0.05, max(1e2, 4 * max(delta for _, delta in pairs)))
     axis.invert_yaxis()
     axis.set_xlabel("BIC above that of the verdict")
     return figure
@@ -285,6 +294,8 @@ def diagnosis_page(
         )
         for one in found.left_after
     ]
+    # the unit of the figures
+    factor, unit = scaled(found.unit, REACH * found.noise_floor)
     parts = [
         f"<h1>{escape(title)}</h1>",
         *(f'<p class="sentence">{escape(s)}</p>' for s in sentences(found.summary)),
@@ -298,9 +309,9 @@ def diagnosis_page(
         ]
     parts += [
         "<h2>Before and after, on flights not seen</h2>",
-        f"<p>{found.heldout_before:.3e} {found.unit} before, "
-        f"{found.heldout_after:.3e} after; noise and rounding of the sensor are "
-        f"{found.noise_floor:.3e}.</p>",
+        f"<p>{factor * found.heldout_before:.3g} {unit} before, "
+        f"{factor * found.heldout_after:.3g} after; noise and rounding of the sensor "
+        f"are {factor * found.noise_floor:.3g}.</p>",
         *(figure_html(file, caption) for file, caption in figures),
     ]
     if found.caveats:

@@ -11,9 +11,9 @@ from matplotlib.lines import Line2D
 from scipy.stats import norm
 
 from ..recordings.against_model import Comparison, Residuals
+from ..tables import scaled
 from ._axes import several_axes
 from ._channels import name_and_unit
-from ._prefix import scaled
 from ._style import BAND, FLIGHT, styled
 from .labels import labelled
 
