@@ -137,9 +137,9 @@ class Branch:
                 kind = point.kind + ("" if point.converged else " (not converged)")
                 notes = point.criticality or point.reason
                 at = [f"{value:.9g}" for value in values]
-                rows.append(
-                    (str(point.label), kind, *at, stability(point.stable), notes)
-                )
+                # at a special point stability is about to change
+                word = "" if point.special else stability(point.stable)
+                rows.append((str(point.label), kind, *at, word, notes))
         headings = ("label", "kind", *names, "stability", "notes")
         return ShortTable(sentence, headings, rows, ("kind", "stability", "notes"))
 

@@ -166,7 +166,7 @@ def _name(ax: Axes, points, value, x_scale) -> None:
             xytext=(-5 if left else 5, 5),
             textcoords="offset points",
             ha="right" if left else "left",
-            fontsize="x-small",
+            fontsize="small",
             color=mark_of(point.kind)[1],
             path_effects=[withStroke(linewidth=2.5, foreground="white")],
             zorder=5,

@@ -10,7 +10,7 @@ from matplotlib.image import AxesImage
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.patheffects import withStroke
-from matplotlib.text import Text
+from matplotlib.text import Annotation, Text
 
 
 # the background of mkdocs-material's dark pages, and its text
@@ -46,6 +46,8 @@ def on_dark(figure: Figure) -> Figure:
                 _recolour(artist, names)
         if isinstance(artist, Text) and artist.get_bbox_patch() is not None:
             _recolour(artist.get_bbox_patch(), _PROPERTIES[Patch])
+        if isinstance(artist, Annotation) and artist.arrow_patch is not None:
+            _recolour(artist.arrow_patch, _PROPERTIES[Patch])
         if isinstance(artist, ScalarMappable) and artist.get_array() is not None:
             _recolour_values(artist)
         # the halo of a label has the colour of the page
