@@ -440,3 +440,19 @@ def test_compare_recording_takes_a_comparison(recording):
     np.testing.assert_allclose(below.lines[0].get_ydata()[rows], 0.2)
     with pytest.raises(ValueError, match="it has follower_angle_rad of run1"):
         plotting.compare_recording(recording, Comparison((part,)), channel="gyro_rad_s")
+
+
+def test_a_figure_is_recoloured_for_a_dark_page(ball):
+    figure = plotting.time_history(ball)
+    height = figure.axes[0]
+    curve = line(height, "state")
+    before = curve.get_color()
+    assert plotting.on_dark(figure) is figure
+    background, text = figure.get_facecolor(), height.yaxis.label.get_color()
+    assert max(background[:3]) < 0.2 < 0.8 < min(to_rgba(text)[:3])
+    # the same hue, lighter
+    light = np.subtract(to_rgba(curve.get_color()), to_rgba(before))[:3]
+    assert np.all(light > 0) and np.argmax(to_rgba(curve.get_color())[:3]) == 2
+    (tick, *_) = height.get_yticklabels()
+    assert min(to_rgba(tick.get_color())[:3]) > 0.8
+    figure.canvas.draw()

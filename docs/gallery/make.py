@@ -25,6 +25,7 @@ from jaxcam.plotting import on_dark, style
 
 HERE = Path(__file__).parent
 PAGE = HERE.parent / "gallery.md"
+OUT = HERE
 # of the page, from top to bottom
 ORDER = tuple((HERE / "order.txt").read_text("utf-8").split())
 # dots an inch
@@ -77,8 +78,8 @@ def caption(name: str) -> str:
 def draw(name: str) -> None:
     """Run a script and write both its pictures."""
     figure = runpy.run_path(str(HERE / f"{name}.py"))["figure"]
-    _write(figure, HERE / f"{name}-light.png")
-    _write(on_dark(figure), HERE / f"{name}-dark.png")
+    _write(figure, OUT / f"{name}-light.png")
+    _write(on_dark(figure), OUT / f"{name}-dark.png")
 
 
 def _write(figure: Figure, path: Path) -> None:

@@ -42,5 +42,6 @@ with style():
         pulls = np.rad2deg(angles), force, 0, force < 0
         ax.fill_between(*pulls, color=IMPACT, alpha=0.3)
     ax.axhline(0, color="0.3", lw=0.8)
+    ax.margins(y=0.12)
     ax.set(xlabel="cam angle (degrees)", ylabel="contact force (N)", xlim=(0, 360))
     ax.set_xticks(np.arange(0, 361, 45))

@@ -42,7 +42,10 @@ def lambda_cobweb(r: float, ax: Axes | None = None, *, start=None) -> Figure:
     ax.plot(bar, bar, "o", color=SECTION, ms=5, label=rf"$\bar\lambda$ = {bar:.4f}")
     ax.axvline(3 / 8, color=RECORDED, ls=":", lw=1, label=r"$\lambda_{max}$ = 3/8")
     ax.set(
-        xlim=(0, 0.4), ylim=(0, top), xlabel=r"$\lambda_k$", ylabel=r"$\lambda_{k+1}$"
+        xlim=(0, 0.4),
+        ylim=(0, top),
+        xlabel=r"$\lambda_k$ (–)",
+        ylabel=r"$\lambda_{k+1}$ (–)",
     )
     legend_above(ax)
     return figure_of(ax)
@@ -93,7 +96,7 @@ def beta_lobes(
         at - bar, beta_map(at, r), "o", color=SECTION, ms=3, label="an impact is lost"
     )
     ax.axhline(0, color=RECORDED, lw=0.8)
-    ax.set(xlabel=r"$\lambda - \bar\lambda$", ylabel=r"$\beta$")
+    ax.set(xlabel=r"$\lambda - \bar\lambda$ (–)", ylabel=r"$\beta$ (–)")
     legend_above(ax)
     return figure_of(ax)
 
@@ -123,6 +126,6 @@ def lobe_scaling(distance, height, kappa: float, ax: Axes | None = None) -> Figu
     )
     # the labels of minor ticks run into each other over less than two decades
     ax.xaxis.set_minor_formatter(NullFormatter())
-    ax.set(xlabel="distance from the interruption", ylabel="height of the lobe")
+    ax.set(xlabel="distance from the interruption (–)", ylabel="height of the lobe (–)")
     legend_above(ax)
     return figure_of(ax)

@@ -64,7 +64,7 @@ def chattering_picture(
         _draw(ax, manifold.before, release, period, FLIGHT, "S")
         _draw(ax, manifold.after, release, period, IMPACT, "W")
     ax.axvline(0, color=SECTION, lw=0.8, ls=":", label="release")
-    ax.set_xlabel("time from release / period")
+    ax.set_xlabel("time from release (periods)")
     ax.set_ylabel("rebound speed (gap / s)")
     legend_above(ax)
     return figure_of(ax)

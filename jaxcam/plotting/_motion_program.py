@@ -47,7 +47,7 @@ def motion_program(program: MotionProgram, axes=None, *, unit: str = "rad") -> F
         ax.plot(degrees.ravel(), values.ravel(), color=FLIGHT, lw=1.3)
         ax.axhline(0.0, color="0.75", lw=0.6, zorder=0)
         order = ("", "/rad", "/rad$^2$", "/rad$^3$")[k]
-        ax.set_ylabel(f"{_NAMES[k]} ({unit}{order})")
+        ax.set_ylabel(f"{_NAMES[k]}\n({unit}{order})")
     axes[-1].set_xlabel("cam angle (degrees)")
     axes[-1].set_xlim(0, 360)
     axes[-1].set_xticks(np.arange(0, 361, 30))
