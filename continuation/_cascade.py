@@ -1,5 +1,6 @@
 """Cascades of flips."""
 
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -60,11 +61,13 @@ def cascade(
     flips: int = 6,
     settings: BranchSettings | None = None,
     direction: int = 1,
+    callbacks: Iterable[Callable[[Point], Any]] = (),
 ) -> Cascade:
     """Follow a branch to its flip, the doubled branch to its own, and so on.
 
-    **Arguments:** as of [`continuation.follow`][], and `flips`: how many to locate.
-    Steps shrink with the lengths of the branches.
+    **Arguments:** as of [`continuation.follow`][], and `flips`: how many to locate;
+    `callbacks`, called with each point as it comes, to show progress. Steps shrink with
+    the lengths of the branches.
 
     **Returns:** a `Cascade`; it has fewer flips where a branch ends
     without one, and then its `reason` says why.
@@ -75,7 +78,7 @@ def cascade(
     begun = start.problem if isinstance(start, Start) else problem
     leaf, name = pick_one(where, begun.parameters)
     bounds = checked_bounds(bounds, name)
-    branches = []
+    branches, seen = [], tuple(callbacks)
     while len(branches) < flips:
         points = []
         for point in follow(
@@ -83,6 +86,8 @@ def cascade(
             settings=walk, direction=direction,
         ):  # fmt: skip
             points.append(point)
+            for callback in seen:
+                callback(point)
             if point.kind == FLIP and point.converged:
                 break
         branches.append(Branch(tuple(points), name, bounds, leaf, (name,)))

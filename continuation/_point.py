@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from jaxcam.tables import ShortTable
+
 from ._parameter import with_leaf
 from .problem import AbstractProblem
 
@@ -14,7 +16,7 @@ from .problem import AbstractProblem
 ORDINARY = ("start", "regular", "end")
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Point:
     """A point of a branch. All arrays are NumPy's."""
 
@@ -59,6 +61,14 @@ class Point:
     #: index of the parameter among the leaves of the problem's parameters
     leaf: int = -1
 
+    def __repr__(self) -> str:
+        values = self.parameters or (self.parameter,)
+        at = ", ".join(f"{value:.9g}" for value in values)
+        words = [] if self.stable is None else [stability(self.stable)]
+        words += [] if self.converged else ["not converged"]
+        words += [one for one in (self.criticality, self.reason) if one]
+        return f"Point {self.label}: {', '.join([f'{self.kind} at {at}', *words])}"
+
     @property
     def special(self) -> bool:
         """Whether this is a special point."""
@@ -91,7 +101,12 @@ def replace(point: Point, **changes: Any) -> Point:
     return Point(**{**point.__dict__, **changes})
 
 
-@dataclass(frozen=True, eq=False)
+def stability(stable: bool | None) -> str:
+    """In a word; none where a point has no stability."""
+    return {True: "stable", False: "unstable", None: ""}[stable]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
 class Branch:
     """Points in the order of the branch."""
 
@@ -103,6 +118,30 @@ class Branch:
     leaf: int = 0
     #: names of all parameters that vary
     names: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        return self._table().text()
+
+    def _repr_html_(self) -> str:
+        return self._table().html()
+
+    def _table(self) -> ShortTable:
+        """The ends and the special points."""
+        names = self.names or (self.name,)
+        count = f"{len(self.points)} points, {len(self.special)} of them special"
+        sentence = f"Branch over {' and '.join(names)}: {count}."
+        rows = []
+        for point in self.points:
+            if point.kind != "regular":
+                values = point.parameters[-len(names) :] or (point.parameter,)
+                kind = point.kind + ("" if point.converged else " (not converged)")
+                notes = point.criticality or point.reason
+                at = [f"{value:.9g}" for value in values]
+                # at a special point stability is about to change
+                word = "" if point.special else stability(point.stable)
+                rows.append((str(point.label), kind, *at, word, notes))
+        headings = ("label", "kind", *names, "stability", "notes")
+        return ShortTable(sentence, headings, rows, ("kind", "stability", "notes"))
 
     @property
     def special(self) -> tuple[Point, ...]:

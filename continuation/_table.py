@@ -7,19 +7,6 @@ import rich.table
 from ._point import Branch, Point
 
 
-# what AUTO calls them
-_SHORT = {
-    "start": "EP",
-    "end": "EP",
-    "regular": "",
-    "fold": "LP",
-    "branch point": "BP",
-    "flip": "PD",
-    "Neimark-Sacker": "TR",
-    "Hopf": "HB",
-}
-
-
 def table(
     branch: Branch,
     *,
@@ -58,7 +45,7 @@ def _heads(names: tuple[str, ...], n: int) -> list[str]:
 
 
 def _row(point: Point, parameters: int, n: int, factor: float) -> list[str]:
-    kind = _SHORT.get(point.kind, point.kind)
+    kind = "" if point.kind == "regular" else point.kind
     if not point.converged:
         kind += " (not converged)"
     stable = {True: "yes", False: "no", None: ""}[point.stable]
@@ -90,7 +77,8 @@ class PointPrinter:
         ordinary = point.kind == "regular"
         if ordinary and not (self.every and point.label % self.every == 0):
             return
-        kind = _SHORT.get(point.kind, point.kind)
         values = "  ".join(f"{x:.9g}" for x in point.parameters)
         words = point.reason or point.criticality
-        self.console.print(f"{point.label:6d}  {kind:4s}  {values}  {words}".rstrip())
+        self.console.print(
+            f"{point.label:6d}  {point.kind:14s}  {values}  {words}".rstrip()
+        )

@@ -21,7 +21,7 @@ import jax.numpy as jnp
 import matplotlib.pyplot as plt
 
 import jaxcam
-from jaxcam.plotting import phase_portrait, time_history
+from jaxcam.plotting import phase_portrait, style, time_history
 
 
 # -
@@ -38,6 +38,7 @@ class TwoMasses(jaxcam.HybridSystem):
 
     state_names: ClassVar[tuple[str, ...]] = ("x1", "x2", "v1", "v2")
     state_units: ClassVar[tuple[str, ...]] = ("-", "-", "-", "-")
+    constraint_names: ClassVar[tuple[str, ...]] = ("stop 1", "stop 2")
 
     mass_ratio: float = 1.0
     damping: float = 0.1
@@ -103,7 +104,8 @@ history = time_history(
     between=(trajectory.t1 - system.period, trajectory.t1),
 )
 
-portraits, panels = plt.subplots(1, 2, figsize=(9, 4), layout="constrained")
+with style():
+    portraits, panels = plt.subplots(1, 2, figsize=(9, 4))
 for k, ax in enumerate(panels):
     last = (trajectory.t1 - 2 * system.period, trajectory.t1)
     phase_portrait(trajectory, ax, components=(k, 2 + k), between=last)

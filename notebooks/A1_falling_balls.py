@@ -24,7 +24,7 @@ import matplotlib.pyplot as plt
 from rich.console import Console
 
 import jaxcam
-from jaxcam.plotting import residual_by_mode
+from jaxcam.plotting import residual_by_mode, style
 from jaxcam.recordings import compare, merge, read_case, segment
 
 
@@ -81,7 +81,8 @@ Console().print(comparison.table())
 # The heaviest ball above, the lightest below; grey is the noise.
 
 # +
-figure, grid = plt.subplots(2, 2, figsize=(8, 5), layout="constrained")
+with style():
+    figure, grid = plt.subplots(2, 2, figsize=(8, 5))
 for panels, name in zip(grid, ("bowling_ball_drop1", "whiffle_ball_1_drop1")):
     residual_by_mode(comparison, panels, record=name)
 # -

@@ -50,6 +50,7 @@ branch = continuation.branch(
 )
 for point in branch.special:
     print(f"{point.kind:>8} at wall = {point.parameter:.12f} ({point.converged=})")
+print(branch)
 
 # The closed form of the fold of the orbit with one impact a period, for comparison.
 
@@ -63,10 +64,8 @@ assert min(abs(np.array(found) - fold)) < 1e-9
 
 # Stable parts are drawn solid, unstable ones dashed.
 
-fig, ax = plt.subplots()
-branch_diagram(
+figure = branch_diagram(
     branch,
-    ax,
     x_label=("position of the wall", "-"),
     y_label=("position once a period", "-"),
 )

@@ -38,6 +38,7 @@ import numpy as np
 import jaxcam
 from jaxcam.discrepancy import diagnose, Diagnosis, library
 from jaxcam.fitting import fit, held_out_cost, Input, Parameter, Sensor
+from jaxcam.plotting import style
 from jaxcam.recordings import read_case, Recording, References, segment
 
 
@@ -437,7 +438,8 @@ ask(
 # model (open) and with what it lacks (filled).
 
 # +
-figure, axes = plt.subplots(figsize=(10, 4), layout="constrained")
+with style():
+    figure, axes = plt.subplots(figsize=(10, 4))
 for row, result in enumerate(found.values()):
     before = result.heldout_before / result.noise_floor
     after = result.heldout_after / result.noise_floor

@@ -488,10 +488,12 @@ def test_joints_ask_for_a_program():
 
 
 def test_figures_are_drawn(figure_4_5, tmp_path):
-    axes = motion_program(figure_4_5, unit="-")
+    figure = motion_program(figure_4_5, unit="-")
+    axes = figure.axes
     assert len(axes) == 4 and axes[0].get_ylabel().startswith("lift")
-    axes[0].figure.savefig(tmp_path / "program.png")
-    ax = cam_contour(flat_oscillating_contour(EccentricCircle(), ANGLES))
+    figure.savefig(tmp_path / "program.png")
+    contour = flat_oscillating_contour(EccentricCircle(), ANGLES)
+    (ax,) = cam_contour(contour).axes
     assert ax.get_aspect() == 1.0
     plt.close("all")
 

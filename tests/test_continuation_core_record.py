@@ -147,7 +147,7 @@ def test_table_and_progress(whole):
     console = rich.console.Console(record=True, width=100, file=open("/dev/null", "w"))
     console.print(continuation.table(whole, every=10))
     text = console.export_text()
-    assert text.count("LP") == 2 and text.count("EP") == 2
+    assert text.count("fold") == 2 and text.count("end") == 1
     assert "-0.384900179" in text
     console.print(continuation.table(whole, shown=("a thousandth", 1e3)))
     text = console.export_text()
@@ -155,7 +155,7 @@ def test_table_and_progress(whole):
     show = continuation.PointPrinter(console=console)
     for point in whole.points:
         show(point)
-    assert console.export_text().count("LP") == 2
+    assert console.export_text().count("fold") == 2
     console.file.close()
 
 

@@ -17,7 +17,12 @@ def blocks(page: str) -> list[tuple[str, str | None]]:
 
 
 @pytest.mark.parametrize(
-    "page", [pytest.param("tour.md", marks=pytest.mark.slow), "faq.md"]
+    "page",
+    [
+        pytest.param("tour.md", marks=pytest.mark.slow),
+        pytest.param("filippov.md", marks=pytest.mark.slow),
+        "faq.md",
+    ],
 )
 def test_examples_print_what_is_shown(page, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)

@@ -87,6 +87,10 @@ def test_each_code_is_a_sentence():
     items = [RESULTS.successful, RESULTS.running, RESULTS.step_failed]
     items += [RESULTS.not_finite, RESULTS.behind, RESULTS.backward, RESULTS.together]
     assert [message(k) for k in range(len(items))] == [RESULTS[i] for i in items]
+    assert [RESULTS[np.int32(k)] for k in range(len(items))] == [
+        RESULTS[i] for i in items
+    ]
+    assert RESULTS[jnp.asarray(1)] == RESULTS[RESULTS.running]
     assert FINISHED == 0 and message(int(RUNNING)) == RESULTS[RESULTS.running]
     sentences = [message(k) for k in range(1, len(items))]
     assert all(len(s) > 20 and s.endswith(".") for s in sentences)

@@ -15,10 +15,10 @@ from jaxcam import plotting, simulate
 from jaxcam.hybrid import HybridSystem, Settings, Trajectory
 from jaxcam.hybrid.record import Contacts, Impacts, Steps
 from jaxcam.models import BouncingBall
-from jaxcam.plotting._prefix import scaled
 from jaxcam.plotting.curves import trajectory_curve
 from jaxcam.recordings import Recording
 from jaxcam.recordings.against_model import Comparison, Residuals
+from jaxcam.tables import scaled
 
 
 pytestmark = pytest.mark.filterwarnings("error")
@@ -53,6 +53,8 @@ class ClosedForm(Trajectory):
 
 class TwoWalls(HybridSystem):
     """A particle between two walls, without units or a forcing."""
+
+    constraint_names = ("left wall", "right wall")
 
     def vector_field(self, t, state):
         return jnp.stack([state[1], 0.0 * state[0]])
@@ -176,7 +178,7 @@ def test_time_history_of_several_constraints(walls):
     figure.canvas.draw()
     first, second, gap = figure.axes
     assert "x_{1}" in first.get_ylabel() and has_unit(second.get_ylabel())
-    assert line(gap, "gap 0") and line(gap, "gap 1")
+    assert line(gap, "left wall") and line(gap, "right wall")
 
 
 def test_a_curve_ends_in_the_state_before_an_impact(ball):
@@ -194,8 +196,9 @@ def test_a_curve_ends_in_the_state_before_an_impact(ball):
 
 
 def test_phase_portrait_has_jumps_and_stroboscopic_points(ball):
-    ax = plotting.phase_portrait(ball)
-    ax.figure.canvas.draw()
+    figure = plotting.phase_portrait(ball)
+    figure.canvas.draw()
+    (ax,) = figure.axes
     assert line(ax, "impact").get_linestyle() == "--"
     jumps = line(ax, "impact").get_ydata()
     assert np.sum(np.isnan(jumps)) == 30
@@ -208,13 +211,14 @@ def test_phase_portrait_has_jumps_and_stroboscopic_points(ball):
 
 
 def test_phase_portrait_turns_round_and_takes_axes(ball, walls):
-    _, own = plt.subplots()
-    ax = plotting.phase_portrait(ball, own, components=(1, 0), period=0.1)
-    assert ax is own
+    own, ax = plt.subplots()
+    figure = plotting.phase_portrait(ball, ax, components=(1, 0), period=0.1)
+    assert figure is own
     assert ax.get_xlabel() == "velocity (m/s)"
     assert len(line(ax, "once a period").get_xdata()) == 9
     # no forcing, no points
-    labels = [each.get_label() for each in plotting.phase_portrait(walls).lines]
+    (ax,) = plotting.phase_portrait(walls).axes
+    labels = [each.get_label() for each in ax.lines]
     assert "once a period" not in labels
 
 
@@ -237,7 +241,7 @@ def test_impact_map_against_time_and_without_a_period(ball, walls):
     assert left.get_xlabel() == "time of impact $k$ (s)"
     left, right = plotting.impact_return_map(walls).axes
     assert left.get_xlabel().startswith("time of impact")
-    first, second = line(right, "constraint 0"), line(right, "constraint 1")
+    first, second = line(right, "left wall"), line(right, "right wall")
     assert len(first.get_xdata()) == 2 and len(second.get_xdata()) == 2
     with pytest.raises(ValueError, match='choose "phase" or "time"'):
         plotting.impact_return_map(ball, against="speed")
@@ -255,7 +259,7 @@ def test_figures_of_a_simulated_trajectory(ball):
     np.testing.assert_allclose(
         drawn.gap[flying, 0], ball.gap(drawn.time[flying]), atol=1e-9
     )
-    ax = plotting.phase_portrait(simulated)
+    (ax,) = plotting.phase_portrait(simulated).axes
     assert len(line(ax, "once a period").get_xdata()) == 4
     _, speed = plotting.impact_return_map(simulated).axes
     assert len(line(speed, "constraint 0").get_xdata()) == number - 1
@@ -265,7 +269,7 @@ def test_figures_of_a_flight_without_impacts(ball):
     alone = (0.0, 0.1)
     for figure in (
         plotting.time_history(ball, between=alone),
-        plotting.phase_portrait(ball, between=alone).figure,
+        plotting.phase_portrait(ball, between=alone),
         plotting.impact_return_map(ball, between=alone),
     ):
         figure.canvas.draw()
@@ -436,3 +440,19 @@ def test_compare_recording_takes_a_comparison(recording):
     np.testing.assert_allclose(below.lines[0].get_ydata()[rows], 0.2)
     with pytest.raises(ValueError, match="it has follower_angle_rad of run1"):
         plotting.compare_recording(recording, Comparison((part,)), channel="gyro_rad_s")
+
+
+def test_a_figure_is_recoloured_for_a_dark_page(ball):
+    figure = plotting.time_history(ball)
+    height = figure.axes[0]
+    curve = line(height, "state")
+    before = curve.get_color()
+    assert plotting.on_dark(figure) is figure
+    background, text = figure.get_facecolor(), height.yaxis.label.get_color()
+    assert max(background[:3]) < 0.2 < 0.8 < min(to_rgba(text)[:3])
+    # the same hue, lighter
+    light = np.subtract(to_rgba(curve.get_color()), to_rgba(before))[:3]
+    assert np.all(light > 0) and np.argmax(to_rgba(curve.get_color())[:3]) == 2
+    (tick, *_) = height.get_yticklabels()
+    assert min(to_rgba(tick.get_color())[:3]) > 0.8
+    figure.canvas.draw()

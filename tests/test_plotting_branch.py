@@ -55,7 +55,7 @@ def test_stable_solid_unstable_dashed_special_marked():
         # the lines meet: the first point belongs to the other part
         assert np.all(sign * y[1:] >= -1e-12)
     np.testing.assert_allclose(lines["fold"].get_data(), [[0.0], [0.0]], atol=1e-12)
-    assert [text.get_text() for text in ax.texts] == ["F"]
+    assert [text.get_text() for text in ax.texts] == ["fold"]
     legend = ax.get_legend()
     assert {t.get_text() for t in legend.get_texts()} == {"stable", "unstable", "fold"}
     plt.close(figure)

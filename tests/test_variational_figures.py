@@ -20,7 +20,7 @@ def test_multipliers_in_and_out_of_the_picture():
     # one that does not fit is marked at the edge, on its own side
     edge = np.asarray(lines["outside the picture"].get_xdata())
     assert len(edge) == 1 and -2.0 <= edge[0] < -1.9
-    assert figure.axes[0].get_xlabel() == r"real part of $\mu$"
+    assert figure.axes[0].get_xlabel() == r"real part of $\mu$ (–)"
     plt.close(figure)
 
 

@@ -63,6 +63,7 @@ def lyapunov_spectrum(
     settings: Settings | None = None,
     blocks: int = 16,
     max_steps: int = 10_000_000,
+    progress: Callable[[float], None] | None = None,
 ) -> LyapunovSpectrum:
     """All Lyapunov exponents, impacts included, by repeated orthogonalisation.
 
@@ -82,6 +83,7 @@ def lyapunov_spectrum(
     - `settings`: accuracy; a tolerance of 1e-12 by default.
     - `blocks`: number of blocks for the standard error.
     - `max_steps`: budget of attempted steps of a lane.
+    - `progress`: called with the part of the turns that is done.
 
     **Returns:** a `LyapunovSpectrum`. An exponent is minus infinity
     where the motion sticks, because contact forgets what came before.
@@ -119,7 +121,10 @@ def lyapunov_spectrum(
     returned = _restitutions(batched, shared, begin, states)
     check_restitution(system, returned[0] if single else returned)
 
+    done = 0.0
+
     def some(batched, states):
+        nonlocal done
         carry = first_frames(batched, shared, length, states, begin, end, settings)
         seen = _Seen(states.shape[0], transient + turns + 1, states.shape[1])
         used = 0
@@ -129,10 +134,20 @@ def lyapunov_spectrum(
             )
             seen.take(*map(np.asarray, rows))
             used += ROWS
+            if progress is not None:
+                progress(done + seen.share * states.shape[0] / padded)
+        done += states.shape[0] / padded
         return _summary(seen, carry, _turn(batched, shared, length), transient, blocks)
 
+    padded = _padded(states.shape[0])
     made = _in_turn(some, batched, states)
     return jax.tree.map(lambda leaf: leaf[0], made) if single else made
+
+
+def _padded(lanes: int) -> int:
+    """How many lanes there are when all blocks are alike."""
+    count = -(-lanes // _BLOCK)
+    return count * -(-lanes // count)
 
 
 def _in_turn(some: Callable, batched, states):
@@ -144,7 +159,7 @@ def _in_turn(some: Callable, batched, states):
     count = -(-lanes // _BLOCK)
     if count == 1:
         return some(batched, states)
-    size = -(-lanes // count)
+    size = _padded(lanes) // count
     order = np.minimum(np.arange(count * size), lanes - 1).reshape(count, size)
     parts = [
         some(jax.tree.map(lambda leaf, k=k: leaf[k], batched), states[k]) for k in order
@@ -165,6 +180,11 @@ class _Seen:
         self.logs[:, 0], self.hits[:, 0] = 0.0, 0.0
         self._filled = np.ones(lanes, dtype=int)
         self._hits = np.zeros(lanes)
+
+    @property
+    def share(self) -> float:
+        """Part of the turns that is done, over all lanes."""
+        return float(np.mean(self._filled)) / self.logs.shape[1]
 
     def take(self, kind, logs, after) -> None:
         hit = (kind == RowKind.IMPACT) | (kind == RowKind.LAST_IMPACT)

@@ -63,7 +63,7 @@ def draw(
             f"The nominal rig at {at}: simulated motion, last turns.",
         )
         keep(
-            plotting.phase_portrait(motion, between=last(motion, 12.0)).figure,
+            plotting.phase_portrait(motion, between=last(motion, 12.0)),
             f"phase_portrait_{rpm:.1f}rpm",
             f"The nominal rig at {at}: velocity against angle.",
         )

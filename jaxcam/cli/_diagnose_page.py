@@ -97,12 +97,12 @@ def _unseen(plt, found: Diagnosis):
                 rasterized=True,
             )
         band = 2 * factor * part.noise
-        axis.axhspan(-band, band, color="0.5", alpha=0.25, lw=0)
+        axis.axhspan(-band, band, color="0.5", alpha=0.25, lw=0, label="noise ± 2σ")
         axis.set_title(f"{title_of(part, before)}: {label}")
         axis.set_ylabel(residual_label(part))
     axes[-1].set_xlabel("time (s)")
     handles, labels = axes[0].get_legend_handles_labels()
-    figure.legend(handles, labels, markerscale=6, ncols=2, loc="outside upper right")
+    figure.legend(handles, labels, markerscale=6, ncols=3, loc="outside upper right")
     return figure
 
 
@@ -145,7 +145,9 @@ def _maps(plt, found: Diagnosis):
             axis.grid(False)
     for axis in axes[-1]:
         axis.set_xlabel(along.label)
-    figure.colorbar(image, ax=axes, label="mean residual (standard errors)")
+    figure.colorbar(
+        image, ax=axes, label="mean residual (standard errors)", extend="both"
+    )
     return figure
 
 
@@ -226,13 +228,22 @@ def _band(axis, one: Structure, color, label) -> None:
 
 
 def _ranking(plt, found: Diagnosis):
-    pairs = [(o.name, o.delta_bic) for o in found.alternatives] or [("none", 0.0)]
+    ranked = found.alternatives[: found.policy.alternatives]
+    pairs = [(one.name, one.delta_bic) for one in ranked] or [("none", 0.0)]
     figure, axis = plt.subplots(figsize=(8, 0.35 * len(pairs) + 1.0))
     names = [name.replace("_", " ").replace("+", " + ") for name, _ in pairs]
-    axis.barh(names, [max(delta, 0.1) for _, delta in pairs], color=FLIGHT)
+    # dots, not bars: a logarithmic axis has no zero to measure a length from
+    for row, (_, delta) in enumerate(pairs):
+        axis.plot(max(delta, 0.1), row, "o", color=FLIGHT)
+        axis.annotate(
+            f"{delta:.3g}", (max(delta, 0.1), row), (7, 0), va="center",
+            textcoords="offset points", fontsize="small",
+        )  # fmt: skip
+    axis.set_yticks(range(len(names)), names)
+    axis.set_ylim(-0.6, len(names) - 0.4)
     axis.set_xscale("log")
     # from the same value in every report, so that a single bar has a scale too
-    axis.set_xlim(0.05, max(1e2, 2 * max(delta for _, delta in pairs)))
+    axis.set_xlim(0.05, max(1e2, 4 * max(delta for _, delta in pairs)))
     axis.invert_yaxis()
     axis.set_xlabel("BIC above that of the verdict")
     return figure

@@ -6,8 +6,10 @@ from pathlib import Path
 
 from ..discrepancy import Diagnosis, Verdict
 from ..discrepancy.report import listed, number
+from ..tables import scaled
 from ._outlook import Outlook
 from ._page import figure_html, sentences, STYLE, table_html
+from ._residual_axes import REACH
 
 
 _PARTS = {"flight": "in flight", "impact": "at impacts", "contact": "in contact"}
@@ -88,11 +90,13 @@ def _effects(found: Diagnosis) -> list[str]:
 
 
 def _before_and_after(found: Diagnosis) -> list[str]:
+    # the unit of the figures
+    factor, unit = scaled(found.unit, REACH * found.noise_floor)
     parts = [
         "<h2>Before and after, on held-out flights</h2>",
-        f"<p>{found.heldout_before:.3e} {found.unit} before, "
-        f"{found.heldout_after:.3e} after; noise and rounding of the sensor are "
-        f"{found.noise_floor:.3e}.</p>",
+        f"<p>{factor * found.heldout_before:.3g} {unit} before, "
+        f"{factor * found.heldout_after:.3g} after; noise and rounding of the sensor "
+        f"are {factor * found.noise_floor:.3g}.</p>",
     ]
     if found.misfit:
         where = listed(f"{s:.0%} {_PARTS[part]}" for part, s in found.misfit.items())

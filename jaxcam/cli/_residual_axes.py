@@ -8,17 +8,16 @@ from jaxtyping import Float
 
 from ..fitting import Residuals
 from ..recordings.files import unit_of
+from ..tables import scaled
 
 
 # Residuals that are nothing but noise seldom reach this many of its deviations
-_REACH = 10.0
+REACH = 10.0
 
 
 def shown_in(part: Residuals) -> tuple[float, str]:
     """A factor and the unit in which the residuals of a channel are drawn."""
-    from ..plotting.labels import scaled
-
-    return scaled(unit_of(part.channel), _REACH * part.noise)
+    return scaled(unit_of(part.channel), REACH * part.noise)
 
 
 def residual_label(part: Residuals) -> str:

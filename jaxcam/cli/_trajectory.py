@@ -48,7 +48,8 @@ def impact_table(trajectory: Trajectory) -> Table | None:
             row.append(f"{_phase(time[k], period):.5f}")
         row += [f"{float(impacts.before[k, 0]):z.6f}"]
         row += [f"{before[k]:.4e}", f"{after[k]:.4e}"]
-        table.add_row(*row, *([str(int(impacts.constraint[k]))] if several else []))
+        hit = system.constraint_name(int(impacts.constraint[k]))
+        table.add_row(*row, *([hit] if several else []))
     return table
 
 
@@ -101,6 +102,7 @@ def about(trajectory: Trajectory) -> dict[str, Any]:
         "parameters": parameters(system),
         "state_names": list(system.state_names),
         "state_units": list(system.state_units),
+        "constraint_names": list(system.constraint_names),
         "t0": float(trajectory.t0),
         "t1": float(trajectory.t1),
         "tolerance": float(trajectory.settings.tolerance),
@@ -135,7 +137,7 @@ def draw(trajectory: Trajectory, folder: Path) -> list[Path]:
 
     history = plotting.time_history(trajectory, between=last(trajectory, _HISTORY))
     portrait = plotting.phase_portrait(trajectory, between=last(trajectory, _PORTRAIT))
-    figures = {"time_history": history, "phase_portrait": portrait.figure}
+    figures = {"time_history": history, "phase_portrait": portrait}
     if int(trajectory.impacts.count) > 1:
         figures["impact_map"] = plotting.impact_return_map(trajectory)
     return [

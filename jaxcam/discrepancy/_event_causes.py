@@ -51,6 +51,7 @@ def event_causes(
     tolerance: float,
     *,
     policy: Policy = Policy(),
+    progress: Callable[[float], None] | None = None,
 ) -> tuple[EventCause, ...]:
     """Rank terms by how near they bring a rig to the speeds that were observed.
 
@@ -66,6 +67,7 @@ def event_causes(
     - `where`, `tolerance`: a parameter of the rig that is fitted beside each term, and
         how far it may be off; `lambda rig: rig.restitution.intercept`, say.
     - `policy`: how far strengths are searched.
+    - `progress`: called with the part of the terms that is done.
 
     **Returns:** explanations, the best first; one of them is no term at all.
 
@@ -91,7 +93,10 @@ def event_causes(
         paths.append(_Path(goal, jax.tree.map(jnp.asarray, system), here))
         here = paths[0].here
     found = [_none(paths[0])]
-    found += [_best(path, term) for path, term in zip(paths, terms)]
+    for path, term in zip(paths, terms):
+        found.append(_best(path, term))
+        if progress is not None:
+            progress((len(found) - 1) / len(terms))
     return tuple(sorted(found, key=lambda one: one.misfit))
 
 

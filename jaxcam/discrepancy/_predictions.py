@@ -1,6 +1,8 @@
 """What a rig will do, with and without what its model lacked."""
 
 import dataclasses
+from collections.abc import Callable
+from functools import partial
 
 import equinox as eqx
 import jax
@@ -32,7 +34,12 @@ class Prediction:
     after: Value
 
 
-def predictions(found: Diagnosis, seed: int = 0) -> tuple[Prediction, ...]:
+def predictions(
+    found: Diagnosis,
+    seed: int = 0,
+    *,
+    progress: Callable[[float], None] | None = None,
+) -> tuple[Prediction, ...]:
     """Speeds at which the motion of a cam-follower rig changes, by both its models.
 
     Valve float, the fold and the flip of P(1,1), and the interruption of complete
@@ -40,7 +47,8 @@ def predictions(found: Diagnosis, seed: int = 0) -> tuple[Prediction, ...]:
     that were named are part of the second model, but for those that have a frequency
     of their own: their motion is not periodic with the cam.
 
-    **Arguments:** a diagnosis, and the `seed` of the rigs that are drawn.
+    **Arguments:** a diagnosis, the `seed` of the rigs that are drawn, and `progress`,
+    called with the part of them that is done.
 
     **Returns:** nothing for a system that is no cam-follower.
     """
@@ -49,15 +57,20 @@ def predictions(found: Diagnosis, seed: int = 0) -> tuple[Prediction, ...]:
     sides = []
     for fit, present in ((found.before, False), (found.after, True)):
         rng = np.random.default_rng(seed)
-        sides.append(_speeds(fit, found.names, present, rng, found.policy))
+        part = None if progress is None else partial(_half, progress, present)
+        sides.append(_speeds(fit, found.names, present, rng, found.policy, part))
     return tuple(
         Prediction(name, *(Value(float(v), float(e), "rad/s") for v, e in pair))
         for name, *pair in zip(EVENTS, *sides)
     )
 
 
+def _half(progress, second: bool, share: float) -> None:
+    progress((share + second) / 2)
+
+
 def _speeds(
-    fit: Fit, names, present: bool, rng, policy: Policy
+    fit: Fit, names, present: bool, rng, policy: Policy, progress
 ) -> list[tuple[float, float]]:
     """The speeds and their standard errors."""
     row = np.asarray(fit.point.values[0])
@@ -68,10 +81,12 @@ def _speeds(
         fit.covariance / np.outer(scale, scale) + _DEFINITE * np.eye(len(scale))
     )
     drawn = []
-    for _ in range(policy.drawn_rigs):
+    for k in range(policy.drawn_rigs):
         moved = row.copy()
         moved[free] += scale * (root @ rng.standard_normal(len(free)))
         drawn.append(best.near(_system(fit, moved, names, present)).values)
+        if progress is not None:
+            progress((k + 1) / policy.drawn_rigs)
     errors = [_spread(column) for column in np.array(drawn).T]
     return [(float(v), e) for v, e in zip(best.values, errors)]
 

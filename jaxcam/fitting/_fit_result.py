@@ -9,6 +9,7 @@ import jax
 import numpy as np
 from jaxtyping import Float
 
+from ..tables import ShortTable
 from ._doubts import Doubt, far_from_data, not_finite, on_a_bound, Reason
 from ._ellipse import Ellipse, ellipse_of, most_correlated
 from ._unconstrained import Unconstrained, unconstrained
@@ -50,7 +51,7 @@ class Estimate:
         return self.value - 1.96 * self.stderr, self.value + 1.96 * self.stderr
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, repr=False)
 class Fit:
     """What a fit found.
 
@@ -78,6 +79,24 @@ class Fit:
     ended: str
     weights: Weights | None = None
     unconstrained: tuple[Unconstrained, ...] = ()
+
+    def __repr__(self) -> str:
+        return self._table().text()
+
+    def _repr_html_(self) -> str:
+        return self._table().html()
+
+    def _table(self) -> ShortTable:
+        """How the fit ended, and its estimates."""
+        count = f"{self.problem.samples} samples, {len(self.problem.records)} records"
+        trusted = "converged" if self.converged else "not to be trusted"
+        rows = [
+            (one.label, f"{one.value:.7g}", f"{one.stderr:.2g}", one.unit)
+            for one in self.estimates
+        ]
+        headings = ("parameter", "value", "standard error", "unit")
+        sentence = f"Fit to {count}, {trusted}. {self.message}"
+        return ShortTable(sentence, headings, rows, ("parameter", "unit"))
 
     @functools.cached_property
     def reasons(self) -> tuple[Reason, ...]:

@@ -1,7 +1,7 @@
 """Profile likelihood: how much worse the best fit is with parameters held."""
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from jaxtyping import Float
@@ -54,6 +54,7 @@ def profile(
     values: Sequence[float] | None = None,
     weights: Weights | None = None,
     prior: bool = True,
+    progress: Callable[[int, int], None] | None = None,
 ) -> Profile:
     """Fit all other parameters again with one of them held at several values.
 
@@ -65,6 +66,7 @@ def profile(
     - `values`: where to hold it instead, in any order; a value is inside the 95 %
         interval if its cost is below 3.84.
     - `weights`, `prior`: as they were for `found`.
+    - `progress`: called with the number of values done and of all.
 
     **Raises:** `KeyError` for a parameter that was not fitted; `ValueError` for one
     that differs from record to record.
@@ -91,6 +93,8 @@ def profile(
             )
             near = fit(problem, free=others, start=start, weights=weights, prior=prior)
             fits[k] = near
+            if progress is not None:
+                progress(len(fits), len(tried))
     # what was known of the parameter itself counts although it is held
     cost = np.array([fits[k].cost for k in range(len(tried))])
     if prior:

@@ -29,6 +29,8 @@ class HybridSystem(eqx.Module):
     #: names and units of the state's components, for tables and axes
     state_names: ClassVar[tuple[str, ...]] = ()
     state_units: ClassVar[tuple[str, ...]] = ()
+    #: names of the constraints, in the order of `gap`, such as `("left", "right")`
+    constraint_names: ClassVar[tuple[str, ...]] = ()
     #: whether impacts may give speed, as at a driven bumper or where time runs
     #: backwards; otherwise a coefficient of restitution above one is refused
     active: ClassVar[bool] = False
@@ -72,6 +74,11 @@ class HybridSystem(eqx.Module):
         begins and ends; a few, as each costs some operations in every step.
         """
         return None
+
+    def constraint_name(self, number: int) -> str:
+        """Name of a constraint, or `constraint 1` where the system names none."""
+        names = self.constraint_names
+        return names[number] if number < len(names) else f"constraint {number}"
 
     def prepared(self) -> "HybridSystem":
         """An equal system that is cheaper to evaluate many times.

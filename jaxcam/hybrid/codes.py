@@ -1,6 +1,7 @@
 """What a row of the log records, and how a run ended, in words."""
 
 import enum
+import operator
 
 import equinox as eqx
 
@@ -18,8 +19,19 @@ class RowKind(enum.IntEnum):
     STOP = 6
 
 
-class RESULTS(eqx.Enumeration):
-    """How a run ended; each item says what to do about it."""
+class _ByCode(type(eqx.Enumeration)):
+    """An enumeration that is indexed by its codes as well as by its items."""
+
+    def __getitem__(cls, item) -> str:
+        known = isinstance(item, cls)
+        return super().__getitem__(item if known else _ITEMS[operator.index(item)])
+
+
+class RESULTS(eqx.Enumeration, metaclass=_ByCode):
+    """How a run ended; each item says what to do about it.
+
+    `RESULTS[trajectory.code]` is the sentence of a result code, 0 being success.
+    """
 
     successful = ""
     running = (
@@ -62,4 +74,4 @@ FINISHED, RUNNING, STEP_FAILED, NOT_FINITE, BEHIND, BACKWARD, TOGETHER = map(
 
 def message(code: int) -> str:
     """The sentence of a result code."""
-    return RESULTS[_ITEMS[code]]
+    return RESULTS[code]

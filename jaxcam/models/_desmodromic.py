@@ -38,6 +38,7 @@ class DesmodromicCam(AbstractCamDriven):
 
     state_names: ClassVar[tuple[str, ...]] = ("lift", "follower velocity")
     state_units: ClassVar[tuple[str, ...]] = ("m", "m/s")
+    constraint_names: ClassVar[tuple[str, ...]] = ("lower flank", "upper flank")
 
     profile: CamProfile
     speed: jax.Array = parameter()

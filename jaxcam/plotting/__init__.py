@@ -10,6 +10,7 @@ from ._chatter_maps import (
 )
 from ._chatter_region import chattering_picture as chattering_picture
 from ._compare_recording import compare_recording as compare_recording
+from ._dark import on_dark as on_dark
 from ._diagram import sweep_chart as sweep_chart, sweep_diagram as sweep_diagram
 from ._grazing_map import cobweb as cobweb
 from ._impact_map import impact_return_map as impact_return_map

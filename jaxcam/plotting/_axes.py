@@ -15,6 +15,13 @@ def one_axes(ax: Axes | None) -> Axes:
     return plt.subplots()[1] if ax is None else ax
 
 
+def figure_of(ax: Axes) -> Figure:
+    """The figure that the axes are in; of a subfigure, the whole."""
+    figure = ax.get_figure(root=True)
+    assert figure is not None
+    return figure
+
+
 def several_axes(axes, shape: tuple[int, int], **layout) -> tuple[Figure, np.ndarray]:
     """A figure and its axes, shape `shape`; `layout` goes to `plt.subplots`.
 

@@ -8,8 +8,9 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from scipy.ndimage import gaussian_filter
 
-from ._axes import one_axes
+from ._axes import figure_of, one_axes
 from ._diagram import COLOURS, NOTHING
 from ._style import SECTION, styled
 from .labels import labelled
@@ -22,6 +23,10 @@ if TYPE_CHECKING:
 # attractors with a colour and a line of the legend of their own
 _SHOWN = len(COLOURS) - 1
 _OTHERS = "#D9D9D9"
+# cells of a picture along its shorter side, at least
+_FINE = 500
+# neighbourhood of a small cell, in computed ones
+_BLUR = 1.2
 _MARKS = "osD^vP*X"
 
 
@@ -65,7 +70,7 @@ def basin_picture(
     # white below, one colour an attractor, grey for those without
     index = np.where(number < 0, 0, np.minimum(number, len(colours) - 2) + 1)
     image = ax.imshow(
-        index.T,
+        _finer(index, len(colours)).T,
         origin="lower",
         extent=(low[0], high[0], low[1], high[1]),
         cmap=ListedColormap(colours),
@@ -91,7 +96,35 @@ def basin_picture(
         bbox_to_anchor=(0.0, 1.0),
         ncols=min(len(handles), 3),
     )
-    return ax.figure  # pyright: ignore
+    return figure_of(ax)
+
+
+def _finer(index, count: int) -> np.ndarray:
+    """The same regions in smaller cells, so that slanting boundaries are no stairs.
+
+    A small cell belongs to the region that has most of its neighbourhood. Where that
+    would change what was computed, at the centre of a cell, the cell stays as it was:
+    thin and fractal regions are not smoothed away.
+    """
+    factor = -(-_FINE // min(index.shape))
+    if factor == 1:
+        return index
+    # odd, so that a cell has a centre
+    factor += 1 - factor % 2
+    cells = np.kron(index, np.ones((factor, factor), dtype=int))
+    finer, most = np.zeros_like(cells), np.zeros(cells.shape)
+    for region in (*range(1, count), 0):
+        if np.any(index == region):
+            share = gaussian_filter(
+                (cells == region).astype(float), _BLUR * factor, mode="nearest"
+            )
+            # where no motion starts, more than all basins together, not than each
+            least = 0.5 if region == 0 else most
+            finer = np.where(share > least, region, finer)
+            most = np.where(share > least, share, most)
+    centres = finer[factor // 2 :: factor, factor // 2 :: factor]
+    wrong = np.kron(centres != index, np.ones((factor, factor), dtype=bool))
+    return np.where(wrong, cells, finer)
 
 
 def _colours(basins, orbits: bool):

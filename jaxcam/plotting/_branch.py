@@ -9,8 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 
-from ._axes import legend_above, one_axes
-from ._style import CONTACT, FLIGHT, IMPACT, SECTION, styled
+from ._axes import figure_of, legend_above, one_axes
+from ._style import FLIGHT, IMPACT, SECTION, styled
 from .labels import labelled
 
 
@@ -25,22 +25,19 @@ _MARKS = {
     "Neimark-Sacker": ("D", "#CC79A7"),
     "branch point": ("P", SECTION),
     "Hopf": ("H", "#56B4E9"),
-    "grazing": ("^", CONTACT),
+    "grazing": ("^", "#8A5F00"),
     "interruption of chattering": ("*", "#CC79A7"),
     "beginning of impacts": ("v", "#56B4E9"),
 }
 _OTHER = ("X", SECTION)
-# letters beside the marks
+# words beside the marks, where the kind has a long name
 _SHORT = {
-    "fold": "F",
-    "flip": "PD",
     "Neimark-Sacker": "NS",
-    "branch point": "BP",
-    "Hopf": "H",
-    "grazing": "G",
-    "interruption of chattering": "I",
-    "beginning of impacts": "B",
+    "interruption of chattering": "interruption",
+    "beginning of impacts": "detachment",
 }
+# a word nearer than this to one that is there is left out (points)
+_ROOM = 26, 11
 
 
 def mark_of(kind: str) -> tuple[str, str]:
@@ -70,7 +67,8 @@ def branch_diagram(
         points have it, or else of their solution.
     - `x_label`, `y_label`: name and unit of both axes; the parameter's name without.
     - `x_scale`: by which parameters are multiplied (30/pi for a speed in rpm).
-    - `letters`: whether letters name the special points besides the legend.
+    - `letters`: whether words name the special points besides the legend; one that
+      would cover another is left out.
 
     **Returns:** the figure.
     """
@@ -82,13 +80,20 @@ def branch_diagram(
     for branch in several:
         _draw(ax, branch, value, x_scale)
     for branch in several:
-        _mark(ax, branch, value, x_scale, letters)
+        _mark(ax, branch, value, x_scale)
     name = several[0].name if several else "parameter"
     ax.set_xlabel(labelled(*((name, "-") if x_label is None else x_label)))
     ax.set_ylabel(labelled(*y_label))
     ax.margins(x=0.03, y=0.08)
+    if letters:
+        _name(
+            ax,
+            [point for branch in several for point in branch.special],
+            value,
+            x_scale,
+        )
     legend_above(ax)
-    return ax.figure  # pyright: ignore
+    return figure_of(ax)
 
 
 def _first_component(point) -> np.ndarray:
@@ -127,13 +132,12 @@ def _solid(point) -> bool:
     return point.stable is None or bool(point.stable)
 
 
-def _mark(ax: Axes, branch, value, x_scale, letters: bool) -> None:
+def _mark(ax: Axes, branch, value, x_scale) -> None:
     for point in branch.special:
         mark, colour = mark_of(point.kind)
         ys = np.atleast_1d(np.asarray(value(point), dtype=float))
-        x = x_scale * point.parameter
         ax.plot(
-            np.full(len(ys), x),
+            np.full(len(ys), x_scale * point.parameter),
             ys,
             mark,
             color=colour,
@@ -143,14 +147,27 @@ def _mark(ax: Axes, branch, value, x_scale, letters: bool) -> None:
             zorder=4,
             label=point.kind if point.converged else f"{point.kind} (bracketed)",
         )
-        if letters:
-            ax.annotate(
-                str(_SHORT.get(point.kind, point.kind)),
-                (x, float(ys[0])),
-                xytext=(4, 5),
-                textcoords="offset points",
-                fontsize="x-small",
-                color=colour,
-                path_effects=[withStroke(linewidth=2.5, foreground="white")],
-                zorder=5,
-            )
+
+
+def _name(ax: Axes, points, value, x_scale) -> None:
+    """A word beside each mark, where there is room for it."""
+    taken: list[np.ndarray] = []
+    for point in points:
+        y = float(np.ravel(np.asarray(value(point), dtype=float))[0])
+        place = (x_scale * point.parameter, y)
+        here = ax.transData.transform(place) * 72 / ax.figure.dpi
+        if any(np.all(np.abs(here - other) < _ROOM) for other in taken):
+            continue
+        taken.append(here)
+        left = ax.transAxes.inverted().transform(ax.transData.transform(place))[0] > 0.8
+        ax.annotate(
+            _SHORT.get(point.kind, point.kind),
+            place,
+            xytext=(-5 if left else 5, 5),
+            textcoords="offset points",
+            ha="right" if left else "left",
+            fontsize="small",
+            color=mark_of(point.kind)[1],
+            path_effects=[withStroke(linewidth=2.5, foreground="white")],
+            zorder=5,
+        )

@@ -2,19 +2,20 @@
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from ..models.cams import CamContour
-from ._axes import legend_above, one_axes
+from ._axes import figure_of, legend_above, one_axes
 from ._style import CAM, IMPACT, styled
 
 
 @styled
-def cam_contour(contour: CamContour, ax: Axes | None = None) -> Axes:
+def cam_contour(contour: CamContour, ax: Axes | None = None) -> Figure:
     """Draw a cam in its own frame, the axis it turns about, and where it is undercut.
 
     **Arguments:** the contour over a whole turn, and where to draw.
 
-    **Returns:** the axes.
+    **Returns:** the figure.
     """
     ax = one_axes(ax)
     x, y = np.asarray(contour.x), np.asarray(contour.y)
@@ -28,4 +29,4 @@ def cam_contour(contour: CamContour, ax: Axes | None = None) -> Axes:
     ax.set_xlabel("x (m)")
     ax.set_ylabel("y (m)")
     legend_above(ax)
-    return ax
+    return figure_of(ax)

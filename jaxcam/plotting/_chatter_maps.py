@@ -2,16 +2,17 @@
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
 from variational import beta_map, lambda_inverse, lambda_map, scaling_law
 
-from ._axes import legend_above, one_axes
+from ._axes import figure_of, legend_above, one_axes
 from ._style import FLIGHT, IMPACT, RECORDED, SECTION, styled
 
 
 @styled
-def lambda_cobweb(r: float, ax: Axes | None = None, *, start=None) -> Axes:
+def lambda_cobweb(r: float, ax: Axes | None = None, *, start=None) -> Figure:
     """Draw f(lambda) with its fixed point. (Figure 6.5)
 
     **Arguments:**
@@ -21,7 +22,7 @@ def lambda_cobweb(r: float, ax: Axes | None = None, *, start=None) -> Axes:
     - `start`: first values of lambda to draw cobwebs from; without, one either side of
       the fixed point, where chattering completes and where it is interrupted.
 
-    **Returns:** the axes.
+    **Returns:** the figure.
     """
     ax = one_axes(ax)
     law = scaling_law(r)
@@ -41,10 +42,13 @@ def lambda_cobweb(r: float, ax: Axes | None = None, *, start=None) -> Axes:
     ax.plot(bar, bar, "o", color=SECTION, ms=5, label=rf"$\bar\lambda$ = {bar:.4f}")
     ax.axvline(3 / 8, color=RECORDED, ls=":", lw=1, label=r"$\lambda_{max}$ = 3/8")
     ax.set(
-        xlim=(0, 0.4), ylim=(0, top), xlabel=r"$\lambda_k$", ylabel=r"$\lambda_{k+1}$"
+        xlim=(0, 0.4),
+        ylim=(0, top),
+        xlabel=r"$\lambda_k$ (–)",
+        ylabel=r"$\lambda_{k+1}$ (–)",
     )
     legend_above(ax)
-    return ax
+    return figure_of(ax)
 
 
 def _cobweb(lam, r, most=40):
@@ -61,7 +65,7 @@ def _cobweb(lam, r, most=40):
 @styled
 def beta_lobes(
     r: float, ax: Axes | None = None, *, measured=None, lobes: int = 4
-) -> Axes:
+) -> Figure:
     """Draw beta over lambda - lambda_bar, with its corners. (Figures 6.14, 6.15)
 
     **Arguments:**
@@ -72,7 +76,7 @@ def beta_lobes(
       the theory.
     - `lobes`: how many of them, from the largest.
 
-    **Returns:** the axes.
+    **Returns:** the figure.
     """
     ax = one_axes(ax)
     bar = float(scaling_law(r).lambda_bar)
@@ -92,19 +96,19 @@ def beta_lobes(
         at - bar, beta_map(at, r), "o", color=SECTION, ms=3, label="an impact is lost"
     )
     ax.axhline(0, color=RECORDED, lw=0.8)
-    ax.set(xlabel=r"$\lambda - \bar\lambda$", ylabel=r"$\beta$")
+    ax.set(xlabel=r"$\lambda - \bar\lambda$ (–)", ylabel=r"$\beta$ (–)")
     legend_above(ax)
-    return ax
+    return figure_of(ax)
 
 
 @styled
-def lobe_scaling(distance, height, kappa: float, ax: Axes | None = None) -> Axes:
+def lobe_scaling(distance, height, kappa: float, ax: Axes | None = None) -> Figure:
     """Draw heights of lobes over their distance from the interruption. (6.53)
 
     **Arguments:** `distance` and `height`, each `(k,)`, positive; `kappa`, the exponent
     of the theory; `ax`, a new figure without.
 
-    **Returns:** the axes.
+    **Returns:** the figure.
     """
     ax = one_axes(ax)
     distance, height = np.asarray(distance), np.asarray(height)
@@ -122,6 +126,6 @@ def lobe_scaling(distance, height, kappa: float, ax: Axes | None = None) -> Axes
     )
     # the labels of minor ticks run into each other over less than two decades
     ax.xaxis.set_minor_formatter(NullFormatter())
-    ax.set(xlabel="distance from the interruption", ylabel="height of the lobe")
+    ax.set(xlabel="distance from the interruption (–)", ylabel="height of the lobe (–)")
     legend_above(ax)
-    return ax
+    return figure_of(ax)

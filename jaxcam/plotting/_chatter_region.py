@@ -2,11 +2,22 @@
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
+from matplotlib.patheffects import withStroke
 
 from variational.chatter import ChatterFrame, GrazingManifold, ImpactCurve
 
-from ._axes import legend_above, one_axes
+from ._axes import figure_of, legend_above, one_axes
 from ._style import BAND, FLIGHT, IMPACT, SECTION, styled
+
+
+# how much of white is in the last curve of a family
+_LIGHTEST = 0.5
+# parts of a curve that are shorter than this (periods) have no name
+_NAMED = 0.04
+# nor has a curve this near to the axis (part of the picture's height)
+_LOWEST = 0.03
 
 
 @styled
@@ -18,7 +29,7 @@ def chattering_picture(
     *,
     period: float,
     most: float | None = None,
-) -> Axes:
+) -> Figure:
     """Draw the chattering region D and the grazing manifold. (Figures 6.2 and 6.4)
 
     **Arguments:**
@@ -29,7 +40,7 @@ def chattering_picture(
     - `period`: of the forcing (s).
     - `most`: largest speed drawn; that of the region without.
 
-    **Returns:** the axes: rebound speed over time from release, modulo the period.
+    **Returns:** the figure: rebound speed over time from release, modulo the period.
     """
     ax = one_axes(ax)
     release = float(frame.release)
@@ -37,23 +48,31 @@ def chattering_picture(
     speed = np.asarray(region.speed)
     inside = (time > -0.75 * period) & np.isfinite(speed)
     ax.fill_between(
-        time[inside] / period, 0, speed[inside], color=BAND, lw=0, label="D: completes"
+        time[inside] / period,
+        0,
+        speed[inside],
+        color=BAND,
+        lw=0,
+        label="D: chatter completes",
     )
-    ax.plot(time[inside] / period, speed[inside], color=SECTION, lw=1.4, label="C")
+    ax.plot(
+        time[inside] / period, speed[inside], color=SECTION, lw=1.4, label="C: its edge"
+    )
     top = 1.3 * float(np.max(speed[inside])) if most is None else most
+    ax.set(xlim=(-0.75, 0.25), ylim=(0, top))
     if manifold is not None:
         _draw(ax, manifold.before, release, period, FLIGHT, "S")
         _draw(ax, manifold.after, release, period, IMPACT, "W")
-    ax.axvline(0, color=SECTION, lw=0.8, ls=":")
-    ax.set(xlim=(-0.75, 0.25), ylim=(0, top))
-    ax.set_xlabel("time from release / period")
+    ax.axvline(0, color=SECTION, lw=0.8, ls=":", label="release")
+    ax.set_xlabel("time from release (periods)")
     ax.set_ylabel("rebound speed (gap / s)")
     legend_above(ax)
-    return ax
+    return figure_of(ax)
 
 
 def _draw(ax, curves, release, period, colour, name):
-    styles = ["-", "--", "-.", ":"]
+    """Curves from dark to light by their numbers, which stand at their parts."""
+    count = len(curves.time)
     for k, (time, speed) in enumerate(
         zip(np.asarray(curves.time), np.asarray(curves.speed), strict=True)
     ):
@@ -63,11 +82,25 @@ def _draw(ax, curves, release, period, colour, name):
         jump |= np.abs(np.diff(speed)) > 0.2 * np.nanmax(np.append(speed, 0.0))
         speed = np.array(speed)
         speed[1:][jump] = np.nan
-        ax.plot(
-            shown,
-            speed,
-            color=colour,
-            ls=styles[k % len(styles)],
-            lw=1.0,
-            label=f"{name}$^{k + 1}$",
-        )
+        shade = np.array(to_rgb(colour))
+        shade = shade + _LIGHTEST * k / max(count - 1, 1) * (1 - shade)
+        (line,) = ax.plot(shown, speed, color=shade, lw=1.3)
+        if k == 0:
+            line.set_label(f"${name}^1$ to ${name}^{{{count}}}$")
+        _number(ax, shown, speed, f"${name}^{{{k + 1}}}$", shade, k / count)
+
+
+def _number(ax, x, y, word: str, colour, stagger: float) -> None:
+    """The name of a curve at each part that is long enough."""
+    ends, top = np.flatnonzero(np.isnan(y)), ax.get_ylim()[1]
+    for part in np.split(np.arange(len(y)), ends):
+        part = part[(y[part] > _LOWEST * top) & (y[part] < top)]
+        if len(part) < 2 or np.ptp(x[part]) < _NAMED:
+            continue
+        # neighbouring curves are named at different places
+        at = part[np.argsort(x[part])][int((0.1 + 0.5 * stagger) * len(part))]
+        ax.text(
+            x[at], y[at], word, color=colour, fontsize="small", ha="center",
+            va="center", zorder=4,
+            path_effects=[withStroke(linewidth=3, foreground="white")],
+        )  # fmt: skip

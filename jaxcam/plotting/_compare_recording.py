@@ -10,9 +10,9 @@ from matplotlib.figure import Figure
 
 from ..recordings import Recording
 from ..recordings.against_model import Comparison
+from ..tables import scaled
 from ._axes import legend_above, several_axes
 from ._channels import channel_label, name_and_unit
-from ._prefix import scaled
 from ._simulated import simulated_channel
 from ._style import BAND, CAM, RECORDED, styled
 from .labels import labelled

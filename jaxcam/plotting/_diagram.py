@@ -4,12 +4,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.colors import ListedColormap
+from matplotlib.colors import ListedColormap, to_rgba
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from ._axes import one_axes
+from ._axes import figure_of, one_axes
 from ._style import FLIGHT, IMPACT, SECTION, styled
 from .labels import labelled
 
@@ -25,6 +25,10 @@ COLOURS = (
     "#0072B2", "#56B4E9", "#E69F00", "#009E73", "#CC79A7", "#D55E00", "#F0E442",
     "#8C8C8C", "#004D7A", "#A6D8F5", "#8A5F00", "#7FD1B9", "#7A3F62", "#F4B183",
 )  # fmt: skip
+# heights that a diagram tells apart
+_ROWS = 600
+# smallest and largest dots (points)
+_DOTS = 0.6, 2.4
 # for what is not an attractor
 NOTHING = "#FFFFFF"
 
@@ -40,7 +44,7 @@ def sweep_diagram(
     y_label: tuple[str, str] | None = None,
     x_scale: float = 1.0,
 ) -> Figure:
-    """Draw what motions settled on, a dot a sample, over the parameter.
+    """Draw what motions settled on over the parameter, darker where they are often.
 
     Dots are drawn as an image, so that millions of them stay a small file.
 
@@ -71,24 +75,15 @@ def sweep_diagram(
     else:
         y = states[..., component]
     x = np.broadcast_to(values[:, None, None], (points, starts, keep))
-    total = points * starts * keep
-    size = float(np.clip(600 / np.sqrt(max(total, 1)), 0.35, 2.4))
     ways = [way for way in (1, -1, 0) if np.any(diagram.direction == way)]
     handles = []
     for way in ways:
         colour, word = _WAYS[way]
         some = diagram.direction == way
-        ax.plot(
-            x[some].ravel(),
-            y[some].ravel(),
-            "o",
-            color=colour,
-            # where both ways lead to the same, the larger dots remain visible
-            markersize=1.7 * size if way == 1 and len(ways) > 1 else size,
-            markeredgewidth=0,
-            rasterized=True,
-            zorder=2 if way >= 0 else 3,
-        )
+        # where both ways lead to the same, the larger dots remain visible
+        larger = 1.5 if way == 1 and len(ways) > 1 else 1.0
+        size = larger * _dot_size(ax, int(np.sum(some)))
+        _dots(ax, x[some], y[some], colour, size, 2 if way >= 0 else 3)
         if word:
             handles.append(
                 Line2D([], [], marker="o", ls="", color=colour, ms=5, label=word)
@@ -100,7 +95,40 @@ def sweep_diagram(
     ax.set_xlim(float(values.min()), float(values.max()))
     if handles:
         _above(ax, handles)
-    return ax.figure  # pyright: ignore
+    return figure_of(ax)
+
+
+def _dot_size(ax: Axes, columns: int) -> float:
+    """Diameter of a dot (points): the distance of the columns, within limits."""
+    width = ax.get_window_extent().width * 72 / ax.figure.dpi
+    return float(np.clip(1.2 * width / max(columns, 1), *_DOTS))
+
+
+def _dots(ax: Axes, x, y, colour: str, size: float, zorder: float) -> None:
+    """A dot for each height at which there are samples, darker where there are many.
+
+    `x` and `y` have the shape `(columns, starts, keep)`. One sample of all those kept
+    is still seen, and a motion that repeats is as dark as can be.
+    """
+    finite = np.isfinite(y)
+    if not np.any(finite):
+        return
+    low, high = y[finite].min(), y[finite].max()
+    row = np.floor(_ROWS * (y - low) / ((high - low) or 1.0), where=finite, out=y * 0.0)
+    column = np.broadcast_to(np.arange(len(y))[:, None, None], y.shape)
+    place = column[finite] * (_ROWS + 1.0) + row[finite]
+    _, first, inverse, count = np.unique(
+        place, return_index=True, return_inverse=True, return_counts=True
+    )
+    height = np.bincount(inverse, y[finite]) / count
+    keep = y.shape[-1]
+    shade = (1 + np.log(np.minimum(count, keep))) / (1 + np.log(keep))
+    rgba = np.tile(to_rgba(colour), (len(count), 1))
+    rgba[:, 3] = shade
+    ax.scatter(
+        x[finite][first], height, s=size**2, c=rgba, linewidths=0, rasterized=True,
+        zorder=zorder,
+    )  # fmt: skip
 
 
 @styled
@@ -157,7 +185,7 @@ def sweep_chart(
     ax.set_ylabel(labelled(*((other, "-") if y_label is None else y_label)))
     ax.grid(False)
     _above(ax, handles)
-    return ax.figure  # pyright: ignore
+    return figure_of(ax)
 
 
 def _above(ax: Axes, handles) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ._axes import legend_above, one_axes
+from ._axes import figure_of, legend_above, one_axes
 from ._style import BAND, FLIGHT, IMPACT, styled
 
 
@@ -66,9 +66,7 @@ def cobweb(
     ax.set_xlim(low, high)
     ax.set_ylim(low, high)
     ax.set_aspect("equal")
-    ax.set_xlabel(f"${name}_k$")
-    ax.set_ylabel(f"${name}_{{k+1}}$")
+    ax.set_xlabel(f"${name}_k$ (–)")
+    ax.set_ylabel(f"${name}_{{k+1}}$ (–)")
     legend_above(ax)
-    figure = ax.figure
-    assert isinstance(figure, Figure)
-    return figure
+    return figure_of(ax)

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from ..hybrid import Trajectory
 from ._axes import legend_above, several_axes
-from ._style import BAND, IMPACT, styled
+from ._style import BAND, gap_colour, IMPACT, styled
 from .curves import Hits, hits, window
 from .labels import labelled, speed_unit, time_unit
 
@@ -54,24 +54,25 @@ def impact_return_map(
     left, right = grid[0]
     if against == "phase" and period is not None:
         turns = np.mod(found.time / float(period), 1.0)
-        _draw(left, 2 * np.pi * turns, found, "phase", "rad", (0.0, 2 * np.pi))
+        whole = (0.0, 2 * np.pi)
+        _draw(left, system, 2 * np.pi * turns, found, "phase", "rad", whole)
         ticks = np.arange(5) * np.pi / 2
         names = ["0", r"$\pi/2$", r"$\pi$", r"$3\pi/2$", r"$2\pi$"]
         left.set_xticks(ticks, names)
         left.set_yticks(ticks, names)
     else:
-        _draw(left, found.time, found, "time", time_unit(system), None)
+        _draw(left, system, found.time, found, "time", time_unit(system), None)
     wide = len(found.speed) > 1 and found.speed.max() > _MANY_SCALES * found.speed.min()
     if wide and found.speed.min() > 0:
         right.set_xscale("log")
         right.set_yscale("log")
-    _draw(right, found.speed, found, "speed", speed_unit(system), None)
+    _draw(right, system, found.speed, found, "speed", speed_unit(system), None)
     if np.ptp(found.constraint) if len(found.constraint) else False:
         legend_above(right)
     return figure
 
 
-def _draw(ax: Axes, values, found: Hits, name: str, unit: str, limits) -> None:
+def _draw(ax: Axes, system, values, found: Hits, name: str, unit: str, limits) -> None:
     if limits is None:
         limits = _limits(values, ax.get_xscale() == "log")
     ax.plot(limits, limits, color=BAND, linewidth=1.2, zorder=1, label="_identity")
@@ -84,11 +85,11 @@ def _draw(ax: Axes, values, found: Hits, name: str, unit: str, limits) -> None:
             this[chosen],
             following[chosen],
             "o",
-            color=IMPACT if len(kinds) == 1 else f"C{k}",
+            color=IMPACT if len(kinds) == 1 else gap_colour(k),
             markersize=4,
             markeredgecolor="white",
             markeredgewidth=0.4,
-            label=f"constraint {k}",
+            label=system.constraint_name(int(k)),
         )
     ax.set_xlim(*limits)
     ax.set_ylim(*limits)

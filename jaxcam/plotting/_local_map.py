@@ -3,10 +3,11 @@
 import jax.numpy as jnp
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from variational.chatter import Lobes, LocalMap
 
-from ._axes import legend_above, one_axes
+from ._axes import figure_of, legend_above, one_axes
 from ._style import FLIGHT, IMPACT, RECORDED, SECTION, styled
 
 
@@ -18,7 +19,7 @@ def local_map(
     *,
     shift: float = 0.0,
     turns: int = 60,
-) -> Axes:
+) -> Figure:
     """Draw the fitted map over the measured one, with a cobweb. (Figures 5.25, 5.26)
 
     **Arguments:**
@@ -29,7 +30,7 @@ def local_map(
     - `shift`: how far the map is moved to the left, as a parameter moves it.
     - `turns`: steps of the cobweb, the first half of which is not drawn.
 
-    **Returns:** the axes.
+    **Returns:** the figure.
     """
     ax = one_axes(ax)
     x_0, x_inf = float(local.x_0), float(local.x_inf)
@@ -70,4 +71,4 @@ def local_map(
     ax.set_ylabel("one turn later")
     ax.set_ylim(np.nanmin(shown) - 0.1 * span, np.nanmax(shown) + 0.3 * span)
     legend_above(ax)
-    return ax
+    return figure_of(ax)

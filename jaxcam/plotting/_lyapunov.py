@@ -4,7 +4,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ._axes import legend_above, one_axes
+from ._axes import figure_of, legend_above, one_axes
 from ._style import BAND, styled
 
 
@@ -45,6 +45,4 @@ def lyapunov_convergence(spectrum, ax: Axes | None = None) -> Figure:
     ax.set_xlabel("time averaged over (s)")
     ax.set_ylabel("Lyapunov exponent (1/s)")
     legend_above(ax)
-    figure = ax.figure
-    assert isinstance(figure, Figure)
-    return figure
+    return figure_of(ax)

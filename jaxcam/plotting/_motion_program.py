@@ -2,6 +2,7 @@
 
 import jax.numpy as jnp
 import numpy as np
+from matplotlib.figure import Figure
 
 from ..models import MotionProgram
 from ._axes import several_axes
@@ -13,7 +14,7 @@ _POINTS = 200
 
 
 @styled
-def motion_program(program: MotionProgram, axes=None, *, unit: str = "rad"):
+def motion_program(program: MotionProgram, axes=None, *, unit: str = "rad") -> Figure:
     """Draw lift, velocity, acceleration and jerk, for each radian of the cam.
 
     Where a derivative jumps the curve is broken: the values on both sides are marked by
@@ -26,10 +27,9 @@ def motion_program(program: MotionProgram, axes=None, *, unit: str = "rad"):
     - `axes`: four of them; a new figure without.
     - `unit`: of the lift, "rad" or "m".
 
-    **Returns:** the four axes.
+    **Returns:** the figure.
     """
     figure, axes = several_axes(axes, (4, 1), sharex=True, figsize=(6.4, 8.4))
-    del figure
     axes = axes[:, 0]
     pieces = program.prepared()
     starts, ends = np.asarray(pieces.starts), np.asarray(pieces.ends())
@@ -47,8 +47,8 @@ def motion_program(program: MotionProgram, axes=None, *, unit: str = "rad"):
         ax.plot(degrees.ravel(), values.ravel(), color=FLIGHT, lw=1.3)
         ax.axhline(0.0, color="0.75", lw=0.6, zorder=0)
         order = ("", "/rad", "/rad$^2$", "/rad$^3$")[k]
-        ax.set_ylabel(f"{_NAMES[k]} ({unit}{order})")
+        ax.set_ylabel(f"{_NAMES[k]}\n({unit}{order})")
     axes[-1].set_xlabel("cam angle (degrees)")
     axes[-1].set_xlim(0, 360)
     axes[-1].set_xticks(np.arange(0, 361, 30))
-    return axes
+    return figure

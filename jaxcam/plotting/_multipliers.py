@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ._axes import legend_above, one_axes
+from ._axes import figure_of, legend_above, one_axes
 from ._style import BAND, FLIGHT, IMPACT, styled
 
 
@@ -60,9 +60,7 @@ def multipliers(
     ax.set_xlim(-reach, reach)
     ax.set_ylim(-reach, reach)
     ax.set_aspect("equal")
-    ax.set_xlabel(r"real part of $\mu$")
-    ax.set_ylabel(r"imaginary part of $\mu$")
+    ax.set_xlabel(r"real part of $\mu$ (–)")
+    ax.set_ylabel(r"imaginary part of $\mu$ (–)")
     legend_above(ax)
-    figure = ax.figure
-    assert isinstance(figure, Figure)
-    return figure
+    return figure_of(ax)

@@ -2,9 +2,10 @@
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from ..hybrid import Trajectory
-from ._axes import legend_above, one_axes
+from ._axes import figure_of, legend_above, one_axes
 from ._style import CONTACT, FLIGHT, IMPACT, SECTION, styled
 from .curves import Curve, trajectory_curve, window
 from .labels import state_label
@@ -20,7 +21,7 @@ def phase_portrait(
     phase: float = 0.0,
     between: tuple[float, float] | None = None,
     samples: int = 1500,
-) -> Axes:
+) -> Figure:
     """Draw a trajectory in the plane of two components of the state.
 
     Flights and contacts are lines of different colour, jumps at impacts are thin and
@@ -37,7 +38,7 @@ def phase_portrait(
     - `between`: the span of time to draw (s), the whole trajectory without.
     - `samples`: points of a curve, besides those that short flights need.
 
-    **Returns:** the axes.
+    **Returns:** the figure.
     """
     drawn = trajectory_curve(trajectory, between, samples)
     ax = one_axes(ax)
@@ -59,7 +60,7 @@ def phase_portrait(
     ax.set_xlabel(state_label(trajectory.system, components[0]))
     ax.set_ylabel(state_label(trajectory.system, components[1]))
     legend_above(ax)
-    return ax
+    return figure_of(ax)
 
 
 def _draw_motion(ax: Axes, drawn: Curve, right: int, up: int) -> None:

@@ -11,9 +11,9 @@ from matplotlib.lines import Line2D
 from scipy.stats import norm
 
 from ..recordings.against_model import Comparison, Residuals
+from ..tables import scaled
 from ._axes import several_axes
 from ._channels import name_and_unit
-from ._prefix import scaled
 from ._style import BAND, FLIGHT, styled
 from .labels import labelled
 
@@ -74,6 +74,7 @@ def residual_by_mode(
     left, right = grid[-1]
     left.set_xlabel("time (s)" if against == "time" else "cam angle in its turn (rad)")
     right.set_xlabel("share (%)")
+    grid[0, 1].set_title("line: noise alone", fontsize="small")
     # for all rows; the noise of a large residual is all in one bin, and may be cut off
     right.set_xlim(0.0, 1.25 * highest)
     if against == "phase":

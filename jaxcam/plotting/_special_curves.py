@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 
-from ._axes import one_axes
+from ._axes import figure_of, one_axes
 from ._branch import mark_of
 from ._style import styled
 from .labels import labelled
@@ -56,7 +56,7 @@ def special_curves(
                 "a chart needs curves in two parameters; give branches made by "
                 "continuation.curve"
             )
-        kind = curve.points[0].signature.rsplit(" of ", 1)[0]
+        kind = _kind(curve)
         values = scale * np.array([point.parameters for point in curve.points])
         ax.plot(*values.T, "-", color=mark_of(kind)[1], label=kind, zorder=2)
         for point in curve.special:
@@ -65,13 +65,37 @@ def special_curves(
     ax.set_xlabel(labelled(*((names[0], "-") if x_label is None else x_label)))
     ax.set_ylabel(labelled(*((names[1], "-") if y_label is None else y_label)))
     ax.margins(x=0.03, y=0.0)
-    # beside the curves: above them is too little room for such long names
-    handles, labels = ax.get_legend_handles_labels()
-    unique = dict(zip(labels, handles, strict=True))
-    ax.legend(
-        unique.values(), unique.keys(), loc="center left", bbox_to_anchor=(1.0, 0.5)
+    for curve in several:
+        _name(ax, curve, scale)
+    return figure_of(ax)
+
+
+def _name(ax: Axes, curve, scale) -> None:
+    """The kind of the curve along it, where it is a third of its way up."""
+    values = scale * np.array([point.parameters for point in curve.points])
+    shown = ax.transData.transform(values)
+    middle = np.argmin(np.abs(shown[:, 1] - np.quantile(shown[:, 1], 0.35)))
+    near = shown[max(middle - 3, 0) : middle + 4]
+    along = near[-1] - near[0]
+    angle = np.rad2deg(np.arctan2(along[1], along[0]))
+    kind = _kind(curve)
+    ax.annotate(
+        kind,
+        tuple(values[middle]),
+        xytext=(0, 0),
+        textcoords="offset points",
+        ha="center",
+        va="center",
+        rotation=(angle + 90) % 180 - 90,
+        fontsize="small",
+        color=mark_of(kind)[1],
+        path_effects=[withStroke(linewidth=5, foreground="white")],
+        zorder=3,
     )
-    return ax.figure  # pyright: ignore
+
+
+def _kind(curve) -> str:
+    return curve.points[0].signature.rsplit(" of ", 1)[0]
 
 
 def _mark(ax: Axes, place: np.ndarray, kind: str) -> None:

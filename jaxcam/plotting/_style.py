@@ -18,10 +18,17 @@ CONTACT = "#E69F00"
 SECTION = "#000000"
 RECORDED = "#ABABAB"
 BAND = "#BDBDBD"
-CAM = "#E69F00"
+CAM = "#8A5F00"
+# constraints side by side, in none of the colours of impact and contact
+_GAPS = (FLIGHT, "#009E73", "#CC79A7", "#56B4E9", SECTION)
 
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
+
+
+def gap_colour(number: int) -> str:
+    """Colour of one of several constraints."""
+    return _GAPS[number % len(_GAPS)]
 
 
 def style():

@@ -7,9 +7,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ..hybrid import Trajectory
+from ..hybrid import HybridSystem, Trajectory
 from ._axes import legend_above, several_axes
-from ._style import CONTACT, FLIGHT, IMPACT, styled
+from ._style import CONTACT, FLIGHT, gap_colour, IMPACT, styled
 from .curves import Curve, trajectory_curve
 from .labels import gap_label, state_label, time_label
 
@@ -52,7 +52,7 @@ def time_history(
     for ax, component in zip(panels[:-1], components, strict=True):
         _draw_component(ax, drawn, component)
         ax.set_ylabel(_narrow(state_label(system, component)))
-    _draw_gap(panels[-1], drawn)
+    _draw_gap(panels[-1], drawn, system)
     panels[-1].set_ylabel(_narrow(gap_label(system)))
     panels[-1].set_xlabel(time_label(system))
     panels[-1].locator_params(axis="x", nbins=7)
@@ -77,12 +77,13 @@ def _draw_component(ax: Axes, drawn: Curve, component: int) -> None:
     _mark_impacts(ax, drawn.impact_time, before)
 
 
-def _draw_gap(ax: Axes, drawn: Curve) -> None:
+def _draw_gap(ax: Axes, drawn: Curve, system: HybridSystem) -> None:
     number = drawn.gap.shape[1]
     for k in range(number):
         # one constraint needs no name, several are told apart by the colour cycle
         one = number == 1
-        colour, label = (FLIGHT, None) if one else (f"C{k}", f"gap {k}")
+        label = None if one else system.constraint_name(k)
+        colour = FLIGHT if one else gap_colour(k)
         ax.plot(drawn.time, drawn.gap[:, k], color=colour, label=label)
     if number > 1:
         legend_above(ax)

@@ -1,7 +1,7 @@
 """Axis labels: a name and a unit for every quantity of a system."""
 
 from ..hybrid import HybridSystem
-from ._prefix import scaled as scaled
+from ..tables import scaled as scaled
 
 
 def labelled(name: str, unit: str) -> str:

@@ -45,6 +45,10 @@ class Wandering(HybridSystem):
         return self.base.state_names
 
     @property
+    def constraint_names(self) -> tuple[str, ...]:  # pyright: ignore
+        return self.base.constraint_names
+
+    @property
     def state_units(self) -> tuple[str, ...]:  # pyright: ignore
         return self.base.state_units
 

@@ -1,5 +1,7 @@
 """The largest Lyapunov exponent of many motions, to tell chaos from long transients."""
 
+from collections.abc import Callable
+from functools import partial
 from typing import NamedTuple
 
 import equinox as eqx
@@ -26,7 +28,13 @@ class Exponents(NamedTuple):
 
 
 def largest_exponents(
-    section: AbstractSection, states, turns: int, *, where=None, values=None
+    section: AbstractSection,
+    states,
+    turns: int,
+    *,
+    where=None,
+    values=None,
+    progress: Callable[[float], None] | None = None,
 ) -> Exponents:
     """Exponents of motions from states that have settled, by `variational`.
 
@@ -36,6 +44,7 @@ def largest_exponents(
     - `turns`: how many are averaged, 16 or more.
     - `where`, `values`: as for a section; motions of one second parameter are computed
         together.
+    - `progress`: called with the part that is done.
 
     **Raises:** `ValueError` for a map, whose exponents are not computed here.
     """
@@ -52,7 +61,12 @@ def largest_exponents(
     if not len(ready):
         return made
     values = None if values is None else np.asarray(values, dtype=float)[ready]
+    done = 0
     for some, own, one, column in _together(system, where, values, len(ready)):
+        part = None
+        if progress is not None:
+            begun, size = done / len(ready), len(some) / len(ready)
+            part = partial(_within, progress, begun, size)
         spectrum = variational.lyapunov_spectrum(
             own,
             states[ready[some]],
@@ -63,10 +77,16 @@ def largest_exponents(
             where=one,
             values=column,
             settings=Settings(tolerance=1e-10, chatter_depth=1.0),
+            progress=part,
         )
+        done += len(some)
         made.largest[ready[some]] = np.asarray(spectrum.exponents)[:, 0]
         made.stderr[ready[some]] = np.asarray(spectrum.stderr)[:, 0]
     return made
+
+
+def _within(progress, begun: float, size: float, share: float) -> None:
+    progress(begun + size * share)
 
 
 def _together(system, where, values, lanes):

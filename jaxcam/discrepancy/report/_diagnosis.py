@@ -8,11 +8,13 @@ import jax.numpy as jnp
 
 from ...fitting import Fit, Model, Residuals
 from ...hybrid import HybridSystem
+from ...tables import ShortTable
 from ..evidence import Ripple, Structure
 from ..policy import Policy
 from ..terms import FreeFunction, Value, WithTerms
 from ._caveats import Caveat
 from ._missing import MissingFunction
+from ._words import number
 
 
 class Verdict(enum.StrEnum):
@@ -83,7 +85,7 @@ class Effect:
         }
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, repr=False)
 class Diagnosis:
     """The answer to: what physics did the model leave out?
 
@@ -131,6 +133,31 @@ class Diagnosis:
     policy: Policy = Policy()
     missing: tuple[MissingFunction, ...] = ()
     misfit: dict[str, float] = dataclasses.field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        return self._table().text()
+
+    def _repr_html_(self) -> str:
+        return self._table().html()
+
+    def _table(self) -> ShortTable:
+        """The summary, and the effects with their evidence."""
+        rows = [
+            (
+                effect.name.replace("_", " "),
+                ", ".join(
+                    f"{name} = {number(one.value, one.stderr, one.unit)}"
+                    for name, one in effect.parameters.items()
+                ),
+                effect.where,
+                f"{effect.delta_bic:.0f}",
+                f"{effect.heldout_gain_nats:.0f}",
+            )
+            for effect in self.effects
+        ]
+        headings = ("effect", "parameters", "where", "BIC", "held-out gain (nats)")
+        case = f"{self.case}: " if self.case else ""
+        return ShortTable(f"{case}{self.summary}", headings, rows, headings[:3])
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 
 from ...fitting import Fit
+from ...tables import scaled
 from ..evidence import Choice, HeldOut, Limit, rms_of
 from ..policy import Policy
 from ..search import Trial
@@ -78,11 +79,12 @@ def summary_of_functions(
     words = " and ".join(one.words for one in functions)
     found = f"Something is missing that has no name{beside}: {words}."
     if held.after < held.before:
+        factor, unit = scaled(unit, held.before * floor)
+        before, after = (factor * floor * one for one in (held.before, held.after))
         return (
             f"{found} Fitted with the rig it lowers the error on unseen flights from "
-            f"{held.before * floor:.3g} to "
-            f"{quantity(f'{held.after * floor:.3g}', unit)}, where the noise is "
-            f"{floor:.3g}."
+            f"{before:.3g} to {quantity(f'{after:.3g}', unit)}, where the noise is "
+            f"{factor * floor:.3g}."
         )
     return (
         f"{found} Fitted with the rig it explains the records to {left:.3g} times the "

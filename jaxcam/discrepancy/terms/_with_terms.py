@@ -35,6 +35,10 @@ class WithTerms(HybridSystem):
         return self.base.state_names
 
     @property
+    def constraint_names(self) -> tuple[str, ...]:  # pyright: ignore
+        return self.base.constraint_names
+
+    @property
     def state_units(self) -> tuple[str, ...]:  # pyright: ignore
         return self.base.state_units
 

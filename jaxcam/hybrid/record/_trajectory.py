@@ -1,5 +1,7 @@
 """What a simulation returns: impacts, contacts, and the state at any time."""
 
+from html import escape
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -39,6 +41,10 @@ class Trajectory(eqx.Module):
             f"impacts: {int(self.impacts.count)}, contacts: {int(self.contacts.count)}"
         )
         return f"{said}. {self.result}" if self.result else said
+
+    def _repr_html_(self) -> str | None:
+        batch = is_traced(self) or np.ndim(self.code)
+        return None if batch else f"<p>{escape(str(self))}</p>"
 
     @property
     def successful(self):

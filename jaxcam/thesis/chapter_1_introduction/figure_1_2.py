@@ -30,7 +30,7 @@ def compute(system: CamFollower) -> Rows:
 
 def draw(system: CamFollower) -> Figure:
     run = released_turn(system, both_sides(system)[0])
-    return plotting.phase_portrait(run).figure  # pyright: ignore
+    return plotting.phase_portrait(run)
 
 
 TARGET = Target("A periodic orbit with chatter", compute, draw)

@@ -55,7 +55,7 @@ def compute(system: CamFollower) -> Rows:
 def draw(system: CamFollower) -> Figure:
     del system
     program = _program()
-    return plotting.motion_program(program, unit="rise")[0].figure
+    return plotting.motion_program(program, unit="rise")
 
 
 TARGET = Target("A motion program with four dwells", compute, draw)

@@ -1,0 +1,11 @@
+"""Two attractors of one oscillator, and which initial states end on which."""
+
+from jaxcam import sweeps
+from jaxcam.models import ImpactOscillator
+from jaxcam.plotting import basin_picture
+
+
+system = ImpactOscillator(omega=2.6, restitution=0.8, wall=0.0)
+grid = sweeps.Grid((-3.0, -2.5), (0.0, 2.5), (128, 128))
+found = sweeps.basins(system, grid, turns=400, reruns=4)
+figure = basin_picture(found)

@@ -1,0 +1,20 @@
+"""An impact oscillator over its forcing frequency: periodic windows, period doublings
+and chaos, darker where the motion is more often."""
+
+import numpy as np
+
+from jaxcam import sweeps
+from jaxcam.models import ImpactOscillator
+from jaxcam.plotting import sweep_diagram
+
+
+system = ImpactOscillator(omega=2.8, restitution=0.8, wall=0.0, damping=0.0)
+made = sweeps.diagram(
+    system,
+    lambda s: s.omega,
+    np.linspace(2.6, 4.2, 400),
+    [-0.5, 0.5],
+    turns=300,
+    keep=100,
+)
+figure = sweep_diagram(made, x_label=("frequency", "–"))

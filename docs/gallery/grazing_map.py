@@ -1,0 +1,12 @@
+"""The square-root map of a grazing impact: most steps are small and linear, and now and
+then one impact throws the motion far back."""
+
+import variational
+from jaxcam.plotting import cobweb
+
+
+def nordmark(x):
+    return variational.nordmark_map(x, 0.12, 0.62)
+
+
+figure = cobweb(nordmark, start=0.05, turns=60, skip=500, edge=0.12)

@@ -1,0 +1,11 @@
+"""Two Lyapunov exponents of a chaotic impact oscillator settle while they are averaged;
+one is positive, and bands are their standard errors."""
+
+import variational
+from jaxcam.models import ImpactOscillator
+from jaxcam.plotting import lyapunov_convergence
+
+
+system = ImpactOscillator(omega=2.9, restitution=0.8, wall=0.0)
+spectrum = variational.lyapunov_spectrum(system, [-0.5, 0.5], turns=400)
+figure = lyapunov_convergence(spectrum)

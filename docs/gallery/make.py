@@ -1,0 +1,115 @@
+"""Draw the gallery: `python docs/gallery/make.py [NAME ...]`, all pictures by default.
+
+Each script beside this file makes one `figure`; the first sentence of its docstring
+says what is seen. Here it becomes a light and a dark picture, and a part of
+`docs/gallery.md`.
+"""
+
+import ast
+import io
+import runpy
+import sys
+import time
+from pathlib import Path
+
+import matplotlib
+
+
+matplotlib.use("Agg")
+
+from matplotlib.figure import Figure
+from PIL import Image
+
+from jaxcam.plotting import on_dark, style
+
+
+HERE = Path(__file__).parent
+PAGE = HERE.parent / "gallery.md"
+OUT = HERE
+# of the page, from top to bottom
+ORDER = tuple((HERE / "order.txt").read_text("utf-8").split())
+# dots an inch
+DOTS = 130
+# colours of a picture: few enough for a small file
+COLOURS = 64
+
+_TOP = """---
+hide:
+  - navigation
+  - toc
+---
+
+# Gallery
+
+Each picture is made by a short script; a picture leads to its code. Run a script as it
+is, or change the system in it. All of them are drawn by `python docs/gallery/make.py`,
+in a light version and, by [`jaxcam.plotting.on_dark`][], in a dark one.
+
+<div class="grid cards" markdown>
+
+"""
+_CARD = """-   [![{title}](gallery/{name}-light.png#only-light){{ loading=lazy }}
+    ![{title}](gallery/{name}-dark.png#only-dark){{ loading=lazy }}](#{anchor})
+
+    **[{title}](#{anchor})**
+
+"""
+_PART = """
+## {title} {{ #{anchor} }}
+
+{caption}
+
+![{caption}](gallery/{name}-light.png#only-light){{ width=640 loading=lazy }}
+![{caption}](gallery/{name}-dark.png#only-dark){{ width=640 loading=lazy }}
+
+```python title="docs/gallery/{name}.py"
+--8<-- "docs/gallery/{name}.py"
+```
+"""
+
+
+def caption(name: str) -> str:
+    """The first sentence of a script, on one line."""
+    words = ast.get_docstring(ast.parse((HERE / f"{name}.py").read_text("utf-8")))
+    assert words, f"{name}.py has no docstring"
+    return " ".join(words.split("\n\n")[0].split())
+
+
+def draw(name: str) -> None:
+    """Run a script and write both its pictures."""
+    figure = runpy.run_path(str(HERE / f"{name}.py"))["figure"]
+    _write(figure, OUT / f"{name}-light.png")
+    _write(on_dark(figure), OUT / f"{name}-dark.png")
+
+
+def _write(figure: Figure, path: Path) -> None:
+    drawn = io.BytesIO()
+    with style():
+        figure.savefig(drawn, dpi=DOTS, facecolor=figure.get_facecolor())
+    picture = Image.open(drawn).convert("RGB")
+    picture.quantize(COLOURS, dither=Image.Dither.NONE).save(path, optimize=True)
+
+
+def page() -> str:
+    """The text of `docs/gallery.md`."""
+    parts = {
+        name: dict(
+            name=name,
+            anchor=name.replace("_", "-"),
+            title=name.replace("_", " ").capitalize(),
+            caption=caption(name),
+        )
+        for name in ORDER
+    }
+    cards = "".join(_CARD.format(**part) for part in parts.values())
+    texts = "".join(_PART.format(**part) for part in parts.values())
+    return f"{_TOP}{cards}</div>\n{texts}"
+
+
+if __name__ == "__main__":
+    for name in sys.argv[1:] or ORDER:
+        began = time.time()
+        draw(name)
+        size = sum(f.stat().st_size for f in HERE.glob(f"{name}-*.png")) / 1000
+        print(f"{name}: {time.time() - began:.0f} s, {size:.0f} kB", flush=True)
+    PAGE.write_text(page(), "utf-8")

@@ -1,0 +1,19 @@
+"""A cam's program as handbooks draw it: a rise of modified sine, a dwell, and a return
+of constant acceleration, whose acceleration jumps."""
+
+import numpy as np
+
+from jaxcam.models import MotionProgram, Segment
+from jaxcam.plotting import motion_program
+
+
+program = MotionProgram(
+    [
+        Segment("modified sine", np.deg2rad(120), 0.012),
+        Segment("dwell", np.deg2rad(60)),
+        Segment("constant acceleration", np.deg2rad(120), -0.012),
+        Segment("dwell", np.deg2rad(60)),
+    ]
+)
+figure = motion_program(program, unit="m")
+figure.set_size_inches(6.4, 6.4)

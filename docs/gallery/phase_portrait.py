@@ -1,0 +1,13 @@
+"""A slowly driven mass hits its wall, chatters, sticks to it, and is let go."""
+
+import jaxcam
+from jaxcam.models import ImpactOscillator
+from jaxcam.plotting import phase_portrait
+
+
+system = ImpactOscillator(omega=0.35, restitution=0.6, wall=0.4, damping=0.05)
+period = float(system.period)
+trajectory = jaxcam.simulate(system, [0.0, 0.0], 0.0, 12 * period)
+
+last_turn = (11 * period, 12 * period)
+figure = phase_portrait(trajectory, between=last_turn)

@@ -1,0 +1,26 @@
+"""A block on a moving belt: dry friction holds it until the spring wins, and the
+motions from inside and outside end in one stick-slip cycle."""
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+from jaxcam.filippov import simulate_filippov
+from jaxcam.models import BeltOscillator
+from jaxcam.plotting import style
+from jaxcam.plotting.colours import CONTACT, FLIGHT
+
+
+block = BeltOscillator(belt=0.3, friction=1.0, weakening=2.0, damping=0.05)
+
+with style():
+    figure, ax = plt.subplots()
+    for start in ([0.75, 0.05], [2.2, 0.0]):
+        motion = simulate_filippov(block, start, 0.0, 30.0)
+        times = np.linspace(0.0, 30.0, 3000)
+        x, velocity = np.asarray(motion.at(times)).T
+        sticks = np.abs(velocity - 0.3) < 1e-9
+        ax.plot(x, velocity, color=FLIGHT, lw=1.2)
+        ax.plot(x, np.where(sticks, velocity, np.nan), color=CONTACT, lw=3)
+        ax.plot(*start, "o", color=FLIGHT)
+    ax.annotate("sticks to the belt", (1.0, 0.3), (0.0, 6), textcoords="offset points")
+    ax.set(xlabel="position (–)", ylabel="velocity (–)")

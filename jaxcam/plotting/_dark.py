@@ -1,0 +1,100 @@
+"""A figure recoloured for a dark page."""
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.collections import Collection
+from matplotlib.colors import ListedColormap, to_rgba_array
+from matplotlib.figure import Figure
+from matplotlib.image import AxesImage
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from matplotlib.patheffects import withStroke
+from matplotlib.text import Annotation, Text
+
+
+# the background of mkdocs-material's dark pages, and its text
+_BACKGROUND = np.array([0x1E, 0x21, 0x29]) / 255
+_TEXT = np.array([0.92, 0.92, 0.94])
+# colours are lightened by this much: pure blue is hard to see on black
+_LIGHTER = 0.25
+# spread of the channels from which a colour counts as a colour and not as a grey
+_COLOURFUL = 0.25
+# properties of an artist that hold a colour
+_PROPERTIES = {
+    Line2D: ("color", "markerfacecolor", "markeredgecolor"),
+    Patch: ("edgecolor", "facecolor"),
+    Collection: ("edgecolor", "facecolor"),
+    Text: ("color",),
+}
+
+
+def on_dark(figure: Figure) -> Figure:
+    """Recolour a figure for a dark page: greys are turned round, colours lightened.
+
+    The figure is changed in place, whatever drew it; save the light version first.
+
+    **Returns:** the figure.
+    """
+    # ticks are made when a figure is drawn
+    figure.canvas.draw()
+    for artist in figure.findobj():
+        if isinstance(artist, Axes):
+            _recolour_ticks(artist)
+        for kind, names in _PROPERTIES.items():
+            if isinstance(artist, kind):
+                _recolour(artist, names)
+        if isinstance(artist, Text) and artist.get_bbox_patch() is not None:
+            _recolour(artist.get_bbox_patch(), _PROPERTIES[Patch])
+        if isinstance(artist, Annotation) and artist.arrow_patch is not None:
+            _recolour(artist.arrow_patch, _PROPERTIES[Patch])
+        if isinstance(artist, ScalarMappable) and artist.get_array() is not None:
+            _recolour_values(artist)
+        # the halo of a label has the colour of the page
+        if artist.get_path_effects():
+            halo = tuple(_BACKGROUND)
+            artist.set_path_effects([withStroke(linewidth=2.5, foreground=halo)])
+    return figure
+
+
+def dark(colours: np.ndarray) -> np.ndarray:
+    """RGBA colours, shape `(..., 4)`, as they are drawn on a dark page."""
+    rgb, alpha = colours[..., :3], colours[..., 3:]
+    turned = _TEXT + rgb.mean(axis=-1, keepdims=True) * (_BACKGROUND - _TEXT)
+    lightened = rgb + _LIGHTER * (1 - rgb)
+    share = np.clip(np.ptp(rgb, axis=-1, keepdims=True) / _COLOURFUL, 0, 1)
+    return np.concatenate([turned + share * (lightened - turned), alpha], axis=-1)
+
+
+def _recolour(artist, names: tuple[str, ...]) -> None:
+    # all are read before one is set: setting one may set another
+    colours = {name: getattr(artist, f"get_{name}")() for name in names}
+    for name, colour in colours.items():
+        if isinstance(colour, str) and colour in ("none", "auto"):
+            continue
+        changed = dark(to_rgba_array(colour))
+        if isinstance(artist, Collection):
+            getattr(artist, f"set_{name}")(changed)
+        else:
+            getattr(artist, f"set_{name}")(tuple(changed[0]))
+
+
+def _recolour_values(artist: ScalarMappable) -> None:
+    values = np.asarray(artist.get_array())
+    if isinstance(artist, AxesImage) and values.ndim == 3:
+        artist.set_data(dark(values))
+        return
+    colours = np.asarray(artist.cmap(np.arange(artist.cmap.N)))
+    artist.set_cmap(ListedColormap(dark(colours)))
+
+
+def _recolour_ticks(axes: Axes) -> None:
+    # also for ticks that are made later
+    for axis in (axes.xaxis, axes.yaxis):
+        parameters = axis.get_tick_params()
+        found = {
+            name: tuple(dark(to_rgba_array(parameters[name]))[0])
+            for name in ("color", "labelcolor", "grid_color")
+            if name in parameters
+        }
+        axis.set_tick_params(**found)

@@ -1,0 +1,72 @@
+"""How results are shown: short tables, and units that suit the size of a number."""
+
+from collections.abc import Sequence
+from html import escape
+from typing import NamedTuple
+
+import numpy as np
+
+
+# rows shown of a longer table: the first and the last
+_MOST = 20
+_CELL = 'style="text-align: {}"'
+# units that a prefix can be put before; others (rpm, -) keep their numbers
+_TAKES_PREFIX = ("rad", "m", "s", "N", "V")
+
+
+class ShortTable(NamedTuple):
+    """A sentence and a table below it; of many rows the first and the last ones."""
+
+    sentence: str
+    headings: tuple[str, ...]
+    rows: Sequence[tuple[str, ...]]
+    #: headings of the columns that are words
+    words: tuple[str, ...] = ()
+
+    def text(self) -> str:
+        """Columns of equal width, numbers to the right."""
+        if not self.rows:
+            return self.sentence
+        lines = [self.headings, *self._shown()]
+        widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
+        made = [
+            "  ".join(
+                cell.ljust(width) if heading in self.words else cell.rjust(width)
+                for cell, width, heading in zip(line, widths, self.headings)
+            ).rstrip()
+            for line in lines
+        ]
+        return "\n".join([self.sentence, *made])
+
+    def html(self) -> str:
+        """The same for a notebook."""
+        sides = ["left" if one in self.words else "right" for one in self.headings]
+
+        def row(cells, tag: str) -> str:
+            made = (
+                f"<{tag} {_CELL.format(side)}>{escape(cell)}</{tag}>"
+                for cell, side in zip(cells, sides, strict=True)
+            )
+            return f"<tr>{''.join(made)}</tr>"
+
+        sentence = f"<p>{escape(self.sentence)}</p>"
+        if not self.rows:
+            return sentence
+        body = "".join(row(cells, "td") for cells in self._shown())
+        head = row(self.headings, "th")
+        return f"{sentence}<table><thead>{head}</thead><tbody>{body}</tbody></table>"
+
+    def _shown(self) -> list[tuple[str, ...]]:
+        if len(self.rows) <= _MOST:
+            return list(self.rows)
+        half, gap = _MOST // 2, tuple("…" for _ in self.headings)
+        return [*self.rows[:half], gap, *self.rows[-half:]]
+
+
+def scaled(unit: str, largest: float) -> tuple[float, str]:
+    """A factor and a unit in which `largest` (in `unit`) is not far from one."""
+    if unit.partition("/")[0] not in _TAKES_PREFIX or not 0 < largest < 0.05:
+        return 1.0, unit
+    if not np.isfinite(largest) or largest > 2e-5:
+        return 1e3, f"m{unit}"
+    return 1e6, f"µ{unit}"

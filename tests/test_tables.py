@@ -1,0 +1,70 @@
+"""Results print as short tables, as text and as HTML."""
+
+import numpy as np
+import pytest
+
+from continuation import Branch, Point
+from jaxcam.fitting._fit_result import Fit
+from jaxcam.tables import ShortTable
+
+
+def point(label, kind, parameter, stable=True, **other):
+    return Point(
+        label=label,
+        kind=kind,
+        parameter=parameter,
+        state=np.zeros(2),
+        multipliers=np.zeros(2, complex),
+        stable=stable,
+        tangent=np.zeros(3),
+        scale=np.ones(3),
+        step=0.1,
+        arclength=0.0,
+        iterations=1,
+        converged=other.pop("converged", True),
+        **other,
+    )
+
+
+def test_columns_have_one_width_and_numbers_stand_to_the_right():
+    table = ShortTable("Two.", ("name", "n"), [("a", "1"), ("long", "10")], ("name",))
+    assert table.text() == "Two.\nname   n\na      1\nlong  10"
+
+
+def test_html_is_escaped_and_a_table():
+    page = ShortTable("a < b", ("x",), [("<1",)]).html()
+    assert "a &lt; b" in page and "&lt;1" in page and page.count("<tr>") == 2
+
+
+def test_of_many_rows_the_ends_are_shown():
+    table = ShortTable("Many.", ("k",), [(str(k),) for k in range(1000)])
+    lines = table.text().splitlines()
+    assert len(lines) == 2 + 21 and lines[2].strip() == "0"
+    assert lines[12].strip() == "…" and lines[-1].strip() == "999"
+
+
+def test_a_branch_prints_its_ends_and_special_points():
+    points = [point(1, "start", 0.0)]
+    points += [point(k, "regular", 0.1 * k) for k in range(2, 60)]
+    points += [
+        point(60, "fold", 6.0, criticality="the branch lies at smaller parameters"),
+        point(61, "grazing", 6.1, converged=False),
+        point(62, "end", 7.0, stable=False, reason="speed is at its bound 7"),
+    ]
+    branch = Branch(tuple(points), "speed", (0.0, 7.0))
+    text = str(branch)
+    assert text == repr(branch)
+    assert "62 points, 2 of them special" in text
+    assert len(text.splitlines()) == 2 + 4
+    assert "the branch lies at smaller" in text and "not converged" in text
+    assert "unstable" in text.splitlines()[-1]
+    assert branch._repr_html_().count("<tr>") == 1 + 4
+    assert len(str(points[59]).splitlines()) == 1
+    assert str(points[-1]) == "Point 62: end at 7, unstable, speed is at its bound 7"
+
+
+@pytest.mark.parametrize("kind", [Fit, Branch, Point])
+def test_no_result_prints_its_arrays(kind):
+    """The representation that a dataclass writes would show every array."""
+    assert "dataclasses" not in kind.__repr__.__module__
+    assert kind.__repr__.__qualname__ == f"{kind.__name__}.__repr__"
