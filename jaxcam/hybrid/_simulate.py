@@ -80,13 +80,7 @@ def simulate(
         >>> print(trajectory)
         BouncingBall from 0 to 1 s, impacts: 1, contacts: 0
     """
-    if settings is None:
-        chosen = diffrax.Dopri8() if solver is None else solver
-        settings = Settings(tolerance=tolerance, solver=chosen, max_step=max_step)
-    elif max_step is not None:
-        raise ValueError(
-            "max_step and settings are both given; pass Settings(max_step=...)"
-        )
+    settings = _chosen(settings, tolerance, solver, max_step)
     if engine not in ("loop", "diffeqsolve"):
         raise ValueError(f'engine is {engine!r}; choose "loop" or "diffeqsolve"')
     if derivatives not in ("forward", "reverse"):
@@ -133,6 +127,18 @@ def simulate(
         )
         parts = _assemble(system, t_start, state, contact, log)
     return Trajectory(system, settings, t0, t1, *_trim(parts), code)
+
+
+def _chosen(settings, tolerance, solver, max_step) -> Settings:
+    """Return the settings of a run, given as a whole or one by one."""
+    if settings is None:
+        chosen = diffrax.Dopri8() if solver is None else solver
+        return Settings(tolerance=tolerance, solver=chosen, max_step=max_step)
+    if max_step is not None:
+        raise ValueError(
+            "max_step and settings are both given; pass Settings(max_step=...)"
+        )
+    return settings
 
 
 def _released(system, t0, traced):

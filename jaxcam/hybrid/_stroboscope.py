@@ -102,13 +102,9 @@ def stroboscope(
     settings.check()
     system = as_arrays(system)
     settings = as_arrays(settings)
-    states = np.asarray(real_array(states, "states"))
     values = None if values is None else np.asarray(values, dtype=float)
-    lanes = (
-        states.shape[0] if states.ndim == 2 else (1 if values is None else len(values))
-    )
-    if states.ndim == 1:
-        states = np.broadcast_to(states, (lanes, states.shape[0]))
+    states = _one_for_each(np.asarray(real_array(states, "states")), values)
+    lanes = len(states)
     where = None if where is None else pick(where, system)
     several = (len(where.leaves),) if where is not None and where.several else ()
     if (where is None) != (values is None) or (
@@ -146,6 +142,13 @@ def stroboscope(
             if progress is not None:
                 progress(min(1.0, len(pieces) * group / lanes))
     return Stroboscope(*map(np.concatenate, zip(*pieces, strict=True)))
+
+
+def _one_for_each(states, values) -> np.ndarray:
+    """Return one initial state for each lane, shape `(lanes, n)`."""
+    if states.ndim != 1:
+        return states
+    return np.broadcast_to(states, (1 if values is None else len(values), len(states)))
 
 
 def _check_times(system, period, turns, skip) -> None:
