@@ -66,8 +66,9 @@ def cascade(
     **Arguments:** as of [`continuation.follow`][], and `flips`: how many to locate.
     Steps shrink with the lengths of the branches.
 
-    **Returns:** a `Cascade`; it has fewer flips where a branch ends
-    without one, and then its `reason` says why.
+    Returns:
+        A `Cascade`; it has fewer flips where a branch ends without one, and then its
+            `reason` says why.
     """
     if flips < 1:
         raise ValueError(f"flips is {flips}; give the number of flips, at least 1")

@@ -26,14 +26,14 @@ _LAUNCH = 1.0
 class Zeno(NamedTuple):
     """The bouncing ball to its rest, by events and by steps of three lengths."""
 
-    #: accumulation time (2.43)
     exact: float
+    """Accumulation time (2.43)."""
     run: Trajectory
-    #: with the fewest steps
     steps: SteppedMotion
+    """With the fewest steps."""
     counts: tuple[int, ...]
-    #: accumulation time of each number of steps, and its error (s)
     rests: np.ndarray
+    """Accumulation time of each number of steps, and its error (s)."""
     errors: np.ndarray
 
 
