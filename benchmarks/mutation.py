@@ -31,8 +31,8 @@ from pathlib import Path
 
 MODULES = (
     "loop/_advance record/_assemble surface/_chatter loop/_flight loop/_functions "
-    "loop/_gap_polynomial loop/_loop_state loop/_iterate surface/_normal loop/_release "
-    "loop/_run runge_kutta record/_sample loop/_select"
+    "loop/_gap_polynomial loop/_loop_state loop/_iterate surface/_normal "
+    "surface/_rounding loop/_release loop/_run runge_kutta record/_sample loop/_select"
 ).split()
 TESTS = [
     "tests/test_motion_parts.py",

@@ -26,16 +26,16 @@ from .special import locate, test_values
 class Batch:
     """Branches side by side. Rows of a lane beyond its `count` are not points."""
 
-    #: (lanes, points, n)
     states: np.ndarray
-    #: (lanes, points)
+    """(lanes, points, n)."""
     parameters: np.ndarray
-    #: (lanes, points, k)
+    """(lanes, points)."""
     multipliers: np.ndarray
-    #: (lanes,) number of points
+    """(lanes, points, k)."""
     count: np.ndarray
-    #: (lanes,) why each branch ends
+    """(lanes,) number of points."""
     reasons: tuple[str, ...]
+    """(lanes,) why each branch ends."""
     name: str
     _passed: Corrected
     _problems: Callable[[int], AbstractProblem]
@@ -112,18 +112,20 @@ def follow_batch(
     needs decisions in Python (transitions, admissibility, fresh references) is left
     out.
 
-    **Arguments:**
+    Args:
+        states: (lanes, n) states to begin with.
+        where: As of [`continuation.follow`][].
+        bounds: As of [`continuation.follow`][].
+        settings: As of [`continuation.follow`][].
+        algorithm: One that corrects in a plane and whose predictor takes a single
+            point, such as the tangent; by default [`continuation.PseudoArclength`][].
+        parameters: The problem's parameters, each float leaf (lanes,) or a scalar for
+            all; None: those of the problem.
+        direction: 1 or -1, or (lanes,) of them.
+        points: At most this many on each branch.
 
-    - `states`: (lanes, n) states to begin with.
-    - `where`, `bounds`, `settings`: as of [`continuation.follow`][].
-    - `algorithm`: one that corrects in a plane and whose predictor takes a single
-      point, such as the tangent; by default [`continuation.PseudoArclength`][].
-    - `parameters`: the problem's parameters, each float leaf (lanes,) or a scalar for
-      all; None: those of the problem.
-    - `direction`: 1 or -1, or (lanes,) of them.
-    - `points`: at most this many on each branch.
-
-    **Returns:** a `Batch`; a lane that fails says so in its reason.
+    Returns:
+        A `Batch`; a lane that fails says so in its reason.
     """
     settings = BranchSettings() if settings is None else settings
     algorithm = PseudoArclength() if algorithm is None else algorithm

@@ -38,14 +38,15 @@ class Lane(NamedTuple):
 class Axes(eqx.Module):
     """Which parameters differ from lane to lane; static."""
 
-    #: 0 for each leaf that differs, None for one that all share
     tree: PyTree = eqx.field(static=True)
+    """0 for each leaf that differs, None for one that all share."""
 
     @staticmethod
     def of(one: PyTree, given: PyTree, lanes: int) -> "Axes":
         """From the parameters of one lane and those given for all.
 
-        **Raises:** `ValueError` for a wrong number of values.
+        Raises:
+            ValueError: For a wrong number of values.
         """
         axes = jax.tree.map(
             lambda a, b: 0 if np.ndim(b) == np.ndim(a) + 1 else None, one, given
@@ -85,7 +86,8 @@ def follow_lanes(
     `leaf` that is followed; for each lane a point `z` and the sign of its direction;
     bounds; settings from `as_traced`; and how many `points` at most.
 
-    **Returns:** the last `Lane` of each branch.
+    Returns:
+        The last `Lane` of each branch.
     """
     width = high - low
 

@@ -43,7 +43,8 @@ def branch(
     - `resume`: go on where the run that wrote `out` was interrupted. The result is the
       branch that it would have become.
 
-    **Returns:** a [`continuation.Branch`][].
+    Returns:
+        A [`continuation.Branch`][].
     """
     if direction not in (1, -1, "both"):
         raise ValueError(f"direction is {direction!r}; give 1, -1 or 'both'")

@@ -69,8 +69,9 @@ def cascade(
     `callbacks`, called with each point as it comes, to show progress. Steps shrink with
     the lengths of the branches.
 
-    **Returns:** a `Cascade`; it has fewer flips where a branch ends
-    without one, and then its `reason` says why.
+    Returns:
+        A `Cascade`; it has fewer flips where a branch ends without one, and then its
+            `reason` says why.
     """
     if flips < 1:
         raise ValueError(f"flips is {flips}; give the number of flips, at least 1")

@@ -11,9 +11,9 @@ class Context(NamedTuple):
     Where a single point is looked at, the bounds do not matter.
     """
 
-    #: index among the leaves of the problem's parameters
     leaf: int
-    #: of the bounds: a change by this much has length one
+    """Index among the leaves of the problem's parameters."""
     width: float
+    """Of the bounds: a change by this much has length one."""
     settings: BranchSettings
     bounds: tuple[float, float] = (-float("inf"), float("inf"))

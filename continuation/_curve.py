@@ -43,7 +43,8 @@ def extended(
     """The problem whose solutions are special points like this one, the parameter that
     `where` picks among the unknowns (at the end of the state).
 
-    **Raises:** `ValueError` for points that form no curve.
+    Raises:
+        ValueError: For points that form no curve.
     """
     problem = point.solved
     leaf, name = pick_one(where, problem.parameters)
@@ -91,21 +92,22 @@ def curve(
 ) -> Branch:
     """Follow a special point in two parameters.
 
-    **Arguments:**
+    Args:
+        point: A fold, flip, Neimark-Sacker or Hopf point of a branch, or a zero of a
+            monitor of its problem.
+        where: Picks the two parameters. The first becomes an unknown; steps, bounds and
+            `point.parameter` are those of the second.
+        bounds: (lowest, highest) of both; the curve ends exactly on them.
+        ?- the rest as of [`c: - the rest as of [`continuation.branch`][].
 
-    - `point`: a fold, flip, Neimark-Sacker or Hopf point of a branch, or a zero of a
-      monitor of its problem.
-    - `where`: picks the two parameters. The first becomes an unknown; steps, bounds and
-      `point.parameter` are those of the second.
-    - `bounds`: (lowest, highest) of both; the curve ends exactly on them.
-    - the rest as of [`continuation.branch`][].
+    Returns:
+        A [`continuation.Branch`][]; `point.parameters` has both parameters in the order
+            of `where`. Its special points are those of codimension two: cusp,
+            Bogdanov-Takens, zero-Hopf; generalized flip, fold-flip, 1:1, 1:2, 1:3, 1:4
+            resonances; and crossings with monitors.
 
-    **Returns:** a [`continuation.Branch`][]; `point.parameters` has both parameters in
-    the order of `where`. Its special points are those of codimension two: cusp,
-    Bogdanov-Takens, zero-Hopf; generalized flip, fold-flip, 1:1, 1:2, 1:3, 1:4
-    resonances; and crossings with monitors.
-
-    **Raises:** `ValueError` for points that form no curve, and as `follow` does.
+    Raises:
+        ValueError: For points that form no curve, and as `follow` does.
     """
     try:
         (first, second), (bounds_1, bounds_2) = where, bounds

@@ -50,14 +50,14 @@ def deflate(
     Comput. 37, 2015), so that Newton's method from the same guesses must end elsewhere
     or nowhere.
 
-    **Arguments:**
+    Args:
+        guesses: (guesses, n) or (n,), from which Newton's method begins.
+        known: States (n,) of solutions that are known already.
+        most: Number of solutions, known ones included, at which the search ends.
+        max_iterations: Of Newton's method for each guess.
 
-    - `guesses`: (guesses, n) or (n,), from which Newton's method begins.
-    - `known`: states (n,) of solutions that are known already.
-    - `most`: number of solutions, known ones included, at which the search ends.
-    - `max_iterations`: of Newton's method for each guess.
-
-    **Returns:** the further solutions, each (n,), in the order found.
+    Returns:
+        The further solutions, each (n,), in the order found.
     """
     settings = BranchSettings() if settings is None else settings
     problem = set_parameters(problem, as_arguments(problem.parameters))

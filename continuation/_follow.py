@@ -30,29 +30,29 @@ def follow(
 ) -> Iterator[Point]:
     """Follow a branch of solutions; yields its points, special points among them.
 
-    **Arguments:**
-
-    - `problem`: what is followed, such as [`continuation.Equilibrium`][]; or a hybrid
-      system, with an orbit of it as `start`.
-    - `start`: a state (n,), on the branch at the parameter that the problem has, or so
-      near that Newton's method gets there; or a [`continuation.Start`][], such as a
-      branch to switch to; or a [`continuation.Point`][], to go on from there exactly as
-      the run that it is from did.
-    - `where`: picks the parameter, as in `lambda parameters: parameters.speed`.
-    - `bounds`: (lowest, highest) value of the parameter; the branch ends exactly there.
-    - `algorithm`: [`continuation.PseudoArclength`][] by default.
-    - `settings`: accuracy and steps.
-    - `direction`: 1 to begin towards larger parameters, -1 towards smaller ones.
-    - `history`: the points before `start`, where that is a point; predictors through
-      several points need them.
-
     The branch ends on a bound, where it meets an earlier point of its own, where
     doubled orbits join those of half the period, where a monitor of the problem ends it
     and the problem knows no transition, where the smallest step fails, or after
     `settings.max_points`; the last point says which in `reason`.
 
-    **Raises:** `ValueError` for a start that is no solution, a parameter that does not
-    exist, bounds that are the wrong way round or do not contain the start.
+    Args:
+        problem: What is followed, such as [`continuation.Equilibrium`][]; or a hybrid
+            system, with an orbit of it as `start`.
+        start: A state (n,), on the branch at the parameter that the problem has, or so
+            near that Newton's method gets there; or a [`continuation.Start`][], such as
+            a branch to switch to; or a [`continuation.Point`][], to go on from there
+            exactly as the run that it is from did.
+        where: Picks the parameter, as in `lambda parameters: parameters.speed`.
+        bounds: (lowest, highest) value of the parameter; the branch ends exactly there.
+        algorithm: [`continuation.PseudoArclength`][] by default.
+        settings: Accuracy and steps.
+        direction: 1 to begin towards larger parameters, -1 towards smaller ones.
+        history: The points before `start`, where that is a point; predictors through
+            several points need them.
+
+    Raises:
+        ValueError: For a start that is no solution, a parameter that does not exist,
+            bounds that are the wrong way round or do not contain the start.
     """
     settings = BranchSettings() if settings is None else settings
     algorithm = PseudoArclength() if algorithm is None else algorithm

@@ -21,23 +21,20 @@ class LimitCycle(AbstractProblem):
     The unknowns are (u(0), period), the equations u(period) = u(0) and a phase
     condition: u(0) lies in a plane that is renewed at each point of a branch. The
     multipliers are those of the map on that plane, (2.14), without the trivial one.
-
-    **Arguments:**
-
-    - `vector_field`: maps a state (n,), n >= 2, and the parameters to (n,).
-    - `parameters`: any pytree with scalar floats among its leaves.
-    - `reference`: a state (n,) on the cycle or near it, to begin with.
-    - `steps`: of equal length in a period, by Dormand and Prince's method of order 8.
-      `point.observed["error"]` is its estimated error, relative to the state.
     """
 
     vector_field: Callable[[Array, Any], Array]
+    """Maps a state (n,), n >= 2, and the parameters to (n,)."""
     parameters: PyTree
+    """Any pytree with scalar floats among its leaves."""
     reference: Any
-    #: (n,) unit normal of the plane, and (n, n-1) unit vectors in it
+    """A state (n,) on the cycle or near it, to begin with."""
     normal: Any
+    """(n,) unit normal of the plane, and (n, n-1) unit vectors in it."""
     basis: Any
     steps: int = eqx.field(static=True)
+    """Of equal length in a period, by Dormand and Prince's method of order 8.
+    `point.observed["error"]` is its estimated error, relative to the state."""
     stability: ClassVar[StabilityKind] = "map"
     normal_forms: ClassVar[bool] = False
 

@@ -13,7 +13,8 @@ from jaxcam.parameters import pick as parameter_pick, Where
 def pick_one(where: Where, parameters: PyTree) -> tuple[int, str]:
     """Index of the leaf that `where` picks, and its name.
 
-    **Raises:** `ValueError` where it picks nothing, or not a single number.
+    Raises:
+        ValueError: Where it picks nothing, or not a single number.
     """
     # bifurcation problems are often stated with whole numbers
     picked = parameter_pick(where, parameters, integers=True)

@@ -12,54 +12,54 @@ from ._parameter import with_leaf
 from .problem import AbstractProblem
 
 
-#: kinds of points that are not special
 ORDINARY = ("start", "regular", "end")
+"""Kinds of points that are not special."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Point:
     """A point of a branch. All arrays are NumPy's."""
 
-    #: number along the branch, from 1
     label: int
-    #: `"start"`, `"regular"`, `"end"`, or the kind of special point
+    """Number along the branch, from 1."""
     kind: str
-    #: value of the parameter that is followed
+    """`"start"`, `"regular"`, `"end"`, or the kind of special point."""
     parameter: float
-    #: (n,) the solution
+    """Value of the parameter that is followed."""
     state: np.ndarray
-    #: (k,) eigenvalues of an equilibrium, multipliers of a map or an orbit
+    """(n,) the solution."""
     multipliers: np.ndarray
-    #: None where the problem has no stability, or a multiplier is not finite
+    """(k,) eigenvalues of an equilibrium, multipliers of a map or an orbit."""
     stable: bool | None
-    #: (n+1,) direction of the branch in (state, parameter)
+    """None where the problem has no stability, or a multiplier is not finite."""
     tangent: np.ndarray
-    #: (n+1,) sizes by which lengths are measured here
+    """(n+1,) direction of the branch in (state, parameter)."""
     scale: np.ndarray
-    #: the step that follows; arclength from the start
+    """(n+1,) sizes by which lengths are measured here."""
     step: float
+    """The step that follows; arclength from the start."""
     arclength: float
-    #: of the corrector
     iterations: int
-    #: False for a special point that could only be bracketed
+    """Of the corrector."""
     converged: bool
-    #: why the branch ends here, or what is to be known about a special point
+    """False for a special point that could only be bracketed."""
     reason: str = ""
-    #: normal-form coefficient where there is one, and what its sign says
+    """Why the branch ends here, or what is to be known about a special point."""
     coefficient: float | None = None
+    """normal-form coefficient where there is one, and what its sign says."""
     criticality: str = ""
-    #: quantities that the problem watches
     observed: dict[str, Any] = field(default_factory=dict)
-    #: values of the test functions
+    """Quantities that the problem watches."""
     tests: dict[str, float] = field(default_factory=dict)
-    #: `problem.signature` here
+    """Values of the test functions."""
     signature: str = ""
-    #: the parameters that vary, in order: one, or two on a curve of special points
+    """`problem.signature` here."""
     parameters: tuple[float, ...] = ()
-    #: the problem with its parameters here; None for a point read from a file
+    """The parameters that vary, in order: one, or two on a curve of special points."""
     problem: AbstractProblem | None = None
-    #: index of the parameter among the leaves of the problem's parameters
+    """The problem with its parameters here; None for a point read from a file."""
     leaf: int = -1
+    """Index of the parameter among the leaves of the problem's parameters."""
 
     def __repr__(self) -> str:
         values = self.parameters or (self.parameter,)
@@ -111,13 +111,13 @@ class Branch:
     """Points in the order of the branch."""
 
     points: tuple[Point, ...]
-    #: name of the parameter
     name: str
+    """Name of the parameter."""
     bounds: tuple[float, float]
-    #: index of the parameter among the leaves
     leaf: int = 0
-    #: names of all parameters that vary
+    """Index of the parameter among the leaves."""
     names: tuple[str, ...] = ()
+    """Names of all parameters that vary."""
 
     def __repr__(self) -> str:
         return self._table().text()
@@ -175,7 +175,8 @@ class Branch:
     def at(self, label: int) -> Point:
         """The point with a label.
 
-        **Raises:** `ValueError` where there is none.
+        Raises:
+            ValueError: Where there is none.
         """
         for point in self.points:
             if point.label == label:

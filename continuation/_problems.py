@@ -18,15 +18,12 @@ from .special import FLIP, flip_direction, HOPF
 class Equations(AbstractProblem):
     """function(u, parameters) = 0, with no stability: discretised boundary value
     problems, for example.
-
-    **Arguments:**
-
-    - `function`: maps a state (n,) and the parameters to (n,).
-    - `parameters`: any pytree with scalar floats among its leaves.
     """
 
     function: Callable[[Array, Any], Array]
+    """Maps a state (n,) and the parameters to (n,)."""
     parameters: PyTree
+    """Any pytree with scalar floats among its leaves."""
     stability: ClassVar[StabilityKind] = "none"
 
     def residual(self, u: Float[Array, " n"], parameters: PyTree) -> Float[Array, " n"]:
@@ -52,19 +49,15 @@ class Equilibrium(AbstractProblem):
 
 
 class FixedPoint(AbstractProblem):
-    """Points of period `period` of u -> map(u, parameters).
-
-    **Arguments:**
-
-    - `map`: maps a state (n,) and the parameters to (n,).
-    - `parameters`: any pytree with scalar floats among its leaves.
-    - `period`: number of applications of the map, >= 1. All periods share one compiled
-      program.
-    """
+    """Points of period `period` of u -> map(u, parameters)."""
 
     map: Callable[[Array, Any], Array]
+    """Maps a state (n,) and the parameters to (n,)."""
     parameters: PyTree
+    """Any pytree with scalar floats among its leaves."""
     period: Int[Array, ""]
+    """Number of applications of the map, >= 1. All periods share one compiled program.
+    """
     stability: ClassVar[StabilityKind] = "map"
 
     def __init__(

@@ -24,12 +24,12 @@ class Corrected(eqx.Module):
     z: Float[Any, " n1"]
     success: Any
     iterations: Any
-    #: (n, n+1) derivative of the residual with respect to (state, parameter)
     jacobian: Float[Any, "n n1"]
+    """(n, n+1) derivative of the residual with respect to (state, parameter)."""
     linearisation: Float[Any, "k k"]
     tangent: Float[Any, " n1"]
-    #: sign and (n+1)-th root of the determinant of jacobian and tangent, scaled
     determinant: Any
+    """Sign and (n+1)-th root of the determinant of jacobian and tangent, scaled."""
     scale: Float[Any, " n1"]
     monitors: dict[str, Any]
     observed: dict[str, Any]

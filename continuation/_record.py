@@ -75,7 +75,8 @@ def load_branch(
     **Arguments:** `problem`: what was followed; then the points carry it, at their
     parameters, and can be switched from or followed in two parameters.
 
-    **Raises:** `ValueError` where the file is no branch or of a later version.
+    Raises:
+        ValueError: Where the file is no branch or of a later version.
     """
     return read_branch(path, problem)[0]
 

@@ -23,13 +23,13 @@ def special_point(
     implicit function theorem. The parameters must be so near to those of `point` that
     Newton gets there; the result is NaN where it does not.
 
-    **Arguments:**
+    Args:
+        point: A fold, flip, Neimark-Sacker or Hopf point, or a zero of a monitor.
+        where: Picks the parameter in which it is located.
+        parameters: Of the same structure as the problem's; the picked one is ignored.
 
-    - `point`: a fold, flip, Neimark-Sacker or Hopf point, or a zero of a monitor.
-    - `where`: picks the parameter in which it is located.
-    - `parameters`: of the same structure as the problem's; the picked one is ignored.
-
-    **Returns:** the state (n,) and the value of the picked parameter.
+    Returns:
+        The state (n,) and the value of the picked parameter.
     """
     value = point.parameter
     problem = extended(point, where, (value - 0.5, value + 0.5))
@@ -64,8 +64,9 @@ def sensitivity(point: Point, where: Where) -> PyTree:
 
     **Arguments:** `point`, `where`: as of [`continuation.special_point`][].
 
-    **Returns:** a tree like the problem's parameters, with the derivative by each float
-    leaf in its place; 0 for the picked one, None for leaves that are not floats.
+    Returns:
+        A tree like the problem's parameters, with the derivative by each float leaf in
+            its place; 0 for the picked one, None for leaves that are not floats.
     """
     value = point.parameter
     problem = extended(point, where, (value - 0.5, value + 0.5))

@@ -12,33 +12,33 @@ class BranchSettings(eqx.Module):
     Lengths along a branch are measured with the parameter in units of the width of its
     bounds, and the state in units of `problem.scale`, root mean square over its
     components: a step of 0.01 is a hundredth of the bounds.
-
-    **Arguments:**
-
-    - `tolerance`: corrections smaller than this, relative to the scales, end Newton's
-      iteration; its error is then about the square of that.
-    - `max_iterations`: of the corrector; more means a smaller step.
-    - `iterations`: the number aimed at by the step control.
-    - `step`, `min_step`, `max_step`: first, smallest and largest step.
-    - `angle`, `max_angle`: rad, change of direction per step aimed at, and refused.
-    - `max_points`: ordinary points on a branch.
-    - `special`: locate and report special points.
-    - `localise`: `"newton"` on the extended system, which takes second derivatives of
-      the residual; or `"bracket"`, which takes none and encloses the point between
-      points of the branch; or `"auto"`, the second where `problem.costly` says so.
     """
 
     tolerance: float = 1e-10
+    """Corrections smaller than this, relative to the scales, end Newton's iteration;
+    its error is then about the square of that."""
     max_iterations: int = 8
+    """Of the corrector; more means a smaller step."""
     iterations: int = 4
+    """The number aimed at by the step control."""
     step: float = 0.01
+    """First, smallest and largest step."""
     min_step: float = 1e-8
+    """First, smallest and largest step."""
     max_step: float = 0.05
+    """First, smallest and largest step."""
     angle: float = 0.1
+    """rad, change of direction per step aimed at, and refused."""
     max_angle: float = 0.35
+    """rad, change of direction per step aimed at, and refused."""
     max_points: int = 1000
+    """Ordinary points on a branch."""
     special: bool = True
+    """Locate and report special points."""
     localise: str = "auto"
+    """`"newton"` on the extended system, which takes second derivatives of the
+    residual; or `"bracket"`, which takes none and encloses the point between points of
+    the branch; or `"auto"`, the second where `problem.costly` says so."""
 
     def __check_init__(self):
         if not 0 < self.tolerance < 1e-2:
@@ -66,9 +66,9 @@ class BranchSettings(eqx.Module):
             )
 
 
-#: what a batch does not use: it is told its number of points, and special points are
-#: located when a lane is looked at
 _NOT_OF_A_BATCH = ("max_points", "special", "localise")
+"""What a batch does not use: it is told its number of points, and special points are
+located when a lane is looked at."""
 
 
 def as_traced(settings: BranchSettings) -> BranchSettings:

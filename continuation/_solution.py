@@ -19,10 +19,10 @@ class Solution(NamedTuple):
     tests: dict[str, float]
     step: float
     arclength: float
-    #: points passed, oldest first, as states with their tangents
     trail: tuple
-    #: whether its point has been yielded
+    """Points passed, oldest first, as states with their tangents."""
     yielded: bool = False
+    """Whether its point has been yielded."""
 
 
 def solution_at(

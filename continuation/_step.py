@@ -18,14 +18,14 @@ from .step_control import Refusal, way_between
 class StepAttempt(NamedTuple):
     """What came of a step."""
 
-    #: None where it is not taken
     at: Corrected | None
-    #: which bound it ends on, as a sentence; empty if none
+    """None where it is not taken."""
     bound: str = ""
-    #: length of the step that follows
+    """Which bound it ends on, as a sentence; empty if none."""
     following: float = 0.0
-    #: why it is not taken
+    """Length of the step that follows."""
     refusal: Refusal | None = None
+    """Why it is not taken."""
 
 
 def attempt_step(

@@ -27,7 +27,8 @@ def emanating(point: Point, where: Where, width: float = 1.0) -> tuple[Start, ..
 
     **Arguments:** `width`: of the bounds of the parameter, the unit of its directions.
 
-    **Raises:** `ValueError` for a point from which no branch is known to leave.
+    Raises:
+        ValueError: For a point from which no branch is known to leave.
     """
     problem = point.solved
     leaf, _ = pick_one(where, problem.parameters)
@@ -64,10 +65,12 @@ def switch(
     **Arguments:** `point`: a branch point, a flip or a Hopf point of a branch; the rest
     as of [`continuation.follow`][].
 
-    **Returns:** two branches from a branch point, one from a flip or a Hopf point. The
-    two are the same closed curve in both directions where they meet again.
+    Returns:
+        Two branches from a branch point, one from a flip or a Hopf point. The two are
+            the same closed curve in both directions where they meet again.
 
-    **Raises:** `ValueError` for a point from which no branch is known to leave.
+    Raises:
+        ValueError: For a point from which no branch is known to leave.
     """
     starts = emanating(point, where, float(bounds[1] - bounds[0]))
     return tuple(

@@ -16,14 +16,14 @@ def table(
 ) -> rich.table.Table:
     """Special points, ends and every so manieth ordinary point of a branch.
 
-    **Arguments:**
+    Args:
+        every: Show each ordinary point whose label it divides; 0 shows none.
+        components: How many of the state.
+        shown: Head of the parameter's column and a factor, where it is shown in another
+            unit: `("speed (rpm)", 30 / math.pi)`.
 
-    - `every`: show each ordinary point whose label it divides; 0 shows none.
-    - `components`: how many of the state.
-    - `shown`: head of the parameter's column and a factor, where it is shown in another
-      unit: `("speed (rpm)", 30 / math.pi)`.
-
-    **Returns:** a table that `rich.print` shows.
+    Returns:
+        A table that `rich.print` shows.
     """
     found = rich.table.Table()
     names = branch.names or (branch.name,)

@@ -16,8 +16,8 @@ class AbstractAlgorithm(eqx.Module):
 
     predictor: eqx.AbstractVar[AbstractPredictor]
     control: eqx.AbstractVar[AbstractStepControl]
-    #: whether the corrector takes the shortest corrections instead of a fixed plane
     least_norm: eqx.AbstractClassVar[bool]
+    """Whether the corrector takes the shortest corrections instead of a fixed plane."""
 
     @abc.abstractmethod
     def normal(self, tangent: Float[Any, " n+1"]) -> Float[Any, " n+1"]:
@@ -26,19 +26,15 @@ class AbstractAlgorithm(eqx.Module):
 
 
 class Natural(AbstractAlgorithm):
-    """Corrections leave one component alone (the thesis, 3.4.3, 1).
-
-    **Arguments:**
-
-    - `predictor`: by default the linear extrapolation (3.40).
-    - `component`: `"parameter"`, which stops at folds; or `"fastest"`: the component
-      that changes most, chosen at each step, which passes them.
-    - `control`: of the steps, by effort and angle.
-    """
+    """Corrections leave one component alone (the thesis, 3.4.3, 1)."""
 
     predictor: AbstractPredictor = Extrapolation()
+    """By default the linear extrapolation (3.40)."""
     control: AbstractStepControl = EffortAndAngle()
+    """Of the steps, by effort and angle."""
     component: str = eqx.field(static=True, default="parameter")
+    """`"parameter"`, which stops at folds; or `"fastest"`: the component that changes
+    most, chosen at each step, which passes them."""
     least_norm: ClassVar[bool] = False
 
     def __check_init__(self):

@@ -14,17 +14,17 @@ from jaxcam.parameters import AnyArray
 class Station(NamedTuple):
     """A point passed, as predictors see it: lengths are scaled."""
 
-    #: (n+1,) scaled state and parameter
     y: Float[AnyArray, " n+1"]
-    #: (n+1,) scaled unit tangent
+    """(n+1,) scaled state and parameter."""
     tangent: Float[AnyArray, " n+1"]
+    """(n+1,) scaled unit tangent."""
 
 
 class AbstractPredictor(eqx.Module):
     """Extrapolates a branch. The last of the stations is where it stands."""
 
-    #: number of stations that are used where there are so many
     stations: eqx.AbstractClassVar[int]
+    """Number of stations that are used where there are so many."""
 
     @abc.abstractmethod
     def __call__(self, stations: Sequence[Station], step: Any) -> Any:

@@ -14,67 +14,59 @@ from ._eigenvalues import eigenvalues_of
 from .representation import AbstractRepresentation, Unique
 
 
-#: what the eigenvalues of `linearisation` mean
 StabilityKind = Literal["equilibrium", "map", "none"]
+"""What the eigenvalues of `linearisation` mean."""
 
 
 class Monitor(eqx.Module):
-    """A test function that a problem adds, and what its zero means.
-
-    **Arguments:**
-
-    - `kind`: name of the special point at its zero, such as `"grazing"`.
-    - `ends`: the branch of this problem ends there. `AbstractProblem.transition` is
-      then asked for another problem to go on with. The zero of such a monitor is also
-      looked for ahead of the last point, when a step fails or its result is refused; so
-      the monitor may cease to exist, or not change sign, behind its zero. It must have
-      a nonzero slope on the near side.
-    - `bracket`: its zero is enclosed by points of the branch instead of solved for by
-      Newton's method; for values whose derivative is costly to compile.
-    - `vanishing`: names of monitors that are zero wherever this one is, and say nothing
-      more there.
-    """
+    """A test function that a problem adds, and what its zero means."""
 
     kind: str = eqx.field(static=True)
+    """Name of the special point at its zero, such as `"grazing"`."""
     ends: bool = eqx.field(static=True, default=False)
+    """The branch of this problem ends there. `AbstractProblem.transition` is then asked
+    for another problem to go on with. The zero of such a monitor is also looked for
+    ahead of the last point, when a step fails or its result is refused; so the monitor
+    may cease to exist, or not change sign, behind its zero. It must have a nonzero
+    slope on the near side."""
     bracket: bool = eqx.field(static=True, default=False)
+    """Its zero is enclosed by points of the branch instead of solved for by Newton's
+    method; for values whose derivative is costly to compile."""
     vanishing: tuple[str, ...] = eqx.field(static=True, default=())
+    """Names of monitors that are zero wherever this one is, and say nothing more there.
+    """
 
 
 class LocalDynamics(NamedTuple):
     """The vector field or map around a solution whose eigenvalues are the problem's."""
 
-    #: (k,) where the solution is
     at: Array
-    #: maps (k,) to (k,) and can be differentiated three times; None: only its Jacobian
-    #: is known, and higher derivatives come from central differences of that
+    """(k,) where the solution is."""
     motion: Callable[[Float[Array, " k"]], Float[Array, " k"]] | None
-    #: maps (k,) to (k, k)
+    """Maps (k,) to (k,) and can be differentiated three times; None: only its Jacobian
+    is known, and higher derivatives come from central differences of that."""
     jacobian: Callable[[Float[Array, " k"]], Float[Array, "k k"]]
+    """Maps (k,) to (k, k)."""
 
 
 class Start(eqx.Module):
-    """Where to begin a branch, and with which problem.
-
-    **Arguments:**
-
-    - `problem`: what is to be followed.
-    - `state`: (n,) state, on the branch or near it.
-    - `parameter`: value of the parameter; None: the one that `problem.parameters` has.
-    - `tangent`: (n+1,) direction (state, parameter) in which the branch leaves; its
-      length is immaterial. The first point is sought in the plane across it, so a
-      branch that leaves a branch point is found and not the one that was known. None:
-      along the branch through `state`, in the direction asked for.
-    - `step`: first step; None: as the settings say.
-    - `reason`: what is to be known about the first point.
-    """
+    """Where to begin a branch, and with which problem."""
 
     problem: "AbstractProblem"
+    """What is to be followed."""
     state: np.ndarray
+    """(n,) state, on the branch or near it."""
     parameter: float | None = None
+    """Value of the parameter; None: the one that `problem.parameters` has."""
     tangent: np.ndarray | None = None
+    """(n+1,) direction (state, parameter) in which the branch leaves; its length is
+    immaterial. The first point is sought in the plane across it, so a branch that
+    leaves a branch point is found and not the one that was known. None: along the
+    branch through `state`, in the direction asked for."""
     step: float | None = None
+    """First step; None: as the settings say."""
     reason: str = eqx.field(static=True, default="")
+    """What is to be known about the first point."""
 
 
 class AbstractProblem(eqx.Module):
@@ -114,13 +106,13 @@ class AbstractProblem(eqx.Module):
 
     parameters: eqx.AbstractVar[PyTree]
     stability: eqx.AbstractClassVar[StabilityKind]
-    #: whether `local_dynamics` is there, for the coefficients of normal forms
     normal_forms: ClassVar[bool] = True
-    #: whether second derivatives of `residual` take long to compile, so that special
-    #: points are better enclosed than solved for; `local_dynamics` has only a Jacobian
+    """Whether `local_dynamics` is there, for the coefficients of normal forms."""
     costly: ClassVar[bool] = False
-    #: whether folds, branch points and those of `stability` are sought
+    """Whether second derivatives of `residual` take long to compile, so that special
+    points are better enclosed than solved for; `local_dynamics` has only a Jacobian."""
     detects: ClassVar[bool] = True
+    """Whether folds, branch points and those of `stability` are sought."""
 
     # -- equations
 

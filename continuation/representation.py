@@ -14,8 +14,8 @@ class AbstractRepresentation(eqx.Module):
     turn. Called between compiled programs, with NumPy arrays.
     """
 
-    #: problems of one family have the same solutions, as states of one form
     family: eqx.AbstractVar[str]
+    """Problems of one family have the same solutions, as states of one form."""
 
     @abc.abstractmethod
     def copies(
@@ -23,8 +23,9 @@ class AbstractRepresentation(eqx.Module):
     ) -> list[tuple[str, np.ndarray, np.ndarray]]:
         """All ways to write this solution down, the first of them as it is.
 
-        **Returns:** family, state and tangent of each, both (n,). A branch that meets
-        any of them again is closed.
+        Returns:
+            Family, state and tangent of each, both (n,). A branch that meets any of
+                them again is closed.
         """
 
     @abc.abstractmethod

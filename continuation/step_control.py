@@ -21,12 +21,12 @@ class Refusal(enum.StrEnum):
 class Way(NamedTuple):
     """What a step has been like. NumPy's numbers, or traced ones in a batch."""
 
-    #: of the corrector
     iterations: Any
-    #: length of its correction
+    """Of the corrector."""
     correction: Any
-    #: between the tangents at both ends, rad
+    """Length of its correction."""
     angle: Any
+    """Between the tangents at both ends, rad."""
 
 
 class AbstractStepControl(eqx.Module):

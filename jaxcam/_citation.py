@@ -5,10 +5,9 @@ from importlib.metadata import version
 from pathlib import Path
 
 
-#: one entry a publication; the only copy of the bibliography
 _REFERENCES = Path(__file__).with_name("references.bib")
+"""One entry a publication; the only copy of the bibliography."""
 
-#: what can be asked for, and the keys of `references.bib` it stands for
 _TOPICS: dict[str, tuple[str, ...]] = {
     "basin entropy": ("daza2016",),
     "basin stability": ("menck2013",),
@@ -34,6 +33,7 @@ _TOPICS: dict[str, tuple[str, ...]] = {
     "time-stepping": ("moreau1988", "cottle1992", "camlibel2002"),
     "uncertainty exponent": ("mcdonald1985",),
 }
+"""What can be asked for, and the keys of `references.bib` it stands for."""
 
 
 def citation(*names: str) -> str:
@@ -46,9 +46,11 @@ def citation(*names: str) -> str:
     **Arguments:** topics, or keys of single entries ("nordmark1991"); capitals do not
     matter.
 
-    **Returns:** text to append to a `.bib` file.
+    Returns:
+        Text to append to a `.bib` file.
 
-    **Raises:** `ValueError` for an unknown name, with the names there are.
+    Raises:
+        ValueError: For an unknown name, with the names there are.
     """
     if not names:
         lines = ["% Methods, by topic: jaxcam.citation(topic, ...)"]

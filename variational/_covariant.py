@@ -19,14 +19,14 @@ class CovariantVectors(eqx.Module):
     What `vectors[k, :, j]` is after a turn points along `vectors[k + 1, :, j]`.
     """
 
-    #: (turns, n) states at the start of each turn
     state: Float[Array, "turns n"]
-    #: (turns, n, n) a unit vector in each column; NaN where the motion ever sticks
+    """(turns, n) states at the start of each turn."""
     vectors: Float[Array, "turns n n"]
-    #: (turns, n) 1/s, how fast each grew in the turn
+    """(turns, n, n) a unit vector in each column; NaN where the motion ever sticks."""
     local: Float[Array, "turns n"]
-    #: 0 where every turn was finished, else an index into `RESULTS`
+    """(turns, n) 1/s, how fast each grew in the turn."""
     code: Array
+    """0 where every turn was finished, else an index into `RESULTS`."""
 
     @property
     def exponents(self) -> Float[Array, " n"]:
@@ -61,18 +61,20 @@ def covariant_vectors(
 
     Pure; may be compiled and batched with `vmap` over states and parameters.
 
-    **Arguments:**
+    Args:
+        state: Shape `(n,)`, at time `t0` (s).
+        turns: How many are returned, after `transient` others, in which the motion
+            settles and the frame turns; as many follow, from which the vectors turn
+            back.
+        settings: Accuracy; a tolerance of 1e-12 by default.
 
-    - `state`: shape `(n,)`, at time `t0` (s).
-    - `turns`: how many are returned, after `transient` others, in which the motion
-        settles and the frame turns; as many follow, from which the vectors turn back.
-    - `settings`: accuracy; a tolerance of 1e-12 by default.
+    Returns:
+        A `CovariantVectors`. A motion that sticks forgets every deviation, so it has no
+            such directions, and all of them are NaN.
 
-    **Returns:** a `CovariantVectors`. A motion that sticks forgets
-    every deviation, so it has no such directions, and all of them are NaN.
-
-    **Raises:** `ValueError` for a system without a period, or for numbers of turns that
-    make no sense.
+    Raises:
+        ValueError: For a system without a period, or for numbers of turns that make no
+            sense.
     """
     if system.period is None:
         raise ValueError(

@@ -17,12 +17,12 @@ TOLERANCE = 1e-14
 class LinearisedFlight(NamedTuple):
     """The end of a flight and how it depends on its start."""
 
-    #: (n,) state at the end
     state: Float[Array, " n"]
-    #: (n, n + q): by the state at the start, then by the q parameters
+    """(n,) state at the end."""
     matrix: Float[Array, "n columns"]
-    #: logarithm of the determinant of the first n columns (Liouville)
+    """(n, n + q): by the state at the start, then by the q parameters."""
     log_volume: Float[Array, ""]
+    """Logarithm of the determinant of the first n columns (Liouville)."""
 
 
 def fly_linearised(

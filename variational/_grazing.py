@@ -46,22 +46,23 @@ class GrazingForm(eqx.Module):
     the orbit of the system as it is; mu, shape `(q,)`, is the change of the parameters.
     """
 
-    #: s, and the state there: where the gap of the orbit is smallest
     time: Float[Array, ""]
+    """S, and the state there: where the gap of the orbit is smallest."""
     state: Float[Array, " n"]
-    #: gap at that point: zero at the graze, positive short of it
     clearance: Float[Array, ""]
-    #: acceleration of the gap there, positive, and coefficient of restitution
+    """Gap at that point: zero at the graze, positive short of it."""
     acceleration: Float[Array, ""]
+    """Acceleration of the gap there, positive, and coefficient of restitution."""
     restitution: Float[Array, ""]
-    #: H_x and H_mu
     normal: Float[Array, " n"]
+    """H_x and H_mu."""
     normal_parameters: Float[Array, " q"]
-    #: the vectors b of the zero-time mapping, and of the mapping of the section v = 0
     zero_time: Float[Array, " n"]
+    """The vectors b of the zero-time mapping, and of the mapping of the section v = 0.
+    """
     section: Float[Array, " n"]
-    #: N and N_mu: derivative of one period from `time` on, without the graze
     matrix: Float[Array, "n n"]
+    """N and N_mu: derivative of one period from `time` on, without the graze."""
     matrix_parameters: Float[Array, "n q"]
 
     @property
@@ -114,14 +115,14 @@ def grazing_form(
 ) -> GrazingForm:
     """The square-root map of an orbit that grazes a constraint, or almost does.
 
-    **Arguments:**
+    Args:
+        orbit: A periodic orbit whose gap has a smooth minimum near zero; it may have
+            other impacts.
+        where: Picks the parameters mu, one or a tuple; none without.
+        constraint: The one that is grazed.
 
-    - `orbit`: a periodic orbit whose gap has a smooth minimum near zero; it may have
-        other impacts.
-    - `where`: picks the parameters mu, one or a tuple; none without.
-    - `constraint`: the one that is grazed.
-
-    **Raises:** `ValueError` where the smallest gap is at an impact or in contact.
+    Raises:
+        ValueError: Where the smallest gap is at an impact or in contact.
     """
     system = as_arrays(system)
     time, state = _lowest(system, orbit, constraint)

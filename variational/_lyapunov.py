@@ -24,21 +24,21 @@ from ._tangent_lanes import Carried, first_frames, next_rows, ROWS
 class LyapunovSpectrum(eqx.Module):
     """Lyapunov exponents (1/s), one set for each lane where there are several."""
 
-    #: (n,) or (lanes, n), the largest first
     exponents: Float[Array, "*lanes n"]
-    #: standard error of each, from the scatter of blocks of consecutive turns
+    """(n,) or (lanes, n), the largest first."""
     stderr: Float[Array, "*lanes n"]
-    #: impacts per second
+    """Standard error of each, from the scatter of blocks of consecutive turns."""
     impact_rate: Float[Array, "*lanes"]
-    #: (turns, n) finite-time exponents, each over one turn
+    """Impacts per second."""
     local: Float[Array, "*lanes turns n"]
-    #: (n,) state at the end, to go on from
+    """(turns, n) finite-time exponents, each over one turn."""
     state: Float[Array, "*lanes n"]
-    #: s, length of a turn; shape (1,) where it is the same for all lanes
+    """(n,) state at the end, to go on from."""
     turn: Float[Array, "*lanes"] | Float[Array, "1"]
-    #: 0 where every turn was finished, else an index into `RESULTS`; the exponents are
-    #: NaN there
+    """S, length of a turn; shape (1,) where it is the same for all lanes."""
     code: Array
+    """0 where every turn was finished, else an index into `RESULTS`; the exponents are
+    NaN there."""
 
     @property
     def running(self) -> Float[Array, "*lanes turns n"]:
@@ -72,23 +72,24 @@ def lyapunov_spectrum(
     again (Benettin et al., Meccanica 15, 1980; for impacts Mueller, Chaos, Solitons and
     Fractals 5, 1995).
 
-    **Arguments:**
+    Args:
+        state: Shape `(n,)`, or `(lanes, n)` for many motions at once.
+        turns: How many are averaged, after `transient` others.
+        t0: s.
+        turn: s, length of a turn; the forcing's period without.
+        where: `where(system)` picks one parameter, which takes `values[i]` in lane i.
+        values: `where(system)` picks one parameter, which takes `values[i]` in lane i.
+        settings: Accuracy; a tolerance of 1e-12 by default.
+        blocks: Number of blocks for the standard error.
+        max_steps: Budget of attempted steps of a lane.
+        progress: Called with the part of the turns that is done.
 
-    - `state`: shape `(n,)`, or `(lanes, n)` for many motions at once.
-    - `turns`: how many are averaged, after `transient` others.
-    - `t0`: s.
-    - `turn`: s, length of a turn; the forcing's period without.
-    - `where`, `values`: `where(system)` picks one parameter, which takes `values[i]` in
-        lane i.
-    - `settings`: accuracy; a tolerance of 1e-12 by default.
-    - `blocks`: number of blocks for the standard error.
-    - `max_steps`: budget of attempted steps of a lane.
-    - `progress`: called with the part of the turns that is done.
+    Returns:
+        A `LyapunovSpectrum`. An exponent is minus infinity where the motion sticks,
+            because contact forgets what came before.
 
-    **Returns:** a `LyapunovSpectrum`. An exponent is minus infinity
-    where the motion sticks, because contact forgets what came before.
-
-    **Raises:** `ValueError` where shapes do not fit, or there is no period.
+    Raises:
+        ValueError: Where shapes do not fit, or there is no period.
     """
     refuse_tracers(
         "lyapunov_spectrum",

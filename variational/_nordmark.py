@@ -27,7 +27,8 @@ def nordmark_window(lam: float, period: int) -> tuple[float, float]:
     (Chin, Ott, Nusse and Grebogi, Physical Review E 50, 1994). Where the lower bound is
     not below the upper one there is no window.
 
-    **Raises:** `ValueError` for lam outside (0, 1) or a period below 2.
+    Raises:
+        ValueError: For lam outside (0, 1) or a period below 2.
     """
     if not 0 < lam < 1:
         raise ValueError(f"lam is {lam:g}; windows are known for 0 < lam < 1")

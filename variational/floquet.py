@@ -16,20 +16,20 @@ from .orbits import by_product, eigenvalues, Method, Orbit, turn_derivative
 class Stability(eqx.Module):
     """What the monodromy matrix of an orbit says about it."""
 
-    #: (n,) the largest modulus first
     multipliers: Complex[Array, " n"]
-    #: (n, n) a column for each multiplier
+    """(n,) the largest modulus first."""
     vectors: Complex[Array, "n n"]
-    #: det(M - I), det(M + I) and the product of mu_i mu_j - 1 over i < j, each times
-    #: `scale`: zero at a fold, a flip and a Neimark-Sacker bifurcation
+    """(n, n) a column for each multiplier."""
     fold: Float[Array, ""]
+    """det(M - I), det(M + I) and the product of mu_i mu_j - 1 over i < j, each times
+    `scale`: zero at a fold, a flip and a Neimark-Sacker bifurcation."""
     flip: Float[Array, ""]
     neimark_sacker: Float[Array, ""]
-    #: between 0 and 1, vanishing with the slowest impact speed v as M grows like 1/v:
-    #: the least of v / (v + |a| period), a the acceleration of the gap
     scale: Float[Array, ""]
-    #: a sentence where some multipliers must be zero, else the empty string
+    """Between 0 and 1, vanishing with the slowest impact speed v as M grows like 1/v:
+    the least of v / (v + |a| period), a the acceleration of the gap."""
     reason: str = eqx.field(static=True)
+    """A sentence where some multipliers must be zero, else the empty string."""
 
     @property
     def stable(self) -> bool:
@@ -48,8 +48,9 @@ def floquet_multipliers(
 
     **Arguments:** as for [`variational.monodromy`][].
 
-    **Returns:** shape `(n,)`, complex. Zero where the orbit sticks: contact fixes gap
-    and normal velocity, whatever they were.
+    Returns:
+        Shape `(n,)`, complex. Zero where the orbit sticks: contact fixes gap and normal
+            velocity, whatever they were.
     """
     if method == "product":
         return _multipliers(as_arrays(system), orbit.state, orbit.pieces, orbit.sticks)

@@ -33,10 +33,12 @@ def saltation_matrix(
     **Arguments:** the time of the impact (s), the state just before it, shape `(n,)`,
     with a normal velocity below zero, and which constraint is hit.
 
-    **Returns:** shape `(n, n)`. Grows like one over the impact speed near grazing.
+    Returns:
+        Shape `(n, n)`. Grows like one over the impact speed near grazing.
 
-    **Raises:** `ValueError` where the speed is not below zero, so that no impact
-    happens; inside `jit` the matrix is infinite there.
+    Raises:
+        ValueError: Where the speed is not below zero, so that no impact happens; inside
+            `jit` the matrix is infinite there.
     """
     parts = saltation_parts(system, t, state_before, constraint)
     if not isinstance(parts.speed, Tracer) and not float(parts.speed) < 0:
@@ -52,10 +54,10 @@ class SaltationParts(eqx.Module):
     """S = regular + singular / speed; both parts stay bounded at a graze."""
 
     regular: Float[Array, "n n"]
-    #: of rank one
     singular: Float[Array, "n n"]
-    #: normal velocity before the impact, zero at a graze
+    """Of rank one."""
     speed: Float[Array, ""]
+    """Normal velocity before the impact, zero at a graze."""
 
     @property
     def matrix(self) -> Float[Array, "n n"]:
@@ -94,7 +96,8 @@ def saltation_into_contact(
     because gap and normal velocity are zero from then on whatever they were: with two
     states nothing is left, and a motion that sticks has forgotten its past.
 
-    **Returns:** shape `(n, n)`.
+    Returns:
+        Shape `(n, n)`.
     """
     t = jnp.asarray(t, dtype=jnp.float64)
     x = jnp.asarray(state_before, dtype=jnp.float64)
@@ -122,7 +125,8 @@ def saltation_at_release(
     equal, and the deviation goes on as it is. The matrix is the identity on the motions
     in contact, and zero on what contact has taken.
 
-    **Returns:** shape `(n, n)`.
+    Returns:
+        Shape `(n, n)`.
     """
     t = jnp.asarray(t, dtype=jnp.float64)
     x = jnp.asarray(state, dtype=jnp.float64)

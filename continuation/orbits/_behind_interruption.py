@@ -69,8 +69,9 @@ def _is_none(leaf):
 def _from_release(parameters: HybridSystem, leaf: int, values, periods: int):
     """Impacts of the motion that starts at release, at each value of the parameter.
 
-    **Returns:** phases and states `(k, _MOST, 3)`, how many of them belong to the orbit
-    (0 where it sticks), and the slowest rebound over the fastest.
+    Returns:
+        Phases and states `(k, _MOST, 3)`, how many of them belong to the orbit (0 where
+            it sticks), and the slowest rebound over the fastest.
     """
 
     def one(value):

@@ -13,8 +13,8 @@ class ImpactSequences(AbstractRepresentation):
     """An orbit with m impacts begins at each of them, and m unknowns are times."""
 
     family: str = eqx.field(static=True)
-    #: an `ImpactingOrbits`
     problem: Any
+    """An `ImpactingOrbits`."""
 
     def copies(self, u, tangent):
         problem = self.problem

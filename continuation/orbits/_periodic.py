@@ -28,17 +28,17 @@ def periodic_orbits(
     The problem is chosen by the motion: [`continuation.ImpactingOrbits`][] with the
     impacts that the orbit has, or [`continuation.StickingOrbits`][] where it sticks.
 
-    **Arguments:**
+    Args:
+        orbit: From [`continuation.periodic_orbit`][]; or a guess of its state, or None,
+            with `period` or `periods`, as taken there.
+        beyond: For an orbit that sticks, whether to go on behind the interruption of
+            its chattering with the orbits that have finitely many impacts.
 
-    - `orbit`: from [`continuation.periodic_orbit`][]; or a guess of its state, or None,
-      with `period` or `periods`, as taken there.
-    - `beyond`: for an orbit that sticks, whether to go on behind the interruption of
-      its chattering with the orbits that have finitely many impacts.
+    Returns:
+        A [`continuation.Start`][], for [`continuation.follow`][].
 
-    **Returns:** a [`continuation.Start`][], for [`continuation.follow`][].
-
-    **Raises:** `ValueError` as `periodic_orbit`; and for an orbit that sticks without
-    forcing.
+    Raises:
+        ValueError: As `periodic_orbit`; and for an orbit that sticks without forcing.
     """
     system = as_arrays(system)
     if not isinstance(orbit, Orbit):

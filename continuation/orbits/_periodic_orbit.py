@@ -21,14 +21,15 @@ from .._settings import BranchSettings
 from ._shooting import ImpactingOrbits
 
 
-#: turns after which a motion is expected to have settled, and looked at after that
 _TURNS, _LOOKED = 400, 64
-#: motions are called equal when they differ by less than this, relative to their size
+"""Turns after which a motion is expected to have settled, and looked at after that."""
 _SAME = 1e-7
-#: times are equal that differ by less than this of the period
+"""Motions are called equal when they differ by less than this, relative to their size.
+"""
 _SAME_TIME = 1e-9
-#: a gap is closed up to this, relative to its size
+"""Times are equal that differ by less than this of the period."""
 _CLOSED = 1e-9
+"""A gap is closed up to this, relative to its size."""
 
 
 def periodic_orbit(
@@ -47,23 +48,24 @@ def periodic_orbit(
     motion over one period itself. What is found is run once more through the event
     loop, which must return to it.
 
-    **Arguments:**
+    Args:
+        system: A [`jaxcam.hybrid.HybridSystem`][], forced or not.
+        guess: Shape `(n,)`, the state at `t0`. Without: where the motion has settled
+            after some hundred forcing periods (a stable orbit).
+        period: Of the orbit, in s. For a system without forcing a guess of it.
+        periods: Instead, the number of forcing periods in it. With neither: one, or
+            with no guess either as many as are seen.
+        t0: s.
+        settings: Accuracy of the runs; a tolerance of 1e-12 by default.
 
-    - `system`: a [`jaxcam.hybrid.HybridSystem`][], forced or not.
-    - `guess`: shape `(n,)`, the state at `t0`. Without: where the motion has settled
-        after some hundred forcing periods (a stable orbit).
-    - `period`: of the orbit, in s. For a system without forcing a guess of it.
-    - `periods`: instead, the number of forcing periods in it. With neither: one, or
-        with no guess either as many as are seen.
-    - `t0`: s.
-    - `settings`: accuracy of the runs; a tolerance of 1e-12 by default.
+    Returns:
+        A [`variational.Orbit`][]: `.state` at `.time` (t0, unless that is the time of
+            an impact), `.period` (s), `.impacts`, `.contacts`, `.multipliers`.
 
-    **Returns:** a [`variational.Orbit`][]: `.state` at `.time` (t0, unless that is the
-    time of an impact), `.period` (s), `.impacts`, `.contacts`, `.multipliers`.
-
-    **Raises:** `ValueError` where the period is not one of the forcing's, the motion
-    does not settle on a periodic orbit, or no orbit is found near the guess, with the
-    reason.
+    Raises:
+        ValueError: Where the period is not one of the forcing's, the motion does not
+            settle on a periodic orbit, or no orbit is found near the guess, with the
+            reason.
     """
     settings = Settings(tolerance=1e-12) if settings is None else settings
     system = as_arrays(system)

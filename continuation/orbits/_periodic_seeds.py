@@ -26,17 +26,21 @@ def orbits_near(
     attractors of a basin, or the samples of a recording (angles and their derivatives)
     taken once a period.
 
-    **Arguments:**
+    Args:
+        states: Shape `(k, n)`, states at `t0`.
+        period: As for [`continuation.periodic_orbit`][].
+        periods: As for [`continuation.periodic_orbit`][].
+        t0: As for [`continuation.periodic_orbit`][].
+        settings: As for [`continuation.periodic_orbit`][].
+        same: Orbits are one where their states at `t0` differ by less than this,
+            relative to [`jaxcam.hybrid.sizes.component_sizes`][].
 
-    - `states`: shape `(k, n)`, states at `t0`.
-    - `period`, `periods`, `t0`, `settings`: as for [`continuation.periodic_orbit`][].
-    - `same`: orbits are one where their states at `t0` differ by less than this,
-      relative to [`jaxcam.hybrid.sizes.component_sizes`][].
+    Returns:
+        The orbits in the order in which they were found; guesses from which Newton's
+            method leads nowhere are left out, so there may be none.
 
-    **Returns:** the orbits in the order in which they were found; guesses from which
-    Newton's method leads nowhere are left out, so there may be none.
-
-    **Raises:** `ValueError` for states of another shape.
+    Raises:
+        ValueError: For states of another shape.
     """
     states = np.asarray(states, dtype=float)
     if states.ndim != 2:

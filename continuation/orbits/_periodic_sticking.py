@@ -32,8 +32,8 @@ from ._behind_interruption import orbit_behind
 from ._shooting import ImpactingOrbits
 
 
-#: names of the monitors
 CHATTER = "chatter margin"
+"""Names of the monitors."""
 DETACHMENT = "jerk at release"
 # Runge-Kutta steps of order eight in a part of one forcing period
 _STEPS = 64
@@ -58,12 +58,6 @@ class StickingOrbits(AbstractProblem):
 
     Behind the first a branch goes on with [`continuation.ImpactingOrbits`][] where
     `beyond` says so; each number of impacts is then a program to compile.
-
-    **Arguments:**
-
-    - `parameters`: a system with a period, two states and one constraint.
-    - `periods`: n, of the forcing, from release to the release after contact.
-    - `beyond`: whether to go on behind an interruption; else it ends the branch.
     """
 
     stability: ClassVar[StabilityKind] = "map"
@@ -71,8 +65,11 @@ class StickingOrbits(AbstractProblem):
     detects: ClassVar[bool] = False
 
     parameters: HybridSystem
+    """A system with a period, two states and one constraint."""
     periods: int = eqx.field(static=True, default=1)
+    """n, of the forcing, from release to the release after contact."""
     beyond: bool = eqx.field(static=True, default=False)
+    """Whether to go on behind an interruption; else it ends the branch."""
 
     def residual(self, u, parameters) -> Float[Array, "3"]:
         system = parameters.prepared()
@@ -192,7 +189,8 @@ def on_release(
 ) -> tuple[StickingOrbits, np.ndarray]:
     """The problem of the orbit that sticks once in so many periods, and its unknowns.
 
-    **Raises:** `ValueError` where contact never ends, or is never made.
+    Raises:
+        ValueError: Where contact never ends, or is never made.
     """
     frame = _frame(system)
     if not bool(jnp.isfinite(frame.release)):

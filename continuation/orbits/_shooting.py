@@ -29,25 +29,21 @@ class ImpactingOrbits(AbstractProblem):
     `(m (1 + n),)`. Without impacts they are the state at time zero, shape `(n,)`. For a
     system without forcing the first phase is zero, its place taken by the period (s),
     and phases count periods of the orbit.
-
-    **Arguments:**
-
-    - `parameters`: the [`jaxcam.hybrid.HybridSystem`][].
-    - `constraints`: which constraint each impact hits, in order.
-    - `periods`: forcing periods until the orbit repeats; 0 for a system without
-      forcing.
-    - `dimension`: number of states n.
-    - `steps`: Runge-Kutta steps of order eight in each flight.
     """
 
     stability: ClassVar[StabilityKind] = "map"
     costly: ClassVar[bool] = True
 
     parameters: HybridSystem
+    """The [`jaxcam.hybrid.HybridSystem`][]."""
     constraints: tuple[int, ...] = eqx.field(static=True)
+    """Which constraint each impact hits, in order."""
     periods: int = eqx.field(static=True)
+    """Forcing periods until the orbit repeats; 0 for a system without forcing."""
     dimension: int = eqx.field(static=True)
+    """Number of states n."""
     steps: int = eqx.field(static=True, default=32)
+    """Runge-Kutta steps of order eight in each flight."""
 
     def __check_init__(self):
         if self.periods == 0 and not self.constraints:

@@ -7,8 +7,8 @@ class Watched(NamedTuple):
     """The lowest gap within a flight, or the approach speed of an impact."""
 
     what: Literal["gap", "speed"]
-    #: of the flight that begins with impact k, or of impact k
     number: int
+    """Of the flight that begins with impact k, or of impact k."""
 
     @property
     def name(self) -> str:

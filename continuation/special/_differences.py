@@ -5,8 +5,8 @@ from collections.abc import Callable
 import numpy as np
 
 
-#: distances, each half of the one before
 STEPS = 8
+"""Distances, each half of the one before."""
 
 
 def along(
@@ -21,8 +21,9 @@ def along(
     **Arguments:** `matrices` takes displacements `(k, n)` to matrices `(k, n, m)`;
     `direction` is the largest displacement (n,) to be used.
 
-    **Returns:** two matrices; NaN where the extrapolation does not settle to a part in
-    a thousand.
+    Returns:
+        Two matrices; NaN where the extrapolation does not settle to a part in a
+            thousand.
     """
     shares = 0.5 ** np.arange(STEPS)
     moves = np.concatenate([shares, -shares, [0.0]])[:, None] * direction[None, :]

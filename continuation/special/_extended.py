@@ -16,10 +16,11 @@ class AbstractExtended(AbstractProblem):
 
     base: eqx.AbstractVar[AbstractProblem]
     leaf: eqx.AbstractVar[int]
-    #: (2,) of the parameter that is an unknown here: the branch ends exactly on them
     bounds: eqx.AbstractVar[Array]
-    #: between these
+    """(2,) of the parameter that is an unknown here: the branch ends exactly on them.
+    """
     width: eqx.AbstractVar[Array]
+    """Between these."""
     stability: ClassVar[StabilityKind] = "none"
     normal_forms: ClassVar[bool] = False
     detects: ClassVar[bool] = False

@@ -15,8 +15,8 @@ BRANCH_POINT = "branch point"
 FLIP = "flip"
 NEIMARK_SACKER = "Neimark-Sacker"
 HOPF = "Hopf"
-#: stands for an infinite eigenvalue in products
 _HUGE = 1e100
+"""Stands for an infinite eigenvalue in products."""
 
 
 def kinds(problem: AbstractProblem) -> tuple[str, ...]:

@@ -14,8 +14,8 @@ class Axis(NamedTuple):
     """
 
     parameter: str
-    #: of one of the command line's units
     unit: float
+    """Of one of the command line's units."""
 
     @staticmethod
     def of(parameter: str, system: str) -> "Axis":

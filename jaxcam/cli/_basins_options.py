@@ -45,7 +45,11 @@ class Cells:
     ] = 1
 
     def check(self, system: str) -> None:
-        """**Raises:** `ValueError` that names the option at fault."""
+        """
+
+        Raises:
+            ValueError: That names the option at fault.
+        """
         self.corners(system)
         cells = self.counts
         at_least("--keep", self.keep, 2)

@@ -10,9 +10,11 @@ def read(case: Path, rig: Path | None, files: Files, system: str | None = None):
 
     **Arguments:** `system` is `FILE.py:CLASS`, in the place of that of the rig file.
 
-    **Returns:** a `Case`, and a `Rig` or a `Setup`.
+    Returns:
+        A `Case`, and a `Rig` or a `Setup`.
 
-    **Raises:** `ValueError` that names the file at fault and the fix.
+    Raises:
+        ValueError: That names the file at fault and the fix.
     """
     from ..fitting import is_setup, read_setup
     from ..recordings import read_rig

@@ -9,10 +9,10 @@ class Ready(NamedTuple):
     """A system with a name, and how it is started where nothing else is said."""
 
     model: str
-    #: None is the release point
     state: tuple[float, ...] | None
-    #: periods of the forcing, or else s
+    """None is the release point."""
     turns: float | None
+    """Periods of the forcing, or else s."""
     duration: float
 
 

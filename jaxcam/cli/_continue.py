@@ -106,7 +106,11 @@ def continue_(
 
 
 def _refuse_interrupted(path: Path) -> None:
-    """**Raises:** `ValueError` where the branch that a folder holds has no end."""
+    """
+
+    Raises:
+        ValueError: Where the branch that a folder holds has no end.
+    """
     import continuation
 
     for file in (path, path.with_suffix(f".back{path.suffix}")):

@@ -48,7 +48,8 @@ class BranchRange:
     def started(self, model, axis: Axis):
         """The system with the parameter at its first value.
 
-        **Raises:** `ValueError` for no such parameter, or a start outside.
+        Raises:
+            ValueError: For no such parameter, or a start outside.
         """
         import equinox as eqx
         import jax.numpy as jnp
@@ -99,7 +100,11 @@ class Following:
     ] = 300
 
     def check(self) -> None:
-        """**Raises:** `ValueError` that names the option at fault."""
+        """
+
+        Raises:
+            ValueError: That names the option at fault.
+        """
         choose("--direction", self.direction, DIRECTIONS)
         choose("--algorithm", self.algorithm, ALGORITHMS)
         at_least("--periods", self.periods, 1)

@@ -90,8 +90,8 @@ def diagnose(
 def _kept_fits(out: Path | None, resume: bool) -> Path | None:
     """The folder of fits that a run which is stopped leaves.
 
-    **Raises:** `ValueError` where there is nothing to go on with, or something in the
-    way.
+    Raises:
+        ValueError: Where there is nothing to go on with, or something in the way.
     """
     keep = None if out is None else out / "fits"
     if resume and (keep is None or not keep.is_dir()):

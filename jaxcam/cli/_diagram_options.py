@@ -55,7 +55,11 @@ class Sweep:
     ] = "stroboscope"
 
     def check(self) -> None:
-        """**Raises:** `ValueError` that names the option at fault."""
+        """
+
+        Raises:
+            ValueError: That names the option at fault.
+        """
         choose("--direction", self.direction, DIRECTIONS)
         choose("--section", self.section, SECTIONS)
         ordered_bounds(self.low, self.high)
@@ -107,7 +111,11 @@ class Starts:
     seed: Annotated[int, typer.Option(metavar="N", help="Of random starts.")] = 0
 
     def check(self, sweep: Sweep) -> None:
-        """**Raises:** `ValueError` that names the option at fault."""
+        """
+
+        Raises:
+            ValueError: That names the option at fault.
+        """
         at_least("--starts", self.starts, 1)
         at_least("--seed", self.seed, 0)
         counts = sweep.points, self.starts or 1, sweep.keep

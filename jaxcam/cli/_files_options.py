@@ -33,7 +33,11 @@ class Files:
     ] = None
 
     def check(self) -> None:
-        """**Raises:** `ValueError` that names the option at fault."""
+        """
+
+        Raises:
+            ValueError: That names the option at fault.
+        """
         choose("--gaps", self.gaps, ("mend", "refuse", "split"))
         if self.rate is not None and not (math.isfinite(self.rate) and self.rate > 0):
             raise ValueError(
@@ -49,7 +53,8 @@ class Files:
     def named(self) -> list[str] | dict[str, tuple[str, float]] | None:
         """`--columns` as readers take it.
 
-        **Raises:** `ValueError` for names and pairs together, or a factor that is none.
+        Raises:
+            ValueError: For names and pairs together, or a factor that is none.
         """
         if self.columns is None:
             return None

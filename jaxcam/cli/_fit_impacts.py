@@ -18,7 +18,8 @@ def is_table(case: Path, files: Files) -> bool:
 def fit_impacts(case: Path, files: Files, json_file: Path | None) -> None:
     """Print the law that the impacts support, and write it as data.
 
-    **Raises:** `ValueError` that names the row at fault and the fix.
+    Raises:
+        ValueError: That names the row at fault and the fix.
     """
     from ..fitting import impact_law
     from ..recordings import read_impacts

@@ -81,7 +81,8 @@ def fitted(
 
     **Arguments:** `bootstrap`: how often flights are weighted at random; 0 is never.
 
-    **Raises:** `ValueError` for a rig of which nothing is to be fitted.
+    Raises:
+        ValueError: For a rig of which nothing is to be fitted.
     """
     runs = tuple(runs)
     if isinstance(nominal, fitting.Setup):

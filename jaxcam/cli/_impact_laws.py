@@ -13,8 +13,9 @@ from ..recordings.cut import Impacts
 def impact_laws(segments: Sequence[Segments]) -> dict[str, RestitutionFit]:
     """Laws by the gap that was hit, for each gap with impacts enough.
 
-    **Returns:** laws as of `restitution_laws`; where there are several gaps, with the
-    number of the gap before their names.
+    Returns:
+        Laws as of `restitution_laws`; where there are several gaps, with the number of
+            the gap before their names.
     """
     sides = np.unique(np.concatenate([part.impacts.side for part in segments]))
     found = {}

@@ -13,7 +13,8 @@ def hold(folder: Path) -> None:
     The lock is the kernel's, so that a command that is killed leaves none behind. Where
     there is no such thing (Windows, some network file systems) nothing is kept out.
 
-    **Raises:** `ValueError` where another command holds it.
+    Raises:
+        ValueError: Where another command holds it.
     """
     try:
         import fcntl

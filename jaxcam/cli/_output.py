@@ -19,7 +19,9 @@ class Output:
 
     Places that cannot be written are found before the work begins, not after it.
 
-    **Raises:** `ValueError` or `OSError` for those.
+    Raises:
+        ValueError: Or.
+        OSError: For those.
     """
 
     def __init__(self, json_file: Path | None, folder: Path | None):

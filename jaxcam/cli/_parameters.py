@@ -29,7 +29,8 @@ def make_model(
 ) -> HybridSystem:
     """A system with parameters of its own, as a command line names it.
 
-    **Raises:** `ValueError` that names the fix.
+    Raises:
+        ValueError: That names the fix.
     """
     return assign_parameters(make_system(name, preset, rpm, source), assignments or ())
 
@@ -44,7 +45,8 @@ def assign_parameters(system: HybridSystem, assignments: Sequence[str]) -> Hybri
 
     `restitution.r=0.6` gives a cam-follower a constant restitution.
 
-    **Raises:** `ValueError` for a name that is not a parameter, or no number.
+    Raises:
+        ValueError: For a name that is not a parameter, or no number.
     """
     for assignment in assignments:
         name, value = _split(assignment)

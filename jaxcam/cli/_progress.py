@@ -13,8 +13,8 @@ from rich.progress import (
 )
 
 
-#: the first words of commands that compile before they compute
 COMPILING = "compiling (the first run of a system takes longest)"
+"""The first words of commands that compile before they compute."""
 
 
 @contextmanager

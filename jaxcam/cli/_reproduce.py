@@ -10,8 +10,8 @@ from ._choices import choose
 from ._options import JsonFile, Resume
 
 
-#: the rigs, and which of them is meant where nothing is said
 _PRESETS = ("calibrated", "table-4.4")
+"""The rigs, and which of them is meant where nothing is said."""
 _SIZES = ("default", "full")
 _ALL = "all"
 

@@ -13,13 +13,13 @@ from ._reproduce_record import Origin, TargetRecord
 
 HEADINGS = ("quantity", "printed", "computed", "difference", "relative", "unit")
 _OVERVIEW = ("target", "", "largest relative", "compared", "time")
-#: what the page has besides the style that all pages share
 _MORE = """
 nav a { display: inline-block; padding: .15rem .45rem .15rem 0; color: inherit; }
 section { border-top: 1px solid var(--line); margin-top: 2.4rem; }
 section h2 { margin-top: 1.2rem; }
 td.text { white-space: normal; min-width: 8rem; }
 """
+"""What the page has besides the style that all pages share."""
 _CHAPTERS = {
     "1": "Introduction",
     "2": "Dynamical systems, smooth and not",

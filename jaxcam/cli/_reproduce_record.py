@@ -26,8 +26,8 @@ class Origin:
     version: str
     preset: str
     size: str
-    #: of the code that computed it; see `source_mark`
     code: str
+    """Of the code that computed it; see `source_mark`."""
 
     @staticmethod
     def of(preset: str, size: str) -> "Origin":

@@ -34,7 +34,8 @@ def load_saved(file: Path) -> HybridSystem:
 
     The Python file that a system of a user's own comes from is run.
 
-    **Raises:** `ValueError` that says what is wrong with it.
+    Raises:
+        ValueError: That says what is wrong with it.
     """
     from ..discrepancy.terms import saved_classes
     from ..fitting.own_systems import classes_beside, split_name, system_class

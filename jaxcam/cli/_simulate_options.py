@@ -50,7 +50,11 @@ class RunOptions:
     ] = None
 
     def check(self) -> None:
-        """**Raises:** `ValueError` that names the option at fault."""
+        """
+
+        Raises:
+            ValueError: That names the option at fault.
+        """
         choose("--solver", self.solver, SOLVERS)
         choose("--engine", self.chosen_engine, ENGINES)
 

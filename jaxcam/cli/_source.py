@@ -30,7 +30,8 @@ class Source:
     def system(self) -> HybridSystem:
         """The system that was saved, or that of a file with its nominal values.
 
-        **Raises:** `ValueError` that names the file at fault and the fix.
+        Raises:
+            ValueError: That names the file at fault and the fix.
         """
         from ..fitting import is_setup, read_setup
         from ..fitting.own_systems import stated_system, system_class
@@ -58,7 +59,8 @@ class Source:
     def name(self, word: str) -> str:
         """The name of the system; `word` is that of a ready one.
 
-        **Raises:** `ValueError` for an unknown one, or a file that is at fault.
+        Raises:
+            ValueError: For an unknown one, or a file that is at fault.
         """
         if not self:
             if _is_code(word):
@@ -81,7 +83,8 @@ def make_system(
 ) -> HybridSystem:
     """A system; `preset` and a speed in rpm are for the cam-follower alone.
 
-    **Raises:** `ValueError` that names the fix.
+    Raises:
+        ValueError: That names the fix.
     """
     import equinox as eqx
     import jax.numpy as jnp

@@ -8,8 +8,8 @@ from pathlib import Path
 
 
 _PACKAGES = ("jaxcam", "variational", "continuation")
-#: what decides digits besides
 _BENEATH = ("jax", "jaxlib", "diffrax", "equinox", "numpy", "scipy", "matplotlib")
+"""What decides digits besides."""
 
 
 @functools.cache

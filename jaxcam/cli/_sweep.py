@@ -32,7 +32,11 @@ class Execution:
             )
 
     def check_system(self, system: HybridSystem) -> None:
-        """**Raises:** `ValueError` for one that other processes could not import."""
+        """
+
+        Raises:
+            ValueError: For one that other processes could not import.
+        """
         from ..discrepancy.terms import WithTerms
         from ..fitting.own_systems import system_source
 

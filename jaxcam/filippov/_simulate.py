@@ -41,10 +41,12 @@ def simulate_filippov(
     **Arguments:** a state `(n,)`, times (s), the error allowed in a step, and the
     budget of attempted steps.
 
-    **Returns:** a [`jaxcam.filippov.FilippovTrajectory`][].
+    Returns:
+        A [`jaxcam.filippov.FilippovTrajectory`][].
 
-    **Raises:** `ValueError` for a start that is not finite, or on the part of the
-    surface that both fields point away from, where the motion is not unique.
+    Raises:
+        ValueError: For a start that is not finite, or on the part of the surface that
+            both fields point away from, where the motion is not unique.
     """
     refuse_tracers(
         "simulate_filippov", "jaxcam.filippov.filippov_flow", system, state, t0, t1

@@ -29,8 +29,8 @@ class FilippovState(NamedTuple):
     t: Any
     x: Any
     mode: Any
-    #: length of the next step, and of the last one that no event cut short
     step: Any
+    """Length of the next step, and of the last one that no event cut short."""
     natural: Any
     failures: Any
     status: Any

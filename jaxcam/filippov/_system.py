@@ -18,8 +18,8 @@ class FilippovSystem(eqx.Module):
     condition, so that the two have event loops of their own.
     """
 
-    #: names and units of the state's components
     state_names: ClassVar[tuple[str, ...]] = ()
+    """Names and units of the state's components."""
     state_units: ClassVar[tuple[str, ...]] = ()
 
     @abc.abstractmethod

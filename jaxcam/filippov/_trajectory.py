@@ -14,13 +14,13 @@ from ._system import FilippovSystem
 class Switches(eqx.Module):
     """The events of a motion, in order: crossings, begins and ends of sliding."""
 
-    #: (k,) s
     time: Float[Array, " k"]
-    #: (k, n)
+    """(k,) s."""
     state: Float[Array, "k n"]
-    #: (k,) [`Mode`][jaxcam.filippov.modes.Mode] before and after: 1 above, 0 sliding,
-    #: -1 below
+    """(k, n)."""
     before: Int[Array, " k"]
+    """(k,) [`Mode`][jaxcam.filippov.modes.Mode] before and after: 1 above, 0 sliding,
+    -1 below."""
     after: Int[Array, " k"]
 
     @property
@@ -35,13 +35,13 @@ class FilippovTrajectory(eqx.Module):
     system: FilippovSystem
     t0: Float[Array, ""]
     t1: Float[Array, ""]
-    #: (s,) and (s, n) ends of the steps, and (s,) the mode from there on
     time: Float[Array, " s"]
+    """(s,) and (s, n) ends of the steps, and (s,) the mode from there on."""
     state: Float[Array, "s n"]
     mode: Int[Array, " s"]
     switches: Switches
-    #: empty, or why t1 was not reached
     result: str = eqx.field(static=True)
+    """Empty, or why t1 was not reached."""
 
     @property
     def final(self) -> Float[Array, " n"]:
@@ -51,7 +51,8 @@ class FilippovTrajectory(eqx.Module):
     def at(self, times: VectorLike) -> Float[Array, "times n"]:
         """State at each of `times` (s), by one more step from the point before it.
 
-        **Raises:** `ValueError` for times outside the run.
+        Raises:
+            ValueError: For times outside the run.
         """
         wanted = np.asarray(times, dtype=float)
         known = np.asarray(self.time)

@@ -12,8 +12,8 @@ from ._system import FilippovSystem
 from .modes import first_mode
 
 
-#: attempts between two looks from Python
 CHUNK = 256
+"""Attempts between two looks from Python."""
 
 
 def first_filippov_state(system: FilippovSystem, state, t0, t1) -> FilippovState:

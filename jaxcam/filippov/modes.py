@@ -45,7 +45,8 @@ def equivalent_control(
     Because the control enters linearly, its field is Filippov's. Also the force of dry
     friction over the largest there is, or the mean of a relay.
 
-    **Returns:** u and the field f + g u.
+    Returns:
+        u and the field f + g u.
     """
     above, below = system.above(t, state), system.below(t, state)
     mean, control = (above + below) / 2, (above - below) / 2

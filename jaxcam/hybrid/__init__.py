@@ -1,4 +1,9 @@
-"""What a hybrid system is, and its exact trajectory."""
+"""Simulate hybrid systems with exact event detection.
+
+Equation numbers in docstrings ("thesis, eq. 2.24") are those of R. Alzate, *Analysis
+and Application of Bifurcations in Systems with Impacts and Chattering*, University of
+Naples Federico II, 2008; `jaxcam.citation("thesis")` prints its entry.
+"""
 
 from ._flow import flow as flow
 from ._settings import Settings as Settings

@@ -1,4 +1,4 @@
-"""The flow map alone: where a trajectory ends, without a record of how it got there."""
+"""Compute the flow map alone: the final state, without a record of the events."""
 
 import functools
 
@@ -24,17 +24,18 @@ _BLOCK = 4
 
 
 class Arrival(eqx.Module):
-    """Where a trajectory ends."""
+    """The end of a trajectory, returned by [`jaxcam.hybrid.flow`][]."""
 
-    #: (n,) state at the end
     state: Float[Array, " n"]
-    #: (m,) which constraints are in contact at the end
+    """State at the end, shape `(n,)`."""
     contact: Bool[Array, " m"]
-    #: number of impacts, and of attempted steps
+    """Constraints in contact at the end, shape `(m,)`."""
     impacts: Float[Array, ""]
+    """Number of impacts."""
     steps: Float[Array, ""]
-    #: 0 where the end was reached, else an index into `RESULTS`
+    """Number of attempted integration steps."""
     code: Int[Array, ""]
+    """Index into `RESULTS`: 0 where the run reached the end."""
 
 
 def flow(
@@ -46,26 +47,36 @@ def flow(
     settings: Settings | None = None,
     max_steps: int = 4096,
 ) -> Arrival:
-    """Where the motion from `state` at `t0` is at `t1`; for use inside `jit`.
+    """Return the state at `t1` of the motion that starts from `state` at `t0`.
 
-    Pure: it can be compiled, batched with `vmap` and differentiated (`jvp`, `grad`,
-    `linearize`, nested) with respect to state, times and parameters; a gradient costs a
-    forward derivative in every number differentiated by. What cannot start (behind a
-    constraint, not finite, t1 before t0) has a code of its own and state NaN; where
-    nothing is traced, the system is checked.
-    The number of impacts, contacts and releases may differ from lane to lane.
+    The function is pure: it can be compiled (`jit`), batched (`vmap`) and
+    differentiated (`jvp`, `grad`, `linearize`, nested) with respect to state, times and
+    parameters. A gradient costs one forward derivative per number differentiated by.
+    The number of impacts, contacts and releases may differ between batch elements. An
+    invalid start (behind a constraint, not finite, t1 before t0) returns a result code
+    of its own and the state NaN; outside of transformations the system is checked
+    first.
 
-    **Arguments:**
+    Args:
+        system: The system to simulate.
+        state: Initial state, shape `(n,)`, with every gap >= 0.
+        t0: Start time (s).
+        t1: End time (s), t1 >= t0.
+        settings: Accuracy; default `Settings()`.
+        max_steps: Budget of attempted integration steps.
 
-    - `state`: shape `(n,)`, with every gap >= 0.
-    - `t0`, `t1`: s, t1 >= t0.
-    - `settings`: accuracy; `Settings()` by default.
-    - `max_steps`: budget of attempted steps.
+    Returns:
+        An `Arrival`, whose `code` is an index into `RESULTS`.
 
-    **Returns:** an `Arrival`; its `code` is an index into `RESULTS`.
+    Raises:
+        ValueError: The state is complex; or, outside of transformations, a parameter or
+            a function of the system is invalid.
 
-    **Raises:** `ValueError` for a complex state; and for parameters or functions of the
-    system that cannot be, where nothing is traced.
+    Examples:
+        >>> from jaxcam.hybrid import flow
+        >>> from jaxcam.models import BouncingBall
+        >>> float(flow(BouncingBall(), jnp.array([1.0, 0.0]), 0.0, 1.0).impacts)
+        1.0
     """
     state = real_array(state)
     system = as_arrays(system)

@@ -1,4 +1,4 @@
-"""How accurately a trajectory is made."""
+"""Accuracy settings of a run."""
 
 import diffrax
 import equinox as eqx
@@ -9,49 +9,58 @@ from ..parameters import FloatScalar
 
 
 class Settings(eqx.Module):
-    """Numbers that decide the accuracy of a run, not its physics.
+    """Accuracy settings of a run; they do not change its physics.
 
-    **Arguments:**
-
-    - `tolerance`: error allowed in a step, in each component relative to how far it has
-      moved since the start of the run; at first, to the distance from the constraint
-      where a gap depends on the component, and to its own size where none does. So no
-      choice of units, nor of the origin of a coordinate, changes the accuracy; but a
-      coordinate is never known better than 1e-15 of itself, which limits what can be
-      told of a small gap far from the origin.
-    - `absolute`: absolute error allowed instead, in units of the state: a number, or
-      one for each component, shape `(n,)`. The error allowed is then
-      `absolute + tolerance * |state|`.
-    - `max_step`: longest step (s). What is narrower than a step, and not seen at its
-      stages, is stepped over: state it where forces or barriers are brief, or declare
-      them as [`jaxcam.hybrid.HybridSystem.breakpoints`][]. Steps are a quarter of the
-      system's period at most; with neither, they are a 64th of the run at most where
-      the estimate of their error says nothing (at rest, or in a uniform field).
-    - `chatter_smallness`: chatter is completed analytically only where
-      lambda/(1 - r) is below this, lambda = v |j| / a^2; the completed time is then
-      wrong by about its square, relatively.
-    - `chatter_depth`: and only after the speed has fallen to this fraction of the
-      fastest rebound since the last release (or hops have become lower than rounding
-      can tell). 1 completes as soon as theory allows
-      (fast, for sweeps); small values list more impacts of each sequence.
-    - `plain`: run the loop as written, without the passes of `jaxcam.hybrid.lowering`
-      that make it fast. Slower by an order of magnitude, equal to the tolerance, and
-      without reverse mode: a check on these passes, and a way on where one fails.
-    - `solver`: any explicit Runge-Kutta solver of diffrax with an error estimate.
+    Examples:
+        >>> from jaxcam.models import BouncingBall
+        >>> settings = jaxcam.Settings(tolerance=1e-8)
+        >>> ball = BouncingBall()
+        >>> run = jaxcam.simulate(ball, [1.0, 0.0], 0.0, 1.0, settings=settings)
+        >>> bool(run.successful)
+        True
     """
 
     tolerance: FloatScalar = 1e-10
+    """Relative error allowed per step. Each component is measured against the distance
+    it has moved since the start of the run; at first, against its distance from the
+    constraint if a gap depends on it, otherwise against its own size. The accuracy is
+    therefore independent of the units and of the origin of a coordinate. A coordinate
+    is still known only to 1e-15 of its value, which limits the resolution of a small
+    gap far from the origin."""
     chatter_smallness: FloatScalar = 1e-3
+    """Chatter is completed analytically only where lambda/(1 - r) is below this, with
+    lambda = v |j| / a^2. The relative error of the completed time is about its square.
+    """
     chatter_depth: FloatScalar = 1e-6
+    """Chatter is completed analytically only after the speed has fallen to this
+    fraction of the fastest rebound since the last release (or the impacts can no longer
+    be resolved in floating point). 1 completes as soon as the theory allows (fast, for
+    sweeps); small values list more impacts of each sequence."""
     solver: diffrax.AbstractSolver = eqx.field(
         default_factory=diffrax.Dopri8, static=True
     )
+    """Explicit Runge-Kutta solver of diffrax with an error estimate."""
     absolute: FloatScalar | Float[ArrayLike, " n"] | None = None
+    """Absolute error allowed, in units of the state: a number, or one per component,
+    shape `(n,)`. It replaces the scale described under `tolerance`: the error allowed
+    becomes `absolute + tolerance * |state|`."""
     max_step: FloatScalar | None = None
+    """Longest integration step (s). A force or barrier that is narrower than a step can
+    be stepped over: set this where forces are brief, or declare their times as
+    [`jaxcam.hybrid.HybridSystem.breakpoints`][]. By default a step is at most a quarter
+    of the system's period; without a period, at most 1/64 of the run while the error
+    estimate is uninformative (at rest, or in a uniform field)."""
     plain: bool = eqx.field(default=False, static=True)
+    """Run the event loop without the compiler passes of `jaxcam.hybrid.lowering`. About
+    ten times slower, equal within the tolerance, and without reverse mode: a check of
+    these passes, and a fallback if one fails."""
 
     def check(self) -> None:
-        """Raise `ValueError` for a setting outside its range."""
+        """Raise `ValueError` if a setting is outside its range.
+
+        Raises:
+            ValueError: A setting is outside its range.
+        """
         if not 0 < float(self.tolerance) < 1:
             raise ValueError(
                 f"tolerance is {float(self.tolerance):g}; give a number between 1e-14 "

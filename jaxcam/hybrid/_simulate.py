@@ -1,4 +1,4 @@
-"""The front door: `simulate`."""
+"""Simulate a hybrid system: `simulate`."""
 
 from collections.abc import Callable
 from typing import Any, Literal
@@ -43,43 +43,44 @@ def simulate(
     engine: Literal["loop", "diffeqsolve"] = "loop",
     progress: Callable[[float], None] | None = None,
 ) -> Trajectory:
-    """The exact trajectory of a hybrid system from `t0` to `t1`.
+    """Simulate a hybrid system from `t0` to `t1` and return its trajectory.
 
-    **Arguments:**
+    Args:
+        system: A [`jaxcam.hybrid.HybridSystem`][].
+        state: Initial state, shape `(n,)`, with every gap >= 0. `None` starts on the
+            orbit last released from contact (systems with a period, two states and one
+            constraint): in contact at `t0` if contact holds then, otherwise from the
+            last release before.
+        t0: Start time (s).
+        t1: End time (s), t1 >= t0.
+        tolerance: Error allowed per step, relative to how far each component moves.
+        solver: Explicit Runge-Kutta solver of diffrax, default `Dopri8`.
+        settings: All accuracy settings; overrides `tolerance` and `solver`.
+        max_step: Longest integration step (s); a narrower force or barrier may be
+            stepped over.
+        max_steps: Budget of attempted steps. By default up to a million; inside `jit`,
+            `vmap`, `jvp` or `grad`, where array sizes must be fixed, 4096 with padded
+            arrays.
+        derivatives: "forward", or "reverse" for gradients by hundreds of numbers; both
+            serve jvp, linearize, grad and hessian. "reverse" always runs `max_steps`
+            attempts.
+        engine: "loop", or "diffeqsolve" for one diffrax call per piece of motion.
+        progress: Called from time to time with the fraction done.
 
-    - `system`: a [`jaxcam.hybrid.HybridSystem`][].
-    - `state`: shape `(n,)`, with every gap >= 0; or `None` for the orbit released last
-      from contact (systems with a period, two states and one constraint): in contact at
-      `t0` where contact holds then, else from the last release before `t0` on.
-    - `t0`, `t1`: s, t1 >= t0.
-    - `tolerance`: error allowed in a step, relative to how far each component moves.
-    - `solver`: any explicit Runge-Kutta solver of diffrax, `Dopri8` by default.
-    - `settings`: everything else about accuracy; overrides `tolerance` and `solver`.
-    - `max_step`: longest step (s). A force or a barrier that is narrower than the steps
-      may be stepped over: give this, or the system's `breakpoints`.
-    - `max_steps`: budget of attempted steps. Without it a run outside of any
-      transformation grows as needed, up to a million; inside `jit`, `vmap`, `jvp` or
-      `grad`, where sizes must be known, it is 4096 and arrays are padded.
-    - `derivatives`: "forward", or "reverse" for gradients by hundreds of numbers. Both
-      serve jvp, linearize, grad and hessian; the cost of the former grows with how many
-      numbers are differentiated by, the latter always runs `max_steps` attempts.
-    - `engine`: "loop", or "diffeqsolve" for one diffrax call a flight (implicit
-      solvers, an independent check).
-    - `progress`: called with the fraction done, now and then.
+    Returns:
+        A trajectory. If it did not reach t1, its `result` says why.
 
-    **Returns:** a [`jaxcam.hybrid.Trajectory`][]. Where it did not reach t1,
-    `trajectory.result` says why.
+    Raises:
+        ValueError: The state is not finite or lies behind a constraint, t1 < t0, a
+            setting is out of range, or a function of the system has the wrong shape.
 
-    **Raises:** `ValueError` naming the fix: a state that is not finite or behind the
-    constraint, t1 < t0, a setting out of range, functions of the wrong shape.
+    Examples:
+        >>> from jaxcam.models import BouncingBall
+        >>> trajectory = jaxcam.simulate(BouncingBall(), [1.0, 0.0], 0.0, 1.0)
+        >>> print(trajectory)
+        BouncingBall from 0 to 1 s, impacts: 1, contacts: 0
     """
-    if settings is None:
-        chosen = diffrax.Dopri8() if solver is None else solver
-        settings = Settings(tolerance=tolerance, solver=chosen, max_step=max_step)
-    elif max_step is not None:
-        raise ValueError(
-            "max_step and settings are both given; pass Settings(max_step=...)"
-        )
+    settings = _chosen(settings, tolerance, solver, max_step)
     if engine not in ("loop", "diffeqsolve"):
         raise ValueError(f'engine is {engine!r}; choose "loop" or "diffeqsolve"')
     if derivatives not in ("forward", "reverse"):
@@ -128,8 +129,20 @@ def simulate(
     return Trajectory(system, settings, t0, t1, *_trim(parts), code)
 
 
+def _chosen(settings, tolerance, solver, max_step) -> Settings:
+    """Return the settings of a run, given as a whole or one by one."""
+    if settings is None:
+        chosen = diffrax.Dopri8() if solver is None else solver
+        return Settings(tolerance=tolerance, solver=chosen, max_step=max_step)
+    if max_step is not None:
+        raise ValueError(
+            "max_step and settings are both given; pass Settings(max_step=...)"
+        )
+    return settings
+
+
 def _released(system, t0, traced):
-    """Start of the orbit released last before t0."""
+    """Return the start of the orbit that was last released before t0."""
     if not traced:
         system.check()
     if system.period is None:
@@ -160,7 +173,9 @@ def _constraints(system, t0) -> int:
 
 @eqx.filter_jit
 def _release_point(system, t0):
-    """State (NaN where there is no release), time, and whether there is none."""
+    """Return the state (NaN without a release), the time, and whether there is no
+    release.
+    """
     point = release_point(system, t0)
     nowhere = point.holds == 2
     return jnp.where(nowhere, jnp.nan, point.state), point.time, nowhere
@@ -183,7 +198,7 @@ def _forward(
 
 
 def _reversible(system, settings, t0, state, t1, rows: int):
-    """The same as a scan."""
+    """Do the same as a scan."""
     return _of_rows(run_reversible, system, settings, t0, state, t1, rows)
 
 

@@ -1,4 +1,4 @@
-"""Many trajectories at once, sampled once a period."""
+"""Simulate many trajectories and sample them once per period."""
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -22,18 +22,24 @@ _GROUP = 64
 
 
 class Stroboscope(eqx.Module):
-    """Samples of many trajectories, as numpy arrays; NaN where a lane failed."""
+    """Stroboscopic samples of many trajectories, as NumPy arrays; NaN where a run
+    failed.
+    """
 
-    #: (lanes, turns, n) states at t0 + k period, k = 1..turns, without those skipped
     states: np.ndarray
-    #: (lanes,) number of impacts and of attempted steps
+    """States at t0 + k period, k = skip + 1..turns, shape `(lanes, turns - skip, n)`.
+    """
     impacts: np.ndarray
+    """Number of impacts of each trajectory, shape `(lanes,)`."""
     steps: np.ndarray
-    #: (lanes,) 0 where the lane reached its end, else an index into `RESULTS`
+    """Number of attempted integration steps, shape `(lanes,)`."""
     code: np.ndarray
-    #: (lanes, turns) impacts in each turn, and how many of them completed a chatter
+    """Index into `RESULTS`, shape `(lanes,)`: 0 where the trajectory reached its end.
+    """
     hits: np.ndarray
+    """Impacts in each sampled period, shape `(lanes, turns - skip)`."""
     rests: np.ndarray
+    """Completed chatter sequences in each sampled period, same shape."""
 
 
 def stroboscope(
@@ -53,26 +59,39 @@ def stroboscope(
     workers: int = 1,
     progress: Callable[[float], None] | None = None,
 ) -> Stroboscope:
-    """Follow many trajectories for `turns` periods and sample each once a period.
+    """Simulate many trajectories for `turns` periods and sample each once per period.
 
-    **Arguments:**
+    Args:
+        system: The system; all trajectories share it unless `where` is given.
+        states: Initial states, shape `(lanes, n)`, or `(n,)` for the same start
+            everywhere.
+        turns: Number of periods.
+        skip: Number of periods at the start that are not sampled.
+        t0: Start time (s).
+        where: Picks the parameter that differs between trajectories
+            (`lambda s: s.speed`, or its dotted name), or several.
+        values: Value of that parameter in each trajectory, shape `(lanes,)` or
+            `(lanes, k)`.
+        period: Sampling period (s); default the system's forcing period.
+        settings: Accuracy; the default completes chatter as soon as the theory allows.
+        block: Number of trajectories advanced together; one that ends makes room for
+            the next.
+        rows: Attempted steps between two checks for ended trajectories.
+        max_steps: Budget of attempted steps per trajectory.
+        workers: Number of threads; results do not depend on it.
+        progress: Called with the fraction of trajectories done.
 
-    - `system`: the system; `where(system)` picks one of its parameters, which takes the
-      value `values[i]` in lane i (`where=lambda s: s.speed`), or a tuple of several,
-      which take the row `values[i]`. Without it all lanes share the system.
-    - `states`: shape `(lanes, n)`, or `(n,)` for all lanes alike.
-    - `skip`: number of turns at the start that are not sampled.
-    - `period`: s; the system's own forcing period by default.
-    - `settings`: accuracy; the default completes chatter as soon as theory allows.
-    - `block`: lanes that advance together, of which each that ends makes room for the
-      next; `rows`: attempts between looks at them.
-    - `max_steps`: budget of attempted steps of a lane.
-    - `workers`: threads that work on blocks; results do not depend on their number.
-    - `progress`: called with the fraction of lanes done.
+    Returns:
+        A `Stroboscope` of NumPy arrays.
 
-    **Returns:** a `Stroboscope`.
+    Raises:
+        ValueError: Shapes do not fit, or there is no period.
 
-    **Raises:** `ValueError` where shapes do not fit, or there is no period.
+    Examples:
+        >>> from jaxcam.hybrid import stroboscope
+        >>> from jaxcam.models import ImpactOscillator
+        >>> stroboscope(ImpactOscillator(), jnp.zeros((3, 2)), 4, skip=2).states.shape
+        (3, 2, 2)
     """
     refuse_tracers(
         "stroboscope", "jaxcam.hybrid.flow", system, states, values, t0, period
@@ -83,13 +102,9 @@ def stroboscope(
     settings.check()
     system = as_arrays(system)
     settings = as_arrays(settings)
-    states = np.asarray(real_array(states, "states"))
     values = None if values is None else np.asarray(values, dtype=float)
-    lanes = (
-        states.shape[0] if states.ndim == 2 else (1 if values is None else len(values))
-    )
-    if states.ndim == 1:
-        states = np.broadcast_to(states, (lanes, states.shape[0]))
+    states = _one_for_each(np.asarray(real_array(states, "states")), values)
+    lanes = len(states)
     where = None if where is None else pick(where, system)
     several = (len(where.leaves),) if where is not None and where.several else ()
     if (where is None) != (values is None) or (
@@ -100,14 +115,7 @@ def stroboscope(
             f"{lanes} lanes here"
         )
     length = None if period is None else jnp.asarray(period, dtype=jnp.float64)
-    if period is None and system.period is None:
-        raise ValueError(
-            "this system has no forcing period; pass period=... in seconds"
-        )
-    if turns < 1:
-        raise ValueError(f"turns is {turns}; give the number of periods, 1 or more")
-    if not 0 <= skip < turns:
-        raise ValueError(f"skip is {skip}; it must be less than the {turns} turns")
+    _check_times(system, period, turns, skip)
     start = jnp.asarray(t0, dtype=jnp.float64)
     _check(*split_lanes(system, where, values), settings, start, length, states)
 
@@ -134,6 +142,24 @@ def stroboscope(
             if progress is not None:
                 progress(min(1.0, len(pieces) * group / lanes))
     return Stroboscope(*map(np.concatenate, zip(*pieces, strict=True)))
+
+
+def _one_for_each(states, values) -> np.ndarray:
+    """Return one initial state for each lane, shape `(lanes, n)`."""
+    if states.ndim != 1:
+        return states
+    return np.broadcast_to(states, (1 if values is None else len(values), len(states)))
+
+
+def _check_times(system, period, turns, skip) -> None:
+    if period is None and system.period is None:
+        raise ValueError(
+            "this system has no forcing period; pass period=... in seconds"
+        )
+    if turns < 1:
+        raise ValueError(f"turns is {turns}; give the number of periods, 1 or more")
+    if not 0 <= skip < turns:
+        raise ValueError(f"skip is {skip}; it must be less than the {turns} turns")
 
 
 def _check(batched, shared, settings, t0, period, states) -> None:
@@ -163,7 +189,7 @@ def _check(batched, shared, settings, t0, period, states) -> None:
 
 @eqx.filter_jit
 def _starts(batched, shared, period, t0, states):
-    """Of each lane: smallest gap, whether it is behind, period, restitution."""
+    """Return smallest gap, whether it is negative, period and restitution, per lane."""
 
     def one(batched, state):
         system = eqx.combine(batched, shared)

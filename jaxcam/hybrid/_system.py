@@ -1,4 +1,4 @@
-"""What a hybrid system is: three functions of time and state, and parameters."""
+"""Define a hybrid system by three functions of time and state, and its parameters."""
 
 import abc
 from typing import Any, ClassVar
@@ -10,10 +10,10 @@ from ._types import RealScalar
 
 
 class HybridSystem(eqx.Module):
-    """A mechanical system that flies freely until it hits something.
+    """A mechanical system with impacts: free flight between impacts on its constraints.
 
-    Subclass it, state the three methods below, and declare the parameters as fields:
-    every floating-point field is a parameter that can be swept, fitted, followed and
+    Subclass it, define the three methods below, and declare the parameters as fields:
+    every floating-point field is a parameter that can be swept, fitted, continued and
     differentiated, and is picked with a `where` function (`lambda s: s.speed`).
 
     All three methods take the time `t` (seconds, a scalar) and the state (shape
@@ -24,54 +24,92 @@ class HybridSystem(eqx.Module):
     Everything else (normal velocity, acceleration and jerk of the gap, the sticking
     field, release, the completion of chatter) is derived from them by automatic
     differentiation.
+
+    Examples:
+        >>> class Ball(jaxcam.HybridSystem):
+        ...     restitution: float = 0.8
+        ...     def vector_field(self, t, state):
+        ...         return jnp.stack([state[1], -9.81])
+        ...     def gap(self, t, state):
+        ...         return state[0]
+        ...     def impact(self, t, state):
+        ...         return jnp.stack([state[0], -self.restitution * state[1]])
+        >>> int(jaxcam.simulate(Ball(), [1.0, 0.0], 0.0, 1.0).impacts.count)
+        1
     """
 
-    #: names and units of the state's components, for tables and axes
     state_names: ClassVar[tuple[str, ...]] = ()
+    """Names of the state's components, for tables and axes."""
     state_units: ClassVar[tuple[str, ...]] = ()
-    #: names of the constraints, in the order of `gap`, such as `("left", "right")`
+    """Units of the state's components, for tables and axes."""
     constraint_names: ClassVar[tuple[str, ...]] = ()
-    #: whether impacts may give speed, as at a driven bumper or where time runs
-    #: backwards; otherwise a coefficient of restitution above one is refused
+    """Names of the constraints, in the order of `gap`, such as `("left", "right")`."""
     active: ClassVar[bool] = False
+    """Whether impacts may add energy, as at a driven bumper or in reversed time.
+    Otherwise a coefficient of restitution above one is refused."""
 
     @abc.abstractmethod
     def vector_field(
         self, t: RealScalar, state: Float[Array, " n"]
     ) -> Float[Array, " n"]:
-        """Rate of change of the state in free flight, shape `(n,)`. (2.24)"""
+        """Return the rate of change of the state in free flight (thesis, eq. 2.24).
+
+        Args:
+            t: Time (s).
+            state: State, shape `(n,)`.
+
+        Returns:
+            Rates per second, shape `(n,)`.
+        """
 
     @abc.abstractmethod
     def gap(
         self, t: RealScalar, state: Float[Array, " n"]
     ) -> Float[Array, "*constraints"]:
-        """Distance to the constraint: positive outside, zero in contact. (2.23)"""
+        """Return the gap: positive in flight, zero in contact (thesis, eq. 2.23).
+
+        Args:
+            t: Time (s).
+            state: State, shape `(n,)`.
+
+        Returns:
+            A scalar, or shape `(m,)` for m constraints.
+        """
 
     @abc.abstractmethod
     def impact(
         self, t: RealScalar, state: Float[Array, " n"]
     ) -> Float[Array, "*constraints n"]:
-        """State just after an impact that found the system in `state`.
+        """Return the state just after an impact that finds the system in `state`.
 
-        It must have the form `state + W(t, state) * normal_velocity` (2.27): a grazing
-        state is left alone. With restitution r the normal velocity is multiplied
-        by -r.
+        It must have the form `state + W(t, state) * normal_velocity` (thesis,
+        eq. 2.27), so that a grazing state is unchanged. With coefficient of restitution
+        r the normal velocity is multiplied by -r.
+
+        Args:
+            t: Time (s).
+            state: State just before the impact, shape `(n,)`.
+
+        Returns:
+            State after the impact, shape `(n,)`, or one row per constraint, shape
+                `(m, n)`.
         """
 
     @property
     def period(self) -> Any:
-        """Period of the forcing (s), or `None` for a system without one."""
+        """Return the period of the forcing (s), or `None` for a system without one."""
         return None
 
     @property
     def breakpoints(self) -> Any:
-        """Times at which a function may change abruptly (s), shape `(k,)`, or `None`.
+        """Return the times at which a function may change abruptly (s), or `None`.
 
-        Steps end exactly there, and the field, gap and impact law are evaluated on
-        either side only, so that a switch may be written with `jnp.where(t < b, ...)`.
-        A system with a `period` has them in every period, at `b + k * period`; without
-        one they are times of the run. State a brief force by the times at which it
-        begins and ends; a few, as each costs some operations in every step.
+        Shape `(k,)`. Steps end exactly there, and the field, gap and impact law are
+        evaluated on either side only, so that a switch may be written with
+        `jnp.where(t < b, ...)`. A system with a `period` repeats them in every period,
+        at `b + k * period`; without one they are times of the run. Declare a brief
+        force by the times at which it begins and ends; keep them few, since each adds
+        some operations to every step.
         """
         return None
 
@@ -81,15 +119,18 @@ class HybridSystem(eqx.Module):
         return names[number] if number < len(names) else f"constraint {number}"
 
     def prepared(self) -> "HybridSystem":
-        """An equal system that is cheaper to evaluate many times.
+        """Return an equivalent system that is cheaper to evaluate many times.
 
         Called once before a simulation, and differentiated through. For example, a cam
         profile replaces its geometry by Fourier coefficients here.
+
+        Returns:
+            The system itself by default.
         """
         return self
 
     def check(self) -> None:
-        """Raise `ValueError` where a parameter has no physical meaning.
+        """Raise `ValueError` if a parameter has no physical meaning.
 
         Called with concrete parameters, before a simulation starts.
         """

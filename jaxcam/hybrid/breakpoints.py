@@ -1,8 +1,8 @@
-"""Declared times at which a field may change abruptly: no step reaches across one.
+"""Handle declared times of abrupt change: no step reaches across one.
 
-Between two of them the functions are evaluated strictly between them, so that a switch
-at the time itself may be written with `<` or `<=`. Any other time is taken as it is:
-moved by its rounding, a wall would not be where an impact has been found.
+Between two of them the functions are evaluated strictly inside the interval, so that a
+switch at the time itself may be written with `<` or `<=`. Any other time is used
+unchanged: a shift by rounding would move a wall away from a detected impact.
 """
 
 import jax

@@ -1,4 +1,4 @@
-"""Bad input, found before anything is compiled, with a sentence that names the fix."""
+"""Detect invalid input before anything is compiled; each message names the fix."""
 
 import hashlib
 
@@ -16,19 +16,22 @@ from .surface import check_restitution, restitutions
 
 
 def is_traced(tree) -> bool:
-    """Whether any array in `tree` is being transformed, so its value is not known."""
+    """Return whether any array in `tree` is traced, so that its value is unknown."""
     return any(isinstance(leaf, Tracer) for leaf in jax.tree.leaves(tree))
 
 
 def is_tracing() -> bool:
-    """Whether what is computed here becomes part of a program, as inside `jit`."""
+    """Return whether a computation here becomes part of a program, as inside `jit`."""
     return isinstance(jnp.asarray(0.0), Tracer)
 
 
 def refuse_tracers(name: str, instead: str, *arguments) -> None:
-    """Raise `ValueError` for a function that a transformation of JAX cannot go through.
+    """Raise `ValueError` for a function that JAX cannot transform.
 
-    **Arguments:** what its name is, what to use `instead`, and what it was called with.
+    Args:
+        name: Name of the function.
+        instead: The function to use instead.
+        *arguments: The arguments of the call.
     """
     if is_traced(arguments):
         raise ValueError(
@@ -83,7 +86,7 @@ _MANY = 1000
 
 
 def check_system(system, t0, state) -> None:
-    """Raise `ValueError` for a parameter or a function of the system that cannot be."""
+    """Raise `ValueError` for an invalid parameter or function of the system."""
     signature = _signature(system, state)
     numbers = signature, _digest(system)
     if signature is not None and numbers in _SOUND:
@@ -162,7 +165,7 @@ def _check_shapes(system, t0, state) -> None:
 
 
 def _shape(system, name, t0, state):
-    """Shape and type of what a function of the reader returns."""
+    """Return shape and type of the result of a user's function."""
     try:
         made = jax.eval_shape(getattr(system, name), t0, state)
     except (ConcretizationTypeError, TracerArrayConversionError) as error:

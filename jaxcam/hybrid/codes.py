@@ -1,4 +1,4 @@
-"""What a row of the log records, and how a run ended, in words."""
+"""Codes of log rows, and the reasons why a run ended, in words."""
 
 import enum
 import operator
@@ -28,33 +28,45 @@ class _ByCode(type(eqx.Enumeration)):
 
 
 class RESULTS(eqx.Enumeration, metaclass=_ByCode):
-    """How a run ended; each item says what to do about it.
+    """Reasons why a run ended; each message says what to do about it.
 
     `RESULTS[trajectory.code]` is the sentence of a result code, 0 being success.
+
+    Examples:
+        >>> from jaxcam.hybrid import RESULTS
+        >>> RESULTS[RESULTS.backward]
+        't1 lies before t0, and motion runs forward: exchange them.'
     """
 
     successful = ""
+    """The run reached t1."""
     running = (
         "The step budget ran out before t1: raise max_steps, or loosen the tolerance."
     )
+    """The step budget ran out."""
     step_failed = (
         "No step was short enough: the vector field or the gap is not smooth here, or "
         "the tolerance is below rounding; loosen the tolerance or check the functions."
     )
+    """The integration step shrank to nothing."""
     not_finite = (
         "The vector field, gap or impact law returned NaN or infinity: check the "
         "parameters and the state just before this time."
     )
+    """A function of the system returned NaN or infinity."""
     behind = (
         "A gap is negative at t0: start with every gap at zero or above, or pass "
         "state=None to start at the release point."
     )
+    """A gap is negative at t0."""
     backward = "t1 lies before t0, and motion runs forward: exchange them."
+    """t1 lies before t0."""
     together = (
         "Impacts on two or more constraints accumulate together, and only those on one "
         "are summed: choose t1 before this time, or parameters with which one "
         "constraint comes to rest before impacts on the next begin."
     )
+    """Impacts on several constraints accumulate together."""
 
 
 _ITEMS = (
@@ -66,12 +78,13 @@ _ITEMS = (
     RESULTS.backward,
     RESULTS.together,
 )
-#: codes: the place of each item above. A lane of the loop has one of them as its status
 FINISHED, RUNNING, STEP_FAILED, NOT_FINITE, BEHIND, BACKWARD, TOGETHER = map(
     float, range(len(_ITEMS))
 )
+"""Codes: the place of each item above. A lane of the loop has one of them as its
+status."""
 
 
 def message(code: int) -> str:
-    """The sentence of a result code."""
+    """Return the sentence that explains a result code."""
     return RESULTS[code]

@@ -22,16 +22,23 @@ class Tableau(NamedTuple):
     """Coefficients as plain numbers; zeros are skipped when the step is unrolled."""
 
     lower: tuple[tuple[float, ...], ...]
+    """Coefficients of the stages, one row per stage after the first."""
     nodes: tuple[float, ...]
+    """Nodes of the stages after the first."""
     weights: tuple[float, ...]
+    """Weights of the stages in the result."""
     error: tuple[float, ...]
+    """Weights of the stages in the error estimate."""
     order: int
+    """Order of the method."""
 
 
 def tableau_of(solver) -> Tableau:
-    """The tableau of an explicit diffrax Runge-Kutta solver with an error estimate.
+    """Return the tableau of an explicit diffrax Runge-Kutta solver with an error
+    estimate.
 
-    **Raises:** `ValueError` for an implicit solver or one without an error estimate.
+    Raises:
+        ValueError: For an implicit solver or one without an error estimate.
     """
     table = getattr(solver, "tableau", None)
     name = type(solver).__name__
@@ -58,11 +65,10 @@ def tableau_of(solver) -> Tableau:
     )
 
 
-#: Dormand and Prince's steps of order five
 DOPRI5 = tableau_of(diffrax.Dopri5())
-#: and of order eight
+"""Tableau of Dormand and Prince's method of order five."""
 DOPRI8 = tableau_of(diffrax.Dopri8())
-#: the classical method, which diffrax has not; without an estimate of the error
+"""Tableau of Dormand and Prince's method of order eight."""
 RK4 = Tableau(
     lower=((0.5,), (0.0, 0.5), (0.0, 0.0, 1.0)),
     nodes=(0.0, 0.5, 0.5, 1.0),
@@ -70,6 +76,8 @@ RK4 = Tableau(
     error=(0.0,) * 4,
     order=4,
 )
+"""Tableau of the classical method of order four, which diffrax lacks; without an error
+estimate."""
 
 
 class Squared(NamedTuple):
@@ -118,7 +126,8 @@ def step(tableau: Tableau, field, t, x: tuple, h):
 
     **Arguments:** `field(t, x)` and `x` work on tuples of scalars.
 
-    **Returns:** the state after the step, the error estimate, and the stages.
+    Returns:
+        The state after the step, the error estimate, and the stages.
     """
     n = len(x)
     first = field(t, x)
@@ -168,12 +177,26 @@ def array_step(
     *,
     unrolled: bool = False,
 ) -> tuple[Float[Array, " n"], Float[Array, " n"], Float[Array, " n"]]:
-    """One step of length `h` from `(t, x)` along `field(t, x)`, all of arrays.
+    """Take one Runge-Kutta step of length `h` from `(t, x)` along `field(t, x)`.
 
-    **Arguments:** `unrolled` says that the stages are written out one by one, for steps
-    in a hot loop; else `field` is compiled once.
+    Args:
+        tableau: Coefficients of the method.
+        field: The vector field, `field(t, x)`, shape `(n,)`.
+        t: Time (s).
+        x: State, shape `(n,)`.
+        h: Step length (s).
+        unrolled: Write out the stages one by one, for steps in a hot loop; otherwise
+            `field` is compiled once.
 
-    **Returns:** the state after the step, its error estimate, and the rate at `(t, x)`.
+    Returns:
+        The state after the step, its error estimate, and the rate at `(t, x)`, each
+            `(n,)`.
+
+    Examples:
+        >>> from jaxcam.hybrid.runge_kutta import RK4, array_step
+        >>> after, _, _ = array_step(RK4, lambda t, x: -x, 0.0, jnp.ones(1), 0.1)
+        >>> round(float(after[0]), 6)
+        0.904837
     """
     if unrolled:
         one: Any = step(tableau, lambda s, y: (field(s, y[0]),), t, (x,), h)
@@ -211,9 +234,25 @@ def _weighted(weights, rates):
 def fixed_steps(
     tableau: Tableau, field: Callable, t0, x0: Float[Array, " n"], t1, steps: int
 ) -> tuple[Float[Array, " s"], Float[Array, "s n"], Float[Array, "s n"]]:
-    """From `(t0, x0)` to `t1` along `field(t, x)` in equal steps.
+    """Integrate `field(t, x)` from `(t0, x0)` to `t1` in equal steps.
 
-    **Returns:** times, states and error estimates at the ends of the steps.
+    Args:
+        tableau: Coefficients of the method.
+        field: The vector field, `field(t, x)`, shape `(n,)`.
+        t0: Start time (s).
+        x0: Initial state, shape `(n,)`.
+        t1: End time (s).
+        steps: Number of steps, s.
+
+    Returns:
+        Times `(s,)`, states `(s, n)` and error estimates `(s, n)` at the ends of the
+            steps.
+
+    Examples:
+        >>> from jaxcam.hybrid.runge_kutta import RK4, fixed_steps
+        >>> _, states, _ = fixed_steps(RK4, lambda t, x: -x, 0.0, jnp.ones(1), 1.0, 10)
+        >>> round(float(states[-1, 0]), 5)
+        0.36788
     """
     h = (t1 - t0) / steps
 
@@ -235,12 +274,27 @@ def adaptive_steps(
     tolerance: float,
     max_steps: int = 4096,
 ) -> Float[Array, " n"]:
-    """The state at `t1` of a motion along `field(t, x)` from `(t0, x0)`.
+    """Integrate `field(t, x)` from `(t0, x0)` to `t1` with adaptive steps.
 
-    **Arguments:** `tolerance`, of the error of a step, relative to 1 + |x|.
+    Derivatives are taken at fixed step lengths.
 
-    **Returns:** NaN where `max_steps` attempts do not reach `t1`. The derivative is
-    that at fixed lengths of the steps.
+    Args:
+        tableau: Coefficients of a method with an error estimate.
+        field: The vector field, `field(t, x)`, shape `(n,)`.
+        t0: Start time (s).
+        x0: Initial state, shape `(n,)`.
+        t1: End time (s).
+        tolerance: Error allowed per step, relative to 1 + |x|.
+        max_steps: Budget of attempted steps.
+
+    Returns:
+        The state at `t1`, shape `(n,)`; NaN if `max_steps` attempts do not reach it.
+
+    Examples:
+        >>> from jaxcam.hybrid.runge_kutta import DOPRI5, adaptive_steps
+        >>> end = adaptive_steps(DOPRI5, lambda t, x: -x, 0.0, jnp.ones(1), 1.0, 1e-9)
+        >>> round(float(end[0]), 6)
+        0.367879
     """
     span = t1 - t0
 

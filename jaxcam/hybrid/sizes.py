@@ -1,4 +1,4 @@
-"""How large each component of a motion is, for comparisons that know no units."""
+"""Measure the size of each component of a motion, for comparisons without units."""
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -14,14 +14,26 @@ def component_sizes(
     state: Float[ArrayLike, " n"],
     period: Float[ArrayLike, ""],
 ) -> Float[Array, " n"]:
-    """What differences of two states are small or large beside, in the states' units.
+    """Return the scale of each state component, for relative comparisons of two states.
 
-    The size of each component, and of what its rate in free flight moves it by in
-    period / (2 pi): the amplitude of a harmonic motion, at whichever phase it is seen.
+    The scale is the size of the component plus the distance that its rate in free
+    flight covers in period / (2 pi): for a harmonic motion this is of the order of its
+    amplitude at every phase.
 
-    **Arguments:** time (s), state `(n,)`, and the period of the motion (s).
+    Args:
+        system: The system.
+        t: Time (s).
+        state: State, shape `(n,)`.
+        period: Period of the motion (s).
 
-    **Returns:** shape `(n,)`.
+    Returns:
+        Scales in the units of the state, shape `(n,)`.
+
+    Examples:
+        >>> from jaxcam.hybrid.sizes import component_sizes
+        >>> from jaxcam.models import ImpactOscillator
+        >>> component_sizes(ImpactOscillator(), 0.0, jnp.zeros(2), 2.0).shape
+        (2,)
     """
     numbers = (jnp.asarray(x, dtype=jnp.float64) for x in (t, state, period))
     return _sizes(as_arrays(system), *numbers)

@@ -13,12 +13,12 @@ from ..parameters import real_array
 class Attractor(NamedTuple):
     """The end of one orbit."""
 
-    #: smallest period up to the longest one looked for; 0 where there is none
     period: int
-    #: mean of log |f'| along it: positive in chaos
+    """Smallest period up to the longest one looked for; 0 where there is none."""
     lyapunov: float
-    #: whether the orbit stayed finite
+    """Mean of log |f'| along it: positive in chaos."""
     bounded: bool
+    """Whether the orbit stayed finite."""
 
     @property
     def kind(self) -> str:

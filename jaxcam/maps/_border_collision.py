@@ -17,16 +17,16 @@ _STEPS = 40
 class BorderCollision(NamedTuple):
     """What happens where a fixed point meets the border."""
 
-    #: "persistence": the fixed point goes on, on the other side; "nonsmooth fold": two
-    #: of them meet and vanish
     kind: str
-    #: whether an orbit of period two begins there, visiting both sides
+    """"persistence": the fixed point goes on, on the other side; "nonsmooth fold": two
+    of them meet and vanish."""
     period_two: bool
-    #: stability of the fixed point on either side of the border
+    """Whether an orbit of period two begins there, visiting both sides."""
     stable_left: bool
+    """Stability of the fixed point on either side of the border."""
     stable_right: bool
-    #: parameter and state at the border; NaN where matrices alone were classified
     parameter: float = float("nan")
+    """Parameter and state at the border; NaN where matrices alone were classified."""
     state: float = float("nan")
 
 
@@ -40,7 +40,8 @@ def classify_border_collision(left, right) -> BorderCollision:
 
     **Arguments:** derivatives on the two sides: numbers, or matrices `(n, n)`.
 
-    **Raises:** `ValueError` where an eigenvalue is 1 or -1, which is degenerate.
+    Raises:
+        ValueError: Where an eigenvalue is 1 or -1, which is degenerate.
     """
     values = [np.linalg.eigvals(np.atleast_2d(m).astype(float)) for m in (left, right)]
     real = [np.real(v[np.abs(np.imag(v)) < 1e-12]) for v in values]
@@ -64,7 +65,8 @@ def border_collision(
     **Arguments:** a continuous map, `where` that picks its parameter, and guesses of
     the parameter and of the fixed point.
 
-    **Raises:** `ValueError` where it is not found, or the map jumps at the border.
+    Raises:
+        ValueError: Where it is not found, or the map jumps at the border.
     """
     unknown = jnp.array([float(state), float(guess)])
     for _ in range(_STEPS):

@@ -25,8 +25,9 @@ def superstable(
     **Arguments:** a map, `where` that picks its parameter, the critical point, guesses
     of the first two parameters, and how many.
 
-    **Raises:** `ValueError` where Newton's method does not converge; rounding ends the
-    cascade at about the thirteenth.
+    Raises:
+        ValueError: Where Newton's method does not converge; rounding ends the cascade
+            at about the thirteenth.
     """
     found: list[float] = []
     for k in range(count):

@@ -20,15 +20,16 @@ class Saddle(NamedTuple):
     """A fixed point of a plane map with one multiplier inside the unit circle."""
 
     point: Float[Array, " 2"]
-    #: the multipliers, the stable one first, and their directions as columns
     multipliers: Float[np.ndarray, " 2"]
+    """The multipliers, the stable one first, and their directions as columns."""
     directions: Float[np.ndarray, "2 2"]
 
 
 def saddle_at(system: Callable, guess: VectorLike) -> Saddle:
     """The saddle near a guess, by Newton's method.
 
-    **Raises:** `ValueError` where there is no fixed point, or it is no saddle.
+    Raises:
+        ValueError: Where there is no fixed point, or it is no saddle.
     """
     point = real_array(guess, "guess")
     step = jnp.full(2, jnp.inf)
@@ -71,10 +72,12 @@ def grow_manifold(
     chooses the side; the length of curve wanted, the largest distance of neighbours,
     and the distance from the saddle at which it begins (its square is the error).
 
-    **Returns:** the points in order, shape `(points, 2)`. The curve ends where the map
-    is not finite, or jumps: there no refinement brings neighbours together.
+    Returns:
+        The points in order, shape `(points, 2)`. The curve ends where the map is not
+            finite, or jumps: there no refinement brings neighbours together.
 
-    **Raises:** `ValueError` where the direction is not stretched by the map.
+    Raises:
+        ValueError: Where the direction is not stretched by the map.
     """
     point = np.asarray(point, dtype=float)
     unit = np.asarray(direction, dtype=float)

@@ -40,8 +40,6 @@ def _root(sign):
     return branch
 
 
-#: Those of Figure 2.7. The map printed for period doubling, (1 + mu) x - x^3, has its
-#: multiplier at +1 and is a pitchfork; with the sign of the map changed it doubles.
 NORMAL_FORMS: dict[str, NormalForm] = {
     "fold": NormalForm("Fold", lambda x, mu: mu - x * x, (_root(1), _root(-1))),
     "transcritical": NormalForm(
@@ -58,3 +56,5 @@ NORMAL_FORMS: dict[str, NormalForm] = {
         discrete=True,
     ),
 }
+"""Those of Figure 2.7. The map printed for period doubling, (1 + mu) x - x^3, has its
+multiplier at +1 and is a pitchfork; with the sign of the map changed it doubles."""

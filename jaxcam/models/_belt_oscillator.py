@@ -20,25 +20,23 @@ class BeltOscillator(FilippovSystem):
     Dimensionless. The belt moves at a constant speed and pulls the mass along with
     `friction / (1 + weakening |x' - belt|)`, which falls with the speed of slip, so
     that the mass sticks and slips. Sticking is sliding on the surface x' = belt.
-
-    **Arguments:**
-
-    - `belt`: speed of the belt.
-    - `friction`: largest force of friction, in units of the spring's at x = 1.
-    - `weakening`: how fast friction falls with slip; zero is Coulomb's law.
-    - `damping`: damping ratio.
-    - `amplitude`, `omega`: of the forcing; no forcing by default.
     """
 
     state_names: ClassVar[tuple[str, ...]] = ("position", "velocity")
     state_units: ClassVar[tuple[str, ...]] = ("-", "-")
 
     belt: jax.Array = parameter(0.2)
+    """Speed of the belt."""
     friction: jax.Array = parameter(1.0)
+    """Largest force of friction, in units of the spring's at x = 1."""
     weakening: jax.Array = parameter(3.0)
+    """How fast friction falls with slip; zero is Coulomb's law."""
     damping: jax.Array = parameter(0.0)
+    """Damping ratio."""
     amplitude: jax.Array = parameter(0.0)
+    """Of the forcing; no forcing by default."""
     omega: jax.Array = parameter(1.0)
+    """Of the forcing; no forcing by default."""
 
     def above(self, t, state) -> jax.Array:
         """Faster than the belt: friction pulls back."""

@@ -18,22 +18,19 @@ class BouncingBall(HybridSystem):
     """A ball in free fall above a floor at `amplitude sin(frequency t)`.
 
     The state is the height above the floor's mean position and the velocity (m, m/s).
-
-    **Arguments:**
-
-    - `gravity`: acceleration of free fall (m/s^2).
-    - `restitution`: coefficient of restitution, between 0 and 1.
-    - `amplitude`: amplitude of the floor's motion (m); zero for a floor at rest.
-    - `frequency`: angular frequency of the floor's motion (rad/s).
     """
 
     state_names: ClassVar[tuple[str, ...]] = ("height", "velocity")
     state_units: ClassVar[tuple[str, ...]] = ("m", "m/s")
 
     gravity: jax.Array = parameter(9.81)
+    """Acceleration of free fall (m/s^2)."""
     restitution: jax.Array = parameter(0.8)
+    """Coefficient of restitution, between 0 and 1."""
     amplitude: jax.Array = parameter(0.0)
+    """Amplitude of the floor's motion (m); zero for a floor at rest."""
     frequency: jax.Array = parameter(1.0)
+    """Angular frequency of the floor's motion (rad/s)."""
 
     def vector_field(self, t, state) -> jax.Array:
         """Velocity and acceleration, shape `(2,)`."""

@@ -27,39 +27,36 @@ class CamFollower(AbstractCamDriven):
     (rad) between the follower and its contact angle. The defaults are Table 4.4 as
     printed, at 145 rpm.
 
-    **Arguments:**
-
-    - `speed`: speed of the cam (rad/s).
-    - `phase`: angle that the cam has turned at time zero (rad).
-    - `inertia`: moment of inertia of the follower about its hinge, J (kg m^2).
-    - `stiffness`: spring coefficient K (N/m).
-    - `spring_hook_x`: x-coordinate of the spring's hanging point, x_A (m).
-    - `spring_elongation`: y_A - d_0 - d_1 (m).
-    - `spring_half_height`: d in the spring's torque (m). The half height that sets the
-        contact angle belongs to the profile, so that each can be fitted.
-    - `profile`: contact angle as a function of the cam's angle, a
-        [`jaxcam.models.CamProfile`][] .
-    - `restitution`: law `r(speed, approach_speed)`, any Module; approach speed in
-        rad/s.
-    - `rotation`: "clockwise" or "counterclockwise". The thesis' tables need a cam
-        that turns clockwise, although its Table 4.3 counts angles the other way.
-
-    **Raises:** `ValueError` for another `rotation`.
+    Raises:
+        ValueError: For another `rotation`.
     """
 
     state_names: ClassVar[tuple[str, ...]] = ("follower angle", "follower velocity")
     state_units: ClassVar[tuple[str, ...]] = ("rad", "rad/s")
 
     speed: jax.Array = parameter(rpm_to_rad_s(145.0))
+    """Speed of the cam (rad/s)."""
     phase: jax.Array = parameter(0.0)
+    """Angle that the cam has turned at time zero (rad)."""
     inertia: jax.Array = parameter(0.043)
+    """Moment of inertia of the follower about its hinge, J (kg m^2)."""
     stiffness: jax.Array = parameter(105.0)
+    """Spring coefficient K (N/m)."""
     spring_hook_x: jax.Array = parameter(-0.031)
+    """x-coordinate of the spring's hanging point, x_A (m)."""
     spring_elongation: jax.Array = parameter(0.173)
+    """y_A - d_0 - d_1 (m)."""
     spring_half_height: jax.Array = parameter(0.021)
+    """d in the spring's torque (m). The half height that sets the contact angle belongs
+    to the profile, so that each can be fitted."""
     profile: CamProfile = eqx.field(default_factory=EccentricCircle)
+    """Contact angle as a function of the cam's angle, a [`jaxcam.models.CamProfile`][]
+    ."""
     restitution: eqx.Module = eqx.field(default_factory=LinearInSpeed)
+    """Law `r(speed, approach_speed)`, any Module; approach speed in rad/s."""
     rotation: str = eqx.field(default="clockwise", static=True)
+    """"clockwise" or "counterclockwise". The thesis' tables need a cam that turns
+    clockwise, although its Table 4.3 counts angles the other way."""
 
     def __check_init__(self):
         if self.rotation not in _SENSE:

@@ -14,18 +14,18 @@ from .cams import flat_oscillating_contour, MotionPieces, MotionProgram, profile
 
 _TURN = 2 * np.pi
 _SAMPLES = 1025
-#: of the golden section, from two steps of the scan to rounding
 _HALVINGS = 60
+"""Of the golden section, from two steps of the scan to rounding."""
 _GOLDEN = (5**0.5 - 1) / 2
 
 
 class FloatSpeed(NamedTuple):
     """The lowest speed at which a follower leaves its cam, and where it does."""
 
-    #: rad/s; infinite where no speed makes it leave
     speed: Float[Array, ""]
-    #: cam angle (rad)
+    """rad/s; infinite where no speed makes it leave."""
     cam_angle: Float[Array, ""]
+    """Cam angle (rad)."""
 
 
 def contact_load(
@@ -56,7 +56,8 @@ def contact_force(
     The lever is l of (4.19). `center` is the cam's axis (m) from the hinge, known for
     an eccentric circle.
 
-    **Raises:** `ValueError` where the axis is not known.
+    Raises:
+        ValueError: Where the axis is not known.
     """
     load = contact_load(system, cam_angles)
     if isinstance(system, ValveTrain):

@@ -24,16 +24,6 @@ class DesmodromicCam(AbstractCamDriven):
     The flanks ask for the same lift, one from below and one from above, a clearance
     apart. Two gaps: to the lower flank and to the upper one. No spring is needed; one
     may help.
-
-    **Arguments:**
-
-    - `profile`: lift (m) of the lower flank as a function of the cam's angle.
-    - `speed`: speed of the cam (rad/s).
-    - `clearance`: room of the follower between the flanks (m).
-    - `mass`, `stiffness`, `preload`, `damping`: of the follower (kg, N/m, N, N s/m), as
-        for [`jaxcam.models.ValveTrain`][].
-    - `restitution`: law `r(speed, approach_speed)` of both flanks.
-    - `phase`: angle of the cam at time zero (rad).
     """
 
     state_names: ClassVar[tuple[str, ...]] = ("lift", "follower velocity")
@@ -41,16 +31,25 @@ class DesmodromicCam(AbstractCamDriven):
     constraint_names: ClassVar[tuple[str, ...]] = ("lower flank", "upper flank")
 
     profile: CamProfile
+    """Lift (m) of the lower flank as a function of the cam's angle."""
     speed: jax.Array = parameter()
+    """Speed of the cam (rad/s)."""
     clearance: jax.Array = parameter()
+    """Room of the follower between the flanks (m)."""
     mass: jax.Array = parameter(1.0)
+    """Of the follower (kg, N/m, N, N s/m), as for [`jaxcam.models.ValveTrain`][]."""
     stiffness: jax.Array = parameter(0.0)
+    """Of the follower (kg, N/m, N, N s/m), as for [`jaxcam.models.ValveTrain`][]."""
     preload: jax.Array = parameter(0.0)
+    """Of the follower (kg, N/m, N, N s/m), as for [`jaxcam.models.ValveTrain`][]."""
     damping: jax.Array = parameter(0.0)
+    """Of the follower (kg, N/m, N, N s/m), as for [`jaxcam.models.ValveTrain`][]."""
     restitution: eqx.Module = eqx.field(
         default_factory=lambda: ConstantRestitution(as_parameter(0.5))
     )
+    """Law `r(speed, approach_speed)` of both flanks."""
     phase: jax.Array = parameter(0.0)
+    """Angle of the cam at time zero (rad)."""
 
     def vector_field(self, t, state) -> jax.Array:
         """Velocity and acceleration between the flanks, shape `(2,)`."""

@@ -20,22 +20,19 @@ class ImpactOscillator(HybridSystem):
 
     Dimensionless. Many of its periodic orbits and their bifurcations are known in
     closed form.
-
-    **Arguments:**
-
-    - `omega`: angular frequency of the forcing.
-    - `restitution`: coefficient of restitution at the wall, between 0 and 1.
-    - `wall`: position of the wall.
-    - `damping`: damping ratio.
     """
 
     state_names: ClassVar[tuple[str, ...]] = ("position", "velocity")
     state_units: ClassVar[tuple[str, ...]] = ("-", "-")
 
     omega: jax.Array = parameter(2.8)
+    """Angular frequency of the forcing."""
     restitution: jax.Array = parameter(0.8)
+    """Coefficient of restitution at the wall, between 0 and 1."""
     wall: jax.Array = parameter(0.0)
+    """Position of the wall."""
     damping: jax.Array = parameter(0.0)
+    """Damping ratio."""
 
     def vector_field(self, t, state) -> jax.Array:
         """Velocity and acceleration, shape `(2,)`."""

@@ -49,20 +49,21 @@ class PiecewiseLinear(FilippovSystem):
 class PlanarStability(NamedTuple):
     """What Theorem 2.2 says of the origin."""
 
-    #: asymptotically stable
     stable: bool
-    #: every motion is periodic, with this period (s); NaN where they are not
+    """Asymptotically stable."""
     periodic: bool
+    """Every motion is periodic, with this period (s); NaN where they are not."""
     period: float
-    #: growth of the logarithm of the amplitude in one turn; NaN where nothing turns
     growth: float
+    """Growth of the logarithm of the amplitude in one turn; NaN where nothing turns."""
 
 
 def planar_stability(system: PiecewiseLinear) -> PlanarStability:
     """Stability of the origin of a planar continuous system, by Theorem 2.2.
 
-    **Raises:** `ValueError` for another number of states, a field that jumps at the
-    line, or a pair (c, A-) that is not observable.
+    Raises:
+        ValueError: For another number of states, a field that jumps at the line, or a
+            pair (c, A-) that is not observable.
     """
     minus, plus = np.asarray(system.minus), np.asarray(system.plus)
     c = np.asarray(system.normal)

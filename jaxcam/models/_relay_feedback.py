@@ -12,7 +12,8 @@ class RelayFeedback(FilippovSystem):
 
     **Arguments:** the matrix A, shape `(n, n)`, and the vectors b and c, shape `(n,)`.
 
-    **Raises:** `ValueError` where the shapes do not fit.
+    Raises:
+        ValueError: Where the shapes do not fit.
     """
 
     matrix: jax.Array = parameter()

@@ -14,14 +14,10 @@ from ._units import rad_s_to_rpm
 
 
 class ConstantRestitution(eqx.Module):
-    """The same coefficient of restitution in every impact.
-
-    **Arguments:**
-
-    - `r`: coefficient of restitution, between 0 and 1.
-    """
+    """The same coefficient of restitution in every impact."""
 
     r: jax.Array = parameter()
+    """Coefficient of restitution, between 0 and 1."""
 
     def __call__(self, speed, approach_speed) -> jax.Array:
         del speed, approach_speed
@@ -36,15 +32,12 @@ class LinearInSpeed(eqx.Module):
     product of the two multipliers of an orbit with one impact a turn is r^2. The
     defaults are the line through the ten values of r found that way, rounded (which
     moves r by 5e-7).
-
-    **Arguments:**
-
-    - `slope`: change of the coefficient with the speed (s/rad).
-    - `intercept`: value of the line at speed zero.
     """
 
     slope: jax.Array = parameter(rad_s_to_rpm(0.00795658))
+    """Change of the coefficient with the speed (s/rad)."""
     intercept: jax.Array = parameter(-0.62122908)
+    """Value of the line at speed zero."""
 
     def __call__(self, speed, approach_speed) -> jax.Array:
         del approach_speed
@@ -52,19 +45,15 @@ class LinearInSpeed(eqx.Module):
 
 
 class PowerLawRestitution(eqx.Module):
-    """Restitution that falls with the approach speed: r = r0 (1 + v / v_ref)^-b.
-
-    **Arguments:**
-
-    - `r0`: coefficient of the slowest impacts, between 0 and 1.
-    - `reference_speed`: approach speed at which the coefficient has fallen to
-        r0 / 2^b, in the units of the gap a second.
-    - `exponent`: b; zero makes the coefficient constant.
-    """
+    """Restitution that falls with the approach speed: r = r0 (1 + v / v_ref)^-b."""
 
     r0: jax.Array = parameter()
+    """Coefficient of the slowest impacts, between 0 and 1."""
     reference_speed: jax.Array = parameter()
+    """Approach speed at which the coefficient has fallen to r0 / 2^b, in the units of
+    the gap a second."""
     exponent: jax.Array = parameter()
+    """b; zero makes the coefficient constant."""
 
     def __call__(self, speed, approach_speed) -> jax.Array:
         del speed

@@ -18,10 +18,10 @@ from .cams import CamProfile, MotionPieces, MotionProgram
 
 
 _TURN = 2 * np.pi
-#: distance, and velocity, that a contact can be off by, over the size of the state
 _NEAR = 4e-12
-#: of which a body that moves in is put behind the surface
+"""Distance, and velocity, that a contact can be off by, over the size of the state."""
 _BEHIND = 2e-4
+"""Of which a body that moves in is put behind the surface."""
 _Part = TypeVar("_Part", Impacts, Contacts, Steps)
 
 
@@ -56,9 +56,11 @@ def simulate_through_joints(
     **Arguments:** a system whose `profile` is a [`jaxcam.models.MotionProgram`][], and
     everything else as for [`jaxcam.simulate`][jaxcam.hybrid.simulate].
 
-    **Returns:** one trajectory; a contact that lasts through a joint is listed once.
+    Returns:
+        One trajectory; a contact that lasts through a joint is listed once.
 
-    **Raises:** `ValueError` for another profile, and whatever `simulate` raises.
+    Raises:
+        ValueError: For another profile, and whatever `simulate` raises.
     """
     refuse_tracers("simulate_through_joints", "jaxcam.simulate", system, state, t0, t1)
     program = system.profile

@@ -15,16 +15,13 @@ class TripleIntegrator(HybridSystem):
     It is what any impacting system looks like close to the release point of a sticking
     orbit, with the jerk there scaled to one: started with a negative acceleration it
     chatters, and if it comes to rest it lifts off where the acceleration is zero.
-
-    **Arguments:**
-
-    - `restitution`: coefficient of restitution, between 0 and 1.
     """
 
     state_names: ClassVar[tuple[str, ...]] = ("position", "velocity", "acceleration")
     state_units: ClassVar[tuple[str, ...]] = ("-", "-", "-")
 
     restitution: jax.Array = parameter(0.8)
+    """Coefficient of restitution, between 0 and 1."""
 
     def vector_field(self, t, state) -> jax.Array:
         """Velocity, acceleration and the unit jerk, shape `(3,)`. (6.22)"""

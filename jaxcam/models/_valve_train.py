@@ -23,33 +23,30 @@ class ValveTrain(AbstractCamDriven):
 
     The state is the follower's lift and velocity (m, m/s); the gap is the distance
     between the follower and the lift that the cam asks for.
-
-    **Arguments:**
-
-    - `profile`: lift (m) as a function of the cam's angle, such as a
-        [`jaxcam.models.MotionProgram`][].
-    - `speed`: speed of the cam (rad/s), half that of a four-stroke engine's crank.
-    - `mass`: mass that moves with the valve (kg), with a third of the spring's.
-    - `stiffness`: of the valve spring (N/m).
-    - `preload`: force of the spring at lift zero (N).
-    - `damping`: viscous damping (N s/m).
-    - `restitution`: law `r(speed, approach_speed)`, approach speed in m/s.
-    - `phase`: angle of the cam at time zero (rad).
     """
 
     state_names: ClassVar[tuple[str, ...]] = ("lift", "valve velocity")
     state_units: ClassVar[tuple[str, ...]] = ("m", "m/s")
 
     profile: CamProfile
+    """Lift (m) as a function of the cam's angle, such as a
+    [`jaxcam.models.MotionProgram`][]."""
     speed: jax.Array = parameter()
+    """Speed of the cam (rad/s), half that of a four-stroke engine's crank."""
     mass: jax.Array = parameter()
+    """Mass that moves with the valve (kg), with a third of the spring's."""
     stiffness: jax.Array = parameter()
+    """Of the valve spring (N/m)."""
     preload: jax.Array = parameter()
+    """Force of the spring at lift zero (N)."""
     damping: jax.Array = parameter(0.0)
+    """Viscous damping (N s/m)."""
     restitution: eqx.Module = eqx.field(
         default_factory=lambda: ConstantRestitution(as_parameter(0.5))
     )
+    """Law `r(speed, approach_speed)`, approach speed in m/s."""
     phase: jax.Array = parameter(0.0)
+    """Angle of the cam at time zero (rad)."""
 
     def vector_field(self, t, state) -> jax.Array:
         """Velocity and acceleration of the free valve, shape `(2,)`."""

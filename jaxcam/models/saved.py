@@ -57,8 +57,9 @@ def save_system(
     **Arguments:** `about` is anything else to be kept with it, in plain JSON: the
     errors of the parameters, where they come from.
 
-    **Raises:** `ValueError` for a system with a field that is not a number, an array, a
-    word or another Module.
+    Raises:
+        ValueError: For a system with a field that is not a number, an array, a word or
+            another Module.
     """
     Path(file).write_text(
         json.dumps(system_to_json(system, about=about), indent=1) + "\n", "utf-8"
@@ -71,7 +72,8 @@ def load_system(file: str | Path, *, classes: Iterable[type] = ()) -> HybridSyst
     **Arguments:** `classes` beside those of `jaxcam.models` that may occur in it, such
     as a system of your own, or `jaxcam.discrepancy.terms.saved_classes()`.
 
-    **Raises:** `ValueError` for a file that is not one, or names another class.
+    Raises:
+        ValueError: For a file that is not one, or names another class.
     """
     file = Path(file)
     try:
@@ -98,7 +100,8 @@ def system_to_json(
 def system_from_json(found: Any, *, classes: Iterable[type] = ()) -> HybridSystem:
     """The system in plain JSON; see `load_system`. Keys beside its own are ignored.
 
-    **Raises:** `ValueError` that says what is wrong.
+    Raises:
+        ValueError: That says what is wrong.
     """
     if not isinstance(found, dict) or found.get("format") != _FORMAT:
         raise ValueError(

@@ -32,12 +32,12 @@ class Pick:
     serves wherever equinox takes a `where`.
     """
 
-    #: places among the leaves of the tree
     leaves: tuple[int, ...]
-    #: `speed`, `profile.radius`, ...
+    """Places among the leaves of the tree."""
     names: tuple[str, ...]
-    #: whether a call returns a tuple
+    """`speed`, `profile.radius`, ..."""
     several: bool = False
+    """Whether a call returns a tuple."""
 
     def __call__(self, tree: PyTree) -> Any:
         flat = jax.tree.leaves(tree)
@@ -52,8 +52,9 @@ class Pick:
         return jax.tree.unflatten(structure, flat)
 
 
-#: what names a parameter: a function of the system, a dotted name, or several of those
 Where = Callable[[Any], Any] | str | tuple[Callable[[Any], Any] | str, ...] | Pick
+"""What names a parameter: a function of the system, a dotted name, or several of those.
+"""
 
 
 def pick(
@@ -64,17 +65,18 @@ def pick(
 ) -> Pick:
     """The parameters of `tree` that `where` picks.
 
-    **Arguments:**
+    Args:
+        where: A function of the tree (`lambda system: system.speed`), a dotted name
+            (`"profile.radius"`), or a tuple of those. A function may return several
+            parameters at once.
+        tree: A system, or any other pytree with numbers among its leaves.
+        integers: Whether integers may vary too; by default floating-point numbers only.
 
-    - `where`: a function of the tree (`lambda system: system.speed`), a dotted name
-        (`"profile.radius"`), or a tuple of those. A function may return several
-        parameters at once.
-    - `tree`: a system, or any other pytree with numbers among its leaves.
-    - `integers`: whether integers may vary too; by default floating-point numbers only.
+    Returns:
+        A [`jaxcam.parameters.Pick`][].
 
-    **Returns:** a [`jaxcam.parameters.Pick`][].
-
-    **Raises:** `ValueError` where a parameter does not exist or is not one number.
+    Raises:
+        ValueError: Where a parameter does not exist or is not one number.
     """
     if isinstance(where, Pick):
         return where
@@ -100,8 +102,9 @@ def pick(
 def unit_tangent(where: Where, tree: _Tree) -> _Tree:
     """The direction in which one parameter grows, for `equinox.filter_jvp`.
 
-    **Returns:** zeros for every inexact array of the tree, one for the parameter that
-    `where` picks, `None` for all other leaves.
+    Returns:
+        Zeros for every inexact array of the tree, one for the parameter that `where`
+            picks, `None` for all other leaves.
     """
     picked = pick(where, tree)
     zeros = jax.tree.map(jnp.zeros_like, eqx.filter(tree, eqx.is_inexact_array))

@@ -7,7 +7,8 @@ import jax.numpy as jnp
 def real_array(values, name: str = "state") -> jax.Array:
     """An array of 64-bit floats.
 
-    **Raises:** `ValueError` for complex numbers, whose imaginary part would be lost.
+    Raises:
+        ValueError: For complex numbers, whose imaginary part would be lost.
     """
     if any(jnp.iscomplexobj(leaf) for leaf in jax.tree.leaves(values)):
         raise ValueError(

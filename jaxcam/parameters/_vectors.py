@@ -7,10 +7,10 @@ import numpy as np
 from jaxtyping import Array, ArrayLike, Float, Real
 
 
-#: of a program, or of the host
 AnyArray: TypeAlias = Array | np.ndarray
+"""Of a program, or of the host."""
 RealScalar: TypeAlias = Real[ArrayLike, ""]
-#: a number that may be an argument of a program
 FloatScalar: TypeAlias = float | Float[AnyArray, ""]
-#: one vector of any length, as an array or as a list of numbers
+"""A number that may be an argument of a program."""
 VectorLike: TypeAlias = Float[ArrayLike, " _"] | Sequence[RealScalar]
+"""One vector of any length, as an array or as a list of numbers."""

@@ -38,29 +38,34 @@ def basins(
     attractor where their orbits agree; those that do not are where they visit common
     cells. Neither depends on the order of states, on blocks, or on the executor.
 
-    **Arguments:**
+    Args:
+        system: A hybrid system, or a section that is taken once a turn.
+        grid: A [`jaxcam.sweeps.Grid`][] of initial states; those behind the constraint
+            are left out.
+        turns: How many are simulated, of which the last `keep` are looked at; periods
+            up to `keep / 2` are found.
+        period_tolerance: For finding periods.
+        same: Orbits that differ by less, in units of `scale`, are one.
+        reruns: How often motions that do not repeat yet go on, each time for twice as
+            many turns.
+        scale: Size of the motions, shape `(n,)`; without, the largest extent or
+            coordinate of the grid, or the scale of `known`. It matters for a grid that
+            is small beside the attractors.
+        known: Basins of the same system whose attractors keep their numbers here, for
+            example when zooming in.
+        out: As for [`jaxcam.sweeps.blocks.run_blocks`][].
+        resume: As for [`jaxcam.sweeps.blocks.run_blocks`][].
+        executor: As for [`jaxcam.sweeps.blocks.run_blocks`][].
+        workers: As for [`jaxcam.sweeps.blocks.run_blocks`][].
+        progress: As for [`jaxcam.sweeps.blocks.run_blocks`][].
+        block: Rows of the grid's first component that are computed together.
 
-    - `system`: a hybrid system, or a section that is taken once a turn.
-    - `grid`: a [`jaxcam.sweeps.Grid`][] of initial states; those behind the constraint
-        are left out.
-    - `turns`: how many are simulated, of which the last `keep` are looked at; periods
-        up to `keep / 2` are found.
-    - `period_tolerance`: for finding periods.
-    - `same`: orbits that differ by less, in units of `scale`, are one.
-    - `reruns`: how often motions that do not repeat yet go on, each time for twice as
-        many turns.
-    - `scale`: size of the motions, shape `(n,)`; without, the largest extent or
-        coordinate of the grid, or the scale of `known`. It matters for a grid that is
-        small beside the attractors.
-    - `known`: basins of the same system whose attractors keep their numbers here, for
-        example when zooming in.
-    - `out`, `resume`, `executor`, `workers`, `progress`: as for
-        [`jaxcam.sweeps.blocks.run_blocks`][].
-    - `block`: rows of the grid's first component that are computed together.
+    Returns:
+        [`jaxcam.sweeps.Basins`][].
 
-    **Returns:** [`jaxcam.sweeps.Basins`][].
-
-    **Raises:** `ValueError` that names the fix; `RuntimeError` where workers were lost.
+    Raises:
+        ValueError: That names the fix.
+        RuntimeError: Where workers were lost.
     """
     section = as_section(system)
     check_turns(turns, keep, period_tolerance, reruns)

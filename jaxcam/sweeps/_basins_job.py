@@ -12,8 +12,8 @@ from .blocks import about_section, AbstractJob, Arrays, StoredVariable, StoreLay
 from .sections import AbstractSection
 
 
-#: extent of the cells by which motions that do not repeat are told apart
 _FINE = 1 / 64
+"""Extent of the cells by which motions that do not repeat are told apart."""
 
 
 class BasinsJob(AbstractJob):

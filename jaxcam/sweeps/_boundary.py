@@ -22,10 +22,10 @@ class Uncertainty(NamedTuple):
 
     exponent: float
     stderr: float
-    #: box-counting dimension of the boundary: that of the grid less the exponent
     dimension: float
-    #: distances (cells) and fractions of uncertain states that the fit goes through
+    """box-counting dimension of the boundary: that of the grid less the exponent."""
     distance: np.ndarray
+    """Distances (cells) and fractions of uncertain states that the fit goes through."""
     fraction: np.ndarray
 
 
@@ -34,13 +34,13 @@ def basin_entropy(attractor, box: int = 5) -> BasinEntropy:
 
     Daza et al., Scientific Reports 6, 31416 (2016).
 
-    **Arguments:**
+    Args:
+        attractor: Numbers of attractors on a grid of any dimension; states that cannot
+            start (-3) are left out.
+        box: Cells along each side of a box.
 
-    - `attractor`: numbers of attractors on a grid of any dimension; states that cannot
-        start (-3) are left out.
-    - `box`: cells along each side of a box.
-
-    **Raises:** `ValueError` for a box that does not fit into the grid.
+    Raises:
+        ValueError: For a box that does not fit into the grid.
     """
     attractor = np.asarray(attractor)
     sides = [k // box for k in attractor.shape]
@@ -72,13 +72,13 @@ def uncertainty_exponent(attractor, distances=(1, 2, 4, 8, 16)) -> Uncertainty:
     A state is uncertain where one at the given distance along an axis ends elsewhere;
     their fraction goes as distance^exponent (McDonald et al., Physica D 17, 1985).
 
-    **Arguments:**
+    Args:
+        attractor: Numbers of attractors on a grid of any dimension; pairs with a state
+            that cannot start (-3) are left out.
+        distances: In cells; the longest must fit into the grid.
 
-    - `attractor`: numbers of attractors on a grid of any dimension; pairs with a state
-        that cannot start (-3) are left out.
-    - `distances`: in cells; the longest must fit into the grid.
-
-    **Raises:** `ValueError` where fewer than two distances show uncertain states.
+    Raises:
+        ValueError: Where fewer than two distances show uncertain states.
     """
     attractor = np.asarray(attractor)
     axes = [axis for axis, k in enumerate(attractor.shape) if k > 1]

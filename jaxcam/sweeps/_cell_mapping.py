@@ -11,14 +11,14 @@ from ._inputs import as_section
 class CellMapping(NamedTuple):
     """Where the cells of a grid lead, in the shape of the grid."""
 
-    #: number of the group that a cell leads to; -1 for the sink cell
     group: np.ndarray
-    #: cells of the cycle that it leads to; 0 for the sink cell
+    """Number of the group that a cell leads to; -1 for the sink cell."""
     period: np.ndarray
-    #: turns until that is reached
+    """Cells of the cycle that it leads to; 0 for the sink cell."""
     steps: np.ndarray
-    #: whether the cell is part of a cycle
+    """Turns until that is reached."""
     cyclic: np.ndarray
+    """Whether the cell is part of a cycle."""
 
 
 def cell_mapping(system, grid: Grid, *, turns: int = 1) -> CellMapping:
@@ -29,12 +29,12 @@ def cell_mapping(system, grid: Grid, *, turns: int = 1) -> CellMapping:
     where they are small, and groups are numbered by their first cell. Compare with
     [`jaxcam.sweeps.basins`][], which follows each motion itself.
 
-    **Arguments:**
+    Args:
+        system: A hybrid system, or a section that is taken once a turn.
+        turns: Of one application of the map.
 
-    - `system`: a hybrid system, or a section that is taken once a turn.
-    - `turns`: of one application of the map.
-
-    **Raises:** `ValueError` for another section, or fewer than one turn.
+    Raises:
+        ValueError: For another section, or fewer than one turn.
     """
     section = as_section(system)
     if not section.regular or turns < 1:

@@ -25,8 +25,8 @@ from .blocks import (
 from .sections import AbstractSection
 
 
-#: motions in a block; fewer than elsewhere, as exponents take long
 _LANES = 1024
+"""Motions in a block; fewer than elsewhere, as exponents take long."""
 
 
 def chart(
@@ -50,22 +50,31 @@ def chart(
 ) -> Chart:
     """The label of the motion at each pair of values of two parameters.
 
-    **Arguments:**
+    Args:
+        system: A hybrid system, or a section that is taken once a turn.
+        where: Two parameters: `("speed", "stiffness")`, or two functions.
+        first: Their values, shapes `(k,)` and `(l,)`.
+        second: Their values, shapes `(k,)` and `(l,)`.
+        states: Where motions start: `(n,)`, or `(starts, n)`; in contact at rest
+            without.
+        turns: As for [`jaxcam.sweeps.basins`][].
+        keep: As for [`jaxcam.sweeps.basins`][].
+        period_tolerance: As for [`jaxcam.sweeps.basins`][].
+        reruns: As for [`jaxcam.sweeps.basins`][].
+        exponents: With it, the largest Lyapunov exponent over so many further turns.
+        out: As for [`jaxcam.sweeps.blocks.run_blocks`][].
+        resume: As for [`jaxcam.sweeps.blocks.run_blocks`][].
+        executor: As for [`jaxcam.sweeps.blocks.run_blocks`][].
+        workers: As for [`jaxcam.sweeps.blocks.run_blocks`][].
+        progress: As for [`jaxcam.sweeps.blocks.run_blocks`][].
+        block: Values of the second parameter that are computed together.
 
-    - `system`: a hybrid system, or a section that is taken once a turn.
-    - `where`: two parameters: `("speed", "stiffness")`, or two functions.
-    - `first`, `second`: their values, shapes `(k,)` and `(l,)`.
-    - `states`: where motions start: `(n,)`, or `(starts, n)`; in contact at rest
-        without.
-    - `turns`, `keep`, `period_tolerance`, `reruns`: as for [`jaxcam.sweeps.basins`][].
-    - `exponents`: with it, the largest Lyapunov exponent over so many further turns.
-    - `out`, `resume`, `executor`, `workers`, `progress`: as for
-        [`jaxcam.sweeps.blocks.run_blocks`][].
-    - `block`: values of the second parameter that are computed together.
+    Returns:
+        A [`jaxcam.sweeps.Chart`][].
 
-    **Returns:** a [`jaxcam.sweeps.Chart`][].
-
-    **Raises:** `ValueError` that names the fix; `RuntimeError` where workers were lost.
+    Raises:
+        ValueError: That names the fix.
+        RuntimeError: Where workers were lost.
     """
     section = as_section(system)
     check_turns(turns, keep, period_tolerance, reruns)

@@ -40,29 +40,34 @@ def diagram(
 ) -> Diagram:
     """The points that motions settle on, over the values of a parameter.
 
-    **Arguments:**
+    Args:
+        system: A hybrid system, seen once a period, or a section: with
+            [`jaxcam.sweeps.ImpactSection`][] the diagram is one of impacts, with
+            [`jaxcam.sweeps.Map`][] one of a map.
+        where: The parameter that varies: `lambda s: s.speed`, or `"speed"`.
+        values: Of the parameter, shape `(points,)`.
+        states: Where motions start: `(n,)`; `(starts, n)` for several of each value;
+            `(points, starts, n)` for others at each, such as those of
+            [`jaxcam.sweeps.monte_carlo`][]. Without, in contact at rest.
+        turns: How many are simulated, of which the last `keep` are kept.
+        direction: "each" value from the same start; or "up", "down" or "both" ways with
+            the state carried from one value to the next, which shows hysteresis.
+        dwell: s to wait at each value and s to store, as a rig is driven up or down, in
+            place of `turns` and `keep`. Samples that a value has no turns for are NaN.
+        period_tolerance: For finding periods, up to `keep / 2`.
+        out: As for [`jaxcam.sweeps.blocks.run_blocks`][].
+        resume: As for [`jaxcam.sweeps.blocks.run_blocks`][].
+        executor: As for [`jaxcam.sweeps.blocks.run_blocks`][].
+        workers: As for [`jaxcam.sweeps.blocks.run_blocks`][].
+        progress: As for [`jaxcam.sweeps.blocks.run_blocks`][].
+        block: Values that are computed together and stored at once.
 
-    - `system`: a hybrid system, seen once a period, or a section: with
-        [`jaxcam.sweeps.ImpactSection`][] the diagram is one of impacts, with
-        [`jaxcam.sweeps.Map`][] one of a map.
-    - `where`: the parameter that varies: `lambda s: s.speed`, or `"speed"`.
-    - `values`: of the parameter, shape `(points,)`.
-    - `states`: where motions start: `(n,)`; `(starts, n)` for several of each value;
-        `(points, starts, n)` for others at each, such as those of
-        [`jaxcam.sweeps.monte_carlo`][]. Without, in contact at rest.
-    - `turns`: how many are simulated, of which the last `keep` are kept.
-    - `direction`: "each" value from the same start; or "up", "down" or "both" ways
-        with the state carried from one value to the next, which shows hysteresis.
-    - `dwell`: s to wait at each value and s to store, as a rig is driven up or down, in
-        place of `turns` and `keep`. Samples that a value has no turns for are NaN.
-    - `period_tolerance`: for finding periods, up to `keep / 2`.
-    - `out`, `resume`, `executor`, `workers`, `progress`: as for
-        [`jaxcam.sweeps.blocks.run_blocks`][].
-    - `block`: values that are computed together and stored at once.
+    Returns:
+        A [`jaxcam.sweeps.Diagram`][].
 
-    **Returns:** a [`jaxcam.sweeps.Diagram`][].
-
-    **Raises:** `ValueError` that names the fix; `RuntimeError` where workers were lost.
+    Raises:
+        ValueError: That names the fix.
+        RuntimeError: Where workers were lost.
     """
     section = as_section(system)
     check_turns(turns, keep, period_tolerance)

@@ -19,8 +19,8 @@ from .blocks import (
 from .sections import AbstractSection, component_coordinates, filled
 
 
-#: values of a block where the state is carried from one to the next
 _CHAIN = 16
+"""Values of a block where the state is carried from one to the next."""
 
 
 class DiagramJob(AbstractJob):

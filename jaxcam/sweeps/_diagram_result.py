@@ -14,8 +14,8 @@ class Range(NamedTuple):
     label: str
     low: float
     high: float
-    #: 1 for values gone through upwards, -1 downwards, 0 where each begins anew
     direction: int
+    """1 for values gone through upwards, -1 downwards, 0 where each begins anew."""
 
 
 class Diagram:

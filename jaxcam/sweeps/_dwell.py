@@ -12,8 +12,8 @@ from .blocks import Arrays
 from .sections import AbstractSection
 
 
-#: of a turn, so that rounding costs none
 _SLACK = 1e-9
+"""Of a turn, so that rounding costs none."""
 
 
 def dwell_turns(
@@ -24,7 +24,8 @@ def dwell_turns(
     **Arguments:** `dwell`: s to wait, and s to store. The wait ends with the turn in
     which it is over, and whole turns alone are stored.
 
-    **Raises:** `ValueError` where there is not one whole turn to store.
+    Raises:
+        ValueError: Where there is not one whole turn to store.
     """
     if not section.regular:
         raise ValueError(

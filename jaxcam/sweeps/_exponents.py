@@ -38,15 +38,15 @@ def largest_exponents(
 ) -> Exponents:
     """Exponents of motions from states that have settled, by `variational`.
 
-    **Arguments:**
+    Args:
+        states: Shape `(lanes, n)`; lanes that are NaN stay so.
+        turns: How many are averaged, 16 or more.
+        where: As for a section; motions of one second parameter are computed together.
+        values: As for a section; motions of one second parameter are computed together.
+        progress: Called with the part that is done.
 
-    - `states`: shape `(lanes, n)`; lanes that are NaN stay so.
-    - `turns`: how many are averaged, 16 or more.
-    - `where`, `values`: as for a section; motions of one second parameter are computed
-        together.
-    - `progress`: called with the part that is done.
-
-    **Raises:** `ValueError` for a map, whose exponents are not computed here.
+    Raises:
+        ValueError: For a map, whose exponents are not computed here.
     """
     system = section.system
     if not isinstance(system, HybridSystem):

@@ -22,12 +22,12 @@ class FollowedBasins(NamedTuple):
 
     values: np.ndarray
     basins: tuple[Basins, ...]
-    #: for each value, the number that each of its attractors has throughout
     numbers: tuple[np.ndarray, ...]
-    #: (values, numbers) part of the states that ends on each; 0 where it is not met
+    """For each value, the number that each of its attractors has throughout."""
     shares: np.ndarray
-    #: (values, numbers) its name there, empty where it is not met
+    """(values, numbers) part of the states that ends on each; 0 where it is not met."""
     names: np.ndarray
+    """(values, numbers) its name there, empty where it is not met."""
 
 
 def follow_basins(
@@ -44,16 +44,18 @@ def follow_basins(
 ) -> FollowedBasins:
     """Basins at each value of a parameter, with attractors matched to those before.
 
-    **Arguments:**
+    Args:
+        where: The parameter, and its values in the order to go through.
+        values: The parameter, and its values in the order to go through.
+        most: Distance of two orbits, in units of the first scale, beyond which they are
+            not the same attractor, moved. Pairs are chosen so that all distances
+            together are smallest; the label may change, as it does where P(1,1) turns
+            into P(2,2).
+        out: Folder, in which there will be one sweep for each value.
+        ?- everything else: a: - everything else: as for [`jaxcam.sweeps.basins`][].
 
-    - `where`, `values`: the parameter, and its values in the order to go through.
-    - `most`: distance of two orbits, in units of the first scale, beyond which they are
-        not the same attractor, moved. Pairs are chosen so that all distances together
-        are smallest; the label may change, as it does where P(1,1) turns into P(2,2).
-    - `out`: folder, in which there will be one sweep for each value.
-    - everything else: as for [`jaxcam.sweeps.basins`][].
-
-    **Raises:** as [`jaxcam.sweeps.basins`][].
+    Raises:
+        ValueError: as [`jaxcam.sweeps.basins`][].
     """
     section = as_section(system)
     picked = pick(where, section.system)

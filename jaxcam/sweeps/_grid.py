@@ -7,20 +7,19 @@ import numpy as np
 class Grid(eqx.Module):
     """A box of states, cut into equal cells.
 
-    **Arguments:**
-
-    - `low`, `high`: corners of the box, one number for each component of the state.
-    - `shape`: number of cells along each component; 1 where it does not vary, with
-        `low` and `high` alike or not.
-
-    **Raises:** `ValueError` where they do not fit together.
+    Raises:
+        ValueError: Where they do not fit together.
     """
 
     low: tuple[float, ...] = eqx.field(converter=lambda x: tuple(map(float, x)))
+    """Corners of the box, one number for each component of the state."""
     high: tuple[float, ...] = eqx.field(converter=lambda x: tuple(map(float, x)))
+    """Corners of the box, one number for each component of the state."""
     shape: tuple[int, ...] = eqx.field(
         converter=lambda x: tuple(map(int, x)), static=True
     )
+    """Number of cells along each component; 1 where it does not vary, with `low` and
+    `high` alike or not."""
 
     def __check_init__(self):
         if not len(self.low) == len(self.high) == len(self.shape) > 0:

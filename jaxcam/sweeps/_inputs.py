@@ -6,14 +6,15 @@ from ..hybrid import HybridSystem
 from .sections import AbstractSection, Stroboscopic
 
 
-#: motions in a block, unless something else is asked for
 LANES = 4096
+"""Motions in a block, unless something else is asked for."""
 
 
 def as_section(system) -> AbstractSection:
     """A section as it is; a hybrid system seen once a period of its forcing.
 
-    **Raises:** `ValueError` for anything else, or a system without a period.
+    Raises:
+        ValueError: For anything else, or a system without a period.
     """
     if isinstance(system, AbstractSection):
         section = system

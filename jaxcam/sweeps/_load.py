@@ -16,8 +16,9 @@ def load_sweep(path: str | Path) -> Diagram | Basins | Chart:
     Without jaxcam, `xarray.open_dataset(path, engine="zarr", consolidated=False)` reads
     the same, unchecked.
 
-    **Raises:** `ValueError` that names the blocks that are missing or damaged, or where
-    there is no sweep, or one that is not finished.
+    Raises:
+        ValueError: That names the blocks that are missing or damaged, or where there is
+            no sweep, or one that is not finished.
     """
     dataset = checked(path)
     identity = json.loads(dataset.attrs[SWEEP])

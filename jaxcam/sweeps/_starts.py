@@ -6,16 +6,18 @@ import numpy as np
 def monte_carlo(low, high, count: int, seed: int = 0, points: int | None = None):
     """States drawn evenly from a box. (3.26)
 
-    **Arguments:**
+    Args:
+        low: Corners of the box, shape `(n,)`.
+        high: Corners of the box, shape `(n,)`.
+        count: How many.
+        points: With it, others for each of so many values of a parameter.
 
-    - `low`, `high`: corners of the box, shape `(n,)`.
-    - `count`: how many.
-    - `points`: with it, others for each of so many values of a parameter.
+    Returns:
+        Shape `(count, n)`, or `(points, count, n)`. Those of the first values do not
+            depend on how many follow.
 
-    **Returns:** shape `(count, n)`, or `(points, count, n)`. Those of the first values
-    do not depend on how many follow.
-
-    **Raises:** `ValueError` for corners that do not fit, or no states.
+    Raises:
+        ValueError: For corners that do not fit, or no states.
     """
     low, high = np.asarray(low, dtype=float), np.asarray(high, dtype=float)
     if low.shape != high.shape or low.ndim != 1 or not np.all(low <= high):

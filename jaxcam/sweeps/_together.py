@@ -18,10 +18,10 @@ from .blocks import Store
 from .sections import AbstractSection, component_coordinates
 
 
-#: points of an orbit that are kept of each attractor
 _SHOWN = 64
-#: distance of two orbits that are one attractor, in units of the scale
+"""Points of an orbit that are kept of each attractor."""
 _ALIKE = 0.05
+"""Distance of two orbits that are one attractor, in units of the scale."""
 
 
 def together(job: BasinsJob, store: Store, known: Basins | None) -> xarray.Dataset:

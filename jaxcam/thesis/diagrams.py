@@ -9,8 +9,8 @@ from ..models import rad_s_to_rpm
 from ..sweeps import Diagram
 
 
-#: what an orbit with one impact a turn doubles to
 CASCADE = tuple(f"P({2**k},{2**k})" for k in range(1, 5))
+"""What an orbit with one impact a turn doubles to."""
 
 
 class Events(NamedTuple):

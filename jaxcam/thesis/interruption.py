@@ -12,21 +12,23 @@ from .remember import remembered
 from .speeds import at_speed, speed_of
 
 
-#: where the thesis' rig is interrupted (section 6.7.1), and where Table 6.1 is taken
 INTERRUPTION = 152.67658
+"""Where the thesis' rig is interrupted (section 6.7.1), and where Table 6.1 is taken.
+"""
 REFERENCE = 152.67
-#: rpm of the ranges in which an interruption is looked for, the thesis' own first,
-#: then the next above and below, so many times
 _RANGE, _RANGES = 12.0, 5
-#: rpm to which the interruption of another rig moves the printed speeds around it
+"""Rpm of the ranges in which an interruption is looked for, the thesis' own first, then
+the next above and below, so many times."""
 _MOVED = 0.01
+"""Rpm to which the interruption of another rig moves the printed speeds around it."""
 
 
 @remembered
 def interruption(system: CamFollower) -> CamFollower:
     """The rig at the speed where its complete chattering is interrupted.
 
-    **Raises:** `ValueError` where that is not within 66 rpm of the thesis' speed.
+    Raises:
+        ValueError: Where that is not within 66 rpm of the thesis' speed.
     """
     places = [0, *(way * k for k in range(1, _RANGES + 1) for way in (1, -1))]
     for place in places:

@@ -34,11 +34,11 @@ from .orbits import first_orbit, NEAR_CAM
 from .speeds import at_rpm, speed_of
 
 
-#: relative tolerance of what Table 4.4 prints
 TOLERANCE = 0.02
-#: error of a printed sum of multipliers: they have twelve digits, but come from AUTO,
-#: whose orbits are converged to 1e-6 or 1e-7 as a rule
+"""Relative tolerance of what Table 4.4 prints."""
 TRACE_ERROR = 1e-6
+"""Error of a printed sum of multipliers: they have twelve digits, but come from AUTO,
+whose orbits are converged to 1e-6 or 1e-7 as a rule."""
 
 NAMES = (
     "eccentricity",
@@ -130,7 +130,8 @@ def tolerances(system: CamFollower) -> list[float]:
 def published(system: CamFollower) -> list[Published]:
     """Tables 5.2 and 6.1, with the functions that compute them near `system`.
 
-    **Raises:** `ValueError` where the rig has no P(1,1) at 148 rpm to start from.
+    Raises:
+        ValueError: Where the rig has no P(1,1) at 148 rpm to start from.
     """
     guess = first_orbit(system)
     if guess is None:

@@ -14,8 +14,8 @@ from ..plotting.curves import trajectory_curve
 from .settled import run_of, SettledMotion
 
 
-#: turns drawn, at least
 _TURNS = 4
+"""Turns drawn, at least."""
 
 
 def _cam(run: Trajectory, times):

@@ -16,10 +16,10 @@ from ..models import CamFollower, rpm_to_rad_s
 from .speeds import at_rpm, speed_of
 
 
-#: a state near the cam, from which Newton finds contact
 NEAR_CAM = (0.3, 0.0)
-#: where the search for the branch begins (rpm), and the longest stride along it
+"""A state near the cam, from which Newton finds contact."""
 SEARCH, _STRIDE = 148.0, 0.5
+"""Where the search for the branch begins (rpm), and the longest stride along it."""
 
 
 def first_orbit(system: CamFollower) -> ImpactOrbit | None:

@@ -47,18 +47,19 @@ TARGETS: dict[str, Target] = _discovered()
 def reproduce(name: str, system: CamFollower, size: str = SIZES[0]) -> "pd.DataFrame":
     """A table of the thesis or the numbers of a figure, printed beside computed.
 
-    **Arguments:**
+    Args:
+        name: A key of [`jaxcam.thesis.TARGETS`][], such as "table-5.2".
+        system: The rig, such as `jaxcam.models.preset("calibrated")`.
+        size: "full" for diagrams and basins as fine as published ones.
 
-    - `name`: a key of [`jaxcam.thesis.TARGETS`][], such as "table-5.2".
-    - `system`: the rig, such as `jaxcam.models.preset("calibrated")`.
-    - `size`: "full" for diagrams and basins as fine as published ones.
+    Returns:
+        Columns quantity, printed, computed, unit, difference, relative (the difference
+            over the size of the printed value); speeds in rpm and everything else in SI
+            units. NaN where the rig has no such thing, and under printed where the
+            thesis draws something but gives no number.
 
-    **Returns:** columns quantity, printed, computed, unit, difference, relative (the
-    difference over the size of the printed value); speeds in rpm and everything else in
-    SI units. NaN where the rig has no such thing, and under printed where the thesis
-    draws something but gives no number.
-
-    **Raises:** `ValueError` for an unknown name or size.
+    Raises:
+        ValueError: For an unknown name or size.
     """
     if name not in TARGETS:
         known = ", ".join(TARGETS)

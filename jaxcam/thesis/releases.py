@@ -14,8 +14,8 @@ from .speeds import at_speed
 from .target import Rows, Target
 
 
-#: times in a period at which a release is asked for
 _LOOKS = 8
+"""Times in a period at which a release is asked for."""
 
 
 def released_turn(system: CamFollower, rpm: float) -> Trajectory:

@@ -16,18 +16,19 @@ from .speeds import at_rpm, speed_of
 from .target import Rows
 
 
-#: turns before the first look, samples kept, and how often patience is doubled
 _TURNS, _KEEP, _RERUNS = 300, 64, 2
+"""Turns before the first look, samples kept, and how often patience is doubled."""
 
 
 class ShownMotion(NamedTuple):
     """A motion that the thesis shows: where it starts, and what it is said to be."""
 
     rpm: float
-    #: at time zero; None is in contact at rest
     state: tuple[float, float] | None
-    #: printed P(impacts, turns); zero impacts are contact for good, zero turns chaos
+    """At time zero; None is in contact at rest."""
     impacts: float
+    """Printed P(impacts, turns); zero impacts are contact for good, zero turns chaos.
+    """
     turns: int
     name: str = ""
 
@@ -41,13 +42,13 @@ class SettledMotion(NamedTuple):
     """What it settles on."""
 
     case: ShownMotion
-    #: as in `jaxcam.sweeps.attractors.Labels`
     impacts: int
+    """As in `jaxcam.sweeps.attractors.Labels`."""
     turns: int
-    #: rests in one orbit, or in all the turns kept
     rests: int
-    #: at the end, at time zero in its turn
+    """Rests in one orbit, or in all the turns kept."""
     state: Float[np.ndarray, " 2"]
+    """At the end, at time zero in its turn."""
 
     @property
     def label(self) -> str:

@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-#: quantity, printed value, computed value, unit
 Row: TypeAlias = tuple[str, Any, Any, str]
+"""Quantity, printed value, computed value, unit."""
 Rows: TypeAlias = list[Row]
 SIZES = ("default", "full")
 
@@ -25,14 +25,14 @@ class Target:
     """A table of the thesis, or a figure: its numbers and its drawing."""
 
     title: str
-    #: takes the rig; returns rows of quantity, printed and computed value, and unit
     compute: Callable[..., Rows]
-    #: takes the rig; tables have no drawing
+    """Takes the rig; returns rows of quantity, printed and computed value, and unit."""
     draw: Callable[..., Figure] | None = None
-    #: whether both also take a size, "default" or "full"
+    """Takes the rig; tables have no drawing."""
     sized: bool = False
-    #: what to know of it when comparing
+    """Whether both also take a size, "default" or "full"."""
     note: str = ""
+    """What to know of it when comparing."""
 
     def table(self, system: CamFollower, size: str = SIZES[0]) -> "pd.DataFrame":
         """Printed beside computed, as [`jaxcam.thesis.reproduce`][] returns it."""

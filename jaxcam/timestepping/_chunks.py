@@ -8,8 +8,8 @@ import jax.numpy as jnp
 import numpy as np
 
 
-#: steps in a chunk
 CHUNK = 1024
+"""Steps in a chunk."""
 
 
 def in_chunks(run: Callable[[Any, Any], tuple[Any, Any]], carry, steps: int):

@@ -19,14 +19,14 @@ from .complementarity import explain, lemke
 class SteppedMotion(NamedTuple):
     """A motion at the ends of its steps; the first row is the start."""
 
-    #: (steps + 1,) s
     time: Float[Array, " times"]
-    #: (steps + 1, n)
+    """(steps + 1,) s."""
     state: Float[Array, "times n"]
-    #: (steps, m) change of each normal velocity by impacts and contact
+    """(steps + 1, n)."""
     percussion: Float[Array, "steps m"]
-    #: (steps + 1, m)
+    """(steps, m) change of each normal velocity by impacts and contact."""
     gap: Float[Array, "times m"]
+    """(steps + 1, m)."""
 
     def rests_from(self, constraint: int = 0) -> float:
         """The time (s) from which contact pushes in every step up to the end.
@@ -57,7 +57,8 @@ def moreau(
     **Arguments:** any [`jaxcam.hybrid.HybridSystem`][], a state with every gap >= 0,
     times (s) and the number of steps. Each number of steps is compiled once.
 
-    **Raises:** `ValueError` where a step has no solution, or the motion is not finite.
+    Raises:
+        ValueError: Where a step has no solution, or the motion is not finite.
     """
     state = real_array(state)
     t0, t1 = float(t0), float(t1)

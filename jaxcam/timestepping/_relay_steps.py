@@ -17,12 +17,12 @@ from .relay import is_p_matrix, relay_problem, RelaySystem
 class RelayMotion(NamedTuple):
     """A relay system's motion at the ends of the steps; the first row is the start."""
 
-    #: (steps + 1,) s
     time: Float[Array, " times"]
-    #: (steps + 1, n)
+    """(steps + 1,) s."""
     state: Float[Array, "times n"]
-    #: (steps, m) inputs u and outputs y over each step
+    """(steps + 1, n)."""
     inputs: Float[Array, "steps m"]
+    """(steps, m) inputs u and outputs y over each step."""
     outputs: Float[Array, "steps m"]
 
 
@@ -34,8 +34,9 @@ def relay_steps(system: RelaySystem, state: VectorLike, t1, steps: int) -> Relay
     Camlibel, W. P. M. H. Heemels, J. M. Schumacher, Consistency of a time-stepping
     method for a class of piecewise-linear networks, 2002).
 
-    **Raises:** `ValueError` where a step has no solution or more than one: I - h A is
-    singular, or C (I/h - A)^-1 B + D is no P-matrix.
+    Raises:
+        ValueError: Where a step has no solution or more than one: I - h A is singular,
+            or C (I/h - A)^-1 B + D is no P-matrix.
     """
     state = real_array(state)
     n = system.A.shape[0]

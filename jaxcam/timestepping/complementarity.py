@@ -19,11 +19,11 @@ SOLVED, RAY, EXHAUSTED = 0, 1, 2
 class Pivoting(NamedTuple):
     """Where Lemke's method ended."""
 
-    #: (m,) the solution, and w = M z + q
     z: Float[Array, " m"]
+    """(m,) the solution, and w = M z + q."""
     w: Float[Array, " m"]
-    #: 0 solved, 1 ended on a ray (no solution is known), 2 out of pivots
     code: Int[Array, ""]
+    """0 solved, 1 ended on a ray (no solution is known), 2 out of pivots."""
 
 
 def lemke(matrix: Float[Array, "m m"], vector: Float[Array, " m"]) -> Pivoting:
@@ -88,7 +88,8 @@ def solve_lcp(
 ) -> Float[Array, " m"]:
     """The z of [`jaxcam.timestepping.complementarity.lemke`][], or an error.
 
-    **Raises:** `ValueError` where Lemke's method finds no solution.
+    Raises:
+        ValueError: Where Lemke's method finds no solution.
     """
     matrix = jnp.asarray(matrix, dtype=jnp.float64)
     vector = jnp.asarray(vector, dtype=jnp.float64)

@@ -25,7 +25,8 @@ class RelaySystem(eqx.Module):
     **Arguments:** matrices of shapes `(n, n)`, `(n, m)`, `(m, n)` and `(m, m)`; no D
     means zero.
 
-    **Raises:** `ValueError` where the shapes do not fit.
+    Raises:
+        ValueError: Where the shapes do not fit.
     """
 
     A: Float[Array, "n n"]
@@ -55,7 +56,8 @@ def relay_problem(
     and 1 - u with its negative part. It always has a solution, since u is bounded; only
     one where M is a P-matrix.
 
-    **Returns:** u and y, shape `(m,)`, and how the pivoting ended.
+    Returns:
+        u and y, shape `(m,)`, and how the pivoting ended.
     """
     m = vector.shape[0]
     eye = jnp.eye(m, dtype=vector.dtype)
@@ -69,7 +71,8 @@ def relay_problem(
 def is_p_matrix(matrix: Float[ArrayLike, "m m"]) -> bool:
     """Whether all principal minors are positive: one solution for every vector.
 
-    **Raises:** `ValueError` for more than 14 rows; there are 2^m minors.
+    Raises:
+        ValueError: For more than 14 rows; there are 2^m minors.
     """
     values = np.asarray(matrix)
     m = values.shape[0]

@@ -23,14 +23,15 @@ def adding_thresholds(
     values approach the interruption with the factor q of
     [`variational.scaling_law`][].
 
-    **Arguments:**
+    Args:
+        system: As in [`variational.chatter_interruption`][].
+        where: As in [`variational.chatter_interruption`][].
+        interruption: The parameter value where complete chattering ends.
+        beyond: A value on the interrupted side; thresholds between the two are found.
+        count: How many, farthest first.
 
-    - `system`, `where`: as in [`variational.chatter_interruption`][].
-    - `interruption`: the parameter value where complete chattering ends.
-    - `beyond`: a value on the interrupted side; thresholds between the two are found.
-    - `count`: how many, farthest first.
-
-    **Returns:** shape `(count,)`, in the parameter's unit.
+    Returns:
+        Shape `(count,)`, in the parameter's unit.
     """
     check_chatter_system(system)
     along = line(system, where)

@@ -25,12 +25,12 @@ class BetaMap(eqx.Module):
         gap = c (tau_P^3 / 6 + beta tau*^2 tau_P + gamma tau*^3).
     """
 
-    #: (P^2 (lambda - 1/2)) at the last impact, P the product of the h (6.43)
     beta: Float[Array, "..."]
-    #: (P^3 (1/3 - lambda)) there, the term that (6.55) drops
+    """(P^2 (lambda - 1/2)) at the last impact, P the product of the h (6.43)."""
     gamma: Float[Array, "..."]
-    #: number of impacts that follow the first
+    """(P^3 (1/3 - lambda)) there, the term that (6.55) drops."""
     impacts: Int[Array, "..."]
+    """Number of impacts that follow the first."""
 
 
 def beta_parts(lam, r) -> BetaMap:
@@ -38,8 +38,9 @@ def beta_parts(lam, r) -> BetaMap:
 
     **Arguments:** `lam` >= 0 and `r` in (0, 1), dimensionless, broadcast.
 
-    **Returns:** a [`variational.chatter.BetaMap`][]. Zero up to lambda_bar, where
-    chattering completes before release (`impacts` is then 0).
+    Returns:
+        A [`variational.chatter.BetaMap`][]. Zero up to lambda_bar, where chattering
+            completes before release (`impacts` is then 0).
     """
     lam, r = jnp.broadcast_arrays(
         jnp.asarray(lam, jnp.float64), jnp.asarray(r, jnp.float64)
@@ -56,8 +57,9 @@ def beta_map(lam, r) -> Float[Array, "..."]:
 
     **Arguments:** `lam` >= 0 and `r` in (0, 1), dimensionless, broadcast.
 
-    **Returns:** beta, dimensionless: 0 up to lambda_bar, then lobes between square-root
-    corners, each q^-1 wider and p^-2 higher than the one before.
+    Returns:
+        Beta, dimensionless: 0 up to lambda_bar, then lobes between square-root corners,
+            each q^-1 wider and p^-2 higher than the one before.
     """
     return beta_parts(lam, r).beta
 

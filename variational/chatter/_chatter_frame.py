@@ -29,14 +29,14 @@ class ChatterFrame(eqx.Module):
     Times of the frame's methods are those of the system; tau is time less `release`.
     """
 
-    #: time of release, phi_alpha of the thesis counted as a time
     release: Float[Array, ""]
-    #: (n,) state there
+    """Time of release, phi_alpha of the thesis counted as a time."""
     state: Float[Array, " n"]
-    #: c, the rate of the relative acceleration there, > 0 (6.76), (6.112)
+    """(n,) state there."""
     jerk: Float[Array, ""]
-    #: coefficient of restitution of slow impacts there
+    """C, the rate of the relative acceleration there, > 0 (6.76), (6.112)."""
     restitution: Float[Array, ""]
+    """Coefficient of restitution of slow impacts there."""
 
     def coordinate(self, time, speed) -> Float[Array, "..."]:
         """lambda = v / (c tau^2) of an impact with rebound speed v. (6.84), (6.98)"""
@@ -55,7 +55,8 @@ class ChatterFrame(eqx.Module):
         **Arguments:** `time` and rebound `speed` of an impact before release;
         `section`, the time of the section, after release.
 
-        **Returns:** shape `(2,)`. Unlike (6.55) the term of order tau*^3 is kept.
+        Returns:
+            Shape `(2,)`. Unlike (6.55) the term of order tau*^3 is kept.
         """
         tau, after = time - self.release, section - self.release
         parts = beta_parts(self.coordinate(time, speed), self.restitution)
@@ -67,16 +68,16 @@ class ChatterFrame(eqx.Module):
 def chatter_frame(system: HybridSystem, time=0.0) -> ChatterFrame:
     """Release point and scales of chattering; differentiable in the parameters.
 
-    **Arguments:**
+    Args:
+        system: Two states, one constraint, with a period.
+        time: The release is the first at or after it, of the stretch of contact that
+            ends before the contact acceleration is greatest.
 
-    - `system`: two states, one constraint, with a period.
-    - `time`: the release is the first at or after it, of the stretch of contact that
-      ends before the contact acceleration is greatest.
+    Returns:
+        A [`variational.chatter.ChatterFrame`][]; NaN where the period has no release.
 
-    **Returns:** a [`variational.chatter.ChatterFrame`][]; NaN where the period has no
-    release.
-
-    **Raises:** `ValueError` for a system without a period.
+    Raises:
+        ValueError: For a system without a period.
     """
     check_chatter_system(system)
     return _frame(as_arrays(system), jnp.asarray(time, jnp.float64))
@@ -130,8 +131,9 @@ def parameter_incidence(system: HybridSystem, where: Where, time=0.0) -> Chatter
 
     **Arguments:** as in [`variational.chatter_frame`][]; `where` picks the parameter.
 
-    **Returns:** a [`variational.chatter.ChatterFrame`][] of derivatives, in units of
-    the frame over the parameter's.
+    Returns:
+        A [`variational.chatter.ChatterFrame`][] of derivatives, in units of the frame
+            over the parameter's.
     """
     system = as_arrays(system)
     along = unit_tangent(where, system)

@@ -35,20 +35,20 @@ _NEAR = 1e-12
 class ChatterOrbit(eqx.Module):
     """The motion that starts at release, up to contact; where its chattering ends."""
 
-    #: where it starts; releases follow a period apart
     frame: ChatterFrame
-    #: when the impacts accumulate; NaN where they do not before the last release
+    """Where it starts; releases follow a period apart."""
     accumulation: Float[Array, ""]
-    #: whether they do, in the last of the periods asked for and not before
+    """When the impacts accumulate; NaN where they do not before the last release."""
     complete: Bool[Array, ""]
-    #: signed distance from the interruption in the last period: zero where accumulation
-    #: and release coincide, negative where chattering is complete, smooth in the
-    #: parameters except where an earlier impact grazes; NaN for a period without
-    #: impact, or where contact comes in an earlier one
+    """Whether they do, in the last of the periods asked for and not before."""
     margin: Float[Array, ""]
-    #: impacts listed: of a complete sequence those until the completion map takes
-    #: over, of an interrupted one all
+    """Signed distance from the interruption in the last period: zero where accumulation
+    and release coincide, negative where chattering is complete, smooth in the
+    parameters except where an earlier impact grazes; NaN for a period without impact,
+    or where contact comes in an earlier one."""
     impacts: Int[Array, ""]
+    """Impacts listed: of a complete sequence those until the completion map takes over,
+    of an interrupted one all."""
 
 
 class _Search(NamedTuple):
@@ -88,9 +88,11 @@ def chatter_accumulation(
     [`variational.chatter_frame`][]; `periods`, from release to the release after
     sticking. Pure; may be compiled, batched and differentiated forward.
 
-    **Returns:** a [`variational.chatter.ChatterOrbit`][].
+    Returns:
+        A [`variational.chatter.ChatterOrbit`][].
 
-    **Raises:** `ValueError` for a system without a period.
+    Raises:
+        ValueError: For a system without a period.
     """
     check_chatter_system(system)
     return _orbit(as_arrays(system), jnp.asarray(time, jnp.float64), periods)

@@ -45,31 +45,33 @@ _LINEAR = 1e-8
 class ComposedMap(eqx.Module):
     """Local theory of one turn around the interruption of complete chattering."""
 
-    #: its release lies between the section at the start of the turn and the next
     frame: ChatterFrame
-    #: time of the section at the end of the turn
+    """Its release lies between the section at the start of the turn and the next."""
     section: Float[Array, ""]
-    #: (2,) state there of the orbit that sticks until release; its gap and velocity
+    """Time of the section at the end of the turn."""
     state: Float[Array, "2"]
+    """(2,) state there of the orbit that sticks until release; its gap and velocity."""
     relative: Float[Array, "2"]
-    #: time and rebound speed of D* on the orbit from release, and its lambda
     time: Float[Array, ""]
+    """Time and rebound speed of D* on the orbit from release, and its lambda."""
     speed: Float[Array, ""]
     lam: Float[Array, ""]
-    #: fixed point of the lambda-map
     lambda_bar: Float[Array, ""]
-    #: A: rebound speed and time of D* by the state at the section (6.107)
+    """Fixed point of the lambda-map."""
     matrix: Float[Array, "2 2"]
-    #: B: state at the section by epsilon, and gap and velocity by epsilon (6.103)
+    """A: rebound speed and time of D* by the state at the section (6.107)."""
     vector: Float[Array, "2"]
+    """B: state at the section by epsilon, and gap and velocity by epsilon (6.103)."""
     relative_vector: Float[Array, "2"]
-    #: C: lambda by rebound speed and time of D*, (6.100), and by the parameter (6.114)
     covector: Float[Array, "2"]
+    """C: lambda by rebound speed and time of D*, (6.100), and by the parameter (6.114).
+    """
     by_parameter: Float[Array, ""]
-    #: change of lambda - lambda_bar with the parameter, D* moving with the orbit
     incidence: Float[Array, ""]
-    #: change of gap and velocity at the section with the parameter, epsilon = 0 (6.115)
+    """Change of lambda - lambda_bar with the parameter, D* moving with the orbit."""
     drift: Float[Array, "2"]
+    """Change of gap and velocity at the section with the parameter, epsilon = 0
+    (6.115)."""
 
     @property
     def tau(self) -> Float[Array, ""]:
@@ -94,7 +96,8 @@ class ComposedMap(eqx.Module):
 
         **Arguments:** changes of the rebound speed and time of D*, broadcast.
 
-        **Returns:** shape `(..., 2)`.
+        Returns:
+            Shape `(..., 2)`.
         """
         moved = self.covector[0] * speed + self.covector[1] * time
         parts = beta_parts(self.lambda_bar + moved, self.frame.restitution)
@@ -105,7 +108,8 @@ class ComposedMap(eqx.Module):
 
         **Arguments:** distance of the parameter from the interruption, any shape.
 
-        **Returns:** shape `(..., 2)`.
+        Returns:
+            Shape `(..., 2)`.
         """
         return self._section(self._left(self.incidence * parameter), parameter)
 
@@ -137,18 +141,19 @@ def composed_map(
 ) -> ComposedMap:
     """Compose beta with the rest of the turn, all derivatives by differentiation.
 
-    **Arguments:**
+    Args:
+        system: At the interruption ([`variational.chatter_interruption`][]).
+        where: Picks the parameter.
+        rank: Number of the impact D* after release, from 0. The later it is, the better
+            the lambda-map describes what follows, and the smaller the deviations for
+            which A and C are linear: they move D* by much less than tau*.
+        phase: Of the section, in periods, in the flight after release.
 
-    - `system`: at the interruption ([`variational.chatter_interruption`][]).
-    - `where`: picks the parameter.
-    - `rank`: number of the impact D* after release, from 0. The later it is, the better
-      the lambda-map describes what follows, and the smaller the deviations for which
-      A and C are linear: they move D* by much less than tau*.
-    - `phase`: of the section, in periods, in the flight after release.
+    Returns:
+        A [`variational.chatter.ComposedMap`][].
 
-    **Returns:** a [`variational.chatter.ComposedMap`][].
-
-    **Raises:** `ValueError` for a system without a period.
+    Raises:
+        ValueError: For a system without a period.
     """
     check_chatter_system(system)
     system = as_arrays(system)
@@ -225,7 +230,8 @@ def simulated_at_section(
     **Arguments:** `system` at the interruption; `speed`, changes of the rebound speed
     of D*, shape `(k,)`.
 
-    **Returns:** a [`variational.chatter.SectionArrival`][] with a leading axis.
+    Returns:
+        A [`variational.chatter.SectionArrival`][] with a leading axis.
     """
     system = as_arrays(system).prepared()
     speeds = composed.speed + jnp.asarray(speed, jnp.float64)
@@ -243,8 +249,9 @@ def simulated_by_parameter(
     **Arguments:** `system` at the interruption; `where` picks the parameter; `changes`
     of it, shape `(k,)`; `phase` of the section, in periods.
 
-    **Returns:** a [`variational.chatter.SectionArrival`][] with a leading axis, at the
-    section after the next release.
+    Returns:
+        A [`variational.chatter.SectionArrival`][] with a leading axis, at the section
+            after the next release.
     """
     system = as_arrays(system)
     value = jnp.asarray(pick(where, system)(system), jnp.float64)

@@ -14,8 +14,8 @@ from jaxcam.hybrid.runge_kutta import adaptive_steps, array_step, DOPRI8
 from jaxcam.hybrid.surface import normal_acceleration
 
 
-#: error of a step, relative to one plus the state
 TOLERANCE = 1e-14
+"""Error of a step, relative to one plus the state."""
 
 
 def runge_kutta_step(rates, s, y, h):
@@ -46,8 +46,9 @@ def fly(system: HybridSystem, time, state, speed, duration, height: ArrayLike = 
 
     **Arguments:** as in [`variational.chatter.next_impact`][]; `duration` >= 0.
 
-    **Returns:** state `(n,)`, gap and normal velocity at the end; the gap keeps its
-    relative accuracy if the flight starts on the surface.
+    Returns:
+        State `(n,)`, gap and normal velocity at the end; the gap keeps its relative
+            accuracy if the flight starts on the surface.
     """
     rates = flight_rates(system, jnp.asarray(time, jnp.float64))
     y = on_flight(state, speed, height)

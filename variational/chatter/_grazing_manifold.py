@@ -26,12 +26,12 @@ class ImpactCurve(eqx.Module):
 class GrazingManifold(eqx.Module):
     """Impacts that lead to, or follow from, an impact without speed. (6.16)"""
 
-    #: (points,) phases outside contact at which the motion grazes
     grazing: Float[Array, " points"]
-    #: (n, points) S^1..S^n, impacts whose n-th successor grazes (6.13), (6.15)
+    """(points,) phases outside contact at which the motion grazes."""
     before: ImpactCurve
-    #: (n, points) W^1..W^n, the n-th successors of grazing impacts (6.14), (6.15)
+    """(n, points) S^1..S^n, impacts whose n-th successor grazes (6.13), (6.15)."""
     after: ImpactCurve
+    """(n, points) W^1..W^n, the n-th successors of grazing impacts (6.14), (6.15)."""
 
 
 def grazing_manifold(
@@ -46,11 +46,13 @@ def grazing_manifold(
     above zero; `n`, how many of each; `points` on the line; `horizon`, the longest
     flight, in periods.
 
-    **Returns:** a [`variational.chatter.GrazingManifold`][]; times are not taken modulo
-    the period. A point of S^k whose flight would have started inside an earlier impact
-    is NaN.
+    Returns:
+        A [`variational.chatter.GrazingManifold`][]; times are not taken modulo the
+            period. A point of S^k whose flight would have started inside an earlier
+            impact is NaN.
 
-    **Raises:** `ValueError` for a system without a period.
+    Raises:
+        ValueError: For a system without a period.
     """
     check_chatter_system(system)
     return _manifold(as_arrays(system).prepared(), n, points, horizon)
@@ -101,18 +103,19 @@ def chattering_region(
     Close to release it is the parabola of lambda_bar; from there it is continued
     backwards by the impact map, which keeps it.
 
-    **Arguments:**
+    Args:
+        system: Two states, one constraint, a period; restitution above zero.
+        points: On each piece between an impact and the one before.
+        impacts: How many pieces.
+        near: Time from release, in periods, at which the parabola is trusted; its
+            relative error there is of that order, and the backward map reduces it.
 
-    - `system`: two states, one constraint, a period; restitution above zero.
-    - `points`: on each piece between an impact and the one before.
-    - `impacts`: how many pieces.
-    - `near`: time from release, in periods, at which the parabola is trusted; its
-      relative error there is of that order, and the backward map reduces it.
+    Returns:
+        A [`variational.chatter.ImpactCurve`][], shape `(impacts * points,)`, ordered
+            backwards in time from release; D lies between it and speed zero.
 
-    **Returns:** a [`variational.chatter.ImpactCurve`][], shape `(impacts * points,)`,
-    ordered backwards in time from release; D lies between it and speed zero.
-
-    **Raises:** `ValueError` for a system without a period.
+    Raises:
+        ValueError: For a system without a period.
     """
     check_chatter_system(system)
     return _boundary(as_arrays(system).prepared(), points, impacts, near)

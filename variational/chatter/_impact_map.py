@@ -25,16 +25,16 @@ _GAUSS, _GAUSS_WEIGHTS = (_GAUSS + 1) / 2, _GAUSS_WEIGHTS / 2
 class ImpactPoint(eqx.Module):
     """Just after an impact."""
 
-    #: time of the impact
     time: Float[Array, "..."]
-    #: (n,) state after it
+    """Time of the impact."""
     state: Float[Array, "... n"]
-    #: normal velocity after it, > 0; known better than the state's own
+    """(n,) state after it."""
     speed: Float[Array, "..."]
-    #: normal velocity before it, < 0
+    """Normal velocity after it, > 0; known better than the state's own."""
     approach: Float[Array, "..."]
-    #: whether there was one before the horizon
+    """Normal velocity before it, < 0."""
     found: Bool[Array, "..."]
+    """Whether there was one before the horizon."""
 
 
 def next_impact(
@@ -44,16 +44,17 @@ def next_impact(
 
     Pure; may be compiled, batched and differentiated forward, also twice.
 
-    **Arguments:**
+    Args:
+        system: With one constraint, already `prepared`.
+        time: On the surface, after an impact or at release; shape `(n,)`.
+        state: On the surface, after an impact or at release; shape `(n,)`.
+        speed: Normal velocity there, >= 0 (0 at release).
+        horizon: How long to wait for an impact, in units of time.
+        height: Gap at the start, > 0 for a motion that is already in flight; `speed`
+            may then have either sign.
 
-    - `system`: with one constraint, already `prepared`.
-    - `time`, `state`: on the surface, after an impact or at release; shape `(n,)`.
-    - `speed`: normal velocity there, >= 0 (0 at release).
-    - `horizon`: how long to wait for an impact, in units of time.
-    - `height`: gap at the start, > 0 for a motion that is already in flight; `speed`
-      may then have either sign.
-
-    **Returns:** a [`variational.chatter.ImpactPoint`][].
+    Returns:
+        A [`variational.chatter.ImpactPoint`][].
     """
     time = jnp.asarray(time, jnp.float64)
     longest = longest_step(system, horizon)
@@ -122,7 +123,8 @@ def impact_map(system: HybridSystem, time, speed, *, horizon=None):
     **Arguments:** a system with two states and one constraint; `time`; `speed` >= 0 in
     the units of the gap over time; `horizon`, the longest wait (a period by default).
 
-    **Returns:** time and rebound speed of the next impact; NaN where there is none.
+    Returns:
+        Time and rebound speed of the next impact; NaN where there is none.
     """
     system = as_arrays(system)
     time = jnp.asarray(time, jnp.float64)

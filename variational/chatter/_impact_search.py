@@ -31,31 +31,31 @@ _LANDINGS, _LOWERINGS = 100, 12
 _BEHIND = 2.2
 
 _SEARCH, _LAND, _LAST, _BOTTOM = range(4)
-#: lengths of steps and decisions carry no derivative
 frozen = jax.lax.stop_gradient
+"""Lengths of steps and decisions carry no derivative."""
 
 
 class SearchState(NamedTuple):
     """Where the motion is, and what the next step is for."""
 
     time: Float[Array, ""]
-    #: state, normal velocity and gap: the last two are integrated beside the state from
-    #: the last impact on, so that low flights are as exact as high ones
     y: Float[Array, " n+2"]
-    #: time of the last impact
+    """State, normal velocity and gap: the last two are integrated beside the state from
+    the last impact on, so that low flights are as exact as high ones."""
     since: Float[Array, ""]
-    #: of the next step
+    """Time of the last impact."""
     length: Float[Array, ""]
-    #: of any step
+    """Of the next step."""
     longest: Float[Array, ""]
+    """Of any step."""
     mode: Int[Array, ""]
-    #: lengths before and behind what is looked for
     low: Float[Array, ""]
+    """Lengths before and behind what is looked for."""
     high: Float[Array, ""]
-    #: steps for the same purpose
     tries: Int[Array, ""]
-    #: whether the flight has just passed its lowest point
+    """Steps for the same purpose."""
     rises: Bool[Array, ""]
+    """Whether the flight has just passed its lowest point."""
 
     @property
     def searches(self) -> Bool[Array, ""]:

@@ -52,15 +52,15 @@ def line(system: HybridSystem, where: Where) -> Line:
 class Interruption(eqx.Module):
     """Where complete chattering ends at the release point."""
 
-    #: the parameter, in its own unit
     value: Float[Array, ""]
-    #: whether the bracket was closed to rounding
+    """The parameter, in its own unit."""
     converged: Bool[Array, ""]
-    #: margin at the two ends of the bracket, and its slope at `value`
+    """Whether the bracket was closed to rounding."""
     ends: Float[Array, "2"]
+    """Margin at the two ends of the bracket, and its slope at `value`."""
     slope: Float[Array, ""]
-    #: evaluations of one turn
     turns: Int[Array, ""]
+    """Evaluations of one turn."""
 
 
 def interruption_in(
@@ -181,20 +181,21 @@ def chatter_interruption(
     not stick then and is followed by lobes of periodic windows and chaos (section 5.4,
     chapter 6).
 
-    **Arguments:**
+    Args:
+        system: Two states, one constraint and a period.
+        where: Picks the parameter: `lambda system: system.speed`, or `"speed"`.
+        bracket: Two values of it, chattering complete at one and interrupted at the
+            other. With several periods, near the interruption: elsewhere contact may
+            come earlier, which counts as interrupted too.
+        periods: Of the forcing in one of the orbit.
 
-    - `system`: two states, one constraint and a period.
-    - `where`: picks the parameter: `lambda system: system.speed`, or `"speed"`.
-    - `bracket`: two values of it, chattering complete at one and interrupted at the
-      other. With several periods, near the interruption: elsewhere contact may come
-      earlier, which counts as interrupted too.
-    - `periods`: of the forcing in one of the orbit.
+    Returns:
+        The value, in the parameter's unit; differentiable forward in the other
+            parameters.
 
-    **Returns:** the value, in the parameter's unit; differentiable forward in the other
-    parameters.
-
-    **Raises:** `ValueError` where the bracket holds no interruption, as far as the
-    values can be seen.
+    Raises:
+        ValueError: Where the bracket holds no interruption, as far as the values can be
+            seen.
     """
     check_chatter_system(system)
     low, high = bracket

@@ -32,11 +32,11 @@ class _Sequence(NamedTuple):
     """What the impacts so far say."""
 
     over: Bool[Array, ""]
-    #: number of the period, from 1, whose end is the next release
     turn: Int[Array, ""]
-    #: time from that release and speed of the impact that the margin is taken from, and
-    #: its number in its period
+    """Number of the period, from 1, whose end is the next release."""
     tau: Float[Array, ""]
+    """Time from that release and speed of the impact that the margin is taken from, and
+    its number in its period."""
     speed: Float[Array, ""]
     rank: Int[Array, ""]
     here: Int[Array, ""]
@@ -56,9 +56,11 @@ def interruption_margin(
     `prepared`; its release; `periods` from there to the last release. Pure; may be
     compiled, batched and differentiated forward, once.
 
-    **Returns:** NaN for a last period without impact, or where contact comes earlier.
+    Returns:
+        NaN for a last period without impact, or where contact comes earlier.
 
-    **Raises:** `ValueError` where it is differentiated twice.
+    Raises:
+        ValueError: Where it is differentiated twice.
     """
     return _margin(system, frame, periods=periods)
 

@@ -12,8 +12,8 @@ from jaxtyping import Array, Float
 from jaxcam.hybrid.lowering import while_loop
 
 
-#: above it the motion does not return (6.47); above 1/3 it does so after release
 LAMBDA_MAX = 3 / 8
+"""Above it the motion does not return (6.47); above 1/3 it does so after release."""
 
 
 def _root(lam):
@@ -26,8 +26,9 @@ def hop_ratio(lam) -> Float[Array, "..."]:
 
     **Arguments:** `lam`, dimensionless, any shape, between 0 and 3/8.
 
-    **Returns:** h, between 1 and -1/2; negative where the next impact comes after
-    release; NaN above 3/8, where there is none.
+    Returns:
+        h, between 1 and -1/2; negative where the next impact comes after release; NaN
+            above 3/8, where there is none.
     """
     return (3 * _root(lam) - 1) / 2
 
@@ -35,13 +36,13 @@ def hop_ratio(lam) -> Float[Array, "..."]:
 def lambda_map(lam, r) -> Float[Array, "..."]:
     """f(lambda): the coordinate of the next impact. (6.36), (6.89)
 
-    **Arguments:**
+    Args:
+        lam: Dimensionless, any shape, between 0 and 3/8.
+        r: Coefficient of restitution of slow impacts, broadcast against `lam`.
 
-    - `lam`: dimensionless, any shape, between 0 and 3/8.
-    - `r`: coefficient of restitution of slow impacts, broadcast against `lam`.
-
-    **Returns:** f, with a pole at 1/3 where the next impact falls on release; NaN above
-    3/8, where the motion does not return.
+    Returns:
+        f, with a pole at 1/3 where the next impact falls on release; NaN above 3/8,
+            where the motion does not return.
     """
     s = _root(lam)
     # 3 s (1 - s) = 8 lambda s / (1 + s) keeps all digits of a small lambda

@@ -22,20 +22,20 @@ _ROW = 32
 class Lobes(eqx.Module):
     """Lobes of the stroboscopic map, found by the number of impacts of a turn."""
 
-    #: (k + 1,) where they begin and end: the turn grazes there; farthest first
     corners: np.ndarray
-    #: (k + 1,) the map there
+    """(k + 1,) where they begin and end: the turn grazes there; farthest first."""
     values: np.ndarray
-    #: (k, samples) points of each lobe, from its outer corner inwards; the map and its
-    #: slope there
+    """(k + 1,) the map there."""
     points: np.ndarray
+    """(k, samples) points of each lobe, from its outer corner inwards; the map and its
+    slope there."""
     images: np.ndarray
     slopes: np.ndarray
-    #: where the lobes accumulate, and the map there
     accumulation: float
+    """Where the lobes accumulate, and the map there."""
     limit: float
-    #: the whole measured map: (n,) points, images and numbers of impacts
     scan: np.ndarray
+    """The whole measured map: (n,) points, images and numbers of impacts."""
     scanned: np.ndarray
     impacts: np.ndarray
 
@@ -43,17 +43,17 @@ class Lobes(eqx.Module):
 class LocalMap(eqx.Module):
     """The fitted map (5.2)-(5.5): one lobe, repeated with two scales."""
 
-    #: logarithms of the scales of the image and of the point (5.2)
     Q: Float[Array, ""]
+    """Logarithms of the scales of the image and of the point (5.2)."""
     M: Float[Array, ""]
-    #: height and width of the first lobe; x_1 = x_0 - width
     delta_pi: Float[Array, ""]
+    """Height and width of the first lobe; x_1 = x_0 - width."""
     delta_x: Float[Array, ""]
-    #: c_0..c_n and d of (5.3), in powers of x - x_0
     coefficients: Float[Array, " n"]
+    """c_0..c_n and d of (5.3), in powers of x - x_0."""
     root: Float[Array, ""]
-    #: right end of the first lobe and the map there
     x_0: Float[Array, ""]
+    """Right end of the first lobe and the map there."""
     p_0: Float[Array, ""]
 
     @property
@@ -109,18 +109,19 @@ def find_lobes(
     A lobe ends where the number of impacts of the turn changes; those places are
     bisected to rounding.
 
-    **Arguments:**
+    Args:
+        system: With two states, one constraint and a period, near the interruption.
+        state: Shape `(2,)`, at time `phase` x period, on the sticking orbit.
+        deviations: Shape `(n,)`, of `component` of the state, in order and across the
+            accumulation point.
+        direction: Shape `(2,)`, along which the state deviates; only `component` does
+            by default, as in the thesis. Motions leave the lobes along the `vector` of
+            a [`variational.chatter.ComposedMap`][], so the map that is iterated needs
+            that.
+        samples: Points measured in each lobe; `most`: how many lobes.
 
-    - `system`: with two states, one constraint and a period, near the interruption.
-    - `state`: shape `(2,)`, at time `phase` x period, on the sticking orbit.
-    - `deviations`: shape `(n,)`, of `component` of the state, in order and across the
-      accumulation point.
-    - `direction`: shape `(2,)`, along which the state deviates; only `component` does
-      by default, as in the thesis. Motions leave the lobes along the `vector` of a
-      [`variational.chatter.ComposedMap`][], so the map that is iterated needs that.
-    - `samples`: points measured in each lobe; `most`: how many lobes.
-
-    **Raises:** `ValueError` where fewer than two lobes are found.
+    Raises:
+        ValueError: Where fewer than two lobes are found.
     """
     check_chatter_system(system)
     system = as_arrays(system)
@@ -285,10 +286,11 @@ def iterate_local_map(
 ) -> Float[Array, "shifts keep"]:
     """Attractor of the fitted map, moved sideways by each of `shifts`. (Figure 5.28)
 
-    **Arguments:** `shifts`, shape `(k,)`, in the units of x: the map of x is that of
-    x + shift; iterates in all, and how many of the last to keep.
+    **Arguments:** `shifts`, shape `(k,)`, in the units of x: the map of x is that of x
+    + shift; iterates in all, and how many of the last to keep.
 
-    **Returns:** shape `(k, keep)`.
+    Returns:
+        Shape `(k, keep)`.
     """
     return _iterate(local, jnp.asarray(shifts, jnp.float64), turns, keep)
 

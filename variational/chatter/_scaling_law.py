@@ -11,14 +11,14 @@ from jaxtyping import Array, Float
 class ScalingLaw(eqx.Module):
     """Fixed point of the lambda-map and the scales that follow from it."""
 
-    #: fixed point: impacts with this lambda accumulate exactly at release (6.45)
     lambda_bar: Float[Array, "..."]
-    #: h(lambda_bar): each impact is closer to release by this factor
+    """Fixed point: impacts with this lambda accumulate exactly at release (6.45)."""
     p: Float[Array, "..."]
-    #: 1 / f'(lambda_bar): each lobe is closer to lambda_bar by this factor (6.49)
+    """h(lambda_bar): each impact is closer to release by this factor."""
     q: Float[Array, "..."]
-    #: exponent of the envelope |beta| <= |lambda - lambda_bar|^kappa (6.53)
+    """1 / f'(lambda_bar): each lobe is closer to lambda_bar by this factor (6.49)."""
     kappa: Float[Array, "..."]
+    """Exponent of the envelope |beta| <= |lambda - lambda_bar|^kappa (6.53)."""
 
 
 def scaling_law(r) -> ScalingLaw:
@@ -31,10 +31,11 @@ def scaling_law(r) -> ScalingLaw:
 
     **Arguments:** `r`, coefficient of restitution of slow impacts, any shape.
 
-    **Returns:** a [`variational.chatter.ScalingLaw`][], dimensionless, in the shape of
-    `r`.
+    Returns:
+        A [`variational.chatter.ScalingLaw`][], dimensionless, in the shape of `r`.
 
-    **Raises:** `ValueError` for r outside (0, 1), where it can be seen.
+    Raises:
+        ValueError: For r outside (0, 1), where it can be seen.
     """
     if not isinstance(r, Tracer):
         values = np.asarray(r)

@@ -26,14 +26,14 @@ _SMALL = 1e-12
 class SectionArrival(eqx.Module):
     """Arrival at a section."""
 
-    #: (n,) state; gap and normal velocity there, known better than the state's own
     state: Float[Array, "... n"]
+    """(n,) state; gap and normal velocity there, known better than the state's own."""
     gap: Float[Array, "..."]
     velocity: Float[Array, "..."]
-    #: impacts on the way; of a complete sequence those before it became negligible
     impacts: Int[Array, "..."]
-    #: whether the motion stuck on the way
+    """Impacts on the way; of a complete sequence those before it became negligible."""
     stuck: Bool[Array, "..."]
+    """Whether the motion stuck on the way."""
 
 
 class _Run(NamedTuple):
@@ -62,7 +62,8 @@ def to_section(
     start and the section; `start`, of which time, state and speed are used; `section`,
     a time; `height`, the gap at the start, > 0 in flight.
 
-    **Returns:** a [`variational.chatter.SectionArrival`][].
+    Returns:
+        A [`variational.chatter.SectionArrival`][].
     """
     section = jnp.asarray(section, jnp.float64)
 
@@ -115,7 +116,8 @@ def section_turn(system: HybridSystem, state, phase=0.0) -> SectionArrival:
     `(2,)`, in flight at time `phase` x period. Pure; may be compiled, batched and
     differentiated forward.
 
-    **Returns:** a [`variational.chatter.SectionArrival`][].
+    Returns:
+        A [`variational.chatter.SectionArrival`][].
     """
     check_chatter_system(system)
     return _turn(as_arrays(system), jnp.asarray(state, jnp.float64), phase)
@@ -141,9 +143,11 @@ def flight_start(system, time, state):
 def release_impacts(system: HybridSystem, count: int, time=0.0) -> ImpactPoint:
     """The first `count` impacts of the orbit that starts at release.
 
-    **Returns:** a [`variational.chatter.ImpactPoint`][] with a leading axis of impacts;
-    its times are those of the turn that starts at the release of `chatter_frame(system,
-    time)`, and `found` is false from the first flight on that does not return.
+    Returns:
+        A [`variational.chatter.ImpactPoint`][] with a leading axis of impacts; its
+            times are those of the turn that starts at the release of
+            `chatter_frame(system, time)`, and `found` is false from the first flight on
+            that does not return.
     """
     check_chatter_system(system)
     return _from_release(as_arrays(system), count, jnp.asarray(time, jnp.float64))

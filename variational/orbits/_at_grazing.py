@@ -19,8 +19,9 @@ def multipliers_at_grazing(
     **Arguments:** both parts, shape `(n, n)`; the speed is the normal velocity before
     the impact, below zero.
 
-    **Returns:** shape `(n,)`: plus or minus infinity and the n - 1 limits, the largest
-    modulus first; all NaN where c'b = 0, so that the growth is of another order.
+    Returns:
+        Shape `(n,)`: plus or minus infinity and the n - 1 limits, the largest modulus
+            first; all NaN where c'b = 0, so that the growth is of another order.
     """
     n = regular.shape[0]
     unknown = np.full(n, np.nan, complex)

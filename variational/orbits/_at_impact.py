@@ -21,10 +21,10 @@ class ImpactStart(NamedTuple):
     """The impact that an orbit starts at."""
 
     constraint: int
-    #: (n,) state just after it
     after: np.ndarray
-    #: s, within which an impact of the same constraint is the same one
+    """(n,) state just after it."""
     window: float
+    """S, within which an impact of the same constraint is the same one."""
 
 
 def start_at_impact(system: HybridSystem, t, state, period) -> ImpactStart | None:

@@ -26,12 +26,12 @@ _STEPS = 4
 class Knots(NamedTuple):
     """The impacts of a turn in order, and how well flights join them."""
 
-    #: (k, n + 1) time (s) and state just after
     rows: Float[np.ndarray, "k n1"]
-    #: (k, n) state just before
+    """(k, n + 1) time (s) and state just after."""
     before: Float[np.ndarray, "k n"]
-    #: largest miss of a flight before the first step, relative to the scale
+    """(k, n) state just before."""
     miss: float
+    """Largest miss of a flight before the first step, relative to the scale."""
 
 
 def close(

@@ -19,8 +19,9 @@ def flight_nodes(
 ) -> tuple[Float[Array, " steps"], Float[Array, "steps n"], Float[Array, ""]]:
     """Free flight from `x0` at `t0` to `t1` (s) in equal steps of order eight.
 
-    **Returns:** the times and states at the ends of the steps, and the sum of the
-    error estimates, relative to 1 + |x|.
+    Returns:
+        The times and states at the ends of the steps, and the sum of the error
+            estimates, relative to 1 + |x|.
     """
     field = system.prepared().vector_field
     times, states, errors = fixed_steps(DOPRI8, field, t0, x0, t1, steps)

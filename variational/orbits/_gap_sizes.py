@@ -22,7 +22,8 @@ def gap_sizes(
 
     **Arguments:** time (s), state `(n,)`, and the period of the motion (s).
 
-    **Returns:** shape `(m,)`, for each constraint.
+    Returns:
+        Shape `(m,)`, for each constraint.
     """
     sizes = component_sizes(system, t, state, period)
     slopes = jax.jacfwd(lambda x: gaps(system, t, x))(jnp.asarray(state))

@@ -18,22 +18,18 @@ from ._shooting import Shooting
 
 
 class ImpactOrbit(eqx.Module):
-    """A periodic orbit that flies between impacts, without sustained contact.
-
-    **Arguments:**
-
-    - `times`: shape `(k,)`, the impacts of one period of the orbit (s), increasing.
-    - `states`: shape `(k, n)`, the state just after each of them.
-    - `constraints`: which constraint each impact hits; the first by default.
-    - `periods`: of the forcing, after which the orbit repeats.
-    - `steps`: Runge-Kutta steps of order 8 in each flight.
-    """
+    """A periodic orbit that flies between impacts, without sustained contact."""
 
     times: Float[Array, " k"]
+    """Shape `(k,)`, the impacts of one period of the orbit (s), increasing."""
     states: Float[Array, "k n"]
+    """Shape `(k, n)`, the state just after each of them."""
     constraints: tuple[int, ...] | None = eqx.field(static=True, default=None)
+    """Which constraint each impact hits; the first by default."""
     periods: int = eqx.field(static=True, default=1)
+    """Of the forcing, after which the orbit repeats."""
     steps: int = eqx.field(static=True, default=32)
+    """Runge-Kutta steps of order 8 in each flight."""
 
     @property
     def number(self) -> int:
@@ -61,9 +57,10 @@ class ImpactOrbit(eqx.Module):
 def impact_orbit(system: HybridSystem, guess: ImpactOrbit) -> ImpactOrbit:
     """The orbit near `guess`, differentiable with respect to every parameter.
 
-    **Returns:** a [`variational.orbits.ImpactOrbit`][], NaN where there is none near
-    the guess. That its flights stay clear of the constraints is not looked at; see
-    [`variational.orbits.clearance`][].
+    Returns:
+        A [`variational.orbits.ImpactOrbit`][], NaN where there is none near the guess.
+            That its flights stay clear of the constraints is not looked at; see
+            [`variational.orbits.clearance`][].
     """
 
     def residual(unknowns):
@@ -78,7 +75,8 @@ def orbit_monodromy(system: HybridSystem, orbit: ImpactOrbit) -> Float[Array, "n
     Product of flight transition matrices and saltation matrices, in the order of the
     motion, beginning just after the first impact.
 
-    **Returns:** shape `(n, n)`. Its eigenvalues are the Floquet multipliers.
+    Returns:
+        Shape `(n, n)`. Its eigenvalues are the Floquet multipliers.
     """
     return monodromy_of(orbit.shooting, orbit.unknowns(system), system)
 

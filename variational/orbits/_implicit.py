@@ -23,7 +23,8 @@ def implicit_root(
     theorem.
     Works under `jit`, `vmap`, `jvp` and `vjp`.
 
-    **Returns:** shape `(n,)`; NaN where Newton's method does not converge.
+    Returns:
+        Shape `(n,)`; NaN where Newton's method does not converge.
     """
 
     def newton(function, start):

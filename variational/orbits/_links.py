@@ -26,14 +26,14 @@ _EVALUATIONS = 5
 class Link(NamedTuple):
     """A flight and the impact at its end: gap there, state after it, derivatives."""
 
-    #: (1 + n,) gap on arrival, and the state that the impact leaves
     value: Float[Array, " 1+n"]
-    #: (1 + n, 1 + n) by time (s) and state at the start
+    """(1 + n,) gap on arrival, and the state that the impact leaves."""
     by_start: Float[Array, "1+n 1+n"]
-    #: (1 + n,) by the time of arrival (s)
+    """(1 + n, 1 + n) by time (s) and state at the start."""
     by_end: Float[Array, " 1+n"]
-    #: (n,) field after the impact
+    """(1 + n,) by the time of arrival (s)."""
     field: Float[Array, " n"]
+    """(n,) field after the impact."""
 
     @property
     def by_impact(self) -> Float[Array, "k k"]:
@@ -89,7 +89,8 @@ def matrix_of(links: Link, following, sign: Any = 1.0, real: Any = True):
     **Arguments:** links `(m, ...)`; the index of the row after each; factors of the
     entries by that row; which rows are real, others having the identity.
 
-    **Returns:** shape `(m (1 + n), m (1 + n))`, times in s.
+    Returns:
+        Shape `(m (1 + n), m (1 + n))`, times in s.
     """
     m, size = links.value.shape
     first = jnp.zeros(size).at[0].set(1.0)
@@ -238,7 +239,8 @@ def around_the_period(shooting: Shooting, u, system: HybridSystem):
     Of (phase, state), without forcing of the state, without impacts of the state at
     time zero.
 
-    **Returns:** the Jacobian as a function of a point near the orbit's own, and that.
+    Returns:
+        The Jacobian as a function of a point near the orbit's own, and that.
     """
     if not shooting.constraints:
         return jax.jacfwd(lambda x: shooting.residual(x, system) + x), u

@@ -33,8 +33,9 @@ def lowest_times(
     **Arguments:** time and state `(1 + n,)` at the start, time at the end (s); `nodes`
     of the flight where they are known.
 
-    **Returns:** times (s) and gaps, one for each constraint; where a gap has no
-    minimum, the end of the flight and the largest gap on it.
+    Returns:
+        Times (s) and gaps, one for each constraint; where a gap has no minimum, the end
+            of the flight and the largest gap on it.
     """
     t0 = start[0]
     nodes = nodes_of(system, start, end, steps) if nodes is None else nodes
@@ -117,8 +118,9 @@ def _rise(speeds, changes):
 
     After a fall within the same step too: a low bounce may be shorter than a step.
 
-    **Returns:** the fraction of the step, the way up to there over its length, and
-    whether there is such a rise; `(steps, m)` each.
+    Returns:
+        The fraction of the step, the way up to there over its length, and whether there
+            is such a rise; `(steps, m)` each.
     """
     a, b = speeds[:-1], speeds[1:]
     p, q = changes[:-1], changes[1:]

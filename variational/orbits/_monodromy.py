@@ -26,16 +26,16 @@ def monodromy(
 ) -> Float[Array, "n n"]:
     """The monodromy matrix: state after one period by state at its start.
 
-    **Arguments:**
+    Args:
+        orbit: From [`variational.orbit_of`][] or `continuation.periodic_orbit`.
+        method: "product" multiplies the transition matrices of the flights and the
+            saltation matrices of the recorded events; "flow" differentiates the event
+            loop. The first is right at every impact speed, the second loses one digit
+            for each of the impact speed, because it has to find the impacts again.
+        settings: Accuracy of "flow"; a tolerance of 1e-12 by default.
 
-    - `orbit`: from [`variational.orbit_of`][] or `continuation.periodic_orbit`.
-    - `method`: "product" multiplies the transition matrices of the flights and the
-        saltation matrices of the recorded events; "flow" differentiates the event loop.
-        The first is right at every impact speed, the second loses one digit for each
-        of the impact speed, because it has to find the impacts again.
-    - `settings`: accuracy of "flow"; a tolerance of 1e-12 by default.
-
-    **Returns:** shape `(n, n)`.
+    Returns:
+        Shape `(n, n)`.
     """
     made = turn_derivative(system, orbit, method=method, settings=settings)
     return made.state
@@ -51,16 +51,17 @@ def turn_derivative(
 ) -> TurnDerivative:
     """Derivatives of a turn by state, period, phase and parameters.
 
-    **Arguments:**
+    Args:
+        where: Picks a parameter of the system, or several, as for
+            [`jaxcam.parameters.pick`][]; none by default.
+        ?- the others as for : - the others as for [`variational.monodromy`][].
 
-    - `where`: picks a parameter of the system, or several, as for
-        [`jaxcam.parameters.pick`][]; none by default.
-    - the others as for [`variational.monodromy`][].
+    Returns:
+        A [`variational.orbits.TurnDerivative`][]. The forcing's period does not follow
+            the parameters: add `period` times its own derivative where it should.
 
-    **Returns:** a [`variational.orbits.TurnDerivative`][]. The forcing's period does
-    not follow the parameters: add `period` times its own derivative where it should.
-
-    **Raises:** `ValueError` for another method.
+    Raises:
+        ValueError: For another method.
     """
     if method not in ("product", "flow"):
         raise ValueError(f'method is {method!r}; choose "product" or "flow"')

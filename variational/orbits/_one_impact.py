@@ -24,11 +24,13 @@ def one_impact_orbits(system: HybridSystem, state) -> list[ImpactOrbit]:
     **Arguments:** a system with a `period`, two states and one constraint, and a state
     near its surface, shape `(2,)`.
 
-    **Returns:** those whose flight stays clear of the constraint, with impacts in the
-    first period, in the order of the sum of their multipliers: a saddle comes last. The
-    list may be empty.
+    Returns:
+        Those whose flight stays clear of the constraint, with impacts in the first
+            period, in the order of the sum of their multipliers: a saddle comes last.
+            The list may be empty.
 
-    **Raises:** `ValueError` for a system without a period.
+    Raises:
+        ValueError: For a system without a period.
     """
     if system.period is None:
         raise ValueError("One impact a period needs a system with a `period`.")

@@ -32,24 +32,24 @@ class Event(NamedTuple):
 class Orbit(eqx.Module):
     """One period of a motion that repeats."""
 
-    #: (n,) state at `time`
     state: Float[Array, " n"]
-    #: s, where the turn starts
+    """(n,) state at `time`."""
     time: Float[Array, ""]
-    #: s, of the whole orbit: several periods of the forcing for a subharmonic
+    """S, where the turn starts."""
     period: Float[Array, ""]
+    """S, of the whole orbit: several periods of the forcing for a subharmonic."""
     impacts: Impacts
     contacts: Contacts
-    #: largest deviation of the state after one period, as it was given
     closure: Float[Array, ""]
-    #: (n, n) derivative of the state after one period with respect to `state`
+    """Largest deviation of the state after one period, as it was given."""
     monodromy: Float[Array, "n n"]
-    #: its determinant, from flights and impacts one by one
+    """(n, n) derivative of the state after one period with respect to `state`."""
     determinant: Float[Array, ""]
-    #: the turn cut at its events
+    """Its determinant, from flights and impacts one by one."""
     pieces: TurnPieces
-    #: whether there is contact in the turn
+    """The turn cut at its events."""
     sticks: bool = eqx.field(static=True)
+    """Whether there is contact in the turn."""
 
     def __str__(self) -> str:
         return repr(self) if is_traced(self) else self._table().text()
@@ -112,20 +112,22 @@ def orbit_of(
     The impacts of an orbit without contact are then improved as a boundary value
     problem, so that they, and the multipliers, are right at every impact speed.
 
-    **Arguments:**
+    Args:
+        state: Shape `(n,)`, of a motion that returns to it. At an impact it may be the
+            state before or after: the orbit then starts halfway through its first
+            flight, because the flow jumps at an impact and has no derivative from
+            there.
+        period: s; the forcing's own without.
+        t0: s.
+        settings: Accuracy of the run; a tolerance of 1e-12 by default.
+        closure: The deviation after one period that is allowed, relative to
+            [`jaxcam.hybrid.sizes.component_sizes`][].
 
-    - `state`: shape `(n,)`, of a motion that returns to it. At an impact it may be the
-        state before or after: the orbit then starts halfway through its first flight,
-        because the flow jumps at an impact and has no derivative from there.
-    - `period`: s; the forcing's own without.
-    - `t0`: s.
-    - `settings`: accuracy of the run; a tolerance of 1e-12 by default.
-    - `closure`: the deviation after one period that is allowed, relative to
-      [`jaxcam.hybrid.sizes.component_sizes`][].
+    Returns:
+        A [`variational.Orbit`][] with its monodromy matrix.
 
-    **Returns:** a [`variational.Orbit`][] with its monodromy matrix.
-
-    **Raises:** `ValueError` where the run fails, or the state does not return.
+    Raises:
+        ValueError: Where the run fails, or the state does not return.
     """
     refuse_tracers("orbit_of", "jaxcam.hybrid.flow", system, state, period, t0)
     settings = Settings(tolerance=1e-12) if settings is None else settings

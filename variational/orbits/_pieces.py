@@ -7,9 +7,9 @@ from jaxtyping import Bool, Float, Int
 from jaxcam.hybrid.record import Contacts, Impacts
 
 
-#: what ends a piece: nothing (its mode may change), an impact, or the impact after
-#: which all later ones of a chatter are summed
 NOTHING, IMPACT, LAST_IMPACT = 0, 1, 2
+"""What ends a piece: nothing (its mode may change), an impact, or the impact after
+which all later ones of a chatter are summed."""
 
 
 class TurnPieces(eqx.Module):
@@ -22,11 +22,11 @@ class TurnPieces(eqx.Module):
     end: Float[np.ndarray, " k"]
     kind: Int[np.ndarray, " k"]
     constraint: Int[np.ndarray, " k"]
-    #: (k, n) state before the event
     before: Float[np.ndarray, "k n"]
-    #: (k, m) constraints in contact in the piece, and in the one after; for those
-    #: that are hit or touched, further ones are not
+    """(k, n) state before the event."""
     contact: Bool[np.ndarray, "k m"]
+    """(k, m) constraints in contact in the piece, and in the one after; for those that
+    are hit or touched, further ones are not."""
     contact_after: Bool[np.ndarray, "k m"]
 
 

@@ -24,14 +24,15 @@ from ._pieces import IMPACT, LAST_IMPACT, TurnPieces
 class Product(NamedTuple):
     """The derivative of a turn, and what can be said about its accuracy."""
 
-    #: (n,) state at the end
     state: Float[Array, " n"]
-    #: (n, n + q): by the state at the start, then by the q parameters
+    """(n,) state at the end."""
     matrix: Float[Array, "n columns"]
-    #: of the first n columns, from flights and impacts one by one
+    """(n, n + q): by the state at the start, then by the q parameters."""
     determinant: Float[Array, ""]
-    #: relative error of the first n columns for a relative error of one in each factor
+    """Of the first n columns, from flights and impacts one by one."""
     condition: Float[Array, ""]
+    """Relative error of the first n columns for a relative error of one in each factor.
+    """
 
 
 def product_of(

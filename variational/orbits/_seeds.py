@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from ._orbit import Orbit
 
 
-#: numbers of steps to choose from, and the error allowed in a flight
 _STEPS = (16, 32, 64, 128, 256)
+"""Numbers of steps to choose from, and the error allowed in a flight."""
 _ALLOWED = 1e-12
 
 
@@ -31,7 +31,8 @@ def steps_for(system: HybridSystem, starts, ends) -> int:
     **Arguments:** times and states `(m, 1 + n)` at the starts, times `(m,)` of the
     ends.
 
-    **Raises:** `ValueError` where 256 steps are not enough.
+    Raises:
+        ValueError: Where 256 steps are not enough.
     """
     starts, ends = jnp.asarray(starts), jnp.asarray(ends)
     for steps in _STEPS:
@@ -58,12 +59,12 @@ def seed(
 ) -> tuple[Shooting, Float[np.ndarray, " u"]]:
     """The equations of the orbit that one turn of a motion shows, and its unknowns.
 
-    **Arguments:**
+    Args:
+        motion: An orbit, or a run over one period of it, near it.
+        periods: The number of forcing periods in it; 0 without forcing.
 
-    - `motion`: an orbit, or a run over one period of it, near it.
-    - `periods`: the number of forcing periods in it; 0 without forcing.
-
-    **Raises:** `ValueError` where the motion sticks, or hits nothing without forcing.
+    Raises:
+        ValueError: Where the motion sticks, or hits nothing without forcing.
     """
     if int(motion.contacts.count):
         raise ValueError(

@@ -29,16 +29,16 @@ from ._lowest_gap import gap_or_speed, lowest_times, nodes_of
 class Seen(NamedTuple):
     """What decides whether a solution of the equations is an orbit, and its flights."""
 
-    #: (m,) lowest gap inside each flight; of the whole turn without impacts
     gaps: Float[Array, " flights"]
-    #: (m,) approach speed of each impact, positive where it is physical
+    """(m,) lowest gap inside each flight; of the whole turn without impacts."""
     speeds: Float[Array, " m"]
-    #: estimated error of the flights, relative to 1 + |x|
+    """(m,) approach speed of each impact, positive where it is physical."""
     error: Float[Array, ""]
-    #: what a gap is large or small beside, in its units
+    """Estimated error of the flights, relative to 1 + |x|."""
     gap_size: Float[Array, ""]
-    #: (flights, 1 + steps) and (flights, 1 + steps, n) at the ends of all steps
+    """What a gap is large or small beside, in its units."""
     times: Float[Array, "flights nodes"]
+    """(flights, 1 + steps) and (flights, 1 + steps, n) at the ends of all steps."""
     states: Float[Array, "flights nodes n"]
 
 
@@ -49,20 +49,16 @@ class Shooting(eqx.Module):
     state after it: shape `(m (1 + n),)`. Without impacts they are the state at time
     zero, shape `(n,)`. For a system without forcing the first phase is zero, its place
     taken by the period (s), and phases count periods of the orbit.
-
-    **Arguments:**
-
-    - `constraints`: which constraint each impact hits, in order.
-    - `periods`: forcing periods until the orbit repeats; 0 for a system without
-      forcing.
-    - `dimension`: number of states n.
-    - `steps`: Runge-Kutta steps of order eight in each flight.
     """
 
     constraints: tuple[int, ...] = eqx.field(static=True)
+    """Which constraint each impact hits, in order."""
     periods: int = eqx.field(static=True)
+    """Forcing periods until the orbit repeats; 0 for a system without forcing."""
     dimension: int = eqx.field(static=True)
+    """Number of states n."""
     steps: int = eqx.field(static=True, default=32)
+    """Runge-Kutta steps of order eight in each flight."""
 
     def residual(self, u, system: HybridSystem) -> Float[Array, " u"]:
         """Zero for an orbit: gap at each impact, and what its law misses."""

@@ -23,11 +23,11 @@ from ._shooting import Shooting
 class SpecialPoint(eqx.Module):
     """A value of the parameter at which something happens, and where it happens."""
 
-    #: value of the parameter, in its own unit
     parameter: Float[Array, ""]
-    #: the impacts of the orbit, behind its graze if it has one; for a detachment the
-    #: time and state of the contact
+    """Value of the parameter, in its own unit."""
     orbit: ImpactOrbit
+    """The impacts of the orbit, behind its graze if it has one; for a detachment the
+    time and state of the contact."""
 
 
 def _where(
@@ -62,7 +62,8 @@ def orbit_where(
     parameter, the orbit near it, and `test(matrix)` with the matrix of
     [`variational.orbits.orbit_monodromy`][].
 
-    **Returns:** NaN where Newton's method does not converge.
+    Returns:
+        NaN where Newton's method does not converge.
     """
     return _where(system, where, guess, lambda *orbit: test(monodromy_of(*orbit)))
 
@@ -97,16 +98,17 @@ def graze_of_orbit(
     A graze is an impact without speed. The square root of a grazing bifurcation is in
     the orbits behind it, not in the graze.
 
-    **Arguments:**
+    Args:
+        system: Near the graze; `where` picks the parameter.
+        guess: The graze first, then the impacts of the orbit in the order in which they
+            follow it, up to one period later; the graze alone for an orbit without
+            impacts. Its `constraints` say which constraint is touched, and which are
+            hit.
 
-    - `system`: near the graze; `where` picks the parameter.
-    - `guess`: the graze first, then the impacts of the orbit in the order in which
-        they follow it, up to one period later; the graze alone for an orbit without
-        impacts. Its `constraints` say which constraint is touched, and which are hit.
-
-    **Returns:** the orbit begins with the graze. NaN where Newton's method does not
-    converge. That the gap has a minimum there, not a maximum, and is open elsewhere is
-    not looked at; see [`jaxcam.hybrid.surface.normal_acceleration`][].
+    Returns:
+        The orbit begins with the graze. NaN where Newton's method does not converge.
+            That the gap has a minimum there, not a maximum, and is open elsewhere is
+            not looked at; see [`jaxcam.hybrid.surface.normal_acceleration`][].
     """
 
     def speed(shooting, u, system):
@@ -131,7 +133,8 @@ def detachment(
     **Arguments:** the system near the detachment, `where` that picks the parameter, and
     time (s) and state near the weakest contact, shape `(2,)`.
 
-    **Returns:** NaN where Newton's method does not converge.
+    Returns:
+        NaN where Newton's method does not converge.
     """
 
     def residual(unknowns):

@@ -18,21 +18,21 @@ from ._product import product_of, with_all_constraints
 class TurnDerivative(eqx.Module):
     """How the state at the end of a turn depends on what it started with."""
 
-    #: (n, n) by the state at the start: the monodromy matrix of a periodic orbit
     state: Float[Array, "n n"]
-    #: (n,) by the period, that is, by the time at which the turn ends
+    """(n, n) by the state at the start: the monodromy matrix of a periodic orbit."""
     period: Float[Array, " n"]
-    #: (n,) by the time of the start, at the same length
+    """(n,) by the period, that is, by the time at which the turn ends."""
     phase: Float[Array, " n"]
-    #: (n, q) by the parameters picked, at the same times
+    """(n,) by the time of the start, at the same length."""
     parameters: Float[Array, "n q"]
-    #: determinant of `state`; zero where the turn sticks
+    """(n, q) by the parameters picked, at the same times."""
     determinant: Float[Array, ""]
-    #: the relative error of `state` that a relative error of one in each flight and
-    #: each saltation matrix makes
+    """Determinant of `state`; zero where the turn sticks."""
     condition: Float[Array, ""]
-    #: whether there is contact in the turn, which forgets what came before
+    """The relative error of `state` that a relative error of one in each flight and
+    each saltation matrix makes."""
     sticks: bool = eqx.field(static=True)
+    """Whether there is contact in the turn, which forgets what came before."""
 
 
 def picked(system, where: Pick | None) -> Float[Array, " q"]:

@@ -1,4 +1,4 @@
-"""Many trajectories at once, in fewer slots than there are trajectories."""
+"""Run many trajectories in fewer slots than there are trajectories."""
 
 from ._layout import Horizon as Horizon, Lanes as Lanes, split_lanes as split_lanes
 from ._refilled_lanes import Chunking as Chunking, run_refilled as run_refilled

@@ -1,7 +1,7 @@
-"""Many lanes as one matrix of numbers, and the compiled loop that works on it.
+"""Store many lanes as one matrix of numbers, and compile the loop that works on it.
 
-A chunk of attempts is a call with few arrays. With a whole system and all leaves of a
-lane it costs four times as much: as much as the work of 64 lanes in a chunk.
+Each chunk is one dispatch of few arrays. Passing a whole system and all leaves of a
+lane instead would cost four times as much: as much as 64 lanes need for a chunk.
 """
 
 import functools
@@ -23,7 +23,7 @@ _AT_ONCE = 16
 
 
 class LaneLayout(NamedTuple):
-    """Where the numbers of a lane stand among the rows of a matrix, and their types."""
+    """The rows of the matrix that hold each number of a lane, and their types."""
 
     rows: LoopState
     dtypes: tuple
@@ -49,14 +49,17 @@ def layout_of(lane: LoopState) -> LaneLayout:
 
 
 class Lanes(NamedTuple):
-    """What is run: a system, what of it differs from lane to lane, and where from."""
+    """The batch to run: a system, the parameters that differ between lanes, and the
+    starts.
+    """
 
     system: HybridSystem
-    #: what `where(system)` picks takes `values`, `(lanes,)` or `(lanes, k)`; or neither
     where: Callable | None
+    """What `where(system)` picks takes `values`, `(lanes,)` or `(lanes, k)`; or
+    neither."""
     values: np.ndarray | None
-    #: (lanes, n)
     states: np.ndarray
+    """(lanes, n)."""
 
     def some(self, which: slice) -> "Lanes":
         """A part of the lanes."""
@@ -65,9 +68,9 @@ class Lanes(NamedTuple):
 
 
 class Horizon(NamedTuple):
-    """When it is run: `number` turns of a `period` (s) from `t0` (s) on.
+    """The time span to run: `number` turns of a `period` (s) from `t0` (s) on.
 
-    Without a period the system's own is taken, lane by lane.
+    By default the period is the system's own, lane by lane.
     """
 
     t0: Any
@@ -76,12 +79,12 @@ class Horizon(NamedTuple):
 
 
 class LaneStart(NamedTuple):
-    """Lanes as they start, one column each, and what they are run with."""
+    """Initial lanes, one column each, and the arrays they are run with."""
 
     slots: LaneLayout
     numbers: np.ndarray
-    #: parts of system and plan that differ from lane to lane, and that do not
     own: Packed
+    """Parts of system and plan that differ from lane to lane, and that do not."""
     shared: Packed
     static: Any
 
@@ -210,7 +213,7 @@ def _start(batched, shared, period, t0, turns, settings, states):
 
 
 def _depends(function: Callable, argument):
-    """Of each leaf of the result, whether it depends on the argument."""
+    """Return for each leaf of the result whether it depends on the argument."""
     result = eqx.filter_eval_shape(function, argument)
     closed = jax.make_jaxpr(lambda a: eqx.filter(function(a), eqx.is_array))(argument)
     known = {id(v) for v in closed.jaxpr.invars}

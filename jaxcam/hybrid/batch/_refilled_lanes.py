@@ -1,4 +1,4 @@
-"""A group of lanes in fewer slots: one that ends makes room for the next."""
+"""Run a group of lanes in fewer slots: a lane that ends makes room for the next."""
 
 from typing import NamedTuple
 
@@ -10,14 +10,14 @@ from ._layout import compiled_chunk, Horizon, Lanes, start_lanes
 
 
 class Chunking(NamedTuple):
-    """How lanes are run in chunks; it changes no result, but for the budget."""
+    """Chunk sizes of a batch run; they change no result except through the budget."""
 
-    #: lanes that run at a time
     width: int
-    #: attempts in a chunk, after which ended lanes are replaced
+    """Lanes that run at a time."""
     rows: int
-    #: attempts of one lane, at most
+    """Attempts in a chunk, after which ended lanes are replaced."""
     max_steps: int
+    """Attempts of one lane, at most."""
 
 
 def run_refilled(lanes: Lanes, horizon: Horizon, settings, chunking: Chunking, seen):
@@ -27,7 +27,8 @@ def run_refilled(lanes: Lanes, horizon: Horizon, settings, chunking: Chunking, s
     `seen` takes the log as it comes: of each number in `seen.row` one array, an attempt
     after the other.
 
-    **Returns:** impacts, attempts and result codes, each `(lanes,)`.
+    Returns:
+        Impacts, attempts and result codes, each `(lanes,)`.
     """
     count, (width, rows, max_steps) = len(lanes.states), chunking
     start = start_lanes(lanes, horizon, settings, width)

@@ -1,4 +1,4 @@
-"""What becomes of the loop state after an attempt at a step, and what it tries next."""
+"""Update the loop state after an attempted step, and choose the next step."""
 
 from typing import Any, NamedTuple
 
@@ -26,7 +26,7 @@ _UNSEEN = 64
 
 
 class Plan(NamedTuple):
-    """What does not change during a run; scalars, except for the tableau."""
+    """The constants of a run; scalars, except for the tableau."""
 
     t0: Any
     t1: Any
@@ -65,7 +65,9 @@ class Plan(NamedTuple):
         stop_period=jnp.inf,
         differentiable=True,
     ) -> "Plan":
-        """The plan of a run from `t0` to `t1`; `period` is the system's own without."""
+        """Return the plan of a run from `t0` to `t1`; `period` defaults to the system's
+        own.
+        """
         own = system.period
         period = own if period is None else period
         longest = jnp.inf if period is None else period / _PARTS
@@ -101,7 +103,7 @@ def _each(absolute) -> tuple | None:
 
 
 class Attempt(NamedTuple):
-    """An attempt at a step: where it led, and what was found out."""
+    """An attempted step: where it ends and what was detected."""
 
     t: Any
     x: tuple
@@ -212,7 +214,7 @@ def _longest(plan, carried, attempt):
 
 
 def _next_length(plan, carried, attempt, longest):
-    """To the next contact or release, if it is nearer than the error allows."""
+    """Return the step to the next contact or release, or the longest one allowed."""
     ahead = jnp.minimum(longest, 6.0 * carried.ramp)
     good, h = attempt.good, attempt.length
     # the step that completes a chatter did not follow the motion

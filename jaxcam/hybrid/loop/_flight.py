@@ -1,4 +1,4 @@
-"""Judging a step of free flight: accept it, retake it shorter, or land."""
+"""Check a step of free flight for events: accept it, shorten it, or land."""
 
 from typing import Any, NamedTuple
 
@@ -27,7 +27,7 @@ _SHORT = 1e-3
 
 
 class StepVerdict(NamedTuple):
-    """What became of a step; for one constraint, or the earliest of several."""
+    """The outcome of a step; for one constraint, or the earliest of several."""
 
     retake: Any
     length: Any
@@ -39,12 +39,12 @@ class StepVerdict(NamedTuple):
 def judge(
     left: Jet, right: Jet, h, slack, rounding, scale, room, longest
 ) -> StepVerdict:
-    """Judge the step of one free constraint.
+    """Check the step of one free constraint for events.
 
-    **Arguments:** the jets at both ends, the length of the step, the gap below zero
-    that is let pass, the gap that cannot be told from zero, the largest gap so far, the
-    time left to the next time that was asked for (an impact beyond it waits for a
-    later step), and the longest step that the error allows.
+    **Arguments:** the jets at both ends, the step length, the negative gap that is
+    tolerated, the gap that rounding cannot distinguish from zero, the largest gap so
+    far, the time left to the next requested time (an impact beyond it waits for a later
+    step), and the longest step that the error allows.
     """
     polynomial = bernstein(left, right, h)
     inward = moves_in(right, rounding)
@@ -77,7 +77,8 @@ def judge(
 
 
 def moves_in(jet: Jet, rounding):
-    """Whether the motion at this instant goes, or is pulled, into the constraint.
+    """Return whether the motion at this instant goes, or is pulled, into the
+    constraint.
 
     A parabola that turns before it is below rounding only touches.
     """
@@ -89,7 +90,7 @@ def moves_in(jet: Jet, rounding):
 
 
 def earliest(verdicts: list[StepVerdict]) -> StepVerdict:
-    """The verdict on the step as a whole: the first thing that happens in it."""
+    """Return the outcome of the step as a whole: the first event in it."""
     best = verdicts[0]
     for k, v in enumerate(verdicts[1:], start=1):
         sooner = v.lands & (~best.lands | (v.offset < best.offset))

@@ -30,7 +30,7 @@ from ._gap_polynomial import Jet
 
 
 class Frame(NamedTuple):
-    """How a state is put back on the surface: see `Functions.onto`."""
+    """Directions that put a state back on the surface: see `Functions.onto`."""
 
     lift: tuple
     push: tuple
@@ -129,7 +129,7 @@ class Functions:
         return tuple(self._velocity(t, _pack(x)))
 
     def frame(self, t, x) -> Frame:
-        """See `Frame`."""
+        """Return the `Frame` at this state."""
         lift, push, lift_velocity, damping = self._frame(t, _pack(x))
         return Frame(
             tuple(map(tuple, lift)),
@@ -143,12 +143,12 @@ class Functions:
         return tuple(map(tuple, self._lift(t, _pack(x))))
 
     def blur(self, t, x, extents):
-        """What rounding can tell of the gaps, where components reached this far."""
+        """Return the rounding errors of the gaps, for components up to `extents`."""
         reach = [jnp.abs(a) + b for a, b in zip(x, extents, strict=True)]
         return tuple(self._blur(t, _pack(x), _pack(reach)))
 
     def speed_blur(self, t, x):
-        """What rounding can tell of the normal velocities."""
+        """Return the rounding error of the normal velocities."""
         reach = [jnp.abs(a) for a in x]
         return tuple(self._speed_blur(t, _pack(x), _pack(reach)))
 

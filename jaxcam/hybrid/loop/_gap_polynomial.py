@@ -40,7 +40,7 @@ def _scaled(jet: Jet, h) -> tuple:
 
 
 def _remainders(left: tuple, right: tuple) -> tuple:
-    """What the parabola from the left misses at the right: `_scaled` of it."""
+    """Return the error of the left parabola at the right end: `_scaled` of it."""
     c0, c1, c2, _ = left
     e0, e1, e2, _ = right
     return e0 - (c0 + c1 + c2), e1 - (c1 + 2 * c2), e2 - c2

@@ -36,7 +36,7 @@ class Record(NamedTuple):
 
 
 class Judged(NamedTuple):
-    """What became of the flights of a step."""
+    """The outcome of a step for the open gaps."""
 
     flown: StepVerdict
     lands: Any
@@ -160,7 +160,7 @@ def _iterate(
 def _judge_flights(
     plan: Plan, carried: LoopState, end: StepEnd, made: Step, rounding
 ) -> Judged:
-    """What happened to the gaps that are open."""
+    """Detect events at the gaps that are open."""
     h, jets = end.length, made.jets
     slack = [2e-12 * s + b for s, b in zip(carried.scale, carried.blur, strict=True)]
     flown = earliest(
@@ -202,7 +202,7 @@ def _judge_flights(
 def _judge_contacts(
     carried: LoopState, end: StepEnd, landing: Landing, judged: Judged
 ) -> StepVerdict:
-    """What happened to the gaps that are closed."""
+    """Detect events at the gaps that are closed."""
     return earliest(
         [
             _where_in_force(
@@ -234,7 +234,7 @@ def _shorter(functions, end: StepEnd, judged: Judged, held: StepVerdict, converg
 
 
 def _kind(carried, lands, begins, released, stopped):
-    """What an accepted attempt is in the log: see `RowKind`."""
+    """Return the kind of an accepted attempt in the log: see `RowKind`."""
     kind = jnp.where(stopped, float(RowKind.STOP), float(RowKind.STEP))
     kind = jnp.where(carried.completing, float(RowKind.CONTACT), kind)
     kind = jnp.where(released, float(RowKind.RELEASE), kind)
@@ -243,7 +243,7 @@ def _kind(carried, lands, begins, released, stopped):
 
 
 def _next_jets(carried, jets, landing: Landing, went, pressing, delay):
-    """The jets to go on with: what contact has decided, rounding must not undo.
+    """Return the jets of the next step, in which rounding must not undo a contact.
 
     On the surface the gap is zero, at a release velocity is too, and the acceleration
     does not press; a chatter that completes goes on with the acceleration of its end.

@@ -87,9 +87,9 @@ def land(
 
 
 def _kept_contacts(functions, carried, lands, t, before, after):
-    """An impact on one constraint may throw the system off another it rests on.
+    """Return the contacts kept after an impact, which may break contact elsewhere.
 
-    That is, it changes the normal velocity there by more than rounding.
+    A contact breaks if the impact changes its normal velocity by more than rounding.
     """
     if functions.m == 1:
         return carried.contact
@@ -102,10 +102,11 @@ def _kept_contacts(functions, carried, lands, t, before, after):
 
 
 def _hides(carried, t, impact, pulled, rounding):
-    """Whether rounding hides the hop after an impact, or the one before it.
+    """Return whether the flight after an impact, or before it, is lost in rounding.
 
-    The one after it is v^2 / 2a high; where nothing pulls, the one before it was no
-    higher than its end is fast and its duration long.
+    The flight after it is v^2 / 2a high; without an acceleration towards the
+    constraint, the flight before it was at most as high as its final speed times its
+    duration.
     """
     after = impact.rebound * impact.rebound <= 500 * rounding * pulled
     if not carried.struck:

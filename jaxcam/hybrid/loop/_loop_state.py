@@ -1,4 +1,4 @@
-"""What one trajectory carries from one iteration of the loop to the next."""
+"""The state of one trajectory between two iterations of the loop."""
 
 from typing import Any, NamedTuple
 

@@ -1,4 +1,4 @@
-"""Judging a step of contact: it goes on, or the constraint lets go."""
+"""Check a step of contact: it continues, or the constraint releases."""
 
 import jax.numpy as jnp
 

@@ -1,4 +1,4 @@
-"""Whether the rest of a chatter may follow an impact in no time, and where it ends."""
+"""Check whether chatter may be completed at once after an impact, and where it ends."""
 
 from typing import Any, NamedTuple
 
@@ -31,7 +31,7 @@ class Impact(NamedTuple):
 
 
 def rest_of_chatter(functions, plan, impact: Impact, jets, contact, stop) -> Rest:
-    """The completion of the sequence after an impact, and whether it may be used.
+    """Complete the chatter after an impact, and say whether the completion may be used.
 
     **Arguments:** the `jets` of all gaps after the impact, the constraints in `contact`
     then, and where the run has to `stop` (s).

@@ -32,8 +32,8 @@ class Log(NamedTuple):
     contact: Float[Array, "rows m"]
 
 
-#: how many lanes `vmap` will run together: no `vmap` at all, or a few
 Company = Literal["one", "few"]
+"""How many lanes `vmap` will run together: no `vmap` at all, or a few."""
 
 
 def run(
@@ -101,7 +101,8 @@ def run_raw(
 def attempts(functions: Functions, plan: Plan, carried: LoopState, row):
     """A block of attempts of one run, to be mapped over many.
 
-    **Returns:** the lane, and of each number in `row` an array, one for each attempt.
+    Returns:
+        The lane, and of each number in `row` an array, one for each attempt.
     """
 
     def body(carried):
@@ -122,7 +123,8 @@ def run_many(some: Callable, lanes: LoopState, rows: int, row):
     **Arguments:** `some(lanes)`, the `attempts` of all lanes with the lanes last in the
     log; the lanes, `(lanes,)` each; the rows of the log, and `row`.
 
-    **Returns:** the lanes and the log, `(rows, lanes)` for each number in a row.
+    Returns:
+        The lanes and the log, `(rows, lanes)` for each number in a row.
     """
     # the log is written as it will lie: under `vmap` each write would move all of it
     blocks, width = -(-rows // _BLOCK), len(lanes.status)
@@ -152,7 +154,7 @@ def run_many(some: Callable, lanes: LoopState, rows: int, row):
 def run_reversible(
     functions: Functions, plan: Plan, carried: LoopState, rows: int
 ) -> tuple[LoopState, Log]:
-    """The same, always for `rows` iterations, for reverse-mode differentiation.
+    """Run a fixed number of `rows` iterations, for reverse-mode differentiation.
 
     Blocks of iterations are recomputed on the way back, so that memory grows with the
     square root of their number.

@@ -1,7 +1,7 @@
-"""How large a motion is: what its errors and its rounding are measured by.
+"""Measure the size of a motion, to which its errors and its rounding are relative.
 
-Nothing here has units of its own: in micrometres and milliseconds a motion is the same
-as in metres and seconds.
+Nothing here has units of its own: a motion in micrometres and milliseconds is treated
+as one in metres and seconds.
 """
 
 import jax
@@ -20,7 +20,7 @@ _FIRST = 0.125
 
 
 def first_extents(lifts, jets, tinies, x) -> tuple[tuple, tuple]:
-    """Where components are measured from, and their scales before they have moved.
+    """Return the origins of the components, and their scales before they have moved.
 
     One that a gap depends on is measured from its start, and has the scale of that gap,
     wherever the origin of its coordinate is; any other has its own size. With several
@@ -110,7 +110,7 @@ def error_norm(error, allowed):
 
 
 def says_nothing(effort, tolerance):
-    """Whether the estimate of the error of a step is rounding, at this effort."""
+    """Return whether the error estimate of a step, at this effort, is only rounding."""
     return effort * tolerance <= _ROUNDING
 
 

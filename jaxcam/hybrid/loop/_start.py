@@ -1,4 +1,4 @@
-"""Which starts are refused, whether a run is traced or not."""
+"""Refuse invalid starts, traced or not."""
 
 import jax.numpy as jnp
 
@@ -13,10 +13,10 @@ def starts_behind(system, t, state):
 
 
 def first_status(t0, x, t1, gaps, rooms):
-    """The status of a run at its start: `RUNNING`, or why it cannot start.
+    """Return the status of a run at its start: `RUNNING`, or why it cannot start.
 
-    **Arguments:** times (s), the state, all gaps and what is not told from zero of them
-    (`start_room`) as tuples of scalars.
+    **Arguments:** times (s), the state, all gaps and their resolution (`start_room`) as
+    tuples of scalars.
     """
     behind = any_of([gap + room < 0 for gap, room in zip(gaps, rooms, strict=True)])
     finite = jnp.isfinite(sum(x) + sum(gaps) + t0 + t1)

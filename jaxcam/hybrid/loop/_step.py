@@ -48,7 +48,7 @@ class Step(NamedTuple):
 
 
 def end_of_step(plan: Plan, carried: LoopState, rounding) -> StepEnd:
-    """Where the next step ends; `rounding` is what cannot be told from a zero gap."""
+    """Choose where the next step ends; `rounding` is the resolution of a gap."""
     asked = jnp.minimum(plan.t0 + (carried.stops + 1) * plan.stop_period, plan.t1)
     sides = neighbours(plan.breaks, plan.repeat, carried.t)
     stop = jnp.minimum(asked, sides[1])
@@ -70,7 +70,7 @@ def end_of_step(plan: Plan, carried: LoopState, rounding) -> StepEnd:
 
 
 def seen_from_inside(plan: Plan, end: StepEnd):
-    """How the times of a step are seen: inside the breakpoints on its sides."""
+    """Move the times of a step inside the breakpoints on its sides."""
     if not plan.breaks:
         return lambda t: t
     (low, high), span = end.sides, plan.t1 - plan.t0

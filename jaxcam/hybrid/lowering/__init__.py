@@ -1,4 +1,4 @@
-"""All that depends on how JAX traces and XLA compiles: it changes speed, not results.
+"""Adapt programs to JAX's tracing and XLA's compiler: speed changes, results do not.
 
 The one exception is `whole`, which gives a loop the transformations that it lacks.
 """

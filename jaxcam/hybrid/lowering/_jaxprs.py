@@ -1,7 +1,7 @@
-"""Reading programs that jax has traced.
+"""Read programs that JAX has traced.
 
-What is called for every equation is not checked in the tests, which would take a fifth
-longer; it takes no arrays.
+Functions called for every equation are not type-checked in the tests, which would take
+a fifth longer; they take no arrays.
 """
 
 import math

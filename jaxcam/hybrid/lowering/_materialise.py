@@ -84,7 +84,8 @@ def with_kept(body: Callable, carry, on: bool = True):
     **Arguments:** `body(carry) -> (carry, row)` and an example of the carry, scalars.
     The row may be a pytree. Without `on` nothing is kept.
 
-    **Returns:** the new body, on `(carry, kept)`, and the first `kept`.
+    Returns:
+        The new body, on `(carry, kept)`, and the first `kept`.
     """
     if not on:
         return functools.partial(_keeping_nothing, body), []

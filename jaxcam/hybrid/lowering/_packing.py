@@ -12,8 +12,9 @@ class Packing(NamedTuple):
     """Where the leaves of a pytree are: hashable, so that programs are found by it."""
 
     structure: Any
-    #: shape of each leaf; `None` for one that is not of 64-bit floats and stays apart
     shapes: tuple
+    """Shape of each leaf; `None` for one that is not of 64-bit floats and stays apart.
+    """
 
     def unpacked(self, numbers, apart):
         """The pytree of these numbers, `(k,)`, and of the leaves that stayed apart."""
@@ -31,10 +32,10 @@ class Packing(NamedTuple):
 class Packed(NamedTuple):
     """The arrays of a pytree; where lanes differ, a column of `numbers` for each."""
 
-    #: (k,) or (k, lanes)
     numbers: np.ndarray
-    #: leaves that are no 64-bit floats, a row for each lane
+    """(k,) or (k, lanes)."""
     apart: list
+    """Leaves that are no 64-bit floats, a row for each lane."""
     packing: Packing
 
     def some(self, lanes) -> tuple:

@@ -83,8 +83,9 @@ def scalarise(function: Callable, *example) -> Callable:
     **Arguments:** the function of arrays, and examples of its arguments (pytrees of
     arrays or `jax.ShapeDtypeStruct`).
 
-    **Returns:** a function of the same pytrees whose leaves are what `split` makes of
-    the arrays.
+    Returns:
+        A function of the same pytrees whose leaves are what `split` makes of the
+            arrays.
     """
     closed, shape = jax.make_jaxpr(function, return_shape=True)(*example)
     treedef = jax.tree.structure(shape)

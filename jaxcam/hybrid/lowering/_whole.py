@@ -1,8 +1,8 @@
-"""A program that the transformations of JAX take whole, never in part.
+"""Make a program one operation that JAX transforms as a whole, never in part.
 
-Linearisation splits a program into what is known and what is linear, and leaves out
-results that nobody needs. XLA aborts where results of a loop that is compiled as one
-kernel (`_one_kernel.py`) are left out, and no loop can be run backward. Here a program
+Linearisation splits a program into known and linear parts, and drops unused
+results. XLA aborts where results of a loop that is compiled as one
+kernel (`_one_kernel.py`) are dropped, and no loop can be run backward. Here a program
 is one operation (a primitive): `vmap` and `jvp` make another such operation of it,
 linearisation evaluates it and its derivative one after the other, and a gradient comes
 from its forward derivatives, one for each number differentiated by.
@@ -31,7 +31,7 @@ _ONE_FUNCTION = {"inlineable": "false", "xla_cpu_small_call": "true"}
 
 
 class Program(NamedTuple):
-    """What the operation does; hashable, compared by identity of the jaxpr."""
+    """The content of the operation; hashable, compared by identity of the jaxpr."""
 
     jaxpr: ClosedJaxpr
     # whether the CPU backend compiles it as one function
@@ -48,10 +48,11 @@ def whole(function: Callable, *, kernel: dict[str, str] | None = None) -> Callab
     `kernel`, attributes of the calls inside, the CPU backend compiles it as one
     function, if it can.
 
-    **Returns:** a function of the same arguments with the same results (arrays, and
-    what is static). It can be compiled, batched and differentiated in both modes, any
-    number of times. A gradient costs as much as a forward derivative in all numbers
-    differentiated by.
+    Returns:
+        A function of the same arguments with the same results (arrays, and what is
+            static). It can be compiled, batched and differentiated in both modes, any
+            number of times. A gradient costs as much as a forward derivative in all
+            numbers differentiated by.
     """
 
     def call(*arguments):

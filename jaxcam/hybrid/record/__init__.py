@@ -1,4 +1,4 @@
-"""What a run leaves behind: events, contacts, steps, and the state in between."""
+"""The record of a run: events, contacts, steps, and the state in between."""
 
 from ._assemble import assemble as assemble, Parts as Parts
 from ._events import Contacts as Contacts, Impacts as Impacts, Steps as Steps

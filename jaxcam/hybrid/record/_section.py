@@ -11,7 +11,7 @@ _PLACES = 8
 
 
 def crossings(trajectory, function, direction: int):
-    """See `Trajectory.section`."""
+    """Find the crossings; see `Trajectory.section`."""
 
     def look(times):
         # of a padded length, so that few lengths are compiled

@@ -1,4 +1,4 @@
-"""What a simulation returns: impacts, contacts, and the state at any time."""
+"""The result of a simulation: impacts, contacts, and the state at any time."""
 
 from html import escape
 
@@ -19,17 +19,31 @@ from ._section import crossings
 
 
 class Trajectory(eqx.Module):
-    """A trajectory of a hybrid system on [t0, t1]."""
+    """A trajectory of a hybrid system on [t0, t1].
+
+    Examples:
+        >>> from jaxcam.models import BouncingBall
+        >>> trajectory = jaxcam.simulate(BouncingBall(), [1.0, 0.0], 0.0, 1.0)
+        >>> np.asarray(trajectory.at([0.0, 0.4])).round(4).tolist()
+        [[1.0, 0.0], [0.2152, -3.924]]
+    """
 
     system: HybridSystem
+    """The simulated system."""
     settings: Settings
+    """Accuracy settings of the run."""
     t0: Float[Array, ""]
+    """Start time (s)."""
     t1: Float[Array, ""]
+    """Requested end time (s)."""
     impacts: Impacts
+    """The impacts, in order."""
     contacts: Contacts
+    """The intervals of sustained contact."""
     steps: Steps
-    #: index into `RESULTS`: 0 successful
+    """The integration points."""
     code: Int[Array, ""]
+    """Index into `RESULTS`: 0 if the run reached t1."""
 
     def __str__(self) -> str:
         # of a batch there is no one line
@@ -53,12 +67,14 @@ class Trajectory(eqx.Module):
 
     @property
     def result(self) -> str:
-        """A sentence when the run did not reach t1, else the empty string."""
+        """The reason if the run did not reach t1, otherwise the empty string."""
         return message(int(self.code))
 
     @property
     def final(self) -> Float[Array, " n"]:
-        """State at the end of the run; NaN under a transformation if it failed."""
+        """State at the end of the run, shape `(n,)`; NaN under a transformation if it
+        failed.
+        """
         if not is_traced(self):
             last = np.asarray(self.steps.state)[int(self.steps.count) - 1]
             return jax.device_put(last)
@@ -66,12 +82,19 @@ class Trajectory(eqx.Module):
         return jnp.where(self.code == 0, last, jnp.nan)
 
     def at(self, times) -> Float[Array, "times n"]:
-        """State at each of `times` (s, shape `(times,)`), after any impact there.
+        """Return the state at each of `times`, after any impact there.
 
         Each sample is one more step of the same method from the last point before it,
         so it is as accurate as the run itself and differentiable.
 
-        **Raises:** `ValueError` for times outside [t0, t1].
+        Args:
+            times: Times (s), shape `(times,)`.
+
+        Returns:
+            States, shape `(times, n)`.
+
+        Raises:
+            ValueError: `times` is not a vector, or reaches outside [t0, t1].
         """
         known = not (is_traced((self, times)) or is_tracing())
         # in numpy where it can be: jax would compile something for every new length
@@ -98,7 +121,14 @@ class Trajectory(eqx.Module):
         return jax.device_put(np.asarray(found)[: times.shape[0]].copy())
 
     def gap(self, times):
-        """Gap at each of `times`: shape `(times,)`, or `(times, m)` for m > 1."""
+        """Return the gap at each of `times`.
+
+        Args:
+            times: Times (s), shape `(times,)`.
+
+        Returns:
+            Gaps, shape `(times,)`, or `(times, m)` for m > 1 constraints.
+        """
         states = self.at(times)
         if is_traced((self, times)) or is_tracing():
             return _gaps(self.system, jnp.asarray(times, dtype=jnp.float64), states)
@@ -107,9 +137,17 @@ class Trajectory(eqx.Module):
         return jax.device_put(np.asarray(found)[: len(times)].copy())
 
     def stroboscopic(self, period=None, phase=0.0) -> Float[Array, "k n"]:
-        """States at t0 + phase + k period, for a period (s) or the forcing's own.
+        """Return the states at t0 + phase + k period.
 
-        **Raises:** `ValueError` where the system has no period and none is given.
+        Args:
+            period: Sampling period (s); default the forcing's own.
+            phase: Time of the first sample after t0 (s).
+
+        Returns:
+            States, shape `(k, n)`.
+
+        Raises:
+            ValueError: The system has no period and none is given.
         """
         refuse_tracers("stroboscopic", "trajectory.at(times)", self, period, phase)
         period = self.system.period if period is None else period
@@ -123,13 +161,17 @@ class Trajectory(eqx.Module):
         return self.at(np.minimum(times, end))
 
     def section(self, function, direction: int = 0):
-        """Crossings of a Poincare section `function(t, state) = 0`.
+        """Return the crossings of a Poincare section `function(t, state) = 0`.
 
-        **Arguments:** a smooth scalar function, and the direction of the crossings that
-        count: +1 rising, -1 falling, 0 both. Each step of the integration is searched
-        in eight pieces; two crossings within one piece are missed.
+        Each integration step is searched in eight pieces; two crossings within one
+        piece are missed.
 
-        **Returns:** times (s) and states, shapes `(k,)` and `(k, n)`.
+        Args:
+            function: A smooth scalar function of time and state.
+            direction: Crossings that count: +1 rising, -1 falling, 0 both.
+
+        Returns:
+            Times (s) and states, shapes `(k,)` and `(k, n)`.
         """
         refuse_tracers("section", "trajectory.at(times)", self)
         return crossings(self, function, direction)

@@ -1,4 +1,4 @@
-"""The second engine: a call of `diffrax.diffeqsolve` for each piece of motion."""
+"""Simulate by one call of `diffrax.diffeqsolve` per piece of motion (second engine)."""
 
 from ._one_step import one_step as one_step
 from ._pieces import simulate_segments as simulate_segments

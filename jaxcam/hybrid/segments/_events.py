@@ -13,16 +13,17 @@ from ._motion import CompiledMotion, FRACTIONS
 
 
 class PieceEnd(NamedTuple):
-    """What ends a piece: the constraint, the row of the last point before, and the
-    time from there (s)."""
+    """The event that ends a piece: constraint, row of the last point before, time since
+    (s).
+    """
 
     constraint: int
     row: int
     length: float
 
 
-#: the step after an event was longer than the flight: try again with a shorter one
 TOO_LONG = PieceEnd(-1, 0, 0.0)
+"""The step after an event was longer than the flight: try again with a shorter one."""
 
 
 class Flown(NamedTuple):

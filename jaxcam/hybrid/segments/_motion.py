@@ -92,8 +92,8 @@ class CompiledMotion(eqx.Module):
     system: HybridSystem
     tolerance: jax.Array
     smallness: jax.Array
-    #: of each component, `(n,)`: what errors are relative to
     scale: jax.Array
+    """Of each component, `(n,)`: what errors are relative to."""
     solver: diffrax.AbstractSolver = eqx.field(static=True)
 
     def __init__(self, system, settings, scale):
@@ -210,7 +210,7 @@ class CompiledMotion(eqx.Module):
 
     @_compiled
     def rounding(self, t, x, reach):
-        """What rounding can tell of gaps and normal velocities, `(2, m)`."""
+        """Return the rounding errors of gaps and normal velocities, `(2, m)`."""
         found = gap_rounding, speed_rounding
         return jnp.stack([one(self.system, t, x, reach) for one in found])
 

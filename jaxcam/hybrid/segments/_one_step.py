@@ -13,9 +13,11 @@ def one_step(solver: diffrax.AbstractSolver, tolerance, field, t, x, h, scale):
     take that of their equations; time (s), state `(n,)` and length (s, zero allowed);
     the scale of each component, `(n,)`, positive.
 
-    **Returns:** the state after the step and the estimate of its error, both `(n,)`.
+    Returns:
+        The state after the step and the estimate of its error, both `(n,)`.
 
-    **Raises:** `ValueError` for a solver without an error estimate.
+    Raises:
+        ValueError: For a solver without an error estimate.
     """
     # time counts from t: t + h - t would lose the digits of a short step
     terms = scaled_term(field, t, x, scale)

@@ -36,8 +36,9 @@ def simulate_segments(
     **Arguments:** as in [`jaxcam.simulate`][jaxcam.hybrid.simulate], with concrete
     values.
 
-    **Returns:** the log, the constraints in contact at the start `(m,)`, and the index
-    into `RESULTS`.
+    Returns:
+        The log, the constraints in contact at the start `(m,)`, and the index into
+            `RESULTS`.
     """
     engine = _Engine(system, settings, float(t0), np.asarray(state), float(t1))
     contact = engine.contact.copy()
@@ -237,7 +238,7 @@ class _Engine:
         self._row(RowKind.IMPACT, k, t, after, before)
 
     def _no_step(self) -> float:
-        """Why no step is short enough."""
+        """Return the reason why no step is short enough."""
         return TOGETHER if self.crowded else STEP_FAILED
 
     def _release(self, k, t, x):
@@ -307,7 +308,7 @@ class _Engine:
         self.motion = self.motion.measured(scale)
 
     def _tiny(self, states):
-        """What rounding can tell of each gap, along some states."""
+        """Return the rounding error of each gap, along some states."""
         reach = np.abs(states).max(axis=0) + self.extents
         return 500 * np.asarray(self.motion.rounding(self.t, self.x, reach))[0]
 

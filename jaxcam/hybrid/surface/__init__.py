@@ -1,4 +1,4 @@
-"""The motion relative to the constraints: gaps, velocities, contact, chatter, release.
+"""Derive the motion relative to the constraints: gaps, contact, chatter, release.
 
 Everything is derived from the three functions that a system states.
 """
@@ -16,12 +16,9 @@ from ._impact_law import (
 from ._normal import (
     contact_multipliers as contact_multipliers,
     field_in_force as field_in_force,
-    forced_time as forced_time,
     free_jet as free_jet,
-    gap_rounding as gap_rounding,
     gaps as gaps,
     impacts as impacts,
-    least_gaps as least_gaps,
     lie_derivative as lie_derivative,
     lie_series as lie_series,
     mode_jet as mode_jet,
@@ -29,8 +26,6 @@ from ._normal import (
     normal_directions as normal_directions,
     normal_velocity as normal_velocity,
     restitution_coefficients as restitution_coefficients,
-    speed_rounding as speed_rounding,
-    start_room as start_room,
     sticking_field as sticking_field,
 )
 from ._release_point import (
@@ -38,4 +33,11 @@ from ._release_point import (
     contact_state as contact_state,
     release_point as release_point,
     ReleasePoint as ReleasePoint,
+)
+from ._rounding import (
+    forced_time as forced_time,
+    gap_rounding as gap_rounding,
+    least_gaps as least_gaps,
+    speed_rounding as speed_rounding,
+    start_room as start_room,
 )

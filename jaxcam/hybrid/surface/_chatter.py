@@ -1,16 +1,16 @@
-"""The rest of a chattering sequence in one formula.
+"""Complete a chattering sequence by one formula.
 
 After an impact with small rebound speed u the normal motion is y'' = A + B t + C y',
 where A < 0 and its rate B belong to the state without normal velocity, and C is the
 change of acceleration with normal velocity. With restitution r0 + r1 v the remaining,
-infinitely many hops last
+infinitely many flights last
 
     T = 2 u (1 + r1 u / (1 - r0^2)) / (|A| (1 - r0))
         - (4/3) B u^2 / (A^3 (1 - r0)^2) + (2/3) C u^2 / (A^2 (1 - r0)^2) + O(u^3).
 
-For C = r1 = 0 this is the expansion behind (3.17) carried to second order; the small
-number is lambda / (1 - r0), lambda = u j / A^2. Meanwhile the rest of the state moves
-by the sticking field from the state P whose normal velocity is removed along the
+For C = r1 = 0 this is the expansion behind eq. (3.17) of the thesis, carried to second
+order; the small number is lambda / (1 - r0), lambda = u j / A^2. The rest of the state
+moves by the sticking field from the state P whose normal velocity is removed along the
 direction of the impulse, which is exact to the same order.
 """
 
@@ -36,11 +36,24 @@ from ._normal import (
 def completion_time(
     speed, acceleration, rate, damping, restitution, softening: ArrayLike = 0.0
 ):
-    """Duration of the remaining hops, of second order in `speed`.
+    """Return the duration of the remaining impacts of a chatter, to second order in
+    `speed`.
 
-    **Arguments:** rebound speed u > 0; A < 0, B and C as above; r0 and r1.
+    Args:
+        speed: Rebound speed u > 0.
+        acceleration: Normal acceleration A < 0.
+        rate: Jerk B along the flight, as in the module's formula.
+        damping: Rate C of the normal acceleration with normal velocity.
+        restitution: Coefficient of restitution r0 in the limit of slow impacts.
+        softening: Slope r1 of the coefficient, r0 + r1 v.
 
-    **Returns:** T, in the units of u/A.
+    Returns:
+        Duration T in the units of u/A (thesis, eq. 3.17, carried to second order).
+
+    Examples:
+        >>> from jaxcam.hybrid.surface import completion_time
+        >>> float(completion_time(1.0, -10.0, 0.0, 0.0, 0.5))
+        0.4
     """
     rest = 1 - restitution
     inverse = 1 / acceleration
@@ -52,7 +65,7 @@ def completion_time(
 
 
 def completion_coefficients(system, t, before, after):
-    """C and r0 of each constraint, for an impact from `before` to `after`.
+    """Return C and r0 of each constraint, for an impact from `before` to `after`.
 
     Also returns the state P without normal velocity, one row for each constraint, as if
     each of them had been hit.
@@ -86,26 +99,41 @@ def completion_coefficients(system, t, before, after):
 
 
 class Completion(NamedTuple):
-    """Where and when a chattering sequence ends."""
+    """The end of a chattering sequence."""
 
     time: Float[Array, ""]
+    """Accumulation time (s)."""
     state: Float[Array, " n"]
+    """State there, shape `(n,)`."""
     smallness: Float[Array, ""]
+    """The number lambda/(1 - r), which must be small for the completion to hold."""
 
 
 def chatter_completion(
     system: HybridSystem, t: RealScalar, state: State, order: int = 2
 ) -> Completion:
-    """End of the chatter that starts at a state on the surface, just after an impact.
+    """Complete the chatter that starts on the surface, just after an impact.
 
-    **Arguments:**
+    Args:
+        system: A system with one constraint.
+        t: Time of the impact (s).
+        state: State just after the impact, shape `(n,)`: gap zero, normal velocity u >
+            0, acceleration a < 0.
+        order: 1 for the thesis, eq. (3.17), with error O(u^2); 2 for the second-order
+            map, error O(u^3).
 
-    - `t`: time of the impact (s).
-    - `state`: shape `(n,)`, gap zero, normal velocity u > 0, acceleration a < 0.
-    - `order`: 1 for (3.17), error O(u^2); 2 for the second-order map, error O(u^3).
+    Returns:
+        The accumulation time (s), the state there, and lambda/(1 - r), which must be
+            small for either to be valid.
 
-    **Returns:** the accumulation time (s), the state there, and lambda/(1 - r), which
-    must be small for either to mean anything. For systems with one constraint.
+    Raises:
+        ValueError: `order` is neither 1 nor 2.
+
+    Examples:
+        >>> from jaxcam.hybrid.surface import chatter_completion
+        >>> from jaxcam.models import BouncingBall
+        >>> float(chatter_completion(BouncingBall(), 0.0, jnp.array([0.0, 0.981])).time)
+        1.0
     """
     if order not in (1, 2):
         raise ValueError(f"order is {order}; the completion map has order 1 or 2")

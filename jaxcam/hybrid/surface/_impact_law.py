@@ -1,4 +1,4 @@
-"""How much of the approach speed the impact law of a system gives back."""
+"""Measure the coefficient of restitution of a system's impact law."""
 
 import jax
 import jax.numpy as jnp
@@ -6,7 +6,8 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from .._system import HybridSystem
-from ._normal import gaps, impacts, normal_velocity, speed_rounding
+from ._normal import gaps, impacts, normal_velocity
+from ._rounding import speed_rounding
 
 
 # rounding of a law that is evaluated through several coordinates
@@ -18,12 +19,13 @@ _STEPS = 4
 
 
 def restitutions(system: HybridSystem, t, x: Float[Array, " n"]) -> Float[Array, " m"]:
-    """Coefficient of restitution of each constraint, for an impact near a state.
+    """Return the coefficient of restitution of each constraint near a state.
 
     The state is moved onto the constraint, and its normal velocity made negative: the
-    quotient of normal velocities after and before an impact (2.27) is minus the
-    coefficient. Of a state at rest on the constraint the normal velocity is nothing but
-    the rounding of its terms, so it is made larger than that; one where all are zero.
+    coefficient is minus the quotient of normal velocities after and before an impact
+    (thesis, eq. 2.27). For a state at rest on the constraint the normal velocity is
+    only the rounding of its terms, so it is made larger than that; one where all are
+    zero.
     """
     number = gaps(system, t, x).shape[0]
     found = []
@@ -46,9 +48,12 @@ def restitutions(system: HybridSystem, t, x: Float[Array, " n"]) -> Float[Array,
 
 
 def check_restitution(system: HybridSystem, values) -> None:
-    """Raise `ValueError` for a coefficient outside of [0, 1]; NaN says nothing.
+    """Raise `ValueError` for a coefficient outside of [0, 1]; NaN passes.
 
-    **Arguments:** shape `(m,)`, or `(lanes, m)` for lanes that differ in parameters.
+    Args:
+        system: The system, whose `active` allows values above one.
+        values: Coefficients, shape `(m,)`, or `(lanes, m)` for lanes that differ in
+            parameters.
     """
     values = np.asarray(values)
     high = np.inf if system.active else 1.0 + _ROUNDING

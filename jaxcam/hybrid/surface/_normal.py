@@ -1,10 +1,10 @@
-"""Motion normal to the constraints, derived from the three stated functions.
+"""Derive the motion normal to the constraints from the three functions of a system.
 
 Notation of the thesis: H gap, v = dH/dt normal velocity, a and j its first and second
-derivative along the field in force, W the impulse direction of x+ = x + W v (2.27).
-Here the unit direction D = W / (v_x W) is used: moving by D changes the normal velocity
-by one and leaves the gap alone. It does not depend on the restitution, and the sticking
-field (2.30)-(2.31) becomes F - a D.
+derivative along the field in force, W the impulse direction of x+ = x + W v (thesis,
+eq. 2.27). Here the unit direction D = W / (v_x W) is used: moving by D changes the
+normal velocity by one and leaves the gap unchanged. It does not depend on the
+restitution, and the sticking field (thesis, eqs. 2.30 and 2.31) becomes F - a D.
 """
 
 from collections.abc import Callable
@@ -18,71 +18,49 @@ from .._types import RealScalar, State
 
 
 def gaps(system: HybridSystem, t: RealScalar, x: State) -> Float[Array, " m"]:
-    """All gaps as a vector, whether the system states one or several."""
+    """Return all gaps as a vector, whether the system defines one or several.
+
+    Args:
+        system: The system.
+        t: Time (s).
+        x: State, shape `(n,)`.
+
+    Returns:
+        Gaps, shape `(m,)`.
+
+    Examples:
+        >>> from jaxcam.hybrid.surface import gaps
+        >>> from jaxcam.models import BouncingBall
+        >>> gaps(BouncingBall(), 0.0, jnp.array([1.0, 0.0])).tolist()
+        [1.0]
+    """
     return jnp.atleast_1d(system.gap(t, x))
 
 
-def gap_rounding(
-    system: HybridSystem, t: RealScalar, x: State, reach: State
-) -> Float[Array, " m"]:
-    """What rounding can tell of each gap, for components as large as `reach`."""
-    return _rounding(lambda s, y: gaps(system, s, y), t, x, reach)
-
-
-def speed_rounding(
-    system: HybridSystem, t: RealScalar, x: State, reach: State
-) -> Float[Array, " m"]:
-    """What rounding can tell of each normal velocity."""
-    return _rounding(lambda s, y: normal_velocity(system, s, y), t, x, reach)
-
-
-def start_room(rounding, acceleration, time):
-    """How far from the surface, or how fast, a start may be and count as in contact.
-
-    **Arguments:** what rounding can tell; the normal acceleration; and the time in
-    which it acts (s), squared for a distance. A start at the origin of a coordinate has
-    no other size than that of the forced motion.
-    """
-    return 500 * rounding + 1e-12 * jnp.abs(acceleration) * time
-
-
-def forced_time(period):
-    """The period over 2 pi, or zero for a system without one (`None`, or inf)."""
-    if period is None:
-        return jnp.zeros(())
-    return jnp.where(jnp.isfinite(period), period / (2 * jnp.pi), 0.0)
-
-
-def least_gaps(system, t, x, room: RealScalar = 1.0) -> Float[Array, " m"]:
-    """The gaps of a start, and `room` times what is not told from zero added to them.
-
-    A start is in front of the constraints where none of them is negative.
-    """
-    rounding = gap_rounding(system, t, x, jnp.abs(x))
-    acceleration = normal_acceleration(system, t, x)
-    time = forced_time(system.period) ** 2
-    return gaps(system, t, x) + room * start_room(rounding, acceleration, time)
-
-
-def _rounding(function: Callable, t, x, reach):
-    """How far rounding of `t` and `x` moves a function.
-
-    A state is right to some parts in 1e15 of its components; a time, and a phase made
-    of it, to two parts in 1e16 each.
-    """
-    by_state = jax.jacfwd(lambda y: function(t, y))(x)
-    by_time = jax.jvp(lambda s: function(s, x), (t,), (jnp.ones_like(t),))[1]
-    size = jnp.sum(jnp.abs(by_state) * reach[None], axis=1)
-    return 2e-15 * size + 4e-16 * jnp.abs(t * by_time)
-
-
 def impacts(system: HybridSystem, t: RealScalar, x: State) -> Float[Array, "m n"]:
-    """The state after an impact at each constraint, one row for each."""
+    """Return the state after an impact at each constraint, one row for each.
+
+    Args:
+        system: The system.
+        t: Time (s).
+        x: State just before the impact, shape `(n,)`.
+
+    Returns:
+        States after the impact, shape `(m, n)`.
+
+    Examples:
+        >>> from jaxcam.hybrid.surface import impacts
+        >>> from jaxcam.models import BouncingBall
+        >>> impacts(BouncingBall(), 0.0, jnp.array([0.0, -1.0])).tolist()
+        [[0.0, 0.8]]
+    """
     return jnp.atleast_2d(system.impact(t, x))
 
 
 def lie_derivative(function: Callable, field: Callable) -> Callable:
-    """Rate of change of `function(t, x)` along `field`, explicit time included."""
+    """Return the rate of change of `function(t, x)` along `field`, explicit time
+    included.
+    """
 
     def derivative(t, x):
         return jax.jvp(function, (t, x), (jnp.ones_like(t), field(t, x)))[1]
@@ -91,7 +69,8 @@ def lie_derivative(function: Callable, field: Callable) -> Callable:
 
 
 def lie_series(function: Callable, field: Callable, order: int) -> Callable:
-    """`function` and its rates of change along `field` up to `order`, as a tuple.
+    """Return `function` and its rates of change along `field` up to `order`, as a
+    tuple.
 
     Each level is differentiated together with those below it, which costs less than one
     after the other.
@@ -114,14 +93,44 @@ def lie_series(function: Callable, field: Callable, order: int) -> Callable:
 
 
 def normal_velocity(system, t, x) -> Float[Array, " m"]:
-    """v = H_t + H_x F for each constraint. (2.26)"""
+    """Return v = H_t + H_x F for each constraint (thesis, eq. 2.26).
+
+    Args:
+        system: The system.
+        t: Time (s).
+        x: State, shape `(n,)`.
+
+    Returns:
+        Normal velocities, shape `(m,)`.
+
+    Examples:
+        >>> from jaxcam.hybrid.surface import normal_velocity
+        >>> from jaxcam.models import BouncingBall
+        >>> normal_velocity(BouncingBall(), 0.0, jnp.array([1.0, -2.0])).tolist()
+        [-2.0]
+    """
     return lie_derivative(
         lambda s, y: gaps(system, s, y), lambda s, y: system.vector_field(s, y)
     )(t, x)
 
 
 def normal_acceleration(system, t, x) -> Float[Array, " m"]:
-    """a = dv/dt in free flight for each constraint. (2.29)"""
+    """Return a = dv/dt in free flight for each constraint (thesis, eq. 2.29).
+
+    Args:
+        system: The system.
+        t: Time (s).
+        x: State, shape `(n,)`.
+
+    Returns:
+        Normal accelerations, shape `(m,)`.
+
+    Examples:
+        >>> from jaxcam.hybrid.surface import normal_acceleration
+        >>> from jaxcam.models import BouncingBall
+        >>> normal_acceleration(BouncingBall(), 0.0, jnp.array([1.0, -2.0])).tolist()
+        [-9.81]
+    """
     return lie_derivative(
         lambda s, y: normal_velocity(system, s, y),
         lambda s, y: system.vector_field(s, y),
@@ -129,10 +138,26 @@ def normal_acceleration(system, t, x) -> Float[Array, " m"]:
 
 
 def normal_directions(system, t, x) -> Float[Array, "m n"]:
-    """D for each constraint, exact where the normal velocity is zero.
+    """Return the unit direction D of the impulse for each constraint.
 
-    R(x) - x = W v vanishes with v, so W is found from its derivative in a direction
-    that changes v; the gradient of v is one.
+    It is exact where the normal velocity is zero: R(x) - x = W v vanishes with v, so W
+    is found from its derivative in a direction that changes v; the gradient of v is
+    one.
+
+    Args:
+        system: The system.
+        t: Time (s).
+        x: State, shape `(n,)`.
+
+    Returns:
+        Directions, shape `(m, n)`; moving by one changes the normal velocity by one.
+
+    Examples:
+        >>> from jaxcam.hybrid.surface import normal_directions
+        >>> from jaxcam.models import BouncingBall
+        >>> d = normal_directions(BouncingBall(), 0.0, jnp.array([0.0, -2.0]))
+        >>> d.shape, float(d[0, 1])
+        ((1, 2), 1.0)
     """
     gradient = jax.jacfwd(lambda y: normal_velocity(system, t, y))(x)
     number = gradient.shape[0]
@@ -147,7 +172,7 @@ def normal_directions(system, t, x) -> Float[Array, "m n"]:
 
 
 def contact_multipliers(system, t, x, contact: Bool[Array, " m"]) -> Float[Array, " m"]:
-    """q with F_s = F - sum q_k D_k over the constraints in contact.
+    """Return q with F_s = F - sum q_k D_k over the constraints in contact.
 
     With one constraint q = a. The constraint presses while q < 0 and lets go where q
     rises through zero. Zero for constraints that are not in contact.
@@ -161,7 +186,24 @@ def contact_multipliers(system, t, x, contact: Bool[Array, " m"]) -> Float[Array
 
 
 def field_in_force(system, t, x, contact: Bool[Array, " m"]) -> State:
-    """Free flight, or sticking on the constraints marked in `contact`. (2.30)"""
+    """Return the field of free flight, or of sticking on the constraints in `contact`.
+
+    Args:
+        system: The system.
+        t: Time (s).
+        x: State, shape `(n,)`.
+        contact: Which constraints are in contact, shape `(m,)`.
+
+    Returns:
+        Rates of the state, shape `(n,)` (thesis, eq. 2.30).
+
+    Examples:
+        >>> from jaxcam.hybrid.surface import field_in_force
+        >>> from jaxcam.models import BouncingBall
+        >>> ball, held = BouncingBall(), jnp.array([True])
+        >>> field_in_force(ball, 0.0, jnp.zeros(2), held).tolist()
+        [0.0, 0.0]
+    """
     multipliers = contact_multipliers(system, t, x, contact)
     directions = normal_directions(system, t, x)
     push = jnp.sum(multipliers[:, None] * directions, axis=0)
@@ -169,18 +211,44 @@ def field_in_force(system, t, x, contact: Bool[Array, " m"]) -> State:
 
 
 def sticking_field(system: HybridSystem, t: RealScalar, x: State) -> State:
-    """The field of sustained contact with every constraint. (2.30)-(2.31)
+    """Return the field of sustained contact with every constraint.
 
-    **Arguments:** `t` (s) and the state, shape `(n,)`, on the surface.
+    Args:
+        system: The system.
+        t: Time (s).
+        x: State on the surface, shape `(n,)`.
 
-    **Returns:** rate of change of the state, shape `(n,)`.
+    Returns:
+        Rates of the state, shape `(n,)` (thesis, eqs. 2.30 and 2.31).
+
+    Examples:
+        >>> from jaxcam.hybrid.surface import sticking_field
+        >>> from jaxcam.models import BouncingBall
+        >>> sticking_field(BouncingBall(), 0.0, jnp.zeros(2)).tolist()
+        [0.0, 0.0]
     """
     everywhere = jnp.ones(gaps(system, t, x).shape, dtype=bool)
     return field_in_force(system, t, x, everywhere)
 
 
 def free_jet(system, t, x) -> Float[Array, "m 4"]:
-    """H, v, a, j of each gap in free flight."""
+    """Return gap H, velocity v, acceleration a and jerk j of each constraint in free
+    flight.
+
+    Args:
+        system: The system.
+        t: Time (s).
+        x: State, shape `(n,)`.
+
+    Returns:
+        One row H, v, a, j per constraint, shape `(m, 4)`.
+
+    Examples:
+        >>> from jaxcam.hybrid.surface import free_jet
+        >>> from jaxcam.models import BouncingBall
+        >>> free_jet(BouncingBall(), 0.0, jnp.array([1.0, -2.0])).tolist()
+        [[1.0, -2.0, -9.81, 0.0]]
+    """
 
     def field(s, y):
         return system.vector_field(s, y)
@@ -192,7 +260,7 @@ def free_jet(system, t, x) -> Float[Array, "m 4"]:
 
 
 def mode_jet(system, t, x, contact: Bool[Array, " m"]) -> Float[Array, "m 4"]:
-    """H, v, a, j of each gap along the field in force.
+    """Return H, v, a, j of each gap along the field in force.
 
     For a constraint in contact a and j are the multiplier q and its rate, whose zero is
     the release.
@@ -221,7 +289,24 @@ def mode_jet(system, t, x, contact: Bool[Array, " m"]) -> Float[Array, "m 4"]:
 
 
 def restitution_coefficients(system, t, x) -> Float[Array, " m"]:
-    """r of each constraint in the limit of slow impacts: v changes from v to -r v."""
+    """Return r of each constraint in the limit of slow impacts: v changes from v to -r
+    v.
+
+    Args:
+        system: The system.
+        t: Time (s).
+        x: State, shape `(n,)`.
+
+    Returns:
+        Coefficients of restitution, shape `(m,)`.
+
+    Examples:
+        >>> from jaxcam.hybrid.surface import restitution_coefficients
+        >>> from jaxcam.models import BouncingBall
+        >>> r = restitution_coefficients(BouncingBall(), 0.0, jnp.zeros(2))
+        >>> round(float(r[0]), 6)
+        0.8
+    """
     directions = normal_directions(system, t, x)
 
     def rebound(speed, k):

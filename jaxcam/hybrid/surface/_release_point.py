@@ -1,5 +1,4 @@
-"""The motion that leaves the constraint after sticking: where every orbit with complete
-chattering starts its turn."""
+"""Find the release from sticking, the start of a period with complete chattering."""
 
 import equinox as eqx
 import jax
@@ -12,34 +11,68 @@ from ._normal import free_jet, gaps, normal_acceleration, normal_velocity
 
 
 class ReleasePoint(eqx.Module):
-    """`time` (s) and `state` `(n,)` at which contact ends.
+    """The time and state at which contact ends.
 
     `holds`: 0 for a release, 1 where contact still holds, 2 where there is none.
     """
 
     time: Float[Array, ""]
+    """Time of release (s)."""
     state: Float[Array, " n"]
+    """State there, shape `(n,)`."""
     holds: Float[Array, ""]
+    """0 for a release, 1 where contact still holds, 2 where there is none."""
 
 
 def contact_state(system: HybridSystem, times, guess) -> Float[Array, "times n"]:
-    """State of sustained contact at each of `times`, for two states and one constraint.
+    """Return the state of sustained contact at each of `times`.
 
-    Gap and normal velocity zero fix it; found by Newton from `guess`, shape `(n,)`.
+    Zero gap and zero normal velocity determine it; found by Newton's method.
+
+    Args:
+        system: A system with two states and one constraint.
+        times: Times (s), shape `(times,)`.
+        guess: State from which Newton's method starts, shape `(n,)`.
+
+    Returns:
+        States, shape `(times, n)`.
+
+    Examples:
+        >>> from jaxcam.hybrid.surface import contact_state
+        >>> from jaxcam.models import ImpactOscillator
+        >>> system = ImpactOscillator(wall=0.5)
+        >>> contact_state(system, jnp.zeros(1), jnp.zeros(2)).tolist()
+        [[0.5, 0.0]]
     """
     return _contact(system, jnp.asarray(times), guess)[0]
 
 
 def contact_acceleration(system: HybridSystem, times, guess) -> Float[Array, " times"]:
-    """Normal acceleration that contact suppresses at each of `times`; it holds below 0.
+    """Return the normal acceleration that contact suppresses at each of `times`.
 
-    The follower detaches where its maximum over the period is positive.
+    Contact holds while it is negative; the follower detaches where its maximum over the
+    period is positive.
+
+    Args:
+        system: A system with two states and one constraint.
+        times: Times (s), shape `(times,)`.
+        guess: State from which Newton's method starts, shape `(n,)`.
+
+    Returns:
+        Accelerations, shape `(times,)`.
+
+    Examples:
+        >>> from jaxcam.hybrid.surface import contact_acceleration
+        >>> from jaxcam.models import ImpactOscillator
+        >>> system = ImpactOscillator(wall=0.5)
+        >>> contact_acceleration(system, jnp.zeros(1), jnp.zeros(2)).tolist()
+        [-0.5]
     """
     return _contact(system, jnp.asarray(times), guess)[1]
 
 
 def _contact(system: HybridSystem, times, guess):
-    """States and accelerations of contact: twelve steps of Newton at each time."""
+    """Return states and accelerations of contact: twelve Newton steps at each time."""
 
     def one(t):
         x = jax.lax.fori_loop(0, 12, lambda _, x: _onto(system, t, x), guess)
@@ -49,7 +82,7 @@ def _contact(system: HybridSystem, times, guess):
 
 
 def _onto(system: HybridSystem, t: RealScalar, x: State) -> State:
-    """One Newton step of the two states onto gap = normal velocity = 0."""
+    """Take one Newton step of the two states onto gap = normal velocity = 0."""
 
     def both(y):
         return gaps(system, t, y)[0], normal_velocity(system, t, y)[0]
@@ -63,13 +96,24 @@ def _onto(system: HybridSystem, t: RealScalar, x: State) -> State:
 def release_point(
     system: HybridSystem, t: RealScalar, guess=None, samples: int = 512
 ) -> ReleasePoint:
-    """The last release at or before `t`, found by a scan over one period.
+    """Find the last release at or before `t` by a scan over one period.
 
-    **Arguments:** a system with a `period`, two states and one constraint; a state near
-    the surface for Newton's method (zeros by default); points in the scan.
+    Args:
+        system: A system with a `period`, two states and one constraint.
+        t: Time (s).
+        guess: State near the surface for Newton's method, shape `(n,)`, default zeros.
+        samples: Number of points in the scan.
 
-    **Returns:** the release, or, where contact holds at `t`, the state of contact at
-    `t` with `holds` 1. `holds` is 2 where there is no contact at all in a period.
+    Returns:
+        The release. Where contact holds at `t`, the state of contact at `t` with
+            `holds` 1; `holds` is 2 where there is no contact at all in a period.
+
+    Examples:
+        >>> from jaxcam.hybrid.surface import release_point
+        >>> from jaxcam.models import ImpactOscillator
+        >>> release = release_point(ImpactOscillator(omega=1.0, wall=0.5), 3.0)
+        >>> round(float(release.time), 6)
+        1.047198
     """
     system = system.prepared()
     guess = jnp.zeros(2) if guess is None else guess

@@ -22,15 +22,15 @@ class CamContour(NamedTuple):
     circle, or a smaller roller.
     """
 
-    #: contact point in the frame of the cam (m)
     x: Float[Array, " angles"]
+    """Contact point in the frame of the cam (m)."""
     y: Float[Array, " angles"]
-    #: positive where the contour is convex (m)
     radius_of_curvature: Float[Array, " angles"]
-    #: between the contact force and the motion of the point where it acts (rad)
+    """Positive where the contour is convex (m)."""
     pressure_angle: Float[Array, " angles"]
-    #: lever of the contact force about the hinge (m); 1 for a translating follower
+    """Between the contact force and the motion of the point where it acts (rad)."""
     arm: Float[Array, " angles"]
+    """Lever of the contact force about the hinge (m); 1 for a translating follower."""
 
 
 def flat_translating_contour(
@@ -64,17 +64,18 @@ def flat_oscillating_contour(
     The common normal meets the line from the hinge to the axis of the cam where both
     bodies have one velocity, which gives the contact point from lift and slope alone.
 
-    **Arguments:**
+    Args:
+        profile: Lift is the angle of the follower (rad).
+        cam_angles: rad, shape `(angles,)`.
+        center: The axis of the cam (x0, y0) from the hinge (m), and.
+        half_height: Distance of the face from the hinge (m); both are known for an
+            [`jaxcam.models.EccentricCircle`][] .
 
-    - `profile`: lift is the angle of the follower (rad).
-    - `cam_angles`: rad, shape `(angles,)`.
-    - `center`: the axis of the cam (x0, y0) from the hinge (m), and
-    - `half_height`: distance of the face from the hinge (m); both are known for an
-        [`jaxcam.models.EccentricCircle`][] .
+    Returns:
+        The contour about the cam's axis.
 
-    **Returns:** the contour about the cam's axis.
-
-    **Raises:** `ValueError` where the axis or the half height is not known.
+    Raises:
+        ValueError: Where the axis or the half height is not known.
     """
     if isinstance(profile, EccentricCircle):
         if center is None:
@@ -140,9 +141,9 @@ def roller_oscillating_contour(
 ) -> CamContour:
     """The cam of a roller on an arm that swings about a pivot.
 
-    **Arguments:** a profile whose lift is the arm's angle (rad) from the x-axis,
-    the pivot (m) from the cam's axis, the arm's length and the roller's radius (m), and
-    cam angles (rad).
+    **Arguments:** a profile whose lift is the arm's angle (rad) from the x-axis, the
+    pivot (m) from the cam's axis, the arm's length and the roller's radius (m), and cam
+    angles (rad).
     """
 
     def center(lift):

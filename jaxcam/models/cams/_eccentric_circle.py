@@ -10,31 +10,28 @@ from ._fourier_profile import FourierProfile
 from ._profile import CamProfile
 
 
-#: largest part of the profile (rad) that its Fourier series may leave out
 _TAIL = 1e-13
+"""Largest part of the profile (rad) that its Fourier series may leave out."""
 
 
 class EccentricCircle(CamProfile):
     """A flat follower, hinged at the origin, on an eccentric circular cam. (4.23)
 
     The defaults are Table 4.4.
-
-    **Arguments:**
-
-    - `radius`: radius of the cam R (m).
-    - `eccentricity`: distance of its centre from the axis it turns about, e (m).
-    - `center_x`, `center_y`: the axis it turns about (x0, y0), from the follower's
-        hinge (m).
-    - `half_height`: distance of the follower's flat face from its hinge, d (m).
-    - `harmonics`: number of harmonics that `prepared` keeps.
     """
 
     radius: jax.Array = parameter(0.045)
+    """Radius of the cam R (m)."""
     eccentricity: jax.Array = parameter(0.015)
+    """Distance of its centre from the axis it turns about, e (m)."""
     center_x: jax.Array = parameter(0.249)
+    """The axis it turns about (x0, y0), from the follower's hinge (m)."""
     center_y: jax.Array = parameter(0.0)
+    """The axis it turns about (x0, y0), from the follower's hinge (m)."""
     half_height: jax.Array = parameter(0.021)
+    """Distance of the follower's flat face from its hinge, d (m)."""
     harmonics: int = eqx.field(default=12, static=True)
+    """Number of harmonics that `prepared` keeps."""
 
     def __check_init__(self):
         if self.harmonics < 1:
@@ -53,9 +50,10 @@ class EccentricCircle(CamProfile):
 
         The coefficients come from an FFT of (4.23) over one turn.
 
-        **Raises:** `ValueError` if the harmonics left out add up to more than
-        1e-13 rad. Inside `jax.jit` the values cannot be seen and nothing is raised;
-        call `check` before.
+        Raises:
+            ValueError: If the harmonics left out add up to more than 1e-13 rad. Inside
+                `jax.jit` the values cannot be seen and nothing is raised; call `check`
+                before.
         """
         mean, cosines, sines, left_out = _series(self)
         if is_concrete(left_out) and not left_out <= _TAIL:

@@ -16,18 +16,16 @@ class FourierProfile(CamProfile):
     Smooth to all orders, and the cheapest profile: one sine and one cosine for any
     number of harmonics.
 
-    **Arguments:**
-
-    - `mean`: contact angle averaged over a turn (rad).
-    - `cosines`, `sines`: coefficients of harmonics 1, 2, ... (rad), both of shape
-        `(harmonics,)`.
-
-    **Raises:** `ValueError` if the two lists are empty or differ in length.
+    Raises:
+        ValueError: If the two lists are empty or differ in length.
     """
 
     mean: jax.Array = parameter()
+    """Contact angle averaged over a turn (rad)."""
     cosines: jax.Array = parameter()
+    """Coefficients of harmonics 1, 2, ... (rad), both of shape `(harmonics,)`."""
     sines: jax.Array = parameter()
+    """Coefficients of harmonics 1, 2, ... (rad), both of shape `(harmonics,)`."""
 
     def __check_init__(self):
         if self.cosines.shape != self.sines.shape or self.cosines.size == 0:

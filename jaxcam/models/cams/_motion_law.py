@@ -8,8 +8,8 @@ class LawPiece(NamedTuple):
     """`polynomial(u) + amplitude sin(frequency u + phase)` up to the fraction `end`."""
 
     end: float
-    #: coefficients, lowest power first
     polynomial: tuple[float, ...]
+    """Coefficients, lowest power first."""
     amplitude: float = 0.0
     frequency: float = 0.0
     phase: float = 0.0
@@ -29,10 +29,6 @@ _PI = math.pi
 _SINE = 1 / (4 + _PI)
 
 
-#: The laws that a [`jaxcam.models.Segment`][] may name (R. L. Norton, Cam Design and
-#: Manufacturing Handbook, 2002, chapters 2 to 4). "cubic" is the one cubic without
-#: velocity at both ends, 3u^2 - 2u^3; "modified sine" is a cycloidal law of four times
-#: the frequency in the first and last eighth, joined by a third of that.
 MOTION_LAWS: dict[str, MotionLaw] = {
     law.name: law
     for law in (
@@ -69,3 +65,7 @@ MOTION_LAWS: dict[str, MotionLaw] = {
         ),
     )
 }
+"""The laws that a [`jaxcam.models.Segment`][] may name (R. L. Norton, Cam Design and
+Manufacturing Handbook, 2002, chapters 2 to 4). "cubic" is the one cubic without
+velocity at both ends, 3u^2 - 2u^3; "modified sine" is a cycloidal law of four times the
+frequency in the first and last eighth, joined by a third of that."""

@@ -16,24 +16,20 @@ from ._profile import CamProfile
 
 
 _TURN = 2 * np.pi
-#: parts of the turn, or of the largest rise, that rounding may leave open
 _CLOSED = 1e-9
+"""Parts of the turn, or of the largest rise, that rounding may leave open."""
 
 
 class Segment(NamedTuple):
-    """One segment of a motion program.
-
-    **Arguments:**
-
-    - `law`: a name in [`jaxcam.models.cams.MOTION_LAWS`][], or a
-        [`jaxcam.models.cams.MotionLaw`][].
-    - `width`: cam angle that it takes (rad).
-    - `rise`: change of the lift over it; negative for a fall, 0 for a dwell.
-    """
+    """One segment of a motion program."""
 
     law: str | MotionLaw
+    """A name in [`jaxcam.models.cams.MOTION_LAWS`][], or a
+    [`jaxcam.models.cams.MotionLaw`][]."""
     width: Any
+    """Cam angle that it takes (rad)."""
     rise: Any = 0.0
+    """Change of the lift over it; negative for a fall, 0 for a dwell."""
 
 
 class Joint(NamedTuple):
@@ -54,18 +50,18 @@ class MotionProgram(CamProfile):
     translating one. The program is played in its order by a cam whose angle grows,
     which for [`jaxcam.models.CamFollower`][] means `rotation="counterclockwise"`.
 
-    **Arguments:**
+    Args:
+        segments: A list of [`jaxcam.models.Segment`][]; their widths add up to a turn
+            and their rises to zero.
 
-    - `segments`: a list of [`jaxcam.models.Segment`][]; their widths add up to a turn
-        and their rises to zero.
-    - `base`: lift at cam angle zero, where the first segment begins.
-
-    **Raises:** `ValueError` for an unknown law, or a program that does not close.
+    Raises:
+        ValueError: For an unknown law, or a program that does not close.
     """
 
     widths: jax.Array
     rises: jax.Array
     base: jax.Array
+    """Lift at cam angle zero, where the first segment begins."""
     laws: tuple[MotionLaw, ...] = eqx.field(static=True)
 
     def __init__(self, segments: Iterable[Segment], base=0.0):

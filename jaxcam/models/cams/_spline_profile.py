@@ -26,21 +26,19 @@ _HERMITE = np.array(
 class SplineProfile(CamProfile):
     """The periodic quintic spline through a table of points, continuous to order four.
 
-    **Arguments:**
-
-    - `angles`: cam angles (rad), shape `(points,)`, strictly increasing within one
-        turn, evenly spaced or not. The first point may be repeated a turn later.
-    - `lifts`: the follower's contact angles there (rad), shape `(points,)`.
-
     The coefficients need a dense solve of twice as many unknowns as points. They are
     found once for each simulation; thousands of points are better smoothed first.
 
-    **Raises:** `ValueError` if the table is too short, is not finite or not
-    increasing, spans more than a turn, does not close, or looks like degrees.
+    Raises:
+        ValueError: If the table is too short, is not finite or not increasing, spans
+            more than a turn, does not close, or looks like degrees.
     """
 
     angles: jax.Array
+    """Cam angles (rad), shape `(points,)`, strictly increasing within one turn, evenly
+    spaced or not. The first point may be repeated a turn later."""
     lifts: jax.Array
+    """The follower's contact angles there (rad), shape `(points,)`."""
 
     def __init__(self, angles, lifts):
         angles, lifts = as_parameter(angles), as_parameter(lifts)
@@ -70,19 +68,15 @@ class SplineProfile(CamProfile):
 
 
 class PiecewiseProfile(CamProfile):
-    """A periodic profile of polynomial pieces; `SplineProfile.prepared` makes it.
-
-    **Arguments:**
-
-    - `starts`: cam angle at which each piece begins (rad), shape `(pieces,)`.
-    - `widths`: length of each piece (rad), shape `(pieces,)`.
-    - `coefficients`: shape `(pieces, order)`, lowest power first, of the fraction of
-        the piece that has been passed.
-    """
+    """A periodic profile of polynomial pieces; `SplineProfile.prepared` makes it."""
 
     starts: jax.Array = parameter()
+    """Cam angle at which each piece begins (rad), shape `(pieces,)`."""
     widths: jax.Array = parameter()
+    """Length of each piece (rad), shape `(pieces,)`."""
     coefficients: jax.Array = parameter()
+    """Shape `(pieces, order)`, lowest power first, of the fraction of the piece that
+    has been passed."""
 
     def __call__(self, cam_angle) -> jax.Array:
         angle = jnp.mod(cam_angle - self.starts[0], _TURN)

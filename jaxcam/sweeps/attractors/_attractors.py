@@ -9,8 +9,8 @@ from ._label import APERIODIC, ESCAPED, FAILED, label_name, OUTSIDE
 from ._unique_rows import unique_rows
 
 
-#: instead of the number of an attractor
 NONE = {ESCAPED: -1, FAILED: -2, OUTSIDE: -3}
+"""Instead of the number of an attractor."""
 
 
 class Attractors(NamedTuple):
@@ -18,10 +18,10 @@ class Attractors(NamedTuple):
 
     impacts: np.ndarray
     turns: np.ndarray
-    #: (attractors, means) see `fingerprints`
     fingerprint: np.ndarray
-    #: (attractors,) the lane that stands for each
+    """(attractors, means) see `fingerprints`."""
     lane: np.ndarray
+    """(attractors,) the lane that stands for each."""
 
     def __len__(self) -> int:
         return len(self.turns)
@@ -32,18 +32,19 @@ def find_attractors(
 ) -> tuple[np.ndarray, Attractors]:
     """Attractors, and the number of the one that each lane ends on.
 
-    **Arguments:**
+    Args:
+        impacts: Labels, shape `(lanes,)`.
+        turns: Labels, shape `(lanes,)`.
+        fingerprint: Shape `(lanes, means)`.
+        cells: An iterable of pairs: indices of lanes that do not repeat, and the cells
+            `(lanes, keep)` that they visit.
+        starts: `(lanes, n)`; where several lanes end on an attractor, the one with the
+            smallest start stands for it.
+        same: Two orbits are one where their fingerprints differ by less.
 
-    - `impacts`, `turns`: labels, shape `(lanes,)`.
-    - `fingerprint`: shape `(lanes, means)`.
-    - `cells`: an iterable of pairs: indices of lanes that do not repeat, and the cells
-        `(lanes, keep)` that they visit.
-    - `starts`: `(lanes, n)`; where several lanes end on an attractor, the one with the
-        smallest start stands for it.
-    - `same`: two orbits are one where their fingerprints differ by less.
-
-    **Returns:** numbers `(lanes,)`, -1 for motions that escaped, -2 for those that
-    failed and -3 for those that could not start; and the attractors.
+    Returns:
+        Numbers `(lanes,)`, -1 for motions that escaped, -2 for those that failed and -3
+            for those that could not start; and the attractors.
     """
     lanes = len(turns)
     group = np.full(lanes, -1)

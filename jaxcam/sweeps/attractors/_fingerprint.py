@@ -9,8 +9,8 @@ from ._label import APERIODIC
 from ._unique_rows import unique_rows
 
 
-#: waves whose averages tell orbits of one mean apart
 _WAVES = 8
+"""Waves whose averages tell orbits of one mean apart."""
 
 
 def fingerprint_size(n: int) -> int:
@@ -24,13 +24,14 @@ def fingerprints(states, turns, origin, scale) -> np.ndarray:
     They are the same from whichever point an orbit starts, vary smoothly with it, and
     differ for different orbits, also for those that a symmetry turns into each other.
 
-    **Arguments:**
+    Args:
+        states: Shape `(lanes, keep, n)`; the last `turns` of them are one orbit, all of
+            them where `turns` is 0.
+        origin: Shape `(n,)`, in which states are of order one.
+        scale: Shape `(n,)`, in which states are of order one.
 
-    - `states`: shape `(lanes, keep, n)`; the last `turns` of them are one orbit, all of
-        them where `turns` is 0.
-    - `origin`, `scale`: shape `(n,)`, in which states are of order one.
-
-    **Returns:** shape `(lanes, fingerprint_size(n))`; NaN for lanes without an orbit.
+    Returns:
+        Shape `(lanes, fingerprint_size(n))`; NaN for lanes without an orbit.
     """
     z = (np.asarray(states) - origin) / scale
     lanes, keep, n = z.shape
@@ -82,7 +83,8 @@ class SharedCells:
     def add(self, cells) -> np.ndarray:
         """Take motions with the cells they visit, shape `(lanes, keep)`.
 
-        **Returns:** one cell of each, to ask for its group by at the end.
+        Returns:
+            One cell of each, to ask for its group by at the end.
         """
         cells = np.asarray(cells)
         if not len(cells):

@@ -9,10 +9,10 @@ from ..sections import BEHIND, Samples
 from ._unique_rows import unique_rows
 
 
-#: instead of a number of turns
 APERIODIC, ESCAPED, FAILED, OUTSIDE = 0, -1, -2, -3
-#: instead of a number of impacts: infinitely many, contact without end, not counted
+"""Instead of a number of turns."""
 STICKING, CONTACT, UNCOUNTED = -1, -2, -3
+"""Instead of a number of impacts: infinitely many, contact without end, not counted."""
 
 # how steady the distances within an orbit must be
 _STEADY = 0.9
@@ -33,18 +33,18 @@ class Labels(NamedTuple):
 def periods(states, period_tolerance: float = 1e-6, sizes=None) -> np.ndarray:
     """Smallest number of points after which each lane repeats; 0 where none does.
 
-    **Arguments:**
-
-    - `states`: shape `(lanes, keep, n)`; periods up to `keep / 2` are found, so that
-        each is seen twice.
-    - `period_tolerance`: allowed difference of two states, relative to `sizes`.
-    - `sizes`: shape `(lanes, n)`, of each component; by default its largest value.
-
     A motion that spirals in towards an orbit looks, for a while, as if it had a
     multiple of its period. It counts as not repeating until its points stop
     approaching.
 
-    **Returns:** shape `(lanes,)`.
+    Args:
+        states: Shape `(lanes, keep, n)`; periods up to `keep / 2` are found, so that
+            each is seen twice.
+        period_tolerance: Allowed difference of two states, relative to `sizes`.
+        sizes: Shape `(lanes, n)`, of each component; by default its largest value.
+
+    Returns:
+        Shape `(lanes,)`.
     """
     states = np.asarray(states, dtype=float)
     lanes, keep, _ = states.shape

@@ -8,16 +8,17 @@ from scipy.spatial import KDTree
 def match_orbits(first, second, scale, most: float, labels=None) -> dict[int, int]:
     """Pairs of orbits that are closest to each other, all distances together.
 
-    **Arguments:**
+    Args:
+        first: Orbits, shapes `(k, points, n)` and `(l, points, n)`, filled up with NaN.
+        second: Orbits, shapes `(k, points, n)` and `(l, points, n)`, filled up with
+            NaN.
+        scale: Shape `(n,)`, in whose units distances are.
+        most: Orbits farther apart than this are no pair.
+        labels: Of both, shapes `(k, 2)` and `(l, 2)`; with them, only orbits of one
+            label are a pair.
 
-    - `first`, `second`: orbits, shapes `(k, points, n)` and `(l, points, n)`, filled up
-        with NaN.
-    - `scale`: shape `(n,)`, in whose units distances are.
-    - `most`: orbits farther apart than this are no pair.
-    - `labels`: of both, shapes `(k, 2)` and `(l, 2)`; with them, only orbits of one
-        label are a pair.
-
-    **Returns:** for indices of `second` that have one, that of its partner in `first`.
+    Returns:
+        For indices of `second` that have one, that of its partner in `first`.
     """
     if not len(first) or not len(second):
         return {}

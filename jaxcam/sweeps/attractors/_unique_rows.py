@@ -9,9 +9,10 @@ def unique_rows(table) -> tuple[np.ndarray, np.ndarray]:
     **Arguments:** a table of numbers, shape `(rows, columns)`; without columns all rows
     are the same.
 
-    **Returns:** the different rows, shape `(number, columns)`, and an index into them,
-    shape `(rows,)`. As `numpy.unique(table, axis=0, return_inverse=True)`, which sorts
-    rows as records and takes several times as long.
+    Returns:
+        The different rows, shape `(number, columns)`, and an index into them, shape
+            `(rows,)`. As `numpy.unique(table, axis=0, return_inverse=True)`, which
+            sorts rows as records and takes several times as long.
     """
     table = np.asarray(table)
     rows = np.arange(len(table))

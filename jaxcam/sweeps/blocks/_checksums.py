@@ -56,7 +56,8 @@ def checksum(arrays: Mapping[str, np.ndarray]) -> int:
 def open_store(path: str | Path) -> xarray.Dataset:
     """The dataset on disk, read when it is used.
 
-    **Raises:** `ValueError` where its description or a coordinate is damaged.
+    Raises:
+        ValueError: Where its description or a coordinate is damaged.
     """
     try:
         with warnings.catch_warnings():
@@ -91,7 +92,8 @@ def read_block(group: zarr.Group, block: int) -> dict[str, np.ndarray]:
 def checked(path: str | Path) -> xarray.Dataset:
     """The dataset on disk, after a look at all of its blocks.
 
-    **Raises:** `ValueError` that names the blocks that are missing or damaged.
+    Raises:
+        ValueError: That names the blocks that are missing or damaged.
     """
     if stored_identity(Path(path)) is None:
         raise ValueError(f"{path} is not a stored sweep")

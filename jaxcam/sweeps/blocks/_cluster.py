@@ -18,14 +18,14 @@ def cluster(address: str, workers: int | None = None) -> Iterator[Executor]:
     A worker that is lost in the middle is replaced by another one, and its blocks are
     computed again. Code that runs it must be guarded by `if __name__ == "__main__":`.
 
-    **Arguments:**
+    Args:
+        address: "local" for processes of one thread each on this machine, which end
+            with the context; or "tcp://host:port" of a scheduler that runs.
+        workers: How many local processes; one a core without.
 
-    - `address`: "local" for processes of one thread each on this machine, which end
-        with the context; or "tcp://host:port" of a scheduler that runs.
-    - `workers`: how many local processes; one a core without.
-
-    **Raises:** `ValueError` for another address, or one where nobody answers; where
-    Dask is not installed.
+    Raises:
+        ValueError: For another address, or one where nobody answers; where Dask is not
+            installed.
     """
     try:
         from distributed import Client, LocalCluster

@@ -33,7 +33,8 @@ from ._store import ordered, plain, StoreLayout, template
 class OnDisk:
     """Blocks in a Zarr group; with `resume` those of an earlier run are kept.
 
-    **Raises:** `ValueError` where there is something else at the path.
+    Raises:
+        ValueError: Where there is something else at the path.
     """
 
     def __init__(self, path: str | Path, layout: StoreLayout, resume: bool):

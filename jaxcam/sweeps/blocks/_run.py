@@ -34,8 +34,8 @@ class Progress(NamedTuple):
     done: int
     total: int
     elapsed: float
-    #: expected time until the end, NaN before the first block
     remaining: float
+    """Expected time until the end, NaN before the first block."""
 
 
 class AbstractJob(abc.ABC):
@@ -64,17 +64,18 @@ def run_blocks(
 ) -> Store:
     """Compute the blocks that are missing and store each as it finishes.
 
-    **Arguments:**
+    Args:
+        out: Folder of a Zarr group; in memory without.
+        resume: Whether to go on with what is in the folder. Blocks that are missing or
+            damaged are computed again.
+        executor: Any `concurrent.futures.Executor`; without, `workers` threads, one a
+            core if that is not given either. Results do not depend on it.
+        progress: Called after each block, with a [`jaxcam.sweeps.blocks.Progress`][].
 
-    - `out`: folder of a Zarr group; in memory without.
-    - `resume`: whether to go on with what is in the folder. Blocks that are missing or
-        damaged are computed again.
-    - `executor`: any `concurrent.futures.Executor`; without, `workers` threads, one a
-        core if that is not given either. Results do not depend on it.
-    - `progress`: called after each block, with a [`jaxcam.sweeps.blocks.Progress`][].
-
-    **Raises:** `ValueError` for a folder with something else in it; `RuntimeError`
-    where workers were lost. An interruption (Ctrl-C) loses the blocks in work only.
+    Raises:
+        ValueError: For a folder with something else in it.
+        RuntimeError: Where workers were lost. An interruption (Ctrl-C) loses the blocks
+            in work only.
     """
     layout = job.layout
     store = Memory(layout) if out is None else OnDisk(out, layout, resume)

@@ -8,8 +8,8 @@ import numpy as np
 import xarray
 
 
-#: name of the attribute with what the sweep is of
 SWEEP = "sweep"
+"""Name of the attribute with what the sweep is of."""
 FORMAT, VERSION = "jaxcam sweep", 1
 
 
@@ -17,8 +17,8 @@ class StoredVariable(NamedTuple):
     """One array of a sweep: its first dimension is that of the blocks."""
 
     dims: tuple[str, ...]
-    #: without the first dimension
     tail: tuple[int, ...]
+    """Without the first dimension."""
     dtype: Any
     attributes: Mapping[str, Any] = {}
 
@@ -30,8 +30,8 @@ class StoreLayout(NamedTuple):
     block: int
     variables: Mapping[str, StoredVariable]
     coordinates: Mapping[str, tuple[str, Any, Mapping[str, Any]]]
-    #: what the sweep is of, as JSON; two sweeps are the same where this is
     identity: Mapping[str, Any]
+    """What the sweep is of, as JSON; two sweeps are the same where this is."""
 
     @property
     def blocks(self) -> int:

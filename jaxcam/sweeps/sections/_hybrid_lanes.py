@@ -16,8 +16,8 @@ from ...parameters import as_arrays
 from ._samples import BEHIND
 
 
-#: motions that advance together, for numbers of motions up to so many
 _WIDTHS = ((32, 16), (512, 48), (sys.maxsize, 1 << 16))
+"""Motions that advance together, for numbers of motions up to so many."""
 
 
 def chunk_rows(width: int) -> int:
@@ -60,8 +60,9 @@ def lifted(system: HybridSystem, t0, states, where=None, values=None) -> np.ndar
 def state_in_contact(system: HybridSystem, t0, where=None, values=None) -> np.ndarray:
     """The state in contact, without velocity relative to the constraint, at `t0`.
 
-    **Raises:** `ValueError` where a state has not two components or there are several
-    constraints.
+    Raises:
+        ValueError: Where a state has not two components or there are several
+            constraints.
     """
     names = system.state_names
     gap = jax.eval_shape(system.gap, jnp.asarray(t0, float), jnp.zeros(2))
@@ -80,7 +81,8 @@ def state_in_contact(system: HybridSystem, t0, where=None, values=None) -> np.nd
 def turn_lengths(system: HybridSystem, period, where=None, values=None) -> np.ndarray:
     """Length of a turn (s) in each lane, shape `(lanes,)`, or `(1,)` for all alike.
 
-    **Raises:** `ValueError` for a system without a period of its own, if none is given.
+    Raises:
+        ValueError: For a system without a period of its own, if none is given.
     """
     length = system.period if period is None else period
     if length is None:
@@ -104,15 +106,15 @@ def lane_sizes(system: HybridSystem, times, states, turns, where=None, values=No
 def run_lanes(run, system, t0, states, where, values, lanes: int, tails):
     """Run the motions that can start, in blocks of few different widths.
 
-    **Arguments:**
+    Args:
+        ?- `run(states, value: - `run(states, values, width)` returns arrays with one
+            row for each lane, the last     of them the code.
+        lanes: Motions that advance together, at most.
+        tails: Shapes of a row of the arrays.
 
-    - `run(states, values, width)` returns arrays with one row for each lane, the last
-        of them the code.
-    - `lanes`: motions that advance together, at most.
-    - `tails`: shapes of a row of the arrays.
-
-    **Returns:** the same arrays for all lanes; rows of lanes that cannot start, or
-    failed, are NaN or zero, and of the code `BEHIND` or why.
+    Returns:
+        The same arrays for all lanes; rows of lanes that cannot start, or failed, are
+            NaN or zero, and of the code `BEHIND` or why.
     """
     states = np.asarray(states, dtype=float)
     values = None if values is None else np.asarray(values, dtype=float)

@@ -18,21 +18,21 @@ class ImpactSection(AbstractSystemSection):
 
     A chattering sequence is listed up to the impact after which the rest of it is
     summed; `Settings(chatter_depth=...)` says how far.
-
-    **Arguments:**
-
-    - `system`, `period`, `lanes`, `max_steps`: as of [`jaxcam.sweeps.Stroboscopic`][].
-    - `t0`: s, where motions start.
-    - `settings`: accuracy; by default a tolerance of 1e-9 and chatter listed down to a
-        hundredth of the fastest rebound.
     """
 
     system: HybridSystem
+    """As of [`jaxcam.sweeps.Stroboscopic`][]."""
     t0: float = 0.0
+    """s, where motions start."""
     period: float | None = None
+    """As of [`jaxcam.sweeps.Stroboscopic`][]."""
     settings: Settings | None = None
+    """Accuracy; by default a tolerance of 1e-9 and chatter listed down to a hundredth
+    of the fastest rebound."""
     lanes: int = eqx.field(default=128, static=True)
+    """As of [`jaxcam.sweeps.Stroboscopic`][]."""
     max_steps: int = eqx.field(default=1_000_000, static=True)
+    """As of [`jaxcam.sweeps.Stroboscopic`][]."""
     regular: bool = eqx.field(default=False, static=True, init=False)
     impacting: bool = eqx.field(default=True, static=True, init=False)
 

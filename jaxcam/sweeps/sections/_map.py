@@ -17,22 +17,19 @@ from ._section import AbstractSection
 class Map(AbstractSection):
     """A map `function(state, parameters) -> state`; a turn is one iteration.
 
-    **Arguments:**
-
-    - `function`: written with `jax.numpy`, state of shape `(n,)`.
-    - `system`: its parameters, any pytree of numbers.
-    - `t0`: number of the first iteration.
-    - `components`: name and unit of each component of the state; x1, x2, ... without.
-
     A motion that leaves for infinity keeps the points it had; its code is 3.
     """
 
     function: Callable[[Float[Array, " n"], Any], Float[Array, " n"]] = eqx.field(
         static=True
     )
+    """Written with `jax.numpy`, state of shape `(n,)`."""
     system: Any
+    """Its parameters, any pytree of numbers."""
     t0: float
+    """Number of the first iteration."""
     components: tuple[tuple[str, str], ...] = eqx.field(static=True)
+    """Name and unit of each component of the state; x1, x2, ... without."""
     regular: bool = eqx.field(static=True)
     impacting: bool = eqx.field(static=True)
 

@@ -18,23 +18,20 @@ class PoincareSection(AbstractSystemSection):
     Motions are made one after the other by
     [`jaxcam.simulate`][jaxcam.hybrid.simulate]: right for dozens of them, slow for
     thousands.
-
-    **Arguments:**
-
-    - `system`: a [`jaxcam.hybrid.HybridSystem`][].
-    - `function`: smooth scalar function of time and state, in `jax.numpy`.
-    - `direction`: +1 for rising crossings, -1 for falling ones, 0 for both.
-    - `t0`: s, where motions start.
-    - `period`: s, length of a turn; the system's own forcing period by default.
-    - `settings`: accuracy; that of `simulate` by default.
     """
 
     system: HybridSystem
+    """A [`jaxcam.hybrid.HybridSystem`][]."""
     function: Callable = eqx.field(static=True)
+    """Smooth scalar function of time and state, in `jax.numpy`."""
     direction: int = eqx.field(default=1, static=True)
+    """+1 for rising crossings, -1 for falling ones, 0 for both."""
     t0: float = 0.0
+    """s, where motions start."""
     period: float | None = None
+    """s, length of a turn; the system's own forcing period by default."""
     settings: Settings | None = None
+    """Accuracy; that of `simulate` by default."""
     regular: bool = eqx.field(default=False, static=True, init=False)
     impacting: bool = eqx.field(default=True, static=True, init=False)
 

@@ -8,23 +8,24 @@ import numpy as np
 class Samples(NamedTuple):
     """The last points of many motions on a section, as numpy arrays."""
 
-    #: (lanes, keep, n); NaN where a lane failed or has fewer points
     states: np.ndarray
-    #: (lanes, keep) when they were taken: s, or iterations of a map
+    """(lanes, keep, n); NaN where a lane failed or has fewer points."""
     times: np.ndarray
-    #: (lanes, keep) impacts since the point before, and how many completed a chatter
+    """(lanes, keep) when they were taken: s, or iterations of a map."""
     hits: np.ndarray
+    """(lanes, keep) impacts since the point before, and how many completed a chatter.
+    """
     rests: np.ndarray
-    #: (lanes, n) state at the end, one whole number of turns after the start
     final: np.ndarray
-    #: (lanes,) whether contact lasted throughout
+    """(lanes, n) state at the end, one whole number of turns after the start."""
     contact: np.ndarray
-    #: (lanes,) 0, or why there is no result: an index into `RESULTS`, or `BEHIND`
+    """(lanes,) whether contact lasted throughout."""
     code: np.ndarray
+    """(lanes,) 0, or why there is no result: an index into `RESULTS`, or `BEHIND`."""
 
 
-#: code of a start behind the constraint, or outside of where the map is defined
 BEHIND = -1
+"""Code of a start behind the constraint, or outside of where the map is defined."""
 
 
 def with_lanes(old: Samples, which, new: Samples) -> Samples:

@@ -19,12 +19,12 @@ class AbstractSection(eqx.Module):
     relies on that.
     """
 
-    #: whose leaves are the parameters
     system: AbstractVar[Any]
-    #: whether samples are a turn apart, so that a label P(m, n) says n turns
+    """Whose leaves are the parameters."""
     regular: AbstractVar[bool]
-    #: whether impacts are counted
+    """Whether samples are a turn apart, so that a label P(m, n) says n turns."""
     impacting: AbstractVar[bool]
+    """Whether impacts are counted."""
 
     @abc.abstractmethod
     def sample(
@@ -38,21 +38,24 @@ class AbstractSection(eqx.Module):
     ) -> Samples:
         """The last `keep` points within `turns` turns.
 
-        **Arguments:**
+        Args:
+            states: Shape `(lanes, n)`, where each lane starts.
+            where: `where(system)` picks a parameter, which takes `values[i]` in lane i;
+                or a tuple of parameters, which take the row `values[i]`.
+            values: `where(system)` picks a parameter, which takes `values[i]` in lane
+                i; or a tuple of parameters, which take the row `values[i]`.
 
-        - `states`: shape `(lanes, n)`, where each lane starts.
-        - `where`, `values`: `where(system)` picks a parameter, which takes `values[i]`
-            in lane i; or a tuple of parameters, which take the row `values[i]`.
-
-        **Returns:** [`jaxcam.sweeps.sections.Samples`][]. A lane that cannot start has
-        the code `BEHIND` and no points.
+        Returns:
+            [`jaxcam.sweeps.sections.Samples`][]. A lane that cannot start has the code
+                `BEHIND` and no points.
         """
 
     @abc.abstractmethod
     def starts(self, where: Callable | None = None, values=None) -> np.ndarray:
         """Where a lane starts if nothing is said, shape `(lanes, n)`.
 
-        **Raises:** `ValueError` for a system without such a place.
+        Raises:
+            ValueError: For a system without such a place.
         """
 
     @abc.abstractmethod

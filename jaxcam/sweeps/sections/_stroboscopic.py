@@ -10,25 +10,21 @@ from ._system_section import AbstractSystemSection
 
 
 class Stroboscopic(AbstractSystemSection):
-    """States at t0 + k period, k = 1, 2, ...; a turn is one period.
-
-    **Arguments:**
-
-    - `system`: a [`jaxcam.hybrid.HybridSystem`][].
-    - `t0`: s, where motions start; its phase is that of the samples.
-    - `period`: s, length of a turn; the system's own forcing period by default.
-    - `settings`: accuracy; by default a tolerance of 1e-9 and chatter completed as soon
-        as theory allows.
-    - `lanes`: how many motions advance together in one compiled program.
-    - `max_steps`: budget of attempted steps of a lane in one call.
-    """
+    """States at t0 + k period, k = 1, 2, ...; a turn is one period."""
 
     system: HybridSystem
+    """A [`jaxcam.hybrid.HybridSystem`][]."""
     t0: float = 0.0
+    """s, where motions start; its phase is that of the samples."""
     period: float | None = None
+    """s, length of a turn; the system's own forcing period by default."""
     settings: Settings | None = None
+    """Accuracy; by default a tolerance of 1e-9 and chatter completed as soon as theory
+    allows."""
     lanes: int = eqx.field(default=128, static=True)
+    """How many motions advance together in one compiled program."""
     max_steps: int = eqx.field(default=1_000_000, static=True)
+    """Budget of attempted steps of a lane in one call."""
     regular: bool = eqx.field(default=True, static=True, init=False)
     impacting: bool = eqx.field(default=True, static=True, init=False)
 

@@ -12,10 +12,10 @@ class AbstractSystemSection(AbstractSection):
     """A section of the motions of a hybrid system that start at one time."""
 
     system: AbstractVar[HybridSystem]
-    #: s, where motions start
     t0: AbstractVar[float]
-    #: s, length of a turn; None for the system's own forcing period
+    """S, where motions start."""
     period: AbstractVar[float | None]
+    """S, length of a turn; None for the system's own forcing period."""
 
     def starts(self, where=None, values=None) -> np.ndarray:
         return state_in_contact(self.system, self.t0, where, values)

@@ -11,8 +11,8 @@ from ..releases import draw_turn, released_turn, sticking_time
 from ..target import Rows, Target
 
 
-#: printed speeds of Figure 1.3 (rpm), either side of the interruption
 _COMPLETE, _INTERRUPTED = 152.65, 152.69
+"""Printed speeds of Figure 1.3 (rpm), either side of the interruption."""
 
 
 def both_sides(system: CamFollower) -> tuple[float, float]:

@@ -15,12 +15,12 @@ def _numbers(*values):
     return [jnp.asarray(value, dtype=float) for value in values]
 
 
-#: the three maps of Figure 2.11, which gives no numbers
 MAPS = {
     "piecewise-linear, continuous": SkewMap(*_numbers(0.5, -1.5, 0.3)),
     "piecewise-linear, discontinuous": SkewMap(*_numbers(0.5, 0.4, 0.3, -1.0)),
     "square root": SquareRootMap(*_numbers(0.5, 0.1)),
 }
+"""The three maps of Figure 2.11, which gives no numbers."""
 
 
 def compute(system: CamFollower) -> Rows:

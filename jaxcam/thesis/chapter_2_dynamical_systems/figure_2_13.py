@@ -28,14 +28,14 @@ _NEIGHBOURS = (0.92, 0.96, 1.0, 1.04, 1.08)
 class Zeno(NamedTuple):
     """The bouncing ball to its rest, by events and by steps of three lengths."""
 
-    #: accumulation time (2.43)
     exact: float
+    """Accumulation time (2.43)."""
     run: Trajectory
-    #: with the fewest steps
     steps: SteppedMotion
+    """With the fewest steps."""
     counts: tuple[int, ...]
-    #: accumulation time of each number of steps (s)
     rests: np.ndarray
+    """Accumulation time of each number of steps (s)."""
 
 
 @cache

@@ -19,23 +19,23 @@ from ...plotting.colours import CONTACT, FLIGHT, IMPACT
 from ..target import Rows, Target
 
 
-#: a forced mass with Coulomb friction on a belt, whose speed varies
 BELT = BeltOscillator(*(jnp.asarray(v) for v in (1.0, 0.4, 0.0, 0.05, 0.9, 0.7)))
+"""A forced mass with Coulomb friction on a belt, whose speed varies."""
 _BELTS = np.linspace(0.05, 1.5, 59)
 _SETTLE = 30
-#: speeds of the belt of which orbits are drawn, one between any two events
 DRAWN = 0.2, 0.7, 1.1, 1.4
+"""Speeds of the belt of which orbits are drawn, one between any two events."""
 
 
 class Belted(NamedTuple):
     """What a mass does on a belt of one speed, over one period of the forcing."""
 
     belt: float
-    #: largest velocity; time of sticking over the period
     highest: float
+    """Largest velocity; time of sticking over the period."""
     stuck: float
-    #: crossings of the surface that do not stick
     crossings: int
+    """Crossings of the surface that do not stick."""
     run: FilippovTrajectory
 
 
@@ -68,8 +68,8 @@ class SlidingEvent(NamedTuple):
     """A speed of the belt at which the sequence of switches changes."""
 
     belt: float
-    #: rate at which the field beyond the surface leaves it, where the orbit arrives
     beyond: float
+    """Rate at which the field beyond the surface leaves it, where the orbit arrives."""
 
 
 def _sticks(one: Belted) -> bool:

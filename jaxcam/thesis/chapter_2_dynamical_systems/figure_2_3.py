@@ -10,8 +10,8 @@ from ...models import CamFollower
 from ..target import Rows, Target
 
 
-#: parameter and start of the three cobwebs
 COBWEBS = ((1.5, 0.8), (3.3, 0.6), (3.8, 0.1))
+"""Parameter and start of the three cobwebs."""
 
 
 def compute(system: CamFollower) -> Rows:

@@ -10,8 +10,8 @@ from ...plotting.colours import FLIGHT
 from ..target import Rows, Target
 
 
-#: (2.17)
 FEIGENBAUM = 4.669
+"""(2.17)."""
 
 
 def compute(system: CamFollower) -> Rows:

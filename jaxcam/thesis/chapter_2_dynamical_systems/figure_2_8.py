@@ -21,9 +21,9 @@ from ...plotting.colours import CONTACT, FLIGHT
 from ..target import Rows, Target
 
 
-#: the oscillator of Figure 2.8: forcing and restitution; its wall lies where a pair of
-#: orbits with one impact a turn exists
 _OMEGA, _RESTITUTION = 2.8, 0.8
+"""The oscillator of Figure 2.8: forcing and restitution; its wall lies where a pair of
+orbits with one impact a turn exists."""
 _LENGTH = 0.6
 
 
@@ -49,8 +49,8 @@ class Manifolds(NamedTuple):
     """A saddle of the stroboscopic map, and its manifolds, each to both sides."""
 
     saddle: Saddle
-    #: the same saddle, by the closed form of orbits with one impact a turn
     exact: np.ndarray
+    """The same saddle, by the closed form of orbits with one impact a turn."""
     unstable: list[np.ndarray]
     stable: list[np.ndarray]
 

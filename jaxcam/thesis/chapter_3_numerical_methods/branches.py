@@ -11,8 +11,8 @@ if TYPE_CHECKING:
     from continuation import Branch
 
 
-#: where branches start (rpm)
 START_RPM = 145.0
+"""Where branches start (rpm)."""
 
 
 def bounds(ends: tuple[float, float]) -> tuple[float, float]:

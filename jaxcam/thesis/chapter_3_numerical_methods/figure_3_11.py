@@ -14,15 +14,16 @@ from ..speeds import at_rpm
 from ..target import Rows, Target
 
 
-#: speed at which the orbit is drawn (rpm)
 SPEED = 147.941373499943
+"""Speed at which the orbit is drawn (rpm)."""
 
 
 @remembered
 def periodic_run(system: CamFollower, turns: float = 2.0) -> Trajectory:
     """The P(1,1) orbit of Figures 3.8 (a) and 3.11, from half a turn after an impact.
 
-    **Raises:** `ValueError` where the rig has no such orbit.
+    Raises:
+        ValueError: Where the rig has no such orbit.
     """
     start = first_orbit(system)
     if start is None:

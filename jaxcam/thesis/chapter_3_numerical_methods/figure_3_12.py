@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from continuation import Branch
 
 
-#: rpm between which it is followed
 _HITTING = 130.0, 154.0
+"""Rpm between which it is followed."""
 
 
 @remembered

@@ -32,19 +32,19 @@ from .figure_3_11 import periodic_run
 
 
 _RANGE = (138.0, 153.5)
-#: points below that, and how far the sum of the multipliers goes beyond the fold's
 _NEAR_FOLD, _BEYOND = 12, 0.1
+"""Points below that, and how far the sum of the multipliers goes beyond the fold's."""
 
 
 class SmoothBranch(NamedTuple):
     """The P(1,1) branch of a rig, from the saddles behind its fold on."""
 
-    #: (k,) rpm
     speed: np.ndarray
-    #: (k,) angle of the follower at its impact (rad)
+    """(k,) rpm."""
     angle: np.ndarray
-    #: (k, 2)
+    """(k,) angle of the follower at its impact (rad)."""
     multipliers: np.ndarray
+    """(k, 2)."""
     fold: float
     flip: float
 

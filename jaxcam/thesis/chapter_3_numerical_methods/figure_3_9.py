@@ -21,10 +21,10 @@ if TYPE_CHECKING:
     from continuation import Branch
 
 
-#: rpm down to which it is followed
 _LOWEST = 115.0
-#: rpm past the interruption at which the branch that sticks is left
+"""Rpm down to which it is followed."""
 _PAST = 0.01
+"""Rpm past the interruption at which the branch that sticks is left."""
 
 
 @remembered

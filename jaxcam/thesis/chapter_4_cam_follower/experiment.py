@@ -7,12 +7,12 @@ from ...models import CamFollower, rpm_to_rad_s
 from ..remember import remembered
 
 
-#: s at each speed that are waited, and s that are stored (section 4.7)
 DWELL = 60.0, 10.0
-#: rpm at which the speed begins and ends, on the way up and on the way down
+"""S at each speed that are waited, and s that are stored (section 4.7)."""
 UP, DOWN = (120.0, 200.0), (200.0, 150.0)
-#: rpm between speeds; not printed
+"""Rpm at which the speed begins and ends, on the way up and on the way down."""
 _STEP = {"default": 0.5, "full": 0.1}
+"""Rpm between speeds; not printed."""
 
 
 def _speeds(ends: tuple[float, float], step: float) -> np.ndarray:

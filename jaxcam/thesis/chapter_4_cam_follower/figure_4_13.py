@@ -16,10 +16,10 @@ from ...models import CamFollower
 from ..target import Rows, Target
 
 
-#: where the free follower is let go (rad); not printed
 _LET_GO = 0.75
-#: where the spring is looked for at rest (rad)
+"""Where the free follower is let go (rad); not printed."""
 _HANGING = (-1.55, 0.0)
+"""Where the spring is looked for at rest (rad)."""
 
 
 @eqx.filter_jit

@@ -12,8 +12,8 @@ from ..speeds import at_rpm
 from ..target import Rows, Target
 
 
-#: speed of the figure, and where contact is first lost (section 5.2)
 CONTACT_SPEED, DETACHMENT = 110.0, 125.0
+"""Speed of the figure, and where contact is first lost (section 5.2)."""
 
 
 def constrained_run(system: CamFollower, rpm: float = CONTACT_SPEED) -> Trajectory:

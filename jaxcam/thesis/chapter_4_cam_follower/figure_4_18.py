@@ -15,8 +15,8 @@ from ..target import Rows, Target
 from .experiment import DWELL, experiment, EXPERIMENT_NOTE, UP
 
 
-#: rpm that a label is met over, at least, to be listed
 _WIDE = 1.0 - 1e-9
+"""Rpm that a label is met over, at least, to be listed."""
 
 
 def compute(system: CamFollower, size: str) -> Rows:

@@ -12,7 +12,6 @@ from ...models import CamFollower, MotionProgram, Segment
 from ..target import Rows, Target
 
 
-#: Figure 4.5 (a): function, and start, end and delta angle (degrees)
 PROGRAM = (
     ("constant velocity", 0, 60, 60, 1.0),
     ("dwell", 60, 90, 30, 0.0),
@@ -23,6 +22,7 @@ PROGRAM = (
     ("simple harmonic", 270, 330, 60, -1.0),
     ("dwell", 330, 360, 30, 0.0),
 )
+"""Figure 4.5 (a): function, and start, end and delta angle (degrees)."""
 
 
 def _program() -> MotionProgram:

@@ -1,6 +1,7 @@
 """Table 4.4: the parameters as printed, beside those of a rig.
 
-**Raises:** `ValueError` for a cam that is not an eccentric circle.
+Raises:
+    ValueError: For a cam that is not an eccentric circle.
 """
 
 from ...models import CamFollower, EccentricCircle

@@ -13,8 +13,8 @@ from ..speeds import at_rpm
 from ..target import Rows, Target
 
 
-#: corners of the states where none are printed
 _BOX = (0.33, -3.5), (0.6, 3.5)
+"""Corners of the states where none are printed."""
 _SHAPE = {"default": 128, "full": 400}
 _TURNS, _KEEP, _RERUNS = 100, 48, 2
 
@@ -29,14 +29,14 @@ class Picture(NamedTuple):
     """A figure of basins: the speed, its labels and its printed points."""
 
     rpm: float
-    #: labels of its attractors, as printed; chaos is "aperiodic"
     labels: tuple[str, ...]
+    """Labels of its attractors, as printed; chaos is "aperiodic"."""
     points: dict[str, tuple[float, float]]
-    #: corners of the states
     low: tuple[float, float] = _BOX[0]
+    """Corners of the states."""
     high: tuple[float, float] = _BOX[1]
-    #: how often motions that do not repeat yet go on, for twice as many turns
     reruns: int = _RERUNS
+    """How often motions that do not repeat yet go on, for twice as many turns."""
 
 
 def basins_target(title: str, picture: Picture, note: str = "") -> Target:

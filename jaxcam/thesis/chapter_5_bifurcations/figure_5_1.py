@@ -11,12 +11,11 @@ from ..remember import remembered
 from ..target import Rows, Target
 
 
-#: cycles at each speed and how many are kept, as section 5.2 prints them
 TURNS, KEEP = 300, 100
-#: rpm between speeds of Figure 5.1 and its ends
+"""Cycles at each speed and how many are kept, as section 5.2 prints them."""
 _STEP = {"default": 0.25, "full": 0.1}
+"""Rpm between speeds of Figure 5.1 and its ends."""
 _ENDS = 120.0, 170.0
-#: what the text says of it: sections 5.2.1 and 5.2.2
 _SAID = {
     (1, "contact", "to"): 125.0,
     (1, "P(inf,1)", "to"): 152.67,
@@ -24,6 +23,7 @@ _SAID = {
     (-1, "P(1,1)", "to"): 152.0,
     (-1, "P(4,4)", "from"): 157.5,
 }
+"""What the text says of it: sections 5.2.1 and 5.2.2."""
 
 
 @remembered

@@ -13,8 +13,8 @@ from ..target import Rows, Target
 from .figure_5_1 import KEEP, TURNS
 
 
-#: rpm of Figure 5.11, and how many speeds
 _ZOOM = 152.6, 153.2
+"""Rpm of Figure 5.11, and how many speeds."""
 _ZOOMED = {"default": 401, "full": 2001}
 
 

@@ -11,12 +11,12 @@ from ..remember import remembered
 from ..target import Rows, Target
 
 
-#: Figure 5.12: rpm, starts at each, cycles and how many are kept; how many speeds
 _MONTE_CARLO = 152.0, 160.0
+"""Figure 5.12: rpm, starts at each, cycles and how many are kept; how many speeds."""
 _STARTS, _MC_TURNS, _MC_KEEP = 20, 100, 50
 _DRAWN = {"default": 161, "full": 801}
-#: box from which its starts are drawn
 BOX = (0.34, -3.0), (0.55, 3.0)
+"""Box from which its starts are drawn."""
 
 
 @remembered

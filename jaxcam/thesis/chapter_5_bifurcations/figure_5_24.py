@@ -17,8 +17,8 @@ from ..speeds import speed_of
 from ..target import Rows, Target
 
 
-#: speed (rpm) at which the time is given
 _BELOW = 152.65
+"""Speed (rpm) at which the time is given."""
 
 
 @eqx.filter_jit

@@ -20,8 +20,8 @@ class LobeEvents(NamedTuple):
     """Shifts (rad) of the map at which the fixed points of a lobe change."""
 
     fold: float
-    #: where the fixed point of the lobe inside it is lost at their common corner
     border: float
+    """Where the fixed point of the lobe inside it is lost at their common corner."""
     flip: float
 
 

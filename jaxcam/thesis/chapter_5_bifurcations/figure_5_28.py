@@ -20,25 +20,25 @@ from ..target import Rows, Target
 from .figure_5_11 import onset
 
 
-#: number of the impact that the local theory starts from (docs/chatter.md)
 _RANK = 37
-#: distances (rpm) from the interruption at which map and motion are compared
+"""Number of the impact that the local theory starts from (docs/chatter.md)."""
 _AFTER = 0.05, 0.1, 0.15
+"""Distances (rpm) from the interruption at which map and motion are compared."""
 _SHIFTS = 600
 
 
 class Iterated(NamedTuple):
     """Figure 5.28: the fitted map beside the motion, both from the sticking state."""
 
-    #: (k,) rpm; (k, kept) rad
     speeds: np.ndarray
+    """(k,) rpm; (k, kept) rad."""
     attractor: np.ndarray
     motion_speeds: np.ndarray
     motion: np.ndarray
-    #: rad by rpm
     rate: float
-    #: rpm
+    """Rad by rpm."""
     interruption: float
+    """rpm."""
 
 
 @remembered

@@ -19,8 +19,8 @@ from ..target import Rows, Target
 from .figure_5_1 import KEEP, TURNS
 
 
-#: printed speeds (rpm), and impacts that are drawn at each
 _SPEEDS, _IMPACTS = (152.66, 152.882, 153.45), 1500
+"""Printed speeds (rpm), and impacts that are drawn at each."""
 
 
 def impact_speeds(system: CamFollower) -> list[float]:

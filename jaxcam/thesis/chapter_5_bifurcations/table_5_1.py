@@ -11,7 +11,6 @@ from ..target import Rows, Target
 from .figure_5_1 import both_ways
 
 
-#: the events, and their speeds (rpm) as printed: of the rig, and of the simulation
 WORDS = Events(
     "permanent contact, to",
     "P(inf,1), from",
@@ -23,6 +22,7 @@ WORDS = Events(
     "P(2,2), from",
     "P(2,2) and its doublings, to",
 )
+"""The events, and their speeds (rpm) as printed: of the rig, and of the simulation."""
 RIG = Events(125, 125, 155, 155, 170, 150, 188, 188, 200)
 MODEL = Events(125, 125, 152, 152.6, 154.5, 135, 151, 152, 170)
 

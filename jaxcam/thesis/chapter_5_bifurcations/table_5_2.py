@@ -19,7 +19,6 @@ from ..orbits import (
 from ..target import Rows, Target
 
 
-#: speed (rpm) and the two multipliers of P(1,1)
 MULTIPLIERS = np.array(
     [
         (135.946698873817, 0.212856564951, 0.996008664393),
@@ -42,13 +41,14 @@ MULTIPLIERS = np.array(
         (153.420355289483, -0.297944998464, -1.206154145399),
     ]
 )
+"""Speed (rpm) and the two multipliers of P(1,1)."""
 
 
 SPEEDS = np.real(MULTIPLIERS[:, 0])
 TRACES = np.real(MULTIPLIERS[:, 1] + MULTIPLIERS[:, 2])
 PRODUCTS = np.real(MULTIPLIERS[:, 1] * MULTIPLIERS[:, 2])
-#: the rows close to the fold, where the speed says little about the multipliers
 NEAR_FOLD = SPEEDS < 140.0
+"""The rows close to the fold, where the speed says little about the multipliers."""
 
 
 # Section 5.2.1: where P(1,1) is born, and where it doubles ("close to")

@@ -11,8 +11,8 @@ from .sequence import ChatterSequence, hops, sequence
 from .table_6_2 import REBOUND_SPEED
 
 
-#: impacts that Figure 6.11 predicts
 _AHEAD = 6
+"""Impacts that Figure 6.11 predicts."""
 
 
 def local_impacts(system: CamFollower) -> tuple[ChatterSequence, int]:

@@ -18,8 +18,8 @@ from .rebuilt import composed_at, draw_rebuilt, error_of, Rebuilt
 from .table_6_3 import ANGLE, VELOCITY
 
 
-#: of Figure 6.15: largest change of the speed (rpm)
 _CHANGE = 0.001 * 152.67
+"""Of Figure 6.15: largest change of the speed (rpm)."""
 
 
 @remembered

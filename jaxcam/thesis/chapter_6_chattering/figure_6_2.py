@@ -7,8 +7,8 @@ from ..target import Rows, Target
 from .manifold import draw_manifold, manifold_of, manifold_rows
 
 
-#: impacts S^k and W^k that are shown
 BRANCHES = 2
+"""Impacts S^k and W^k that are shown."""
 
 
 def compute(system: CamFollower) -> Rows:

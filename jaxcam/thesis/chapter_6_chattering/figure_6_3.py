@@ -22,9 +22,9 @@ from .figure_6_2 import BRANCHES
 from .manifold import manifold_of
 
 
-#: a start this much slower hits where rounding would let the graze be missed; the speed
-#: of that impact goes with its root
 _UNDER = 1 - 1e-11
+"""A start this much slower hits where rounding would let the graze be missed; the speed
+of that impact goes with its root."""
 
 
 class Series(NamedTuple):
@@ -33,8 +33,8 @@ class Series(NamedTuple):
     name: str
     time: float
     speed: float
-    #: time of the graze, or of release
     until: float
+    """Time of the graze, or of release."""
     run: Trajectory
 
 

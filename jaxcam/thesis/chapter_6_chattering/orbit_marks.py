@@ -18,8 +18,8 @@ from .sequence import sequence, sticking_turn
 from .table_6_1 import ACCUMULATION, RELEASE, SECTION_RELATIVE
 
 
-#: triangle, diamond and square of Figures 6.7 to 6.10
 _MARKS = (("^", "accumulation"), ("D", "release"), ("s", "section"))
+"""Triangle, diamond and square of Figures 6.7 to 6.10."""
 
 
 def compute_marks(system: CamFollower) -> Rows:

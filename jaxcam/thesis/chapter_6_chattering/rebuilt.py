@@ -17,8 +17,8 @@ from ..target import Rows
 from .table_6_3 import D_STAR, nearest_impact
 
 
-#: the late impact that the composed map starts from (docs/chatter.md)
 _RANK = 37
+"""The late impact that the composed map starts from (docs/chatter.md)."""
 
 
 class Rebuilt(NamedTuple):

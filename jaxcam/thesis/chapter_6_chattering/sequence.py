@@ -19,11 +19,11 @@ class ChatterSequence(NamedTuple):
 
     system: CamFollower
     frame: ChatterFrame
-    #: (k,) from release (s), rebound speeds (rad/s)
     tau: np.ndarray
+    """(k,) from release (s), rebound speeds (rad/s)."""
     speed: np.ndarray
-    #: from release (s)
     accumulation: float
+    """From release (s)."""
 
 
 @remembered

@@ -11,16 +11,16 @@ from ..interruption import accumulation_of, contact_at, reference, sticking_stat
 from ..target import Rows, Target
 
 
-#: speed of the table (rpm)
 CHATTER_SPEED = 152.67
-#: time in the period (s), angle (rad) and velocity (rad/s) of the follower
+"""Speed of the table (rpm)."""
 ACCUMULATION = (0.33474, 0.30531, 0.86956)
+"""Time in the period (s), angle (rad) and velocity (rad/s) of the follower."""
 RELEASE = (0.33668, 0.30698, 0.84854)
-#: at the end of the period: the follower, and the follower less the cam
 SECTION_STATE = (0.33717, 0.22313)
+"""At the end of the period: the follower, and the follower less the cam."""
 SECTION_RELATIVE = (0.00494, 0.22315)
-#: digits after the point in the table
 DECIMALS = 5
+"""Digits after the point in the table."""
 PERIOD, STICKING = 0.39300, 0.00194
 
 

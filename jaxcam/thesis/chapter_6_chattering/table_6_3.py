@@ -15,8 +15,8 @@ from ..target import Rows, Target
 
 
 BY_SPEED, VELOCITY, ANGLE = 3.9, 0.009647, 0.0002305
-#: time of D* from release (Table 6.1)
 D_STAR = -0.00194
+"""Time of D* from release (Table 6.1)."""
 
 
 def nearest_impact(rig: CamFollower, release: float, tau: float) -> int:

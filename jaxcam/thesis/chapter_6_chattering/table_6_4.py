@@ -18,8 +18,8 @@ from .table_6_3 import nearest_impact
 
 START = (0.30697, 0.84867, 0.33665)
 REMAINING = 4.201e-6
-#: (6.107): velocity and time of D* by angle and velocity a turn before
 A = ((0.01597, 0.00301), (-0.04830, -0.00912))
+"""(6.107): velocity and time of D* by angle and velocity a turn before."""
 INVERSE_SCALE = 3.145e-10
 
 
