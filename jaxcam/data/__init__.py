@@ -1,10 +1,16 @@
-"""Small recordings and an example of a rig of one's own, shipped with the package."""
+"""Small recordings, and an example of a rig of your own, shipped with the package.
+
+The cam-follower recordings are simulated; those of the pendulum are real.
+"""
 
 from pathlib import Path
 
 
-#: a case folder of three runs and its rig file, made by `make_demo.py`
 DEMO_RIG = Path(__file__).parent / "demo_rig"
+"""A case folder of three simulated recordings and its rig file (`make_demo.py`)."""
 
-#: a system in Python and its rig file, to be copied and changed (`jaxcam new-rig`)
+PENDULUM = Path(__file__).parent / "pendulum"
+"""A case folder of two real recordings and its rig file (`pendulum/SOURCE.md`)."""
+
 NEW_RIG = Path(__file__).parent / "new_rig"
+"""A system in Python and its rig file, to be copied and changed (`jaxcam new-rig`)."""

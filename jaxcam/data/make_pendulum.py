@@ -1,0 +1,44 @@
+"""Make `pendulum/*.csv.gz`: `python -m jaxcam.data.make_pendulum FOLDER`.
+
+`FOLDER` holds `swing_large.csv.gz` and `swing_small.csv.gz`, two swings of the public
+recordings that `pendulum/SOURCE.md` names, at 1 kHz. Every tenth sample is kept, and the
+end of a swing, where the pendulum hangs still, is cut off.
+"""
+
+import gzip
+import sys
+from pathlib import Path
+
+import numpy as np
+
+
+#: every so many samples one is kept, which leaves 100 a second
+EVERY = 10
+#: what the encoder's smallest step is (rad): 40000 counts a turn
+COUNT = 2 * np.pi / 40000
+
+
+def thinned(file: Path) -> str:
+    """The kept lines of a recording as text, with times from zero."""
+    with gzip.open(file, "rt", encoding="utf-8") as stream:
+        head, *lines = stream.read().splitlines()
+    kept = [line.split(",") for line in lines[::EVERY]]
+    angle = np.array([float(angle) for _, angle in kept])
+    moving = np.flatnonzero(np.abs(angle - angle[-1]) > 2 * COUNT)[-1] + 1
+    start = float(kept[0][0])
+    rows = [f"{float(time) - start:.2f},{text}" for time, text in kept[:moving]]
+    return "\n".join([head, *rows, ""])
+
+
+def main(source: Path) -> None:
+    """Write both swings beside their rig file."""
+    folder = Path(__file__).parent / "pendulum"
+    for name in ("swing_large", "swing_small"):
+        file = folder / f"{name}.csv.gz"
+        data = thinned(source / file.name).encode("utf-8")
+        # no time stamp: the same data are the same file
+        file.write_bytes(gzip.compress(data, mtime=0))
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))

@@ -1,0 +1,25 @@
+"""A rigid pendulum, as a textbook has it: no friction at all."""
+
+import jax.numpy as jnp
+
+from jaxcam import HybridSystem
+
+
+class Pendulum(HybridSystem):
+    """The angle is counted as the encoder counts it; `hanging` is straight down."""
+
+    state_names = ("angle", "rate")
+    state_units = ("rad", "rad/s")
+
+    stiffness: float = 60.0  # gravity torque over inertia, 1/s^2
+    hanging: float = 3.14159  # rad
+
+    def vector_field(self, t, state):
+        angle, rate = state
+        return jnp.stack([rate, -self.stiffness * jnp.sin(angle - self.hanging)])
+
+    def gap(self, t, state):
+        return jnp.ones_like(t)  # there is nothing to hit
+
+    def impact(self, t, state):
+        return state
