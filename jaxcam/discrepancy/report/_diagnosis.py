@@ -10,7 +10,7 @@ from ...fitting import Fit, Model, Residuals
 from ...hybrid import HybridSystem
 from ..evidence import Ripple, Structure
 from ..policy import Policy
-from ..terms import FreeFunction, Value, WithTerms
+from ..terms import FreeFunction, Value, Where, WithTerms
 from ._caveats import Caveat
 from ._missing import MissingFunction
 
@@ -145,10 +145,13 @@ class Diagnosis:
         terms = [
             term
             for term in system.terms
-            if isinstance(term, FreeFunction)
-            and term.label in used
-            or term.acts
-            and term.name in self.names
+            if Where.SENSOR not in term.acts
+            and (
+                isinstance(term, FreeFunction)
+                and term.label in used
+                or term.acts
+                and term.name in self.names
+            )
         ]
         row = record if isinstance(record, int) else self.records.index(record)
         drive = self.after.problem.segments[row].drive
