@@ -11,7 +11,7 @@ from ...hybrid import HybridSystem
 from ...tables import ShortTable
 from ..evidence import Ripple, Structure
 from ..policy import Policy
-from ..terms import FreeFunction, Value, WithTerms
+from ..terms import FreeFunction, Value, Where, WithTerms
 from ._caveats import Caveat
 from ._missing import MissingFunction
 from ._words import number
@@ -181,10 +181,13 @@ class Diagnosis:
         terms = [
             term
             for term in system.terms
-            if isinstance(term, FreeFunction)
-            and term.label in used
-            or term.acts
-            and term.name in self.names
+            if Where.SENSOR not in term.acts
+            and (
+                isinstance(term, FreeFunction)
+                and term.label in used
+                or term.acts
+                and term.name in self.names
+            )
         ]
         row = record if isinstance(record, int) else self.records.index(record)
         drive = self.after.problem.segments[row].drive

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ..terms import Factor, Family, Primitive, Variable
+from ..terms import Factor, Family, Primitive, Variable, Where
 from ._words import quantity
 
 
@@ -51,7 +51,18 @@ _WORDS = {
     "arc": "acts in a part of each turn only, around {x} {turn}, over +-{half}",
     "bump in turn": "is felt around {x} {turn} of each turn only, over some {half}",
 }
-_THINGS = {"force": "a force", "restitution": "a restitution", "surface": "a surface"}
+_THINGS = {
+    "force": "a force",
+    "restitution": "a restitution",
+    "surface": "a surface",
+    "sensor": "an error of the sensor",
+}
+#: what an engineer knows an error of a sensor by
+_FAULTS = {
+    Variable.POSITION: "as of a scale with uneven graduation or an encoder off centre",
+    Variable.PHASE: "as of something picked up in step with the drive",
+    Variable.TIME: "as of a sensor that drifts",
+}
 _FACTORS = {
     Factor.VELOCITY: ("velocity", "damping"),
     Factor.DIRECTION: ("sign(velocity)", "dry friction"),
@@ -64,7 +75,7 @@ def formula_of(
     """The formula of a function, and a sentence about it.
 
     **Arguments:** its family and form, the numbers of the form, and the kind of thing
-    that it is (`"force"`, `"restitution"` or `"surface"`).
+    that it is (`"force"`, `"restitution"`, `"surface"` or `"sensor"`).
     """
     values = _values(family, numbers)
     text = _FORMULAS[primitive.name].format(**values)
@@ -108,7 +119,11 @@ def _values(family: Family, numbers: np.ndarray) -> Mapping[str, str]:
 
 
 def _mechanism(family: Family, primitive: Primitive, numbers, values) -> str:
-    """The mechanism that an engineer knows by such a force."""
+    """The mechanism that an engineer knows by such a function."""
+    if family.where is Where.SENSOR and family.argument in _FAULTS:
+        return f"; {_FAULTS[family.argument]}"
+    if family.where is not Where.FLIGHT:
+        return ""
     if family.factor is not Factor.ONE or family.argument is not Variable.POSITION:
         return ""
     size, unit = float(numbers[0]), family.motion_unit

@@ -20,11 +20,13 @@ _KINDS = {
     Where.FLIGHT: "force",
     Where.IMPACT: "restitution",
     Where.CONTACT: "surface",
+    Where.SENSOR: "sensor",
 }
 _VERBS = {
     "force": "a force",
     "restitution": "a restitution",
     "surface": "a surface",
+    "sensor": "an error of the sensor",
 }
 _ARGUMENT_NAMES = {Variable.APPROACH: "speed"}
 
@@ -34,8 +36,8 @@ class MissingFunction:
     """What has no name: a function that was fitted together with the rig.
 
     - `kind`: `"force"`, what is to be added to the acceleration; `"restitution"`, what
-        the coefficient is to be multiplied with; `"surface"`, what is to be added to
-        the surface.
+        the coefficient is to be multiplied with; `"surface"` and `"sensor"`, what is to
+        be added to the surface and to what the sensor of the first coordinate shows.
     - `arguments`: what it depends on, each with its `grid`: `"position"`,
         `"velocity"`, `"phase"`, `"time"` or `"speed"` (of approach).
     - `value`, `stderr`: in `unit`, at the points of the grid, `(n,)` or `(n, m)`.

@@ -20,7 +20,7 @@ from ...fitting.engine import (
     Weights,
 )
 from ..policy import Policy
-from ..terms import Term, WithTerms
+from ..terms import Term, watched, WithTerms
 
 
 def extended(problem: Problem, terms: Sequence[Term], at: Point) -> Problem:
@@ -37,6 +37,7 @@ def extended(problem: Problem, terms: Sequence[Term], at: Point) -> Problem:
         problem.model,
         WithTerms(system.base, (*system.terms, *terms), system.coordinates),
     )
+    model = watched(model)
     more = [p for k, t in enumerate(terms) for p in t.parameters(before + k)]
     parameters = (*problem.parameters, *more)
     layout = Layout(model, parameter_places(model, parameters))

@@ -15,7 +15,7 @@ from scipy.stats import chi2
 from ...fitting import Problem
 from ...fitting.engine import Point, separated
 from ..policy import Policy
-from ..terms import Family, Term, Where
+from ..terms import Family, own_faults, Term, Variable, Where
 from ._blocks import blocks_of, values_of
 from ._formulas import formulated
 from ._free_fits import FreeFits, heat_of, heated, Missing, Subset, unscaled
@@ -71,6 +71,8 @@ class FreeSearch:
         self.families = tuple(families)
         impacting = any(family.where is not Where.FLIGHT for family in families)
         self.problem = roomy(problem, self.families[0], impacting)
+        #: what any sensor may do is no function without a name
+        self.faults = own_faults(self.problem.model, self.problem.parameters)
         self.apart = dataclasses.replace(
             self.problem, extras=separated(self.problem.extras)
         )
@@ -125,7 +127,9 @@ class FreeSearch:
     def _shows_apart(self, lead: _Lead) -> bool:
         """Whether pieces that are tied to none show what a lead adds."""
         if lead.family is not None:
-            return lead.family.where is not Where.IMPACT
+            place, argument = lead.family.where, lead.family.argument
+            drifts = place is Where.SENSOR and argument is Variable.TIME
+            return place is not Where.IMPACT and not drifts
         acts = self._term(lead.name).acts
         return Where.FLIGHT in acts or Where.CONTACT in acts
 
@@ -160,7 +164,7 @@ class FreeSearch:
             where: [s for s in slots_of(problem, where) if s not in used]
             if len(used) < self.policy.functions
             else []
-            for where in (Where.FLIGHT, Where.IMPACT, Where.CONTACT)
+            for where in (Where.FLIGHT, Where.IMPACT, Where.CONTACT, Where.SENSOR)
         }
         forces = [f for f in self.families if f.where is Where.FLIGHT]
         if slots[Where.FLIGHT]:
@@ -177,16 +181,19 @@ class FreeSearch:
                 rough = roughness(information, score, rows, own, family, zero, policy)
                 leads.append(_Lead(rough.gain, None, family, rough, slot))
         # impacts say nothing where they tie nothing
-        elsewhere = (Where.CONTACT,) if apart else (Where.CONTACT, Where.IMPACT)
+        elsewhere = {Where.CONTACT, Where.SENSOR, *([] if apart else [Where.IMPACT])}
         for family in self.families:
             if family.where not in elsewhere or not slots[family.where]:
                 continue
             slot = slots[family.where][0]
             one = Free(family, Roughness(), slot)
             put, names = filled(problem, [one], prior=False), one.coefficients
-            blocks = blocks_of(put, point, names=[*free, *names])
+            beside = free
+            if family.where is Where.SENSOR:
+                beside = list(dict.fromkeys([*free, *self.faults]))
+            blocks = blocks_of(put, point, names=[*beside, *names])
             information, score = unscaled(blocks, names, heat)
-            rows, own = blocks.rows(free), blocks.rows(names)
+            rows, own = blocks.rows(beside), blocks.rows(names)
             zero = np.zeros(len(own))
             rough = roughness(information, score, rows, own, family, zero, policy)
             leads.append(_Lead(rough.gain, None, family, rough, slot))

@@ -9,7 +9,7 @@ from ...recordings import Recording, RecordingError, Rig, segment_case
 from ...recordings.cut import Segments
 from ...recordings.files import check_channels, check_drive
 from ..policy import Policy
-from ..terms import base_drive, library, Term, WithTerms
+from ..terms import base_drive, library, Term, watched, WithTerms
 from ._question import (
     by_listing,
     Question,
@@ -51,7 +51,7 @@ def rig_question(
     sensors, noisier = with_seen_noise(
         base.sensors, [run.recording for run in cut], policy
     )
-    model = Model(WithTerms(base.system, terms), sensors, base_drive())
+    model = watched(Model(WithTerms(base.system, terms), sensors, base_drive()))
     parameters = cam_follower_parameters(rig, base=lambda s: s.base)
     names = tuple(p.name for p in parameters)
     report("preparing the fits", None)

@@ -15,9 +15,10 @@ from ._roughness import Roughness
 
 
 # Sines of a function, and one more coefficient for its jump
-_SINES = {Where.FLIGHT: 20, Where.IMPACT: 10, Where.CONTACT: 24}
+_SINES = {Where.FLIGHT: 20, Where.IMPACT: 10, Where.CONTACT: 24, Where.SENSOR: 20}
 # Functions of each kind that a problem has room for
 _ROOM = ((Where.FLIGHT, "force_a"), (Where.FLIGHT, "force_b"))
+_ROOM_OF_SENSOR = ((Where.SENSOR, "sensor_a"),)
 _ROOM_OF_IMPACTS = ((Where.IMPACT, "restitution_a"), (Where.CONTACT, "surface_a"))
 
 
@@ -60,7 +61,7 @@ def roomy(problem: Problem, family: Family, impacting: bool) -> Problem:
 
     **Arguments:** any family, which fills the slots to begin with.
     """
-    room = (*_ROOM, *_ROOM_OF_IMPACTS) if impacting else _ROOM
+    room = (*_ROOM, *(_ROOM_OF_IMPACTS if impacting else ()), *_ROOM_OF_SENSOR)
     empty = [
         FREE[where].of(family, label, [0.0] * (_SINES[where] + 1))
         for where, label in room

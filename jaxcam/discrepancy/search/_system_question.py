@@ -22,7 +22,7 @@ from ...recordings.cut import (
 )
 from ...recordings.files import check_channels, unit_of
 from ..policy import Policy
-from ..terms import coordinates, library, Term, terms_of, WithTerms
+from ..terms import coordinates, library, Term, terms_of, watched, WithTerms
 from ._question import (
     by_listing,
     Question,
@@ -131,7 +131,7 @@ def system_question(
         drive = Input(drive.channel, _OfBase(drive.value))
     elif drive is not None:
         drive = Turning(_OfBase(drive.speed), _OfBase(drive.phase))
-    model = Model(WithTerms(system, terms, pairs), dict(sensors), drive)
+    model = watched(Model(WithTerms(system, terms, pairs), dict(sensors), drive))
     inside = [_within(parameter) for parameter in parameters]
     report("preparing the fits", None)
     problem = Problem.build(

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ._primitives import OF_PHASE, OF_SPEED, ON_A_LINE, Primitive
+from ._primitives import OF_PHASE, OF_SPEED, ON_A_LINE, Primitive, STRAIGHT
 from ._shapes import Variable
 from ._where import Where
 
@@ -31,8 +31,9 @@ class Factor(enum.StrEnum):
 class Family:
     """All functions of one argument, times a factor, that act in one place.
 
-    - `where`: flight (a force), impact (a factor on the restitution) or contact (a
-        surface). `argument` between `low` and `high`; `factor` of a force.
+    - `where`: flight (a force), impact (a factor on the restitution), contact (a
+        surface) or sensor (what it shows besides). `argument` between `low` and `high`;
+        `factor` of a force.
     - `middle`: of the positions, which a deflection is measured from. `slip`: speed
         below which a direction is smoothed.
     - `motion_unit`: of the coordinate.
@@ -83,6 +84,9 @@ class Family:
         """Forms that a function of this family may turn out to have."""
         if self.periodic:
             return OF_PHASE
+        if self.where is Where.SENSOR and self.argument is not Variable.TIME:
+            # a gain or a lag is no form without a name
+            return tuple(one for one in ON_A_LINE if one is not STRAIGHT)
         return (*ON_A_LINE, *OF_SPEED) if self.jumps else ON_A_LINE
 
     def waves(self, count: int) -> tuple[Array, Array]:
@@ -168,6 +172,9 @@ def families(
             for argument in (Variable.APPROACH, Variable.TIME, *phase)
         ]
         found += [one(Where.CONTACT, argument) for argument in (Variable.TIME, *phase)]
+    found += [
+        one(Where.SENSOR, argument) for argument in (*_TIMELESS, Variable.TIME, *phase)
+    ]
     return tuple(found)
 
 

@@ -222,8 +222,18 @@ class FreeSurface(FreeFunction):
         return self.at(self._argument(motion, motion.velocity))
 
 
+class FreeSensor(FreeFunction):
+    """What the sensor of the first coordinate shows besides."""
+
+    name: ClassVar[str] = "free_sensor"
+
+    def sensed(self, motion: Motion):
+        return self.at(self._argument(motion, motion.velocity))
+
+
 FREE: dict[Where, type[FreeFunction]] = {
     Where.FLIGHT: FreeForce,
     Where.IMPACT: FreeRestitution,
     Where.CONTACT: FreeSurface,
+    Where.SENSOR: FreeSensor,
 }

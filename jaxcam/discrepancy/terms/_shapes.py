@@ -240,6 +240,51 @@ class BounceOfPhase(Harmonics):
         return 1 + self.value(motion.phase)
 
 
+class SensorOfPosition(Polynomial):
+    name: ClassVar[str] = "sensor_of_position"
+    sentence: ClassVar[str] = "a sensor that is wrong by where it is"
+    where: ClassVar[str] = Where.SENSOR
+    region: ClassVar[str] = "in the measured motion, by position"
+    quantity: ClassVar[str] = "sensor"
+    variable: ClassVar[Variable] = Variable.POSITION
+    count: ClassVar[int] = 5
+    unit: ClassVar[str] = "[q]"
+    size: ClassVar[float] = 1e-4
+
+    def sensed(self, motion: Motion):
+        return self.value(motion.position)
+
+
+class SensorOfTime(Polynomial):
+    name: ClassVar[str] = "sensor_of_time"
+    sentence: ClassVar[str] = "a sensor that drifts in the course of a record"
+    where: ClassVar[str] = Where.SENSOR
+    region: ClassVar[str] = "in the measured motion, by time of the record"
+    quantity: ClassVar[str] = "sensor"
+    variable: ClassVar[Variable] = Variable.TIME
+    count: ClassVar[int] = 4
+    unit: ClassVar[str] = "[q]"
+    size: ClassVar[float] = 1e-4
+
+    def sensed(self, motion: Motion):
+        return self.value(motion.t)
+
+
+class SensorOfPhase(Harmonics):
+    name: ClassVar[str] = "sensor_of_phase"
+    sentence: ClassVar[str] = "a sensor that is wrong in step with the drive"
+    where: ClassVar[str] = Where.SENSOR
+    region: ClassVar[str] = "in the measured motion, by phase of the drive"
+    quantity: ClassVar[str] = "sensor"
+    variable: ClassVar[Variable] = Variable.PHASE
+    count: ClassVar[int] = 6
+    unit: ClassVar[str] = "[q]"
+    size: ClassVar[float] = 1e-4
+
+    def sensed(self, motion: Motion):
+        return self.value(motion.phase)
+
+
 def shapes(
     positions: tuple[float, float],
     velocities: tuple[float, float],
@@ -265,11 +310,15 @@ def shapes(
         FrictionOfAngle(zeros(FrictionOfAngle), *positions, first=0, slip=slip),
         BounceOfSpeed(zeros(BounceOfSpeed), *approach),
         BounceOfTime(zeros(BounceOfTime), 0.0, duration),
+        # a constant is an offset, a part in proportion to the position a gain
+        SensorOfPosition(zeros(SensorOfPosition), *positions, first=2),
+        SensorOfTime(zeros(SensorOfTime), 0.0, duration),
     ]
     if turned:
         found += [
             ForceOfPhase(zeros(ForceOfPhase)),
             SurfaceOfPhase(zeros(SurfaceOfPhase), first=2),
             BounceOfPhase(zeros(BounceOfPhase)),
+            SensorOfPhase(zeros(SensorOfPhase)),
         ]
     return tuple(found)

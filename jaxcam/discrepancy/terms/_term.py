@@ -18,6 +18,7 @@ _METHODS = {
     "acceleration": Where.FLIGHT,
     "contact": Where.CONTACT,
     "restitution": Where.IMPACT,
+    "sensed": Where.SENSOR,
 }
 
 
@@ -91,9 +92,10 @@ class Strength:
 class Term(eqx.Module):
     """Something a model may lack. Subclass it, and declare its numbers by `strength`.
 
-    With all strengths zero a term changes nothing. It acts in flight, on the surface or
-    in impacts where a subclass overrides `acceleration`, `contact` or `restitution`;
-    `acts` follows from these methods.
+    With all strengths zero a term changes nothing. It acts in flight, on the surface,
+    in impacts or on the sensor of the first coordinate where a subclass overrides
+    `acceleration`, `contact`, `restitution` or `sensed`; `acts` follows from these
+    methods.
 
     Class variables: `name`, `sentence` (what it is, in words that go on after "the
     model lacks"), `where` (a [`Where`][jaxcam.discrepancy.terms.Where] or its name; by
@@ -151,6 +153,11 @@ class Term(eqx.Module):
         """Factor on the restitution coefficient at an approach speed."""
         del approach, motion
         return 1.0
+
+    def sensed(self, motion: Motion):
+        """What the sensor of the first coordinate shows besides, in its unit."""
+        del motion
+        return 0.0
 
     def prepared(self) -> "Term":
         """The term with whatever it needs at every step worked out once."""

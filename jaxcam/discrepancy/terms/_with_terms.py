@@ -67,7 +67,7 @@ class WithTerms(HybridSystem):
         place, rate = self.coordinates[coordinate]
         velocity = state[rate] if field is None else field[place]
         pushed = 0.0 if field is None else field[rate]
-        turned = _turned(self.base, t)
+        turned = drive_at(self.base, t)
         return Motion(t, state[place], velocity, *turned, state, pushed)
 
     def vector_field(self, t, state) -> jax.Array:
@@ -172,7 +172,7 @@ class WithTerms(HybridSystem):
 
     def _raised(self, t, number: int):
         none = jnp.zeros_like(t)
-        motion = Motion(t, none, none, *_turned(self.base, t))
+        motion = Motion(t, none, none, *drive_at(self.base, t))
         total = none
         for term in self._acting(Where.CONTACT, number):
             total = total + term.contact(motion)
@@ -190,7 +190,7 @@ class WithTerms(HybridSystem):
         ]
 
 
-def _turned(base, t):
+def drive_at(base, t):
     """Angle (rad) and rate (rad/s) of the drive; time where there is no drive."""
     if hasattr(base, "speed") and hasattr(base, "phase"):
         return base.speed * t + base.phase, base.speed

@@ -170,11 +170,14 @@ def _columns(function, *args):
 
 def flown(model: Model, state, start, step, angle, rate, place):
     end, nodes = fly(model, state, start, step, angle, rate)
-    return end, samples(model, nodes, step, place)
+    along = start + (jnp.arange(angle.shape[0]) + 0.5) * step, angle, rate
+    return end, samples(model, nodes, start, step, place, along)
 
 
 def rested(model: Model, guess, start, step, angle, rate, place):
-    return samples(model, rest(model, guess, start, step, angle, rate), step, place)
+    nodes = rest(model, guess, start, step, angle, rate)
+    along = start + jnp.arange(angle.shape[0]) * step, angle, rate
+    return samples(model, nodes, start, step, place, [one[:-1] for one in along])
 
 
 def flight_inputs(pieces: Pieces):

@@ -36,6 +36,8 @@ class Sensor(eqx.Module):
         system. The lag must be short beside what the motion takes to change.
     - `tails`: degrees of freedom of a Student distribution for noise with outliers;
         infinite for a Gaussian one.
+    - `error`: what else it shows in a fit, `error(system, t, value, slope)` of what
+        there is to be seen and of its rate of change; nothing by default.
     """
 
     observe: int | Callable[[Array], Array] = eqx.field(static=True)
@@ -47,6 +49,7 @@ class Sensor(eqx.Module):
     gain: Float[Array, ""] = _number(1.0)
     offset: Float[Array, ""] = _number(0.0)
     lag: Float[Array, ""] = _number(0.0)
+    error: Callable | None = eqx.field(default=None, static=True)
 
     def __check_init__(self):
         if not self.noise > 0:

@@ -119,8 +119,12 @@ def _least(slopes, residual):
     return slopes.T @ push
 
 
-def samples(model: Model, nodes: Nodes, step, place):
-    """Every channel at each sample, shape `(n, m, c)`, by cubic Hermite polynomials."""
+def samples(model: Model, nodes: Nodes, start, step, place, along):
+    """Every channel at each sample, shape `(n, m, c)`, by cubic Hermite polynomials.
+
+    **Arguments:** `along` each step, when the drive is where it is stated, its angle
+    and its rate.
+    """
     u = place[..., None]
     left, right = nodes.left[:, None], nodes.right[:, None]
     a, b = step * nodes.left_rate[:, None], step * nodes.right_rate[:, None]
@@ -139,7 +143,30 @@ def samples(model: Model, nodes: Nodes, step, place):
     def sensed(value, slope, bend):
         return offset + gain * (value - lag * slope + lag**2 / 2 * bend)
 
-    return jax.vmap(jax.vmap(sensed))(value, slope, bend)
+    shown = jax.vmap(jax.vmap(sensed))(value, slope, bend)
+    if all(sensor.error is None for sensor in sensors):
+        return shown
+    return shown + _errors(model, start, step, place, along, value, slope)
+
+
+def _errors(model: Model, start, step, place, along, value, slope):
+    """What sensors show besides, at each sample, `(n, m, c)`."""
+
+    def one_step(number, places, when, angle, rate, values, slopes):
+        system = model.driven(when, angle, rate)
+
+        def sample(u, value, slope):
+            t = start + (number + u) * step
+            errors = [
+                jnp.zeros(()) if one.error is None else one.error(system, t, v, s)
+                for one, v, s in zip(model.sensors.values(), value, slope / step)
+            ]
+            return jnp.stack(errors)
+
+        return jax.vmap(sample)(places, values, slopes)
+
+    numbers = jnp.arange(place.shape[0], dtype=float)
+    return jax.vmap(one_step)(numbers, place, *along, value, slope)
 
 
 class Joint(NamedTuple):

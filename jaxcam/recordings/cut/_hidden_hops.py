@@ -36,7 +36,7 @@ def hop_phases(rig: Rig, speed: float) -> Bool[np.ndarray, " 720"]:
     **Arguments:** `speed` of the cam (rad/s). Phase zero is the nominal cam's.
     """
     nominal = _pull(rig, speed)
-    change = [_pull(moved, speed) - nominal for moved in _moved(rig)]
+    change = [_pull(moved, speed) - nominal for moved in moved(rig)]
     pull = nominal + _SPREAD * np.sqrt(np.sum(np.square(change), axis=0))
     if not np.any(pull > 0):
         return np.zeros(_GRID, dtype=bool)
@@ -62,7 +62,7 @@ def _hop(pull: np.ndarray, step: float, restitution: float) -> int:
     return min(len(pull), end + 1 + int(np.ceil(bounces / step)))
 
 
-def _moved(rig: Rig):
+def moved(rig: Rig):
     """The rig with each quantity off by the standard deviation of its tolerance."""
     for field in dataclasses.fields(rig):
         one = getattr(rig, field.name)

@@ -13,12 +13,15 @@ from jaxtyping import Array, Float
 
 from ...models import EccentricCircle
 from .._rig import Rig
+from ._bend import WAVES, waves
 from ._padding import padded
 
 
 # What remains of a cam besides its geometry: run-out, bearings, a bent shaft (rad)
 _HARMONICS = (2, 3)
 _HARMONIC_SIZE = 2e-4
+# Where their sines and a bend begin among the amplitudes
+_ENDS = (len(_HARMONICS), 2 * len(_HARMONICS))
 # What the zero of the cam's angle may be off, and what a sensor that lags by half a
 # millisecond makes of it (rad)
 _PHASE_SIZE = 1e-2
@@ -27,11 +30,12 @@ _LEAST_TOLERANCE = 2e-4
 
 
 class Surface(eqx.Module):
-    """Contact angle (rad) as a function of the cam's angle: geometry and harmonics.
+    """Contact angle (rad) as a function of the cam's angle: geometry and what is added.
 
     - `profile`: the eccentric circle that fits best.
     - `phase`: how far ahead of its measured angle the cam seems to be (rad).
     - `cosines`, `sines`: amplitudes of harmonics 2 and 3 on top of it (rad).
+    - `bend`: amplitudes of what these cannot follow, as a dent; zero without one.
     - `covariance`: of radius, eccentricity, centre, phase and amplitudes together.
     - `sense`: -1 for a clockwise cam; the angle given is counted as it turns.
     """
@@ -40,6 +44,7 @@ class Surface(eqx.Module):
     phase: Float[Array, ""]
     cosines: Float[Array, " harmonics"]
     sines: Float[Array, " harmonics"]
+    bend: Float[Array, " waves"]
     covariance: Float[Array, " p p"]
     sense: float = eqx.field(static=True)
 
@@ -48,7 +53,7 @@ class Surface(eqx.Module):
         angle = self.sense * (jnp.asarray(turned) + self.phase)
         phases = jnp.multiply.outer(angle, order)
         extra = jnp.cos(phases) @ self.cosines + jnp.sin(phases) @ self.sines
-        return self.profile(angle) + extra
+        return self.profile(angle) + extra + waves(turned) @ self.bend
 
     def angle(self, turned) -> Float[np.ndarray, " k"]:
         """The contact angle as a numpy array, shape `(k,)`."""
@@ -72,12 +77,16 @@ def nominal_surface(rig: Rig) -> Surface:
     """The profile as the rig file states it."""
     zero = jnp.zeros(len(_HARMONICS))
     sense = -1.0 if rig.cam_rotation == "clockwise" else 1.0
-    covariance = jnp.diag(jnp.asarray(prior_sizes(rig)) ** 2)
-    return Surface(rig.profile(), jnp.zeros(()), zero, zero, covariance, sense)
+    bend = np.zeros(WAVES)
+    sizes = np.concatenate([prior_sizes(rig), bend])
+    covariance = jnp.diag(jnp.asarray(sizes) ** 2)
+    return Surface(
+        rig.profile(), jnp.zeros(()), zero, zero, jnp.asarray(bend), covariance, sense
+    )
 
 
 def prior_sizes(rig: Rig) -> np.ndarray:
-    """Tolerance of each number of a surface, shape `(p,)`."""
+    """Tolerance of each number of a surface but its bend, shape `(q,)`."""
     geometry = [
         np.hypot(rig.cam_radius.tolerance, rig.follower_half_height.tolerance),
         rig.cam_eccentricity.tolerance,
@@ -93,15 +102,15 @@ def vector_of(surface: Surface) -> np.ndarray:
     """The numbers of a surface that are fitted, shape `(p,)`."""
     p = surface.profile
     geometry = [p.radius + p.half_height, p.eccentricity, p.center_x, p.center_y]
-    parts = [np.array([*geometry, surface.phase]), surface.cosines, surface.sines]
-    return np.concatenate(parts)
+    low = np.array([*geometry, surface.phase])
+    return np.concatenate([low, surface.cosines, surface.sines, surface.bend])
 
 
 def with_vector(surface: Surface, vector) -> Surface:
     """The same surface with other numbers."""
     # only the sum of radius and half height is seen; the radius takes it
     radius = vector[0] - surface.profile.half_height
-    cosines, sines = jnp.split(vector[5:], 2)
+    cosines, sines, bend = jnp.split(vector[5:], _ENDS)
     return eqx.tree_at(
         lambda s: (
             s.profile.radius,
@@ -111,20 +120,23 @@ def with_vector(surface: Surface, vector) -> Surface:
             s.phase,
             s.cosines,
             s.sines,
+            s.bend,
         ),
         surface,
-        (radius, vector[1], vector[2], vector[3], vector[4], cosines, sines),
+        (radius, vector[1], vector[2], vector[3], vector[4], cosines, sines, bend),
     )
 
 
 @eqx.filter_jit
 def linearise(surface, vector, turned):
     """Contact angles `(k,)` and their derivatives `(k, p)` to the numbers."""
+    low, bend = vector[:-WAVES], vector[-WAVES:]
 
-    def contact_angle(vector):
-        return with_vector(surface, vector)(turned)
+    def contact_angle(low):
+        return with_vector(surface, jnp.concatenate([low, bend]))(turned)
 
-    return contact_angle(vector), jax.jacfwd(contact_angle)(vector)
+    jacobian = jax.jacfwd(contact_angle)(low)
+    return contact_angle(low), jnp.concatenate([jacobian, waves(turned)], axis=-1)
 
 
 @eqx.filter_jit

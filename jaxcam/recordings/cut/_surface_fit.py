@@ -14,7 +14,9 @@ from scipy.ndimage import uniform_filter1d
 from .._drive import Drive, read_drive
 from .._recording import Recording
 from .._rig import Rig
+from ._bend import bend_sizes, Seen, WAVES
 from ._contact_stretches import stretches
+from ._firm_contact import firm_contact
 from ._hidden_hops import pressed
 from ._kinks import find_kinks
 from ._padding import padded
@@ -79,9 +81,10 @@ def refine_surface(surface: Surface, rig: Rig, segments: Sequence) -> Surface:
     Contacts count from where the bounces that cannot be seen have died out: before,
     the follower is above the cam on average. It is near it, though, which counts for
     one rough point, and it is never behind: where a cam is seen there alone, it would
-    else be anywhere.
+    else be anywhere. A dent is followed where records agree on it.
     """
     turned, angle, error, above = [], [], [], []
+    ends = []
     for part in segments:
         time, drive = part.recording.time, part.drive
         samples = part.recording[part.channel]
@@ -93,23 +96,52 @@ def refine_surface(surface: Surface, rig: Rig, segments: Sequence) -> Surface:
         turned.append(np.interp(impacts.time[sharp], time, drive.angle))
         angle.append(impacts.angle[sharp])
         error.append(impacts.angle_stderr[sharp])
+        firm = firm_contact(part.recording, rig, drive.speed, part.channel, part.noise)
+        turned.append(drive.angle[firm])
+        angle.append(samples[firm])
+        error.append(np.full(firm.sum(), part.noise))
         for contact in part.contacts:
-            rows = part.resting(contact) & sure
+            rows = part.resting(contact) & sure & ~firm
             turned.append(drive.angle[rows])
             angle.append(samples[rows])
             error.append(np.full(rows.sum(), part.noise))
-            bouncing = slice(contact.first, np.searchsorted(time, contact.settled))
-            number = len(time[bouncing])
+            settled = np.searchsorted(time, contact.settled)
+            bouncing = contact.first + np.flatnonzero(~firm[contact.first : settled])
+            number = len(bouncing)
             turned.append(drive.angle[bouncing])
             angle.append(samples[bouncing])
             error.append(np.full(number, _NEAR * np.sqrt(number) * part.noise))
+        ends.append(sum(map(len, turned)))
     count = sum(map(len, turned))
     for place, least, noise in above:
         turned.append(place)
         angle.append(least)
         error.append(np.full(len(place), noise))
-    joined = (np.concatenate([*column, []]) for column in (turned, angle, error))
-    return _solve(surface, rig, *joined, equal=count)
+    joined = [np.concatenate([*column, []]) for column in (turned, angle, error)]
+    plain = _solve(_unbent(surface), rig, *joined, equal=count)
+    bend = _bend(plain, rig, *(column[:count] for column in joined), ends)
+    if not np.any(bend):
+        return plain
+    return _solve(plain, rig, *joined, equal=count, bend=bend)
+
+
+def _unbent(surface: Surface) -> Surface:
+    return eqx.tree_at(lambda s: s.bend, surface, jnp.zeros(WAVES))
+
+
+def _bend(surface: Surface, rig: Rig, turned, angle, error, ends: list[int]):
+    """How large a bend may be, by points of records that end at `ends`."""
+    vector = vector_of(surface)
+    misfit, rows, weight = _weighted(surface, vector, turned, angle, error)
+    records = []
+    for first, last in zip([0, *ends], ends):
+        here = slice(first, last)
+        pulled = rows[here].T * weight[here]
+        records.append(Seen(pulled @ rows[here], pulled @ misfit[here]))
+    sizes = prior_sizes(rig)
+    off = vector_of(nominal_surface(rig))[:-WAVES] - vector[:-WAVES]
+    noise = rig.sensors.follower_floor
+    return bend_sizes(records, sizes**-2.0, off / sizes**2, noise)
 
 
 def _impact_points(recording, drive, channel, noise, sure):
@@ -153,36 +185,50 @@ def _with_contacts(surface, recording, drive, channel, band, noise, impacts, sur
 
 
 def _solve(
-    surface: Surface, rig: Rig, turned, angle, error, *, equal: int | None = None
+    surface: Surface,
+    rig: Rig,
+    turned,
+    angle,
+    error,
+    *,
+    equal: int | None = None,
+    bend: np.ndarray | None = None,
 ) -> Surface:
     """Gauss-Newton with the tolerances as prior and Huber weights on the points.
 
-    The first `equal` points lie on the profile, the others on it or above.
+    The first `equal` points lie on the profile, the others on it or above. Numbers of a
+    bend are free with the standard deviations `bend`.
     """
     nominal = vector_of(nominal_surface(rig))
-    sizes = prior_sizes(rig)
-    count = len(turned)
-    places = padded(turned)
+    sizes = np.append(prior_sizes(rig), np.zeros(WAVES) if bend is None else bend)
+    free = sizes > 0
+    known = np.outer(sizes[free], sizes[free])
     vector = vector_of(surface)
     covariance = np.diag(sizes**2)
     for _ in range(8):
-        fitted, jacobian = linearise(surface, vector, places)
-        misfit = (angle - np.asarray(fitted)[:count]) / error
-        on = np.abs(misfit[:equal])
-        scale = max(1.0, np.median(on) / 0.6745) if len(on) else 1.0
-        weight = 1 / np.maximum(1.0, np.abs(misfit) / (2 * scale))
-        if equal is not None:
-            weight[equal:] *= misfit[equal:] < 0
-        rows = np.asarray(jacobian)[:count] / error[:, None]
-        normal = rows.T @ (weight[:, None] * rows) + np.diag(sizes**-2.0)
-        target = rows.T @ (weight * misfit) + (nominal - vector) / sizes**2
+        misfit, rows, weight = _weighted(surface, vector, turned, angle, error, equal)
+        pulled = rows[:, free].T * weight
         # in units of the tolerances the matrix is well scaled
-        covariance = np.outer(sizes, sizes) * np.linalg.inv(
-            normal * np.outer(sizes, sizes)
-        )
-        step = covariance @ target
-        vector = vector + step
-        if np.max(np.abs(step / sizes)) < 1e-6:
+        normal = (pulled @ rows[:, free]) * known + np.eye(free.sum())
+        target = pulled @ misfit + ((nominal - vector)[free] / sizes[free] ** 2)
+        inverse = known * np.linalg.inv(normal)
+        covariance[np.ix_(free, free)] = inverse
+        step = inverse @ target
+        vector[free] += step
+        if np.max(np.abs(step / sizes[free])) < 1e-6:
             break
     surface = with_vector(surface, jnp.asarray(vector))
     return eqx.tree_at(lambda s: s.covariance, surface, jnp.asarray(covariance))
+
+
+def _weighted(surface, vector, turned, angle, error, equal: int | None = None):
+    """Misfits of points, their derivatives, both in units of the error, and weights."""
+    fitted, jacobian = linearise(surface, vector, padded(turned))
+    count = len(turned)
+    misfit = (angle - np.asarray(fitted)[:count]) / error
+    on = np.abs(misfit[:equal])
+    scale = max(1.0, np.median(on) / 0.6745) if len(on) else 1.0
+    weight = 1 / np.maximum(1.0, np.abs(misfit) / (2 * scale))
+    if equal is not None:
+        weight[equal:] *= misfit[equal:] < 0
+    return misfit, np.asarray(jacobian)[:count] / error[:, None], weight

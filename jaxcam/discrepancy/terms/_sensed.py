@@ -1,0 +1,42 @@
+"""What terms add to what the sensor of the first coordinate shows."""
+
+import dataclasses
+from collections.abc import Iterable
+
+from ...fitting import Model, Parameter
+from ._term import Motion, terms_of
+from ._where import Where
+from ._with_terms import drive_at
+
+
+def watched(model: Model) -> Model:
+    """The model, whose sensor shows what its terms add to it."""
+    if not any(Where.SENSOR in term.acts for term in terms_of(model)):
+        return model
+    name = watching(model)
+    sensor = dataclasses.replace(model.sensors[name], error=_error)
+    return dataclasses.replace(model, sensors={**model.sensors, name: sensor})
+
+
+def watching(model: Model) -> str:
+    """The first channel that shows the first coordinate, or the first of all."""
+    place, _ = model.system.coordinates[0]  # pyright: ignore
+    shown = [name for name, one in model.sensors.items() if one.observe == place]
+    return next(iter(shown or model.sensors))
+
+
+def own_faults(model: Model, parameters: Iterable[Parameter]) -> list[str]:
+    """Names of the parameters that are gain, offset or lag of that sensor."""
+    sensor = model.sensors[watching(model)]
+    fields = sensor.gain, sensor.offset, sensor.lag
+    return [
+        one.name
+        for one in parameters
+        if any(one.where(model) is field for field in fields)
+    ]
+
+
+def _error(system, t, value, slope):
+    motion = Motion(t, value, slope, *drive_at(system.base, t))
+    acting = [term for term in system.terms if Where.SENSOR in term.acts]
+    return sum(term.sensed(motion) for term in acting)

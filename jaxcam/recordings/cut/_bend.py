@@ -1,0 +1,122 @@
+"""Where a cam is bent: a dent that low harmonics cannot follow, if it is sure.
+
+A bend is a function of the cam's angle with the variances of a Gaussian process with a
+Matern kernel of order 5/2, so that it is zero where nothing is seen. Hops as low as the
+noise look like one; but they are elsewhere at another speed of the cam. So a bend is
+believed where records foretell each other by it.
+"""
+
+from typing import NamedTuple
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+
+# The highest harmonic of a bend: of a dent over a tenth of a radian it has 98 %
+_HIGHEST = 32
+#: how many numbers a bend has
+WAVES = 2 * _HIGHEST + 1
+# Lengths of correlation (rad) and sizes (in units of the noise) that are tried
+_LENGTHS = (0.1, 0.2, 0.4)
+_SIZES = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0)
+# Twice the log-likelihood that a bend must gain: by the numbers of a straight line, as
+# many samples as records have, and some more for where it may be
+_SURE = 30.0
+
+
+def waves(turned: Float[Array, "*k"]) -> Float[Array, "*k waves"]:
+    """What each number of a bend adds to the contact angle."""
+    orders = jnp.arange(_HIGHEST + 1, dtype=float)
+    phases = jnp.multiply.outer(jnp.asarray(turned), orders)
+    return jnp.concatenate([jnp.cos(phases), jnp.sin(phases[..., 1:])], axis=-1)
+
+
+def spread(length: float) -> Float[np.ndarray, " waves"]:
+    """Standard deviation of each number of a bend of variance one."""
+    orders = np.arange(_HIGHEST + 1)
+    density = (1 + (orders * length) ** 2 / 5) ** -3.0
+    density[1:] *= 2
+    density = density / np.sum(density)
+    return np.sqrt(np.concatenate([density, density[1:]]))
+
+
+class Seen(NamedTuple):
+    """What one record says of the numbers of a surface, about some of their values.
+
+    `normal` `(p, p)` and `target` `(p,)`, those of a bend last.
+    """
+
+    normal: Float[np.ndarray, "p p"]
+    target: Float[np.ndarray, " p"]
+
+
+def bend_sizes(
+    records: list[Seen],
+    known: Float[np.ndarray, " q"],
+    pull: Float[np.ndarray, " q"],
+    noise: float,
+) -> Float[np.ndarray, " waves"]:
+    """Standard deviations of the numbers of a bend; zero where there is none for sure.
+
+    **Arguments:** what each record says; information and pull of the tolerances of the
+    numbers that are no bend, of which there are `q`; the noise.
+    """
+    none = np.zeros(WAVES)
+    if len(records) < 2:
+        return none
+    normal, target = _total(records)
+    best, most = none, _SURE
+    for length in _LENGTHS:
+        for size in _SIZES:
+            sizes = size * noise * spread(length)
+            found = _evidence(normal, target, known, pull, sizes)
+            if found > most:
+                best, most = sizes, found
+    if not np.any(best) or _foretold(records, known, pull, best) < _SURE:
+        return none
+    return best
+
+
+def _evidence(normal, target, known, pull, sizes) -> float:
+    """Twice the logarithm of the marginal likelihood, less that without a bend."""
+    count = len(known)
+    low = normal[:count, :count] + np.diag(known)
+    across = normal[:count, count:]
+    solved = np.linalg.solve(low, np.column_stack([across, target[:count] + pull]))
+    inside = normal[count:, count:] - across.T @ solved[:, :-1]
+    along = sizes * (target[count:] - across.T @ solved[:, -1])
+    matrix = _scaled(inside, sizes)
+    _, price = np.linalg.slogdet(matrix)
+    return float(along @ np.linalg.solve(matrix, along) - price)
+
+
+def _foretold(records, known, pull, sizes) -> float:
+    """Twice the log-likelihood that records gain by the bend that all the others show.
+
+    Beside the numbers that are no bend as all of them together have it.
+    """
+    count = len(known)
+    normal, target = _total(records)
+    units = np.append(1 / np.sqrt(known), sizes)
+    right = units * np.append(target[:count] + pull, target[count:])
+    low = (units * np.linalg.solve(_scaled(normal, units), right))[:count]
+    total = 0.0
+    for one in records:
+        others = [other for other in records if other is not one]
+        normal, target = _total(others)
+        left = target[count:] - normal[count:, :count] @ low
+        matrix = _scaled(normal[count:, count:], sizes)
+        bend = sizes * np.linalg.solve(matrix, sizes * left)
+        here = one.target[count:] - one.normal[count:, :count] @ low
+        total += float(2 * bend @ here - bend @ one.normal[count:, count:] @ bend)
+    return total
+
+
+def _total(records) -> tuple[np.ndarray, np.ndarray]:
+    return sum(one.normal for one in records), sum(one.target for one in records)
+
+
+def _scaled(normal, units) -> np.ndarray:
+    """Information in units of what is known beforehand, with that."""
+    return np.eye(len(units)) + normal * np.outer(units, units)
