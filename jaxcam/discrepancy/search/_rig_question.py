@@ -18,6 +18,7 @@ from ._question import (
     Shown,
     term_parameters,
 )
+from ._visited_by import visited_by
 
 
 _FOLLOWER = "follower_angle_rad"
@@ -45,8 +46,10 @@ def rig_question(
         cut = list(segment_case(runs, rig))  # pyright: ignore
     if candidates is None:
         candidates = library(references=rig.references)
-    terms, unlisted = by_listing(tuple(candidates))
     base = cam_follower_model(rig)
+    sensor = base.sensors[_FOLLOWER]
+    visited = visited_by(cut, _FOLLOWER, sensor, rig.references.slip_speed)
+    terms, unlisted = by_listing(tuple(term.scaled(visited) for term in candidates))
     model = Model(WithTerms(base.system, terms), base.sensors, base_drive())
     parameters = cam_follower_parameters(rig, base=lambda s: s.base)
     names = tuple(p.name for p in parameters)

@@ -23,6 +23,7 @@ from ...recordings.cut import (
 from ...recordings.files import check_channels, unit_of
 from ..policy import Policy
 from ..terms import coordinates, library, Term, terms_of, WithTerms
+from ._visited_by import visited_by
 from ._question import by_listing, Question, refuse_one, Report, term_parameters
 
 
@@ -115,7 +116,9 @@ def system_question(
     def listed(references: References):
         usual = library(turned, references, clocked=clocked)
         offered = usual if candidates is None else candidates
-        return by_listing(_measured_in(unit, offered))
+        visited = visited_by(recordings, seen, sensors[seen], references.slip_speed)
+        scaled = [term.scaled(visited) for term in offered]
+        return by_listing(_measured_in(unit, scaled))
 
     terms, unlisted = listed(references)
     if isinstance(drive, Input):
