@@ -1,7 +1,7 @@
 """Terms whose forms have places of their own, scaled from what recordings visit."""
 
 import dataclasses
-from typing import ClassVar, Self
+from typing import ClassVar
 
 import equinox as eqx
 
@@ -25,7 +25,7 @@ class ScaledTerm(Term):
     )
     listed: ClassVar[bool] = True
 
-    def scaled(self, visited: Visited) -> Self:
+    def scaled(self, visited: Visited) -> "ScaledTerm":
         found = dataclasses.replace(self, visited=visited)
         starts = found.starts()
         # somewhere in the range, until a fit says where

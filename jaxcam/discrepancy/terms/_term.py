@@ -3,7 +3,7 @@
 import dataclasses
 import math
 from collections.abc import Mapping
-from typing import Any, ClassVar, NamedTuple, Self
+from typing import Any, ClassVar, NamedTuple
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -154,7 +154,7 @@ class Term(eqx.Module):
         del approach, motion
         return 1.0
 
-    def scaled(self, visited: Visited) -> Self:
+    def scaled(self, visited: Visited) -> "Term":
         """The term with the constants of its form as recordings suggest them."""
         del visited
         return self
