@@ -8,7 +8,9 @@ from ._cam_follower import (
 )
 from ._doubts import Doubt as Doubt
 from ._fit import fit as fit, held_out_cost as held_out_cost
+from ._fit_free_run import fit_free_run as fit_free_run, FreeRunFit as FreeRunFit
 from ._fit_result import Fit as Fit
+from ._free_run import free_run as free_run, FreeRun as FreeRun
 from ._identify import Identifiability as Identifiability, identify as identify
 from ._impact_law import impact_law as impact_law, ImpactLaw as ImpactLaw
 from ._profile import excess_cost as excess_cost, profile as profile

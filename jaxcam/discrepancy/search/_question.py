@@ -111,6 +111,8 @@ def term_parameters(terms: Sequence[Term], segments, policy: Policy) -> list[Par
     found = []
     for k, term in enumerate(terms):
         inner = {one.name for one in term.strengths() if one.inner}
+        if term.starts():
+            inner = set()
         found += [
             dataclasses.replace(p, lower=max(p.lower, least)) if p.name in inner else p
             for p in term.parameters(k)

@@ -19,6 +19,7 @@ from ._question import (
     term_parameters,
     with_seen_noise,
 )
+from ._visited_by import visited_by
 
 
 _FOLLOWER = "follower_angle_rad"
@@ -46,11 +47,13 @@ def rig_question(
         cut = list(segment_case(runs, rig))  # pyright: ignore
     if candidates is None:
         candidates = library(references=rig.references)
-    terms, unlisted = by_listing(tuple(candidates))
     base = cam_follower_model(rig)
     sensors, noisier = with_seen_noise(
         base.sensors, [run.recording for run in cut], policy
     )
+    slip = rig.references.slip_speed
+    visited = visited_by(cut, _FOLLOWER, sensors[_FOLLOWER], slip)
+    terms, unlisted = by_listing(tuple(term.scaled(visited) for term in candidates))
     model = watched(Model(WithTerms(base.system, terms), sensors, base_drive()))
     parameters = cam_follower_parameters(rig, base=lambda s: s.base)
     names = tuple(p.name for p in parameters)

@@ -185,7 +185,9 @@ class Search:
             grown = added_gain(
                 information, score, free, blocks.rows(names), self.policy.alike
             )
-            if any(one.inner for one in term.strengths()):
+            if term.starts():
+                grown = self.trials.placed(trial.names, term).gain
+            elif any(one.inner for one in term.strengths()):
                 grown = max(grown, scan.best[1])
                 if grown < self._least_of_vibrations(trial):
                     continue

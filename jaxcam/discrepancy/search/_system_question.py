@@ -31,6 +31,7 @@ from ._question import (
     term_parameters,
     with_seen_noise,
 )
+from ._visited_by import visited_by
 
 
 # Share of the usual change of the speed in a step within which dry friction changes
@@ -124,7 +125,9 @@ def system_question(
     def listed(references: References):
         usual = library(turned, references, clocked=clocked)
         offered = usual if candidates is None else candidates
-        return by_listing(_measured_in(unit, offered))
+        visited = visited_by(recordings, seen, sensors[seen], references.slip_speed)
+        scaled = [term.scaled(visited) for term in offered]
+        return by_listing(_measured_in(unit, scaled))
 
     terms, unlisted = listed(references)
     if isinstance(drive, Input):

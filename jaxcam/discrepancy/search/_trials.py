@@ -16,6 +16,7 @@ from ._gains import predicted_gain
 from ._given_up import given_up
 from ._kept_trials import Ended, KeptTrials
 from ._local_force import force_response, Response
+from ._placing import Placing, placing
 from ._vibration_scan import Periodogram, periodogram
 
 
@@ -55,6 +56,7 @@ class Trials:
         self._scans: dict[frozenset[str], Periodogram] = {}
         self._responses: dict[frozenset[str], Response] = {}
         self._linear: dict[frozenset[str], Blocks] = {}
+        self._placed: dict[tuple[frozenset[str], str], Placing] = {}
 
     @property
     def least_cost(self) -> float:
@@ -83,7 +85,9 @@ class Trials:
         """Gain that a term must have: the more demanding of BIC and error rate."""
         term = self.term(name)
         number, chance = self.count([name]), self.policy.false_alarms / len(self.terms)
-        if any(one.inner for one in term.strengths()):
+        if term.starts():
+            chance /= len(term.starts())
+        elif any(one.inner for one in term.strengths()):
             # as many chances as there are frequencies
             chance /= self.scan(frozenset()).cells
         level = float(chi2.isf(chance, number))
@@ -113,6 +117,8 @@ class Trials:
             # what was said about the fit before holds no more
             for derived in (self._scans, self._responses, self._linear):
                 derived.pop(names, None)
+            for key in [key for key in self._placed if key[0] == names]:
+                del self._placed[key]
         return self.known[names]
 
     def _left(self, names: frozenset[str]) -> Fit | None:
@@ -233,6 +239,22 @@ class Trials:
             )
         return self._scans[names]
 
+    def placed(self, names: frozenset[str], term: Term) -> Placing:
+        """Where a term with starts of its own would gain most beside a fit."""
+        key = names, term.name
+        if key not in self._placed:
+            self.progress(f"looking where {term.sentence} would be", None)
+            self._placed[key] = placing(
+                self.problem, self.response(names), term, self.policy
+            )
+        return self._placed[key]
+
+    def _inner(self, term: Term, name: str, start: Trial) -> float:
+        """Value from which an inner number of a new term starts."""
+        if term.starts():
+            return self.placed(start.names, term).inner[name]
+        return self._frequency(start)
+
     def _frequency(self, start: Trial) -> float:
         """The best known frequency to start from."""
         known = self._scans.get(start.names) or next(iter(self._scans.values()), None)
@@ -259,7 +281,7 @@ class Trials:
             for one in term.strengths():
                 column = everything.index(one.name)
                 if one.inner and term.name in names - start.names:
-                    values[:, column] = self._frequency(start)
+                    values[:, column] = self._inner(term, one.name, start)
                 elif one.inner:
                     values[:, column] = start.fit.point.values[:, column]
                 elif term.name not in names:

@@ -18,6 +18,7 @@ from ._library import (
     saved_classes as saved_classes,
 )
 from ._primitives import Primitive as Primitive
+from ._scaled import ScaledTerm as ScaledTerm
 from ._sensed import own_faults as own_faults, watched as watched
 from ._shapes import Shape as Shape, shapes as shapes, Variable as Variable
 from ._term import (
@@ -29,5 +30,6 @@ from ._term import (
     terms_of as terms_of,
 )
 from ._value import Value as Value
+from ._visited import Visited as Visited
 from ._where import Where as Where
 from ._with_terms import base_drive as base_drive, WithTerms as WithTerms

@@ -8,7 +8,22 @@ import equinox as eqx
 import jax.numpy as jnp
 
 from ...recordings import References
+from ._by_place import StribeckCurve, UnevenFriction
 from ._free_function import FREE
+from ._one_way import (
+    DampingBackwards,
+    DampingForwards,
+    FrictionBackwards,
+    FrictionForwards,
+)
+from ._power_law import RestitutionPower
+from ._springs import (
+    BilinearSpring,
+    ConstantForce,
+    LinearSpring,
+    StopAbove,
+    StopBelow,
+)
 from ._term import Motion, SensorTerm, strength, Term
 from ._value import Value
 from ._where import Where
@@ -275,10 +290,27 @@ class SensorOffset(SensorTerm):
     offset: float = strength("[q]", 1e-3)
 
 
+_EXTENDED = (
+    StopAbove,
+    StopBelow,
+    BilinearSpring,
+    LinearSpring,
+    ConstantForce,
+    DampingForwards,
+    DampingBackwards,
+    FrictionForwards,
+    FrictionBackwards,
+    StribeckCurve,
+    UnevenFriction,
+    RestitutionPower,
+)
+
+
 def library(
     turned: bool = True,
     references: References = References(),
     clocked: bool | None = None,
+    extended: bool = False,
 ) -> tuple[Term, ...]:
     """All terms that `diagnose` tries by default.
 
@@ -290,6 +322,10 @@ def library(
         where a nonlinear spring is symmetric, at which speed a restitution is stated.
     - `clocked`: whether anything happens at a known time, such as by a drive (the
         default) or a measured input. Otherwise a lag is another beginning of time.
+    - `extended`: whether to add terms that most rigs have as parameters already, or
+        that take longer to look for: forces by position with an edge, friction that
+        differs by direction, speed or place, a restitution as a power. Their constants
+        come from the recordings.
     """
     slip = references.slip_speed
     found: list[Term] = [
@@ -311,10 +347,12 @@ def library(
     if turned:
         lead = references.profile_lead
         found += [CamProfileError(lead=lead), SpeedDependentBounce()]
+    if extended:
+        found += [kind() for kind in _EXTENDED]
     return tuple(found)
 
 
 def saved_classes() -> tuple[type, ...]:
     """Classes that a saved system with terms may name, for `load_system`."""
-    terms = (type(term) for term in library())
+    terms = (type(term) for term in library(extended=True))
     return (WithTerms, DriveRipple, *terms, *FREE.values())

@@ -10,6 +10,7 @@ import jax.numpy as jnp
 
 from ...fitting import Model, Parameter
 from ._value import Value
+from ._visited import Visited
 from ._where import Where
 
 
@@ -64,8 +65,9 @@ def strength(
     - `unit`: for tables; `[q]` in it stands for the unit of the coordinate.
     - `size`: a change that matters; it does not influence the result.
     - `lower`, `upper`: signs that physics demands.
-    - `inner`: a frequency (Hz), without effect while the strengths are zero; it is
-        fitted from the value that a scan of the frequencies finds.
+    - `inner`: a number without effect while the strengths are zero, such as an edge. It
+        is fitted from the best of the term's `starts`, or, without any, is a frequency
+        (Hz) that a scan finds.
     """
     metadata = {
         "strength": Strength("", unit, size, lower, upper, inner),
@@ -158,6 +160,18 @@ class Term(eqx.Module):
         """What the sensor of the first coordinate shows besides, in its unit."""
         del motion
         return 0.0
+
+    def scaled(self, visited: Visited) -> "Term":
+        """The term with the constants of its form as recordings suggest them."""
+        del visited
+        return self
+
+    def starts(self) -> tuple[Mapping[str, float], ...]:
+        """Values of its inner numbers from which a fit may start.
+
+        Of a frequency there are none here; a scan finds it.
+        """
+        return ()
 
     def prepared(self) -> "Term":
         """The term with whatever it needs at every step worked out once."""

@@ -31,6 +31,7 @@ from ._linearise import (
     total_cost as total_cost,
 )
 from ._model import (
+    augmented_field as augmented_field,
     cam_follower_drive as cam_follower_drive,
     filtered_channels as filtered_channels,
     Input as Input,
@@ -45,3 +46,4 @@ from ._predict import runge_kutta as runge_kutta
 from ._problem import Problem as Problem, Weights as Weights
 from ._problem_checks import parameter_places as parameter_places
 from ._sharpness import loosened as loosened, separated as separated
+from ._starts import state_size as state_size

@@ -1,0 +1,31 @@
+"""What recordings visit, as one channel shows it."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from ...fitting import Sensor
+from ...recordings import Segments
+from ...recordings.cut import fast_speed, usual_acceleration
+from ..terms import Visited
+
+
+def visited_by(
+    recordings: Sequence[Segments], channel: str, sensor: Sensor, slip: float
+) -> Visited:
+    """Positions, speeds and accelerations of a coordinate that a channel shows.
+
+    **Arguments:** `slip`, the speed within which dry friction changes sign.
+    """
+    runs = [part.recording for part in recordings]
+    samples = np.concatenate([run[channel] for run in runs])
+    offset, gain = float(sensor.offset), float(sensor.gain)
+    places = (samples[np.isfinite(samples)] - offset) / gain
+    low, high = float(np.min(places)), float(np.max(places))
+    fast = fast_speed(runs, channel) / abs(gain)
+    push = usual_acceleration(runs, channel) / abs(gain)
+    if not (math.isfinite(push) and push > 0):
+        # records too short to show one: as if the range were crossed at that speed
+        push = fast**2 / max(high - low, 1e-300)
+    return Visited(low, high, fast, push, slip)

@@ -1,0 +1,67 @@
+"""Friction that has a scale of speed or position of its own."""
+
+from typing import ClassVar
+
+import jax.numpy as jnp
+import numpy as np
+
+from ._scaled import ScaledTerm
+from ._term import Motion, strength
+
+
+# Speeds of Stribeck's curve that are tried, as shares of the fast ones
+_SHARES = tuple(np.geomspace(0.02, 0.6, 9).tolist())
+
+
+class StribeckCurve(ScaledTerm):
+    """Dry friction that is larger near standstill, `-fs exp(-(v / vs)^2) sign(v)`.
+
+    The speed `vs` is fitted with the strength.
+    """
+
+    name: ClassVar[str] = "stribeck_curve"
+    sentence: ClassVar[str] = "friction that is larger at low speed (Stribeck)"
+    region: ClassVar[str] = "in flight, near standstill"
+    source: ClassVar[str] = (
+        "Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica 1994"
+    )
+    corner: ClassVar[bool] = True
+    fs: float = strength("[q]/s^2", 0.1, lower=0.0)
+    vs: float = strength("[q]/s", 0.1, default=1.0, inner=True)
+
+    def acceleration(self, motion: Motion):
+        slow = jnp.exp(-((motion.velocity / self.vs) ** 2))
+        return -self.fs * slow * jnp.tanh(motion.velocity / self.visited.slip)
+
+    def starts(self):
+        return tuple({"vs": share * self.visited.fast} for share in _SHARES)
+
+    def _sizes(self):
+        return {"fs": self.visited.push, "vs": 0.05 * self.visited.fast}
+
+    def _ends(self):
+        fast = self.visited.fast
+        return {"vs": (2 * self.visited.slip, max(fast, 3 * self.visited.slip))}
+
+
+class UnevenFriction(ScaledTerm):
+    """Dry friction that differs along the way, `-(u1 p + u2 p^2) sign(v)`.
+
+    The place `p` is from -1 to 1 over the positions that were visited.
+    """
+
+    name: ClassVar[str] = "uneven_friction"
+    sentence: ClassVar[str] = "dry friction that differs along the way"
+    region: ClassVar[str] = "in flight, by position"
+    source: ClassVar[str] = "Armstrong-Helouvry 1991, chapter 4"
+    corner: ClassVar[bool] = True
+    u1: float = strength("[q]/s^2", 0.1)
+    u2: float = strength("[q]/s^2", 0.1)
+
+    def acceleration(self, motion: Motion):
+        place = (motion.position - self.visited.middle) / self.visited.half
+        size = place * (self.u1 + place * self.u2)
+        return -size * jnp.tanh(motion.velocity / self.visited.slip)
+
+    def _sizes(self):
+        return {"u1": self.visited.push, "u2": self.visited.push}

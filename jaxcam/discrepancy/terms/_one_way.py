@@ -1,0 +1,82 @@
+"""Friction that differs with the direction of the motion."""
+
+from typing import ClassVar
+
+import jax.numpy as jnp
+
+from ._scaled import ScaledTerm
+from ._term import Motion, strength
+
+
+_SOURCE = "Armstrong-Helouvry 1991, Control of Machines with Friction"
+
+
+class DampingForwards(ScaledTerm):
+    """Viscous damping of motion in the positive direction alone, `-cf max(v, 0)`.
+
+    Next to damping both ways it is how much more there is in this direction.
+    """
+
+    name: ClassVar[str] = "damping_forwards"
+    sentence: ClassVar[str] = "viscous damping that is larger on the way up"
+    region: ClassVar[str] = "in flight, at positive velocities"
+    source: ClassVar[str] = _SOURCE
+    cf: float = strength("1/s", 0.1, lower=0.0)
+
+    def acceleration(self, motion: Motion):
+        return -self.cf * jnp.maximum(motion.velocity, 0.0)
+
+    def _sizes(self):
+        return {"cf": self.visited.push / self.visited.fast}
+
+
+class DampingBackwards(ScaledTerm):
+    """Viscous damping of motion in the negative direction alone, `cb max(-v, 0)`."""
+
+    name: ClassVar[str] = "damping_backwards"
+    sentence: ClassVar[str] = "viscous damping that is larger on the way down"
+    region: ClassVar[str] = "in flight, at negative velocities"
+    source: ClassVar[str] = _SOURCE
+    cb: float = strength("1/s", 0.1, lower=0.0)
+
+    def acceleration(self, motion: Motion):
+        return self.cb * jnp.maximum(-motion.velocity, 0.0)
+
+    def _sizes(self):
+        return {"cb": self.visited.push / self.visited.fast}
+
+
+class FrictionForwards(ScaledTerm):
+    """Dry friction of motion in the positive direction alone, `-ff` for `v > 0`."""
+
+    name: ClassVar[str] = "friction_forwards"
+    sentence: ClassVar[str] = "dry friction that is larger on the way up"
+    region: ClassVar[str] = "in flight, at positive velocities"
+    source: ClassVar[str] = _SOURCE
+    corner: ClassVar[bool] = True
+    ff: float = strength("[q]/s^2", 0.1, lower=0.0)
+
+    def acceleration(self, motion: Motion):
+        forwards = (1 + jnp.tanh(motion.velocity / self.visited.slip)) / 2
+        return -self.ff * forwards
+
+    def _sizes(self):
+        return {"ff": self.visited.push}
+
+
+class FrictionBackwards(ScaledTerm):
+    """Dry friction of motion in the negative direction alone, `fb` for `v < 0`."""
+
+    name: ClassVar[str] = "friction_backwards"
+    sentence: ClassVar[str] = "dry friction that is larger on the way down"
+    region: ClassVar[str] = "in flight, at negative velocities"
+    source: ClassVar[str] = _SOURCE
+    corner: ClassVar[bool] = True
+    fb: float = strength("[q]/s^2", 0.1, lower=0.0)
+
+    def acceleration(self, motion: Motion):
+        backwards = (1 - jnp.tanh(motion.velocity / self.visited.slip)) / 2
+        return self.fb * backwards
+
+    def _sizes(self):
+        return {"fb": self.visited.push}

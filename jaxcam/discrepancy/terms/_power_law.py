@@ -1,0 +1,33 @@
+"""A restitution that is a power of the approach speed."""
+
+from typing import ClassVar
+
+import jax.numpy as jnp
+
+from ._scaled import ScaledTerm
+from ._term import Motion, strength
+from ._where import Where
+
+
+# Approach speeds below this share of the fast ones count as that
+_SLOWEST = 1e-3
+
+
+class RestitutionPower(ScaledTerm):
+    """Restitution as a power of the approach speed, `r0 (v / v0)^-rp`.
+
+    It falls with the speed for a positive `rp`, as of plastic impacts, and rises for a
+    negative one; `v0` is the fast speed of the recordings.
+    """
+
+    name: ClassVar[str] = "restitution_power"
+    sentence: ClassVar[str] = "a restitution that is a power of the approach speed"
+    where: ClassVar[str] = Where.IMPACT
+    region: ClassVar[str] = "at impacts, by their approach speed"
+    source: ClassVar[str] = "Johnson, Contact Mechanics, 1985, section 11.5"
+    rp: float = strength("-", 0.05)
+
+    def restitution(self, approach, motion: Motion):
+        del motion
+        share = jnp.maximum(approach / self.visited.fast, _SLOWEST)
+        return jnp.exp(-self.rp * jnp.log(share))

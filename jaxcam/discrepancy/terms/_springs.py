@@ -1,0 +1,133 @@
+"""Forces by position: constant, linear, with a knee, and one-sided stops."""
+
+from typing import ClassVar
+
+import jax.numpy as jnp
+import numpy as np
+
+from ._scaled import ScaledTerm
+from ._term import Motion, strength
+
+
+# Places of a knee or an edge that are tried, as shares of the positions visited
+_SHARES = tuple(np.linspace(0.02, 0.98, 33).tolist())
+
+
+class ConstantForce(ScaledTerm):
+    """A force that is always the same, as weight is, `f0`."""
+
+    name: ClassVar[str] = "constant_force"
+    sentence: ClassVar[str] = "a constant force"
+    source: ClassVar[str] = "Meriam and Kraige, Dynamics, chapter 3"
+    f0: float = strength("[q]/s^2", 0.1)
+
+    def acceleration(self, motion: Motion):
+        return self.f0 + 0.0 * motion.position
+
+    def _sizes(self):
+        return {"f0": self.visited.push}
+
+
+class LinearSpring(ScaledTerm):
+    """A spring about the middle of the positions visited, `-k1 (q - middle)`."""
+
+    name: ClassVar[str] = "linear_spring"
+    sentence: ClassVar[str] = "a force in proportion to the deflection, a spring"
+    region: ClassVar[str] = "in flight, by position"
+    source: ClassVar[str] = "Hooke 1678"
+    k1: float = strength("1/s^2", 1.0, lower=0.0)
+
+    def acceleration(self, motion: Motion):
+        return -self.k1 * (motion.position - self.visited.middle)
+
+    def _sizes(self):
+        return {"k1": self.visited.push / self.visited.half}
+
+
+class _WithEdge(ScaledTerm):
+    """A force that begins at a position."""
+
+    def starts(self):
+        low, width = self.visited.low, 2 * self.visited.half
+        return tuple({self._edge: low + share * width} for share in _SHARES)
+
+    @property
+    def _edge(self) -> str:
+        """Name of the inner number."""
+        return next(one.name for one in self._declared() if one.inner)
+
+    def _stiff(self) -> float:
+        return self.visited.push / self.visited.half
+
+    def _sizes(self):
+        stiff, visited = self._stiff(), self.visited
+        sizes = {one.name: stiff for one in self._declared()}
+        for one in self._declared():
+            if one.unit.startswith("1/(s [q])"):
+                sizes[one.name] = stiff / visited.fast
+            if one.inner:
+                sizes[one.name] = 0.05 * visited.half
+        return sizes
+
+    def _ends(self):
+        return {self._edge: (self.visited.low, self.visited.high)}
+
+
+class BilinearSpring(_WithEdge):
+    """A stiffness that is another one beyond a knee, `-kb max(q - knee, 0)`."""
+
+    name: ClassVar[str] = "bilinear_spring"
+    sentence: ClassVar[str] = "a stiffness that changes at a position"
+    region: ClassVar[str] = "in flight, beyond the knee"
+    source: ClassVar[str] = "Shaw and Holmes, Journal of Sound and Vibration 1983"
+    kb: float = strength("1/s^2", 1.0)
+    knee: float = strength("[q]", 0.01, default=0.0, inner=True)
+
+    def acceleration(self, motion: Motion):
+        return -self.kb * jnp.maximum(motion.position - self.knee, 0.0)
+
+
+class StopAbove(_WithEdge):
+    """Something that is touched above an edge: it pushes back and takes energy out.
+
+    Of the depth `d = max(q - edge_a, 0)`, the acceleration is
+    `-d (ka + da v + la sign(v))`: stiffness, damping as of a fluid, and a loss that does
+    not depend on the speed, as of rubber or of rubbing sides.
+    """
+
+    name: ClassVar[str] = "stop_above"
+    sentence: ClassVar[str] = "an elastic stop above an edge"
+    region: ClassVar[str] = "in flight, above the edge"
+    source: ClassVar[str] = "Hunt and Crossley, Journal of Applied Mechanics 1975"
+    ka: float = strength("1/s^2", 1.0, lower=0.0)
+    da: float = strength("1/(s [q])", 1.0, lower=0.0)
+    la: float = strength("1/s^2", 1.0, lower=0.0)
+    edge_a: float = strength("[q]", 0.01, default=0.0, inner=True)
+
+    def acceleration(self, motion: Motion):
+        depth = jnp.maximum(motion.position - self.edge_a, 0.0)
+        return -depth * _reaction(self, motion, self.ka, self.da, self.la)
+
+
+class StopBelow(_WithEdge):
+    """The same below an edge: `d (kd - dd v - ld sign(v))`, `d = max(edge_b - q, 0)`."""
+
+    name: ClassVar[str] = "stop_below"
+    sentence: ClassVar[str] = "an elastic stop below an edge"
+    region: ClassVar[str] = "in flight, below the edge"
+    source: ClassVar[str] = "Hunt and Crossley, Journal of Applied Mechanics 1975"
+    kd: float = strength("1/s^2", 1.0, lower=0.0)
+    dd: float = strength("1/(s [q])", 1.0, lower=0.0)
+    ld: float = strength("1/s^2", 1.0, lower=0.0)
+    edge_b: float = strength("[q]", 0.01, default=0.0, inner=True)
+
+    def acceleration(self, motion: Motion):
+        depth = jnp.maximum(self.edge_b - motion.position, 0.0)
+        mirrored = motion._replace(velocity=-motion.velocity)
+        return depth * _reaction(self, mirrored, self.kd, self.dd, self.ld)
+
+
+def _reaction(term: ScaledTerm, motion: Motion, stiffness, damping, loss):
+    """What a unit of depth pushes with, of motion into the stop."""
+    turned = jnp.tanh(motion.velocity / term.visited.slip)
+    return stiffness + damping * motion.velocity + loss * turned

@@ -1,0 +1,28 @@
+"""What recordings visit of a coordinate, from which terms take their scales."""
+
+from typing import NamedTuple
+
+
+class Visited(NamedTuple):
+    """Where a coordinate has been, in its unit, and how fast.
+
+    `low`, `high`: least and largest position; `fast`: a speed that is rarely exceeded;
+    `push`: the usual acceleration; `slip`: speed within which dry friction changes
+    sign.
+    """
+
+    low: float = -1.0
+    high: float = 1.0
+    fast: float = 1.0
+    push: float = 1.0
+    slip: float = 0.01
+
+    @property
+    def middle(self) -> float:
+        return (self.low + self.high) / 2
+
+    @property
+    def half(self) -> float:
+        """Half of the range of positions, positive."""
+        half = (self.high - self.low) / 2
+        return half if half > 0 else 1.0

@@ -1,0 +1,267 @@
+"""A model simulated from its inputs alone, against a recording that it did not see."""
+
+import dataclasses
+import math
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from ..recordings import Recording, RecordingError, Segments
+from .engine import (
+    augmented_field,
+    filtered_channels,
+    Input,
+    Model,
+    runge_kutta,
+    state_size,
+    Turning,
+    with_constants,
+)
+
+
+# Steps of Newton's method on the initial state, and its relative tolerance
+_NEWTON, _STILL = 20, 1e-12
+# Steps between two samples: to begin with, and at most
+_FIRST_STEPS, _MOST_STEPS = 2, 64
+# Change of the simulated motion, in standard deviations of the noise or relative to
+# the motion, that halving the steps may make
+_OF_NOISE, _OF_MOTION = 0.1, 1e-6
+# Steps between two samples may differ by this part
+_UNEVEN = 0.01
+
+
+@dataclasses.dataclass(frozen=True)
+class FreeRun:
+    """A recording and what a model makes of its inputs alone.
+
+    - `time` (s), `measured` and `simulated` channels, each `(k,)`.
+    - `samples`: how many samples the initial `state` was found from; they do not count.
+    - `rmse`: of each channel, in its unit.
+    """
+
+    record: str
+    time: Float[np.ndarray, " k"]
+    measured: Mapping[str, Float[np.ndarray, " k"]]
+    simulated: Mapping[str, Float[np.ndarray, " k"]]
+    state: Float[np.ndarray, " n"]
+    samples: int
+
+    @property
+    def rmse(self) -> dict[str, float]:
+        """Root of the mean squared difference of each channel, in its unit."""
+        return {
+            name: float(np.sqrt(np.nanmean(self.residual(name)[self.samples :] ** 2)))
+            for name in self.simulated
+        }
+
+    def residual(self, channel: str) -> Float[np.ndarray, " k"]:
+        """Measured less simulated samples."""
+        return self.measured[channel] - self.simulated[channel]
+
+
+def free_run(
+    model: Model, recording: Recording | Segments, *, samples: int = 20
+) -> FreeRun:
+    """Simulate a whole recording from its first samples and its input.
+
+    The state at the first sample is the one whose motion fits the first `samples` best.
+    From there on nothing but the measured input is used, held between samples, so that
+    errors add up over the whole recording. This is how benchmarks of identification
+    judge a model; a fit judges it piece by piece.
+
+    **Arguments:**
+
+    - `model`: a system with its sensors and its input, such as `found.model()`.
+    - `recording`: evenly sampled; its `constants` are those of the system.
+    - `samples`: how many samples the initial state is found from.
+
+    **Raises:** `RecordingError` for a recording that is too short, unevenly sampled or
+    lacks a channel; `ValueError` for a model with a turning drive, and for a motion
+    that meets a constraint or does not stay finite.
+    """
+    one = prepared(model, recording, samples)
+    run = recording.recording if isinstance(recording, Segments) else recording
+    found = simulated(with_constants(model, run), one)
+    channels = np.asarray(found.channels)
+    if not np.all(np.isfinite(channels)):
+        raise ValueError(
+            f"{run.name}: the free run does not stay finite; check the signs of the "
+            f"model's damping and stiffness."
+        )
+    below = np.flatnonzero(np.asarray(found.gap) < 0)
+    if len(below):
+        raise ValueError(
+            f"{run.name}: the free run meets a constraint at "
+            f"{run.time[below[0]]:.4g} s; it serves motions without impacts, use "
+            f"`jaxcam.simulate` for others."
+        )
+    data = np.asarray(one.data)
+    return FreeRun(
+        run.name,
+        run.time,
+        {name: data[:, k] for k, name in enumerate(model.sensors)},
+        {name: channels[:, k] for k, name in enumerate(model.sensors)},
+        np.asarray(one.state),
+        samples,
+    )
+
+
+class Prepared(eqx.Module):
+    """A recording as a free run needs it.
+
+    `state` `(n,)` at the first sample, found from `samples` of them; times `start` and
+    `interval` (s); the input's `level` `(k,)`; `data` `(k, c)` and their `noise`
+    `(c,)`; the number of `steps` between two samples.
+    """
+
+    state: Float[Array, " n"]
+    start: Float[Array, ""]
+    interval: Float[Array, ""]
+    level: Float[Array, " k"]
+    data: Float[Array, "k c"]
+    noise: Float[Array, " c"]
+    samples: int = eqx.field(static=True)
+    steps: int = eqx.field(static=True)
+
+
+class Simulated(NamedTuple):
+    """Channels `(k, c)` and the least gap `(k,)` at each sample."""
+
+    channels: Float[Array, "k c"]
+    gap: Float[Array, " k"]
+
+
+def prepared(model: Model, recording: Recording | Segments, samples: int) -> Prepared:
+    """A recording with its initial state, and with steps that are short enough.
+
+    **Raises:** as `free_run` does.
+    """
+    run = recording.recording if isinstance(recording, Segments) else recording
+    if isinstance(model.drive, Turning):
+        raise ValueError(
+            "A free run follows a measured input; of a system with a turning drive, "
+            "compare flights with `jaxcam.recordings.compare`."
+        )
+    model = with_constants(model, run)
+    level = _levels(model, run)
+    data = np.stack([run[name] for name in model.sensors], axis=-1)
+    if not 2 <= samples < len(run):
+        raise RecordingError(
+            f"{run.name}: {samples} samples to begin with are not between 2 and the "
+            f"{len(run)} of the recording."
+        )
+    interval = (run.time[-1] - run.time[0]) / (len(run) - 1)
+    one = Prepared(
+        _first_state(model, data),
+        jnp.asarray(float(run.time[0])),
+        jnp.asarray(float(interval)),
+        level,
+        jnp.asarray(data, dtype=float),
+        jnp.stack([sensor.floor for sensor in model.sensors.values()]),
+        samples,
+        _FIRST_STEPS,
+    )
+    one = _started(model, one)
+    found = simulated(model, one)
+    while one.steps < _MOST_STEPS:
+        finer = dataclasses.replace(one, steps=2 * one.steps)
+        again = simulated(model, finer)
+        off = jnp.max(jnp.abs(again.channels - found.channels), axis=0)
+        size = jnp.ptp(again.channels, axis=0)
+        if bool(jnp.all(off <= jnp.maximum(_OF_NOISE * one.noise, _OF_MOTION * size))):
+            break
+        one, found = finer, again
+    return one
+
+
+@eqx.filter_jit
+def simulated(model: Model, one: Prepared) -> Simulated:
+    """The motion from the initial state on, at each sample."""
+    step = one.interval / one.steps
+    size = one.state.shape[0] - len(filtered_channels(model))
+
+    def seen(t, system, x):
+        field = augmented_field(model, system, t, x)
+        values = []
+        for name, sensor in model.sensors.items():
+            if sensor.filtered:
+                place = size + filtered_channels(model).index(name)
+                value, slope = x[place], field[place]
+            else:
+                value, slope = jax.jvp(sensor.seen, (x[:size],), (field[:size],))
+            values.append(sensor.offset + sensor.gain * (value - sensor.lag * slope))
+        gap = jnp.min(jnp.atleast_1d(system.gap(t, x[:size])))
+        return Simulated(jnp.stack(values), gap)
+
+    def sample(x, inputs):
+        number, level = inputs
+        t = one.start + number * one.interval
+        system = model.driven(t, level, jnp.zeros_like(t))
+
+        def advance(x, k):
+            return runge_kutta(model, system, t + k * step, x, step)[0], None
+
+        after, _ = jax.lax.scan(advance, x, jnp.arange(one.steps, dtype=float))
+        return after, seen(t, system, x)
+
+    numbers = jnp.arange(one.level.shape[0], dtype=float)
+    return jax.lax.scan(sample, one.state, (numbers, one.level))[1]
+
+
+def _first_state(model: Model, data) -> Float[Array, " n"]:
+    """Positions where the first samples have them, all else at rest."""
+    state = jnp.zeros(state_size(model) + len(filtered_channels(model)))
+    for k, sensor in enumerate(model.sensors.values()):
+        seen = np.flatnonzero(np.isfinite(data[:, k]))
+        if isinstance(sensor.observe, int) and len(seen):
+            value = (data[seen[0], k] - sensor.offset) / sensor.gain
+            state = state.at[sensor.observe].set(value)
+    return state
+
+
+def _started(model: Model, one: Prepared) -> Prepared:
+    """With the state whose motion fits the first samples best, by Gauss-Newton."""
+    few = dataclasses.replace(
+        one, level=one.level[: one.samples], data=one.data[: one.samples]
+    )
+    state, cost = np.asarray(one.state), math.inf
+    for _ in range(_NEWTON):
+        missed, rows = (np.asarray(x) for x in _off(model, few, jnp.asarray(state)))
+        now = float(missed @ missed)
+        if not now < cost * (1 - _STILL):
+            break
+        cost = now
+        # rows in like units: a state that no sample shows does not move
+        scale = np.linalg.norm(rows, axis=0)
+        scale = np.where(scale > 0, scale, 1.0)
+        state = state - np.linalg.lstsq(rows / scale, missed, rcond=None)[0] / scale
+    return dataclasses.replace(one, state=jnp.asarray(state))
+
+
+@eqx.filter_jit
+def _off(model: Model, one: Prepared, state):
+    """What samples miss in units of the noise, and its slopes by the initial state."""
+
+    def missed(state):
+        found = simulated(model, dataclasses.replace(one, state=state)).channels
+        off = (found - one.data) / one.noise[None]
+        return jnp.ravel(jnp.where(jnp.isfinite(one.data), off, 0.0))
+
+    return missed(state), jax.jacfwd(missed)(state)
+
+
+def _levels(model: Model, run: Recording) -> Float[Array, " k"]:
+    """The input at each sample; zero without one."""
+    spacing = np.diff(run.time)
+    if np.ptp(spacing) > 2 * _UNEVEN * np.mean(spacing):
+        raise RecordingError(
+            f"{run.name}: its samples are not evenly spaced; resample it first."
+        )
+    if not isinstance(model.drive, Input):
+        return jnp.zeros(len(run))
+    return jnp.asarray(run[model.drive.channel])
