@@ -14,4 +14,7 @@ from ._structure import (
     Form as Form,
     Structure as Structure,
 )
-from ._visited import Visited as Visited, visited as visited
+from ._visited_states import (
+    visited_states as visited_states,
+    VisitedStates as VisitedStates,
+)

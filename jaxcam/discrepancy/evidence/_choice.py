@@ -19,7 +19,7 @@ from ._held_out import held_out, HeldOut
 from ._masked import unmasked
 from ._redrawn import Needs, needs, redrawn, sure
 from ._structure import Structure, structures
-from ._visited import visited
+from ._visited_states import visited_states
 
 
 class Outside(NamedTuple):
@@ -170,7 +170,7 @@ def _without_a_name(
     if best.names and max(one.gain for one in left) < small:
         return None, None
     problem = question.problem
-    positions, velocities, approach, duration = visited(problem).ranges(policy)
+    positions, velocities, approach, duration = visited_states(problem).ranges(policy)
     search = FreeSearch(
         problem,
         question.rig,

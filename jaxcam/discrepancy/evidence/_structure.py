@@ -26,7 +26,7 @@ from ..search import (
     Response,
 )
 from ..terms import Shape, shapes, Term, terms_of, Where
-from ._visited import Visited, visited
+from ._visited_states import visited_states, VisitedStates
 
 
 # A standard error that may be zero is at least this
@@ -113,7 +113,7 @@ def structures(
     are no verdicts, the periodogram of what is left, whether there is a drive, the
     constants of forms, the unit of the motion, and the policy.
     """
-    problem, seen = found.problem, visited(found.problem)
+    problem, seen = found.problem, visited_states(found.problem)
     more: tuple[Term, ...] = (
         *unlisted,
         *(
@@ -176,7 +176,7 @@ def _shape(
     score,
     free,
     own,
-    seen: Visited,
+    seen: VisitedStates,
     policy: Policy,
 ) -> dict[str, Any]:
     """What a shape looks like, once it is fitted."""
@@ -202,7 +202,7 @@ def _threshold(
 
 
 def _function(
-    term: Shape, coefficients, covariance, scale, seen: Visited, policy: Policy
+    term: Shape, coefficients, covariance, scale, seen: VisitedStates, policy: Policy
 ) -> dict[str, Any]:
     """The function where there are data; elsewhere its polynomials mean nothing."""
     grid = np.linspace(*term.ends, policy.shape_points)

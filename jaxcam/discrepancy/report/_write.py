@@ -13,7 +13,7 @@ from ..evidence import (
     rms_of,
     Shares,
     shares,
-    visited,
+    visited_states,
 )
 from ..policy import Policy
 from ..search import Missing, Question, Trials
@@ -123,7 +123,7 @@ def _of_functions(
 ) -> Diagnosis:
     """The diagnosis where functions without a name were found."""
     policy, held, found = trials.policy, choice.held, missing.fit
-    positions, velocities, _, _ = visited(question.problem).ranges(policy)
+    positions, velocities, _, _ = visited_states(question.problem).ranges(policy)
     functions = missing_functions(missing, velocities, positions, policy.shape_points)
     bare = choice.before
     divided = shares(bare.fit, found, needs.lost, 0.0, policy)

@@ -14,7 +14,7 @@ from ..terms import Variable
 _SLOWEST = 1e-3
 
 
-class Visited(NamedTuple):
+class VisitedStates(NamedTuple):
     """Values that the recordings show of each variable, and how long they are (s).
 
     Positions are those of the state: offset and gain of the sensor are taken out.
@@ -61,7 +61,7 @@ class Visited(NamedTuple):
         return count >= enough
 
 
-def visited(problem: Problem) -> Visited:
+def visited_states(problem: Problem) -> VisitedStates:
     """Where the recordings of a problem have been."""
     states = np.asarray(problem.start.states)[np.asarray(problem.pieces.exists)]
     place, rate = problem.model.system.coordinates[0]  # pyright: ignore
@@ -73,7 +73,7 @@ def visited(problem: Problem) -> Visited:
         seen = np.concatenate([p.recording[channels[0]] for p in problem.segments])
         position = (seen - float(sensor.offset)) / float(sensor.gain)
     speeds = np.concatenate([part.impacts.approach for part in problem.segments])
-    return Visited(
+    return VisitedStates(
         position[np.isfinite(position)],
         states[:, rate],
         speeds[np.isfinite(speeds) & (speeds > 0)],
