@@ -106,6 +106,8 @@ def _sines_of(family: Family, primitive: Primitive, starts, count: int) -> np.nd
     direction = np.tanh(along / family.slip) if family.jumps else np.zeros(_GRID)
     place = free_term(family, "form").place(along[None])
     numbers = [np.ones((len(starts), 1)), *starts.T[:, :, None]]
-    values = primitive.value(place, [jnp.asarray(one) for one in numbers], direction)
+    values = primitive.value(
+        place, [jnp.asarray(one) for one in numbers], direction[None]
+    )
     values = np.broadcast_to(np.asarray(values), (len(starts), _GRID))
     return np.linalg.lstsq(basis, values.T, rcond=1e-6)[0].T
