@@ -1,6 +1,6 @@
 """The score of the sealed cases: the verdicts of docs/sealed against the keys.
 
-The keys were published after the verdicts, with the SHA-256 that had been announced; the
+The keys were published after the verdicts, with the SHA-256 announced before; the
 script refuses any other file. Prints a line of a table a case, and the score.
 
     python -m benchmarks.sealed KEYS.json [--verdicts docs/sealed/verdicts.json]
@@ -83,7 +83,9 @@ def line(case: str, truth: dict, verdict: dict) -> str:
         for p, true, value, stderr in strengths(truth, verdict)
     )
     mark = "yes" if right(truth, verdict) else "**no**"
-    return f"| {case} | {', '.join(truth) or 'nothing'} | {named} | {numbers} | {mark} |"
+    return (
+        f"| {case} | {', '.join(truth) or 'nothing'} | {named} | {numbers} | {mark} |"
+    )
 
 
 def main(arguments: argparse.Namespace) -> None:

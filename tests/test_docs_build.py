@@ -25,7 +25,7 @@ def _build(text: str, folder: Path) -> subprocess.CompletedProcess:
         if line.startswith("mkdocs build")
     ]
     settings = (ROOT / "mkdocs.yml").read_text("utf-8")
-    before, rest = settings.split("nav:\n")
+    before, rest = settings.split("\nnav:\n")
     after = rest[rest.index("markdown_extensions:") :]
     (folder / "docs").mkdir()
     (folder / "docs" / "index.md").write_text(text, "utf-8")
@@ -45,6 +45,8 @@ def _build(text: str, folder: Path) -> subprocess.CompletedProcess:
         ("See [`nothing.there`][].", False),
         ("See [a page](absent.md).", False),
         ("See [a place](#absent).", False),
+        ("See [a place](/absent/).", False),
+        ('--8<-- "absent.md"', False),
     ],
 )
 def test_a_broken_reference_fails_the_build(text, builds, tmp_path):

@@ -56,7 +56,7 @@ def _options(
     ] = False,
 ) -> None:
     """
-    Motion of mechanical systems that fly, hit and stick.
+    Simulate, continue, fit and diagnose vibro-impact systems.
 
     \b
     Examples:

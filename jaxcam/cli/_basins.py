@@ -29,12 +29,12 @@ def basins(
     json_file: JsonFile = None,
     out: Annotated[
         Path | None,
-        typer.Option(metavar="DIR", help="Write the basins and their picture there."),
+        typer.Option(metavar="DIR", help="Write the basins and their figure there."),
     ] = None,
     resume: Resume = False,
 ) -> None:
     """
-    Find the attractors, and which initial states end on each.
+    Find attractors and their basins on a grid of initial states.
 
     \b
     Examples:

@@ -21,26 +21,25 @@ class Cells:
     """The grid of initial states, and how long each is followed."""
 
     low: Annotated[
-        str | None, typer.Option(metavar="A,B", help="Lowest state of the grid.")
+        str | None, typer.Option(metavar="A,B", help="Lower corner of the grid.")
     ] = None
     high: Annotated[
-        str | None, typer.Option(metavar="A,B", help="Highest state of the grid.")
+        str | None, typer.Option(metavar="A,B", help="Upper corner of the grid.")
     ] = None
     shape: Annotated[
         str, typer.Option(metavar="K,L", help="Cells along each component.")
     ] = "128,128"
     turns: Annotated[
-        int, typer.Option(metavar="N", help="Forcing periods of each motion.")
+        int, typer.Option(metavar="N", help="Forcing periods per run.")
     ] = 100
     keep: Annotated[
-        int, typer.Option(metavar="N", help="Of these, the last N are compared.")
+        int, typer.Option(metavar="N", help="Periods at the end that are compared.")
     ] = 24
     reruns: Annotated[
         int,
         typer.Option(
             metavar="N",
-            help="How often motions that do not repeat yet go on, each time for twice "
-            "as many turns.",
+            help="Extensions of non-periodic runs, each to twice as many periods.",
         ),
     ] = 1
 

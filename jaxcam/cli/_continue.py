@@ -33,7 +33,7 @@ def continue_(
     resume: Resume = False,
 ) -> None:
     """
-    Follow a periodic orbit in a parameter; list its bifurcations.
+    Continue a periodic orbit over a parameter; list its bifurcations.
 
     \b
     Examples:

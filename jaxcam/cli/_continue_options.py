@@ -27,8 +27,7 @@ class BranchRange:
         str,
         typer.Option(
             metavar="NAME",
-            help="The parameter that varies, such as speed or wall or "
-            "profile.eccentricity.",
+            help="Continuation parameter, such as speed, wall or profile.eccentricity.",
         ),
     ] = "speed"
     low: Lowest = None
@@ -36,7 +35,7 @@ class BranchRange:
     at: Annotated[
         float | None,
         typer.Option(
-            metavar="P", help="Its value at the start; without, that of the system."
+            metavar="P", help="Its value at the start; default: the system's."
         ),
     ] = None
 
@@ -81,7 +80,7 @@ class Following:
         str | None,
         typer.Option(
             metavar="A,B",
-            help="A guess of the orbit's state at time zero, such as 0.3,0. Without: "
+            help="Guess of the orbit's state at time zero, such as 0.3,0. Default: "
             "the orbit that the motion settles on.",
         ),
     ] = None
@@ -96,7 +95,8 @@ class Following:
         str, typer.Option(metavar="NAME", help=f"One of {', '.join(ALGORITHMS)}.")
     ] = "pseudo-arclength"
     max_points: Annotated[
-        int, typer.Option(metavar="N", help="Points in each direction.")
+        int,
+        typer.Option(metavar="N", help="Maximum number of points in each direction."),
     ] = 300
 
     def check(self) -> None:

@@ -1,4 +1,4 @@
-"""`jaxcam demo`: recordings of a rig beside its simulation, and what that lacks."""
+"""`jaxcam demo`: recordings of a rig compared with its model, and a diagnosis."""
 
 import dataclasses
 from pathlib import Path
@@ -12,15 +12,16 @@ from ._options import JsonFile
 def demo(
     case: Annotated[
         Path | None,
-        typer.Option(metavar="DIR", help="A folder of recordings, one CSV a run."),
+        typer.Option(metavar="DIR", help="A folder of recordings, one CSV per run."),
     ] = None,
     rig: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="The rig; DIR/rig.toml without.")
+        Path | None,
+        typer.Option(metavar="FILE", help="The rig file; default DIR/rig.toml."),
     ] = None,
     gaps: Annotated[
         str,
         typer.Option(
-            metavar="NAME", help="Runs with samples missing: refuse them, or split."
+            metavar="NAME", help="Runs with missing samples: refuse or split."
         ),
     ] = "refuse",
     out: Annotated[
@@ -29,18 +30,18 @@ def demo(
     json_file: JsonFile = None,
     diagnose: Annotated[
         bool,
-        typer.Option(help="Say what the model lacks; takes a minute or two at first."),
+        typer.Option(help="Diagnose the model; takes a minute or two at first."),
     ] = True,
     branches: Annotated[
         bool, typer.Option(help="Follow two branches of orbits of the thesis' rig.")
     ] = True,
 ) -> None:
     """
-    Follow orbits of a rig; compare recordings with its simulation; say what it lacks.
+    Compare recordings with a model, diagnose it, and continue two orbits.
 
-    Without --case, a small recording that ships with the package. The report is
-    DIR/index.html, with the figures in it, and DIR/result.json; what the model lacks is
-    in DIR/diagnosis.
+    By default the simulated recordings that ship with the package. The report is
+    DIR/index.html, with the figures in it, and DIR/result.json; the diagnosis is in
+    DIR/diagnosis.
 
     \b
     Examples:
@@ -80,7 +81,9 @@ def demo(
             lacks = _diagnosed(out / "diagnosis", nominal, found, report)
         if branches:
             report("following branches of orbits", None)
-        found = dataclasses.replace(found, lacks=lacks, branches=followed())
+        found = dataclasses.replace(
+            found, lacks=lacks, branches=followed(), simulated=case is None
+        )
     result = write_result(out, found)
     print_result(output, found)
     output.print(f"Report: {out / 'index.html'}")

@@ -17,7 +17,7 @@ from ._rests import rest_table, Rests, rests, simulate_run
 
 @dataclasses.dataclass(frozen=True)
 class DemoResult:
-    """Recordings beside the simulation of their rig, and what that lacks."""
+    """Recordings compared with their rig's model, and the diagnosis."""
 
     case: str
     segments: Sequence[Segments]
@@ -26,6 +26,11 @@ class DemoResult:
     figures: list[tuple[Path, str]]
     lacks: Diagnosis | None = None
     branches: Branches | None = None
+    simulated: bool = False
+
+    def kind(self) -> str:
+        """Recordings, and whether they were measured."""
+        return "simulated recordings" if self.simulated else "recordings"
 
 
 def compared(runs, nominal: Rig, folder: Path, report) -> DemoResult:
@@ -66,7 +71,7 @@ def write_result(folder: Path, found: DemoResult) -> dict[str, Any]:
         "diagnosis": None if lacks is None else lacks.to_json(),
     }
     report = Report(
-        title=f"{found.case}: recordings, simulation, and what lies between",
+        title=f"{found.case}: {found.kind()} compared with the model",
         sentence=found.comparison.sentence(),
         lacks=None if lacks is None else lacks.summary,
         branches=branches,
@@ -83,6 +88,8 @@ def write_result(folder: Path, found: DemoResult) -> dict[str, Any]:
 
 def print_result(output: Output, found: DemoResult) -> None:
     """Tables and sentences for the terminal."""
+    if found.simulated:
+        output.print("The recordings that ship with the package are simulated.")
     for run in found.segments:
         output.print(run.sentence())
     output.print(found.comparison.table())
@@ -105,12 +112,12 @@ def _next_steps(found) -> list[tuple[str, str]]:
         ),
         (
             f"jaxcam simulate cam-follower --speed {rpm:.1f} --set restitution.r=0.5",
-            "The same with another restitution.",
+            "The same with another coefficient of restitution.",
         ),
         (
             "jaxcam simulate --system DIR/diagnosis/model.json --speed 140",
-            "The motion of the rig with what its model lacked; DIR is the folder of "
-            "this page.",
+            "The motion of the rig with the missing physics added; DIR is the folder "
+            "of this page.",
         ),
         (
             "jaxcam continue --preset calibrated --from 130 --to 154 --at 145 "
@@ -118,8 +125,22 @@ def _next_steps(found) -> list[tuple[str, str]]:
             "The branch P(1,1) of this page, with all its points.",
         ),
         (
+            "jaxcam new-rig cart",
+            "A system of your own: edit cart.py, which has its equations, and "
+            "cart.toml, which says what is known and measured.",
+        ),
+        (
+            "jaxcam diagram --system cart.py:Cart --parameter NAME --from A --to B",
+            "A bifurcation diagram of it, once it has a forcing period.",
+        ),
+        (
+            "jaxcam diagnose CASE --rig cart.toml --out ./report",
+            "A recording of your own: CASE is a folder with one CSV file per run, "
+            "whose columns are time_s and the channels of cart.toml.",
+        ),
+        (
             "jaxcam demo --case DIR --rig DIR/rig.toml",
-            "Recordings of your own: a folder DIR of CSV files with the columns "
-            "time_s, cam_angle_rad and follower_angle_rad, and a file with the rig.",
+            "A cam-follower of your own: the columns are time_s, cam_angle_rad and "
+            "follower_angle_rad.",
         ),
     ]

@@ -1,4 +1,4 @@
-"""`jaxcam diagnose`: what physics a rig's model leaves out, from its recordings."""
+"""`jaxcam diagnose`: the physics that a model lacks, from recordings."""
 
 import dataclasses
 from pathlib import Path
@@ -17,15 +17,15 @@ def diagnose(
     rig: RigFile = None,
     system: OwnSystem = None,
     files: Files = Files(),
-    seed: Annotated[int, typer.Option(help="Of the redrawn stretches.")] = 0,
+    seed: Annotated[int, typer.Option(help="Block-bootstrap seed.")] = 0,
     predict: Annotated[
         bool,
         typer.Option(
-            help="Speeds at which the motion changes, with and without what was found."
+            help="Predict bifurcation speeds, with and without the missing physics."
         ),
     ] = True,
     propose: Annotated[
-        bool, typer.Option("--next", help="Which record to make next, by its speed.")
+        bool, typer.Option("--next", help="Recommend the next test speed.")
     ] = False,
     resume: Resume = False,
     json_file: Annotated[
@@ -40,9 +40,9 @@ def diagnose(
     ] = None,
 ) -> None:
     """
-    Say what physics the model of a rig leaves out.
+    Find out from recordings which physics a model lacks.
 
-    Of a cam-follower, or of any system in a Python file; see jaxcam new-rig.
+    For a cam-follower, or for any system in a Python file; see jaxcam new-rig.
 
     \b
     Examples:

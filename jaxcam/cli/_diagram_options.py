@@ -22,32 +22,32 @@ class Sweep:
     parameter: Annotated[
         str,
         typer.Option(
-            metavar="NAME", help="The parameter that varies, such as speed or omega."
+            metavar="NAME", help="Bifurcation parameter, such as speed or omega."
         ),
     ] = "speed"
     low: Lowest = None
     high: Highest = None
-    points: Annotated[int, typer.Option(metavar="N", help="How many values.")] = 200
+    points: Annotated[int, typer.Option(metavar="N", help="Number of values.")] = 200
     turns: Annotated[
         int, typer.Option(metavar="N", help="Forcing periods at each value.")
     ] = 300
     keep: Annotated[
-        int, typer.Option(metavar="N", help="Of these, the last N are drawn.")
+        int, typer.Option(metavar="N", help="Periods at the end that are drawn.")
     ] = 100
     direction: Annotated[
         str,
         typer.Option(
             metavar="NAME",
-            help="up, down or both ways with the state carried on, or each value from "
-            "the same start.",
+            help="up, down or both, each from the last final state; or each value "
+            "from the same start.",
         ),
     ] = "both"
     dwell: Annotated[
         str | None,
         typer.Option(
             metavar="A,B",
-            help="Seconds to wait and to store at each value, as a rig is driven, in "
-            "place of --turns and --keep.",
+            help="Seconds to wait and to store at each value, as in an experiment; "
+            "instead of --turns and --keep.",
         ),
     ] = None
     section: Annotated[
@@ -92,23 +92,23 @@ class Starts:
 
     state: Annotated[
         str | None,
-        typer.Option(metavar="A,B", help="Start; without, in contact at rest."),
+        typer.Option(metavar="A,B", help="Initial state; default: at rest in contact."),
     ] = None
     starts: Annotated[
         int | None,
         typer.Option(
-            metavar="N", help="Or N random starts of each value, between --low, --high."
+            metavar="N", help="Or N random starts per value, from --low to --high."
         ),
     ] = None
     corner: Annotated[
         str | None,
-        typer.Option("--low", metavar="A,B", help="Lowest state of random starts."),
+        typer.Option("--low", metavar="A,B", help="Lower corner of random starts."),
     ] = None
     opposite: Annotated[
         str | None,
-        typer.Option("--high", metavar="A,B", help="Highest state of random starts."),
+        typer.Option("--high", metavar="A,B", help="Upper corner of random starts."),
     ] = None
-    seed: Annotated[int, typer.Option(metavar="N", help="Of random starts.")] = 0
+    seed: Annotated[int, typer.Option(metavar="N", help="Seed of random starts.")] = 0
 
     def check(self, sweep: Sweep) -> None:
         """

@@ -19,17 +19,19 @@ class Files:
         str | None,
         typer.Option(
             metavar="NAMES",
-            help="Names of the columns in their order, - for one that is not read "
+            help="Names of all columns in order, - to skip one "
             "(time_s,-,angle_rad), or pairs (Angle=angle_deg,Y1=height_m*-8e-4).",
         ),
     ] = None
     rate: Annotated[
         float | None,
-        typer.Option(metavar="HZ", help="Samples a second, of files without a time."),
+        typer.Option(metavar="HZ", help="Samples per second, for files without time."),
     ] = None
     split: Annotated[
         str | None,
-        typer.Option(metavar="COLUMN", help="It numbers the runs in one file."),
+        typer.Option(
+            metavar="COLUMN", help="The column that numbers the runs in a file."
+        ),
     ] = None
 
     def check(self) -> None:

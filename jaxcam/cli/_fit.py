@@ -19,7 +19,7 @@ def fit(
     bootstrap: Annotated[
         int,
         typer.Option(
-            metavar="N", help="Weight the flights at random N times for another error."
+            metavar="N", help="Weight flights at random N times, for other errors."
         ),
     ] = 0,
     json_file: Annotated[
@@ -27,7 +27,7 @@ def fit(
         typer.Option(
             "--json",
             metavar="FILE",
-            help="Write the fitted system and its errors, for --system; - prints it.",
+            help="Write the fitted system and its errors, for --system; - to print.",
         ),
     ] = None,
     out: Annotated[
@@ -35,10 +35,10 @@ def fit(
     ] = None,
 ) -> None:
     """
-    Fit the parameters of a rig to recordings of it.
+    Fit the parameters of a rig to recordings.
 
-    Of a cam-follower, or of any system in a Python file; see jaxcam new-rig. A file
-    with one impact a row, before_m_s and after_m_s, gives a law of restitution.
+    For a cam-follower, or for any system in a Python file; see jaxcam new-rig. A file
+    with one impact per row, before_m_s and after_m_s, gives a restitution law.
 
     \b
     Examples:

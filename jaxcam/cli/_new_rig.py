@@ -18,11 +18,11 @@ _FILE, _CLASS = "cart", "Cart"
 
 def new_rig(
     name: Annotated[
-        Path, typer.Argument(metavar="NAME", help="Of the files NAME.py and NAME.toml.")
+        Path, typer.Argument(metavar="NAME", help="Writes NAME.py and NAME.toml.")
     ],
 ) -> None:
     """
-    Write an example of a rig of your own: a system in Python, and what is known of it.
+    Write an example to edit: a system in Python and its rig file.
 
     \b
     Examples:
@@ -44,7 +44,7 @@ def new_rig(
         text = text.replace(f"{_FILE}.", f"{name.name}.")
         write_text(file, re.sub(rf"\b{_CLASS}\b", _class_name(name.name), text))
     code, rig = (shlex.quote(str(file)) for file in files)
-    typer.echo(f"Written: {code}, the system, and {rig}, what is known of it.")
+    typer.echo(f"Written: {code}, the system, and {rig}, its rig file. Edit both.")
     typer.echo(f"Try it: jaxcam simulate --rig {rig} --state 0,0.8 --t1 3")
     typer.echo(
         f"With a folder of recordings: jaxcam fit CASE --rig {rig}, then jaxcam "

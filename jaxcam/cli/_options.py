@@ -22,7 +22,7 @@ SavedSystem: TypeAlias = Annotated[
     typer.Option(
         "--system",
         metavar="FILE",
-        help="A system that `jaxcam fit` or `diagnose` wrote, or FILE.py:CLASS.",
+        help="A system written by `jaxcam fit` or `diagnose`, or FILE.py:CLASS.",
     ),
 ]
 Preset: TypeAlias = Annotated[
@@ -42,11 +42,15 @@ Speed: TypeAlias = Annotated[
 ]
 Lowest: TypeAlias = Annotated[
     float | None,
-    typer.Option("--from", metavar="A", help="Its lowest value (rpm for speed)."),
+    typer.Option(
+        "--from", metavar="A", help="Lower bound of the parameter (rpm for speed)."
+    ),
 ]
 Highest: TypeAlias = Annotated[
     float | None,
-    typer.Option("--to", metavar="B", help="Its highest value (rpm for speed)."),
+    typer.Option(
+        "--to", metavar="B", help="Upper bound of the parameter (rpm for speed)."
+    ),
 ]
 Workers: TypeAlias = Annotated[
     int | None, typer.Option(metavar="N", help="Threads, or local processes.")
@@ -62,31 +66,32 @@ JsonFile: TypeAlias = Annotated[
     typer.Option("--json", metavar="FILE", help="Write the result; - to print it."),
 ]
 Resume: TypeAlias = Annotated[
-    bool, typer.Option("--resume", help="Go on with what a stopped run left in DIR.")
+    bool, typer.Option("--resume", help="Continue what a stopped run left in DIR.")
 ]
 Case: TypeAlias = Annotated[
     Path,
     typer.Argument(
         metavar="CASE",
-        help="A folder of recordings of one rig, or one file; demo: the shipped one.",
+        help="A folder of recordings, or one file; demo: the simulated ones shipped.",
         callback=_shipped,
     ),
 ]
 RigFile: TypeAlias = Annotated[
-    Path | None, typer.Option(metavar="FILE", help="The rig; CASE/rig.toml without.")
+    Path | None,
+    typer.Option(metavar="FILE", help="The rig file; default CASE/rig.toml."),
 ]
 OwnSystem: TypeAlias = Annotated[
     str | None,
     typer.Option(
         "--system",
         metavar="FILE.py:CLASS",
-        help="A system of your own; without, that of the rig file.",
+        help="A system of your own; default: that of the rig file.",
     ),
 ]
 Gaps: TypeAlias = Annotated[
     str,
     typer.Option(
         metavar="NAME",
-        help="Faulty runs: mend them (dropped samples, slips), refuse, or split.",
+        help="Faulty runs: mend (dropped samples, slips), refuse or split.",
     ),
 ]

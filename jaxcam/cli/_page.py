@@ -84,30 +84,28 @@ def page(report: Report) -> str:
     parts = [
         f"<h1>{escape(report.title)}</h1>",
         *_lacks(report.lacks),
-        "<h2>Recording beside simulation</h2>",
+        "<h2>Recording and simulation</h2>",
         # one idea a line is easier to take in than a paragraph of numbers
         *(f'<p class="sentence">{escape(s)}</p>' for s in sentences(report.sentence)),
         *_branches(report.branches),
         "<h2>Residuals by mode</h2>",
         table_html(_MODES, [_cells(row) for row in report.comparison], text=(0, 6)),
-        '<p class="note">Each flight is started where the recording says it started, '
-        "so that what is left over is what the model lacks in that mode. The ratio is "
-        "what is left in units of the noise of the sensors: 1 where nothing is "
-        "missing.</p>",
-        "<h2>Rests of the follower on the cam</h2>",
+        '<p class="note">Each flight starts from its measured initial state, so the '
+        "residual shows what the model lacks in that mode. The ratio is the residual "
+        "in units of the sensor noise: 1 where nothing is missing.</p>",
+        "<h2>Contact intervals</h2>",
         table_html(
             HEADINGS, [row for one in report.rests for row in rest_rows(one)], (0, 1)
         ),
         '<p class="note">Simulated: the rig as its file states it, at the mean speed '
-        "of the run, in its own motion after twenty turns. Angles are those of the "
-        "cam in its turn; ± is the spread from rest to rest. Where the two have "
-        "nothing in common, the rig may follow another motion that exists at the same "
-        "speed.</p>",
+        "of the run, after twenty cycles. Angles are cam angles; ± is the spread "
+        "between contacts. If the two differ entirely, the rig may follow another "
+        "attractor that coexists at the same speed.</p>",
         "<h2>Figures</h2>",
         *(figure_html(file, caption) for file, caption in report.figures),
         "<h2>The runs</h2>",
         f"<ul>{''.join(f'<li>{escape(run)}</li>' for run in report.runs)}</ul>",
-        "<h2>To go on from here</h2>",
+        "<h2>Next: your own system, your own recording</h2>",
         *(
             f'<pre>{escape(command)}</pre><p class="note">{escape(purpose)}</p>'
             for command, purpose in report.next_steps

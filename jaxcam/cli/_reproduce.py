@@ -21,7 +21,7 @@ def reproduce(
         str | None,
         typer.Argument(
             metavar="[TARGET]",
-            help="Such as table-5.2 or figure-4.5; all of them without, or with all.",
+            help="Such as table-5.2 or figure-4.5; default: all.",
         ),
     ] = None,
     preset: Annotated[
@@ -31,24 +31,24 @@ def reproduce(
         str,
         typer.Option(
             metavar="NAME",
-            help="full for diagrams and basins as fine as published ones; or default.",
+            help="full: diagrams and basins as fine as published; or default.",
         ),
     ] = _SIZES[0],
     list_: Annotated[
-        bool, typer.Option("--list", help="Say what there is, and compute nothing.")
+        bool, typer.Option("--list", help="List the targets and compute nothing.")
     ] = False,
     json_file: JsonFile = None,
     out: Annotated[
         Path | None,
         typer.Option(
             metavar="DIR",
-            help="Write numbers and figures there; of all targets, a page as well.",
+            help="Write numbers and figures there; for all targets also a page.",
         ),
     ] = None,
     resume: Resume = False,
 ) -> None:
     """
-    Compute what the thesis prints; show both and the difference.
+    Reproduce tables and figures of the thesis; show printed and computed values.
 
     \b
     Examples:

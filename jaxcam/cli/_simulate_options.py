@@ -17,26 +17,24 @@ class RunOptions:
         str | None,
         typer.Option(
             metavar="A,B",
-            help="Start, such as 0.3,0, or the word release for the release point of "
-            "a sticking orbit. Without: release; 1,0 for the ball; 0,0.1,-2 for the "
+            help="Initial state, such as 0.3,0, or release for the release point of a "
+            "sticking orbit. Default: release; 1,0 for the ball; 0,0.1,-2 for the "
             "triple integrator.",
         ),
     ] = None
-    t0: Annotated[float, typer.Option(metavar="S", help="Start of the motion (s).")] = (
-        0.0
+    t0: Annotated[float, typer.Option(metavar="S", help="Initial time (s).")] = 0.0
+    t1: Annotated[float | None, typer.Option(metavar="S", help="Final time (s).")] = (
+        None
     )
-    t1: Annotated[
-        float | None, typer.Option(metavar="S", help="End of the motion (s).")
-    ] = None
     turns: Annotated[
         float | None,
         typer.Option(
             metavar="N",
-            help="Or its length in periods of the forcing (turns of the cam): 10.",
+            help="Or the length in forcing periods (cam cycles); default 10.",
         ),
     ] = None
     tolerance: Annotated[
-        float, typer.Option(metavar="E", help="Error allowed in a step.")
+        float, typer.Option(metavar="E", help="Error allowed per step.")
     ] = 1e-10
     solver: Annotated[
         str, typer.Option(metavar="NAME", help=f"One of {', '.join(SOLVERS)}.")
@@ -45,7 +43,7 @@ class RunOptions:
         str | None,
         typer.Option(
             metavar="NAME",
-            help="loop, or diffeqsolve: one call a flight, also for implicit solvers.",
+            help="loop, or diffeqsolve (one call per flight; implicit solvers too).",
         ),
     ] = None
 

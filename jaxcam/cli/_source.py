@@ -20,7 +20,7 @@ class Source:
     rig: Annotated[
         Path | None,
         typer.Option(
-            metavar="FILE", help="Its nominal values: a rig file, as of jaxcam new-rig."
+            metavar="FILE", help="Rig file with nominal values; see jaxcam new-rig."
         ),
     ] = None
 

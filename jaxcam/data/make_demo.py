@@ -1,4 +1,6 @@
-"""Make the recordings of the demonstration rig: `python -m jaxcam.data.make_demo`.
+"""Make the simulated recordings of the demonstration rig.
+
+    python -m jaxcam.data.make_demo
 
 The rig is simulated here with a scalar Runge-Kutta loop that shares nothing with
 `jaxcam.hybrid`, so that comparing the two means something. It has a viscous hinge,

@@ -1,7 +1,7 @@
 """Make `pendulum/*.csv.gz`: `python -m jaxcam.data.make_pendulum FOLDER`.
 
 `FOLDER` holds `swing_large.csv.gz` and `swing_small.csv.gz`, two swings of the public
-recordings that `pendulum/SOURCE.md` names, at 1 kHz. Every tenth sample is kept, and the
+recordings that `pendulum/SOURCE.md` names, at 1 kHz. Every tenth sample is kept. The
 end of a swing, where the pendulum hangs still, is cut off.
 """
 
