@@ -8,7 +8,7 @@ from jaxtyping import Array, Float
 
 
 class FilippovSystem(eqx.Module):
-    """A system whose vector field jumps across a surface. (2.19)
+    """A system whose vector field jumps across a surface (thesis, eq. 2.19).
 
     Subclass it and state the three methods below, smooth in time and state, also beyond
     the surface. Every floating-point field is a parameter. The state itself never

@@ -10,7 +10,9 @@ from ._system import FilippovSystem
 def surface_rates(
     system: FilippovSystem, t, state: Float[Array, " n"]
 ) -> tuple[Float[Array, ""], Float[Array, ""]]:
-    """Rates of change of H along the fields above and below, time included. (3.9)"""
+    """Rates of change of H along the fields above and below, time included (thesis,
+    eq. 3.9).
+    """
     t = jnp.asarray(t, dtype=float)
 
     def along(field):

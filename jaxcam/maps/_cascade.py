@@ -48,7 +48,7 @@ def superstable(
 
 
 def feigenbaum_ratios(parameters: Float[np.ndarray, " n"]) -> Float[np.ndarray, " m"]:
-    """(m_k - m_(k-1)) / (m_(k+1) - m_k), which tends to 4.669... (2.17)"""
+    """(m_k - m_(k-1)) / (m_(k+1) - m_k), which tends to 4.669.. (thesis, eq. 2.17)."""
     steps = np.diff(parameters)
     return steps[:-1] / steps[1:]
 

@@ -7,7 +7,7 @@ from jaxtyping import Array, Float
 
 
 class LogisticMap(eqx.Module):
-    """x -> mu x (1 - x) on [0, 1], 0 < mu <= 4. (2.8)"""
+    """x -> mu x (1 - x) on [0, 1], 0 < mu <= 4 (thesis, eq. 2.8)."""
 
     mu: jax.Array = eqx.field(
         default=3.3, converter=lambda value: jnp.asarray(value, dtype=float)

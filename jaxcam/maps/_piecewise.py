@@ -1,4 +1,6 @@
-"""Piecewise-smooth maps of one variable, with their border at zero. (2.20)"""
+"""Piecewise-smooth maps of one variable, with their border at zero (thesis,
+eq. 2.20).
+"""
 
 import abc
 

@@ -66,7 +66,9 @@ class CamFollower(AbstractCamDriven):
             )
 
     def vector_field(self, t, state) -> jax.Array:
-        """Velocity and acceleration of the free follower, shape `(2,)`. (4.9)"""
+        """Velocity and acceleration of the free follower, shape `(2,)` (thesis,
+        eq. 4.9).
+        """
         del t
         angle, velocity = state[0], state[1]
         # one sine and one cosine: this is evaluated in every Runge-Kutta stage
@@ -82,7 +84,9 @@ class CamFollower(AbstractCamDriven):
         return state[0] - self.contact_angle(self.cam_angle(t))
 
     def impact(self, t, state) -> jax.Array:
-        """State after an impact: the relative velocity v becomes -r v. (6.111)"""
+        """State after an impact: the relative velocity v becomes -r v (thesis,
+        eq. 6.111).
+        """
         return self.after_impact(t, state)
 
     def cam_angle(self, t) -> jax.Array:
@@ -95,16 +99,21 @@ class CamFollower(AbstractCamDriven):
         return _SENSE[self.rotation] * self.speed
 
     def contact_angle(self, cam_angle) -> jax.Array:
-        """Follower angle (rad) in contact at `cam_angle` (rad), elementwise. (4.23)"""
+        """Follower angle (rad) in contact at `cam_angle` (rad), elementwise (thesis,
+        eq. 4.23).
+        """
         return self.profile(cam_angle)
 
     def potential_energy(self, follower_angle) -> jax.Array:
-        """Energy stored in the spring (J) at `follower_angle` (rad). (4.8)"""
+        """Energy stored in the spring (J) at `follower_angle` (rad) (thesis,
+        eq. 4.8).
+        """
         reach = self._reach(jnp.sin(follower_angle), 1 / jnp.cos(follower_angle))
         return 0.5 * self.stiffness * (reach - self.spring_elongation) ** 2
 
     def load_terms(self, lift, slope, curvature):
-        """Contact torque (N m) at speed w as `a w^2 + b w + c`: a, b and c. (4.10)
+        """Contact torque (N m) at speed w as `a w^2 + b w + c`: a, b and c (thesis,
+        eq. 4.10).
 
         Lift, slope and curvature are the profile's, for each radian of the cam.
         """

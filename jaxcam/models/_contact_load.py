@@ -31,7 +31,8 @@ class FloatSpeed(NamedTuple):
 def contact_load(
     system: CamFollower | ValveTrain, cam_angles: Float[ArrayLike, " angles"]
 ) -> Float[Array, " angles"]:
-    """What the cam must press with for permanent contact, at the system's speed. (4.10)
+    """What the cam must press with for permanent contact, at the system's speed
+    (thesis, eq. 4.10).
 
     A torque (N m) about the hinge of a [`jaxcam.models.CamFollower`][], a force (N) on
     a [`jaxcam.models.ValveTrain`][]. Contact is lost where it would have to be
@@ -53,8 +54,8 @@ def contact_force(
 ) -> Float[Array, " angles"]:
     """The force normal to the contact (N): for a hinged follower, torque over lever.
 
-    The lever is l of (4.19). `center` is the cam's axis (m) from the hinge, known for
-    an eccentric circle.
+    The lever is l of thesis eq. 4.19. `center` is the cam's axis (m) from the hinge,
+    known for an eccentric circle.
 
     Raises:
         ValueError: Where the axis is not known.

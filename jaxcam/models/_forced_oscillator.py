@@ -9,10 +9,10 @@ from ._parameters import parameter
 
 
 class ForcedOscillator(eqx.Module):
-    """`u'' + 2 damping u' + stiffness u = amplitude cos(omega t)`. (2.4)
+    """`u'' + 2 damping u' + stiffness u = amplitude cos(omega t)` (thesis, eq. 2.4).
 
     On the cylinder: the state is (u, u', time in the period), and the last component
-    closes after 2 pi / omega. (The thesis writes cos(x3) in (2.5), which fits
+    closes after 2 pi / omega. (The thesis writes cos(x3) in thesis eq. 2.5, which fits
     omega = 1.)
     """
 
@@ -27,7 +27,7 @@ class ForcedOscillator(eqx.Module):
         return 2 * jnp.pi / self.omega
 
     def vector_field(self, state: Float[Array, " 3"]) -> Float[Array, " 3"]:
-        """Rate of change on the cylinder. (2.5)"""
+        """Rate of change on the cylinder (thesis, eq. 2.5)."""
         u, velocity, time = state
         force = self.amplitude * jnp.cos(self.omega * time)
         acceleration = force - self.stiffness * u - 2 * self.damping * velocity

@@ -14,7 +14,7 @@ _JOINED = 1e-9
 
 
 class PiecewiseLinear(FilippovSystem):
-    """`x' = A- x` where c x <= 0 and `x' = A+ x` where c x >= 0. (2.44)
+    """`x' = A- x` where c x <= 0 and `x' = A+ x` where c x >= 0 (thesis, eq. 2.44).
 
     Where the field is continuous, A+ - A- = k c for some vector k, there is no sliding;
     in general there is.

@@ -10,7 +10,8 @@ from ._parameters import parameter, require_restitution
 
 
 class TripleIntegrator(HybridSystem):
-    """`x' = v`, `v' = a`, `a' = 1` above `x = 0`; state (x, v, a). (6.22)-(6.24)
+    """`x' = v`, `v' = a`, `a' = 1` above `x = 0`; state (x, v, a) (thesis,
+    eqs. 6.22-6.24).
 
     It is what any impacting system looks like close to the release point of a sticking
     orbit, with the jerk there scaled to one: started with a negative acceleration it
@@ -24,17 +25,19 @@ class TripleIntegrator(HybridSystem):
     """Coefficient of restitution, between 0 and 1."""
 
     def vector_field(self, t, state) -> jax.Array:
-        """Velocity, acceleration and the unit jerk, shape `(3,)`. (6.22)"""
+        """Velocity, acceleration and the unit jerk, shape `(3,)` (thesis, eq. 6.22)."""
         del t
         return jnp.stack([state[1], state[2], jnp.ones_like(state[2])])
 
     def gap(self, t, state) -> jax.Array:
-        """Position, a scalar. (6.23)"""
+        """Position, a scalar (thesis, eq. 6.23)."""
         del t
         return state[0]
 
     def impact(self, t, state) -> jax.Array:
-        """State after an impact: the velocity is multiplied by -restitution. (6.24)"""
+        """State after an impact: the velocity is multiplied by -restitution (thesis,
+        eq. 6.24).
+        """
         del t
         return jnp.stack([state[0], -self.restitution * state[1], state[2]])
 

@@ -1,4 +1,4 @@
-"""Backward Euler steps of a relay system. (3.2)-(3.4)"""
+"""Backward Euler steps of a relay system (thesis, eqs. 3.2-3.4)."""
 
 from typing import NamedTuple
 

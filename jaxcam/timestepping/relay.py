@@ -17,7 +17,7 @@ def _matrix(value) -> jax.Array:
 
 
 class RelaySystem(eqx.Module):
-    """x' = A x + B u, y = C x + D u, each u_i the relay of -y_i. (3.1)
+    """x' = A x + B u, y = C x + D u, each u_i the relay of -y_i (thesis, eq. 3.1).
 
     A relay gives 1 for y < 0, -1 for y > 0, and anything between where y = 0, which is
     what sliding needs.
@@ -50,7 +50,7 @@ class RelaySystem(eqx.Module):
 def relay_problem(
     matrix: Float[Array, "m m"], vector: Float[Array, " m"]
 ) -> tuple[Float[Array, " m"], Float[Array, " m"], Pivoting]:
-    """u and y with y = M u + q and each u_i the relay of -y_i. (3.3)
+    """u and y with y = M u + q and each u_i the relay of -y_i (thesis, eq. 3.3).
 
     As a complementarity problem of twice the size, of 1 + u with the positive part of y
     and 1 - u with its negative part. It always has a solution, since u is bounded; only

@@ -57,14 +57,19 @@ def _errors(system, starts, ends, steps: int):
 def seed(
     system: HybridSystem, motion: "Trajectory | Orbit", periods: int
 ) -> tuple[Shooting, Float[np.ndarray, " u"]]:
-    """The equations of the orbit that one turn of a motion shows, and its unknowns.
+    """Return the equations of the orbit that one period of a motion shows, and the
+    unknowns.
 
     Args:
+        system: The system.
         motion: An orbit, or a run over one period of it, near it.
-        periods: The number of forcing periods in it; 0 without forcing.
+        periods: Number of forcing periods in it; 0 without forcing.
+
+    Returns:
+        The equations, and the unknowns, shape `(u,)`.
 
     Raises:
-        ValueError: Where the motion sticks, or hits nothing without forcing.
+        ValueError: The motion sticks, or has no impact and no forcing.
     """
     if int(motion.contacts.count):
         raise ValueError(

@@ -15,7 +15,8 @@ _TAIL = 1e-13
 
 
 class EccentricCircle(CamProfile):
-    """A flat follower, hinged at the origin, on an eccentric circular cam. (4.23)
+    """A flat follower, hinged at the origin, on an eccentric circular cam (thesis,
+    eq. 4.23).
 
     The defaults are Table 4.4.
     """
@@ -48,7 +49,7 @@ class EccentricCircle(CamProfile):
     def prepared(self) -> FourierProfile:
         """The same profile as a Fourier series, differentiable in the geometry.
 
-        The coefficients come from an FFT of (4.23) over one turn.
+        The coefficients come from an FFT of thesis eq. 4.23 over one turn.
 
         Raises:
             ValueError: If the harmonics left out add up to more than 1e-13 rad. Inside
