@@ -41,21 +41,20 @@ def diagram(
     """Compute a bifurcation diagram: settled motions over the values of a parameter.
 
     Args:
-        system: A hybrid system, sampled once per period, or a section: an
-            [`jaxcam.sweeps.ImpactSection`][] gives a diagram of impacts, a
-            [`jaxcam.sweeps.Map`][] one of a map.
+        system: A hybrid system, sampled once per period, or a section such as
+            [`jaxcam.sweeps.ImpactSection`][] or [`jaxcam.sweeps.Map`][].
         where: The parameter: `lambda s: s.speed`, or `"speed"`.
         values: Values of the parameter, shape `(points,)`.
         states: Initial states: `(n,)`; `(starts, n)` for several at each value;
             `(points, starts, n)` for others at each, such as from
             [`jaxcam.sweeps.monte_carlo`][]. Default: in contact at rest.
-        turns: Number of periods simulated, of which the last `keep` are kept.
-        keep: Number of samples kept.
+        turns: Number of periods simulated.
+        keep: Number of last periods that are kept.
         direction: "each" value from the same start; "up", "down" or "both" carry the
             state from one value to the next, which shows hysteresis.
-        dwell: Times (s) to wait and to record at each value, as when a rig is driven up
-            or down; replaces `turns` and `keep`.
-        period_tolerance: Tolerance for detecting periods, up to `keep / 2`.
+        dwell: Times (s) to wait and to record at each value, instead of `turns`,
+            `keep`.
+        period_tolerance: Tolerance for detecting periods.
         out: As for [`jaxcam.sweeps.blocks.run_blocks`][].
         resume: As for [`jaxcam.sweeps.blocks.run_blocks`][].
         executor: As for [`jaxcam.sweeps.blocks.run_blocks`][].

@@ -121,14 +121,12 @@ def find_lobes(
 ) -> Lobes:
     """Measure the stroboscopic map around the interruption and find its lobes.
 
-    A lobe ends where the number of impacts of the period changes, located to rounding
-    (thesis, eq. 5.1).
+    A lobe ends where the number of impacts changes, to rounding (thesis, eq. 5.1).
 
     Args:
         system: As for [`variational.chatter_frame`][], near the interruption.
         state: State at time `phase` x period on the sticking orbit, shape `(2,)`.
-        deviations: Deviations of `component`, shape `(n,)`, across the accumulation
-            point.
+        deviations: Deviations of `component`, `(n,)`, across the accumulation.
         phase: Phase of the section, in periods.
         component: Component of the state that deviates.
         direction: Direction along which the state deviates, shape `(2,)`; default
@@ -146,9 +144,8 @@ def find_lobes(
         >>> from jaxcam.models import ImpactOscillator
         >>> from variational import composed_map, find_lobes
         >>> system = ImpactOscillator(omega=0.6071945, restitution=0.5)
-        >>> state = composed_map(system, "omega", 24, phase=0.35).state
-        >>> deviations = jnp.linspace(-0.1, 0.1, 41)
-        >>> lobes = find_lobes(system, state, deviations, phase=0.35, most=2)
+        >>> state = composed_map(system, "omega", 24, phase=0.3).state
+        >>> lobes = find_lobes(system, state, np.linspace(-0.1, 0.1), phase=0.3, most=2)
         >>> len(lobes.corners)
         3
     """
@@ -281,9 +278,8 @@ def fit_local_map(lobes: Lobes) -> LocalMap:
         >>> from jaxcam.models import ImpactOscillator
         >>> from variational import composed_map, find_lobes, fit_local_map
         >>> system = ImpactOscillator(omega=0.6071945, restitution=0.5)
-        >>> state = composed_map(system, "omega", 24, phase=0.35).state
-        >>> deviations = jnp.linspace(-0.1, 0.1, 41)
-        >>> lobes = find_lobes(system, state, deviations, phase=0.35, most=2)
+        >>> state = composed_map(system, "omega", 24, phase=0.3).state
+        >>> lobes = find_lobes(system, state, np.linspace(-0.1, 0.1), phase=0.3, most=2)
         >>> fit_local_map(lobes).coefficients.ndim
         1
     """
@@ -342,14 +338,11 @@ def iterate_local_map(
         Iterates, shape `(k, keep)`.
 
     Examples:
-        >>> from jaxcam.models import ImpactOscillator
-        >>> import variational
-        >>> system = ImpactOscillator(omega=0.6071945, restitution=0.5)
-        >>> state = variational.composed_map(system, "omega", 24, phase=0.35).state
-        >>> deviations = jnp.linspace(-0.1, 0.1, 41)
-        >>> lobes = variational.find_lobes(system, state, deviations, phase=0.35, most=2)
-        >>> local = variational.fit_local_map(lobes)
-        >>> variational.iterate_local_map(local, jnp.zeros(3), turns=20, keep=5).shape
+        >>> from variational import iterate_local_map
+        >>> from variational.chatter import LocalMap
+        >>> numbers = (-1.0, -1.0, 1.0, 1.0, [0.0, 1.0], 0.5, 1.0, 0.0)
+        >>> local = LocalMap(*map(jnp.asarray, numbers))
+        >>> iterate_local_map(local, jnp.zeros(3), turns=20, keep=5).shape
         (3, 5)
     """
     return _iterate(local, jnp.asarray(shifts, jnp.float64), turns, keep)
