@@ -1,4 +1,4 @@
-"""What a branch consists of."""
+"""Points and branches."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields

@@ -102,7 +102,7 @@ def sensitivity(point: Point, where: Where) -> PyTree:
 
 
 def _position(moving: PyTree, parameters: PyTree, leaf: int) -> int:
-    """Where a leaf of all parameters stands among those that are floats."""
+    """Return the place of a leaf among the leaves that are floats."""
     del moving
     leaves = jax.tree.leaves(parameters)[:leaf]
     return sum(eqx.is_inexact_array(x) for x in leaves)

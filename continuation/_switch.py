@@ -19,7 +19,7 @@ from .special import BRANCH_POINT, FLIP, HOPF, second
 
 
 def emanating(point: Point, where: Where, width: float = 1.0) -> tuple[Start, ...]:
-    """Where to begin the branches that leave a special point, besides its own.
+    """Return the starts of the other branches that leave a special point.
 
     From a branch point: both halves of the other branch, whose direction solves the
     algebraic branching equation (thesis, eq. 3.37). From a flip: the doubled orbit.

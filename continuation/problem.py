@@ -1,4 +1,4 @@
-"""What is followed: a residual, its kind of stability, and what to watch on the way."""
+"""Define a problem: a residual, its kind of stability, and monitors."""
 
 import abc
 from collections.abc import Callable, Mapping

@@ -1,4 +1,4 @@
-"""Which steps are taken, and how long the next one is."""
+"""Accept or refuse steps, and choose the length of the next one."""
 
 import abc
 import enum

@@ -1,4 +1,4 @@
-"""What a Filippov system is: a field on either side of a surface."""
+"""Define a Filippov system: one vector field on either side of a surface."""
 
 import abc
 from typing import Any, ClassVar

@@ -1,4 +1,4 @@
-"""What a simulation of a Filippov system returns."""
+"""The result of a simulation of a Filippov system."""
 
 import equinox as eqx
 import jax

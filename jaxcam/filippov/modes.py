@@ -1,4 +1,4 @@
-"""What happens at the surface: crossing, sliding, and the field in force."""
+"""Classify motion at the surface: crossing, sliding, and the field in force."""
 
 import jax
 import jax.numpy as jnp
@@ -130,7 +130,7 @@ def mode_field(system: FilippovSystem, mode, t, state) -> Float[Array, " n"]:
 
 
 def levels(system: FilippovSystem, mode, t, state) -> Float[Array, " 2"]:
-    """What stays positive in a mode: H on its own side; in sliding, both inward rates.
+    """Return the quantities that stay positive in a mode: H, or both inward rates.
 
     The second level of a side is one, always.
     """

@@ -1,4 +1,4 @@
-"""What an orbit ends in: a cycle, and of which period, or chaos."""
+"""Classify the attractor of an orbit: a cycle, and of which period, or chaos."""
 
 from collections.abc import Callable
 from typing import NamedTuple

@@ -1,4 +1,4 @@
-"""What the cam must press with to hold its follower, and when it no longer can."""
+"""Contact load on a cam, and the speed at which contact is lost."""
 
 from typing import NamedTuple
 

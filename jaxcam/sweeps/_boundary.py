@@ -1,4 +1,4 @@
-"""How mixed basins are, and how rough the boundary between them is."""
+"""Measure the mixing of basins, and the roughness of their boundary."""
 
 from typing import NamedTuple
 

@@ -1,4 +1,4 @@
-"""What a target is: printed values, the computation, the drawing."""
+"""A target: printed values, the computation, the drawing."""
 
 import dataclasses
 from collections.abc import Callable, Iterable

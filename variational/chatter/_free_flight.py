@@ -36,7 +36,7 @@ def flight_rates(system: HybridSystem, time: ArrayLike = 0.0):
 
 
 def on_flight(state, speed, height: ArrayLike = 0.0):
-    """What is integrated: state, normal velocity and gap."""
+    """Return the integrated rates: state, normal velocity and gap."""
     beside = jnp.stack([jnp.asarray(b, jnp.float64) for b in (speed, height)])
     return jnp.concatenate([state, beside])
 

@@ -210,7 +210,7 @@ def find_lobes(
 
 
 def _corners(turn, accumulation, farthest, most: int) -> np.ndarray:
-    """Where the number of impacts of the turn changes, from the farthest inwards."""
+    """Return where the number of impacts of the period changes, farthest first."""
     number = turn(np.array([farthest]))[2][0]
     corners = []
     for k in range(1, most + 2):

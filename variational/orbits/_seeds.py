@@ -26,7 +26,7 @@ _ALLOWED = 1e-12
 
 
 def steps_for(system: HybridSystem, starts, ends) -> int:
-    """How many steps each of these flights needs for an error of about 1e-12.
+    """Return the number of steps of each flight for an error of about 1e-12.
 
     **Arguments:** times and states `(m, 1 + n)` at the starts, times `(m,)` of the
     ends.

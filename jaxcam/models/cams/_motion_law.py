@@ -1,4 +1,4 @@
-"""How a follower moves through one segment of a cam's motion program."""
+"""Laws of motion of one segment of a cam's motion program."""
 
 import math
 from typing import NamedTuple

@@ -1,4 +1,4 @@
-"""Where the blocks of a sweep are kept as they finish, and how they lie there."""
+"""Stores for the blocks of a sweep, and their layout."""
 
 import json
 from collections.abc import Mapping
@@ -52,7 +52,7 @@ class StoreLayout(NamedTuple):
 
 @runtime_checkable
 class Store(Protocol):
-    """What the blocks are put into and read from."""
+    """A store for blocks."""
 
     layout: StoreLayout
 

@@ -1,4 +1,4 @@
-"""What a section sees of many motions."""
+"""Samples of many motions on a section."""
 
 from typing import NamedTuple
 
