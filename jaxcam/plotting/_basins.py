@@ -123,7 +123,7 @@ def _mark(ax: Axes, basins, axes) -> None:
 
 
 def _mark_of(basins, k: int) -> dict:
-    """How the points of attractor `k` look: white shows on every colour."""
+    """Return the marker of attractor `k`: white shows on every colour."""
     # what does not repeat has many points
     irregular = basins.labels[k, 1] == 0
     return {

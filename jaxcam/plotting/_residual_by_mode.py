@@ -1,4 +1,4 @@
-"""What a model leaves over: in flight, in contact and in the impacts."""
+"""Residuals of a model: in flight, in contact and at the impacts."""
 
 from collections.abc import Sequence
 from typing import Literal

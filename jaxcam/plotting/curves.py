@@ -14,7 +14,7 @@ _POINTS_IN_STEP = 4
 
 
 class Curve(NamedTuple):
-    """What is drawn of a trajectory between two times.
+    """The curve of a trajectory between two times.
 
     A row of NaN ends every flight and every contact, so that a line through the rows
     shows no jump; the jumps are apart.
