@@ -17,7 +17,7 @@ _WINDOW = 0.05
 
 @dataclasses.dataclass(frozen=True)
 class Drive:
-    """What a drive did, such as the cam of a cam-follower.
+    """The measured motion of a drive, such as the cam of a cam-follower.
 
     - `angle`: smoothed angle (rad), unwrapped, counted in the sense of turning.
     - `rate`: its rate of change (rad/s).

@@ -108,7 +108,7 @@ class References:
 
 @dataclasses.dataclass(frozen=True)
 class Rig:
-    """What `rig.toml` says, typed and checked; `system` turns it into a model.
+    """The content of `rig.toml`, typed and checked; `system` turns it into a model.
 
     Lengths are m, the inertia kg m^2, the stiffness N/m. Only the ratio of stiffness
     and inertia can be seen in a recording.

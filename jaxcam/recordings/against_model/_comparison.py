@@ -1,4 +1,4 @@
-"""What a comparison of recordings with a model says: by mode, in words and numbers."""
+"""The result of a comparison with a model: by mode, in words and numbers."""
 
 import dataclasses
 import math
@@ -113,7 +113,7 @@ class Comparison:
         return table
 
     def sentence(self) -> str:
-        """What was found, in words."""
+        """Summarise the comparison in words."""
         words = [_words(row) for row in self.rows]
         if not words:
             return "Nothing could be compared: " + " ".join(self.notes)
@@ -154,7 +154,7 @@ def _row(parts: list[Residuals]) -> Row:
 
 
 def _worst(parts: list[Residuals]) -> tuple[str, float, float, float]:
-    """Where the mean of 10 ms of one piece is the most significant."""
+    """Return the piece of 10 ms with the most significant mean."""
     best = ("", float("nan"), float("nan"), 0.0)
     for part in parts:
         scaled = part.value / part.stderr

@@ -12,7 +12,7 @@ from ._surface import Surface
 
 @dataclasses.dataclass(frozen=True)
 class Boundary:
-    """Where one part ends and the next begins.
+    """The boundary between one part and the next.
 
     - `time`, `stderr`: seconds; the error is not a number at the ends of the record.
     - `kind`: `"impact"` (flight to flight), `"several impacts"` (too close together to
@@ -148,7 +148,7 @@ class Segments:
         return rows if self.sure is None else rows & self.sure
 
     def sentence(self) -> str:
-        """What was found, in words."""
+        """Summarise the segments in words."""
         flown = sum(flight.last - flight.first for flight in self.flights)
         rested = sum(contact.last - contact.first for contact in self.contacts)
         total = len(self.recording)

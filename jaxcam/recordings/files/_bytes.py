@@ -17,10 +17,11 @@ _GZIP = b"\x1f\x8b"
 
 
 def read_bytes(file: Path) -> bytes:
-    """What is in a file, not inflated.
+    """Return the content of a file, without decompression.
 
-    **Raises:** `RecordingError` for something other than a file, or a larger one than
-    `LARGEST`; `OSError` where it cannot be read.
+    Raises:
+        RecordingError: For something other than a file, or a larger one than `LARGEST`.
+        OSError: Where it cannot be read.
     """
     if file.is_dir():
         raise RecordingError(

@@ -1,4 +1,4 @@
-"""What is wrong with the numbers of a recording, in one sentence."""
+"""Describe what is wrong with the numbers of a recording, in one sentence."""
 
 import numpy as np
 from jaxtyping import Float, Int

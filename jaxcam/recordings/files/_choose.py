@@ -1,4 +1,4 @@
-"""Which columns of a file are the channels of a recording, in SI units."""
+"""Choose the columns of a file that are channels of a recording, in SI units."""
 
 import dataclasses
 import math
@@ -107,7 +107,7 @@ def require(file: Path, found: Mapping[str, object], needed: Sequence[str]) -> N
 
 
 def _source(file: Path, names: Sequence[str] | None) -> Source:
-    """What is in a file, read according to its ending."""
+    """Return the content of a file, read according to its suffix."""
     name = file.name.lower()
     if name.endswith((".mat", ".parquet")):
         if names is not None:

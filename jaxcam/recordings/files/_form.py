@@ -1,4 +1,4 @@
-"""Where in a text table the names and the numbers stand, and what is between them."""
+"""Find names, numbers and separators in a text table."""
 
 import re
 from collections.abc import Sequence
