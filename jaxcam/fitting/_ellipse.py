@@ -1,4 +1,4 @@
-"""Where several parameters are together: the ellipsoid of their covariance."""
+"""The joint confidence region of parameters: the ellipsoid of their covariance."""
 
 import dataclasses
 from collections.abc import Sequence

@@ -104,7 +104,7 @@ def fit(
 
 
 class _Descent(NamedTuple):
-    """Where an iteration ended, and how."""
+    """The end of an iteration."""
 
     point: Point
     blocks: Blocks
@@ -224,7 +224,7 @@ def held_out_cost(problem: Problem, found: Fit, weights: Weights) -> float:
 
 
 def start_point(problem: Problem, start) -> Point:
-    """Where to begin."""
+    """Return the start of the iteration."""
     if isinstance(start, Fit):
         return start.point
     if isinstance(start, Point):

@@ -1,4 +1,4 @@
-"""What a fit found: estimates, their covariance, and how it ended."""
+"""The result of a fit: estimates, their covariance, and how it ended."""
 
 import dataclasses
 import functools
@@ -52,7 +52,7 @@ class Estimate:
 
 @dataclasses.dataclass(frozen=True)
 class Fit:
-    """What a fit found.
+    """The result of a fit.
 
     - `problem`, `point`: parameters and states at the optimum.
     - `free`: names of the parameters that were free.
@@ -81,7 +81,7 @@ class Fit:
 
     @functools.cached_property
     def reasons(self) -> tuple[Reason, ...]:
-        """Why the fit is not to be trusted; empty where it has converged.
+        """The reasons not to trust the fit; empty where it has converged.
 
         Found from what the fit holds, so that it cannot disagree with it.
         """
@@ -115,7 +115,7 @@ class Fit:
 
     @property
     def message(self) -> str:
-        """How the fit ended, and every reason to doubt it."""
+        """Say how the fit ended, with every reason for doubt."""
         return " ".join(one.sentence for one in self.reasons) or self.ended
 
     def __getitem__(self, name: str) -> Estimate:

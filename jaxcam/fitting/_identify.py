@@ -1,4 +1,4 @@
-"""What the data can and cannot tell of the parameters, before any fit, in words."""
+"""Analyse identifiability before any fit, and describe it in words."""
 
 import dataclasses
 from collections.abc import Iterable
@@ -24,7 +24,7 @@ _MEMBER = 0.15
 
 @dataclasses.dataclass(frozen=True)
 class Identifiability:
-    """Which combinations of parameters the data see, best first.
+    """The combinations of parameters that the data determine, best first.
 
     - `names`: parameters, as in the columns of `directions` `(g, g)`: one combination a
         row, each parameter in units of its scale (its tolerance).
@@ -103,7 +103,7 @@ class Identifiability:
         )
 
     def _relation(self, direction, members) -> str:
-        """What is left of two parameters that are seen only together."""
+        """Describe the relation of two parameters that are only determined together."""
         pair = [self.names.index(name) for name in members]
         if len(pair) != 2 or np.any(self.values[pair] == 0):
             return ""
@@ -118,7 +118,7 @@ class Identifiability:
 def identify(
     problem: Problem, names: Iterable[str] | None = None, at: Fit | None = None
 ) -> Identifiability:
-    """What the recordings can tell of some parameters, without fitting them.
+    """Analyse which parameters the recordings can determine, without fitting them.
 
     The Fisher information at the nominal parameters, the states of all pieces
     eliminated: its large eigenvalues belong to what the data see, its small ones to

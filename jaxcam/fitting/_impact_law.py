@@ -31,7 +31,7 @@ _NOTHING = 1e-4
 
 @dataclasses.dataclass(frozen=True)
 class ImpactLaw:
-    """What a table of impacts says of their restitution.
+    """The restitution law of a table of impacts.
 
     - `laws`: `"constant"`, and the power law as `"falling"` or `"rising"`.
     - `best`: the name of the one that the impacts support.
@@ -176,7 +176,7 @@ def impact_law(table: ImpactTable) -> ImpactLaw:
 
 
 def _weights(table: ImpactTable) -> dict[str, Float[np.ndarray, " k"]]:
-    """What an impact scatters by, but for a factor, by the unit of that."""
+    """Return the relative scatter of an impact, by its unit."""
     if table.approach_stderr is None and table.separation_stderr is None:
         return {table.unit: np.ones(len(table)), "1": table.approach}
     r = float(np.median(table.separation / table.approach))

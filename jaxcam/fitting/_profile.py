@@ -142,7 +142,7 @@ def _require_shared(found: Fit, name: str) -> None:
 
 
 def _known(problem, name: str, values):
-    """What was known of a parameter, as a cost of values of it."""
+    """Return the prior knowledge of a parameter, as a cost of its values."""
     parameter = problem.parameter(name)
     nominal = parameter.nominal
     if nominal is None:

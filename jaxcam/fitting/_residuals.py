@@ -1,4 +1,4 @@
-"""What a fit leaves over: data minus model by record, mode, time and phase."""
+"""Residuals of a fit: data minus model by record, mode, time and phase."""
 
 import dataclasses
 
@@ -48,7 +48,7 @@ class Residuals:
 
 
 def residuals(found: Fit) -> list[Residuals]:
-    """What is left over, for each record and channel, sorted by time.
+    """Return the residuals of each record and channel, sorted by time.
 
     Saturated samples are left out: they say too little.
     """

@@ -58,7 +58,7 @@ def _gradient(layout, pieces, extras, point, where, values):
 
 
 class Trained(NamedTuple):
-    """What `train` found: the part of the model, and the cost before and after."""
+    """The result of `train`: the trained part, and the cost before and after."""
 
     values: Any
     before: float

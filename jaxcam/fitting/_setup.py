@@ -15,7 +15,7 @@ from .engine import Input, Model, Parameter, Problem
 
 @dataclasses.dataclass(frozen=True)
 class Setup:
-    """What a rig file says of a system of one's own; `read_setup` reads it.
+    """A rig file of a system of one's own; `read_setup` reads it.
 
     - `model`: the system at its nominal values, with its sensors and its drive.
     - `parameters`: what is fitted, each within its tolerance.
@@ -37,7 +37,9 @@ class Setup:
 
     @property
     def channels(self) -> tuple[str, ...]:
-        """What a recording must contain, the sensors of the motion first."""
+        """Return the channels that a recording must contain, the motion's sensors
+        first.
+        """
         drive = self.model.drive
         measured = drive.channel if isinstance(drive, Input) else self.drive_channel
         return (*self.model.sensors, *([] if measured is None else [measured]))

@@ -1,4 +1,4 @@
-"""What each piece and joint of one record says, linear about a point."""
+"""Linearise each piece and joint of one record about a point."""
 
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -24,7 +24,8 @@ class Sharpness(NamedTuple):
 
 
 class Extras(NamedTuple):
-    """What else a program needs: reference states of contact and the joints' errors.
+    """Further arguments of a program: reference states of contact and the joints'
+    errors.
 
     `weight` `(r, k)` and `rest_weight` `(r, kc)` of the data of each piece.
     """

@@ -1,4 +1,4 @@
-"""What is fitted: a system, the drive that turns it, and the sensors that watch it."""
+"""The model to fit: a system, its drive, and its sensors."""
 
 from collections.abc import Callable, Mapping
 
@@ -18,24 +18,24 @@ def _number(default: float):
 
 
 class Sensor(eqx.Module):
-    """How one channel of a recording comes out of the state x(t).
+    """A sensor: the map from the state x(t) to one channel of a recording.
 
     The sensor sees `offset + gain * observe(x(t - lag))`, through a first-order filter
     where it has a bandwidth, with white noise, rounded to its resolution and cut off
     at its limit. The likelihood is that of such samples: a rounded one says in which
     interval it was, a saturated one only that it was beyond the limit.
 
-    **Arguments:**
-
-    - `observe`: a component of the state, or a function of the state.
-    - `noise`: standard deviation of the noise, in the units of the channel.
-    - `resolution`: smallest step of the channel; zero for a continuous one.
-    - `limit`: largest magnitude that it can show.
-    - `bandwidth_hz`: of a first-order filter (Hz); infinite for none.
-    - `gain`, `offset`, `lag` (s): parameters that can be fitted like those of the
-        system. The lag must be short beside what the motion takes to change.
-    - `tails`: degrees of freedom of a Student distribution for noise with outliers;
-        infinite for a Gaussian one.
+    Args:
+        observe: A component of the state, or a function of the state.
+        noise: Standard deviation of the noise, in the units of the channel.
+        resolution: Smallest step of the channel; zero for a continuous one.
+        limit: Largest magnitude that it can show.
+        bandwidth_hz: Of a first-order filter (Hz); infinite for none.
+        ?- `gain`, `offset`, : - `gain`, `offset`, `lag` (s): parameters that can be
+            fitted like those of the     system. The lag must be short beside what the
+            motion takes to change.
+        tails: Degrees of freedom of a Student distribution for noise with outliers;
+            infinite for a Gaussian one.
     """
 
     observe: int | Callable[[Array], Array] = eqx.field(static=True)
@@ -66,7 +66,7 @@ class Sensor(eqx.Module):
         return self.bandwidth_hz != float("inf")
 
     def seen(self, state: Float[Array, " n"]) -> Array:
-        """What there is to be seen of a state, before gain and offset."""
+        """Return the measured quantity of a state, before gain and offset."""
         if isinstance(self.observe, int):
             return state[self.observe]
         return jnp.asarray(self.observe(state))

@@ -1,4 +1,4 @@
-"""What is fitted, and what is known of it beforehand."""
+"""A parameter to fit, and its prior knowledge."""
 
 import dataclasses
 import math

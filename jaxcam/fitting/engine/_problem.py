@@ -73,7 +73,7 @@ _STEPS, _MOST_STEPS = 10, 160
 
 
 class Weights(eqx.Module):
-    """How much the data of each piece count: `(r, k)` in flight, `(r, kc)` at rest."""
+    """Weights of the data of each piece: `(r, k)` in flight, `(r, kc)` in contact."""
 
     flown: Float[np.ndarray, "r k"]
     rested: Float[np.ndarray, "r kc"]
@@ -237,7 +237,7 @@ class Problem:
         )
 
     def weighted(self, weights: Weights | None) -> Extras:
-        """What the compiled programs need, with some weights."""
+        """Return the arguments of the compiled programs, with some weights."""
         weights = weights or self.everything()
         return self.extras._replace(
             weight=jnp.asarray(weights.flown), rest_weight=jnp.asarray(weights.rested)

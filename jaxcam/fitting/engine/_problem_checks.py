@@ -1,4 +1,4 @@
-"""What a problem is refused for before anything is fitted, in sentences."""
+"""Refuse an invalid problem before anything is fitted; each message is a sentence."""
 
 import equinox as eqx
 import jax

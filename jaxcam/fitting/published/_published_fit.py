@@ -1,4 +1,4 @@
-"""What a fit to published numbers found, and what it could not see."""
+"""The result of a fit to published numbers, and its undetermined combinations."""
 
 import dataclasses
 from collections.abc import Sequence
