@@ -1,4 +1,4 @@
-"""Which physics would bring the speeds at which a motion changes to those observed.
+"""Find the physics that would move predicted event speeds to the observed ones.
 
 For a rig without recordings whose motion was seen to change at known speeds: each
 term is given the strength, and the rig one parameter beside it, with which the speeds
@@ -104,7 +104,7 @@ class _Goal:
     policy: Policy
 
     def left(self, speeds, pull: float) -> Float[np.ndarray, " m"]:
-        """What is left of each speed and of the parameter, in their errors."""
+        """Return the residuals of the speeds and of the parameter, in their errors."""
         off = ((speeds - self.observed) / self.errors)[np.isfinite(self.observed)]
         return np.append(
             np.where(np.isfinite(off), off, self.policy.absent_errors), pull

@@ -1,4 +1,4 @@
-"""Which record to make next: the one that would say most about what is asked."""
+"""Recommend the next record: the one that is most informative."""
 
 import dataclasses
 import math
@@ -17,7 +17,7 @@ from .terms import Term, WithTerms
 
 @dataclasses.dataclass(frozen=True)
 class Experiment:
-    """What one more record would say.
+    """The expected information of one more record.
 
     - `name`: of the record.
     - `now`, `then`: standard errors of the parameters asked for, without and with it.
@@ -39,20 +39,21 @@ class Experiment:
 def compare_experiments(
     found: Diagnosis, records: Sequence[Segments], asked: Sequence[str] | None = None
 ) -> tuple[Experiment, ...]:
-    """What each of some records would say, the best first, before they are made.
+    """Rank proposed records by their expected information, best first.
 
     From the sensitivities alone: the Fisher information of each record is added to that
     of the records of the diagnosis.
 
-    **Arguments:**
+    Args:
+        records: Simulated with the system that was found (`found.system()`) by
+            [`jaxcam.recordings.record`][], and cut.
+        asked: Names of parameters; by default the strengths of what was named. The
+            terms whose BIC is not much worse stay free beside them, so that the best
+            record also tells them apart. Where nothing was named, all terms, one at a
+            time.
 
-    - `records`: simulated with the system that was found (`found.system()`) by
-        [`jaxcam.recordings.record`][], and cut.
-    - `asked`: names of parameters; by default the strengths of what was named. The
-        terms whose BIC is not much worse stay free beside them, so that the best record
-        also tells them apart. Where nothing was named, all terms, one at a time.
-
-    **Raises:** `ValueError` for a name that is no parameter.
+    Raises:
+        ValueError: For a name that is no parameter.
     """
     fit = found.after
     for name in asked or ():

@@ -1,4 +1,4 @@
-"""What a rig will do, with and without what its model lacked."""
+"""Predict the behaviour of a rig, with and without the missing physics."""
 
 import dataclasses
 

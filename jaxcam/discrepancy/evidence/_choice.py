@@ -12,7 +12,7 @@ from ._structure import ranges_of, Structure, structures
 
 @dataclasses.dataclass(frozen=True)
 class Choice:
-    """What a search ended with, and the evidence for it.
+    """The result of a search, and the evidence for it.
 
     - `found`: the best subset; `best`: the part of it that is named; `before`: none.
     - `inclusion`, `deviation`: of the bootstrap, by term and by parameter.

@@ -1,4 +1,4 @@
-"""What a fit leaves over: shapes that would still gain, and where they live."""
+"""Analyse the residual of a fit: shapes that would still gain, and their location."""
 
 import dataclasses
 import enum
@@ -35,7 +35,7 @@ _SLOWEST = 1e-3
 
 
 class Form(enum.StrEnum):
-    """How a structure is looked for; equal to its name as a string."""
+    """The form in which a structure is sought; equal to its name as a string."""
 
     TERM = "term"
     FUNCTION = "function"
@@ -87,7 +87,7 @@ class Structure:
 
     @property
     def place(self) -> str:
-        """Where the shape is largest in units of its error."""
+        """Return the place at which the shape is largest in units of its error."""
         if not len(self.grid):
             return self.region
         score = np.abs(self.value) / np.maximum(self.stderr, _TINY)
@@ -173,7 +173,7 @@ def structures(
 def _shape(
     term: Term, blocks: Blocks, information, score, free, own, policy: Policy
 ) -> dict[str, Any]:
-    """What a shape looks like, once it is fitted."""
+    """Return a fitted shape as a function."""
     if not isinstance(term, Shape):
         return {}
     both = np.union1d(free, own)

@@ -1,4 +1,4 @@
-"""What was found: the verdict, its evidence, and how it is written down."""
+"""The result of a diagnosis: verdict, evidence, and how it is written."""
 
 import dataclasses
 import enum
@@ -16,7 +16,7 @@ from ._missing import MissingFunction
 
 
 class Verdict(enum.StrEnum):
-    """What a diagnosis says; equal to its name as a string."""
+    """The verdict of a diagnosis; equal to its name as a string."""
 
     EFFECT = "effect"
     NONE = "none"

@@ -139,7 +139,7 @@ class FreeFunction(Term):
         )
 
     def place(self, argument) -> Place:
-        """What a form sees of an argument."""
+        """Return an argument in the scalings that a form uses."""
         width = self.high - self.low
         return Place(argument, (argument - self.low) / width, argument / width)
 
@@ -214,7 +214,7 @@ class FreeRestitution(FreeFunction):
 
 
 class FreeSurface(FreeFunction):
-    """How much higher the surface is."""
+    """A correction to the height of the surface."""
 
     name: ClassVar[str] = "free_surface"
 

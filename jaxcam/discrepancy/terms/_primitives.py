@@ -16,7 +16,7 @@ _EDGE = 0.01
 
 
 class Place(NamedTuple):
-    """Where a form is evaluated.
+    """The arguments at which a form is evaluated.
 
     `x`: the argument; `u`: its share of the range, and `v`: the argument itself in
     ranges.

@@ -22,7 +22,8 @@ _METHODS = {
 
 
 class Motion(NamedTuple):
-    """What a term sees: time (s), position, velocity, the drive, and the whole state.
+    """The motion as a term sees it: time (s), position, velocity, drive and whole
+    state.
 
     `position` and `velocity` are those of the term's `coordinate`. `phase` is the angle
     that the drive has turned (rad), or time itself without a drive; `rate` the drive's
@@ -138,12 +139,14 @@ class Term(eqx.Module):
             cls.where = acts[0]
 
     def acceleration(self, motion: Motion):
-        """What is added to the acceleration in flight."""
+        """Return the acceleration added in flight."""
         del motion
         return 0.0
 
     def contact(self, motion: Motion):
-        """How much higher the surface is, in units of the gap; of time and phase."""
+        """Return the added height of the surface, in units of the gap; of time and
+        phase.
+        """
         del motion
         return 0.0
 
@@ -175,7 +178,7 @@ class Term(eqx.Module):
         return unit.replace(MOTION, self.motion_unit)
 
     def reported(self, values: Mapping[str, Value]) -> dict[str, Value]:
-        """What a report gives for its strengths, by name; here the strengths."""
+        """Return the reported strengths, by name; here the strengths."""
         return dict(values)
 
     def parameters(self, place: int) -> list[Parameter]:

@@ -56,7 +56,7 @@ class WithTerms(HybridSystem):
         self.base.check()
 
     def motion(self, t, state, coordinate: int = 0, field=None) -> Motion:
-        """What the terms of a coordinate see of a state.
+        """Return the state as the terms of a coordinate see it.
 
         **Arguments:** `field` is the rate of change of the state, if it is known.
         """
