@@ -14,7 +14,8 @@ def cam_contour(contour: CamContour, ax: Axes | None = None) -> Axes:
 
     **Arguments:** the contour over a whole turn, and where to draw.
 
-    **Returns:** the axes.
+    Returns:
+        The axes.
     """
     ax = one_axes(ax)
     x, y = np.asarray(contour.x), np.asarray(contour.y)
