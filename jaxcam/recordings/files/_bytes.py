@@ -8,11 +8,11 @@ from pathlib import Path
 from .._errors import RecordingError
 
 
-#: Bytes of a table once it is inflated: ten minutes of a rig at 5 kHz, or an hour at
-#: 800 Hz. Reading takes about ten times as much memory.
 LARGEST = 100_000_000
-#: Numbers in a table, whatever they take in the file.
+"""Bytes of a table once it is inflated: ten minutes of a rig at 5 kHz, or an hour at
+800 Hz. Reading takes about ten times as much memory."""
 MOST = 15_000_000
+"""Numbers in a table, whatever they take in the file."""
 _GZIP = b"\x1f\x8b"
 
 

@@ -18,10 +18,10 @@ from ._table import LEFT_OUT, read_table
 from ._units import si
 
 
-#: Names of the columns in their order, `"-"` for one that is not read; or channels by
-#: the names that the file has for them, each with a factor where the unit at its end is
-#: not all: `{"Y1": ("height_mm", -0.8)}`.
 Columns: TypeAlias = Sequence[str] | Mapping[str, str | tuple[str, float]]
+"""Names of the columns in their order, `"-"` for one that is not read; or channels by
+the names that the file has for them, each with a factor where the unit at its end is
+not all: `{"Y1": ("height_mm", -0.8)}`."""
 TIME = "time_s"
 
 

@@ -10,8 +10,8 @@ from .._errors import RigError
 from ._toml import known_keys, Section, shown_value
 
 
-#: keys of a rig file that are about files
 LAYOUT_KEYS = ("columns", "rate")
+"""Keys of a rig file that are about files."""
 
 
 @dataclasses.dataclass(frozen=True)
