@@ -14,7 +14,8 @@ def cam_follower_model(
 
     **Arguments:** channels to fit: `follower_angle_rad`, `gyro_rad_s`.
 
-    **Raises:** `ValueError` for another channel, or a gyro that the rig does not have.
+    Raises:
+        ValueError: For another channel, or a gyro that the rig does not have.
     """
     known = rig_sensors(rig)
     for channel in channels:

@@ -52,32 +52,35 @@ class Estimate:
 
 @dataclasses.dataclass(frozen=True)
 class Fit:
-    """The result of a fit.
-
-    - `problem`, `point`: parameters and states at the optimum.
-    - `free`: names of the parameters that were free.
-    - `estimates`: one for each free number, in the order of `covariance`.
-    - `covariance`: from the Fisher information, what was known beforehand included.
-    - `cost`: minus twice the log-likelihood (less a constant) with the prior; `costs`:
-        of each piece, without it.
-    - `optimal`, `iterations`, `ended`: whether the iteration met its tolerance at an
-        optimum, after how many steps, and how it ended in words.
-    - `weights`: how much each piece of the data counted; `None`: all alike.
-    - `unconstrained`: combinations of parameters that the data say nothing of.
-    """
+    """The result of a fit."""
 
     problem: Problem
+    """Parameters and states at the optimum."""
     point: Point
+    """Parameters and states at the optimum."""
     free: tuple[str, ...]
+    """Names of the parameters that were free."""
     estimates: tuple[Estimate, ...]
+    """One for each free number, in the order of `covariance`."""
     covariance: Float[np.ndarray, "g g"]
+    """From the Fisher information, what was known beforehand included."""
     cost: float
+    """Minus twice the log-likelihood (less a constant) with the prior; `costs`: of each
+    piece, without it."""
     costs: Costs
     optimal: bool
+    """Whether the iteration met its tolerance at an optimum, after how many steps, and
+    how it ended in words."""
     iterations: int
+    """Whether the iteration met its tolerance at an optimum, after how many steps, and
+    how it ended in words."""
     ended: str
+    """Whether the iteration met its tolerance at an optimum, after how many steps, and
+    how it ended in words."""
     weights: Weights | None = None
+    """How much each piece of the data counted; `None`: all alike."""
     unconstrained: tuple[Unconstrained, ...] = ()
+    """Combinations of parameters that the data say nothing of."""
 
     @functools.cached_property
     def reasons(self) -> tuple[Reason, ...]:
@@ -121,7 +124,8 @@ class Fit:
     def __getitem__(self, name: str) -> Estimate:
         """The estimate of a parameter, by name or `name@record`.
 
-        **Raises:** `KeyError` that lists the names there are.
+        Raises:
+            KeyError: That lists the names there are.
         """
         for one in self.estimates:
             if name in (one.name, one.label):
@@ -142,8 +146,10 @@ class Fit:
         **Arguments:** names as in `estimates`, with `@record` where each record has its
         own; the probability that the region holds the truth.
 
-        **Raises:** `KeyError` for a name that was not fitted; `ValueError` for a level
-        outside 0 and 1, fewer than two names, or an error that is not finite.
+        Raises:
+            KeyError: For a name that was not fitted.
+            ValueError: For a level outside 0 and 1, fewer than two names, or an error
+                that is not finite.
         """
         labels = [one.label for one in self.estimates]
         values = [one.value for one in self.estimates]

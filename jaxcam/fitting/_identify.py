@@ -24,22 +24,21 @@ _MEMBER = 0.15
 
 @dataclasses.dataclass(frozen=True)
 class Identifiability:
-    """The combinations of parameters that the data determine, best first.
-
-    - `names`: parameters, as in the columns of `directions` `(g, g)`: one combination a
-        row, each parameter in units of its scale (its tolerance).
-    - `stderr`: error of each combination from the data alone, in the same units.
-    - `values`, `scales`: of each parameter, where it was looked and what its unit is.
-    - `alone`: error of each parameter from the data alone if all others were known, and
-        `together` if none is, in units of the scale.
-    """
+    """The combinations of parameters that the data determine, best first."""
 
     names: tuple[str, ...]
+    """Parameters, as in the columns of `directions` `(g, g)`: one combination a row,
+    each parameter in units of its scale (its tolerance)."""
     directions: Float[np.ndarray, "g g"]
     stderr: Float[np.ndarray, " g"]
+    """Error of each combination from the data alone, in the same units."""
     values: Float[np.ndarray, " g"]
+    """Of each parameter, where it was looked and what its unit is."""
     scales: Float[np.ndarray, " g"]
+    """Of each parameter, where it was looked and what its unit is."""
     alone: Float[np.ndarray, " g"]
+    """Error of each parameter from the data alone if all others were known, and
+    `together` if none is, in units of the scale."""
     together: Float[np.ndarray, " g"]
 
     @property

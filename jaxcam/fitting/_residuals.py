@@ -14,9 +14,6 @@ class Residuals:
     """Data minus model of one channel of one record, in units of the channel.
 
     - `time` (s), `turned` (angle of the drive, rad, or nothing), `value`, each `(k,)`.
-    - `flight`: number of the flight or contact each sample belongs to; `resting` is
-        true in contact.
-    - `noise`: standard deviation of noise and rounding.
     """
 
     record: str
@@ -25,8 +22,11 @@ class Residuals:
     turned: Float[np.ndarray, " k"]
     value: Float[np.ndarray, " k"]
     flight: Int[np.ndarray, " k"]
+    """Number of the flight or contact each sample belongs to; `resting` is true in
+    contact."""
     resting: Bool[np.ndarray, " k"]
     noise: float
+    """Standard deviation of noise and rounding."""
 
     @property
     def rms(self) -> float:

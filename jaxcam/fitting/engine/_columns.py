@@ -107,7 +107,8 @@ def invert_information(
     less than rounding makes it. What cannot be seen (a zero on the diagonal) gets an
     infinite variance.
 
-    **Raises:** `ValueError` where it is not finite, as that of a model with NaN.
+    Raises:
+        ValueError: Where it is not finite, as that of a model with NaN.
     """
     if not np.all(np.isfinite(information)):
         raise ValueError(

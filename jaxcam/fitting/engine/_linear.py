@@ -42,21 +42,29 @@ class LinearPieces(NamedTuple):
     The first `n` of `a = n + m` columns are the state at the beginning of the piece,
     the others what else varies.
 
-    - `information`, `slope`: of the samples of each piece in flight.
-    - `pp`, `p`: of all samples in contact, by what else varies.
-    - `later`, `earlier`, `direct`: rows of each joint for the state after it, for the
-        columns of the piece before it, and for what else varies, in units of the
-        joint's error. `tied`: how far the joint is off.
     - `end`: the state at the end of each piece, by its columns.
     """
 
     information: Float[Array, "k a a"]
+    """Of the samples of each piece in flight."""
     slope: Float[Array, "k a"]
+    """Of the samples of each piece in flight."""
     pp: Float[Array, "m m"]
+    """Of all samples in contact, by what else varies."""
     p: Float[Array, " m"]
+    """Of all samples in contact, by what else varies."""
     later: Float[Array, "k e n"]
+    """Rows of each joint for the state after it, for the columns of the piece before
+    it, and for what else varies, in units of the joint's error. `tied`: how far the
+    joint is off."""
     earlier: Float[Array, "k e a"]
+    """Rows of each joint for the state after it, for the columns of the piece before
+    it, and for what else varies, in units of the joint's error. `tied`: how far the
+    joint is off."""
     direct: Float[Array, "k e m"]
+    """Rows of each joint for the state after it, for the columns of the piece before
+    it, and for what else varies, in units of the joint's error. `tied`: how far the
+    joint is off."""
     tied: Float[Array, "k e"]
     flown_cost: Float[Array, " k"]
     joint_cost: Float[Array, " k"]

@@ -80,8 +80,8 @@ class Turning(eqx.Module):
     an offset between its angle and the encoder's.
 
     **Arguments:** functions that pick both out of the system, such as
-    `lambda s: s.speed` and, where the system is a field of another, `lambda s:
-    s.base.speed`.
+    `lambda s: s.speed` and, where the system is a field of another,
+    `lambda s: s.base.speed`.
     """
 
     speed: Callable[[HybridSystem], Array] = eqx.field(static=True)
@@ -101,15 +101,12 @@ class Input(eqx.Module):
     While a recording is predicted, the system has the value that its own recording had,
     each sample held until the next one, as digital controllers do; over a step of the
     integration, its mean.
-
-    **Arguments:**
-
-    - `channel`: of the recordings.
-    - `value`: picks the field out of the system, such as `lambda s: s.force`.
     """
 
     channel: str = eqx.field(static=True)
+    """Of the recordings."""
     value: Callable[[HybridSystem], Array] = eqx.field(static=True)
+    """Picks the field out of the system, such as `lambda s: s.force`."""
 
     def at(self, system, t, level, rate):
         """The system with its input at `level`."""
@@ -118,19 +115,14 @@ class Input(eqx.Module):
 
 
 class Model(eqx.Module):
-    """A system and the sensors that see it; what parameters are picked from.
-
-    **Arguments:**
-
-    - `system`: any `HybridSystem`.
-    - `sensors`: a `Sensor` for each channel that is fitted.
-    - `drive`: for a system that is turned by a measured drive, or that has a measured
-        input.
-    """
+    """A system and the sensors that see it; what parameters are picked from."""
 
     system: HybridSystem
+    """Any `HybridSystem`."""
     sensors: Mapping[str, Sensor]
+    """A `Sensor` for each channel that is fitted."""
     drive: Turning | Input | None = None
+    """For a system that is turned by a measured drive, or that has a measured input."""
 
     def driven(self, t, angle, rate) -> HybridSystem:
         """The system as it is near time `t`."""

@@ -26,7 +26,8 @@ def system_class(named: str, folder: str | Path = ".") -> type[HybridSystem]:
 
     **Arguments:** `named` is `FILE.py:CLASS`, the file seen from `folder`.
 
-    **Raises:** `RigError`, one sentence that names the file and the fix.
+    Raises:
+        RigError: One sentence that names the file and the fix.
     """
     path, name = split_name(named)
     file = Path(folder) / path
