@@ -25,13 +25,13 @@ from .policy import Policy
 from .terms import WithTerms
 
 
-#: what happens at each of the speeds, in their order
 EVENTS = (
     "valve float",
     "P(1,1) appears (fold)",
     "P(1,1) doubles its period (flip)",
     "chattering is interrupted",
 )
+"""What happens at each of the speeds, in their order."""
 
 
 @dataclasses.dataclass(frozen=True)

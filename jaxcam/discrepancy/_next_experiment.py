@@ -17,17 +17,16 @@ from .terms import Term, WithTerms
 
 @dataclasses.dataclass(frozen=True)
 class Experiment:
-    """The expected information of one more record.
-
-    - `name`: of the record.
-    - `now`, `then`: standard errors of the parameters asked for, without and with it.
-    - `speed`: of the cam (rad/s), where there is one.
-    """
+    """The expected information of one more record."""
 
     name: str
+    """Of the record."""
     now: Mapping[str, float]
+    """Standard errors of the parameters asked for, without and with it."""
     then: Mapping[str, float]
+    """Standard errors of the parameters asked for, without and with it."""
     speed: float | None = None
+    """Of the cam (rad/s), where there is one."""
 
     @property
     def factor(self) -> float:
@@ -91,16 +90,16 @@ def next_experiments(
 ) -> tuple[Experiment, ...]:
     """The speed at which to run a cam-follower rig next, the best first.
 
-    **Arguments:**
+    Args:
+        found: What `diagnose` said of its records so far.
+        speeds: Of the cam (rad/s) that can be had; by default some between those of the
+            records and a little beyond.
+        duration: Of a record (s); by default as before.
+        asked: As in [`jaxcam.discrepancy.compare_experiments`][].
 
-    - `found`: what `diagnose` said of its records so far.
-    - `speeds`: of the cam (rad/s) that can be had; by default some between those of
-        the records and a little beyond.
-    - `duration`: of a record (s); by default as before.
-    - `asked`: as in [`jaxcam.discrepancy.compare_experiments`][].
-
-    **Raises:** `ValueError` for a system that is no rig with a drive; `RecordingError`
-    where none of the speeds makes the follower fly.
+    Raises:
+        ValueError: For a system that is no rig with a drive.
+        RecordingError: Where none of the speeds makes the follower fly.
     """
     parts = found.after.problem.segments
     drives = [part.drive for part in parts if part.drive is not None]

@@ -42,7 +42,8 @@ def predictions(found: Diagnosis, seed: int = 0) -> tuple[Prediction, ...]:
 
     **Arguments:** a diagnosis, and the `seed` of the rigs that are drawn.
 
-    **Returns:** nothing for a system that is no cam-follower.
+    Returns:
+        Nothing for a system that is no cam-follower.
     """
     if not isinstance(found.after.model(0).system.base, CamFollower):  # pyright: ignore
         return ()

@@ -45,40 +45,39 @@ class Form(enum.StrEnum):
 
 @dataclasses.dataclass(frozen=True)
 class Structure:
-    """One way in which what is left over might not be noise.
-
-    - `gain`: growth of twice the log-likelihood; `threshold`: what chance and the
-        number of parameters would demand.
-    - `predicted_gain`: growth in half of the records with what the other half says,
-        where `gain` is above its threshold; negative for what differs from record to
-        record.
-    - `variable`, `grid`, `value`, `stderr` `(k,)`: the shape, where there is one;
-        `quantity` is what its value is.
-    - `form`: an unlisted term, a free function, a vibration, or residuals that are
-        correlated in time.
-    """
+    """One way in which what is left over might not be noise."""
 
     name: str
     sentence: str
     where: str
     region: str
     gain: float
+    """Growth of twice the log-likelihood; `threshold`: what chance and the number of
+    parameters would demand."""
     threshold: float
     count: int
     unit: str = ""
     variable: str = ""
+    """The shape, where there is one; `quantity` is what its value is."""
     grid: Float[np.ndarray, " k"] = dataclasses.field(
         default_factory=lambda: np.zeros(0)
     )
+    """The shape, where there is one; `quantity` is what its value is."""
     value: Float[np.ndarray, " k"] = dataclasses.field(
         default_factory=lambda: np.zeros(0)
     )
+    """The shape, where there is one; `quantity` is what its value is."""
     stderr: Float[np.ndarray, " k"] = dataclasses.field(
         default_factory=lambda: np.zeros(0)
     )
+    """The shape, where there is one; `quantity` is what its value is."""
 
     predicted_gain: float = math.inf
+    """Growth in half of the records with what the other half says, where `gain` is
+    above its threshold; negative for what differs from record to record."""
     form: Form = Form.FUNCTION
+    """An unlisted term, a free function, a vibration, or residuals that are correlated
+    in time."""
     quantity: str = ""
 
     @property

@@ -24,14 +24,12 @@ class Reason(enum.StrEnum):
 
 @dataclasses.dataclass(frozen=True)
 class Caveat:
-    """One reservation about a verdict.
-
-    - `reason`: a `Reason`. `terms`: names of those it is about, if any.
-    - `sentence`: in words, also by `str`.
-    """
+    """One reservation about a verdict."""
 
     reason: Reason
+    """A `Reason`. `terms`: names of those it is about, if any."""
     sentence: str
+    """In words, also by `str`."""
     terms: tuple[str, ...] = ()
 
     def __str__(self) -> str:

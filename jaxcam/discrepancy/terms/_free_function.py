@@ -24,8 +24,8 @@ from ._where import Where
 # Knots of the spline that stands for a function: two to the edge of a form, which is
 # smooth over a hundredth of the range
 _KNOTS = 256
-#: arguments in the order of the weights that pick one of them
 _ARGUMENTS = (Variable.POSITION, Variable.VELOCITY, Variable.PHASE, Variable.TIME)
+"""Arguments in the order of the weights that pick one of them."""
 _FACTORS = (Factor.ONE, Factor.VELOCITY, Factor.DIRECTION, Factor.DEFLECTION)
 
 

@@ -151,5 +151,5 @@ ON_A_LINE = (
 OF_SPEED = (FORWARD, FALLING)
 OF_PHASE = (*HARMONICS, HALF_TURN, ARC, BUMP_IN_TURN)
 
-#: all forms, in the order of their numbers in a compiled program
 PRIMITIVES = (*ON_A_LINE, *OF_SPEED, *OF_PHASE)
+"""All forms, in the order of their numbers in a compiled program."""

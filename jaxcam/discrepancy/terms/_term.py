@@ -40,8 +40,8 @@ class Motion(NamedTuple):
     pushed: Any = 0.0
 
 
-#: stands in units for that of the coordinate that a term acts on
 MOTION = "[q]"
+"""Stands in units for that of the coordinate that a term acts on."""
 
 
 # where a term acts is left out of files that do not say it
@@ -59,13 +59,13 @@ def strength(
 ):
     """A field of a term that is fitted.
 
-    **Arguments:**
-
-    - `unit`: for tables; `[q]` in it stands for the unit of the coordinate.
-    - `size`: a change that matters; it does not influence the result.
-    - `lower`, `upper`: signs that physics demands.
-    - `inner`: a frequency (Hz), without effect while the strengths are zero; it is
-        fitted from the value that a scan of the frequencies finds.
+    Args:
+        unit: For tables; `[q]` in it stands for the unit of the coordinate.
+        size: A change that matters; it does not influence the result.
+        lower: Signs that physics demands.
+        upper: Signs that physics demands.
+        inner: A frequency (Hz), without effect while the strengths are zero; it is
+            fitted from the value that a scan of the frequencies finds.
     """
     metadata = {
         "strength": Strength("", unit, size, lower, upper, inner),
@@ -106,7 +106,8 @@ class Term(eqx.Module):
     that is pushed and whose position and velocity are seen; `constraint`, that of the
     gap whose surface or restitution is another; `motion_unit`, that of the coordinate.
 
-    **Raises:** `TypeError` for a subclass whose own `acts` is not what it overrides.
+    Raises:
+        TypeError: For a subclass whose own `acts` is not what it overrides.
     """
 
     name: ClassVar[str] = ""
@@ -200,8 +201,8 @@ class SensorTerm(Term):
     """A fault of the sensor of the motion: it acts on a field of that sensor."""
 
     where: ClassVar[str] = Where.SENSOR
-    #: fields of `jaxcam.fitting.Sensor`, one for each strength
     fields: ClassVar[tuple[str, ...]] = ()
+    """Fields of `jaxcam.fitting.Sensor`, one for each strength."""
 
     def parameters(self, place: int) -> list[Parameter]:
         del place
