@@ -24,25 +24,36 @@ from .special import locate, test_values
 
 @dataclass(frozen=True, eq=False)
 class Batch:
-    """Branches side by side. Rows of a lane beyond its `count` are not points."""
+    """Branches side by side; rows of a branch beyond its `count` are padding."""
 
     states: np.ndarray
-    """(lanes, points, n)."""
+    """States, shape `(lanes, points, n)`."""
     parameters: np.ndarray
-    """(lanes, points)."""
+    """Parameter values, shape `(lanes, points)`."""
     multipliers: np.ndarray
-    """(lanes, points, k)."""
+    """Eigenvalues or multipliers, shape `(lanes, points, k)`."""
     count: np.ndarray
-    """(lanes,) number of points."""
+    """Number of points of each branch, shape `(lanes,)`."""
     reasons: tuple[str, ...]
-    """(lanes,) why each branch ends."""
+    """Why each branch ends, one sentence per branch."""
     name: str
+    """Name of the parameter."""
     _passed: Corrected
     _problems: Callable[[int], AbstractProblem]
     _context: Context
 
     def lane(self, index: int) -> Branch:
-        """One branch, with its special points located."""
+        """Return one branch, with its special points located.
+
+        Args:
+            index: Index of the branch.
+
+        Returns:
+            A [`continuation.Branch`][].
+
+        Raises:
+            ValueError: There is no such branch, or it failed at its start.
+        """
         if not 0 <= index < self.count.size:
             raise ValueError(
                 f"there is no lane {index}; lanes run from 0 to {self.count.size - 1}"
@@ -108,24 +119,36 @@ def follow_batch(
 ) -> Batch:
     """Follow many branches in one compiled program, each with its own steps.
 
-    Branches differ in their starts, in the values of other parameters, or both; what
-    needs decisions in Python (transitions, admissibility, fresh references) is left
-    out.
+    Branches differ in their starts, in the values of other parameters, or both.
+    Features that need decisions in Python (transitions, admissibility, fresh
+    references) are not available.
 
     Args:
-        states: (lanes, n) states to begin with.
+        problem: The problem.
+        states: Initial states, `(lanes, n)`.
         where: As of [`continuation.follow`][].
         bounds: As of [`continuation.follow`][].
+        algorithm: One that corrects in a plane and whose predictor uses a single point,
+            such as the tangent; default [`continuation.PseudoArclength`][].
+        parameters: The problem's parameters, each float leaf `(lanes,)` or a scalar for
+            all; default those of the problem.
         settings: As of [`continuation.follow`][].
-        algorithm: One that corrects in a plane and whose predictor takes a single
-            point, such as the tangent; by default [`continuation.PseudoArclength`][].
-        parameters: The problem's parameters, each float leaf (lanes,) or a scalar for
-            all; None: those of the problem.
-        direction: 1 or -1, or (lanes,) of them.
-        points: At most this many on each branch.
+        direction: 1 or -1, or `(lanes,)` of them.
+        points: Largest number of points on each branch.
 
     Returns:
-        A `Batch`; a lane that fails says so in its reason.
+        A `Batch`; a branch that fails says so in its reason.
+
+    Raises:
+        ValueError: Shapes do not fit, or the algorithm cannot run in a batch.
+
+    Examples:
+        >>> import continuation
+        >>> problem = continuation.Equilibrium(lambda u, p: p["a"] - u**2, {"a": 1.0})
+        >>> starts = [[1.0], [-1.0]]
+        >>> batch = continuation.follow_batch(problem, starts, "a", (-1, 2), points=20)
+        >>> batch.states.shape
+        (2, 20, 1)
     """
     settings = BranchSettings() if settings is None else settings
     algorithm = PseudoArclength() if algorithm is None else algorithm

@@ -36,7 +36,7 @@ class Lane(NamedTuple):
 
 
 class Axes(eqx.Module):
-    """Which parameters differ from lane to lane; static."""
+    """The parameters that differ between lanes; static."""
 
     tree: PyTree = eqx.field(static=True)
     """0 for each leaf that differs, None for one that all share."""

@@ -31,20 +31,38 @@ def branch(
     out: str | os.PathLike | None = None,
     resume: bool = False,
 ) -> Branch:
-    """Collect a branch. Arguments as of [`continuation.follow`][], and
+    """Follow a branch of solutions and return it as a whole.
 
-    - `direction`: 1, -1, or `"both"`: from the start towards smaller and towards larger
-      parameters, put together in order, with labels counted anew.
-    - `callbacks`: called with each point as it comes: progress, saving. One that
-      returns True ends the branch.
-    - `out`: a file to which each point is appended as it comes; its format is that of
-      [`continuation.load_branch`][]. With both directions the first goes to a file of
-      its own, with `.back` before the suffix.
-    - `resume`: go on where the run that wrote `out` was interrupted. The result is the
-      branch that it would have become.
+    The other arguments are those of [`continuation.follow`][].
+
+    Args:
+        problem: The problem, or a hybrid system with an orbit of it as `start`.
+        start: A state `(n,)`, a [`continuation.Start`][] or a [`continuation.Point`][].
+        where: Picks the parameter, as in `lambda parameters: parameters.speed`.
+        bounds: (lowest, highest) value of the parameter; the branch ends exactly there.
+        algorithm: Default [`continuation.PseudoArclength`][].
+        settings: Accuracy and step control.
+        direction: 1 or -1; or `"both"`, from the start towards smaller and towards
+            larger parameters, joined in order, with labels counted anew.
+        callbacks: Called with each point as it is found: progress, saving. One that
+            returns True ends the branch.
+        out: A file to which each point is appended, for [`continuation.load_branch`][];
+            the first of two directions goes to a file with `.back` before the suffix.
+        resume: Continue the run that wrote `out` where it was interrupted. The result
+            is identical to that of an uninterrupted run.
 
     Returns:
         A [`continuation.Branch`][].
+
+    Raises:
+        ValueError: As for [`continuation.follow`][].
+
+    Examples:
+        >>> import continuation
+        >>> problem = continuation.Equilibrium(lambda u, p: p["a"] - u**2, {"a": 1.0})
+        >>> found = continuation.branch(problem, [1.0], "a", (-1, 2), direction=-1)
+        >>> [point.kind for point in found.special]
+        ['fold']
     """
     if direction not in (1, -1, "both"):
         raise ValueError(f"direction is {direction!r}; give 1, -1 or 'both'")

@@ -28,6 +28,7 @@ class Cascade:
     """Branches of doubled orbits, each up to its first flip."""
 
     branches: tuple[Branch, ...]
+    """The branches, in order of doubling."""
 
     @property
     def flips(self) -> tuple[Point, ...]:
@@ -41,13 +42,15 @@ class Cascade:
 
     @property
     def ratios(self) -> np.ndarray:
-        """(flips - 2,) quotients of successive distances, (2.17)."""
+        """Quotients of successive distances, shape `(flips - 2,)` (thesis,
+        eq. 2.17).
+        """
         gaps = np.diff(self.parameters)
         return gaps[:-1] / gaps[1:]
 
     @property
     def reason(self) -> str:
-        """Why the cascade ends."""
+        """The reason why the cascade ends."""
         return self.branches[-1].reason
 
 
@@ -63,15 +66,35 @@ def cascade(
     direction: int = 1,
     callbacks: Iterable[Callable[[Point], Any]] = (),
 ) -> Cascade:
-    """Follow a branch to its flip, the doubled branch to its own, and so on.
+    """Follow a branch to its flip, the doubled branch to its own flip, and so on.
 
-    **Arguments:** as of [`continuation.follow`][], and `flips`: how many to locate;
-    `callbacks`, called with each point as it comes, to show progress. Steps shrink with
-    the lengths of the branches.
+    Steps shrink with the lengths of the branches.
+
+    Args:
+        problem: The problem.
+        start: As for [`continuation.follow`][].
+        where: Picks the parameter.
+        bounds: (lowest, highest) value of the parameter.
+        algorithm: Default [`continuation.PseudoArclength`][].
+        flips: Number of flips to locate.
+        settings: Accuracy and step control.
+        callbacks: Called with each point as it comes, to show progress.
+        direction: 1 to begin towards larger parameters, -1 towards smaller ones.
 
     Returns:
-        A `Cascade`; it has fewer flips where a branch ends without one, and then its
-            `reason` says why.
+        A `Cascade`; it has fewer flips where a branch ends without one, and its
+            `reason` then says why.
+
+    Raises:
+        ValueError: As for [`continuation.follow`][].
+
+    Examples:
+        >>> import continuation
+        >>> f = lambda u, p: p["a"] * u * (1 - u)
+        >>> logistic = continuation.FixedPoint(f, {"a": 2.0})
+        >>> found = continuation.cascade(logistic, [0.5], "a", (1.5, 4.0), flips=2)
+        >>> found.parameters.round(4).tolist()
+        [3.0, 3.4495]
     """
     if flips < 1:
         raise ValueError(f"flips is {flips}; give the number of flips, at least 1")

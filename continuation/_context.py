@@ -1,4 +1,4 @@
-"""What stays the same along a branch."""
+"""Constants of a branch."""
 
 from typing import NamedTuple
 
@@ -6,7 +6,7 @@ from ._settings import BranchSettings
 
 
 class Context(NamedTuple):
-    """Which parameter varies, by what its changes are measured, and how accurately.
+    """The varying parameter, the scale of its changes, and the accuracy.
 
     Where a single point is looked at, the bounds do not matter.
     """

@@ -97,17 +97,32 @@ def curve(
             monitor of its problem.
         where: Picks the two parameters. The first becomes an unknown; steps, bounds and
             `point.parameter` are those of the second.
-        bounds: (lowest, highest) of both; the curve ends exactly on them.
-        ?- the rest as of [`c: - the rest as of [`continuation.branch`][].
+        bounds: (lowest, highest) of both parameters; the curve ends exactly on them.
+        algorithm: Default [`continuation.PseudoArclength`][].
+        settings: Accuracy and step control.
+        direction: As for [`continuation.branch`][].
+        callbacks: As for [`continuation.branch`][].
+        out: As for [`continuation.branch`][].
+        resume: As for [`continuation.branch`][].
 
     Returns:
         A [`continuation.Branch`][]; `point.parameters` has both parameters in the order
-            of `where`. Its special points are those of codimension two: cusp,
-            Bogdanov-Takens, zero-Hopf; generalized flip, fold-flip, 1:1, 1:2, 1:3, 1:4
-            resonances; and crossings with monitors.
+            of `where`. Its special points are those of codimension two (cusp,
+            Bogdanov-Takens, zero-Hopf; generalized flip, fold-flip; 1:1, 1:2, 1:3, 1:4
+            resonances) and zeros of monitors.
 
     Raises:
-        ValueError: For points that form no curve, and as `follow` does.
+        ValueError: The point forms no curve; and as for [`continuation.follow`][].
+
+    Examples:
+        >>> import continuation
+        >>> field = lambda u, p: p["a"] + p["b"] * u + u**3
+        >>> problem = continuation.Equilibrium(field, {"a": 2.0, "b": -1.0})
+        >>> found = continuation.branch(problem, [-1.52], "a", (-2, 2.5), direction=-1)
+        >>> where = lambda p: p["a"], lambda p: p["b"]
+        >>> curve = continuation.curve(found.special[0], where, ((-2, 2.5), (-2, 1)))
+        >>> "cusp" in [point.kind for point in curve.special]
+        True
     """
     try:
         (first, second), (bounds_1, bounds_2) = where, bounds

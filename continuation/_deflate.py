@@ -44,20 +44,32 @@ def deflate(
     most: int = 16,
     max_iterations: int = 100,
 ) -> tuple[np.ndarray, ...]:
-    """Find solutions besides the known ones, at the parameters that the problem has.
+    """Find further solutions besides the known ones, at the problem's parameters.
 
     Each solution found is divided out (Farrell, Birkisson and Funke, SIAM J. Sci.
     Comput. 37, 2015), so that Newton's method from the same guesses must end elsewhere
     or nowhere.
 
     Args:
-        guesses: (guesses, n) or (n,), from which Newton's method begins.
-        known: States (n,) of solutions that are known already.
+        problem: The problem.
+        guesses: States from which Newton's method begins, `(guesses, n)` or `(n,)`.
+        known: States `(n,)` of solutions that are known already.
+        settings: Accuracy.
         most: Number of solutions, known ones included, at which the search ends.
-        max_iterations: Of Newton's method for each guess.
+        max_iterations: Largest number of Newton iterations per guess.
 
     Returns:
-        The further solutions, each (n,), in the order found.
+        The further solutions, each `(n,)`, in the order found.
+
+    Raises:
+        ValueError: A guess or a known solution has another shape.
+
+    Examples:
+        >>> import continuation
+        >>> problem = continuation.Equilibrium(lambda u, p: p["a"] - u**2, {"a": 1.0})
+        >>> others = continuation.deflate(problem, [[0.9]], [[1.0]])
+        >>> [round(float(u[0]), 6) for u in others]
+        [-1.0]
     """
     settings = BranchSettings() if settings is None else settings
     problem = set_parameters(problem, as_arguments(problem.parameters))

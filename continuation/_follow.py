@@ -28,31 +28,41 @@ def follow(
     direction: int = 1,
     history: Sequence[Point] = (),
 ) -> Iterator[Point]:
-    """Follow a branch of solutions; yields its points, special points among them.
+    """Follow a branch of solutions and yield its points, special points among them.
 
     The branch ends on a bound, where it meets an earlier point of its own, where
     doubled orbits join those of half the period, where a monitor of the problem ends it
     and the problem knows no transition, where the smallest step fails, or after
-    `settings.max_points`; the last point says which in `reason`.
+    `settings.max_points`; the last point gives the reason in `reason`.
 
     Args:
-        problem: What is followed, such as [`continuation.Equilibrium`][]; or a hybrid
+        problem: The problem, such as [`continuation.Equilibrium`][]; or a hybrid
             system, with an orbit of it as `start`.
-        start: A state (n,), on the branch at the parameter that the problem has, or so
-            near that Newton's method gets there; or a [`continuation.Start`][], such as
-            a branch to switch to; or a [`continuation.Point`][], to go on from there
+        start: A state `(n,)`, on the branch at the parameter value of the problem, or
+            near enough for Newton's method; or a [`continuation.Start`][], such as a
+            branch to switch to; or a [`continuation.Point`][], to continue from there
             exactly as the run that it is from did.
         where: Picks the parameter, as in `lambda parameters: parameters.speed`.
         bounds: (lowest, highest) value of the parameter; the branch ends exactly there.
-        algorithm: [`continuation.PseudoArclength`][] by default.
-        settings: Accuracy and steps.
+        algorithm: Default [`continuation.PseudoArclength`][].
+        settings: Accuracy and step control.
         direction: 1 to begin towards larger parameters, -1 towards smaller ones.
-        history: The points before `start`, where that is a point; predictors through
+        history: The points before `start`, if that is a point; predictors through
             several points need them.
 
+    Returns:
+        An iterator of [`continuation.Point`][].
+
     Raises:
-        ValueError: For a start that is no solution, a parameter that does not exist,
-            bounds that are the wrong way round or do not contain the start.
+        ValueError: The start is no solution, the parameter does not exist, or the
+            bounds are reversed or do not contain the start.
+
+    Examples:
+        >>> import continuation
+        >>> problem = continuation.Equilibrium(lambda u, p: p["a"] - u**2, {"a": 1.0})
+        >>> points = continuation.follow(problem, [1.0], "a", (-1, 2), direction=-1)
+        >>> next(points).kind
+        'start'
     """
     settings = BranchSettings() if settings is None else settings
     algorithm = PseudoArclength() if algorithm is None else algorithm

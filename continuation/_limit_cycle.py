@@ -18,9 +18,20 @@ from .special import FLIP, flip_direction
 class LimitCycle(AbstractProblem):
     """Periodic orbits of u' = vector_field(u, parameters), with unknown period.
 
-    The unknowns are (u(0), period), the equations u(period) = u(0) and a phase
+    The unknowns are (u(0), period); the equations are u(period) = u(0) and a phase
     condition: u(0) lies in a plane that is renewed at each point of a branch. The
-    multipliers are those of the map on that plane, (2.14), without the trivial one.
+    multipliers are those of the map on that plane (thesis, eq. 2.14), without the
+    trivial one.
+
+    Examples:
+        >>> import continuation
+        >>> def field(u, p):
+        ...     turned = jnp.stack([-u[1], u[0]])
+        ...     return p["mu"] * u + turned - u * (u @ u)
+        >>> problem = continuation.LimitCycle(field, {"mu": 1.0}, [1.0, 0.0])
+        >>> state = jnp.array([1.0, 0.0, 2 * jnp.pi])
+        >>> float(abs(problem.residual(state, {"mu": 1.0})).max()) < 1e-9
+        True
     """
 
     vector_field: Callable[[Array, Any], Array]
@@ -28,15 +39,18 @@ class LimitCycle(AbstractProblem):
     parameters: PyTree
     """Any pytree with scalar floats among its leaves."""
     reference: Any
-    """A state (n,) on the cycle or near it, to begin with."""
+    """A state on the cycle or near it, `(n,)`, to begin with."""
     normal: Any
-    """(n,) unit normal of the plane, and (n, n-1) unit vectors in it."""
+    """Unit normal of the plane, `(n,)`."""
     basis: Any
+    """Unit vectors in the plane, `(n, n-1)`."""
     steps: int = eqx.field(static=True)
-    """Of equal length in a period, by Dormand and Prince's method of order 8.
-    `point.observed["error"]` is its estimated error, relative to the state."""
+    """Number of equal steps per period, by Dormand and Prince's method of order 8.
+    `point.observed["error"]` is their estimated error, relative to the state."""
     stability: ClassVar[StabilityKind] = "map"
+    """Multipliers on the unit circle are bifurcations."""
     normal_forms: ClassVar[bool] = False
+    """No normal-form coefficients are computed."""
 
     def __init__(
         self,

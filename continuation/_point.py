@@ -1,4 +1,4 @@
-"""What a branch consists of."""
+"""Points and branches."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
@@ -18,44 +18,57 @@ ORDINARY = ("start", "regular", "end")
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Point:
-    """A point of a branch. All arrays are NumPy's."""
+    """A point of a branch; all arrays are NumPy's.
+
+    Examples:
+        >>> import continuation
+        >>> problem = continuation.Equilibrium(lambda u, p: p["a"] - u**2, {"a": 1.0})
+        >>> found = continuation.branch(problem, [1.0], "a", (-1, 2), direction=-1)
+        >>> found.at(1).stable
+        True
+    """
 
     label: int
     """Number along the branch, from 1."""
     kind: str
     """`"start"`, `"regular"`, `"end"`, or the kind of special point."""
     parameter: float
-    """Value of the parameter that is followed."""
+    """Value of the continuation parameter."""
     state: np.ndarray
-    """(n,) the solution."""
+    """The solution, shape `(n,)`."""
     multipliers: np.ndarray
-    """(k,) eigenvalues of an equilibrium, multipliers of a map or an orbit."""
+    """Eigenvalues of an equilibrium, or multipliers of a map or an orbit, shape `(k,)`.
+    """
     stable: bool | None
-    """None where the problem has no stability, or a multiplier is not finite."""
+    """Whether the solution is stable; None where the problem has no stability, or a
+    multiplier is not finite."""
     tangent: np.ndarray
-    """(n+1,) direction of the branch in (state, parameter)."""
+    """Direction of the branch in (state, parameter), shape `(n+1,)`."""
     scale: np.ndarray
-    """(n+1,) sizes by which lengths are measured here."""
+    """Scales by which lengths are measured here, shape `(n+1,)`."""
     step: float
-    """The step that follows; arclength from the start."""
+    """Length of the step that follows."""
     arclength: float
+    """Arclength from the start."""
     iterations: int
-    """Of the corrector."""
+    """Number of corrector iterations."""
     converged: bool
     """False for a special point that could only be bracketed."""
     reason: str = ""
-    """Why the branch ends here, or what is to be known about a special point."""
+    """Why the branch ends here, or a remark on a special point."""
     coefficient: float | None = None
-    """normal-form coefficient where there is one, and what its sign says."""
+    """Normal-form coefficient, where there is one."""
     criticality: str = ""
+    """The meaning of its sign, such as "supercritical"."""
     observed: dict[str, Any] = field(default_factory=dict)
-    """Quantities that the problem watches."""
+    """Quantities that the problem records with each point."""
     tests: dict[str, float] = field(default_factory=dict)
     """Values of the test functions."""
     signature: str = ""
-    """`problem.signature` here."""
+    """`problem.signature` at this point."""
     parameters: tuple[float, ...] = ()
-    """The parameters that vary, in order: one, or two on a curve of special points."""
+    """Values of the continuation parameters, in order: one, or two on a curve of
+    special points."""
     problem: AbstractProblem | None = None
     """The problem with its parameters here; None for a point read from a file."""
     leaf: int = -1
@@ -76,7 +89,9 @@ class Point:
 
     @property
     def solved(self) -> AbstractProblem:
-        """The problem; `ValueError` for a point of a file that was read without it."""
+        """The problem of this point; `ValueError` for a point read from a file without
+        it.
+        """
         if self.problem is None:
             raise ValueError(
                 "this point carries no problem; read its file with "
@@ -85,7 +100,16 @@ class Point:
         return self.problem
 
     def inner(self, base: AbstractProblem, leaf: int) -> "Point":
-        """This point of an extended problem as a point of the problem it extends."""
+        """Return this point of an extended problem as a point of the problem it
+        extends.
+
+        Args:
+            base: The problem that was extended.
+            leaf: Index of the parameter among the leaves.
+
+        Returns:
+            A `Point`.
+        """
         value = float(self.state[-1])
         parameters = with_leaf(self.solved.parameters, leaf, np.asarray(value))
         return replace(
@@ -108,12 +132,22 @@ def stability(stable: bool | None) -> str:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Branch:
-    """Points in the order of the branch."""
+    """A branch of solutions: its points in order.
+
+    Examples:
+        >>> import continuation
+        >>> problem = continuation.Equilibrium(lambda u, p: p["a"] - u**2, {"a": 1.0})
+        >>> found = continuation.branch(problem, [1.0], "a", (-1, 2), direction=-1)
+        >>> round(found.of_kind("fold")[0].parameter, 6) + 0.0
+        0.0
+    """
 
     points: tuple[Point, ...]
+    """All points, special ones included."""
     name: str
     """Name of the parameter."""
     bounds: tuple[float, float]
+    """(lowest, highest) value of the parameter."""
     leaf: int = 0
     """Index of the parameter among the leaves."""
     names: tuple[str, ...] = ()
@@ -154,12 +188,19 @@ class Branch:
         return tuple(point for point in self.points if not point.special)
 
     def of_kind(self, kind: str) -> tuple[Point, ...]:
-        """The special points of one kind."""
+        """Return the special points of one kind.
+
+        Args:
+            kind: Such as "fold" or "flip".
+
+        Returns:
+            A tuple of points.
+        """
         return tuple(point for point in self.points if point.kind == kind)
 
     @property
     def reason(self) -> str:
-        """Why the branch ends."""
+        """The reason why the branch ends."""
         return self.points[-1].reason if self.points else ""
 
     @property
@@ -169,14 +210,22 @@ class Branch:
 
     @property
     def states(self) -> np.ndarray:
-        """(points, n) states; problems that change on the way must keep n."""
+        """States at all points, shape `(points, n)`; problems that change on the way
+        must keep n.
+        """
         return np.stack([point.state for point in self.points])
 
     def at(self, label: int) -> Point:
-        """The point with a label.
+        """Return the point with a label.
+
+        Args:
+            label: Number of the point along the branch, from 1.
+
+        Returns:
+            A [`continuation.Point`][].
 
         Raises:
-            ValueError: Where there is none.
+            ValueError: There is no such point.
         """
         for point in self.points:
             if point.label == label:

@@ -16,26 +16,45 @@ from .special import FLIP, flip_direction, HOPF
 
 
 class Equations(AbstractProblem):
-    """function(u, parameters) = 0, with no stability: discretised boundary value
-    problems, for example.
+    """Equations function(u, parameters) = 0 without stability.
+
+    For example, a discretised boundary value problem.
+
+    Examples:
+        >>> import continuation
+        >>> f = lambda u, p: u**2 + p["a"] ** 2 - 1
+        >>> circle = continuation.Equations(f, {"a": 0.0})
+        >>> float(circle.residual(jnp.ones(1), {"a": 0.0})[0])
+        0.0
     """
 
     function: Callable[[Array, Any], Array]
-    """Maps a state (n,) and the parameters to (n,)."""
+    """Maps a state `(n,)` and the parameters to residuals `(n,)`."""
     parameters: PyTree
     """Any pytree with scalar floats among its leaves."""
     stability: ClassVar[StabilityKind] = "none"
+    """No stability."""
 
     def residual(self, u: Float[Array, " n"], parameters: PyTree) -> Float[Array, " n"]:
         return self.function(u, parameters)
 
 
 class Equilibrium(AbstractProblem):
-    """Equilibria of u' = vector_field(u, parameters)."""
+    """Equilibria of u' = vector_field(u, parameters).
+
+    Examples:
+        >>> import continuation
+        >>> problem = continuation.Equilibrium(lambda u, p: p["a"] - u**2, {"a": 1.0})
+        >>> float(problem.residual(jnp.ones(1), {"a": 1.0})[0])
+        0.0
+    """
 
     vector_field: Callable[[Array, Any], Array]
+    """Maps a state `(n,)` and the parameters to its rate `(n,)`."""
     parameters: PyTree
+    """Any pytree with scalar floats among its leaves."""
     stability: ClassVar[StabilityKind] = "equilibrium"
+    """Eigenvalues on the imaginary axis are bifurcations."""
 
     def residual(self, u: Float[Array, " n"], parameters: PyTree) -> Float[Array, " n"]:
         return self.vector_field(u, parameters)
@@ -49,7 +68,15 @@ class Equilibrium(AbstractProblem):
 
 
 class FixedPoint(AbstractProblem):
-    """Points of period `period` of u -> map(u, parameters)."""
+    """Periodic points of the map u -> map(u, parameters), of period `period`.
+
+    Examples:
+        >>> import continuation
+        >>> f = lambda u, p: p["a"] * u * (1 - u)
+        >>> logistic = continuation.FixedPoint(f, {"a": 2.0})
+        >>> float(logistic.residual(jnp.array([0.5]), {"a": 2.0})[0])
+        0.0
+    """
 
     map: Callable[[Array, Any], Array]
     """Maps a state (n,) and the parameters to (n,)."""
@@ -59,6 +86,7 @@ class FixedPoint(AbstractProblem):
     """Number of applications of the map, >= 1. All periods share one compiled program.
     """
     stability: ClassVar[StabilityKind] = "map"
+    """Multipliers on the unit circle are bifurcations."""
 
     def __init__(
         self, map: Callable[[Any, Any], Array], parameters: PyTree, period: int = 1

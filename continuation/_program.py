@@ -66,7 +66,7 @@ def newton(function, y, tolerance, max_iterations: int):
 
 
 def tangent_and_determinant(jacobian, scale, old):
-    """Unit tangent along `old` (all in z), and the determinant of (3.33)."""
+    """Unit tangent along `old` (all in z), and the determinant of thesis eq. 3.33."""
     scaled = jacobian * scale[None, :]
     old = old / scale
     last = jnp.zeros_like(old).at[-1].set(1.0)

@@ -52,7 +52,20 @@ class Recorder:
 
 
 def save_branch(branch: Branch, path: str | os.PathLike) -> None:
-    """Write a branch to a file; [`continuation.load_branch`][] reads it."""
+    """Write a branch to a file that [`continuation.load_branch`][] reads.
+
+    Args:
+        branch: The branch.
+        path: The file to write.
+
+    Examples:
+        >>> import continuation
+        >>> problem = continuation.Equilibrium(lambda u, p: p["a"] - u**2, {"a": 1.0})
+        >>> found = continuation.branch(problem, [1.0], "a", (-1, 2), direction=-1)
+        >>> continuation.save_branch(found, "branch.jsonl")
+        >>> len(continuation.load_branch("branch.jsonl").points) == len(found.points)
+        True
+    """
     Recorder(path, header_of(branch), branch.points)
 
 
@@ -70,13 +83,27 @@ def header_of(branch: Branch, **more: Any) -> dict:
 def load_branch(
     path: str | os.PathLike, problem: AbstractProblem | None = None
 ) -> Branch:
-    """Read a branch that was saved, or as much as an interrupted run has written.
+    """Read a saved branch, or as much of it as an interrupted run has written.
 
-    **Arguments:** `problem`: what was followed; then the points carry it, at their
-    parameters, and can be switched from or followed in two parameters.
+    Args:
+        path: The file to read.
+        problem: The problem of the branch. The points then carry it, at their
+            parameters, so that they can be switched from or continued in two
+            parameters.
+
+    Returns:
+        A [`continuation.Branch`][].
 
     Raises:
-        ValueError: Where the file is no branch or of a later version.
+        ValueError: The file is not a branch, or of a later version.
+
+    Examples:
+        >>> import continuation
+        >>> problem = continuation.Equilibrium(lambda u, p: p["a"] - u**2, {"a": 1.0})
+        >>> found = continuation.branch(problem, [1.0], "a", (-1, 2), direction=-1)
+        >>> continuation.save_branch(found, "branch.jsonl")
+        >>> continuation.load_branch("branch.jsonl", problem).special[0].kind
+        'fold'
     """
     return read_branch(path, problem)[0]
 

@@ -324,7 +324,7 @@ class Run:
             yield self.pending.pop(0)
 
     def _refusal(self, current: Solution) -> str:
-        """Why a point is not admissible; empty if it is."""
+        """Return why a point is not admissible; empty if it is."""
         if type(current.problem).check is AbstractProblem.check:
             return ""
         point = self._point(current, "regular")

@@ -17,19 +17,31 @@ from ._point import Point
 def special_point(
     point: Point, where: Where, parameters: PyTree
 ) -> tuple[Float[Array, " n"], Float[Array, ""]]:
-    """Where a special point is at other parameters; for use inside `jit` and `jvp`.
+    """Locate a special point at other parameters; for use inside `jit` and `jvp`.
 
     Newton's method on the extended system from `point`; the derivative comes from the
-    implicit function theorem. The parameters must be so near to those of `point` that
-    Newton gets there; the result is NaN where it does not.
+    implicit function theorem. The parameters must be near enough to those of `point`
+    for Newton's method to converge.
 
     Args:
         point: A fold, flip, Neimark-Sacker or Hopf point, or a zero of a monitor.
         where: Picks the parameter in which it is located.
-        parameters: Of the same structure as the problem's; the picked one is ignored.
+        parameters: Parameters of the same structure as the problem's; the picked one is
+            ignored.
 
     Returns:
-        The state (n,) and the value of the picked parameter.
+        The state `(n,)` and the value of the picked parameter; NaN where Newton's
+            method fails.
+
+    Examples:
+        >>> import continuation
+        >>> field = lambda u, p: p["a"] - p["shift"] - u**2
+        >>> problem = continuation.Equilibrium(field, {"a": 1.0, "shift": 0.0})
+        >>> found = continuation.branch(problem, [1.0], "a", (-1, 2), direction=-1)
+        >>> fold = found.special[0]
+        >>> _, value = continuation.special_point(fold, "a", {"a": 1.0, "shift": 0.1})
+        >>> round(float(value), 6)
+        0.1
     """
     value = point.parameter
     problem = extended(point, where, (value - 0.5, value + 0.5))
@@ -57,16 +69,28 @@ def _derivatives(problem, u, moving, fixed):
 
 
 def sensitivity(point: Point, where: Where) -> PyTree:
-    """Derivative of the parameter value of a special point by all other parameters.
+    """Return the derivative of a special point's parameter value by all other
+    parameters.
 
-    By the implicit function theorem on the extended system: d(speed at the flip) /
-    d(restitution), for example.
+    It follows from the implicit function theorem on the extended system: d(speed at the
+    flip) / d(restitution), for example.
 
-    **Arguments:** `point`, `where`: as of [`continuation.special_point`][].
+    Args:
+        point: As for [`continuation.special_point`][].
+        where: As for [`continuation.special_point`][].
 
     Returns:
         A tree like the problem's parameters, with the derivative by each float leaf in
             its place; 0 for the picked one, None for leaves that are not floats.
+
+    Examples:
+        >>> import continuation
+        >>> field = lambda u, p: p["a"] - p["shift"] - u**2
+        >>> problem = continuation.Equilibrium(field, {"a": 1.0, "shift": 0.0})
+        >>> found = continuation.branch(problem, [1.0], "a", (-1, 2), direction=-1)
+        >>> fold = found.special[0]
+        >>> round(float(continuation.sensitivity(fold, "a")["shift"]), 6)
+        1.0
     """
     value = point.parameter
     problem = extended(point, where, (value - 0.5, value + 0.5))
@@ -78,7 +102,7 @@ def sensitivity(point: Point, where: Where) -> PyTree:
 
 
 def _position(moving: PyTree, parameters: PyTree, leaf: int) -> int:
-    """Where a leaf of all parameters stands among those that are floats."""
+    """Return the place of a leaf among the leaves that are floats."""
     del moving
     leaves = jax.tree.leaves(parameters)[:leaf]
     return sum(eqx.is_inexact_array(x) for x in leaves)

@@ -7,38 +7,44 @@ import numpy as np
 
 
 class BranchSettings(eqx.Module):
-    """Accuracy and step control.
+    """Accuracy and step control of a branch.
 
     Lengths along a branch are measured with the parameter in units of the width of its
     bounds, and the state in units of `problem.scale`, root mean square over its
     components: a step of 0.01 is a hundredth of the bounds.
+
+    Examples:
+        >>> import continuation
+        >>> continuation.BranchSettings(max_step=0.02).max_step
+        0.02
     """
 
     tolerance: float = 1e-10
     """Corrections smaller than this, relative to the scales, end Newton's iteration;
-    its error is then about the square of that."""
+    the remaining error is about the square of that."""
     max_iterations: int = 8
-    """Of the corrector; more means a smaller step."""
+    """Largest number of corrector iterations; more means a smaller step."""
     iterations: int = 4
-    """The number aimed at by the step control."""
+    """Number of corrector iterations that the step control aims at."""
     step: float = 0.01
-    """First, smallest and largest step."""
+    """First step."""
     min_step: float = 1e-8
-    """First, smallest and largest step."""
+    """Smallest step."""
     max_step: float = 0.05
-    """First, smallest and largest step."""
+    """Largest step."""
     angle: float = 0.1
-    """rad, change of direction per step aimed at, and refused."""
+    """Change of direction per step that the step control aims at (rad)."""
     max_angle: float = 0.35
-    """rad, change of direction per step aimed at, and refused."""
+    """Change of direction at which a step is refused (rad)."""
     max_points: int = 1000
-    """Ordinary points on a branch."""
+    """Largest number of ordinary points on a branch."""
     special: bool = True
-    """Locate and report special points."""
+    """Whether to locate and report special points."""
     localise: str = "auto"
-    """`"newton"` on the extended system, which takes second derivatives of the
-    residual; or `"bracket"`, which takes none and encloses the point between points of
-    the branch; or `"auto"`, the second where `problem.costly` says so."""
+    """How special points are located. `"newton"` solves the extended system, which
+    takes second derivatives of the residual; `"bracket"` takes none and encloses the
+    point between points of the branch; `"auto"` is `"bracket"` where `problem.costly`
+    is set, otherwise `"newton"`."""
 
     def __check_init__(self):
         if not 0 < self.tolerance < 1e-2:

@@ -1,4 +1,4 @@
-"""What may be handed to `follow` instead of a problem."""
+"""Convert the systems that `follow` accepts instead of a problem."""
 
 from typing import Any
 

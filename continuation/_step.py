@@ -16,7 +16,7 @@ from .step_control import Refusal, way_between
 
 
 class StepAttempt(NamedTuple):
-    """What came of a step."""
+    """The outcome of a step."""
 
     at: Corrected | None
     """None where it is not taken."""

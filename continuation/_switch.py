@@ -19,11 +19,11 @@ from .special import BRANCH_POINT, FLIP, HOPF, second
 
 
 def emanating(point: Point, where: Where, width: float = 1.0) -> tuple[Start, ...]:
-    """Where to begin the branches that leave a special point, besides its own.
+    """Return the starts of the other branches that leave a special point.
 
     From a branch point: both halves of the other branch, whose direction solves the
-    algebraic branching equation (3.37). From a flip: the doubled orbit. From a Hopf
-    point of an [`continuation.Equilibrium`][]: the limit cycle.
+    algebraic branching equation (thesis, eq. 3.37). From a flip: the doubled orbit.
+    From a Hopf point of an [`continuation.Equilibrium`][]: the limit cycle.
 
     **Arguments:** `width`: of the bounds of the parameter, the unit of its directions.
 
@@ -60,17 +60,30 @@ def switch(
     *,
     settings: BranchSettings | None = None,
 ) -> tuple[Branch, ...]:
-    """Follow all branches that leave a special point, besides its own.
+    """Follow all other branches that leave a special point.
 
-    **Arguments:** `point`: a branch point, a flip or a Hopf point of a branch; the rest
-    as of [`continuation.follow`][].
+    Args:
+        point: A branch point, a flip or a Hopf point of a branch.
+        where: Picks the parameter, as for [`continuation.follow`][].
+        bounds: (lowest, highest) value of the parameter.
+        algorithm: Default [`continuation.PseudoArclength`][].
+        settings: Accuracy and step control.
 
     Returns:
         Two branches from a branch point, one from a flip or a Hopf point. The two are
             the same closed curve in both directions where they meet again.
 
     Raises:
-        ValueError: For a point from which no branch is known to leave.
+        ValueError: No branch is known to leave the point.
+
+    Examples:
+        >>> import continuation
+        >>> f = lambda u, p: p["a"] * u * (1 - u)
+        >>> logistic = continuation.FixedPoint(f, {"a": 2.0})
+        >>> found = continuation.branch(logistic, [0.5], "a", (1.5, 3.3))
+        >>> doubled = continuation.switch(found.of_kind("flip")[0], "a", (1.5, 3.3))
+        >>> doubled[0].points[-1].stable
+        True
     """
     starts = emanating(point, where, float(bounds[1] - bounds[0]))
     return tuple(
@@ -95,7 +108,9 @@ def _quadratic(problem: AbstractProblem, leaf: int, z, basis, left):
 def other_direction(
     problem: AbstractProblem, context: Context, point: Point
 ) -> np.ndarray:
-    """(n+1,) direction of the branch that crosses at a simple branch point, (3.37)."""
+    """(n+1,) direction of the branch that crosses at a simple branch point, (thesis,
+    eq. 3.37).
+    """
     z = np.append(point.state, point.parameter)
     at = evaluate(problem, context, z, point.tangent)
     left, _, rows = np.linalg.svd(at.jacobian * at.scale[None, :])

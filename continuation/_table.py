@@ -14,16 +14,24 @@ def table(
     components: int = 3,
     shown: tuple[str, float] | None = None,
 ) -> rich.table.Table:
-    """Special points, ends and every so manieth ordinary point of a branch.
+    """Return a table of special points, ends and some ordinary points of a branch.
 
     Args:
+        branch: The branch.
         every: Show each ordinary point whose label it divides; 0 shows none.
-        components: How many of the state.
-        shown: Head of the parameter's column and a factor, where it is shown in another
+        components: Number of state components to show.
+        shown: Heading of the parameter's column and a factor, to show it in another
             unit: `("speed (rpm)", 30 / math.pi)`.
 
     Returns:
         A table that `rich.print` shows.
+
+    Examples:
+        >>> import continuation
+        >>> problem = continuation.Equilibrium(lambda u, p: p["a"] - u**2, {"a": 1.0})
+        >>> found = continuation.branch(problem, [1.0], "a", (-1, 2), direction=-1)
+        >>> continuation.table(found).row_count
+        3
     """
     found = rich.table.Table()
     names = branch.names or (branch.name,)
@@ -64,9 +72,20 @@ def _row(point: Point, parameters: int, n: int, factor: float) -> list[str]:
 
 
 class PointPrinter:
-    """A callback that prints a line for each point that is worth one.
+    """A callback that prints one line for each special point and each end.
 
-    **Arguments:** `every`: also each ordinary point whose label it divides.
+    With `every`, each ordinary point whose label it divides is printed too.
+
+    Examples:
+        >>> import continuation
+        >>> from rich.console import Console
+        >>> problem = continuation.Equilibrium(lambda u, p: p["a"] - u**2, {"a": 1.0})
+        >>> printer = continuation.PointPrinter(console=Console(quiet=True))
+        >>> found = continuation.branch(
+        ...     problem, [1.0], "a", (0.5, 2), callbacks=[printer]
+        ... )
+        >>> found.points[-1].kind
+        'end'
     """
 
     def __init__(self, every: int = 0, console: rich.console.Console | None = None):

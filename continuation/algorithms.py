@@ -11,31 +11,47 @@ from .step_control import AbstractStepControl, EffortAndAngle
 
 
 class AbstractAlgorithm(eqx.Module):
-    """A predictor, the equation that closes the corrector's system, and what controls
-    the steps."""
+    """A predictor, the closing equation of the corrector, and the step control."""
 
     predictor: eqx.AbstractVar[AbstractPredictor]
+    """Extrapolates the branch."""
     control: eqx.AbstractVar[AbstractStepControl]
+    """Step control."""
     least_norm: eqx.AbstractClassVar[bool]
     """Whether the corrector takes the shortest corrections instead of a fixed plane."""
 
     @abc.abstractmethod
     def normal(self, tangent: Float[Any, " n+1"]) -> Float[Any, " n+1"]:
-        """Normal of the corrector's plane, given the tangent; both scaled. NumPy
-        arrays, or traced ones in a batch."""
+        """Return the normal of the corrector's plane, given the tangent; both scaled.
+
+        Args:
+            tangent: Tangent of the branch, `(n+1,)`; NumPy, or traced in a batch.
+
+        Returns:
+            Shape `(n+1,)`.
+        """
 
 
 class Natural(AbstractAlgorithm):
-    """Corrections leave one component alone (the thesis, 3.4.3, 1)."""
+    """Natural continuation: corrections leave one component unchanged.
+
+    See the thesis, section 3.4.3, 1.
+
+    Examples:
+        >>> import continuation
+        >>> continuation.Natural().component
+        'parameter'
+    """
 
     predictor: AbstractPredictor = Extrapolation()
-    """By default the linear extrapolation (3.40)."""
+    """Default the linear extrapolation (thesis, eq. 3.40)."""
     control: AbstractStepControl = EffortAndAngle()
-    """Of the steps, by effort and angle."""
+    """Step control; default by effort and angle."""
     component: str = eqx.field(static=True, default="parameter")
-    """`"parameter"`, which stops at folds; or `"fastest"`: the component that changes
+    """`"parameter"`, which stops at folds; or `"fastest"`, the component that changes
     most, chosen at each step, which passes them."""
     least_norm: ClassVar[bool] = False
+    """Corrections leave the component unchanged."""
 
     def __check_init__(self):
         if self.component not in ("parameter", "fastest"):
@@ -51,26 +67,44 @@ class Natural(AbstractAlgorithm):
 
 
 class PseudoArclength(AbstractAlgorithm):
-    """Corrections are orthogonal to the tangent (3.4.3, 2); passes folds."""
+    """Pseudo-arclength predictor-corrector; passes folds (thesis, section 3.4.3, 2).
+
+    Examples:
+        >>> import continuation
+        >>> from continuation.predictors import Secant
+        >>> continuation.PseudoArclength(predictor=Secant()).predictor.stations
+        2
+    """
 
     predictor: AbstractPredictor = TangentPredictor()
+    """Extrapolates the branch; default along the tangent."""
     control: AbstractStepControl = EffortAndAngle()
+    """Step control; default by effort and angle."""
     least_norm: ClassVar[bool] = False
+    """Corrections are orthogonal to the tangent."""
 
     def normal(self, tangent):
         return tangent
 
 
 class MoorePenrose(AbstractAlgorithm):
-    """Corrections are the shortest ones, by the Moore-Penrose inverse (3.4.3, 3).
+    """Predictor-corrector with the shortest corrections, by the Moore-Penrose inverse.
 
-    The plane turns with the iterate, which is what recomputing the tangent in each
-    iteration does to first order.
+    The corrector's plane turns with the iterate, which to first order equals
+    recomputing the tangent in each iteration (thesis, section 3.4.3, 3).
+
+    Examples:
+        >>> import continuation
+        >>> continuation.MoorePenrose().least_norm
+        True
     """
 
     predictor: AbstractPredictor = TangentPredictor()
+    """Extrapolates the branch; default along the tangent."""
     control: AbstractStepControl = EffortAndAngle()
+    """Step control; default by effort and angle."""
     least_norm: ClassVar[bool] = True
+    """Corrections have the least norm."""
 
     def normal(self, tangent):
         return tangent

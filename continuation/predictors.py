@@ -21,10 +21,12 @@ class Station(NamedTuple):
 
 
 class AbstractPredictor(eqx.Module):
-    """Extrapolates a branch. The last of the stations is where it stands."""
+    """Extrapolates a branch from its last points (stations), of which the last is
+    current.
+    """
 
     stations: eqx.AbstractClassVar[int]
-    """Number of stations that are used where there are so many."""
+    """Number of points that are used where there are so many."""
 
     @abc.abstractmethod
     def __call__(self, stations: Sequence[Station], step: Any) -> Any:
@@ -33,18 +35,20 @@ class AbstractPredictor(eqx.Module):
 
 
 class TangentPredictor(AbstractPredictor):
-    """Along the tangent, (3.30) and (3.33)."""
+    """Extrapolate along the tangent (thesis, eqs. 3.30 and 3.33)."""
 
     stations: ClassVar[int] = 1
+    """Number of points that are used."""
 
     def __call__(self, stations: Sequence[Station], step: Any) -> Any:
         return stations[-1].y + step * stations[-1].tangent
 
 
 class Secant(AbstractPredictor):
-    """Along the line through the last two points."""
+    """Extrapolate along the line through the last two points."""
 
     stations: ClassVar[int] = 2
+    """Number of points that are used."""
 
     def __call__(self, stations: Sequence[Station], step: Any) -> Any:
         current = stations[-1]
@@ -55,9 +59,10 @@ class Secant(AbstractPredictor):
 
 
 class Extrapolation(AbstractPredictor):
-    """The step is one of the parameter, the state linear in it, (3.40)."""
+    """Step in the parameter, with the state linear in it (thesis, eq. 3.40)."""
 
     stations: ClassVar[int] = 2
+    """Number of points that are used."""
 
     def __call__(self, stations: Sequence[Station], step: Any) -> Any:
         current = stations[-1]
@@ -72,13 +77,19 @@ class Extrapolation(AbstractPredictor):
 
 
 class PolynomialPredictor(AbstractPredictor):
-    """Polynomial in arclength through the last points, and the last tangent.
+    """Extrapolate by a polynomial in arclength through the last points and the last
+    tangent.
 
-    **Arguments:** `order`: degree, from 2 up; lower as long as points are missing.
+    Examples:
+        >>> import continuation
+        >>> continuation.PolynomialPredictor(order=4).order
+        4
     """
 
     order: int = eqx.field(static=True, default=3)
+    """Degree, at least 2; lower while points are missing."""
     stations: ClassVar[int] = 8
+    """Number of points that are used."""
 
     def __check_init__(self):
         if not 2 <= self.order <= self.stations:

@@ -1,4 +1,4 @@
-"""What is followed: a residual, its kind of stability, and what to watch on the way."""
+"""Define a problem: a residual, its kind of stability, and monitors."""
 
 import abc
 from collections.abc import Callable, Mapping
@@ -19,54 +19,67 @@ StabilityKind = Literal["equilibrium", "map", "none"]
 
 
 class Monitor(eqx.Module):
-    """A test function that a problem adds, and what its zero means."""
+    """A test function that a problem adds, and the meaning of its zero.
+
+    Examples:
+        >>> import continuation
+        >>> continuation.Monitor("grazing", ends=True).kind
+        'grazing'
+    """
 
     kind: str = eqx.field(static=True)
     """Name of the special point at its zero, such as `"grazing"`."""
     ends: bool = eqx.field(static=True, default=False)
-    """The branch of this problem ends there. `AbstractProblem.transition` is then asked
-    for another problem to go on with. The zero of such a monitor is also looked for
-    ahead of the last point, when a step fails or its result is refused; so the monitor
-    may cease to exist, or not change sign, behind its zero. It must have a nonzero
-    slope on the near side."""
+    """Whether the branch of this problem ends there. `AbstractProblem.transition` is
+    then asked for another problem with which to continue. The zero of such a monitor is
+    also sought ahead of the last point, when a step fails or its result is refused; so
+    the monitor may cease to exist, or not change sign, beyond its zero. It must have a
+    nonzero slope on the near side."""
     bracket: bool = eqx.field(static=True, default=False)
-    """Its zero is enclosed by points of the branch instead of solved for by Newton's
-    method; for values whose derivative is costly to compile."""
+    """Whether its zero is enclosed by points of the branch instead of solved for by
+    Newton's method; for values whose derivative is costly to compile."""
     vanishing: tuple[str, ...] = eqx.field(static=True, default=())
-    """Names of monitors that are zero wherever this one is, and say nothing more there.
-    """
+    """Names of monitors that are zero wherever this one is, and are ignored there."""
 
 
 class LocalDynamics(NamedTuple):
     """The vector field or map around a solution whose eigenvalues are the problem's."""
 
     at: Array
-    """(k,) where the solution is."""
+    """The solution, shape `(k,)`."""
     motion: Callable[[Float[Array, " k"]], Float[Array, " k"]] | None
-    """Maps (k,) to (k,) and can be differentiated three times; None: only its Jacobian
-    is known, and higher derivatives come from central differences of that."""
+    """The map or vector field, `(k,)` to `(k,)`, differentiable three times. None: only
+    its Jacobian is known, and higher derivatives come from central differences."""
     jacobian: Callable[[Float[Array, " k"]], Float[Array, "k k"]]
-    """Maps (k,) to (k, k)."""
+    """Its Jacobian, `(k,)` to `(k, k)`."""
 
 
 class Start(eqx.Module):
-    """Where to begin a branch, and with which problem."""
+    """The start of a branch: a problem, a state, and optionally a direction.
+
+    Examples:
+        >>> import continuation
+        >>> problem = continuation.Equilibrium(lambda u, p: p["a"] - u**2, {"a": 1.0})
+        >>> start = continuation.Start(problem, np.ones(1), parameter=1.0)
+        >>> next(continuation.follow(problem, start, "a", (-1, 2))).parameter
+        1.0
+    """
 
     problem: "AbstractProblem"
-    """What is to be followed."""
+    """The problem to follow."""
     state: np.ndarray
-    """(n,) state, on the branch or near it."""
+    """State on the branch or near it, shape `(n,)`."""
     parameter: float | None = None
-    """Value of the parameter; None: the one that `problem.parameters` has."""
+    """Value of the parameter; default the one of `problem.parameters`."""
     tangent: np.ndarray | None = None
-    """(n+1,) direction (state, parameter) in which the branch leaves; its length is
+    """Direction (state, parameter) in which the branch leaves, `(n+1,)`; its length is
     immaterial. The first point is sought in the plane across it, so a branch that
-    leaves a branch point is found and not the one that was known. None: along the
-    branch through `state`, in the direction asked for."""
+    leaves a branch point is found and not the known one. Default: along the branch
+    through `state`, in the requested direction."""
     step: float | None = None
-    """First step; None: as the settings say."""
+    """First step; default that of the settings."""
     reason: str = eqx.field(static=True, default="")
-    """What is to be known about the first point."""
+    """A remark on the first point."""
 
 
 class AbstractProblem(eqx.Module):
@@ -102,32 +115,54 @@ class AbstractProblem(eqx.Module):
 
     Curves in two parameters need nothing more: the core extends the problem with
     the condition `linearisation is singular` or `monitor = 0`.
+
+    Examples:
+        >>> import continuation
+        >>> class Parabola(continuation.AbstractProblem):
+        ...     parameters: dict
+        ...     stability = "equilibrium"
+        ...     def residual(self, u, parameters):
+        ...         return parameters["a"] - u**2
+        >>> problem = Parabola({"a": 1.0})
+        >>> found = continuation.branch(problem, [1.0], "a", (-1, 2), direction=-1)
+        >>> found.special[0].kind
+        'fold'
     """
 
     parameters: eqx.AbstractVar[PyTree]
+    """Any pytree with scalar floats among its leaves."""
     stability: eqx.AbstractClassVar[StabilityKind]
+    """`"equilibrium"`, `"map"` or `"none"`."""
     normal_forms: ClassVar[bool] = True
-    """Whether `local_dynamics` is there, for the coefficients of normal forms."""
+    """Whether `local_dynamics` is available, for the coefficients of normal forms."""
     costly: ClassVar[bool] = False
     """Whether second derivatives of `residual` take long to compile, so that special
-    points are better enclosed than solved for; `local_dynamics` has only a Jacobian."""
+    points are rather enclosed than solved for; `local_dynamics` then has only a
+    Jacobian."""
     detects: ClassVar[bool] = True
-    """Whether folds, branch points and those of `stability` are sought."""
+    """Whether folds, branch points and bifurcations of `stability` are sought."""
 
     # -- equations
 
     @abc.abstractmethod
     def residual(self, u: Float[Array, " n"], parameters: PyTree) -> Float[Array, " n"]:
-        """G(u, parameters), zero on the branch."""
+        """Return G(u, parameters), zero on the branch.
+
+        Returns:
+            Shape `(n,)`.
+        """
 
     def linearisation(
         self, u: Float[Array, " n"], parameters: PyTree, jacobian: Float[Array, "n n"]
     ) -> Float[Array, "k k"]:
-        """Matrix whose eigenvalues decide stability; `jacobian` is dG/du at the point.
+        """Return the matrix whose eigenvalues decide stability.
 
         By default dG/du for equilibria, and dG/du + I for maps, right for G = f(u) - u.
         Multiple shooting overrides this with the monodromy matrix, autonomous orbits
         with that of the map on a section (no trivial multiplier).
+
+        Returns:
+            Shape `(k, k)`.
         """
         del u, parameters
         if self.stability == "map":
@@ -137,10 +172,18 @@ class AbstractProblem(eqx.Module):
     def derivatives(
         self, u: Float[Array, " n"], p: Float[Array, ""], parameters_at: Callable
     ) -> tuple[Float[Array, "n n+1"], Float[Array, "k k"]]:
-        """Derivative of the residual by u and the parameter, and `linearisation`.
+        """Return the derivative of the residual by u and the parameter, and
+        `linearisation`.
 
-        `parameters_at(p)` are the parameters with the value p of the one that varies.
-        To be overridden where the two share work.
+        Override it where the two share work.
+
+        Args:
+            p: Value of the parameter.
+            parameters_at: `parameters_at(p)` are the parameters with the value p of the
+                one that varies.
+
+        Returns:
+            Shapes `(n, n+1)` and `(k, k)`.
         """
         whole = jax.jacfwd(lambda z: self.residual(z[:-1], parameters_at(z[-1])))(
             jnp.append(u, p)
@@ -150,12 +193,15 @@ class AbstractProblem(eqx.Module):
     def local_dynamics(
         self, u: Float[Array, " n"], parameters: PyTree
     ) -> LocalDynamics:
-        """The vector field or map around a solution.
+        """Return the vector field or map around a solution.
 
         Normal-form coefficients come from its first three derivatives; its eigenvalues
         must be those of `linearisation`, and any number of others off the imaginary
         axis or the unit circle. By default G, or G + u for maps. Override it together
         with `linearisation`, or set `normal_forms` to False.
+
+        Returns:
+            A `LocalDynamics`.
         """
 
         def motion(y):
@@ -165,8 +211,13 @@ class AbstractProblem(eqx.Module):
         return LocalDynamics(u, motion, jax.jacfwd(motion))
 
     def scale(self, u: Float[Array, " n"], parameters: PyTree) -> Float[Array, " n"]:
-        """(n,) sizes of the components of u, by which lengths along a branch are
-        measured. By default 1, or the root mean square of u where that is more."""
+        """Return the scales of the components of u, by which lengths are measured.
+
+        By default 1, or the root mean square of u where that is more.
+
+        Returns:
+            Shape `(n,)`.
+        """
         del parameters
         size = jnp.maximum(1.0, jnp.sqrt(jnp.mean(u * u)))
         return jnp.broadcast_to(size, u.shape)
@@ -174,25 +225,37 @@ class AbstractProblem(eqx.Module):
     # -- what is watched
 
     def monitors(self) -> Mapping[str, Monitor]:
-        """Test functions of this problem by name; may depend on its structure only."""
+        """Return the test functions of this problem by name; may depend on its
+        structure only.
+
+        Returns:
+            Monitors by name.
+        """
         return {}
 
     def seen(
         self, u: Float[Array, " n"], parameters: PyTree
     ) -> tuple[dict[str, Array], dict[str, Array]]:
-        """Values of the test functions that `monitors` names, and further quantities to
-        keep with each point (`point.observed`)."""
+        """Return the values of the test functions, and further quantities to keep.
+
+        Returns:
+            The values by the names in `monitors`, and the quantities kept in
+                `point.observed`.
+        """
         del u, parameters
         return {}, {}
 
     def watched(
         self, number: int | Int[Array, ""], u: Float[Array, " n"], parameters: PyTree
     ) -> Float[Array, ""]:
-        """One of the monitors alone, by its place in `monitors`.
+        """Return one of the monitors alone, by its place in `monitors`.
 
         A traced number lets one program find the zeros of all of them. Where one of
-        them has `bracket`, numbers are integers. To be overridden where this is less
+        them has `bracket`, numbers are integers. Override it where this is less
         work than `seen`.
+
+        Returns:
+            A scalar.
         """
         values, _ = self.seen(u, parameters)
         return jnp.stack([values[name] for name in self.monitors()])[number]
@@ -200,31 +263,44 @@ class AbstractProblem(eqx.Module):
     # -- between compiled programs
 
     def check(self, point: Any) -> str | None:
-        """None where the point is admissible, else the reason why not, in words."""
+        """Return None where the point is admissible, else the reason why not, in words.
+
+        Returns:
+            A sentence, or None.
+        """
         del point
         return None
 
     def transition(self, point: Any, at: Any) -> Start | None:
-        """How to go on from a special point with another problem.
+        """Return the problem with which to continue from a special point.
 
-        Asked for the zero of a monitor that ends this problem: what lies behind it
-        (same `parameters`). Asked when a branch is switched at a flip: a problem whose
-        solutions include this orbit run through twice, its state, and the tangent
-        (direction of the eigenvector of -1, parameter component 0); at a Hopf point:
-        the limit cycle born there. None where there is nothing.
+        It is called for the zero of a monitor that ends this problem: return the
+        problem beyond it (same `parameters`). It is called when a branch is switched at
+        a flip: return a problem whose solutions include this orbit run through twice,
+        its state, and the tangent (direction of the eigenvector of -1, parameter
+        component 0); at a Hopf point: the limit cycle that emerges there.
 
-        **Arguments:** the [`continuation.Point`][], and what the corrector knows of it:
-        `at.linearisation`, `at.jacobian`, `at.monitors`.
+        Args:
+            point: The [`continuation.Point`][].
+            at: The corrector's matrices and values at it: `at.linearisation`,
+                `at.jacobian`, `at.monitors`.
+
+        Returns:
+            A `Start`, or None where there is no continuation.
         """
         del point, at
         return None
 
     def refreshed(self, u: np.ndarray, parameters: PyTree) -> "AbstractProblem":
-        """The same problem with its internal references (borders, phase conditions)
-        taken from this point. Must depend on the point only, not on the way there, so
-        that a branch taken up again is the identical branch; only signs may be chosen
-        by those before, and must be, where test functions depend on them. Structure and
-        shapes stay.
+        """Return the same problem with its internal references taken from this point.
+
+        References are borders and phase conditions. They must depend on the point only,
+        not on the way there, so that a resumed branch is the identical branch; only
+        signs may be chosen by those before, and must be, where test functions depend on
+        them. Structure and shapes stay.
+
+        Returns:
+            A problem.
         """
         del u, parameters
         return self
@@ -232,26 +308,39 @@ class AbstractProblem(eqx.Module):
     def eigenvalues(
         self, u: np.ndarray, parameters: PyTree, at: Any
     ) -> tuple[Any, str]:
-        """Eigenvalues of `at.linearisation`, (k,) complex, the largest modulus first,
-        and what is to be known of them, else the empty string.
+        """Return the eigenvalues of `at.linearisation`, and a remark on them.
 
-        To be overridden where the matrix is unbounded at some points, with the limits.
+        Override it where the matrix is unbounded at some points, with the limits.
+
+        Args:
+            at: The corrector's matrices and values.
+
+        Returns:
+            Eigenvalues `(k,)`, complex, largest modulus first; and a sentence, or the
+                empty string.
         """
         del u, parameters
         return eigenvalues_of(at.linearisation), ""
 
     @property
     def representation(self) -> AbstractRepresentation:
-        """The ways in which a solution can be written down."""
+        """The ways in which a solution can be represented."""
         return Unique(self.signature)
 
     @property
     def signature(self) -> str:
-        """What is not array about this problem, as text; saved with every point."""
+        """The non-array part of this problem, as text; saved with every point."""
         return ""
 
     def with_signature(self, signature: str) -> "AbstractProblem":
-        """The problem that has this signature, to take up a saved branch."""
+        """Return the problem that has this signature, to resume a saved branch.
+
+        Returns:
+            A problem.
+
+        Raises:
+            ValueError: The signature is not one of this problem.
+        """
         if signature != self.signature:
             raise ValueError(
                 f"the saved branch has signature {signature!r}, this problem "

@@ -8,10 +8,10 @@ from jaxtyping import Float, PyTree
 
 
 class AbstractRepresentation(eqx.Module):
-    """How the solutions of a problem are told apart, and which are the same.
+    """Representations of the solutions of a problem, to detect equal ones.
 
     A periodic orbit can begin at several of its points, and phases count from any whole
-    turn. Called between compiled programs, with NumPy arrays.
+    period. Called between compiled programs, with NumPy arrays.
     """
 
     family: eqx.AbstractVar[str]
@@ -21,10 +21,14 @@ class AbstractRepresentation(eqx.Module):
     def copies(
         self, u: np.ndarray, tangent: np.ndarray
     ) -> list[tuple[str, np.ndarray, np.ndarray]]:
-        """All ways to write this solution down, the first of them as it is.
+        """Return all representations of this solution, the first of them unchanged.
+
+        Args:
+            u: Unknowns of the equations, shape `(u,)`.
+            tangent: Tangent of the branch, `(n,)`.
 
         Returns:
-            Family, state and tangent of each, both (n,). A branch that meets any of
+            Family, state and tangent of each, both `(n,)`. A branch that meets any of
                 them again is closed.
         """
 
@@ -32,13 +36,29 @@ class AbstractRepresentation(eqx.Module):
     def brought_near(
         self, states: Float[np.ndarray, "k n"], u: np.ndarray
     ) -> Float[np.ndarray, "k n"]:
-        """The same solutions, as near `u` as can be: phases and angles may differ by
-        whole turns."""
+        """Return the same solutions with phases and angles moved by whole turns,
+        nearest to `u`.
+
+        Args:
+            states: Solutions, `(k, n)`.
+            u: Unknowns of the equations, shape `(u,)`.
+
+        Returns:
+            Shape `(k, n)`.
+        """
 
     @abc.abstractmethod
     def half_away(self, u: np.ndarray, parameters: PyTree) -> float | None:
-        """How far a periodic orbit is from one of half the period run through twice,
-        in lengths of steps; None where the problem has no such solutions."""
+        """Return the distance of a periodic orbit from one of half the period run
+        through twice.
+
+        Args:
+            u: Unknowns of the equations, shape `(u,)`.
+            parameters: Parameters of the problem.
+
+        Returns:
+            The distance in step lengths; None where the problem has no such solutions.
+        """
 
 
 class Unique(AbstractRepresentation):

@@ -1,4 +1,4 @@
-"""Which steps are taken, and how long the next one is."""
+"""Accept or refuse steps, and choose the length of the next one."""
 
 import abc
 import enum
@@ -11,7 +11,7 @@ from ._settings import BranchSettings
 
 
 class Refusal(enum.StrEnum):
-    """Why a step is not taken, as the end of a sentence."""
+    """Reasons why a step is refused, as the end of a sentence."""
 
     NOT_CONVERGED = "the corrector did not converge"
     FARTHER = "the corrector went farther than the step was long"
@@ -19,33 +19,54 @@ class Refusal(enum.StrEnum):
 
 
 class Way(NamedTuple):
-    """What a step has been like. NumPy's numbers, or traced ones in a batch."""
+    """Measures of a step: NumPy numbers, or traced ones in a batch."""
 
     iterations: Any
-    """Of the corrector."""
+    """Number of corrector iterations."""
     correction: Any
-    """Length of its correction."""
+    """Length of the correction."""
     angle: Any
-    """Between the tangents at both ends, rad."""
+    """Angle between the tangents at both ends (rad)."""
 
 
 class AbstractStepControl(eqx.Module):
-    """Judges steps; the same arithmetic serves a branch and a batch of branches."""
+    """Accepts or refuses steps and chooses their lengths, for a branch or a batch."""
 
     @abc.abstractmethod
     def refusals(
         self, way: Way, step: Any, settings: BranchSettings
     ) -> dict[Refusal, Bool[Any, ""]]:
-        """For each reason to refuse a step whether it holds; the first is reported."""
+        """Return for each reason to refuse a step whether it holds; the first is
+        reported.
+
+        Args:
+            way: Measures of the step.
+            step: Its length.
+            settings: Accuracy and step control.
+
+        Returns:
+            A flag by `Refusal`.
+        """
 
     @abc.abstractmethod
     def next_step(self, way: Way, step: Any, settings: BranchSettings) -> Any:
-        """Length of the step that follows one that is taken."""
+        """Return the length of the step that follows an accepted one.
+
+        Args:
+            way: Measures of the step.
+            step: Its length.
+            settings: Accuracy and step control.
+
+        Returns:
+            The next length.
+        """
 
 
 class EffortAndAngle(AbstractStepControl):
-    """Longer steps where the corrector is quick and the branch straight (the thesis,
-    3.4.4)."""
+    """Lengthen steps where the corrector is quick and the branch straight.
+
+    See the thesis, section 3.4.4.
+    """
 
     def refusals(self, way: Way, step: Any, settings: BranchSettings):
         return {

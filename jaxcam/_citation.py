@@ -37,20 +37,24 @@ _TOPICS: dict[str, tuple[str, ...]] = {
 
 
 def citation(*names: str) -> str:
-    """BibTeX entries of the methods that were used.
+    """Return BibTeX entries of the methods that were used.
 
     `print(jaxcam.citation())` gives the entry of this package and, in lines that BibTeX
-    ignores, the topics to ask for; `jaxcam.citation("chatter", "saltation")` gives
+    ignores, the available topics; `jaxcam.citation("chatter", "saltation")` gives
     their entries, each of them once.
 
-    **Arguments:** topics, or keys of single entries ("nordmark1991"); capitals do not
-    matter.
+    Args:
+        *names: Topics, or keys of single entries ("nordmark1991"); case-insensitive.
 
     Returns:
         Text to append to a `.bib` file.
 
     Raises:
-        ValueError: For an unknown name, with the names there are.
+        ValueError: A name is unknown; the message lists the known ones.
+
+    Examples:
+        >>> "alzate2008" in jaxcam.citation("thesis")
+        True
     """
     if not names:
         lines = ["% Methods, by topic: jaxcam.citation(topic, ...)"]

@@ -14,28 +14,33 @@ from ._tangent_lanes import orthonormal
 
 
 class CovariantVectors(eqx.Module):
-    """Directions at the start of each turn, the fastest growing first.
+    """Covariant directions at the start of each period, fastest growing first.
 
-    What `vectors[k, :, j]` is after a turn points along `vectors[k + 1, :, j]`.
+    One period maps `vectors[k, :, j]` to a multiple of `vectors[k + 1, :, j]`.
     """
 
     state: Float[Array, "turns n"]
-    """(turns, n) states at the start of each turn."""
+    """State at the start of each period, shape `(turns, n)`."""
     vectors: Float[Array, "turns n n"]
-    """(turns, n, n) a unit vector in each column; NaN where the motion ever sticks."""
+    """Unit vectors, one per column, shape `(turns, n, n)`; NaN where the motion ever
+    sticks."""
     local: Float[Array, "turns n"]
-    """(turns, n) 1/s, how fast each grew in the turn."""
+    """Growth rate of each vector in the period (1/s), shape `(turns, n)`."""
     code: Array
-    """0 where every turn was finished, else an index into `RESULTS`."""
+    """0 where every period was finished, else an index into `RESULTS`."""
 
     @property
     def exponents(self) -> Float[Array, " n"]:
-        """Their mean growth (1/s), which are the Lyapunov exponents."""
+        """The mean growth rates (1/s), which are the Lyapunov exponents, shape
+        `(n,)`.
+        """
         return self.local.mean(axis=0)
 
     @property
     def angle(self) -> Float[Array, " turns"]:
-        """The smallest angle (rad) between two of them; 0 where a tangency is."""
+        """The smallest angle between two of the vectors (rad), shape `(turns,)`; 0 at a
+        tangency.
+        """
         size = jnp.abs(jnp.einsum("kij,kil->kjl", self.vectors, self.vectors))
         n = size.shape[-1]
         others = size * (1.0 - jnp.eye(n))[None]
@@ -51,30 +56,39 @@ def covariant_vectors(
     transient: int = 100,
     settings: Settings | None = None,
 ) -> CovariantVectors:
-    """The covariant Lyapunov vectors along a motion, impacts included.
+    """Compute the covariant Lyapunov vectors along a motion, impacts included.
 
-    Forwards, an orthonormal frame is carried by the derivative M of each turn,
-    M Q = Q' R; backwards, vectors are carried inside it by the inverses of the R, where
-    they turn to what they must have been (Ginelli et al., Physical Review Letters 99,
-    130601, 2007). For a periodic orbit they are the eigenvectors of the
-    monodromy matrix.
-
-    Pure; may be compiled and batched with `vmap` over states and parameters.
+    Forwards, an orthonormal frame is carried by the derivative M of each period, M Q =
+    Q' R; backwards, vectors are carried inside it by the inverses of the R, under which
+    they converge to the covariant directions (Ginelli et al., Physical Review Letters
+    99, 130601, 2007). For a periodic orbit they are the eigenvectors of the monodromy
+    matrix. The function is pure; it may be compiled and batched with `vmap` over states
+    and parameters.
 
     Args:
-        state: Shape `(n,)`, at time `t0` (s).
-        turns: How many are returned, after `transient` others, in which the motion
-            settles and the frame turns; as many follow, from which the vectors turn
-            back.
-        settings: Accuracy; a tolerance of 1e-12 by default.
+        system: The system.
+        state: State at `t0`, shape `(n,)`.
+        turns: Number of periods returned. `transient` others precede them, in which the
+            motion settles and the frame converges; as many follow, from which the
+            vectors converge backwards.
+        t0: Start time (s).
+        transient: Number of periods before and after those returned.
+        settings: Accuracy of the run; default a tolerance of 1e-12.
 
     Returns:
         A `CovariantVectors`. A motion that sticks forgets every deviation, so it has no
             such directions, and all of them are NaN.
 
     Raises:
-        ValueError: For a system without a period, or for numbers of turns that make no
-            sense.
+        ValueError: The system has no period, or a number of periods is invalid.
+
+    Examples:
+        >>> from jaxcam.models import ImpactOscillator
+        >>> from variational import covariant_vectors
+        >>> system = ImpactOscillator(omega=3.5, wall=-0.2, damping=0.02)
+        >>> start = jnp.array([-0.9, 0.0])
+        >>> covariant_vectors(system, start, turns=10, transient=10).vectors.shape
+        (10, 2, 2)
     """
     if system.period is None:
         raise ValueError(

@@ -1,4 +1,4 @@
-"""What happens to a deviation at an event: impact, entering contact, release."""
+"""Propagate a deviation through an event: impact, entering contact, release."""
 
 from collections.abc import Callable
 

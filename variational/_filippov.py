@@ -14,20 +14,34 @@ from jaxcam.filippov.modes import mode_field
 def filippov_saltation(
     system: FilippovSystem, t, state: Float[Array, " n"], before: int, after: int
 ) -> Float[Array, "n n"]:
-    """How a deviation just before a switch becomes one just after it.
+    """Return the saltation matrix of a switch of a Filippov system.
 
     With F- and F+ the fields in force before and after, at a crossing and where sliding
     begins,
 
         S = I + (F+ - F-) H_x / (H_t + H_x F-).
 
-    Where sliding begins its rank falls by one: the deviation is taken onto the surface.
-    Where sliding ends one field has become tangent, F+ = F-, and S is the identity. (R.
-    I. Leine, H. Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical Systems,
-    2004, chapter 7)
+    Where sliding begins its rank falls by one: the deviation is projected onto the
+    surface. Where sliding ends one field has become tangent, F+ = F-, and S is the
+    identity. (R. I. Leine, H. Nijmeijer, Dynamics and Bifurcations of Non-Smooth
+    Mechanical Systems, 2004, chapter 7)
 
-    **Arguments:** time (s) and state `(n,)` of the switch, and the modes before and
-    after it: 1 above, 0 sliding, -1 below.
+    Args:
+        system: The system.
+        t: Time of the switch (s).
+        state: State at the switch, shape `(n,)`.
+        before: Mode before the switch: 1 above, 0 sliding, -1 below.
+        after: Mode after the switch.
+
+    Returns:
+        Shape `(n, n)`.
+
+    Examples:
+        >>> from jaxcam.models import BeltOscillator
+        >>> from variational import filippov_saltation
+        >>> state = jnp.array([0.0, 0.2])
+        >>> filippov_saltation(BeltOscillator(), 0.0, state, -1, 0).shape
+        (2, 2)
     """
     t = jnp.asarray(t, dtype=float)
     old = mode_field(system, jnp.asarray(float(before)), t, state)
@@ -42,14 +56,26 @@ def filippov_saltation(
 
 
 def filippov_monodromy(trajectory: FilippovTrajectory) -> Float[Array, "n n"]:
-    """Derivative of the state at the end of a run by that at its start.
+    """Return the derivative of the state at the end of a run by that at its start.
 
-    The product of the flows' derivatives between switches and the saltation matrices at
-    them. Over one period of a periodic motion its eigenvalues are the multipliers; each
-    stretch of sliding leaves a zero among them. A start that slides is varied along the
-    surface only.
+    It is the product of the flows' derivatives between switches and the saltation
+    matrices at the switches. Over one period of a periodic motion its eigenvalues are
+    the Floquet multipliers; each stretch of sliding contributes a zero. A start that
+    slides is varied along the surface only.
 
-    **Arguments:** a run of `jaxcam.filippov.simulate_filippov`.
+    Args:
+        trajectory: A run of [`jaxcam.filippov.simulate_filippov`][].
+
+    Returns:
+        Shape `(n, n)`.
+
+    Examples:
+        >>> from jaxcam.filippov import simulate_filippov
+        >>> from jaxcam.models import BeltOscillator
+        >>> from variational import filippov_monodromy
+        >>> run = simulate_filippov(BeltOscillator(), jnp.array([1.0, 0.0]), 0.0, 1.0)
+        >>> filippov_monodromy(run).shape
+        (2, 2)
     """
     system, switches = trajectory.system, trajectory.switches
     modes = np.append(np.asarray(trajectory.mode)[0], np.asarray(switches.after))

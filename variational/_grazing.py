@@ -1,4 +1,4 @@
-"""What a grazing orbit becomes: discontinuity mappings and the square-root map.
+"""Derive the local map of a grazing orbit: discontinuity mappings and square-root map.
 
 At a graze the gap has a minimum of zero: H = v = 0 and a > 0. A neighbour whose gap
 would reach the depth d = -min H > 0 hits with the speed sqrt(2 a d), which the impact
@@ -43,31 +43,45 @@ class GrazingForm(eqx.Module):
     """The leading-order map of a neighbourhood of a grazing orbit.
 
     Deviations z, shape `(n,)`, are those of the state at the time of the graze, from
-    the orbit of the system as it is; mu, shape `(q,)`, is the change of the parameters.
+    the orbit of the unchanged system; mu, shape `(q,)`, is the change of the
+    parameters. The map is that of M. di Bernardo, C. J. Budd, A. R. Champneys, Physica
+    D 160, 2001.
+
+    Examples:
+        >>> from jaxcam.models import ImpactOscillator
+        >>> from variational import grazing_form, orbit_of
+        >>> system = ImpactOscillator(omega=2.0, damping=0.0, wall=0.334)
+        >>> form = grazing_form(system, orbit_of(system, [-1 / 3, 0.0]))
+        >>> form.step(jnp.zeros(2)).shape
+        (2,)
     """
 
     time: Float[Array, ""]
-    """S, and the state there: where the gap of the orbit is smallest."""
+    """Time at which the gap of the orbit is smallest (s)."""
     state: Float[Array, " n"]
+    """State at that time, shape `(n,)`."""
     clearance: Float[Array, ""]
-    """Gap at that point: zero at the graze, positive short of it."""
+    """Gap there: zero at the graze, positive short of it."""
     acceleration: Float[Array, ""]
-    """Acceleration of the gap there, positive, and coefficient of restitution."""
+    """Acceleration of the gap there, positive."""
     restitution: Float[Array, ""]
+    """Coefficient of restitution there."""
     normal: Float[Array, " n"]
-    """H_x and H_mu."""
+    """Gradient H_x of the gap, shape `(n,)`."""
     normal_parameters: Float[Array, " q"]
+    """Derivative H_mu of the gap by the parameters, shape `(q,)`."""
     zero_time: Float[Array, " n"]
-    """The vectors b of the zero-time mapping, and of the mapping of the section v = 0.
-    """
+    """The vector b of the zero-time discontinuity mapping, shape `(n,)`."""
     section: Float[Array, " n"]
+    """The vector b of the discontinuity mapping of the section v = 0, shape `(n,)`."""
     matrix: Float[Array, "n n"]
-    """N and N_mu: derivative of one period from `time` on, without the graze."""
+    """Derivative N of one period from `time` on, without the graze, shape `(n, n)`."""
     matrix_parameters: Float[Array, "n q"]
+    """Derivative N_mu of that period by the parameters, shape `(n, q)`."""
 
     @property
     def multipliers(self) -> Complex[Array, " n"]:
-        """Multipliers of the orbit as long as it does not touch."""
+        """Multipliers of the orbit as long as it does not touch, shape `(n,)`."""
         return eigenvalues(self.matrix)
 
     @property
@@ -76,27 +90,57 @@ class GrazingForm(eqx.Module):
         return self.normal @ self.matrix @ self.zero_time
 
     def depth(self, z: Float[Array, " n"], mu=None) -> Float[Array, ""]:
-        """How deep the gap of a deviation would go; negative without an impact."""
+        """Return the depth to which the gap of a deviation would go without an impact.
+
+        Args:
+            z: Deviation of the state, shape `(n,)`.
+            mu: Change of the parameters, shape `(q,)`; default none.
+
+        Returns:
+            The depth; negative without an impact.
+        """
         shift = 0.0 if mu is None else self.normal_parameters @ mu
         return -(self.clearance + self.normal @ z + shift)
 
     def discontinuity(self, z: Float[Array, " n"], mu=None) -> Float[Array, " n"]:
-        """The zero-time discontinuity mapping."""
+        """Apply the zero-time discontinuity mapping.
+
+        Args:
+            z: Deviation of the state, shape `(n,)`.
+            mu: Change of the parameters, shape `(q,)`; default none.
+
+        Returns:
+            Deviation after the mapping, shape `(n,)`.
+        """
         deep = self.depth(z, mu)
         hits = deep > 0
         root = jnp.sqrt(jnp.where(hits, deep, 1.0))
         return z + self.zero_time * jnp.where(hits, root, 0.0)
 
     def step(self, z: Float[Array, " n"], mu=None) -> Float[Array, " n"]:
-        """The local map: the impact, if any, and then one period of the flow."""
+        """Apply the local map: the impact, if any, and then one period of the flow.
+
+        Args:
+            z: Deviation of the state, shape `(n,)`.
+            mu: Change of the parameters, shape `(q,)`; default none.
+
+        Returns:
+            Deviation one period later, shape `(n,)`.
+        """
         moved = self.matrix @ self.discontinuity(z, mu)
         return moved if mu is None else moved + self.matrix_parameters @ mu
 
     def penetration(self, mu=None) -> Float[Array, ""]:
-        """The parameter mu of Nordmark's map, [`variational.nordmark_map`][].
+        """Return the parameter mu of Nordmark's map, [`variational.nordmark_map`][].
 
-        Depth of the orbit that would pass through the wall, over the square of the
-        coefficient. Only where the coefficient is positive.
+        It is the depth of the orbit that would pass through the wall, over the square
+        of the coefficient; defined only where the coefficient is positive.
+
+        Args:
+            mu: Change of the parameters, shape `(q,)`; default none.
+
+        Returns:
+            A scalar.
         """
         n = self.normal.shape[0]
         fixed = jnp.zeros(n)
@@ -113,16 +157,28 @@ def grazing_form(
     where: Where | None = None,
     constraint: int = 0,
 ) -> GrazingForm:
-    """The square-root map of an orbit that grazes a constraint, or almost does.
+    """Compute the square-root map of an orbit that grazes a constraint, or almost does.
 
     Args:
+        system: The system.
         orbit: A periodic orbit whose gap has a smooth minimum near zero; it may have
             other impacts.
-        where: Picks the parameters mu, one or a tuple; none without.
-        constraint: The one that is grazed.
+        where: Picks the parameters mu, one or a tuple; default none.
+        constraint: Index of the constraint that is grazed.
+
+    Returns:
+        A [`variational.GrazingForm`][].
 
     Raises:
-        ValueError: Where the smallest gap is at an impact or in contact.
+        ValueError: The smallest gap is at an impact or in contact.
+
+    Examples:
+        >>> from jaxcam.models import ImpactOscillator
+        >>> from variational import grazing_form, orbit_of
+        >>> system = ImpactOscillator(omega=2.0, damping=0.0, wall=0.334)
+        >>> orbit = orbit_of(system, [-1 / 3, 0.0])
+        >>> round(float(grazing_form(system, orbit).clearance), 6)
+        0.000667
     """
     system = as_arrays(system)
     time, state = _lowest(system, orbit, constraint)

@@ -22,27 +22,28 @@ from ._tangent_lanes import Carried, first_frames, next_rows, ROWS
 
 
 class LyapunovSpectrum(eqx.Module):
-    """Lyapunov exponents (1/s), one set for each lane where there are several."""
+    """Lyapunov exponents (1/s), one set per batch element if there are several."""
 
     exponents: Float[Array, "*lanes n"]
-    """(n,) or (lanes, n), the largest first."""
+    """Exponents, largest first, shape `(n,)` or `(lanes, n)`."""
     stderr: Float[Array, "*lanes n"]
-    """Standard error of each, from the scatter of blocks of consecutive turns."""
+    """Standard error of each, from the scatter of blocks of consecutive periods."""
     impact_rate: Float[Array, "*lanes"]
     """Impacts per second."""
     local: Float[Array, "*lanes turns n"]
-    """(turns, n) finite-time exponents, each over one turn."""
+    """Finite-time exponents, each over one period, shape `(turns, n)`."""
     state: Float[Array, "*lanes n"]
-    """(n,) state at the end, to go on from."""
+    """State at the end, from which to continue, shape `(n,)`."""
     turn: Float[Array, "*lanes"] | Float[Array, "1"]
-    """S, length of a turn; shape (1,) where it is the same for all lanes."""
+    """Length of a period (s); shape `(1,)` where it is the same for all batch elements.
+    """
     code: Array
-    """0 where every turn was finished, else an index into `RESULTS`; the exponents are
-    NaN there."""
+    """0 where every period was finished, else an index into `RESULTS`; the exponents
+    are NaN there."""
 
     @property
     def running(self) -> Float[Array, "*lanes turns n"]:
-        """The exponents over the first 1, 2, ... turns, to see them settle."""
+        """The exponents over the first 1, 2, ... periods, to check convergence."""
         number = self.local.shape[-2]
         count = jnp.arange(1.0, number + 1)[:, None]
         return jnp.cumsum(self.local, axis=-2) / jnp.broadcast_to(
@@ -65,31 +66,42 @@ def lyapunov_spectrum(
     max_steps: int = 10_000_000,
     progress: Callable[[float], None] | None = None,
 ) -> LyapunovSpectrum:
-    """All Lyapunov exponents, impacts included, by repeated orthogonalisation.
+    """Compute all Lyapunov exponents, impacts included, by repeated orthogonalisation.
 
-    The steps of a run are differentiated one by one, saltation matrices are put in at
-    its events, and the product is applied to a frame that is made orthonormal again and
+    The steps of a run are differentiated one by one, saltation matrices are inserted at
+    its events, and the product is applied to a frame that is orthonormalised again and
     again (Benettin et al., Meccanica 15, 1980; for impacts Mueller, Chaos, Solitons and
     Fractals 5, 1995).
 
     Args:
-        state: Shape `(n,)`, or `(lanes, n)` for many motions at once.
-        turns: How many are averaged, after `transient` others.
+        system: The system.
+        state: Initial state, shape `(n,)`, or `(lanes, n)` for many motions at once.
+        turns: Number of periods that are averaged, after the transient.
         t0: s.
-        turn: s, length of a turn; the forcing's period without.
-        where: `where(system)` picks one parameter, which takes `values[i]` in lane i.
-        values: `where(system)` picks one parameter, which takes `values[i]` in lane i.
-        settings: Accuracy; a tolerance of 1e-12 by default.
+        transient: Number of periods before the average.
+        turn: Length of a period (s); default the forcing's own.
+        where: Picks the parameter that differs between motions.
+        values: Value of that parameter in each motion, shape `(lanes,)`.
+        settings: Accuracy of the run; default a tolerance of 1e-12.
         blocks: Number of blocks for the standard error.
-        max_steps: Budget of attempted steps of a lane.
+        max_steps: Budget of attempted steps per motion.
         progress: Called with the part of the turns that is done.
 
     Returns:
         A `LyapunovSpectrum`. An exponent is minus infinity where the motion sticks,
-            because contact forgets what came before.
+            because contact forgets the past.
 
     Raises:
-        ValueError: Where shapes do not fit, or there is no period.
+        ValueError: Shapes do not fit, or there is no period.
+
+    Examples:
+        >>> from jaxcam.models import ImpactOscillator
+        >>> from variational import lyapunov_spectrum
+        >>> system = ImpactOscillator(omega=3.5, wall=-0.2, damping=0.02)
+        >>> start = jnp.array([-0.9, 0.0])
+        >>> found = lyapunov_spectrum(system, start, turns=50, transient=20)
+        >>> found.exponents.shape
+        (2,)
     """
     refuse_tracers(
         "lyapunov_spectrum",

@@ -5,12 +5,25 @@ from jaxtyping import Array, ArrayLike, Float
 
 
 def nordmark_map(x: ArrayLike, mu: ArrayLike, lam: ArrayLike) -> Float[Array, "..."]:
-    """sqrt(mu - x) + lam mu where x <= mu, and lam x elsewhere.
+    """Return sqrt(mu - x) + lam mu where x <= mu, and lam x elsewhere.
 
-    What remains of [`variational.GrazingForm`][] where one multiplier `lam` in (0, 1)
-    outlives the others: x is the gap at the graze less that of the orbit that would
+    This is the limit of [`variational.GrazingForm`][] where one multiplier `lam` in (0,
+    1) dominates the others: x is the gap at the graze less that of the orbit that would
     pass through the wall, and mu its depth, both over the square of the coefficient
     (Nordmark, Journal of Sound and Vibration 145, 1991).
+
+    Args:
+        x: Scaled gap, any shape.
+        mu: Scaled depth, broadcast against `x`.
+        lam: Dominant multiplier, between 0 and 1.
+
+    Returns:
+        The next x, in the broadcast shape.
+
+    Examples:
+        >>> from variational import nordmark_map
+        >>> float(nordmark_map(0.0, 0.25, 0.5))
+        0.625
     """
     x, mu, lam = (jnp.asarray(a, dtype=jnp.float64) for a in (x, mu, lam))
     hits = x <= mu
@@ -19,16 +32,30 @@ def nordmark_map(x: ArrayLike, mu: ArrayLike, lam: ArrayLike) -> Float[Array, ".
 
 
 def nordmark_window(lam: float, period: int) -> tuple[float, float]:
-    """Between which mu the orbit with one impact in `period` turns is stable.
+    """Return the interval of mu in which the orbit with one impact per `period` is
+    stable.
 
         3 lam^(2m-2) / (4 (1 - lam^m)) < mu < lam^(2m-4) (1 - lam) / (1 - lam^(m-1))^2
 
     At the upper end the orbit grazes, at the lower one it loses stability by a flip
-    (Chin, Ott, Nusse and Grebogi, Physical Review E 50, 1994). Where the lower bound is
+    (Chin, Ott, Nusse and Grebogi, Physical Review E 50, 1994). If the lower bound is
     not below the upper one there is no window.
 
+    Args:
+        lam: Dominant multiplier, between 0 and 1.
+        period: Number m of iterations between impacts, at least 2.
+
+    Returns:
+        Lower and upper bound of mu.
+
     Raises:
-        ValueError: For lam outside (0, 1) or a period below 2.
+        ValueError: Lam lies outside (0, 1), or the period is below 2.
+
+    Examples:
+        >>> from variational import nordmark_window
+        >>> low, high = nordmark_window(0.2, 3)
+        >>> low < high
+        True
     """
     if not 0 < lam < 1:
         raise ValueError(f"lam is {lam:g}; windows are known for 0 < lam < 1")

@@ -17,13 +17,31 @@ def poincare_derivative(
     *,
     tolerance: float = 1e-11,
 ) -> Float[Array, "n n"]:
-    """Derivative of the Poincare map at a point of a periodic motion. (2.14)
+    """Return the derivative of the Poincare map at a point of a periodic motion.
 
-    The monodromy matrix, projected onto the section along the flow. It has one
-    eigenvalue zero, in the direction of the flow, and the multipliers of the orbit.
+    It is the monodromy matrix, projected onto the section along the flow (thesis,
+    eq. 2.14). It has one eigenvalue zero, in the direction of the flow, and the
+    multipliers of the orbit.
 
-    **Arguments:** an autonomous vector field and a section function of the state, both
-    smooth; a state on the section and on the orbit, and the period (s).
+    Args:
+        field: Vector field of an autonomous system, `field(state)`.
+        section: Smooth scalar function of the state, zero on the section.
+        state: A state on the section and on the orbit, shape `(n,)`.
+        period: Period of the orbit (s).
+        tolerance: Relative error allowed per step.
+
+    Returns:
+        Shape `(n, n)`.
+
+    Examples:
+        >>> from variational import poincare_derivative
+        >>> def field(x):
+        ...     growth = 1 - x @ x
+        ...     return jnp.stack([growth * x[0] - x[1], growth * x[1] + x[0]])
+        >>> state, period = jnp.array([1.0, 0.0]), 2 * jnp.pi
+        >>> m = poincare_derivative(field, lambda x: x[1], state, period)
+        >>> round(float(m[0, 0]) / float(jnp.exp(-4 * jnp.pi)), 4)
+        1.0
     """
 
     def flow(x):

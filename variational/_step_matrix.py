@@ -23,7 +23,7 @@ from ._event_law import (
 
 
 class LogRow(NamedTuple):
-    """What the log says of one attempt at a step."""
+    """The log entry of one attempted step."""
 
     kind: Array
     constraint: Array
@@ -34,7 +34,7 @@ class LogRow(NamedTuple):
 
 
 class StepStart(NamedTuple):
-    """Where a step begins."""
+    """The start of a step."""
 
     t: Array
     x: tuple

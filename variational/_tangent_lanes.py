@@ -15,7 +15,7 @@ from ._step_matrix import elementwise_product, LogRow, step_matrix, StepStart
 
 
 class Carried(NamedTuple):
-    """What a lane takes from one chunk of rows to the next."""
+    """The state that a lane carries from one chunk of rows to the next."""
 
     lane: Any
     point: StepStart
@@ -39,7 +39,7 @@ def _plan(system, length, t0, turns, settings) -> Plan:
 
 @eqx.filter_jit
 def first_frames(batched, shared, length, states, t0, turns, settings):
-    """What each lane starts with."""
+    """Return the initial frame of each lane."""
 
     def one(batched, state):
         system = eqx.combine(batched, shared).prepared()

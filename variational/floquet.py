@@ -14,22 +14,24 @@ from .orbits import by_product, eigenvalues, Method, Orbit, turn_derivative
 
 
 class Stability(eqx.Module):
-    """What the monodromy matrix of an orbit says about it."""
+    """Stability of an orbit, from its monodromy matrix."""
 
     multipliers: Complex[Array, " n"]
-    """(n,) the largest modulus first."""
+    """Floquet multipliers, largest modulus first, shape `(n,)`."""
     vectors: Complex[Array, "n n"]
-    """(n, n) a column for each multiplier."""
+    """Eigenvectors, one column per multiplier, shape `(n, n)`."""
     fold: Float[Array, ""]
-    """det(M - I), det(M + I) and the product of mu_i mu_j - 1 over i < j, each times
-    `scale`: zero at a fold, a flip and a Neimark-Sacker bifurcation."""
+    """det(M - I) times `scale`: zero at a fold."""
     flip: Float[Array, ""]
+    """det(M + I) times `scale`: zero at a flip."""
     neimark_sacker: Float[Array, ""]
+    """The product of mu_i mu_j - 1 over i < j, times `scale`: zero at a Neimark-Sacker
+    bifurcation."""
     scale: Float[Array, ""]
-    """Between 0 and 1, vanishing with the slowest impact speed v as M grows like 1/v:
-    the least of v / (v + |a| period), a the acceleration of the gap."""
+    """A factor between 0 and 1 that vanishes with the slowest impact speed v as M grows
+    like 1/v: the least of v / (v + |a| period), with a the acceleration of the gap."""
     reason: str = eqx.field(static=True)
-    """A sentence where some multipliers must be zero, else the empty string."""
+    """Why some multipliers must be zero, else the empty string."""
 
     @property
     def stable(self) -> bool:
@@ -44,13 +46,26 @@ def floquet_multipliers(
     method: Method = "product",
     settings: Settings | None = None,
 ) -> Complex[Array, " n"]:
-    """Floquet multipliers of a periodic orbit, the largest modulus first.
+    """Return the Floquet multipliers of a periodic orbit, largest modulus first.
 
-    **Arguments:** as for [`variational.monodromy`][].
+    Args:
+        system: The system.
+        orbit: The periodic orbit.
+        method: As for [`variational.monodromy`][].
+        settings: Accuracy of "flow"; default a tolerance of 1e-12.
 
     Returns:
-        Shape `(n,)`, complex. Zero where the orbit sticks: contact fixes gap and normal
-            velocity, whatever they were.
+        Multipliers, shape `(n,)`, complex. Zero where the orbit sticks, because contact
+            fixes gap and normal velocity whatever they were.
+
+    Examples:
+        >>> import continuation, variational
+        >>> from jaxcam.models import ImpactOscillator
+        >>> system = ImpactOscillator(omega=2.8, restitution=0.8, wall=-0.5)
+        >>> orbit = continuation.periodic_orbit(system, guess=[-0.8, 1.0])
+        >>> product = np.prod(variational.floquet_multipliers(system, orbit))
+        >>> round(float(product.real), 6)  # the square of the restitution
+        0.64
     """
     if method == "product":
         return _multipliers(as_arrays(system), orbit.state, orbit.pieces, orbit.sticks)
@@ -65,11 +80,26 @@ def _multipliers(system, state, pieces, sticks):
 
 
 def stability(system: HybridSystem, orbit: Orbit) -> Stability:
-    """Multipliers, eigenvectors and test functions of a periodic orbit.
+    """Return multipliers, eigenvectors and test functions of a periodic orbit.
 
     The test functions are formed from the multipliers (Kuznetsov, Elements of Applied
     Bifurcation Theory, section 10.2) and multiplied by the impact speed, so that they
     stay bounded where an impact becomes a graze, and change sign only at a bifurcation.
+
+    Args:
+        system: The system.
+        orbit: The periodic orbit.
+
+    Returns:
+        A [`variational.floquet.Stability`][].
+
+    Examples:
+        >>> import continuation, variational
+        >>> from jaxcam.models import ImpactOscillator
+        >>> system = ImpactOscillator(omega=2.8, restitution=0.8, wall=-0.5)
+        >>> orbit = continuation.periodic_orbit(system, guess=[-0.8, 1.0])
+        >>> variational.stability(system, orbit).multipliers.shape
+        (2,)
     """
     system = as_arrays(system)
     made = turn_derivative(system, orbit)
@@ -92,7 +122,14 @@ def stability(system: HybridSystem, orbit: Orbit) -> Stability:
 def test_functions(
     multipliers: Complex[Array, " n"],
 ) -> tuple[Float[Array, ""], Float[Array, ""], Float[Array, ""]]:
-    """det(M - I), det(M + I) and the product of mu_i mu_j - 1, from the multipliers."""
+    """Return det(M - I), det(M + I) and the product of mu_i mu_j - 1.
+
+    Args:
+        multipliers: Eigenvalues of M, shape `(n,)`.
+
+    Returns:
+        Three real scalars.
+    """
     i, j = np.triu_indices(multipliers.shape[0], k=1)
     return (
         jnp.prod(multipliers - 1).real,
@@ -106,10 +143,18 @@ test_functions.__test__ = False  # pyright: ignore[reportFunctionMemberAccess]
 
 
 def impact_scale(system: HybridSystem, orbit: Orbit) -> Float[Array, ""]:
-    """The least of v / (v + |a| period) over the impacts that are no chatter; else 1.
+    """Return the least of v / (v + |a| period) over the impacts outside chatter; else
+    1.
 
     v is the speed of an impact and a the acceleration of the gap just before it, so
     that |a| period / v is about the largest entry of its saltation matrix.
+
+    Args:
+        system: The system.
+        orbit: The periodic orbit.
+
+    Returns:
+        A scalar between 0 and 1.
     """
     count = int(orbit.impacts.count)
     if count == 0 or orbit.sticks:

@@ -1,4 +1,4 @@
-"""The derivative of the flow across an event, and its own derivative."""
+"""Compute how a deviation passes an event: impact, start of contact, release."""
 
 import equinox as eqx
 import jax
@@ -22,23 +22,36 @@ from ._event_law import (
 def saltation_matrix(
     system: HybridSystem, t, state_before: Float[Array, " n"], constraint: int = 0
 ) -> Float[Array, "n n"]:
-    """How a deviation just before an impact becomes one just after it.
+    """Return the saltation matrix, which maps a deviation across an impact.
 
     With F-, F+ the vector field before and after, R the impact law and H the gap,
 
         S = R_x + (F+ - R_t - R_x F-) H_x / (H_t + H_x F-),
 
-    explicit time included, so that moving constraints need nothing extra.
+    explicit time included, so that moving constraints need nothing extra (M. di
+    Bernardo, C. J. Budd, A. R. Champneys, P. Kowalczyk, Piecewise-smooth Dynamical
+    Systems, 2008, chapter 2).
 
-    **Arguments:** the time of the impact (s), the state just before it, shape `(n,)`,
-    with a normal velocity below zero, and which constraint is hit.
+    Args:
+        system: The system.
+        t: Time of the impact (s).
+        state_before: State just before the impact, shape `(n,)`, with a negative normal
+            velocity.
+        constraint: Index of the constraint that is hit.
 
     Returns:
-        Shape `(n, n)`. Grows like one over the impact speed near grazing.
+        Shape `(n, n)`. It grows like one over the impact speed near grazing.
 
     Raises:
-        ValueError: Where the speed is not below zero, so that no impact happens; inside
+        ValueError: The normal velocity is not negative, so there is no impact; inside
             `jit` the matrix is infinite there.
+
+    Examples:
+        >>> from jaxcam.models import BouncingBall
+        >>> from variational import saltation_matrix
+        >>> s = saltation_matrix(BouncingBall(), 0.0, jnp.array([0.0, -1.0]))
+        >>> np.asarray(s).round(3).tolist()
+        [[-0.8, 0.0], [17.658, -0.8]]
     """
     parts = saltation_parts(system, t, state_before, constraint)
     if not isinstance(parts.speed, Tracer) and not float(parts.speed) < 0:
@@ -54,28 +67,45 @@ class SaltationParts(eqx.Module):
     """S = regular + singular / speed; both parts stay bounded at a graze."""
 
     regular: Float[Array, "n n"]
+    """The bounded part, shape `(n, n)`."""
     singular: Float[Array, "n n"]
-    """Of rank one."""
+    """The part divided by the speed, of rank one, shape `(n, n)`."""
     speed: Float[Array, ""]
     """Normal velocity before the impact, zero at a graze."""
 
     @property
     def matrix(self) -> Float[Array, "n n"]:
-        """The saltation matrix."""
+        """The saltation matrix, shape `(n, n)`."""
         return self.regular + self.singular / self.speed
 
     @property
     def limit(self) -> Float[Array, "n n"]:
-        """What S times the speed tends to at the graze."""
+        """The limit of S times the speed at the graze, shape `(n, n)`."""
         return self.singular + self.speed * self.regular
 
 
 def saltation_parts(
     system: HybridSystem, t, state_before: Float[Array, " n"], constraint: int = 0
 ) -> SaltationParts:
-    """The bounded part of a saltation matrix, and the one that grows near grazing.
+    """Split a saltation matrix into its bounded part and the part that grows at
+    grazing.
 
-    **Arguments:** as for [`variational.saltation_matrix`][]; the speed may be zero.
+    Args:
+        system: The system.
+        t: Time of the impact (s).
+        state_before: State just before the impact, shape `(n,)`; the normal velocity
+            may be zero.
+        constraint: Index of the constraint that is hit.
+
+    Returns:
+        A [`variational.saltation.SaltationParts`][].
+
+    Examples:
+        >>> from jaxcam.models import BouncingBall
+        >>> from variational import saltation_parts
+        >>> parts = saltation_parts(BouncingBall(), 0.0, jnp.array([0.0, 0.0]))
+        >>> int(np.linalg.matrix_rank(parts.singular))
+        1
     """
     t = jnp.asarray(t, dtype=jnp.float64)
     x = jnp.asarray(state_before, dtype=jnp.float64)
@@ -88,13 +118,20 @@ def saltation_parts(
 def saltation_into_contact(
     system: HybridSystem, t, state_before: Float[Array, " n"], constraint: int = 0
 ) -> Float[Array, "n n"]:
-    """How a deviation before an impact becomes one of the contact that follows it.
+    """Map a deviation before an impact to one of the contact that follows it.
 
-    For the impact from which contact begins at once: a plastic one, or one deep in a
-    chatter, whose remaining impacts are summed. The law is the one that leaves no
-    normal velocity, the field after it that of contact (2.30). The rank falls by two,
-    because gap and normal velocity are zero from then on whatever they were: with two
-    states nothing is left, and a motion that sticks has forgotten its past.
+    This is for an impact from which contact begins at once: a plastic one, or one deep
+    in a chatter whose remaining impacts are completed analytically. The law leaves no
+    normal velocity, and the field after it is that of contact (thesis, eq. 2.30). The
+    rank falls by two, because gap and normal velocity are zero from then on whatever
+    they were: with two states nothing is left, and a motion that sticks has forgotten
+    its past.
+
+    Args:
+        system: The system.
+        t: Time (s).
+        state_before: State just before the impact, shape `(n,)`.
+        constraint: Index of the constraint.
 
     Returns:
         Shape `(n, n)`.
@@ -119,11 +156,17 @@ def saltation_into_contact(
 def saltation_at_release(
     system: HybridSystem, t, state: Float[Array, " n"], constraint: int = 0
 ) -> Float[Array, "n n"]:
-    """How a deviation in contact becomes one of the flight after release.
+    """Map a deviation in contact to one of the flight after release.
 
-    At release the constraint has ceased to press: contact field and free field are
-    equal, and the deviation goes on as it is. The matrix is the identity on the motions
-    in contact, and zero on what contact has taken.
+    At release the contact field and the free field are equal, so the deviation is
+    unchanged. The matrix is the identity on the motions in contact, and zero on the
+    directions that contact has removed.
+
+    Args:
+        system: The system.
+        t: Time (s).
+        state: State at release, shape `(n,)`.
+        constraint: Index of the constraint.
 
     Returns:
         Shape `(n, n)`.
@@ -137,13 +180,28 @@ def saltation_at_release(
 def event_map(
     system: HybridSystem, t, x: Float[Array, " n"], constraint: int = 0
 ) -> Float[Array, " n"]:
-    """Where a motion close to an impact is after it, both at the same time t.
+    """Map a state near an impact to the state after it, both at the same time t.
 
-    The motion is continued from `x` to its impact, sooner or later than `t`, the law is
-    applied, and it is followed back to `t` (the discontinuity mapping of di Bernardo
-    et al., Piecewise-smooth Dynamical Systems, 2008, chapter 2). Flights are Taylor
-    series of third order, and the impact is found by three steps of Newton's method, so
+    The motion is continued from `x` to its impact, before or after `t`, the impact law
+    is applied, and the motion is followed back to `t` (the discontinuity mapping of di
+    Bernardo et al., Piecewise-smooth Dynamical Systems, 2008, chapter 2). Flights are
+    Taylor series of third order, and the impact is located by three Newton steps, so
     that values and derivatives up to the third are exact at a state on the surface.
+
+    Args:
+        system: The system.
+        t: Time (s).
+        x: State near the surface, shape `(n,)`.
+        constraint: Index of the constraint that is hit.
+
+    Returns:
+        State after the impact, shape `(n,)`.
+
+    Examples:
+        >>> from jaxcam.models import BouncingBall
+        >>> from variational import event_map
+        >>> event_map(BouncingBall(), 0.0, jnp.array([0.0, -1.0])).tolist()
+        [0.0, 0.8]
     """
     t = jnp.asarray(t, dtype=jnp.float64)
     law, gap = impact_of(system, constraint), gap_of(system, constraint)
@@ -164,11 +222,20 @@ def event_map(
 def saltation_second(
     system: HybridSystem, t, state_before: Float[Array, " n"], constraint: int = 0
 ) -> Float[Array, "n n n"]:
-    """Second derivative of the flow across an impact, for normal forms.
+    """Return the second derivative of the flow across an impact, for normal forms.
 
-    The change of a deviation d is S d + (1/2) d B d + O(|d|^3), where
-    `B[i, j, k]` is what is returned. By nested forward differentiation of
-    [`variational.event_map`][]. Grows like one over the cube of the impact speed.
+    The change of a deviation d is S d + (1/2) d B d + O(|d|^3), and `B[i, j, k]` is
+    returned. It is computed by nested forward differentiation of
+    [`variational.event_map`][], and grows like one over the cube of the impact speed.
+
+    Args:
+        system: The system.
+        t: Time (s).
+        state_before: State just before the impact, shape `(n,)`.
+        constraint: Index of the constraint.
+
+    Returns:
+        Shape `(n, n, n)`.
     """
     t = jnp.asarray(t, dtype=jnp.float64)
     x = jnp.asarray(state_before, dtype=jnp.float64)

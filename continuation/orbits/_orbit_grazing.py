@@ -1,4 +1,4 @@
-"""How an orbit goes on behind a grazing: with one impact less, or one more."""
+"""Continue an orbit past a grazing: with one impact less, or one more."""
 
 from typing import Any
 

@@ -23,22 +23,35 @@ def periodic_orbits(
     periods: int | None = None,
     beyond: bool = False,
 ) -> Start:
-    """The family of periodic orbits that an orbit belongs to, and where it is on it.
+    """Return the family of periodic orbits that an orbit belongs to, and its place on
+    it.
 
     The problem is chosen by the motion: [`continuation.ImpactingOrbits`][] with the
-    impacts that the orbit has, or [`continuation.StickingOrbits`][] where it sticks.
+    impacts of the orbit, or [`continuation.StickingOrbits`][] where it sticks.
 
     Args:
+        system: The system.
         orbit: From [`continuation.periodic_orbit`][]; or a guess of its state, or None,
             with `period` or `periods`, as taken there.
-        beyond: For an orbit that sticks, whether to go on behind the interruption of
+        period: As for [`continuation.periodic_orbit`][].
+        periods: As for [`continuation.periodic_orbit`][].
+        beyond: For an orbit that sticks, whether to continue past the interruption of
             its chattering with the orbits that have finitely many impacts.
 
     Returns:
         A [`continuation.Start`][], for [`continuation.follow`][].
 
     Raises:
-        ValueError: As `periodic_orbit`; and for an orbit that sticks without forcing.
+        ValueError: As for `periodic_orbit`; and for an orbit that sticks without
+            forcing.
+
+    Examples:
+        >>> import continuation
+        >>> from jaxcam.models import ImpactOscillator
+        >>> system = ImpactOscillator(omega=2.8, restitution=0.8, wall=-0.5)
+        >>> orbit = continuation.periodic_orbit(system, guess=[-0.8, 1.0])
+        >>> type(continuation.periodic_orbits(system, orbit).problem).__name__
+        'ImpactingOrbits'
     """
     system = as_arrays(system)
     if not isinstance(orbit, Orbit):

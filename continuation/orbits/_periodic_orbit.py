@@ -41,31 +41,39 @@ def periodic_orbit(
     t0: float = 0.0,
     settings: Settings | None = None,
 ) -> Orbit:
-    """A periodic orbit near a guess, stable or not, with any number of impacts.
+    """Find a periodic orbit near a guess, stable or not, with any number of impacts.
 
     The impacts of the motion from the guess give the equations of multiple shooting;
-    where that leads nowhere, or the motion sticks, Newton's method is applied to the
-    motion over one period itself. What is found is run once more through the event
+    where that fails, or the motion sticks, Newton's method is applied to the
+    motion over one period itself. The solution is run once more through the event
     loop, which must return to it.
 
     Args:
         system: A [`jaxcam.hybrid.HybridSystem`][], forced or not.
-        guess: Shape `(n,)`, the state at `t0`. Without: where the motion has settled
-            after some hundred forcing periods (a stable orbit).
-        period: Of the orbit, in s. For a system without forcing a guess of it.
-        periods: Instead, the number of forcing periods in it. With neither: one, or
-            with no guess either as many as are seen.
-        t0: s.
-        settings: Accuracy of the runs; a tolerance of 1e-12 by default.
+        guess: State at `t0`, shape `(n,)`. By default the state in which the motion has
+            settled after some hundred forcing periods (a stable orbit).
+        period: Period of the orbit (s); for a system without forcing a guess of it.
+        periods: Instead of `period`, the number of forcing periods in it. With neither,
+            it is one; without a guess, as many as are detected.
+        t0: Time of the guess (s).
+        settings: Accuracy of the runs; default a tolerance of 1e-12.
 
     Returns:
-        A [`variational.Orbit`][]: `.state` at `.time` (t0, unless that is the time of
-            an impact), `.period` (s), `.impacts`, `.contacts`, `.multipliers`.
+        A [`variational.Orbit`][] with `.state` at `.time` (t0, unless that is the time
+            of an impact), `.period` (s), `.impacts`, `.contacts`, `.multipliers`.
 
     Raises:
-        ValueError: Where the period is not one of the forcing's, the motion does not
-            settle on a periodic orbit, or no orbit is found near the guess, with the
-            reason.
+        ValueError: The period is not a multiple of the forcing's, the motion does not
+            settle on a periodic orbit, or no orbit is found near the guess; the message
+            gives the reason.
+
+    Examples:
+        >>> import continuation
+        >>> from jaxcam.models import ImpactOscillator
+        >>> system = ImpactOscillator(omega=2.8, restitution=0.8, wall=-0.5)
+        >>> orbit = continuation.periodic_orbit(system, guess=[-0.8, 1.0])
+        >>> int(orbit.impacts.count), bool(orbit.stable)
+        (1, True)
     """
     settings = Settings(tolerance=1e-12) if settings is None else settings
     system = as_arrays(system)

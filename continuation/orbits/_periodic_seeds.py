@@ -20,27 +20,36 @@ def orbits_near(
     settings: Settings | None = None,
     same: float = 1e-6,
 ) -> tuple[Orbit, ...]:
-    """The different periodic orbits that are found from many guesses.
+    """Return the distinct periodic orbits found from many guesses.
 
     The guesses are states at one phase of the forcing: the last points of a sweep, the
     attractors of a basin, or the samples of a recording (angles and their derivatives)
     taken once a period.
 
     Args:
-        states: Shape `(k, n)`, states at `t0`.
+        system: The system.
+        states: States at `t0`, shape `(k, n)`.
         period: As for [`continuation.periodic_orbit`][].
         periods: As for [`continuation.periodic_orbit`][].
         t0: As for [`continuation.periodic_orbit`][].
         settings: As for [`continuation.periodic_orbit`][].
-        same: Orbits are one where their states at `t0` differ by less than this,
+        same: Orbits count as equal where their states at `t0` differ by less than this,
             relative to [`jaxcam.hybrid.sizes.component_sizes`][].
 
     Returns:
-        The orbits in the order in which they were found; guesses from which Newton's
-            method leads nowhere are left out, so there may be none.
+        The orbits in the order in which they were found. Guesses from which Newton's
+            method fails are left out, so there may be none.
 
     Raises:
-        ValueError: For states of another shape.
+        ValueError: `states` has another shape.
+
+    Examples:
+        >>> import continuation
+        >>> from jaxcam.models import ImpactOscillator
+        >>> system = ImpactOscillator(omega=2.8, restitution=0.8, wall=-0.5)
+        >>> guesses = jnp.array([[-0.8, 1.0], [-0.8, 1.01]])
+        >>> len(continuation.orbits_near(system, guesses))
+        1
     """
     states = np.asarray(states, dtype=float)
     if states.ndim != 2:

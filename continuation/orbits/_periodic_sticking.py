@@ -45,31 +45,42 @@ class StickingOrbits(AbstractProblem):
     While it sticks it follows the constraint, so it starts anew at the release point:
     the time t and the state x at which gap, normal velocity and normal acceleration are
     zero. Those are the equations; the unknowns, shape `(3,)`, are the phase of release
-    (time in forcing periods) and the state there. All multipliers are zero. Where the
-    orbit exists depends on two monitors:
+    (time in forcing periods) and the state there. All multipliers are zero. Two
+    monitors decide where the orbit exists:
 
     - the margin of [`variational.chatter_accumulation`][], zero where the impacts
-      accumulate at the very moment of the n-th release. The sticking time itself falls
-      to zero there like a power and does not change sign (the thesis, 3.5.1); the
+      accumulate exactly at the n-th release. The sticking time itself falls
+      to zero there like a power and does not change sign (thesis, section 3.5.1); the
       margin is smooth.
     - the rate of change of the contact acceleration at release, relative to the forcing
-      period. It is zero where release and the next return to contact fall together:
-      beyond, contact never ends, so impacts begin there.
+      period. It is zero where release and the next return to contact coincide:
+      beyond, contact never ends; this is the detachment (valve float).
 
-    Behind the first a branch goes on with [`continuation.ImpactingOrbits`][] where
-    `beyond` says so; each number of impacts is then a program to compile.
+    Past the first one a branch continues with [`continuation.ImpactingOrbits`][] if
+    `beyond` is set; each number of impacts is then a program to compile.
+
+    Examples:
+        >>> import continuation
+        >>> from jaxcam.models import ImpactOscillator
+        >>> system = ImpactOscillator(omega=0.5, restitution=0.5)
+        >>> orbit = continuation.periodic_orbit(system)
+        >>> type(continuation.periodic_orbits(system, orbit).problem).__name__
+        'StickingOrbits'
     """
 
     stability: ClassVar[StabilityKind] = "map"
+    """Multipliers on the unit circle are bifurcations."""
     normal_forms: ClassVar[bool] = False
+    """No normal-form coefficients are computed."""
     detects: ClassVar[bool] = False
+    """No folds, branch points or flips are sought."""
 
     parameters: HybridSystem
     """A system with a period, two states and one constraint."""
     periods: int = eqx.field(static=True, default=1)
-    """n, of the forcing, from release to the release after contact."""
+    """Number n of forcing periods from release to the release after contact."""
     beyond: bool = eqx.field(static=True, default=False)
-    """Whether to go on behind an interruption; else it ends the branch."""
+    """Whether to continue past an interruption; otherwise it ends the branch."""
 
     def residual(self, u, parameters) -> Float[Array, "3"]:
         system = parameters.prepared()
@@ -83,7 +94,14 @@ class StickingOrbits(AbstractProblem):
         return jnp.concatenate(rows)
 
     def linearisation(self, u, parameters, jacobian) -> Float[Array, "2 2"]:
-        """Zero: nothing of a deviation survives sticking."""
+        """Zero: nothing of a deviation survives sticking.
+
+        Args:
+            u: Unknowns of the equations, shape `(u,)`.
+
+        Returns:
+            Zeros, shape `(2, 2)`.
+        """
         del parameters, jacobian
         return jnp.zeros((u.shape[0] - 1, u.shape[0] - 1))
 
@@ -104,8 +122,17 @@ class StickingOrbits(AbstractProblem):
         }
 
     def seen(self, u, parameters):
-        """Observed: period, release, accumulation and sticking time (s), impacts
-        listed; the states at whole forcing periods, `(periods, 2)`."""
+        """Return the monitors and the observed quantities.
+
+        Observed: period, release, accumulation and sticking time (s), number of
+        impacts; the states at whole forcing periods, `(periods, 2)`.
+
+        Args:
+            u: Unknowns of the equations, shape `(u,)`.
+
+        Returns:
+            As for `AbstractProblem.seen`.
+        """
         system = parameters.prepared()
         period = jnp.asarray(system.period, dtype=jnp.float64)
         turn = orbit_from(system, self._frame(u, system), self.periods)

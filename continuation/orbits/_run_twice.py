@@ -54,8 +54,9 @@ def rotations(
 
 
 def away_from_half(problem: Any, u, parameters) -> float | None:
-    """How far the second half of an orbit is from its first, in lengths of steps; None
-    where it cannot be the same."""
+    """Return the distance of the halves of an orbit, in step lengths; None where
+    unequal.
+    """
     m, periods = len(problem.constraints), problem.periods
     hits = problem.constraints
     if m == 0 or m % 2 or periods % 2 or hits[: m // 2] != hits[m // 2 :]:

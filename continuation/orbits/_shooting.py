@@ -27,17 +27,28 @@ class ImpactingOrbits(AbstractProblem):
     The unknowns and equations are those of [`variational.orbits.Shooting`][]: for each
     impact its phase (time in forcing periods) and the state after it, shape
     `(m (1 + n),)`. Without impacts they are the state at time zero, shape `(n,)`. For a
-    system without forcing the first phase is zero, its place taken by the period (s),
-    and phases count periods of the orbit.
+    system without forcing the first phase is zero, its place is taken by the period
+    (s), and phases count periods of the orbit.
+
+    Examples:
+        >>> import continuation
+        >>> from jaxcam.models import ImpactOscillator
+        >>> system = ImpactOscillator(omega=2.8, restitution=0.8, wall=-0.5)
+        >>> orbit = continuation.periodic_orbit(system, guess=[-0.8, 1.0])
+        >>> start = continuation.periodic_orbits(system, orbit)
+        >>> start.problem.constraints, start.state.shape
+        ((0,), (3,))
     """
 
     stability: ClassVar[StabilityKind] = "map"
+    """Multipliers on the unit circle are bifurcations."""
     costly: ClassVar[bool] = True
+    """Second derivatives take long to compile."""
 
     parameters: HybridSystem
     """The [`jaxcam.hybrid.HybridSystem`][]."""
     constraints: tuple[int, ...] = eqx.field(static=True)
-    """Which constraint each impact hits, in order."""
+    """Constraint that each impact hits, in order."""
     periods: int = eqx.field(static=True)
     """Forcing periods until the orbit repeats; 0 for a system without forcing."""
     dimension: int = eqx.field(static=True)
@@ -54,7 +65,15 @@ class ImpactingOrbits(AbstractProblem):
 
     @staticmethod
     def of(system: HybridSystem, equations: Shooting) -> "ImpactingOrbits":
-        """The problem with these equations."""
+        """Return the problem with these equations.
+
+        Args:
+            system: The system.
+            equations: The equations of multiple shooting.
+
+        Returns:
+            An `ImpactingOrbits`.
+        """
         e = equations
         return ImpactingOrbits(system, e.constraints, e.periods, e.dimension, e.steps)
 
@@ -67,9 +86,15 @@ class ImpactingOrbits(AbstractProblem):
         return self.equations.residual(u, parameters)
 
     def linearisation(self, u, parameters, jacobian) -> Float[Array, "k k"]:
-        """The monodromy matrix, of the state just after the first impact.
+        """Return the monodromy matrix, of the state just after the first impact.
 
         Without forcing, that of the return map to the constraint.
+
+        Args:
+            u: Unknowns of the equations, shape `(u,)`.
+
+        Returns:
+            Shape `(k, k)`.
         """
         if not self.constraints:
             return jacobian + jnp.eye(self.dimension)
@@ -82,15 +107,28 @@ class ImpactingOrbits(AbstractProblem):
         return orbits.return_map(self.equations, u, parameters, matrix)
 
     def local_dynamics(self, u, parameters) -> LocalDynamics:
-        """From the first impact to the one a period later.
+        """Return the map from the first impact to the one a period later.
 
-        In its phase and the state after it, without forcing in the state alone.
+        It acts on its phase and the state after it, without forcing on the state alone.
+
+        Args:
+            u: Unknowns of the equations, shape `(u,)`.
+
+        Returns:
+            A `LocalDynamics`.
         """
         jacobian, at = orbits.around_the_period(self.equations, u, parameters)
         return LocalDynamics(at, None, jacobian)
 
     def derivatives(self, u, p, parameters_at):
-        """Both from one Jacobian of each flight."""
+        """Return both from one Jacobian of each flight.
+
+        Args:
+            u: Unknowns of the equations, shape `(u,)`.
+
+        Returns:
+            As for `AbstractProblem.derivatives`.
+        """
         if not self.constraints:
             return AbstractProblem.derivatives(self, u, p, parameters_at)
         whole, matrix = orbits.equations_and_monodromy(
@@ -120,9 +158,18 @@ class ImpactingOrbits(AbstractProblem):
         return self.equations.gap_or_speed(jnp.asarray(number), u, parameters)
 
     def seen(self, u, parameters):
-        """Observed: period (s); time (s) and state after the first impact; integration
-        error; what gaps are large beside, in their units; with forcing, the states at
-        whole forcing periods, `(periods, n)`."""
+        """Return the monitors and the observed quantities.
+
+        Observed: period (s); time (s) and state after the first impact; integration
+        error; the scale of the gaps, in their units; with forcing, the states at
+        whole forcing periods, `(periods, n)`.
+
+        Args:
+            u: Unknowns of the equations, shape `(u,)`.
+
+        Returns:
+            As for `AbstractProblem.seen`.
+        """
         equations = self.equations
         seen = equations.seen(u, parameters)
         start = equations.flights(u, parameters)[0][0]
@@ -145,9 +192,12 @@ class ImpactingOrbits(AbstractProblem):
     # -- between compiled programs
 
     def refused(self, monitors, observed) -> str | None:
-        """Why a solution is no orbit, from what has been seen of it, or None.
+        """Return the reason why a solution is not admissible, or None.
 
-        A curve of grazing orbits does not watch what is zero along it.
+        A curve of grazing orbits does not check the monitor that is zero along it.
+
+        Returns:
+            A sentence, or None.
         """
         known = watched_of(len(self.constraints))
         gaps, speeds = (
@@ -196,11 +246,15 @@ class ImpactingOrbits(AbstractProblem):
 
     @property
     def representation(self) -> "ImpactSequences":
-        """An orbit is written down from each of its impacts on."""
+        """The representations of an orbit: one starting from each of its impacts."""
         return ImpactSequences(self.sequence(self.constraints), self)
 
     def sequence(self, constraints: tuple[int, ...]) -> str:
-        """The family of orbits with these impacts, in this order."""
+        """Return the name of the family of orbits with these impacts, in this order.
+
+        Returns:
+            Text.
+        """
         # two numbers of steps differ by the error of the integration
         return f"impacts {constraints} periods {self.periods}"
 

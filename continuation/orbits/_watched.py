@@ -1,4 +1,4 @@
-"""What is watched along orbits with impacts: gaps of flights, and speeds of impacts."""
+"""Monitors of orbits with impacts: gaps of flights, and speeds of impacts."""
 
 from typing import Literal, NamedTuple
 

@@ -1,4 +1,4 @@
-"""What problems with one more unknown, the parameter, take from the problem inside."""
+"""Extend a problem by one more unknown, the parameter."""
 
 from typing import ClassVar
 
@@ -52,7 +52,7 @@ class AbstractExtended(AbstractProblem):
         return self.base.check(replace(inner, tests=tests))
 
     def monitor_of_base(self, name: str) -> str:
-        """What a monitor of the problem inside is called here."""
+        """Return the name of a monitor of the inner problem in the extended one."""
         return name
 
 

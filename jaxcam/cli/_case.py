@@ -49,7 +49,7 @@ def _runs(case: Path, channels, files: Files, layout):
 
 
 def notes_of(runs) -> tuple[str, ...]:
-    """What was mended as the runs were read, each note once."""
+    """Return the repairs made while the runs were read, each note once."""
     return tuple(dict.fromkeys(n for run in runs for n in run.meta.get("notes", ())))
 
 

@@ -1,4 +1,4 @@
-"""What several commands ask of the values of their options."""
+"""Check option values that several commands share."""
 
 import math
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""What can be chosen by name at the command line: systems and solvers."""
+"""Systems and solvers that the command line offers by name."""
 
 import difflib
 from collections.abc import Iterable
@@ -47,7 +47,9 @@ def choose(option: str, name: str, known: Iterable[str]) -> str:
 
 
 def ready(name: str) -> Ready:
-    """How a system is started; one's own from its release point, for ten periods."""
+    """Return the start of a system; one's own from its release point, for ten
+    periods.
+    """
     return SYSTEMS.get(name, Ready(name, None, 10.0, 0.0))
 
 

@@ -91,7 +91,7 @@ def demo(
 
 
 def _diagnosed(folder: Path, nominal, found, report):
-    """What the model lacks, with a report of its own."""
+    """Diagnose the model's discrepancy, with a report of its own."""
     from .. import discrepancy
     from ._diagnose_files import write_diagnosis
 

@@ -13,7 +13,7 @@ _BOUNDS = ((130.0, 154.0), (115.0, 160.0))
 
 @dataclasses.dataclass(frozen=True)
 class Branches:
-    """What was found: rows under `HEADINGS`, and a figure."""
+    """Rows under `HEADINGS`, and a figure."""
 
     rows: tuple[tuple[str, str, str, str], ...]
     figure: Path
@@ -29,7 +29,7 @@ _CAPTION = (
 
 
 def _interrupted(point) -> bool:
-    """Where the orbit that sticks ends."""
+    """Find the interruption of the orbit that sticks."""
     return point.kind == "interruption of chattering"
 
 

@@ -1,4 +1,4 @@
-"""What `jaxcam demo` finds: computed, and as page, data and words."""
+"""The result of `jaxcam demo`: computed, and as page, data and words."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -102,7 +102,7 @@ def print_result(output: Output, found: DemoResult) -> None:
 
 
 def _next_steps(found) -> list[tuple[str, str]]:
-    """What to type next, and what it is for."""
+    """Suggest the next commands, with their purpose."""
     rpm = found[0].rpm if found else 140.0
     return [
         (

@@ -1,4 +1,4 @@
-"""What a diagnosis leaves behind: verdict, model and report."""
+"""Write the results of a diagnosis: verdict, model and report."""
 
 from collections.abc import Sequence
 from pathlib import Path

@@ -17,7 +17,7 @@ SECTIONS = ("stroboscope", "impacts")
 
 @dataclasses.dataclass(frozen=True)
 class Sweep:
-    """What varies, and how motions are sampled at each value."""
+    """The parameter to vary, and the sampling at each value."""
 
     parameter: Annotated[
         str,
@@ -88,7 +88,7 @@ class Sweep:
 
 @dataclasses.dataclass(frozen=True)
 class Starts:
-    """Where motions begin."""
+    """Initial states of the motions."""
 
     state: Annotated[
         str | None,

@@ -12,7 +12,7 @@ from ._options import Gaps
 
 @dataclasses.dataclass(frozen=True)
 class Files:
-    """What a file does not say of itself, and what is done with a faulty one."""
+    """Options for files: columns, units, and the treatment of faulty files."""
 
     gaps: Gaps = "mend"
     columns: Annotated[

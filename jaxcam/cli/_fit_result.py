@@ -1,4 +1,4 @@
-"""What `jaxcam fit` finds: computed, and as words and data."""
+"""The result of `jaxcam fit`: computed, and as words and data."""
 
 import dataclasses
 from collections.abc import Iterable, Mapping, Sequence
@@ -28,7 +28,7 @@ class Result:
 
     @property
     def quality(self) -> list[dict[str, Any]]:
-        """What is left of each record and channel, beside the noise."""
+        """Return the residual of each record and channel, compared with the noise."""
         return [
             {"record": part.record, "channel": part.channel, "rms": part.rms}
             | {"noise": part.noise, "ratio": part.rms / part.noise}
@@ -37,7 +37,7 @@ class Result:
 
     @property
     def sentence(self) -> str:
-        """How well the fit explains its samples."""
+        """Say how well the fit explains its samples."""
         quality = self.quality
         ratio = sum(q["ratio"] for q in quality) / len(quality)
         return (

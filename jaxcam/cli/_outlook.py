@@ -1,4 +1,4 @@
-"""What follows from a diagnosis: for the terminal, for its page, and as data."""
+"""Conclusions from a diagnosis: for the terminal, for its page, and as data."""
 
 import dataclasses
 import math

@@ -1,4 +1,4 @@
-"""Where a command writes: the terminal, a JSON file, a folder of figures."""
+"""Output of a command: the terminal, a JSON file, a folder of figures."""
 
 import json
 import math
@@ -83,7 +83,7 @@ def write_text(file: Path, text: str) -> None:
 
 
 def _beside(file: Path) -> Path:
-    """Where a file is written before it takes its place."""
+    """Return a temporary path next to a file, from which it is moved into place."""
     return file.with_name(f"{file.name[:200]}.{os.getpid()}.part")
 
 

@@ -13,7 +13,7 @@ from ._rests import HEADINGS, rest_rows, Rests
 
 @dataclasses.dataclass(frozen=True)
 class Report:
-    """What is on the page, from top to bottom; figures have captions."""
+    """The content of the page, from top to bottom; figures have captions."""
 
     title: str
     sentence: str
@@ -56,7 +56,7 @@ pre { background: var(--shade); padding: .7rem .9rem; border-radius: 6px;
 
 
 def _lacks(summary: str | None) -> list[str]:
-    """What the model lacks, and where more is said of it."""
+    """Summarise the model discrepancy, with a link to the details."""
     if summary is None:
         return []
     return [

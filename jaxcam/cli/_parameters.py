@@ -68,7 +68,7 @@ def assign_parameters(system: HybridSystem, assignments: Sequence[str]) -> Hybri
 
 
 def pick_by_name(name: str) -> Callable[[Any], Any]:
-    """What picks a parameter out of a system by its name, as `terms[0].c1`."""
+    """Return a function that picks a parameter by its name, such as `terms[0].c1`."""
 
     def where(system):
         for part in re.findall(r"[^.\[\]]+", name):

@@ -1,4 +1,4 @@
-"""What has been reproduced, on disk: a file a target, complete or not there."""
+"""Store reproduced targets on disk: one file per target, complete or absent."""
 
 import dataclasses
 import json
@@ -21,7 +21,7 @@ _BROKEN = (OSError, ValueError, TypeError, LookupError, AttributeError, Recursio
 
 @dataclasses.dataclass(frozen=True)
 class Origin:
-    """What decides a result, besides its target."""
+    """Everything besides its target that determines a result."""
 
     version: str
     preset: str

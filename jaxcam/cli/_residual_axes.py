@@ -33,7 +33,7 @@ def title_of(part: Residuals, parts: Sequence[Residuals]) -> str:
 
 
 class Along:
-    """What residuals are drawn along: a turn of the drive, or time without a drive."""
+    """The axis of a residual plot: a turn of the drive, or time without a drive."""
 
     def __init__(self, parts: Sequence[Residuals]):
         self.turns = all(np.any(np.isfinite(part.turned)) for part in parts)
@@ -52,7 +52,7 @@ class Along:
         return "the angle of the drive" if self.turns else "time"
 
     def place(self, part: Residuals) -> Float[np.ndarray, " k"]:
-        """Where each residual is, between `start` and `end`."""
+        """Return the position of each residual between `start` and `end`."""
         if not self.turns:
             return part.time
         return np.nan_to_num(part.turned) % (2 * math.pi)

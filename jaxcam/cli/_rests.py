@@ -1,4 +1,4 @@
-"""When the follower rests on the cam: as recorded, and as simulated."""
+"""Contact intervals of the follower: as recorded, and as simulated."""
 
 import dataclasses
 import math

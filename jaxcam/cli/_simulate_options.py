@@ -11,7 +11,7 @@ from ._choices import choose, ENGINES, ready, SOLVERS
 
 @dataclasses.dataclass(frozen=True)
 class RunOptions:
-    """Where a motion starts, when it ends, and how it is integrated."""
+    """Start, end and integration options of a run."""
 
     state: Annotated[
         str | None,
@@ -75,7 +75,7 @@ class RunOptions:
         return np.array(numbers("--state", self.state, words, finite=False))
 
     def end(self, name: str, model) -> float:
-        """When to stop (s)."""
+        """Return the end time (s)."""
         check_finite("--t0", self.t0)
         check_finite("--t1", self.t1)
         check_finite("--turns", self.turns)

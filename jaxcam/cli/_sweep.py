@@ -1,4 +1,4 @@
-"""What `jaxcam diagram` and `jaxcam basins` have in common: where they run."""
+"""Options that `jaxcam diagram` and `jaxcam basins` share: where they run."""
 
 import dataclasses
 import math
@@ -16,7 +16,7 @@ from ._options import Cluster, Workers
 
 @dataclasses.dataclass(frozen=True)
 class Execution:
-    """Where a sweep runs: threads here, or a cluster."""
+    """Where a sweep runs: local threads, or a cluster."""
 
     workers: Workers = None
     cluster: Cluster = None

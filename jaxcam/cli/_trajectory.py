@@ -76,7 +76,7 @@ def contact_table(trajectory: Trajectory) -> Table | None:
 
 
 def summary(name: str, trajectory: Trajectory) -> str:
-    """What happened, in one sentence."""
+    """Summarise the motion in one sentence."""
     system, unit = trajectory.system, _unit(trajectory.system)
     reached = float(trajectory.steps.time[-1])
     at = ""

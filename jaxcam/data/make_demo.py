@@ -62,7 +62,7 @@ class RealRig:
 
 @dataclasses.dataclass(frozen=True)
 class Truth:
-    """What happened: true samples, impacts, and contacts as (landing, release)."""
+    """The true motion: samples, impacts, and contacts as (landing, release)."""
 
     time: np.ndarray
     turned: np.ndarray
@@ -185,7 +185,7 @@ class _Follower:
 
 
 def _bisect(h: float, crossed: Callable[[float], bool]) -> float:
-    """Where in (0, h] something comes true, which is true at h."""
+    """Return the time in (0, h] from which a condition holds that is true at h."""
     low, high = 0.0, h
     for _ in range(45):
         middle = (low + high) / 2
@@ -223,7 +223,7 @@ def simulate_rig(
 
 
 def measure(samples: np.ndarray, noise: float, counts: int, rng) -> np.ndarray:
-    """What an encoder says: noise, then a whole number of counts."""
+    """Simulate an encoder: noise, then a whole number of counts."""
     step = 2 * math.pi / counts
     return np.round((samples + noise * rng.standard_normal(len(samples))) / step) * step
 

@@ -1,4 +1,4 @@
-"""What physics a model leaves out: where it acts, its name, its strength."""
+"""Model discrepancy: find missing physics, its location, name and strength."""
 
 from ._diagnose import diagnose as diagnose
 from ._event_causes import event_causes as event_causes

@@ -36,27 +36,33 @@ def diagnose(
     keep: Path | None = None,
     policy: Policy = Policy(),
 ) -> Diagnosis:
-    """What physics a model leaves out, from recordings of the real thing.
+    """Diagnose the physics that a model leaves out, from recordings.
 
-    **Arguments:**
+    Args:
+        system: A `Rig` from `jaxcam.recordings.read_rig` or a `Setup` from
+            `jaxcam.fitting.read_setup`, which know their sensors and tolerances; or any
+            system with one coordinate, with what follows.
+        recordings: At least two of a rig; of a bare system, what
+            `jaxcam.recordings.segment` makes of them.
+        candidates: Terms that may be named; by default `library()`, with the constants
+            of the rig. Those that are not `listed` only help to describe what is
+            unknown.
+        sensors: As for `jaxcam.fitting.Model` and `Problem`, of a bare system; the
+            drive is an input that was measured.
+        parameters: As for `jaxcam.fitting.Model` and `Problem`, of a bare system; the
+            drive is an input that was measured.
+        drive: As for `jaxcam.fitting.Model` and `Problem`, of a bare system; the drive
+            is an input that was measured.
+        seed: Of the redrawn blocks.
+        progress: Called with a sentence and a fraction, or `None`.
+        keep: A folder in which fits are kept until the diagnosis is done; one that was
+            interrupted goes on from there.
+        policy: What decides a verdict, and how long a search may take.
 
-    - `system`: a `Rig` from `jaxcam.recordings.read_rig` or a `Setup` from
-        `jaxcam.fitting.read_setup`, which know their sensors and tolerances; or any
-        system with one coordinate, with what follows.
-    - `recordings`: at least two of a rig; of a bare system, what
-        `jaxcam.recordings.segment` makes of them.
-    - `candidates`: terms that may be named; by default `library()`, with the constants
-        of the rig. Those that are not `listed` only help to describe what is unknown.
-    - `sensors`, `parameters`, `drive`: as for `jaxcam.fitting.Model` and `Problem`, of
-        a bare system; the drive is an input that was measured.
-    - `seed`: of the redrawn blocks.
-    - `progress`: called with a sentence and a fraction, or `None`.
-    - `keep`: a folder in which fits are kept until the diagnosis is done; one that was
-        interrupted goes on from there.
-    - `policy`: what decides a verdict, and how long a search may take.
-
-    **Raises:** `RecordingError` for recordings from which nothing can be told, with one
-    sentence that says why; `ValueError` for a term that acts nowhere.
+    Raises:
+        RecordingError: For recordings from which nothing can be told, with one sentence
+            that says why.
+        ValueError: For a term that acts nowhere.
     """
     report = progress or (lambda sentence, fraction: None)
 

@@ -1,4 +1,4 @@
-"""Which physics would bring the speeds at which a motion changes to those observed.
+"""Find the physics that would move predicted event speeds to the observed ones.
 
 For a rig without recordings whose motion was seen to change at known speeds: each
 term is given the strength, and the rig one parameter beside it, with which the speeds
@@ -24,22 +24,20 @@ from .terms import Term, WithTerms
 
 @dataclasses.dataclass(frozen=True)
 class EventCause:
-    """One explanation of the speeds at which a motion changes.
-
-    - `name`: of the term, or `"none"`; `strength` with its `unit`.
-    - `beside`: the parameter of the rig that was fitted with it.
-    - `speeds`: shape `(4,)`, rad/s, valve float, fold and flip of P(1,1), interruption
-        of chattering; NaN where there is none.
-    - `misfit`: sum of the squares of what is left of them, and of the pull on the
-        parameter, in the errors of each.
-    """
+    """One explanation of the speeds at which a motion changes."""
 
     name: str
+    """Of the term, or `"none"`; `strength` with its `unit`."""
     strength: float
     unit: str
     beside: float
+    """The parameter of the rig that was fitted with it."""
     speeds: Float[np.ndarray, "4"]
+    """Shape `(4,)`, rad/s, valve float, fold and flip of P(1,1), interruption of
+    chattering; NaN where there is none."""
     misfit: float
+    """Sum of the squares of what is left of them, and of the pull on the parameter, in
+    the errors of each."""
 
 
 def event_causes(
@@ -59,20 +57,25 @@ def event_causes(
     has a strength of its own: terms within a few units of misfit of the first are its
     equals.
 
-    **Arguments:**
+    Args:
+        observed: Valve float, fold and flip of P(1,1) and interruption of chattering
+            (rad/s), NaN where one was not seen, and how well each is known.
+        errors: Valve float, fold and flip of P(1,1) and interruption of chattering
+            (rad/s), NaN where one was not seen, and how well each is known.
+        terms: Candidates, of one strength each.
+        where: A parameter of the rig that is fitted beside each term, and how far it
+            may be off; `lambda rig: rig.restitution.intercept`, say.
+        tolerance: A parameter of the rig that is fitted beside each term, and how far
+            it may be off; `lambda rig: rig.restitution.intercept`, say.
+        policy: How far strengths are searched.
+        progress: Called with the part of the terms that is done.
 
-    - `observed`, `errors`: valve float, fold and flip of P(1,1) and interruption of
-        chattering (rad/s), NaN where one was not seen, and how well each is known.
-    - `terms`: candidates, of one strength each.
-    - `where`, `tolerance`: a parameter of the rig that is fitted beside each term, and
-        how far it may be off; `lambda rig: rig.restitution.intercept`, say.
-    - `policy`: how far strengths are searched.
-    - `progress`: called with the part of the terms that is done.
+    Returns:
+        Explanations, the best first; one of them is no term at all.
 
-    **Returns:** explanations, the best first; one of them is no term at all.
-
-    **Raises:** `ValueError` for a term with several strengths, or if `observed` are
-    not four speeds.
+    Raises:
+        ValueError: For a term with several strengths, or if `observed` are not four
+            speeds.
     """
     if np.shape(observed) != (4,) or np.shape(errors) != (4,):
         raise ValueError(
@@ -109,7 +112,7 @@ class _Goal:
     policy: Policy
 
     def left(self, speeds, pull: float) -> Float[np.ndarray, " m"]:
-        """What is left of each speed and of the parameter, in their errors."""
+        """Return the residuals of the speeds and of the parameter, in their errors."""
         off = ((speeds - self.observed) / self.errors)[np.isfinite(self.observed)]
         return np.append(
             np.where(np.isfinite(off), off, self.policy.absent_errors), pull

@@ -25,13 +25,13 @@ from .policy import Policy
 from .terms import WithTerms
 
 
-#: what happens at each of the speeds, in their order
 EVENTS = (
     "valve float",
     "P(1,1) appears (fold)",
     "P(1,1) doubles its period (flip)",
     "chattering is interrupted",
 )
+"""What happens at each of the speeds, in their order."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -157,7 +157,7 @@ def _monodromy(system, orbit: ImpactOrbit) -> Float[Array, "2 2"]:
 
 
 def _on_line(system, orbit: ImpactOrbit, offset: float, slope: float) -> SpecialPoint:
-    """Where the sum of the multipliers is `offset + slope` times their product."""
+    """Find the orbit whose multipliers sum to `offset + slope` times their product."""
     return _compiled(system, orbit, jnp.asarray(offset), jnp.asarray(slope))
 
 

@@ -1,4 +1,4 @@
-"""Which record to make next: the one that would say most about what is asked."""
+"""Recommend the next record: the one that is most informative."""
 
 import dataclasses
 import math
@@ -26,17 +26,16 @@ from .terms import Term, WithTerms
 
 @dataclasses.dataclass(frozen=True)
 class Experiment:
-    """What one more record would say.
-
-    - `name`: of the record.
-    - `now`, `then`: standard errors of the parameters asked for, without and with it.
-    - `speed`: of the cam (rad/s), where there is one.
-    """
+    """The expected information of one more record."""
 
     name: str
+    """Of the record."""
     now: Mapping[str, float]
+    """Standard errors of the parameters asked for, without and with it."""
     then: Mapping[str, float]
+    """Standard errors of the parameters asked for, without and with it."""
     speed: float | None = None
+    """Of the cam (rad/s), where there is one."""
 
     @property
     def factor(self) -> float:
@@ -48,20 +47,21 @@ class Experiment:
 def compare_experiments(
     found: Diagnosis, records: Sequence[Segments], asked: Sequence[str] | None = None
 ) -> tuple[Experiment, ...]:
-    """What each of some records would say, the best first, before they are made.
+    """Rank proposed records by their expected information, best first.
 
     From the sensitivities alone: the Fisher information of each record is added to that
     of the records of the diagnosis.
 
-    **Arguments:**
+    Args:
+        records: Simulated with the system that was found (`found.system()`) by
+            [`jaxcam.recordings.record`][], and cut.
+        asked: Names of parameters; by default the strengths of what was named. The
+            terms whose BIC is not much worse stay free beside them, so that the best
+            record also tells them apart. Where nothing was named, all terms, one at a
+            time.
 
-    - `records`: simulated with the system that was found (`found.system()`) by
-        [`jaxcam.recordings.record`][], and cut.
-    - `asked`: names of parameters; by default the strengths of what was named. The
-        terms whose BIC is not much worse stay free beside them, so that the best record
-        also tells them apart. Where nothing was named, all terms, one at a time.
-
-    **Raises:** `ValueError` for a name that is no parameter.
+    Raises:
+        ValueError: For a name that is no parameter.
     """
     fit = found.after
     for name in asked or ():
@@ -99,17 +99,22 @@ def next_experiments(
 ) -> tuple[Experiment, ...]:
     """The speed at which to run a driven rig next, the best first.
 
-    **Arguments:**
+    Args:
+        found: What `diagnose` said of its records so far.
+        rig: As given to `diagnose`.
+        speeds: Of the drive (rad/s) that can be had; by default some between those of
+            the records and a little beyond.
+        duration: Of a record (s); by default as before.
+        asked: As in [`jaxcam.discrepancy.compare_experiments`][].
+        seed: Of the simulated noise.
+        progress: Called with a sentence and a fraction, or `None`.
 
-    - `found`: what `diagnose` said of its records so far.
-    - `rig`: as given to `diagnose`.
-    - `speeds`: of the drive (rad/s) that can be had; by default some between those of
-        the records and a little beyond.
-    - `duration`: of a record (s); by default as before.
-    - `asked`: as in [`jaxcam.discrepancy.compare_experiments`][].
+    Returns:
+        One `Experiment` for each speed, the most informative first.
 
-    **Raises:** `ValueError` for a rig whose drive does not turn; `RecordingError` where
-    nothing flies at any of the speeds.
+    Raises:
+        ValueError: For a rig whose drive does not turn.
+        RecordingError: Where nothing flies at any of the speeds.
     """
     parts = found.after.problem.segments
     drives = [part.drive for part in parts if part.drive is not None]

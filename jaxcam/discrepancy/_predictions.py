@@ -1,4 +1,4 @@
-"""What a rig will do, with and without what its model lacked."""
+"""Predict the behaviour of a rig, with and without the missing physics."""
 
 import dataclasses
 from collections.abc import Callable
@@ -50,7 +50,8 @@ def predictions(
     **Arguments:** a diagnosis, the `seed` of the rigs that are drawn, and `progress`,
     called with the part of them that is done.
 
-    **Returns:** nothing for a system that is no cam-follower.
+    Returns:
+        Nothing for a system that is no cam-follower.
     """
     if not isinstance(found.after.model(0).system.base, CamFollower):  # pyright: ignore
         return ()

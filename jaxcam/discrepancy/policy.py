@@ -16,7 +16,7 @@ from scipy.stats import norm
 
 
 class Group(enum.StrEnum):
-    """What a number of a policy can change."""
+    """The aspect that a setting of a policy can change."""
 
     VERDICT = "verdict"
     BUDGET = "budget"
@@ -50,14 +50,16 @@ class Setting(NamedTuple):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Policy:
-    """What decides a verdict, how long a search may take, and what a report shows.
+    """Settings that decide a verdict, the time of a search, and the content of a
+    report.
 
     Give another one to `diagnose(..., policy=Policy(false_alarms=0.05))`. Numbers
     without a unit are ratios or counts; a cost is minus twice the log-likelihood, a
     cost per sample is one where only noise is left. [Discrepancy](../discrepancy.md)
     has the table of all fields.
 
-    **Raises:** `ValueError` for a number out of its range.
+    Raises:
+        ValueError: For a number out of its range.
     """
 
     # what decides a verdict

@@ -32,21 +32,33 @@ def simulate_filippov(
     tolerance: float = 1e-10,
     max_steps: int = 1_000_000,
 ) -> FilippovTrajectory:
-    """The motion of a Filippov system from `t0` to `t1`.
+    """Simulate a Filippov system from `t0` to `t1`.
 
-    Switches are located to the accuracy of the steps, and also those are found that a
-    step would leap over, as far as a cubic in time tells. On the surface the motion
+    Switches are located to the accuracy of the steps; switches that a step would leap
+    over are detected as far as a cubic in time shows them. On the surface the motion
     crosses, or slides by Filippov's convex combination until one field becomes tangent.
 
-    **Arguments:** a state `(n,)`, times (s), the error allowed in a step, and the
-    budget of attempted steps.
+    Args:
+        system: The system.
+        state: Initial state, shape `(n,)`.
+        t0: Start time (s).
+        t1: End time (s).
+        tolerance: Relative error allowed per step.
+        max_steps: Budget of attempted integration steps.
 
     Returns:
         A [`jaxcam.filippov.FilippovTrajectory`][].
 
     Raises:
-        ValueError: For a start that is not finite, or on the part of the surface that
-            both fields point away from, where the motion is not unique.
+        ValueError: The start is not finite, or on the part of the surface from which
+            both fields point away, where the motion is not unique.
+
+    Examples:
+        >>> from jaxcam.filippov import simulate_filippov
+        >>> from jaxcam.models import BeltOscillator
+        >>> run = simulate_filippov(BeltOscillator(), [1.0, 0.0], 0.0, 1.0)
+        >>> run.final.shape
+        (2,)
     """
     refuse_tracers(
         "simulate_filippov", "jaxcam.filippov.filippov_flow", system, state, t0, t1

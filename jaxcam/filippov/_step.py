@@ -37,7 +37,9 @@ class FilippovState(NamedTuple):
 
 
 class StepRow(NamedTuple):
-    """What an attempt has made: its kind, and time, state, mode and level after it."""
+    """The outcome of an attempted step: its kind, and time, state, mode and level after
+    it.
+    """
 
     kind: Any
     t: Any
@@ -147,7 +149,7 @@ def attempt(
 
 
 def _dip(value0, slope0, value1, slope1):
-    """Where the cubic through two ends dips below zero between them; 1 where nowhere.
+    """Return where the cubic through two ends dips below zero; 1 where nowhere.
 
     The place is that of its least value, as a fraction of the step.
     """

@@ -1,4 +1,4 @@
-"""What a Filippov system is: a field on either side of a surface."""
+"""Define a Filippov system: one vector field on either side of a surface."""
 
 import abc
 from typing import Any, ClassVar
@@ -8,31 +8,44 @@ from jaxtyping import Array, Float
 
 
 class FilippovSystem(eqx.Module):
-    """A system whose vector field jumps across a surface. (2.19)
+    """A system whose vector field jumps across a surface (thesis, eq. 2.19).
 
-    Subclass it and state the three methods below, smooth in time and state, also beyond
-    the surface. Every floating-point field is a parameter. The state itself never
-    jumps: that is what tells it from a [`jaxcam.hybrid.HybridSystem`][], where a
-    surface is never crossed, contact takes two conditions on the state (gap and normal
-    velocity) and begins by an impact. Here both sides are open and sliding takes one
-    condition, so that the two have event loops of their own.
+    Subclass it and define the three methods below, smooth in time and state, also
+    beyond the surface. Every floating-point field is a parameter. The state itself
+    never jumps. In a [`jaxcam.hybrid.HybridSystem`][], by contrast, the surface is
+    never crossed, contact takes two conditions on the state (gap and normal velocity)
+    and begins by an impact. Here both sides are open and sliding takes one condition,
+    so that the two have event loops of their own.
+
+    Examples:
+        >>> from jaxcam.filippov import FilippovSystem, simulate_filippov
+        >>> class Relay(FilippovSystem):
+        ...     def above(self, t, state):
+        ...         return -jnp.ones(1)
+        ...     def below(self, t, state):
+        ...         return jnp.ones(1)
+        ...     def switching(self, t, state):
+        ...         return state[0]
+        >>> round(float(simulate_filippov(Relay(), [0.5], 0.0, 1.0).final[0]), 6) + 0.0
+        0.0
     """
 
     state_names: ClassVar[tuple[str, ...]] = ()
-    """Names and units of the state's components."""
+    """Names of the state's components."""
     state_units: ClassVar[tuple[str, ...]] = ()
+    """Units of the state's components."""
 
     @abc.abstractmethod
     def above(self, t, state: Float[Array, " n"]) -> Float[Array, " n"]:
-        """Rate of change where `switching` is positive, shape `(n,)`."""
+        """Return the rate of change where `switching` is positive, shape `(n,)`."""
 
     @abc.abstractmethod
     def below(self, t, state: Float[Array, " n"]) -> Float[Array, " n"]:
-        """Rate of change where `switching` is negative, shape `(n,)`."""
+        """Return the rate of change where `switching` is negative, shape `(n,)`."""
 
     @abc.abstractmethod
     def switching(self, t, state: Float[Array, " n"]) -> Float[Array, ""]:
-        """The scalar H whose zero is the surface."""
+        """Return the scalar H whose zero is the surface."""
 
     @property
     def period(self) -> Any:

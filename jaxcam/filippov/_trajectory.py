@@ -1,4 +1,4 @@
-"""What a simulation of a Filippov system returns."""
+"""The result of a simulation of a Filippov system."""
 
 import equinox as eqx
 import jax
@@ -12,36 +12,51 @@ from ._system import FilippovSystem
 
 
 class Switches(eqx.Module):
-    """The events of a motion, in order: crossings, begins and ends of sliding."""
+    """The events of a motion, in order: crossings, and begin and end of sliding."""
 
     time: Float[Array, " k"]
-    """(k,) s."""
+    """Time of each event (s), shape `(k,)`."""
     state: Float[Array, "k n"]
-    """(k, n)."""
+    """State there, shape `(k, n)`."""
     before: Int[Array, " k"]
-    """(k,) [`Mode`][jaxcam.filippov.modes.Mode] before and after: 1 above, 0 sliding,
-    -1 below."""
+    """[`Mode`][jaxcam.filippov.modes.Mode] before the event, 1 above, 0 sliding, -1
+    below; shape `(k,)`."""
     after: Int[Array, " k"]
+    """Mode after the event, shape `(k,)`."""
 
     @property
     def count(self) -> int:
-        """How many there are."""
+        """Number of events."""
         return self.time.shape[0]
 
 
 class FilippovTrajectory(eqx.Module):
-    """A motion on [t0, t1]."""
+    """A motion of a Filippov system on [t0, t1].
+
+    Examples:
+        >>> from jaxcam.filippov import simulate_filippov
+        >>> from jaxcam.models import BeltOscillator
+        >>> run = simulate_filippov(BeltOscillator(), [1.0, 0.0], 0.0, 1.0)
+        >>> run.at([0.0, 0.5]).shape
+        (2, 2)
+    """
 
     system: FilippovSystem
+    """The simulated system."""
     t0: Float[Array, ""]
+    """Start time (s)."""
     t1: Float[Array, ""]
+    """End time (s)."""
     time: Float[Array, " s"]
-    """(s,) and (s, n) ends of the steps, and (s,) the mode from there on."""
+    """Times at the ends of the steps (s), shape `(s,)`."""
     state: Float[Array, "s n"]
+    """States there, shape `(s, n)`."""
     mode: Int[Array, " s"]
+    """Mode from there on: 1 above, 0 sliding, -1 below; shape `(s,)`."""
     switches: Switches
+    """The events, in order."""
     result: str = eqx.field(static=True)
-    """Empty, or why t1 was not reached."""
+    """Empty, or the reason why t1 was not reached."""
 
     @property
     def final(self) -> Float[Array, " n"]:
@@ -49,10 +64,17 @@ class FilippovTrajectory(eqx.Module):
         return self.state[-1]
 
     def at(self, times: VectorLike) -> Float[Array, "times n"]:
-        """State at each of `times` (s), by one more step from the point before it.
+        """Return the state at each of `times` (s), by one more step from the point
+        before it.
+
+        Args:
+            times: Times (s), shape `(times,)`.
+
+        Returns:
+            Shape `(times, n)`.
 
         Raises:
-            ValueError: For times outside the run.
+            ValueError: A time lies outside the run.
         """
         wanted = np.asarray(times, dtype=float)
         known = np.asarray(self.time)
@@ -75,7 +97,9 @@ class FilippovTrajectory(eqx.Module):
         )
 
     def sliding(self) -> Float[Array, "intervals 2"]:
-        """Begin and end (s) of each interval of sliding within the run."""
+        """Return begin and end (s) of each interval of sliding, shape
+        `(intervals, 2)`.
+        """
         mode, time = np.asarray(self.mode), np.asarray(self.time)
         held = mode == 0
         begins = np.flatnonzero(held & ~np.append(False, held[:-1]))

@@ -49,11 +49,28 @@ def filippov_flow(
     tolerance=1e-10,
     max_steps: int = 100_000,
 ) -> Float[Array, " n"]:
-    """Where the motion from `state` at `t0` is at `t1`; for use inside `jit`.
+    """Return the state at `t1` of the motion that starts from `state`; for use inside
+    `jit`.
 
-    Can be batched and differentiated in state, times and parameters: crossing,
-    entering and leaving a sliding mode carry their derivatives. NaN where `t1` is not
-    reached within `max_steps` attempted steps.
+    It can be batched and differentiated in state, times and parameters: crossing,
+    entering and leaving a sliding mode carry their derivatives.
+
+    Args:
+        system: The system.
+        state: Initial state, shape `(n,)`.
+        t0: Start time (s).
+        t1: End time (s).
+        tolerance: Relative error allowed per step.
+        max_steps: Budget of attempted integration steps.
+
+    Returns:
+        Shape `(n,)`; NaN if `t1` is not reached within `max_steps` attempted steps.
+
+    Examples:
+        >>> from jaxcam.filippov import filippov_flow
+        >>> from jaxcam.models import BeltOscillator
+        >>> filippov_flow(BeltOscillator(), jnp.array([1.0, 0.0]), 0.0, 1.0).shape
+        (2,)
     """
     t0, t1 = jnp.asarray(t0, dtype=float), jnp.asarray(t1, dtype=float)
     carried = first_filippov_state(system, state, t0, t1)
@@ -79,9 +96,20 @@ def leg_flow(
     t1,
     steps: int = 64,
 ) -> Float[Array, " n"]:
-    """The flow of one mode from `t0` to `t1` by even steps, events ignored.
+    """Integrate one mode from `t0` to `t1` in equal steps, without events.
 
-    Differentiable; what variational theory calls the flow between two events.
+    It is differentiable: the flow between two events of variational theory.
+
+    Args:
+        system: The system.
+        mode: 1 above the surface, -1 below it, 0 sliding on it.
+        state: State, shape `(n,)`.
+        t0: Start time (s).
+        t1: End time (s).
+        steps: Number of steps.
+
+    Returns:
+        State at `t1`, shape `(n,)`.
     """
     h = (t1 - t0) / steps
 

@@ -1,4 +1,4 @@
-"""What happens at the surface: crossing, sliding, and the field in force."""
+"""Classify motion at the surface: crossing, sliding, and the field in force."""
 
 import jax
 import jax.numpy as jnp
@@ -10,7 +10,17 @@ from ._system import FilippovSystem
 def surface_rates(
     system: FilippovSystem, t, state: Float[Array, " n"]
 ) -> tuple[Float[Array, ""], Float[Array, ""]]:
-    """Rates of change of H along the fields above and below, time included. (3.9)"""
+    """Return the rates of change of H along both fields, time included (thesis,
+    eq. 3.9).
+
+    Args:
+        system: The system.
+        t: Time (s).
+        state: State, shape `(n,)`.
+
+    Returns:
+        Two scalars, above and below.
+    """
     t = jnp.asarray(t, dtype=float)
 
     def along(field):
@@ -31,7 +41,16 @@ def sliding_share(system: FilippovSystem, t, state) -> Float[Array, ""]:
 def sliding_field(
     system: FilippovSystem, t, state: Float[Array, " n"]
 ) -> Float[Array, " n"]:
-    """Filippov's convex combination of both fields, tangent to the surface."""
+    """Return Filippov's convex combination of both fields, tangent to the surface.
+
+    Args:
+        system: The system.
+        t: Time (s).
+        state: State, shape `(n,)`.
+
+    Returns:
+        Shape `(n,)`.
+    """
     share = sliding_share(system, t, state)
     return share * system.above(t, state) + (1 - share) * system.below(t, state)
 
@@ -39,14 +58,27 @@ def sliding_field(
 def equivalent_control(
     system: FilippovSystem, t, state: Float[Array, " n"]
 ) -> tuple[Float[Array, ""], Float[Array, " n"]]:
-    """Utkin's equivalent control of x' = f + g u with u = 1 above and -1 below.
+    """Return Utkin's equivalent control of x' = f + g u with u = 1 above and -1 below.
 
     It solves H_t + H_x (f + g u) = 0 and lies in [-1, 1] where the system slides.
-    Because the control enters linearly, its field is Filippov's. Also the force of dry
-    friction over the largest there is, or the mean of a relay.
+    Because the control enters linearly, its field is Filippov's. It is also the force
+    of dry friction over the largest friction force, or the mean of a relay (V. I.
+    Utkin's method of equivalent control).
+
+    Args:
+        system: The system.
+        t: Time (s).
+        state: State, shape `(n,)`.
 
     Returns:
-        u and the field f + g u.
+        u, a scalar, and the field f + g u, shape `(n,)`.
+
+    Examples:
+        >>> from jaxcam.filippov import equivalent_control
+        >>> from jaxcam.models import BeltOscillator
+        >>> u, _ = equivalent_control(BeltOscillator(), 0.0, jnp.array([0.5, 0.2]))
+        >>> round(float(abs(u)), 6)
+        0.5
     """
     above, below = system.above(t, state), system.below(t, state)
     mean, control = (above + below) / 2, (above - below) / 2
@@ -59,10 +91,18 @@ def equivalent_control(
 
 
 def region(system: FilippovSystem, t, state: Float[Array, " n"]) -> str:
-    """What a motion does that is on the surface at `state`.
+    """Classify a state on the surface.
 
     "crossing up", "crossing down", "sliding" (both fields point to the surface),
-    "escaping" (both point away: what follows is not unique), or "tangent".
+    "escaping" (both point away: the motion is not unique), or "tangent".
+
+    Args:
+        system: The system.
+        t: Time (s).
+        state: State, shape `(n,)`.
+
+    Returns:
+        One of these words.
     """
     above, below = (float(rate) for rate in surface_rates(system, t, state))
     if above == 0 or below == 0:
@@ -73,13 +113,24 @@ def region(system: FilippovSystem, t, state: Float[Array, " n"]) -> str:
 
 
 def mode_field(system: FilippovSystem, mode, t, state) -> Float[Array, " n"]:
-    """The field in force: mode 1 above the surface, -1 below it, 0 sliding on it."""
+    """Return the field in force: mode 1 above the surface, -1 below it, 0 sliding on
+    it.
+
+    Args:
+        system: The system.
+        mode: The mode.
+        t: Time (s).
+        state: State, shape `(n,)`.
+
+    Returns:
+        Shape `(n,)`.
+    """
     share = jnp.where(mode == 0, sliding_share(system, t, state), (mode + 1.0) / 2)
     return share * system.above(t, state) + (1 - share) * system.below(t, state)
 
 
 def levels(system: FilippovSystem, mode, t, state) -> Float[Array, " 2"]:
-    """What stays positive in a mode: H on its own side; in sliding, both inward rates.
+    """Return the quantities that stay positive in a mode: H, or both inward rates.
 
     The second level of a side is one, always.
     """

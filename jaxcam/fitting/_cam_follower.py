@@ -14,7 +14,8 @@ def cam_follower_model(
 
     **Arguments:** channels to fit: `follower_angle_rad`, `gyro_rad_s`.
 
-    **Raises:** `ValueError` for another channel, or a gyro that the rig does not have.
+    Raises:
+        ValueError: For another channel, or a gyro that the rig does not have.
     """
     known = rig_sensors(rig)
     for channel in channels:
@@ -48,7 +49,8 @@ def rig_sensors(rig: Rig) -> dict[str, Sensor]:
 
 
 def cam_follower_parameters(rig: Rig, base=lambda system: system) -> list[Parameter]:
-    """What recordings of the rig can tell: K (as K/J), the spring, the cam, r.
+    """Return the identifiable parameters of the rig: K (as K/J), the spring, the cam,
+    r.
 
     The inertia is held, since only K/J acts; so is the follower's half height in the
     profile, since only its sum with the cam's radius does.

@@ -1,4 +1,4 @@
-"""Why a fit is not to be trusted, found from the result itself."""
+"""Find reasons not to trust a fit, from the result itself."""
 
 import enum
 from typing import NamedTuple
@@ -35,7 +35,7 @@ class Reason(NamedTuple):
 
 
 def not_finite(problem: Problem, point: Point, cost: float, costs: Costs) -> str:
-    """What is not a finite number, in a sentence; empty where everything is."""
+    """Return a sentence that names what is not finite; empty where everything is."""
     pieces = problem.pieces
     flown = np.asarray(costs.flown) + np.asarray(costs.joints)
     exists = np.asarray(pieces.exists)
@@ -58,7 +58,7 @@ def not_finite(problem: Problem, point: Point, cost: float, costs: Costs) -> str
 
 
 def far_from_data(problem: Problem, costs: Costs, weights: Weights | None) -> str:
-    """Where the cost is far above the noise, in a sentence; empty where it is not.
+    """Return a sentence where the cost is far above the noise; empty where it is not.
 
     Compared are what three quarters of the pieces keep below, so that one bad record
     among many is no reason, and the mean, so that no part may be far off altogether.

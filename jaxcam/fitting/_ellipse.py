@@ -1,4 +1,4 @@
-"""Where several parameters are together: the ellipsoid of their covariance."""
+"""The joint confidence region of parameters: the ellipsoid of their covariance."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -16,16 +16,16 @@ class Ellipse:
     with d degrees of freedom, C the covariance of these parameters with all others left
     free. As exact as the model is straight over the region; see
     [`jaxcam.fitting.excess_cost`][] for one that bends.
-
-    - `names`: `(d,)`, the order of everything else.
-    - `centre`, `covariance`: `(d,)` and `(d, d)`, in the units of the parameters.
-    - `level`: probability that the region holds the truth.
     """
 
     names: tuple[str, ...]
+    """`(d,)`, the order of everything else."""
     centre: Float[np.ndarray, " d"]
+    """`(d,)` and `(d, d)`, in the units of the parameters."""
     covariance: Float[np.ndarray, "d d"]
+    """`(d,)` and `(d, d)`, in the units of the parameters."""
     level: float
+    """Probability that the region holds the truth."""
 
     @property
     def limit(self) -> float:
@@ -55,7 +55,8 @@ class Ellipse:
     def polygon(self, points: int = 181) -> Float[np.ndarray, "k 2"]:
         """The edge of an ellipse as a closed line, shape `(points, 2)`, to be drawn.
 
-        **Raises:** `ValueError` for more than two parameters.
+        Raises:
+            ValueError: For more than two parameters.
         """
         if len(self.names) != 2:
             raise ValueError(

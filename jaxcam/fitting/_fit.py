@@ -28,8 +28,8 @@ from .engine import (
 
 
 _ITERATIONS = 60
-#: a step that promises less than this (twice the log-likelihood) is the last
 PROMISE = 1e-3
+"""A step that promises less than this (twice the log-likelihood) is the last."""
 # and so must an undamped step: less than a tenth of a standard error
 _GRADIENT = 1e-2
 # Steps that may follow before the first one is judged
@@ -55,27 +55,28 @@ def fit(
 ) -> Fit:
     """Fit the free parameters of a problem.
 
-    **Arguments:**
-
-    - `free`: names of the parameters to fit; by default all of them. The others stay
-        at the values of `start`.
-    - `start`: another fit, or values of some parameters; by default the nominal ones.
-    - `weights`: how much each piece of the data counts.
-    - `prior`: whether the tolerances count as knowledge; bounds always hold.
-    - `stop`: called after each iteration with the cost at the start and after every
-        one so far; where it says so, the fit ends, not converged. Long flights are
-        first fitted with loose joints, to the end; the costs are those that follow.
-    - `progress`: called with the number of the iteration and the cost.
-
     Where a fit from the problem's own start ends far above the noise, and neither
     `start` nor `stop` was given, it is tried again from other places, and the one that
     fits best is returned.
 
-    **Returns:** a [`jaxcam.fitting.Fit`][]. It has `converged` only at an optimum that
-    the noise explains, away from all bounds, with every error known; its `reasons` say
-    why not.
+    Args:
+        free: Names of the parameters to fit; by default all of them. The others stay at
+            the values of `start`.
+        start: Another fit, or values of some parameters; by default the nominal ones.
+        weights: How much each piece of the data counts.
+        prior: Whether the tolerances count as knowledge; bounds always hold.
+        stop: Called after each iteration with the cost at the start and after every one
+            so far; where it says so, the fit ends, not converged. Long flights are
+            first fitted with loose joints, to the end; the costs are those that follow.
+        progress: Called with the number of the iteration and the cost.
 
-    **Raises:** `ValueError` for a name that is not a parameter.
+    Returns:
+        A [`jaxcam.fitting.Fit`][]. It has `converged` only at an optimum that the noise
+            explains, away from all bounds, with every error known; its `reasons` say
+            why not.
+
+    Raises:
+        ValueError: For a name that is not a parameter.
     """
     columns = free_columns(problem, free)
     point = start_point(problem, start)
@@ -104,7 +105,7 @@ def fit(
 
 
 class _Descent(NamedTuple):
-    """Where an iteration ended, and how."""
+    """The end of an iteration."""
 
     point: Point
     blocks: Blocks
@@ -224,7 +225,7 @@ def held_out_cost(problem: Problem, found: Fit, weights: Weights) -> float:
 
 
 def start_point(problem: Problem, start) -> Point:
-    """Where to begin."""
+    """Return the start of the iteration."""
     if isinstance(start, Fit):
         return start.point
     if isinstance(start, Point):

@@ -1,4 +1,4 @@
-"""What a fit found: estimates, their covariance, and how it ended."""
+"""The result of a fit: estimates, their covariance, and how it ended."""
 
 import dataclasses
 import functools
@@ -53,32 +53,35 @@ class Estimate:
 
 @dataclasses.dataclass(frozen=True, repr=False)
 class Fit:
-    """What a fit found.
-
-    - `problem`, `point`: parameters and states at the optimum.
-    - `free`: names of the parameters that were free.
-    - `estimates`: one for each free number, in the order of `covariance`.
-    - `covariance`: from the Fisher information, what was known beforehand included.
-    - `cost`: minus twice the log-likelihood (less a constant) with the prior; `costs`:
-        of each piece, without it.
-    - `optimal`, `iterations`, `ended`: whether the iteration met its tolerance at an
-        optimum, after how many steps, and how it ended in words.
-    - `weights`: how much each piece of the data counted; `None`: all alike.
-    - `unconstrained`: combinations of parameters that the data say nothing of.
-    """
+    """The result of a fit."""
 
     problem: Problem
+    """Parameters and states at the optimum."""
     point: Point
+    """Parameters and states at the optimum."""
     free: tuple[str, ...]
+    """Names of the parameters that were free."""
     estimates: tuple[Estimate, ...]
+    """One for each free number, in the order of `covariance`."""
     covariance: Float[np.ndarray, "g g"]
+    """From the Fisher information, what was known beforehand included."""
     cost: float
+    """Minus twice the log-likelihood (less a constant) with the prior; `costs`: of each
+    piece, without it."""
     costs: Costs
     optimal: bool
+    """Whether the iteration met its tolerance at an optimum, after how many steps, and
+    how it ended in words."""
     iterations: int
+    """Whether the iteration met its tolerance at an optimum, after how many steps, and
+    how it ended in words."""
     ended: str
+    """Whether the iteration met its tolerance at an optimum, after how many steps, and
+    how it ended in words."""
     weights: Weights | None = None
+    """How much each piece of the data counted; `None`: all alike."""
     unconstrained: tuple[Unconstrained, ...] = ()
+    """Combinations of parameters that the data say nothing of."""
 
     def __repr__(self) -> str:
         return self._table().text()
@@ -100,7 +103,7 @@ class Fit:
 
     @functools.cached_property
     def reasons(self) -> tuple[Reason, ...]:
-        """Why the fit is not to be trusted; empty where it has converged.
+        """The reasons not to trust the fit; empty where it has converged.
 
         Found from what the fit holds, so that it cannot disagree with it.
         """
@@ -134,13 +137,14 @@ class Fit:
 
     @property
     def message(self) -> str:
-        """How the fit ended, and every reason to doubt it."""
+        """Say how the fit ended, with every reason for doubt."""
         return " ".join(one.sentence for one in self.reasons) or self.ended
 
     def __getitem__(self, name: str) -> Estimate:
         """The estimate of a parameter, by name or `name@record`.
 
-        **Raises:** `KeyError` that lists the names there are.
+        Raises:
+            KeyError: That lists the names there are.
         """
         for one in self.estimates:
             if name in (one.name, one.label):
@@ -161,8 +165,10 @@ class Fit:
         **Arguments:** names as in `estimates`, with `@record` where each record has its
         own; the probability that the region holds the truth.
 
-        **Raises:** `KeyError` for a name that was not fitted; `ValueError` for a level
-        outside 0 and 1, fewer than two names, or an error that is not finite.
+        Raises:
+            KeyError: For a name that was not fitted.
+            ValueError: For a level outside 0 and 1, fewer than two names, or an error
+                that is not finite.
         """
         labels = [one.label for one in self.estimates]
         values = [one.value for one in self.estimates]

@@ -1,4 +1,4 @@
-"""What the data can and cannot tell of the parameters, before any fit, in words."""
+"""Analyse identifiability before any fit, and describe it in words."""
 
 import dataclasses
 from collections.abc import Iterable
@@ -24,22 +24,21 @@ _MEMBER = 0.15
 
 @dataclasses.dataclass(frozen=True)
 class Identifiability:
-    """Which combinations of parameters the data see, best first.
-
-    - `names`: parameters, as in the columns of `directions` `(g, g)`: one combination a
-        row, each parameter in units of its scale (its tolerance).
-    - `stderr`: error of each combination from the data alone, in the same units.
-    - `values`, `scales`: of each parameter, where it was looked and what its unit is.
-    - `alone`: error of each parameter from the data alone if all others were known, and
-        `together` if none is, in units of the scale.
-    """
+    """The combinations of parameters that the data determine, best first."""
 
     names: tuple[str, ...]
+    """Parameters, as in the columns of `directions` `(g, g)`: one combination a row,
+    each parameter in units of its scale (its tolerance)."""
     directions: Float[np.ndarray, "g g"]
     stderr: Float[np.ndarray, " g"]
+    """Error of each combination from the data alone, in the same units."""
     values: Float[np.ndarray, " g"]
+    """Of each parameter, where it was looked and what its unit is."""
     scales: Float[np.ndarray, " g"]
+    """Of each parameter, where it was looked and what its unit is."""
     alone: Float[np.ndarray, " g"]
+    """Error of each parameter from the data alone if all others were known, and
+    `together` if none is, in units of the scale."""
     together: Float[np.ndarray, " g"]
 
     @property
@@ -103,7 +102,7 @@ class Identifiability:
         )
 
     def _relation(self, direction, members) -> str:
-        """What is left of two parameters that are seen only together."""
+        """Describe the relation of two parameters that are only determined together."""
         pair = [self.names.index(name) for name in members]
         if len(pair) != 2 or np.any(self.values[pair] == 0):
             return ""
@@ -118,7 +117,7 @@ class Identifiability:
 def identify(
     problem: Problem, names: Iterable[str] | None = None, at: Fit | None = None
 ) -> Identifiability:
-    """What the recordings can tell of some parameters, without fitting them.
+    """Analyse which parameters the recordings can determine, without fitting them.
 
     The Fisher information at the nominal parameters, the states of all pieces
     eliminated: its large eigenvalues belong to what the data see, its small ones to

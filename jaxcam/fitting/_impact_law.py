@@ -31,28 +31,26 @@ _NOTHING = 1e-4
 
 @dataclasses.dataclass(frozen=True)
 class ImpactLaw:
-    """What a table of impacts says of their restitution.
-
-    - `laws`: `"constant"`, and the power law as `"falling"` or `"rising"`.
-    - `best`: the name of the one that the impacts support.
-    - `delta_bic`: of each law, less that of the constant one; below zero is better. The
-        power law that the impacts turn away from is the constant with one number more.
-    - `p_value`: chance of what the power law gains where restitution is constant.
-    - `scatter`: standard deviation of an impact, in `scatter_unit`: that of the speed,
-        or, with `"1"`, of the restitution; with `"stated"`, in its standard errors.
-    - `set_aside`: rows (from 1) that are too far off to belong to the others.
-    - `momentum`: of two bodies, how well their momentum is kept; or `None`.
-    """
+    """The restitution law of a table of impacts."""
 
     table: ImpactTable
     laws: dict[str, RestitutionFit]
+    """`"constant"`, and the power law as `"falling"` or `"rising"`."""
     best: str
+    """The name of the one that the impacts support."""
     delta_bic: dict[str, float]
+    """Of each law, less that of the constant one; below zero is better. The power law
+    that the impacts turn away from is the constant with one number more."""
     p_value: float
+    """Chance of what the power law gains where restitution is constant."""
     scatter: float
+    """Standard deviation of an impact, in `scatter_unit`: that of the speed, or, with
+    `"1"`, of the restitution; with `"stated"`, in its standard errors."""
     scatter_unit: str
     set_aside: tuple[int, ...]
+    """Rows (from 1) that are too far off to belong to the others."""
     momentum: MomentumBalance | None
+    """Of two bodies, how well their momentum is kept; or `None`."""
 
     @property
     def law(self) -> RestitutionFit:
@@ -156,7 +154,8 @@ def impact_law(table: ImpactTable) -> ImpactLaw:
     where the table states errors, in proportion to these. The power law is named where
     an F test finds that a constant one would gain as much in one table of a hundred.
 
-    **Raises:** `RecordingError` for fewer than four impacts.
+    Raises:
+        RecordingError: For fewer than four impacts.
     """
     if len(table) < _LEAST:
         raise RecordingError(
@@ -176,7 +175,7 @@ def impact_law(table: ImpactTable) -> ImpactLaw:
 
 
 def _weights(table: ImpactTable) -> dict[str, Float[np.ndarray, " k"]]:
-    """What an impact scatters by, but for a factor, by the unit of that."""
+    """Return the relative scatter of an impact, by its unit."""
     if table.approach_stderr is None and table.separation_stderr is None:
         return {table.unit: np.ones(len(table)), "1": table.approach}
     r = float(np.median(table.separation / table.approach))

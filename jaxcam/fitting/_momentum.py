@@ -15,20 +15,20 @@ _ERRORS, _SHARE = 3.0, 0.005
 
 @dataclasses.dataclass(frozen=True)
 class MomentumBalance:
-    """Momentum of two bodies in their impacts.
-
-    - `change`, `stderr`: of the momentum of both, as a share of what they exchange;
-        not a number where the masses are unknown.
-    - `ratio`, `ratio_stderr`: mass of the second body over that of the first, such that
-        momentum is kept.
-    - `stated`: that ratio of the stated masses, or not a number.
-    """
+    """Momentum of two bodies in their impacts."""
 
     change: float
+    """Of the momentum of both, as a share of what they exchange; not a number where the
+    masses are unknown."""
     stderr: float
+    """Of the momentum of both, as a share of what they exchange; not a number where the
+    masses are unknown."""
     ratio: float
+    """Mass of the second body over that of the first, such that momentum is kept."""
     ratio_stderr: float
+    """Mass of the second body over that of the first, such that momentum is kept."""
     stated: float
+    """That ratio of the stated masses, or not a number."""
 
     @property
     def kept(self) -> bool:

@@ -58,18 +58,19 @@ def profile(
 ) -> Profile:
     """Fit all other parameters again with one of them held at several values.
 
-    **Arguments:**
+    Args:
+        found: The fit, in which `name` was free.
+        reach: How far to go, in standard errors on both sides.
+        points: Number of values, the optimum included.
+        values: Where to hold it instead, in any order; a value is inside the 95 %
+            interval if its cost is below 3.84.
+        weights: As they were for `found`.
+        prior: As they were for `found`.
+        progress: Called with the number of values done and of all.
 
-    - `found`: the fit, in which `name` was free.
-    - `reach`: how far to go, in standard errors on both sides.
-    - `points`: number of values, the optimum included.
-    - `values`: where to hold it instead, in any order; a value is inside the 95 %
-        interval if its cost is below 3.84.
-    - `weights`, `prior`: as they were for `found`.
-    - `progress`: called with the number of values done and of all.
-
-    **Raises:** `KeyError` for a parameter that was not fitted; `ValueError` for one
-    that differs from record to record.
+    Raises:
+        KeyError: For a parameter that was not fitted.
+        ValueError: For one that differs from record to record.
     """
     _require_shared(found, name)
     estimate = found[name]
@@ -123,7 +124,8 @@ def excess_cost(
     **Arguments:** the fit, in which all of these were free; `weights` and `prior` as
     they were for it.
 
-    **Raises:** as in [`jaxcam.fitting.profile`][].
+    Raises:
+        ValueError: as in [`jaxcam.fitting.profile`][].
     """
     problem, cost = found.problem, 0.0
     point = found.point
@@ -146,7 +148,7 @@ def _require_shared(found: Fit, name: str) -> None:
 
 
 def _known(problem, name: str, values):
-    """What was known of a parameter, as a cost of values of it."""
+    """Return the prior knowledge of a parameter, as a cost of its values."""
     parameter = problem.parameter(name)
     nominal = parameter.nominal
     if nominal is None:

@@ -60,7 +60,8 @@ def read_setup(
     **Arguments:** the file; and another system than that of the file: a class, or
     `FILE.py:CLASS` as seen from the working directory.
 
-    **Raises:** `RigError`, one sentence that names the file, the key and the fix.
+    Raises:
+        RigError: One sentence that names the file, the key and the fix.
     """
     file = Path(path)
     tables = read_tables(file)
@@ -95,7 +96,8 @@ def read_setup(
 def is_setup(path: str | Path) -> bool:
     """Whether a rig file is one for `read_setup`, and not that of a cam-follower.
 
-    **Raises:** `RigError` for a file that is no TOML.
+    Raises:
+        RigError: For a file that is no TOML.
     """
     return not {"system", "parameters", "channels"}.isdisjoint(read_tables(Path(path)))
 

@@ -1,4 +1,4 @@
-"""What a fit leaves over: data minus model by record, mode, time and phase."""
+"""Residuals of a fit: data minus model by record, mode, time and phase."""
 
 import dataclasses
 
@@ -14,9 +14,6 @@ class Residuals:
     """Data minus model of one channel of one record, in units of the channel.
 
     - `time` (s), `turned` (angle of the drive, rad, or nothing), `value`, each `(k,)`.
-    - `flight`: number of the flight or contact each sample belongs to; `resting` is
-        true in contact.
-    - `noise`: standard deviation of noise and rounding.
     """
 
     record: str
@@ -25,8 +22,11 @@ class Residuals:
     turned: Float[np.ndarray, " k"]
     value: Float[np.ndarray, " k"]
     flight: Int[np.ndarray, " k"]
+    """Number of the flight or contact each sample belongs to; `resting` is true in
+    contact."""
     resting: Bool[np.ndarray, " k"]
     noise: float
+    """Standard deviation of noise and rounding."""
 
     @property
     def rms(self) -> float:
@@ -48,7 +48,7 @@ class Residuals:
 
 
 def residuals(found: Fit) -> list[Residuals]:
-    """What is left over, for each record and channel, sorted by time.
+    """Return the residuals of each record and channel, sorted by time.
 
     Saturated samples are left out: they say too little.
     """

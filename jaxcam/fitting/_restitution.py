@@ -24,20 +24,22 @@ _STEPS = 200
 
 @dataclasses.dataclass(frozen=True)
 class RestitutionFit:
-    """A law of restitution fitted to measured impacts.
-
-    - `law`: the fitted law, a Module for `CamFollower(restitution=...)`.
-    - `names`, `values`, `stderr`: its parameters.
-    - `cost`, `freedom`: sum of squares (of Huber's kind) in standard errors, and
-        impacts less parameters; their ratio is one where the law says all there is.
-    """
+    """A law of restitution fitted to measured impacts."""
 
     law: eqx.Module
+    """The fitted law, a Module for `CamFollower(restitution=...)`."""
     names: tuple[str, ...]
+    """Its parameters."""
     values: Float[np.ndarray, " p"]
+    """Its parameters."""
     stderr: Float[np.ndarray, " p"]
+    """Its parameters."""
     cost: float
+    """Sum of squares (of Huber's kind) in standard errors, and impacts less parameters;
+    their ratio is one where the law says all there is."""
     freedom: int
+    """Sum of squares (of Huber's kind) in standard errors, and impacts less parameters;
+    their ratio is one where the law says all there is."""
 
     def sentence(self) -> str:
         """The law in words."""
@@ -55,11 +57,13 @@ class RestitutionFit:
 def restitution_laws(segments: Sequence[Segments]) -> dict[str, RestitutionFit]:
     """Three laws fitted to the impacts of some recordings.
 
-    **Returns:** `"constant"`, `"speed"` (linear in the speed of the drive, Figure 4.15
-    of the thesis) and `"approach"` (a power of the approach speed); without a law whose
-    parameters the impacts do not determine.
+    Returns:
+        `"constant"`, `"speed"` (linear in the speed of the drive, Figure 4.15 of the
+            thesis) and `"approach"` (a power of the approach speed); without a law
+            whose parameters the impacts do not determine.
 
-    **Raises:** `RecordingError` where there are too few impacts.
+    Raises:
+        RecordingError: Where there are too few impacts.
     """
     approach = np.concatenate([part.impacts.approach for part in segments])
     usual = float(np.median(approach[approach > 0])) if np.any(approach > 0) else 1.0
@@ -93,13 +97,13 @@ def fit_restitution(
     over the error that both speeds and that of the surface give it. Levenberg-Marquardt
     (optimistix); an outlier counts by its size.
 
-    **Arguments:**
+    Args:
+        segments: From `segment_case` or `segment`.
+        law: Called as `law(speed, approach_speed)`; where to start.
+        names: Its fields to fit; the others stay.
 
-    - `segments`: from `segment_case` or `segment`.
-    - `law`: called as `law(speed, approach_speed)`; where to start.
-    - `names`: its fields to fit; the others stay.
-
-    **Raises:** `RecordingError` where there are fewer impacts than parameters.
+    Raises:
+        RecordingError: Where there are fewer impacts than parameters.
     """
     impacts = [part.impacts for part in segments]
     speed = np.concatenate(
@@ -211,7 +215,8 @@ def first_bounce(
     speed over the recorded approach speed. For comparison: unlike a fit of whole
     trajectories it uses one number a turn, and that one is the largest of noisy ones.
 
-    **Returns:** one coefficient for each turn that has such a pair of flights.
+    Returns:
+        One coefficient for each turn that has such a pair of flights.
     """
     impacts, flights = segments.impacts, segments.flights
     if segments.drive is None:

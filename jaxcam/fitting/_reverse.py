@@ -58,7 +58,7 @@ def _gradient(layout, pieces, extras, point, where, values):
 
 
 class Trained(NamedTuple):
-    """What `train` found: the part of the model, and the cost before and after."""
+    """The result of `train`: the trained part, and the cost before and after."""
 
     values: Any
     before: float
@@ -77,15 +77,14 @@ def train(
     L-BFGS (scipy) with gradients in reverse mode. At each step the states of the pieces
     are fitted first, so that the gradient is that of the best cost.
 
-    **Arguments:**
+    Args:
+        where: Picks a field, or a tuple of fields, out of the model:
+            `lambda m: m.system.network`.
+        steps: Of L-BFGS, at most.
+        progress: Called after each evaluation with its number and its cost.
 
-    - `where`: picks a field, or a tuple of fields, out of the model: `lambda m:
-        m.system.network`.
-    - `steps`: of L-BFGS, at most.
-    - `progress`: called after each evaluation with its number and its cost.
-
-    **Raises:** `ValueError` for a problem with a number that each record has its own
-    of.
+    Raises:
+        ValueError: For a problem with a number that each record has its own of.
     """
     own = [p.name for p in problem.parameters if p.per_record or p.known is not None]
     if own:

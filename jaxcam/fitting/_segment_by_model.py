@@ -33,16 +33,16 @@ def segment_by_model(
     the velocity of the gap jumps, as far as the tolerances of the parameters allow.
     Without a gap the whole record is one flight.
 
-    **Arguments:**
+    Args:
+        model: Its system and sensors. Components of the state are seen by sensors whose
+            `observe` is a number and that have no bandwidth.
+        parameters: Whose tolerances say how far a gap may be off.
+        drive_channel: The encoder of a drive (rad), of a model with a `Turning` drive.
+        restitution: Expected, for the bounces that are too low to be seen.
 
-    - `model`: its system and sensors. Components of the state are seen by sensors whose
-        `observe` is a number and that have no bandwidth.
-    - `parameters`: whose tolerances say how far a gap may be off.
-    - `drive_channel`: the encoder of a drive (rad), of a model with a `Turning` drive.
-    - `restitution`: expected, for the bounces that are too low to be seen.
-
-    **Raises:** `RecordingError` for a missing channel, or a gap that depends on a state
-    that no channel sees.
+    Raises:
+        RecordingError: For a missing channel, or a gap that depends on a state that no
+            channel sees.
     """
     picks = {
         sensor.observe: name

@@ -15,29 +15,29 @@ from .engine import Input, Model, Parameter, Problem
 
 @dataclasses.dataclass(frozen=True)
 class Setup:
-    """What a rig file says of a system of one's own; `read_setup` reads it.
-
-    - `model`: the system at its nominal values, with its sensors and its drive.
-    - `parameters`: what is fitted, each within its tolerance.
-    - `drive_channel`: of the encoder of a turning drive (rad), or `None`.
-    - `references`: constants of the forms of missing physics that are stated, by the
-        names of fields of `jaxcam.recordings.References`, in the units of the motion;
-        the others follow its speeds.
-    - `records`: what is known of some records alone, by patterns of their names:
-        `{"run3*": {"mass": 0.31}}`; of several that fit, the last one counts.
-    - `files`: how the columns of recordings are called, and their rate.
-    """
+    """A rig file of a system of one's own; `read_setup` reads it."""
 
     model: Model
+    """The system at its nominal values, with its sensors and its drive."""
     parameters: tuple[Parameter, ...] = ()
+    """What is fitted, each within its tolerance."""
     drive_channel: str | None = None
+    """Of the encoder of a turning drive (rad), or `None`."""
     references: Mapping[str, float] = dataclasses.field(default_factory=dict)
+    """Constants of the forms of missing physics that are stated, by the names of fields
+    of `jaxcam.recordings.References`, in the units of the motion; the others follow its
+    speeds."""
     records: Mapping[str, Mapping[str, float]] = dataclasses.field(default_factory=dict)
+    """What is known of some records alone, by patterns of their names:
+    `{"run3*": {"mass": 0.31}}`; of several that fit, the last one counts."""
     files: FileLayout = FileLayout()
+    """How the columns of recordings are called, and their rate."""
 
     @property
     def channels(self) -> tuple[str, ...]:
-        """What a recording must contain, the sensors of the motion first."""
+        """Return the channels that a recording must contain, the motion's sensors
+        first.
+        """
         drive = self.model.drive
         measured = drive.channel if isinstance(drive, Input) else self.drive_channel
         return (*self.model.sensors, *([] if measured is None else [measured]))
@@ -52,7 +52,8 @@ class Setup:
         """The recordings in a folder, as `jaxcam.recordings.read_case` does it, with
         the names of columns and the constants that the rig states.
 
-        **Raises:** `RecordingError`, also for constants of a record that is not there.
+        Raises:
+            RecordingError: Also for constants of a record that is not there.
         """
         case = read_case(
             folder,
@@ -67,7 +68,8 @@ class Setup:
     def known_of(self, case: Case) -> Case:
         """The case with what the rig knows of each record.
 
-        **Raises:** `RecordingError` for constants of a record that is not there.
+        Raises:
+            RecordingError: For constants of a record that is not there.
         """
         for pattern in self.records:
             if not any(_fits(run.name, pattern) for run in case):
@@ -92,8 +94,9 @@ class Setup:
     ) -> tuple[Segments, ...]:
         """Recordings cut at the gaps of the system; those that are all cut stay.
 
-        **Raises:** `RecordingError` for a channel that is missing, or a gap that no
-        channel shows.
+        Raises:
+            RecordingError: For a channel that is missing, or a gap that no channel
+                shows.
         """
         runs = tuple(
             dataclasses.replace(run, recording=self._with_known(run.recording))
@@ -112,7 +115,8 @@ class Setup:
     def problem(self, recordings: Iterable[Recording | Segments]) -> Problem:
         """Recordings, cut already or not, ready to be fitted.
 
-        **Raises:** as `segments` and `Problem.build` do.
+        Raises:
+            ValueError: as `segments` and `Problem.build` do.
         """
         return Problem.build(self.model, self.segments(recordings), self.parameters)
 

@@ -18,14 +18,12 @@ _MEMBER = 0.1
 
 @dataclasses.dataclass(frozen=True)
 class Unconstrained:
-    """Parameters that can change together and the data stay the same.
-
-    - `names`: of parameters, `name@record` where each record has its own.
-    - `shares`: how far each moves, in its own unit, the largest of them by its scale.
-    """
+    """Parameters that can change together and the data stay the same."""
 
     names: tuple[str, ...]
+    """Of parameters, `name@record` where each record has its own."""
     shares: Float[np.ndarray, " k"]
+    """How far each moves, in its own unit, the largest of them by its scale."""
 
     def sentence(self) -> str:
         """The combination, and what to do, in words."""

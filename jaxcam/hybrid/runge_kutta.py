@@ -158,7 +158,7 @@ def step(tableau: Tableau, field, t, x: tuple, h):
 
 
 def rates_among(x, rates) -> dict[int, int]:
-    """Which components are rates of others, as they stand: position and velocity."""
+    """Return which components are rates of others: position and velocity."""
     found = {}
     for i, rate in enumerate(rates):
         for j, component in enumerate(x):

@@ -1,4 +1,4 @@
-"""Iterated maps: smooth ones, piecewise-smooth ones, and what they do."""
+"""Iterated maps: smooth and piecewise-smooth ones, their orbits and bifurcations."""
 
 from ._attractor import map_attractor as map_attractor
 from ._border_collision import (

@@ -1,4 +1,4 @@
-"""What an orbit ends in: a cycle, and of which period, or chaos."""
+"""Classify the attractor of an orbit: a cycle, and of which period, or chaos."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -11,18 +11,18 @@ from ..parameters import real_array
 
 
 class Attractor(NamedTuple):
-    """The end of one orbit."""
+    """The attractor of one orbit."""
 
     period: int
-    """Smallest period up to the longest one looked for; 0 where there is none."""
+    """Smallest period up to the longest detected one; 0 where there is none."""
     lyapunov: float
-    """Mean of log |f'| along it: positive in chaos."""
+    """Lyapunov exponent, the mean of log |f'| along the orbit: positive in chaos."""
     bounded: bool
     """Whether the orbit stayed finite."""
 
     @property
     def kind(self) -> str:
-        """In words."""
+        """The kind in words."""
         if not self.bounded:
             return "none"
         if self.period == 1:
@@ -40,10 +40,22 @@ def map_attractor(
     count: int = 20_000,
     longest: int = 64,
 ) -> Attractor:
-    """What the orbit of `start` under a map of one variable ends in.
+    """Classify the attractor on which the orbit of `start` ends.
 
-    **Arguments:** the map, differentiable except on borders; a start; numbers of
-    iterates dropped and used; the longest period that is looked for.
+    Args:
+        system: A map of one variable, differentiable except on borders.
+        start: First point.
+        transient: Number of iterates that are dropped.
+        count: Number of iterates that are used.
+        longest: Longest period that is detected.
+
+    Returns:
+        An `Attractor`.
+
+    Examples:
+        >>> from jaxcam.maps import LogisticMap, map_attractor
+        >>> map_attractor(LogisticMap(3.2), transient=1000, count=1000).period
+        2
     """
     start = real_array(start, "start")
     last, rate, bounded, period = _settle(system, start, transient, count, longest)

@@ -15,33 +15,45 @@ _STEPS = 40
 
 
 class BorderCollision(NamedTuple):
-    """What happens where a fixed point meets the border."""
+    """The scenario at a border collision of a fixed point."""
 
     kind: str
-    """"persistence": the fixed point goes on, on the other side; "nonsmooth fold": two
+    """"persistence": the fixed point continues on the other side; "nonsmooth fold": two
     of them meet and vanish."""
     period_two: bool
-    """Whether an orbit of period two begins there, visiting both sides."""
+    """Whether an orbit of period two emerges, visiting both sides."""
     stable_left: bool
-    """Stability of the fixed point on either side of the border."""
+    """Whether the fixed point is stable left of the border."""
     stable_right: bool
+    """Whether the fixed point is stable right of the border."""
     parameter: float = float("nan")
-    """Parameter and state at the border; NaN where matrices alone were classified."""
+    """Parameter at the collision; NaN where matrices alone were classified."""
     state: float = float("nan")
+    """State at the collision; NaN where matrices alone were classified."""
 
 
 def classify_border_collision(left, right) -> BorderCollision:
-    """Feigin's classification, from the derivatives on both sides.
+    """Classify a border collision by the derivatives on both sides (Feigin).
 
     A fixed point persists where the numbers of real eigenvalues above 1 have an even
-    sum, else it is a nonsmooth fold; an orbit of period two begins where the numbers
+    sum, else it is a nonsmooth fold; an orbit of period two emerges where the numbers
     below -1 have an odd sum. (M. di Bernardo et al., Piecewise-smooth Dynamical
     Systems, 2008, section 3.1)
 
-    **Arguments:** derivatives on the two sides: numbers, or matrices `(n, n)`.
+    Args:
+        left: Derivative on the left: a number, or a matrix `(n, n)`.
+        right: Derivative on the right.
+
+    Returns:
+        A `BorderCollision`.
 
     Raises:
-        ValueError: Where an eigenvalue is 1 or -1, which is degenerate.
+        ValueError: An eigenvalue is 1 or -1, which is degenerate.
+
+    Examples:
+        >>> from jaxcam.maps import classify_border_collision
+        >>> classify_border_collision(0.5, -2.0).period_two
+        True
     """
     values = [np.linalg.eigvals(np.atleast_2d(m).astype(float)) for m in (left, right)]
     real = [np.real(v[np.abs(np.imag(v)) < 1e-12]) for v in values]
@@ -60,13 +72,24 @@ def classify_border_collision(left, right) -> BorderCollision:
 def border_collision(
     system: PiecewiseMap, where: Callable, guess, state=0.0
 ) -> BorderCollision:
-    """Where a fixed point of the left rule meets the border, and what happens there.
+    """Locate and classify the border collision of a fixed point of the left rule.
 
-    **Arguments:** a continuous map, `where` that picks its parameter, and guesses of
-    the parameter and of the fixed point.
+    Args:
+        system: A continuous map.
+        where: Picks the parameter.
+        guess: Guess of the parameter.
+        state: Guess of the fixed point.
+
+    Returns:
+        A `BorderCollision`.
 
     Raises:
-        ValueError: Where it is not found, or the map jumps at the border.
+        ValueError: It is not found, or the map jumps at the border.
+
+    Examples:
+        >>> from jaxcam.maps import SkewMap, border_collision
+        >>> border_collision(SkewMap(a=0.5, b=-2.0, mu=0.1), lambda m: m.mu, 0.1).kind
+        'persistence'
     """
     unknown = jnp.array([float(state), float(guess)])
     for _ in range(_STEPS):

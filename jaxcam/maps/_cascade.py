@@ -16,18 +16,31 @@ _EXACT = 1e-13
 def superstable(
     system: eqx.Module, where: Callable, critical, first: tuple, count: int
 ) -> Float[np.ndarray, " count"]:
-    """Parameters at which the critical point has period 1, 2, 4, ..., 2^(count - 1).
+    """Return parameters at which the critical point has period 1, 2, 4, ..., 2^(count -
+    1).
 
     There is one in each window of the cascade, and they accumulate as its doublings do.
-    Each is found by Newton's method from where the two before it point, with the ratio
-    that they have.
+    Each is found by Newton's method from an extrapolation of the previous ones.
 
-    **Arguments:** a map, `where` that picks its parameter, the critical point, guesses
-    of the first two parameters, and how many.
+    Args:
+        system: The map, a Module.
+        where: Picks the parameter.
+        critical: The critical point.
+        first: Guesses of the first two parameters.
+        count: Number of parameters.
+
+    Returns:
+        Shape `(count,)`.
 
     Raises:
-        ValueError: Where Newton's method does not converge; rounding ends the cascade
-            at about the thirteenth.
+        ValueError: Newton's method does not converge; rounding ends the cascade at
+            about the thirteenth.
+
+    Examples:
+        >>> from jaxcam.maps import LogisticMap, superstable
+        >>> found = superstable(LogisticMap(), lambda m: m.mu, 0.5, (2.0, 3.2), 3)
+        >>> found.round(4).tolist()
+        [2.0, 3.2361, 3.4986]
     """
     found: list[float] = []
     for k in range(count):
@@ -48,7 +61,20 @@ def superstable(
 
 
 def feigenbaum_ratios(parameters: Float[np.ndarray, " n"]) -> Float[np.ndarray, " m"]:
-    """(m_k - m_(k-1)) / (m_(k+1) - m_k), which tends to 4.669... (2.17)"""
+    """Return (m_k - m_(k-1)) / (m_(k+1) - m_k), which tends to 4.669 (thesis,
+    eq. 2.17).
+
+    Args:
+        parameters: Parameters m_k of a period-doubling cascade, shape `(n,)`.
+
+    Returns:
+        Shape `(n - 2,)`.
+
+    Examples:
+        >>> from jaxcam.maps import feigenbaum_ratios
+        >>> feigenbaum_ratios(np.array([0.0, 4.0, 5.0])).tolist()
+        [4.0]
+    """
     steps = np.diff(parameters)
     return steps[:-1] / steps[1:]
 

@@ -11,7 +11,21 @@ from ..parameters import real_array, VectorLike
 
 
 def iterate(system: Callable, start: ArrayLike | VectorLike, count: int) -> jax.Array:
-    """The orbit of `start`, with it: shape `(count + 1, ...)`."""
+    """Iterate a map, and return the orbit.
+
+    Args:
+        system: The map.
+        start: First point, any shape.
+        count: Number of iterations.
+
+    Returns:
+        The orbit with its start, shape `(count + 1, ...)`.
+
+    Examples:
+        >>> from jaxcam.maps import LogisticMap, iterate
+        >>> iterate(LogisticMap(2.0), 0.25, 2).tolist()
+        [0.25, 0.375, 0.46875]
+    """
     start = real_array(start, "start")
     return jnp.concatenate([start[None], _orbit(system, start, count)])
 
@@ -25,10 +39,23 @@ def map_diagram(
     transient: int = 1000,
     keep: int = 200,
 ) -> Float[Array, "values keep"]:
-    """What remains of the orbit of one start for each value of a parameter.
+    """Return the settled orbit of one start for each value of a parameter.
 
-    **Arguments:** a map as a Module, `where` that picks the parameter, its values, the
-    start, and the numbers of iterates that are dropped and kept.
+    Args:
+        system: The map, a Module.
+        where: Picks the parameter.
+        values: Values of the parameter, shape `(values,)`.
+        start: First point.
+        transient: Number of iterates that are dropped.
+        keep: Number of iterates that are kept.
+
+    Returns:
+        Shape `(values, keep)`.
+
+    Examples:
+        >>> from jaxcam.maps import LogisticMap, map_diagram
+        >>> map_diagram(LogisticMap(), lambda m: m.mu, [2.0, 3.2], keep=4).shape
+        (2, 4)
     """
     values = real_array(values, "values")
     start = real_array(start, "start")

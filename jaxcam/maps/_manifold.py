@@ -17,19 +17,40 @@ _MOST_POINTS = 20_000
 
 
 class Saddle(NamedTuple):
-    """A fixed point of a plane map with one multiplier inside the unit circle."""
+    """A fixed point of a plane map with one multiplier inside the unit circle.
+
+    Examples:
+        >>> from jaxcam.maps import saddle_at
+        >>> saddle_at(lambda x: jnp.stack([2 * x[0], x[1] / 2]), [0.1, 0.1]).point.shape
+        (2,)
+    """
 
     point: Float[Array, " 2"]
+    """The fixed point, shape `(2,)`."""
     multipliers: Float[np.ndarray, " 2"]
-    """The multipliers, the stable one first, and their directions as columns."""
+    """Multipliers, the stable one first, shape `(2,)`."""
     directions: Float[np.ndarray, "2 2"]
+    """Eigenvectors as columns, shape `(2, 2)`."""
 
 
 def saddle_at(system: Callable, guess: VectorLike) -> Saddle:
-    """The saddle near a guess, by Newton's method.
+    """Find the saddle near a guess by Newton's method.
+
+    Args:
+        system: A map of the plane.
+        guess: Guess of the saddle, shape `(2,)`.
+
+    Returns:
+        A [`jaxcam.maps.Saddle`][].
 
     Raises:
-        ValueError: Where there is no fixed point, or it is no saddle.
+        ValueError: There is no fixed point, or it is no saddle.
+
+    Examples:
+        >>> from jaxcam.maps import saddle_at
+        >>> linear = lambda x: jnp.stack([2 * x[0], x[1] / 2])
+        >>> saddle_at(linear, [0.1, 0.1]).multipliers.tolist()
+        [0.5, 2.0]
     """
     point = real_array(guess, "guess")
     step = jnp.full(2, jnp.inf)
@@ -61,23 +82,34 @@ def grow_manifold(
     spacing: float = 0.01,
     start: float = 1e-5,
 ) -> Float[np.ndarray, "points 2"]:
-    """One side of the unstable manifold of a saddle, as a curve from the saddle on.
+    """Return one side of the unstable manifold of a saddle, as a curve from the saddle.
 
-    A short segment along the unstable direction and its images. New points are put into
-    the first segment wherever their images lie too far apart, so that every point of
-    the curve is an exact image of one on the segment, and a fold is followed round. For
-    the stable manifold give the inverse map.
+    It consists of a short segment along the unstable direction and its images. Points
+    are added to the first segment wherever their images lie too far apart, so that
+    every point of the curve is an exact image of one on the segment, and folds are
+    resolved. For the stable manifold pass the inverse map.
 
-    **Arguments:** the map, traceable by JAX; the saddle; a direction, whose sign
-    chooses the side; the length of curve wanted, the largest distance of neighbours,
-    and the distance from the saddle at which it begins (its square is the error).
+    Args:
+        system: The map, traceable by JAX.
+        point: The saddle, shape `(2,)`.
+        direction: Unstable direction, whose sign chooses the side, shape `(2,)`.
+        length: Length of the curve.
+        spacing: Largest distance of neighbouring points.
+        start: Distance from the saddle at which it begins; its square is the error.
 
     Returns:
         The points in order, shape `(points, 2)`. The curve ends where the map is not
             finite, or jumps: there no refinement brings neighbours together.
 
     Raises:
-        ValueError: Where the direction is not stretched by the map.
+        ValueError: The direction is not stretched by the map.
+
+    Examples:
+        >>> from jaxcam.maps import grow_manifold
+        >>> linear = lambda x: jnp.stack([2 * x[0], x[1] / 2])
+        >>> curve = grow_manifold(linear, [0.0, 0.0], [1.0, 0.0], length=0.5)
+        >>> curve.shape[1]
+        2
     """
     point = np.asarray(point, dtype=float)
     unit = np.asarray(direction, dtype=float)

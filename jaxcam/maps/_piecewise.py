@@ -1,4 +1,6 @@
-"""Piecewise-smooth maps of one variable, with their border at zero. (2.20)"""
+"""Piecewise-smooth maps of one variable, with their border at zero (thesis,
+eq. 2.20).
+"""
 
 import abc
 
@@ -19,57 +21,84 @@ def _parameter(default=None):
 class PiecewiseMap(eqx.Module):
     """A map with one rule for x <= 0 and another for x > 0.
 
-    Subclass it and state both; for `border_collision` they must be smooth at zero.
+    Subclass it and define both; for `border_collision` they must be smooth at zero.
+
+    Examples:
+        >>> from jaxcam.maps import PiecewiseMap
+        >>> class Tent(PiecewiseMap):
+        ...     def left(self, x):
+        ...         return 1 + 2 * x
+        ...     def right(self, x):
+        ...         return 1 - 2 * x
+        >>> float(Tent()(0.25))
+        0.5
     """
 
     @abc.abstractmethod
     def left(self, x) -> jax.Array:
-        """The image of x <= 0."""
+        """Return the image of x <= 0."""
 
     @abc.abstractmethod
     def right(self, x) -> jax.Array:
-        """The image of x > 0."""
+        """Return the image of x > 0."""
 
     def __call__(self, x) -> jax.Array:
         return jnp.where(x > 0, self.right(x), self.left(x))
 
 
 class SkewMap(PiecewiseMap):
-    """x -> a x + mu for x <= 0, b x + mu + jump for x > 0. (Figure 2.11 (a) and (b))
+    """Skew map x -> a x + mu for x <= 0, b x + mu + jump for x > 0.
 
     The normal form of a border collision where `jump` is zero; with a jump, that of a
-    discontinuous map.
+    discontinuous map (thesis, Figure 2.11 (a) and (b)).
+
+    Examples:
+        >>> from jaxcam.maps import SkewMap
+        >>> float(SkewMap(a=0.5, b=-2.0, mu=1.0)(1.0))
+        -1.0
     """
 
     a: jax.Array = _parameter()
+    """Slope for x <= 0."""
     b: jax.Array = _parameter()
+    """Slope for x > 0."""
     mu: jax.Array = _parameter()
+    """Parameter mu."""
     jump: jax.Array = _parameter(0.0)
+    """Jump at the border."""
 
     def left(self, x) -> jax.Array:
-        """a x + mu."""
+        """Return a x + mu."""
         return self.a * x + self.mu
 
     def right(self, x) -> jax.Array:
-        """b x + mu + jump."""
+        """Return b x + mu + jump."""
         return self.b * x + self.mu + self.jump
 
 
 class SquareRootMap(PiecewiseMap):
-    """x -> a x + mu for x <= 0, mu - root sqrt(x) for x > 0. (Figure 2.11 (c))
+    """Square-root map x -> a x + mu for x <= 0, mu - root sqrt(x) for x > 0.
 
-    What a grazing impact does to the Poincare map, close to it.
+    The form of the Poincare map close to a grazing impact (thesis, Figure 2.11 (c)).
+
+    Examples:
+        >>> from jaxcam.maps import SquareRootMap
+        >>> float(SquareRootMap(a=0.5, mu=0.1)(0.25))
+        -0.4
     """
 
     a: jax.Array = _parameter()
+    """Slope for x <= 0."""
     mu: jax.Array = _parameter()
+    """Parameter mu."""
     root: jax.Array = _parameter(1.0)
+    """Factor of the square root."""
 
     def left(self, x) -> jax.Array:
-        """a x + mu."""
+        """Return a x + mu."""
         return self.a * x + self.mu
 
     def right(self, x) -> jax.Array:
-        """mu - root sqrt(x)."""
+        """Return mu - root sqrt(x)."""
         # of no consequence on the other side, but finite and differentiable there
         return self.mu - self.root * jnp.sqrt(jnp.where(x > 0, x, 1.0))

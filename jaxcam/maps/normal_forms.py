@@ -11,17 +11,23 @@ import numpy as np
 class NormalForm(NamedTuple):
     """A normal form with its branches in closed form.
 
-    A field x' = f(x, mu), or for `discrete` a map. A branch is a function of mu, NaN
-    where it does not exist. For the Hopf bifurcation it is the radius, x' its rate.
+    A field x' = f(x, mu), or a map if `discrete`. For the Hopf bifurcation x is the
+    radius.
     """
 
     title: str
+    """Name of the bifurcation."""
     field: Callable
+    """The field or map, `f(x, mu)`."""
     branches: tuple[Callable, ...]
+    """Branches as functions of mu, NaN where they do not exist."""
     discrete: bool = False
+    """Whether `field` is a map."""
 
     def stable(self, branch: int, mu) -> np.ndarray:
-        """Whether a branch attracts at each `mu`, by the derivative of the field."""
+        """Return whether a branch attracts at each `mu`, by the derivative of the
+        field.
+        """
         mu = np.atleast_1d(np.asarray(mu, dtype=float))
         x = np.asarray(self.branches[branch](mu), dtype=float)
         slope = jax.vmap(jax.grad(self.field))(jnp.asarray(x), jnp.asarray(mu))

@@ -1,4 +1,4 @@
-"""Impacting systems of the thesis and of textbooks, and the parts they are made of."""
+"""Ready systems with impacts, Filippov systems, cams and restitution laws."""
 
 from ._belt_oscillator import BeltOscillator as BeltOscillator
 from ._bouncing_ball import BouncingBall as BouncingBall

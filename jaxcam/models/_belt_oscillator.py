@@ -15,39 +15,51 @@ from ._parameters import (
 
 
 class BeltOscillator(FilippovSystem):
-    """`x'' + 2 damping x' + x = amplitude cos(omega t) + friction force`; (x, x').
+    """A mass on a moving belt with dry friction (stick-slip), dimensionless.
 
-    Dimensionless. The belt moves at a constant speed and pulls the mass along with
+    `x'' + 2 damping x' + x = amplitude cos(omega t) + friction force`; the state is (x,
+    x'). The belt moves at a constant speed and pulls the mass along with
     `friction / (1 + weakening |x' - belt|)`, which falls with the speed of slip, so
     that the mass sticks and slips. Sticking is sliding on the surface x' = belt.
+
+    Examples:
+        >>> from jaxcam.models import BeltOscillator
+        >>> float(BeltOscillator(belt=0.2).switching(0.0, jnp.array([0.0, 0.5])))
+        0.3
     """
 
     state_names: ClassVar[tuple[str, ...]] = ("position", "velocity")
+    """Names of the state's components."""
     state_units: ClassVar[tuple[str, ...]] = ("-", "-")
+    """Units of the state's components."""
 
     belt: jax.Array = parameter(0.2)
     """Speed of the belt."""
     friction: jax.Array = parameter(1.0)
-    """Largest force of friction, in units of the spring's at x = 1."""
+    """Largest friction force, in units of the spring's at x = 1."""
     weakening: jax.Array = parameter(3.0)
-    """How fast friction falls with slip; zero is Coulomb's law."""
+    """Rate at which friction falls with slip; zero is Coulomb's law."""
     damping: jax.Array = parameter(0.0)
     """Damping ratio."""
     amplitude: jax.Array = parameter(0.0)
-    """Of the forcing; no forcing by default."""
+    """Amplitude of the forcing; default no forcing."""
     omega: jax.Array = parameter(1.0)
-    """Of the forcing; no forcing by default."""
+    """Angular frequency of the forcing."""
 
     def above(self, t, state) -> jax.Array:
-        """Faster than the belt: friction pulls back."""
+        """Return the rates while the mass is faster than the belt: friction pulls
+        back.
+        """
         return self._pulled(t, state, -1.0)
 
     def below(self, t, state) -> jax.Array:
-        """Slower than the belt: friction pulls along."""
+        """Return the rates while the mass is slower than the belt: friction pulls
+        along.
+        """
         return self._pulled(t, state, 1.0)
 
     def switching(self, t, state) -> jax.Array:
-        """Velocity of slip."""
+        """Return the slip velocity."""
         del t
         return state[1] - self.belt
 

@@ -18,10 +18,17 @@ class BouncingBall(HybridSystem):
     """A ball in free fall above a floor at `amplitude sin(frequency t)`.
 
     The state is the height above the floor's mean position and the velocity (m, m/s).
+
+    Examples:
+        >>> from jaxcam.models import BouncingBall
+        >>> BouncingBall().impact(0.0, jnp.array([0.0, -1.0])).tolist()
+        [0.0, 0.8]
     """
 
     state_names: ClassVar[tuple[str, ...]] = ("height", "velocity")
+    """Names of the state's components."""
     state_units: ClassVar[tuple[str, ...]] = ("m", "m/s")
+    """Units of the state's components."""
 
     gravity: jax.Array = parameter(9.81)
     """Acceleration of free fall (m/s^2)."""
@@ -33,16 +40,18 @@ class BouncingBall(HybridSystem):
     """Angular frequency of the floor's motion (rad/s)."""
 
     def vector_field(self, t, state) -> jax.Array:
-        """Velocity and acceleration, shape `(2,)`."""
+        """Return velocity and acceleration, shape `(2,)`."""
         del t
         return jnp.stack([state[1], -self.gravity])
 
     def gap(self, t, state) -> jax.Array:
-        """Height above the floor (m), a scalar."""
+        """Return the height above the floor (m), a scalar."""
         return state[0] - self.amplitude * jnp.sin(self.frequency * t)
 
     def impact(self, t, state) -> jax.Array:
-        """State after an impact: the velocity relative to the floor is reversed."""
+        """Return the state after an impact: the velocity relative to the floor is
+        reversed.
+        """
         floor_velocity = self.amplitude * self.frequency * jnp.cos(self.frequency * t)
         velocity = state[1] - floor_velocity
         return jnp.stack([state[0], state[1] - (1 + self.restitution) * velocity])

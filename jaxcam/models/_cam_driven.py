@@ -1,4 +1,4 @@
-"""What a cam of constant speed does to a follower, whatever holds the follower."""
+"""Common parts of followers on a cam of constant speed."""
 
 from typing import TypeVar
 

@@ -28,11 +28,19 @@ class CamFollower(AbstractCamDriven):
     printed, at 145 rpm.
 
     Raises:
-        ValueError: For another `rotation`.
+        ValueError: `rotation` is neither "clockwise" nor "counterclockwise".
+
+    Examples:
+        >>> from jaxcam.models import CamFollower, rpm_to_rad_s
+        >>> rig = CamFollower(speed=rpm_to_rad_s(150.0))
+        >>> round(float(rig.period), 6)
+        0.4
     """
 
     state_names: ClassVar[tuple[str, ...]] = ("follower angle", "follower velocity")
+    """Names of the state's components."""
     state_units: ClassVar[tuple[str, ...]] = ("rad", "rad/s")
+    """Units of the state's components."""
 
     speed: jax.Array = parameter(rpm_to_rad_s(145.0))
     """Speed of the cam (rad/s)."""
@@ -43,15 +51,15 @@ class CamFollower(AbstractCamDriven):
     stiffness: jax.Array = parameter(105.0)
     """Spring coefficient K (N/m)."""
     spring_hook_x: jax.Array = parameter(-0.031)
-    """x-coordinate of the spring's hanging point, x_A (m)."""
+    """x-coordinate of the spring's suspension point, x_A (m)."""
     spring_elongation: jax.Array = parameter(0.173)
     """y_A - d_0 - d_1 (m)."""
     spring_half_height: jax.Array = parameter(0.021)
     """d in the spring's torque (m). The half height that sets the contact angle belongs
     to the profile, so that each can be fitted."""
     profile: CamProfile = eqx.field(default_factory=EccentricCircle)
-    """Contact angle as a function of the cam's angle, a [`jaxcam.models.CamProfile`][]
-    ."""
+    """Contact angle as a function of the cam's angle, a [`jaxcam.models.CamProfile`][].
+    """
     restitution: eqx.Module = eqx.field(default_factory=LinearInSpeed)
     """Law `r(speed, approach_speed)`, any Module; approach speed in rad/s."""
     rotation: str = eqx.field(default="clockwise", static=True)
@@ -66,7 +74,9 @@ class CamFollower(AbstractCamDriven):
             )
 
     def vector_field(self, t, state) -> jax.Array:
-        """Velocity and acceleration of the free follower, shape `(2,)`. (4.9)"""
+        """Return velocity and acceleration of the free follower, `(2,)` (thesis,
+        eq. 4.9).
+        """
         del t
         angle, velocity = state[0], state[1]
         # one sine and one cosine: this is evaluated in every Runge-Kutta stage
@@ -78,15 +88,17 @@ class CamFollower(AbstractCamDriven):
         return jnp.stack([velocity, acceleration])
 
     def gap(self, t, state) -> jax.Array:
-        """Angle between follower and cam (rad), a scalar."""
+        """Return the angle between follower and cam (rad), a scalar."""
         return state[0] - self.contact_angle(self.cam_angle(t))
 
     def impact(self, t, state) -> jax.Array:
-        """State after an impact: the relative velocity v becomes -r v. (6.111)"""
+        """Return the state after an impact: v becomes -r v (thesis, eq. 6.111)."""
         return self.after_impact(t, state)
 
     def cam_angle(self, t) -> jax.Array:
-        """Angle of the cam (rad), counted counterclockwise, at `t` (s), elementwise."""
+        """Return the angle of the cam (rad), counted counterclockwise, at `t` (s),
+        elementwise.
+        """
         return _SENSE[self.rotation] * (self.speed * t + self.phase)
 
     @property
@@ -95,18 +107,23 @@ class CamFollower(AbstractCamDriven):
         return _SENSE[self.rotation] * self.speed
 
     def contact_angle(self, cam_angle) -> jax.Array:
-        """Follower angle (rad) in contact at `cam_angle` (rad), elementwise. (4.23)"""
+        """Return the follower angle (rad) in contact at `cam_angle` (rad) (thesis,
+        eq. 4.23).
+        """
         return self.profile(cam_angle)
 
     def potential_energy(self, follower_angle) -> jax.Array:
-        """Energy stored in the spring (J) at `follower_angle` (rad). (4.8)"""
+        """Return the spring's energy (J) at `follower_angle` (rad) (thesis,
+        eq. 4.8).
+        """
         reach = self._reach(jnp.sin(follower_angle), 1 / jnp.cos(follower_angle))
         return 0.5 * self.stiffness * (reach - self.spring_elongation) ** 2
 
     def load_terms(self, lift, slope, curvature):
-        """Contact torque (N m) at speed w as `a w^2 + b w + c`: a, b and c. (4.10)
+        """Return a, b and c of the contact torque `a w^2 + b w + c` (N m) at speed w.
 
-        Lift, slope and curvature are the profile's, for each radian of the cam.
+        Lift, slope and curvature are the profile's, per radian of the cam (thesis,
+        eq. 4.10).
         """
         at_rest = jnp.stack([lift, jnp.zeros_like(lift)])
         spring = -self.inertia * self.vector_field(0.0, at_rest)[1]

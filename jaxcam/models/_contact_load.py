@@ -1,4 +1,4 @@
-"""What the cam must press with to hold its follower, and when it no longer can."""
+"""Contact load on a cam, and the speed at which contact is lost."""
 
 from typing import NamedTuple
 
@@ -20,10 +20,10 @@ _GOLDEN = (5**0.5 - 1) / 2
 
 
 class FloatSpeed(NamedTuple):
-    """The lowest speed at which a follower leaves its cam, and where it does."""
+    """The lowest speed at which a follower leaves its cam, and the cam angle there."""
 
     speed: Float[Array, ""]
-    """rad/s; infinite where no speed makes it leave."""
+    """Speed (rad/s); infinite where the follower never leaves."""
     cam_angle: Float[Array, ""]
     """Cam angle (rad)."""
 
@@ -31,13 +31,24 @@ class FloatSpeed(NamedTuple):
 def contact_load(
     system: CamFollower | ValveTrain, cam_angles: Float[ArrayLike, " angles"]
 ) -> Float[Array, " angles"]:
-    """What the cam must press with for permanent contact, at the system's speed. (4.10)
+    """Return the load with which the cam must press for permanent contact.
 
     A torque (N m) about the hinge of a [`jaxcam.models.CamFollower`][], a force (N) on
-    a [`jaxcam.models.ValveTrain`][]. Contact is lost where it would have to be
-    negative.
+    a [`jaxcam.models.ValveTrain`][], at the system's speed (thesis, eq. 4.10). Contact
+    is lost where it would have to be negative.
 
-    **Arguments:** angles of the cam (rad), counted as the profile counts them.
+    Args:
+        system: The system.
+        cam_angles: Angles of the cam (rad), as the profile counts them, shape
+            `(angles,)`.
+
+    Returns:
+        Shape `(angles,)`.
+
+    Examples:
+        >>> from jaxcam.models import CamFollower, contact_load
+        >>> contact_load(CamFollower(), jnp.zeros(3)).shape
+        (3,)
     """
     profile = system.profile.prepared()
     jets = jax.vmap(lambda angle: _jet(profile, angle))(jnp.asarray(cam_angles))
@@ -51,13 +62,27 @@ def contact_force(
     *,
     center: tuple | None = None,
 ) -> Float[Array, " angles"]:
-    """The force normal to the contact (N): for a hinged follower, torque over lever.
+    """Return the force normal to the contact (N): for a hinged follower, torque over
+    lever.
 
-    The lever is l of (4.19). `center` is the cam's axis (m) from the hinge, known for
-    an eccentric circle.
+    The lever is l of the thesis, eq. 4.19.
+
+    Args:
+        system: The system.
+        cam_angles: Angles of the cam (rad), as the profile counts them, shape
+            `(angles,)`.
+        center: Axis of the cam (m) from the hinge; known for an eccentric circle.
+
+    Returns:
+        Shape `(angles,)`.
 
     Raises:
-        ValueError: Where the axis is not known.
+        ValueError: The axis is unknown.
+
+    Examples:
+        >>> from jaxcam.models import CamFollower, contact_force
+        >>> contact_force(CamFollower(), jnp.zeros(3)).shape
+        (3,)
     """
     load = contact_load(system, cam_angles)
     if isinstance(system, ValveTrain):
@@ -70,12 +95,25 @@ def contact_force(
 
 
 def float_speed(system: CamFollower | ValveTrain) -> FloatSpeed:
-    """The speed at which the valve floats: the cam would first have to pull.
+    """Return the lowest speed of valve float, at which the cam would first have to
+    pull.
 
-    The least root, over the cam's angles, of the contact load as a function of the
-    speed. At the joints of a motion program the accelerations on both sides count, and
-    a joint where the velocity falls makes every speed too high. Differentiable in the
-    parameters.
+    It is the least root, over the cam's angles, of the contact load as a function of
+    the speed. At the joints of a motion program the accelerations on both sides count,
+    and a joint where the velocity falls makes every speed too high. Differentiable in
+    the parameters.
+
+    Args:
+        system: The system.
+
+    Returns:
+        A `FloatSpeed`.
+
+    Examples:
+        >>> from jaxcam.models import float_speed, preset, rad_s_to_rpm
+        >>> found = float_speed(preset("calibrated"))
+        >>> round(float(rad_s_to_rpm(found.speed)), 1)
+        125.2
     """
     profile = system.profile.prepared()
     start, end = _pieces(profile)

@@ -19,31 +19,42 @@ from .cams import CamProfile
 
 
 class DesmodromicCam(AbstractCamDriven):
-    """A sliding follower between two flanks that move with the cam.
+    """A translating follower between two flanks that move with the cam.
 
-    The flanks ask for the same lift, one from below and one from above, a clearance
-    apart. Two gaps: to the lower flank and to the upper one. No spring is needed; one
-    may help.
+    The flanks prescribe the same lift, one from below and one from above, a clearance
+    apart. There are two gaps: to the lower flank and to the upper one. A spring is
+    optional.
+
+    Examples:
+        >>> from jaxcam.models import DesmodromicCam, MotionProgram, Segment
+        >>> rises = (0.01, -0.01)
+        >>> program = MotionProgram([Segment("cycloidal", np.pi, r) for r in rises])
+        >>> cam = DesmodromicCam(program, speed=10.0, clearance=1e-4)
+        >>> cam.gap(0.0, jnp.array([5e-5, 0.0])).shape
+        (2,)
     """
 
     state_names: ClassVar[tuple[str, ...]] = ("lift", "follower velocity")
+    """Names of the state's components."""
     state_units: ClassVar[tuple[str, ...]] = ("m", "m/s")
+    """Units of the state's components."""
     constraint_names: ClassVar[tuple[str, ...]] = ("lower flank", "upper flank")
+    """Names of the constraints."""
 
     profile: CamProfile
     """Lift (m) of the lower flank as a function of the cam's angle."""
     speed: jax.Array = parameter()
     """Speed of the cam (rad/s)."""
     clearance: jax.Array = parameter()
-    """Room of the follower between the flanks (m)."""
+    """Clearance of the follower between the flanks (m)."""
     mass: jax.Array = parameter(1.0)
-    """Of the follower (kg, N/m, N, N s/m), as for [`jaxcam.models.ValveTrain`][]."""
+    """Mass of the follower (kg)."""
     stiffness: jax.Array = parameter(0.0)
-    """Of the follower (kg, N/m, N, N s/m), as for [`jaxcam.models.ValveTrain`][]."""
+    """Stiffness of its spring (N/m)."""
     preload: jax.Array = parameter(0.0)
-    """Of the follower (kg, N/m, N, N s/m), as for [`jaxcam.models.ValveTrain`][]."""
+    """Force of the spring at lift zero (N)."""
     damping: jax.Array = parameter(0.0)
-    """Of the follower (kg, N/m, N, N s/m), as for [`jaxcam.models.ValveTrain`][]."""
+    """Viscous damping (N s/m)."""
     restitution: eqx.Module = eqx.field(
         default_factory=lambda: ConstantRestitution(as_parameter(0.5))
     )
@@ -52,18 +63,18 @@ class DesmodromicCam(AbstractCamDriven):
     """Angle of the cam at time zero (rad)."""
 
     def vector_field(self, t, state) -> jax.Array:
-        """Velocity and acceleration between the flanks, shape `(2,)`."""
+        """Return velocity and acceleration between the flanks, shape `(2,)`."""
         del t
         force = self.stiffness * state[0] + self.preload + self.damping * state[1]
         return jnp.stack([state[1], -force / self.mass])
 
     def gap(self, t, state) -> jax.Array:
-        """Distances to the lower and the upper flank (m), shape `(2,)`."""
+        """Return the distances to the lower and the upper flank (m), shape `(2,)`."""
         over = state[0] - self.profile(self.cam_angle(t))
         return jnp.stack([over, self.clearance - over])
 
     def impact(self, t, state) -> jax.Array:
-        """States after an impact on either flank, shape `(2, 2)`."""
+        """Return the states after an impact on either flank, shape `(2, 2)`."""
         after = self.after_impact(t, state)
         return jnp.stack([after, after])
 

@@ -9,17 +9,28 @@ from ._parameters import parameter
 
 
 class ForcedOscillator(eqx.Module):
-    """`u'' + 2 damping u' + stiffness u = amplitude cos(omega t)`. (2.4)
+    """Forced linear oscillator without impacts, with its solution in closed form.
 
-    On the cylinder: the state is (u, u', time in the period), and the last component
-    closes after 2 pi / omega. (The thesis writes cos(x3) in (2.5), which fits
+    `u'' + 2 damping u' + stiffness u = amplitude cos(omega t)` (thesis, eq. 2.4), on
+    the cylinder: the state is (u, u', time in the period), and the last component
+    closes after 2 pi / omega. (The thesis writes cos(x3) in its eq. 2.5, which fits
     omega = 1.)
+
+    Examples:
+        >>> from jaxcam.models import ForcedOscillator
+        >>> system = ForcedOscillator(omega=2.0)
+        >>> round(float(system.period), 6)
+        3.141593
     """
 
     damping: jax.Array = parameter(0.05)
+    """Half the damping coefficient."""
     stiffness: jax.Array = parameter(1.0)
+    """Square of the natural frequency."""
     amplitude: jax.Array = parameter(1.0)
+    """Amplitude of the forcing."""
     omega: jax.Array = parameter(1.3)
+    """Angular frequency of the forcing."""
 
     @property
     def period(self) -> jax.Array:
@@ -27,14 +38,16 @@ class ForcedOscillator(eqx.Module):
         return 2 * jnp.pi / self.omega
 
     def vector_field(self, state: Float[Array, " 3"]) -> Float[Array, " 3"]:
-        """Rate of change on the cylinder. (2.5)"""
+        """Return the rates of change on the cylinder, `(3,)` (thesis, eq. 2.5)."""
         u, velocity, time = state
         force = self.amplitude * jnp.cos(self.omega * time)
         acceleration = force - self.stiffness * u - 2 * self.damping * velocity
         return jnp.stack([velocity, acceleration, jnp.ones_like(time)])
 
     def steady(self, time) -> Float[Array, " 2"]:
-        """Position and velocity of the periodic motion at a time."""
+        """Return position and velocity of the periodic motion at a time, shape
+        `(2,)`.
+        """
         real = self.stiffness - self.omega**2
         imaginary = 2 * self.damping * self.omega
         factor = self.amplitude / (real**2 + imaginary**2)
@@ -47,19 +60,21 @@ class ForcedOscillator(eqx.Module):
         )
 
     def propagator(self, duration) -> Float[Array, "2 2"]:
-        """What becomes of a deviation from the periodic motion after `duration`."""
+        """Return the matrix that maps a deviation from the periodic motion over
+        `duration`.
+        """
         matrix = jnp.array([[0.0, 1.0], [0.0, 0.0]])
         matrix = matrix.at[1].set(jnp.stack([-self.stiffness, -2 * self.damping]))
         return jax.scipy.linalg.expm(matrix * duration)
 
     def solution(self, time, state: Float[Array, " 3"]) -> Float[Array, " 3"]:
-        """The state a duration `time` after `state`, exact."""
+        """Return the exact state a duration `time` after `state`, shape `(3,)`."""
         start = state[2]
         moved = self.propagator(time) @ (state[:2] - self.steady(start))
         end = start + time
         return jnp.append(moved + self.steady(end), jnp.mod(end, self.period))
 
     def poincare_map(self, point: Float[Array, " 2"]) -> Float[Array, " 2"]:
-        """Position and velocity one period after time zero."""
+        """Return position and velocity one period after time zero, shape `(2,)`."""
         zero = jnp.zeros(())
         return self.solution(self.period, jnp.append(point, zero))[:2]

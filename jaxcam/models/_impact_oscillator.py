@@ -16,14 +16,21 @@ from ._parameters import (
 
 
 class ImpactOscillator(HybridSystem):
-    """`x'' + 2 damping x' + x = cos(omega t)` with `x <= wall`; state (x, x').
+    """Forced linear oscillator with a rigid wall, dimensionless.
 
-    Dimensionless. Many of its periodic orbits and their bifurcations are known in
-    closed form.
+    `x'' + 2 damping x' + x = cos(omega t)` with `x <= wall`; the state is (x, x'). Many
+    of its periodic orbits and their bifurcations are known in closed form.
+
+    Examples:
+        >>> from jaxcam.models import ImpactOscillator
+        >>> float(ImpactOscillator(wall=0.5).gap(0.0, jnp.array([0.2, 0.0])))
+        0.3
     """
 
     state_names: ClassVar[tuple[str, ...]] = ("position", "velocity")
+    """Names of the state's components."""
     state_units: ClassVar[tuple[str, ...]] = ("-", "-")
+    """Units of the state's components."""
 
     omega: jax.Array = parameter(2.8)
     """Angular frequency of the forcing."""
@@ -35,18 +42,20 @@ class ImpactOscillator(HybridSystem):
     """Damping ratio."""
 
     def vector_field(self, t, state) -> jax.Array:
-        """Velocity and acceleration, shape `(2,)`."""
+        """Return velocity and acceleration, shape `(2,)`."""
         x, velocity = state[0], state[1]
         acceleration = jnp.cos(self.omega * t) - x - 2 * self.damping * velocity
         return jnp.stack([velocity, acceleration])
 
     def gap(self, t, state) -> jax.Array:
-        """Distance to the wall, a scalar."""
+        """Return the distance to the wall, a scalar."""
         del t
         return self.wall - state[0]
 
     def impact(self, t, state) -> jax.Array:
-        """State after an impact: the velocity is multiplied by -restitution."""
+        """Return the state after an impact: the velocity is multiplied by
+        -restitution.
+        """
         del t
         return jnp.stack([state[0], -self.restitution * state[1]])
 

@@ -14,30 +14,37 @@ _JOINED = 1e-9
 
 
 class PiecewiseLinear(FilippovSystem):
-    """`x' = A- x` where c x <= 0 and `x' = A+ x` where c x >= 0. (2.44)
+    """Piecewise-linear system: `x' = A- x` for c x <= 0 and `x' = A+ x` for c x >= 0.
 
     Where the field is continuous, A+ - A- = k c for some vector k, there is no sliding;
-    in general there is.
+    in general there is (thesis, eq. 2.44).
 
-    **Arguments:** matrices of shape `(n, n)` and the vector c, shape `(n,)`.
+    Examples:
+        >>> from jaxcam.models import PiecewiseLinear
+        >>> system = PiecewiseLinear(-np.eye(2), -2 * np.eye(2), np.array([1.0, 0.0]))
+        >>> system.above(0.0, jnp.array([1.0, 0.0])).tolist()
+        [-2.0, 0.0]
     """
 
     minus: jax.Array = parameter()
+    """The matrix A-, shape `(n, n)`."""
     plus: jax.Array = parameter()
+    """The matrix A+, shape `(n, n)`."""
     normal: jax.Array = parameter()
+    """The vector c, shape `(n,)`."""
 
     def above(self, t, state) -> jax.Array:
-        """A+ x."""
+        """Return A+ x."""
         del t
         return self.plus @ state
 
     def below(self, t, state) -> jax.Array:
-        """A- x."""
+        """Return A- x."""
         del t
         return self.minus @ state
 
     def switching(self, t, state) -> jax.Array:
-        """c x."""
+        """Return c x."""
         del t
         return jnp.sum(self.normal * state)
 
@@ -47,23 +54,40 @@ class PiecewiseLinear(FilippovSystem):
 
 
 class PlanarStability(NamedTuple):
-    """What Theorem 2.2 says of the origin."""
+    """Stability of the origin by Theorem 2.2 of the thesis."""
 
     stable: bool
-    """Asymptotically stable."""
+    """Whether the origin is asymptotically stable."""
     periodic: bool
-    """Every motion is periodic, with this period (s); NaN where they are not."""
+    """Whether every motion is periodic."""
     period: float
+    """Period of these motions (s); NaN where they are not periodic."""
     growth: float
-    """Growth of the logarithm of the amplitude in one turn; NaN where nothing turns."""
+    """Growth of the logarithm of the amplitude in one turn around the origin; NaN where
+    nothing turns."""
 
 
 def planar_stability(system: PiecewiseLinear) -> PlanarStability:
-    """Stability of the origin of a planar continuous system, by Theorem 2.2.
+    """Return the stability of the origin of a planar continuous system (thesis, Theorem
+    2.2).
+
+    Args:
+        system: The system.
+
+    Returns:
+        A `PlanarStability`.
 
     Raises:
-        ValueError: For another number of states, a field that jumps at the line, or a
-            pair (c, A-) that is not observable.
+        ValueError: The system has another number of states, its field jumps at the
+            line, or the pair (c, A-) is not observable.
+
+    Examples:
+        >>> from jaxcam.models import PiecewiseLinear, planar_stability
+        >>> minus = np.array([[-0.2, 1.0], [-1.0, 0.0]])
+        >>> plus = np.array([[-0.2, 1.0], [-4.0, 0.0]])
+        >>> system = PiecewiseLinear(minus, plus, np.array([1.0, 0.0]))
+        >>> bool(planar_stability(system).stable)
+        True
     """
     minus, plus = np.asarray(system.minus), np.asarray(system.plus)
     c = np.asarray(system.normal)

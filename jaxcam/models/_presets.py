@@ -36,16 +36,24 @@ _PRESETS: dict[str, Callable[[], CamFollower]] = {
 
 
 def preset(name: str) -> CamFollower:
-    """The cam-follower with a named set of parameters.
+    """Return the cam-follower with a named set of parameters.
 
     Args:
         name: "table-4.4", the thesis' Table 4.4 as printed, or "calibrated", the
             parameters behind its Tables 5.2 and 6.1, recovered from those tables by a
-            fit that starts at Table 4.4. The phase of the latter puts time zero where
-            the cam lifts the follower highest, as in the thesis' chapters 5 and 6.
+            fit that starts at Table 4.4. Time zero of the latter is where the cam lifts
+            the follower highest, as in the thesis' chapters 5 and 6.
+
+    Returns:
+        A [`jaxcam.models.CamFollower`][].
 
     Raises:
-        ValueError: For an unknown name.
+        ValueError: The name is unknown.
+
+    Examples:
+        >>> from jaxcam.models import preset
+        >>> preset("calibrated").rotation
+        'clockwise'
     """
     if name not in _PRESETS:
         names = ", ".join(f'"{known}"' for known in _PRESETS)

@@ -8,17 +8,26 @@ from ._parameters import parameter, require_finite
 
 
 class RelayFeedback(FilippovSystem):
-    """`x' = A x - b sgn(c x)`, for any number of states.
-
-    **Arguments:** the matrix A, shape `(n, n)`, and the vectors b and c, shape `(n,)`.
+    """Linear system with relay feedback: `x' = A x - b sgn(c x)`, for any number of
+    states.
 
     Raises:
-        ValueError: Where the shapes do not fit.
+        ValueError: The shapes do not fit.
+
+    Examples:
+        >>> from jaxcam.models import RelayFeedback
+        >>> b, c = np.array([0.0, 1.0]), np.array([1.0, 0.0])
+        >>> relay = RelayFeedback(-np.eye(2), b, c)
+        >>> relay.above(0.0, jnp.array([1.0, 0.0])).tolist()
+        [-1.0, -1.0]
     """
 
     matrix: jax.Array = parameter()
+    """The matrix A, shape `(n, n)`."""
     input: jax.Array = parameter()
+    """The vector b, shape `(n,)`."""
     output: jax.Array = parameter()
+    """The vector c, shape `(n,)`."""
 
     def __check_init__(self):
         n = self.input.shape[0] if self.input.ndim == 1 else -1
@@ -29,17 +38,17 @@ class RelayFeedback(FilippovSystem):
             )
 
     def above(self, t, state) -> jax.Array:
-        """The relay gives -1."""
+        """Return the rates while the relay gives -1."""
         del t
         return self.matrix @ state - self.input
 
     def below(self, t, state) -> jax.Array:
-        """The relay gives 1."""
+        """Return the rates while the relay gives 1."""
         del t
         return self.matrix @ state + self.input
 
     def switching(self, t, state) -> jax.Array:
-        """The output c x."""
+        """Return the output c x."""
         del t
         return jnp.sum(self.output * state)
 

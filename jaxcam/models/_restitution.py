@@ -14,7 +14,13 @@ from ._units import rad_s_to_rpm
 
 
 class ConstantRestitution(eqx.Module):
-    """The same coefficient of restitution in every impact."""
+    """Constant coefficient of restitution.
+
+    Examples:
+        >>> from jaxcam.models import ConstantRestitution
+        >>> float(ConstantRestitution(0.8)(10.0, 0.5))
+        0.8
+    """
 
     r: jax.Array = parameter()
     """Coefficient of restitution, between 0 and 1."""
@@ -25,17 +31,22 @@ class ConstantRestitution(eqx.Module):
 
 
 class LinearInSpeed(eqx.Module):
-    """Restitution that grows linearly with the speed of the drive, kept in [0, 1].
+    """Restitution that grows linearly with the speed of the drive, limited to [0, 1].
 
     The thesis identifies such a law (section 4.6.1, Figure 4.15) but does not print
     it. Its Table 5.2 does so indirectly: free flight is conservative, hence the
-    product of the two multipliers of an orbit with one impact a turn is r^2. The
+    product of the two multipliers of an orbit with one impact per period is r^2. The
     defaults are the line through the ten values of r found that way, rounded (which
     moves r by 5e-7).
+
+    Examples:
+        >>> from jaxcam.models import LinearInSpeed
+        >>> float(LinearInSpeed(slope=0.01, intercept=0.5)(10.0, 0.1))
+        0.6
     """
 
     slope: jax.Array = parameter(rad_s_to_rpm(0.00795658))
-    """Change of the coefficient with the speed (s/rad)."""
+    """Change of the coefficient per speed (s/rad)."""
     intercept: jax.Array = parameter(-0.62122908)
     """Value of the line at speed zero."""
 
@@ -45,15 +56,21 @@ class LinearInSpeed(eqx.Module):
 
 
 class PowerLawRestitution(eqx.Module):
-    """Restitution that falls with the approach speed: r = r0 (1 + v / v_ref)^-b."""
+    """Restitution that falls with the approach speed: r = r0 (1 + v / v_ref)^-b.
+
+    Examples:
+        >>> from jaxcam.models import PowerLawRestitution
+        >>> float(PowerLawRestitution(0.8, 1.0, 1.0)(10.0, 1.0))
+        0.4
+    """
 
     r0: jax.Array = parameter()
     """Coefficient of the slowest impacts, between 0 and 1."""
     reference_speed: jax.Array = parameter()
-    """Approach speed at which the coefficient has fallen to r0 / 2^b, in the units of
-    the gap a second."""
+    """Approach speed at which the coefficient has fallen to r0 / 2^b, in units of the
+    gap per second."""
     exponent: jax.Array = parameter()
-    """b; zero makes the coefficient constant."""
+    """Exponent b; zero makes the coefficient constant."""
 
     def __call__(self, speed, approach_speed) -> jax.Array:
         del speed

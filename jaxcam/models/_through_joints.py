@@ -45,22 +45,36 @@ class OnePiece(CamProfile):
 def simulate_through_joints(
     system: CamFollower | ValveTrain | DesmodromicCam, state, t0, t1, **options: Any
 ) -> Trajectory:
-    """`jaxcam.simulate` on a cam given by a program, exact also where it has joints.
+    """Simulate a cam given by a motion program, exact also at its joints.
 
-    The run stops at every joint and goes on with the piece after it, so that each leg
-    is smooth. A joint where the lift's slope jumps up is met by a follower in contact
-    as an impact; where it jumps down the follower is thrown off. Instants of joints do
-    not depend on the state: a deviation passes them unchanged, and saltation matrices
-    are those of the impacts alone.
+    The run stops at every joint and continues with the piece after it, so that each
+    part is smooth. At a joint where the slope of the lift jumps up, a follower in
+    contact has an impact; where it jumps down the follower is thrown off. Times of
+    joints do not depend on the state: a deviation passes them unchanged, and saltation
+    matrices are those of the impacts alone.
 
-    **Arguments:** a system whose `profile` is a [`jaxcam.models.MotionProgram`][], and
-    everything else as for [`jaxcam.simulate`][jaxcam.hybrid.simulate].
+    Args:
+        system: A system whose `profile` is a [`jaxcam.models.MotionProgram`][].
+        state: Initial state, shape `(n,)`.
+        t0: Start time (s).
+        t1: End time (s).
+        options: As for [`jaxcam.simulate`][jaxcam.hybrid.simulate].
 
     Returns:
         One trajectory; a contact that lasts through a joint is listed once.
 
     Raises:
-        ValueError: For another profile, and whatever `simulate` raises.
+        ValueError: The profile is another one; and as for `simulate`.
+
+    Examples:
+        >>> from jaxcam.models import DesmodromicCam, MotionProgram, Segment
+        >>> from jaxcam.models import simulate_through_joints
+        >>> rises = (0.01, -0.01)
+        >>> program = MotionProgram([Segment("cycloidal", np.pi, r) for r in rises])
+        >>> cam = DesmodromicCam(program, speed=10.0, clearance=1e-4)
+        >>> run = simulate_through_joints(cam, [5e-5, 0.0], 0.0, 0.1)
+        >>> bool(run.successful)
+        True
     """
     refuse_tracers("simulate_through_joints", "jaxcam.simulate", system, state, t0, t1)
     program = system.profile

@@ -10,31 +10,43 @@ from ._parameters import parameter, require_restitution
 
 
 class TripleIntegrator(HybridSystem):
-    """`x' = v`, `v' = a`, `a' = 1` above `x = 0`; state (x, v, a). (6.22)-(6.24)
+    """Triple integrator above a floor: `x' = v`, `v' = a`, `a' = 1` for `x > 0`.
 
-    It is what any impacting system looks like close to the release point of a sticking
-    orbit, with the jerk there scaled to one: started with a negative acceleration it
-    chatters, and if it comes to rest it lifts off where the acceleration is zero.
+    The state is (x, v, a) (thesis, eqs. 6.22-6.24). Every system with impacts has this
+    form close to the release point of a sticking orbit, with the jerk there scaled to
+    one: started with a negative acceleration it chatters, and once at rest it is
+    released where the acceleration is zero.
+
+    Examples:
+        >>> from jaxcam.models import TripleIntegrator
+        >>> TripleIntegrator().vector_field(0.0, jnp.array([0.0, 1.0, -2.0])).tolist()
+        [1.0, -2.0, 1.0]
     """
 
     state_names: ClassVar[tuple[str, ...]] = ("position", "velocity", "acceleration")
+    """Names of the state's components."""
     state_units: ClassVar[tuple[str, ...]] = ("-", "-", "-")
+    """Units of the state's components."""
 
     restitution: jax.Array = parameter(0.8)
     """Coefficient of restitution, between 0 and 1."""
 
     def vector_field(self, t, state) -> jax.Array:
-        """Velocity, acceleration and the unit jerk, shape `(3,)`. (6.22)"""
+        """Return velocity, acceleration and the unit jerk, `(3,)` (thesis,
+        eq. 6.22).
+        """
         del t
         return jnp.stack([state[1], state[2], jnp.ones_like(state[2])])
 
     def gap(self, t, state) -> jax.Array:
-        """Position, a scalar. (6.23)"""
+        """Return the position, a scalar (thesis, eq. 6.23)."""
         del t
         return state[0]
 
     def impact(self, t, state) -> jax.Array:
-        """State after an impact: the velocity is multiplied by -restitution. (6.24)"""
+        """Return the state after an impact: v becomes -restitution v (thesis,
+        eq. 6.24).
+        """
         del t
         return jnp.stack([state[0], -self.restitution * state[1], state[2]])
 

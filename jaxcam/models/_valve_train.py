@@ -19,14 +19,25 @@ from .cams import CamProfile
 
 
 class ValveTrain(AbstractCamDriven):
-    """A sliding follower on a cam of constant speed: m x'' + c x' + k x + F0 = contact.
+    """A translating follower on a cam of constant speed: m x'' + c x' + k x + F0 =
+    contact.
 
     The state is the follower's lift and velocity (m, m/s); the gap is the distance
-    between the follower and the lift that the cam asks for.
+    between the follower and the lift of the cam.
+
+    Examples:
+        >>> from jaxcam.models import MotionProgram, Segment, ValveTrain
+        >>> rises = (0.01, -0.01)
+        >>> program = MotionProgram([Segment("cycloidal", np.pi, r) for r in rises])
+        >>> valve = ValveTrain(program, 100.0, mass=0.1, stiffness=2e4, preload=200.0)
+        >>> round(float(valve.period), 6)
+        0.062832
     """
 
     state_names: ClassVar[tuple[str, ...]] = ("lift", "valve velocity")
+    """Names of the state's components."""
     state_units: ClassVar[tuple[str, ...]] = ("m", "m/s")
+    """Units of the state's components."""
 
     profile: CamProfile
     """Lift (m) as a function of the cam's angle, such as a
@@ -34,9 +45,9 @@ class ValveTrain(AbstractCamDriven):
     speed: jax.Array = parameter()
     """Speed of the cam (rad/s), half that of a four-stroke engine's crank."""
     mass: jax.Array = parameter()
-    """Mass that moves with the valve (kg), with a third of the spring's."""
+    """Mass that moves with the valve (kg), including a third of the spring's."""
     stiffness: jax.Array = parameter()
-    """Of the valve spring (N/m)."""
+    """Stiffness of the valve spring (N/m)."""
     preload: jax.Array = parameter()
     """Force of the spring at lift zero (N)."""
     damping: jax.Array = parameter(0.0)
@@ -49,24 +60,24 @@ class ValveTrain(AbstractCamDriven):
     """Angle of the cam at time zero (rad)."""
 
     def vector_field(self, t, state) -> jax.Array:
-        """Velocity and acceleration of the free valve, shape `(2,)`."""
+        """Return velocity and acceleration of the free valve, shape `(2,)`."""
         del t
         lift, velocity = state[0], state[1]
         force = self.stiffness * lift + self.preload + self.damping * velocity
         return jnp.stack([velocity, -force / self.mass])
 
     def gap(self, t, state) -> jax.Array:
-        """Distance between follower and cam (m), a scalar."""
+        """Return the distance between follower and cam (m), a scalar."""
         return state[0] - self.profile(self.cam_angle(t))
 
     def impact(self, t, state) -> jax.Array:
-        """State after an impact: the relative velocity v becomes -r v."""
+        """Return the state after an impact: the relative velocity v becomes -r v."""
         return self.after_impact(t, state)
 
     def load_terms(self, lift, slope, curvature):
-        """Contact force (N) at speed w as `a w^2 + b w + c`: a, b and c.
+        """Return a, b and c of the contact force `a w^2 + b w + c` (N) at speed w.
 
-        Lift, slope and curvature are the profile's, for each radian of the cam.
+        Lift, slope and curvature are the profile's, per radian of the cam.
         """
         return (
             self.mass * curvature,

@@ -52,14 +52,23 @@ _KNOWN: tuple[type, ...] = (
 def save_system(
     system: HybridSystem, file: str | Path, *, about: dict[str, Any] | None = None
 ) -> None:
-    """Write a system as JSON.
+    """Write a system to a file as JSON.
 
-    **Arguments:** `about` is anything else to be kept with it, in plain JSON: the
-    errors of the parameters, where they come from.
+    Args:
+        system: The system.
+        file: The file to write.
+        about: Anything else to store with it, in plain JSON: errors of the parameters,
+            their origin.
 
     Raises:
-        ValueError: For a system with a field that is not a number, an array, a word or
-            another Module.
+        ValueError: A field of the system is not a number, an array, a word or another
+            Module.
+
+    Examples:
+        >>> from jaxcam.models import BouncingBall, load_system, save_system
+        >>> save_system(BouncingBall(restitution=0.7), "ball.json")
+        >>> float(load_system("ball.json").restitution)
+        0.7
     """
     Path(file).write_text(
         json.dumps(system_to_json(system, about=about), indent=1) + "\n", "utf-8"
@@ -67,13 +76,24 @@ def save_system(
 
 
 def load_system(file: str | Path, *, classes: Iterable[type] = ()) -> HybridSystem:
-    """Read a system that `save_system` wrote.
+    """Read a system that `save_system` has written.
 
-    **Arguments:** `classes` beside those of `jaxcam.models` that may occur in it, such
-    as a system of your own, or `jaxcam.discrepancy.terms.saved_classes()`.
+    Args:
+        file: The file to read.
+        classes: Classes besides those of `jaxcam.models` that may occur in it, such as
+            a system of your own, or `jaxcam.discrepancy.terms.saved_classes()`.
+
+    Returns:
+        The system.
 
     Raises:
-        ValueError: For a file that is not one, or names another class.
+        ValueError: The file is not a saved system, or names another class.
+
+    Examples:
+        >>> from jaxcam.models import BouncingBall, load_system, save_system
+        >>> save_system(BouncingBall(), "ball.json")
+        >>> type(load_system("ball.json")).__name__
+        'BouncingBall'
     """
     file = Path(file)
     try:
@@ -92,16 +112,32 @@ def load_system(file: str | Path, *, classes: Iterable[type] = ()) -> HybridSyst
 def system_to_json(
     system: HybridSystem, *, about: dict[str, Any] | None = None
 ) -> dict[str, Any]:
-    """A system as plain numbers, lists and words; see `save_system`."""
+    """Return a system as plain numbers, lists and words; see `save_system`.
+
+    Args:
+        system: The system.
+        about: Anything else to store with it, in plain JSON.
+
+    Returns:
+        A dictionary.
+    """
     found = {"format": _FORMAT, "version": _VERSION, "system": _encode(system, "")}
     return found if about is None else {**found, "about": about}
 
 
 def system_from_json(found: Any, *, classes: Iterable[type] = ()) -> HybridSystem:
-    """The system in plain JSON; see `load_system`. Keys beside its own are ignored.
+    """Return the system described by plain JSON; see `load_system`. Other keys are
+    ignored.
+
+    Args:
+        found: The parsed JSON.
+        classes: Classes besides those of `jaxcam.models` that may occur in it.
+
+    Returns:
+        The system.
 
     Raises:
-        ValueError: That says what is wrong.
+        ValueError: The description is invalid; the message says where.
     """
     if not isinstance(found, dict) or found.get("format") != _FORMAT:
         raise ValueError(

@@ -1,4 +1,4 @@
-"""Parameters of any pytree: which of them vary, and floats as arrays."""
+"""Pick parameters of any pytree, and convert floats to arrays."""
 
 from ._arrays import as_arrays as as_arrays
 from ._pick import (

@@ -15,6 +15,17 @@ def as_arrays(tree: _Tree) -> _Tree:
 
     A field declared as `stiffness: float = 3.0` is then a parameter like any other.
     Arrays, traced values, integers and flags stay as they are.
+
+    Args:
+        tree: Any pytree.
+
+    Returns:
+        The tree with its floats as arrays.
+
+    Examples:
+        >>> from jaxcam.parameters import as_arrays
+        >>> as_arrays({"mass": 0.5})["mass"].shape
+        ()
     """
     return jax.tree.map(_as_array, tree)
 

@@ -30,12 +30,18 @@ class Pick:
     It can be hashed, sent to another process and compared. Called with a tree of the
     same structure it returns the leaf, or with `several` the tuple of leaves, so it
     serves wherever equinox takes a `where`.
+
+    Examples:
+        >>> from jaxcam.models import BouncingBall
+        >>> from jaxcam.parameters import pick
+        >>> float(pick("gravity", BouncingBall())(BouncingBall(gravity=1.6)))
+        1.6
     """
 
     leaves: tuple[int, ...]
     """Places among the leaves of the tree."""
     names: tuple[str, ...]
-    """`speed`, `profile.radius`, ..."""
+    """Dotted names, such as `speed` or `profile.radius`."""
     several: bool = False
     """Whether a call returns a tuple."""
 
@@ -45,7 +51,7 @@ class Pick:
         return found if self.several else found[0]
 
     def replaced(self, tree: _Tree, *values: Any) -> _Tree:
-        """The tree with one new value for each parameter."""
+        """Return the tree with one new value for each parameter."""
         flat, structure = jax.tree.flatten(tree)
         for i, value in zip(self.leaves, values, strict=True):
             flat[i] = value
@@ -63,20 +69,26 @@ def pick(
     *,
     integers: bool = False,
 ) -> Pick:
-    """The parameters of `tree` that `where` picks.
+    """Return the parameters of `tree` that `where` picks.
 
     Args:
         where: A function of the tree (`lambda system: system.speed`), a dotted name
             (`"profile.radius"`), or a tuple of those. A function may return several
             parameters at once.
         tree: A system, or any other pytree with numbers among its leaves.
-        integers: Whether integers may vary too; by default floating-point numbers only.
+        integers: Whether integers may vary too; default floating-point numbers only.
 
     Returns:
         A [`jaxcam.parameters.Pick`][].
 
     Raises:
-        ValueError: Where a parameter does not exist or is not one number.
+        ValueError: A parameter does not exist or is not one number.
+
+    Examples:
+        >>> from jaxcam.models import BouncingBall
+        >>> from jaxcam.parameters import pick
+        >>> pick("restitution", BouncingBall()).names
+        ('restitution',)
     """
     if isinstance(where, Pick):
         return where
@@ -100,11 +112,21 @@ def pick(
 
 
 def unit_tangent(where: Where, tree: _Tree) -> _Tree:
-    """The direction in which one parameter grows, for `equinox.filter_jvp`.
+    """Return the direction in which one parameter grows, for `equinox.filter_jvp`.
+
+    Args:
+        where: Picks a parameter of the system: `lambda s: s.speed`, or its dotted name.
+        tree: A system, or any other pytree.
 
     Returns:
         Zeros for every inexact array of the tree, one for the parameter that `where`
             picks, `None` for all other leaves.
+
+    Examples:
+        >>> from jaxcam.models import BouncingBall
+        >>> from jaxcam.parameters import unit_tangent
+        >>> float(unit_tangent("gravity", BouncingBall()).gravity)
+        1.0
     """
     picked = pick(where, tree)
     zeros = jax.tree.map(jnp.zeros_like, eqx.filter(tree, eqx.is_inexact_array))
@@ -114,7 +136,21 @@ def unit_tangent(where: Where, tree: _Tree) -> _Tree:
 
 
 def parameter_names(tree: PyTree, *, integers: bool = False) -> list[str]:
-    """Dotted names of all numbers of a tree that can vary."""
+    """Return the dotted names of all numbers of a tree that can vary.
+
+    Args:
+        tree: A system, or any other pytree.
+        integers: Whether integers may vary too.
+
+    Returns:
+        A list of names.
+
+    Examples:
+        >>> from jaxcam.models import BouncingBall
+        >>> from jaxcam.parameters import parameter_names
+        >>> parameter_names(BouncingBall())
+        ['gravity', 'restitution', 'amplitude', 'frequency']
+    """
     return [name for name, leaf in _named_leaves(tree) if _varies(leaf, integers)]
 
 

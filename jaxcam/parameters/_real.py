@@ -7,8 +7,20 @@ import jax.numpy as jnp
 def real_array(values, name: str = "state") -> jax.Array:
     """An array of 64-bit floats.
 
+    Args:
+        values: Numbers.
+        name: Name of the argument, for the message.
+
+    Returns:
+        A real array.
+
     Raises:
         ValueError: For complex numbers, whose imaginary part would be lost.
+
+    Examples:
+        >>> from jaxcam.parameters import real_array
+        >>> real_array([1, 2]).dtype.name
+        'float64'
     """
     if any(jnp.iscomplexobj(leaf) for leaf in jax.tree.leaves(values)):
         raise ValueError(

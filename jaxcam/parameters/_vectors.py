@@ -1,4 +1,4 @@
-"""What numbers are where they come from outside, or go from programs to the host."""
+"""Array types of numbers that come from outside or return to the host."""
 
 from collections.abc import Sequence
 from typing import TypeAlias

@@ -40,18 +40,19 @@ def basin_picture(
 ) -> Figure:
     """Draw which state ends on which attractor, a colour an attractor.
 
-    **Arguments:**
+    Args:
+        basins: From [`jaxcam.sweeps.basins`][]; other components than those of `axes`
+            must have one value.
+        ax: Axes; a new figure without.
+        axes: The components along x and y.
+        orbits: Whether the points of the attractors are marked.
 
-    - `basins`: from [`jaxcam.sweeps.basins`][]; other components than those of `axes`
-        must have one value.
-    - `ax`: axes; a new figure without.
-    - `axes`: the components along x and y.
-    - `orbits`: whether the points of the attractors are marked.
+    Returns:
+        The figure.
 
-    **Returns:** the figure.
-
-    **Raises:** `ValueError` where a component that is not drawn has several values, or
-    one that is drawn has one.
+    Raises:
+        ValueError: Where a component that is not drawn has several values, or one that
+            is drawn has one.
     """
     ax = one_axes(ax)
     grid = basins.grid
@@ -156,7 +157,7 @@ def _mark(ax: Axes, basins, axes) -> None:
 
 
 def _mark_of(basins, k: int) -> dict:
-    """How the points of attractor `k` look: white shows on every colour."""
+    """Return the marker of attractor `k`: white shows on every colour."""
     # what does not repeat has many points
     irregular = basins.labels[k, 1] == 0
     return {

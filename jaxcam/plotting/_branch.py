@@ -58,19 +58,20 @@ def branch_diagram(
 ) -> Figure:
     """Draw branches: stable parts solid, unstable ones dashed, special points marked.
 
-    **Arguments:**
+    Args:
+        branches: From `continuation.branch`, one or several.
+        ax: Axes; a new figure without.
+        value: What is drawn against the parameter, a number or several from each point;
+            without, the first component of the state once a forcing period, where the
+            points have it, or else of their solution.
+        x_label: Name and unit of both axes; the parameter's name without.
+        y_label: Name and unit of both axes; the parameter's name without.
+        x_scale: By which parameters are multiplied (30/pi for a speed in rpm).
+        letters: Whether words name the special points besides the legend; one that
+            would cover another is left out.
 
-    - `branches`: from `continuation.branch`, one or several.
-    - `ax`: axes; a new figure without.
-    - `value`: what is drawn against the parameter, a number or several from each point;
-        without, the first component of the state once a forcing period, where the
-        points have it, or else of their solution.
-    - `x_label`, `y_label`: name and unit of both axes; the parameter's name without.
-    - `x_scale`: by which parameters are multiplied (30/pi for a speed in rpm).
-    - `letters`: whether words name the special points besides the legend; one that
-      would cover another is left out.
-
-    **Returns:** the figure.
+    Returns:
+        The figure.
     """
     ax = one_axes(ax)
     several: list[Any] = (

@@ -15,7 +15,8 @@ def cam_contour(contour: CamContour, ax: Axes | None = None) -> Figure:
 
     **Arguments:** the contour over a whole turn, and where to draw.
 
-    **Returns:** the figure.
+    Returns:
+        The figure.
     """
     ax = one_axes(ax)
     x, y = np.asarray(contour.x), np.asarray(contour.y)

@@ -15,14 +15,14 @@ from ._style import FLIGHT, IMPACT, RECORDED, SECTION, styled
 def lambda_cobweb(r: float, ax: Axes | None = None, *, start=None) -> Figure:
     """Draw f(lambda) with its fixed point. (Figure 6.5)
 
-    **Arguments:**
+    Args:
+        r: Coefficient of restitution.
+        ax: Where to draw; a new figure without.
+        start: First values of lambda to draw cobwebs from; without, one either side of
+            the fixed point, where chattering completes and where it is interrupted.
 
-    - `r`: coefficient of restitution.
-    - `ax`: where to draw; a new figure without.
-    - `start`: first values of lambda to draw cobwebs from; without, one either side of
-      the fixed point, where chattering completes and where it is interrupted.
-
-    **Returns:** the figure.
+    Returns:
+        The figure.
     """
     ax = one_axes(ax)
     law = scaling_law(r)
@@ -68,15 +68,15 @@ def beta_lobes(
 ) -> Figure:
     """Draw beta over lambda - lambda_bar, with its corners. (Figures 6.14, 6.15)
 
-    **Arguments:**
+    Args:
+        r: Coefficient of restitution.
+        ax: Where to draw; a new figure without.
+        measured: Deviations of lambda and the beta found by simulation, drawn under the
+            theory.
+        lobes: How many of them, from the largest.
 
-    - `r`: coefficient of restitution.
-    - `ax`: where to draw; a new figure without.
-    - `measured`: deviations of lambda and the beta found by simulation, drawn under
-      the theory.
-    - `lobes`: how many of them, from the largest.
-
-    **Returns:** the figure.
+    Returns:
+        The figure.
     """
     ax = one_axes(ax)
     bar = float(scaling_law(r).lambda_bar)
@@ -108,7 +108,8 @@ def lobe_scaling(distance, height, kappa: float, ax: Axes | None = None) -> Figu
     **Arguments:** `distance` and `height`, each `(k,)`, positive; `kappa`, the exponent
     of the theory; `ax`, a new figure without.
 
-    **Returns:** the figure.
+    Returns:
+        The figure.
     """
     ax = one_axes(ax)
     distance, height = np.asarray(distance), np.asarray(height)

@@ -32,15 +32,19 @@ def chattering_picture(
 ) -> Figure:
     """Draw the chattering region D and the grazing manifold. (Figures 6.2 and 6.4)
 
-    **Arguments:**
+    Args:
+        frame: Of [`variational.chatter_frame`][], [`variational.chattering_region`][]
+            and [`variational.grazing_manifold`][].
+        region: Of [`variational.chatter_frame`][], [`variational.chattering_region`][]
+            and [`variational.grazing_manifold`][].
+        manifold: Of [`variational.chatter_frame`][],
+            [`variational.chattering_region`][] and [`variational.grazing_manifold`][].
+        ax: Where to draw; a new figure without.
+        period: Of the forcing (s).
+        most: Largest speed drawn; that of the region without.
 
-    - `frame`, `region`, `manifold`: of [`variational.chatter_frame`][],
-      [`variational.chattering_region`][] and [`variational.grazing_manifold`][].
-    - `ax`: where to draw; a new figure without.
-    - `period`: of the forcing (s).
-    - `most`: largest speed drawn; that of the region without.
-
-    **Returns:** the figure: rebound speed over time from release, modulo the period.
+    Returns:
+        The figure: rebound speed over time from release, modulo the period.
     """
     ax = one_axes(ax)
     release = float(frame.release)

@@ -38,24 +38,25 @@ def compare_recording(
     With a channel `cam_angle_rad` the horizontal axis counts turns of the cam, without
     one it is time.
 
-    **Arguments:**
+    Args:
+        recording: The run.
+        simulated: The channel as simulated at the samples of the recording, shape
+            `(k,)`, NaN where it was not; or a comparison that the recording is in; or
+            several of these by name.
+        axes: Two of them; a new figure without.
+        channel: The channel to compare.
+        contact: What the channel would be in contact with the cam, shape `(k,)`; drawn
+            as the surface below the motion.
+        noise: Standard deviation of a sample of the channel, in its unit; drawn as a
+            band of twice that on either side.
+        turns: How many turns of the cam to draw; without a cam, all is drawn.
+        start: Where to begin (s), at the first sample without.
 
-    - `recording`: the run.
-    - `simulated`: the channel as simulated at the samples of the recording, shape
-        `(k,)`, NaN where it was not; or a comparison that the recording is in; or
-        several of these by name.
-    - `axes`: two of them; a new figure without.
-    - `channel`: the channel to compare.
-    - `contact`: what the channel would be in contact with the cam, shape `(k,)`; drawn
-        as the surface below the motion.
-    - `noise`: standard deviation of a sample of the channel, in its unit; drawn as a
-        band of twice that on either side.
-    - `turns`: how many turns of the cam to draw; without a cam, all is drawn.
-    - `start`: where to begin (s), at the first sample without.
+    Returns:
+        The figure.
 
-    **Returns:** the figure.
-
-    **Raises:** `ValueError` where a simulation has another length than the recording.
+    Raises:
+        ValueError: Where a simulation has another length than the recording.
     """
     runs = dict(simulated) if isinstance(simulated, Mapping) else {"": simulated}
     runs = {name: _samples(recording, run, channel) for name, run in runs.items()}

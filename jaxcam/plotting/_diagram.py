@@ -20,11 +20,11 @@ if TYPE_CHECKING:
 
 # each value by itself, upwards, downwards
 _WAYS = {0: (SECTION, ""), 1: (FLIGHT, "upwards"), -1: (IMPACT, "downwards")}
-#: colours of Okabe and Ito, then lighter ones, for things that are many
 COLOURS = (
     "#0072B2", "#56B4E9", "#E69F00", "#009E73", "#CC79A7", "#D55E00", "#F0E442",
     "#8C8C8C", "#004D7A", "#A6D8F5", "#8A5F00", "#7FD1B9", "#7A3F62", "#F4B183",
 )  # fmt: skip
+"""Colours of Okabe and Ito, then lighter ones, for things that are many."""
 # heights that a diagram tells apart
 _ROWS = 600
 # smallest and largest dots (points)
@@ -48,19 +48,21 @@ def sweep_diagram(
 
     Dots are drawn as an image, so that millions of them stay a small file.
 
-    **Arguments:**
+    Args:
+        diagram: From [`jaxcam.sweeps.diagram`][].
+        ax: Axes; a new figure without.
+        component: Of the state.
+        phase: Draws the phase (turns) of each sample instead, for sections that are not
+            taken once a turn.
+        x_label: Name and unit of both axes.
+        y_label: Name and unit of both axes.
+        x_scale: By which parameters are multiplied (30/pi for a speed in rpm).
 
-    - `diagram`: from [`jaxcam.sweeps.diagram`][].
-    - `ax`: axes; a new figure without.
-    - `component`: of the state.
-    - `phase`: draws the phase (turns) of each sample instead, for sections that are not
-        taken once a turn.
-    - `x_label`, `y_label`: name and unit of both axes.
-    - `x_scale`: by which parameters are multiplied (30/pi for a speed in rpm).
+    Returns:
+        The figure.
 
-    **Returns:** the figure.
-
-    **Raises:** `ValueError` for the phase of samples that all have the same.
+    Raises:
+        ValueError: For the phase of samples that all have the same.
     """
     ax = one_axes(ax)
     states, values = diagram.states, x_scale * diagram.values
@@ -144,15 +146,17 @@ def sweep_chart(
 ) -> Figure:
     """Draw the labels of a chart, a colour a label.
 
-    **Arguments:**
+    Args:
+        chart: From [`jaxcam.sweeps.chart`][].
+        ax: Axes; a new figure without.
+        start: Which of several starts.
+        x_label: Name and unit of the first and the second parameter.
+        y_label: Name and unit of the first and the second parameter.
+        x_scale: By which parameters are multiplied.
+        y_scale: By which parameters are multiplied.
 
-    - `chart`: from [`jaxcam.sweeps.chart`][].
-    - `ax`: axes; a new figure without.
-    - `start`: which of several starts.
-    - `x_label`, `y_label`: name and unit of the first and the second parameter.
-    - `x_scale`, `y_scale`: by which parameters are multiplied.
-
-    **Returns:** the figure.
+    Returns:
+        The figure.
     """
     ax = one_axes(ax)
     labels = chart.labels[..., start].astype(str)

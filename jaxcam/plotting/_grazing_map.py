@@ -23,18 +23,19 @@ def cobweb(
 ) -> Figure:
     """Draw a map, the line on which nothing changes, and the cobweb of one motion.
 
-    **Arguments:**
+    Args:
+        function: The map of a vector of points, such as
+            `lambda x: variational.nordmark_map(x, mu, lam)`.
+        start: Where the motion starts; `turns` steps are drawn after `skip` others.
+        ax: Where to draw; a new figure without.
+        edge: Where impacts begin, marked by a dashed line.
+        name: Of the variable, in TeX.
 
-    - `function`: the map of a vector of points, such as
-        `lambda x: variational.nordmark_map(x, mu, lam)`.
-    - `start`: where the motion starts; `turns` steps are drawn after `skip` others.
-    - `ax`: where to draw; a new figure without.
-    - `edge`: where impacts begin, marked by a dashed line.
-    - `name`: of the variable, in TeX.
+    Returns:
+        The figure.
 
-    **Returns:** the figure.
-
-    **Raises:** `ValueError` for a motion that does not stay finite.
+    Raises:
+        ValueError: For a motion that does not stay finite.
     """
     x, points = float(start), []
     with np.errstate(over="ignore", invalid="ignore"):

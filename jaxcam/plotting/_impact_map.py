@@ -32,18 +32,19 @@ def impact_return_map(
     The first panel shows when the impacts happen, the second their speed of approach
     (the normal speed just before). Points on the line are impacts that repeat.
 
-    **Arguments:**
+    Args:
+        trajectory: What `jaxcam.simulate` returned.
+        axes: Two of them; a new figure without.
+        against: "phase" for the phase of the forcing (rad, from 0 to 2 pi), "time" for
+            the time itself (s), which is also drawn where there is no period.
+        period: Of the forcing (s); the system's own without.
+        between: The span of time to draw (s), for example without a transient.
 
-    - `trajectory`: what `jaxcam.simulate` returned.
-    - `axes`: two of them; a new figure without.
-    - `against`: "phase" for the phase of the forcing (rad, from 0 to 2 pi), "time" for
-        the time itself (s), which is also drawn where there is no period.
-    - `period`: of the forcing (s); the system's own without.
-    - `between`: the span of time to draw (s), for example without a transient.
+    Returns:
+        The figure.
 
-    **Returns:** the figure.
-
-    **Raises:** `ValueError` for another `against` or a wrong number of axes.
+    Raises:
+        ValueError: For another `against` or a wrong number of axes.
     """
     if against not in ("phase", "time"):
         raise ValueError(f'against is {against!r}; choose "phase" or "time".')

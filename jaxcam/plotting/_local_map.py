@@ -22,15 +22,15 @@ def local_map(
 ) -> Figure:
     """Draw the fitted map over the measured one, with a cobweb. (Figures 5.25, 5.26)
 
-    **Arguments:**
+    Args:
+        local: What [`variational.fit_local_map`][] returned.
+        lobes: The measurement, drawn as dots and only without a shift.
+        ax: Where to draw; a new figure without.
+        shift: How far the map is moved to the left, as a parameter moves it.
+        turns: Steps of the cobweb, the first half of which is not drawn.
 
-    - `local`: what [`variational.fit_local_map`][] returned.
-    - `lobes`: the measurement, drawn as dots and only without a shift.
-    - `ax`: where to draw; a new figure without.
-    - `shift`: how far the map is moved to the left, as a parameter moves it.
-    - `turns`: steps of the cobweb, the first half of which is not drawn.
-
-    **Returns:** the figure.
+    Returns:
+        The figure.
     """
     ax = one_axes(ax)
     x_0, x_inf = float(local.x_0), float(local.x_inf)

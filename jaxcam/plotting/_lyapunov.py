@@ -12,14 +12,15 @@ from ._style import BAND, styled
 def lyapunov_convergence(spectrum, ax: Axes | None = None) -> Figure:
     """Draw the exponents over the first turns, with their standard errors.
 
-    **Arguments:**
+    Args:
+        spectrum: Of one motion, from `variational.lyapunov_spectrum`.
+        ax: Where to draw; a new figure without.
 
-    - `spectrum`: of one motion, from `variational.lyapunov_spectrum`.
-    - `ax`: where to draw; a new figure without.
+    Returns:
+        The figure.
 
-    **Returns:** the figure.
-
-    **Raises:** `ValueError` for the spectra of many motions.
+    Raises:
+        ValueError: For the spectra of many motions.
     """
     running = np.asarray(spectrum.running)
     if running.ndim != 2:

@@ -21,13 +21,13 @@ def motion_program(program: MotionProgram, axes=None, *, unit: str = "rad") -> F
     a dashed line. A jump of the derivative before it, which is a pulse of unbounded
     height, is not drawn.
 
-    **Arguments:**
+    Args:
+        program: What to draw.
+        axes: Four of them; a new figure without.
+        unit: Of the lift, "rad" or "m".
 
-    - `program`: what to draw.
-    - `axes`: four of them; a new figure without.
-    - `unit`: of the lift, "rad" or "m".
-
-    **Returns:** the figure.
+    Returns:
+        The figure.
     """
     figure, axes = several_axes(axes, (4, 1), sharex=True, figsize=(6.4, 8.4))
     axes = axes[:, 0]

@@ -16,14 +16,14 @@ def multipliers(
 ) -> Figure:
     """Draw multipliers of one orbit, or of many, and the unit circle.
 
-    **Arguments:**
+    Args:
+        values: Complex, shape `(n,)`, or `(orbits, n)` for the orbits of a branch.
+        ax: Where to draw; a new figure without.
+        reach: Half the width of the picture; without, so that all fit in. Multipliers
+            beyond it are marked at the edge.
 
-    - `values`: complex, shape `(n,)`, or `(orbits, n)` for the orbits of a branch.
-    - `ax`: where to draw; a new figure without.
-    - `reach`: half the width of the picture; without, so that all fit in. Multipliers
-        beyond it are marked at the edge.
-
-    **Returns:** the figure.
+    Returns:
+        The figure.
     """
     values = np.atleast_2d(np.asarray(values, dtype=complex)).ravel()
     values = values[np.isfinite(values)]

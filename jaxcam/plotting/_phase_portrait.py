@@ -27,18 +27,18 @@ def phase_portrait(
     Flights and contacts are lines of different colour, jumps at impacts are thin and
     dashed, and the stroboscopic points, one a period, are dots.
 
-    **Arguments:**
+    Args:
+        trajectory: What `jaxcam.simulate` returned.
+        ax: Where to draw; a new figure without.
+        components: Which component goes to the right and which goes up.
+        period: Time between stroboscopic points (s); the period of the forcing without,
+            and no points for a system that has none.
+        phase: Time from t0 to one of these points (s).
+        between: The span of time to draw (s), the whole trajectory without.
+        samples: Points of a curve, besides those that short flights need.
 
-    - `trajectory`: what `jaxcam.simulate` returned.
-    - `ax`: where to draw; a new figure without.
-    - `components`: which component goes to the right and which goes up.
-    - `period`: time between stroboscopic points (s); the period of the forcing without,
-        and no points for a system that has none.
-    - `phase`: time from t0 to one of these points (s).
-    - `between`: the span of time to draw (s), the whole trajectory without.
-    - `samples`: points of a curve, besides those that short flights need.
-
-    **Returns:** the figure.
+    Returns:
+        The figure.
     """
     drawn = trajectory_curve(trajectory, between, samples)
     ax = one_axes(ax)

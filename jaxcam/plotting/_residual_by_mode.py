@@ -1,4 +1,4 @@
-"""What a model leaves over: in flight, in contact and in the impacts."""
+"""Residuals of a model: in flight, in contact and at the impacts."""
 
 from collections.abc import Sequence
 from typing import Literal
@@ -37,18 +37,19 @@ def residual_by_mode(
     the right how many there are of each size (bars), and how many there would be if
     there were noise alone (black line). Impacts carry their standard errors.
 
-    **Arguments:**
+    Args:
+        comparison: What `jaxcam.recordings.compare` or `compare_case` returned.
+        axes: Two for each mode and channel, row by row; a new figure without.
+        record: Name of the only recording to draw; all of them without, each in its own
+            colour.
+        against: "time" (s), or "phase" for the angle of the cam within its turn (rad).
 
-    - `comparison`: what `jaxcam.recordings.compare` or `compare_case` returned.
-    - `axes`: two for each mode and channel, row by row; a new figure without.
-    - `record`: name of the only recording to draw; all of them without, each in its
-        own colour.
-    - `against`: "time" (s), or "phase" for the angle of the cam within its turn (rad).
+    Returns:
+        The figure.
 
-    **Returns:** the figure.
-
-    **Raises:** `ValueError` where there is nothing to draw, no cam to take the phase
-    of, or for another `against`.
+    Raises:
+        ValueError: Where there is nothing to draw, no cam to take the phase of, or for
+            another `against`.
     """
     if against not in ("time", "phase"):
         raise ValueError(f'against is {against!r}; choose "time" or "phase".')

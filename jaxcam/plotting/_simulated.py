@@ -1,4 +1,4 @@
-"""What a comparison makes of a recording: the channel as the model gives it."""
+"""Evaluate the model at the samples of a recording: the channel as simulated."""
 
 import numpy as np
 from jaxtyping import Float

@@ -33,17 +33,21 @@ def special_curves(
     Each kind of point has the colour that it has on a branch. Points of codimension two
     on the curves, and crossings with other curves found there, are marked and named.
 
-    **Arguments:**
+    Args:
+        curves: From `continuation.curve`, one or several, all in the same parameters.
+        ax: Axes; a new figure without.
+        x_label: Name and unit of the first and the second parameter; the parameters'
+            names without.
+        y_label: Name and unit of the first and the second parameter; the parameters'
+            names without.
+        x_scale: By which they are multiplied (30/pi for a speed in rpm).
+        y_scale: By which they are multiplied (30/pi for a speed in rpm).
 
-    - `curves`: from `continuation.curve`, one or several, all in the same parameters.
-    - `ax`: axes; a new figure without.
-    - `x_label`, `y_label`: name and unit of the first and the second parameter; the
-      parameters' names without.
-    - `x_scale`, `y_scale`: by which they are multiplied (30/pi for a speed in rpm).
+    Returns:
+        The figure.
 
-    **Returns:** the figure.
-
-    **Raises:** `ValueError` for branches in one parameter.
+    Raises:
+        ValueError: For branches in one parameter.
     """
     ax = one_axes(ax)
     several: list[Branch] = (

@@ -27,18 +27,19 @@ def time_history(
 
     Impacts are dots on the curves and thin dashed jumps; contacts are shaded.
 
-    **Arguments:**
+    Args:
+        trajectory: What `jaxcam.simulate` returned.
+        axes: One for each component and one more for the gap; a new figure without.
+        components: The components to draw, all of them without.
+        between: The span of time to draw (s), the whole trajectory without.
+        samples: Points of a curve, besides those that short flights need.
 
-    - `trajectory`: what `jaxcam.simulate` returned.
-    - `axes`: one for each component and one more for the gap; a new figure without.
-    - `components`: the components to draw, all of them without.
-    - `between`: the span of time to draw (s), the whole trajectory without.
-    - `samples`: points of a curve, besides those that short flights need.
+    Returns:
+        The figure.
 
-    **Returns:** the figure.
-
-    **Raises:** `ValueError` for a wrong number of axes, or a span that the trajectory
-    does not cover.
+    Raises:
+        ValueError: For a wrong number of axes, or a span that the trajectory does not
+            cover.
     """
     drawn = trajectory_curve(trajectory, between, samples)
     system = trajectory.system

@@ -1,4 +1,4 @@
-"""What colours stand for in every figure, for figures drawn elsewhere."""
+"""Meaning of the colours in all figures, for figures drawn elsewhere."""
 
 from ._style import (
     BAND as BAND,

@@ -14,7 +14,7 @@ _POINTS_IN_STEP = 4
 
 
 class Curve(NamedTuple):
-    """What is drawn of a trajectory between two times.
+    """The curve of a trajectory between two times.
 
     A row of NaN ends every flight and every contact, so that a line through the rows
     shows no jump; the jumps are apart.
@@ -23,13 +23,13 @@ class Curve(NamedTuple):
     time: Float[np.ndarray, " k"]
     state: Float[np.ndarray, "k n"]
     gap: Float[np.ndarray, "k constraints"]
-    #: (k,) whether the row belongs to a contact
     contact: Bool[np.ndarray, " k"]
+    """(k,) whether the row belongs to a contact."""
     impact_time: Float[np.ndarray, " impacts"]
     before: Float[np.ndarray, "impacts n"]
     after: Float[np.ndarray, "impacts n"]
-    #: (contacts, 2) start and end (s)
     contacts: Float[np.ndarray, "contacts 2"]
+    """(contacts, 2) start and end (s)."""
 
 
 class Hits(NamedTuple):
@@ -39,8 +39,8 @@ class Hits(NamedTuple):
     before: Float[np.ndarray, "k n"]
     after: Float[np.ndarray, "k n"]
     constraint: Int[np.ndarray, " k"]
-    #: speed of approach, positive
     speed: Float[np.ndarray, " k"]
+    """Speed of approach, positive."""
 
 
 def window(

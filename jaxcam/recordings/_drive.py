@@ -17,21 +17,20 @@ _WINDOW = 0.05
 
 @dataclasses.dataclass(frozen=True)
 class Drive:
-    """What a drive did, such as the cam of a cam-follower.
-
-    - `angle`: smoothed angle (rad), unwrapped, counted in the sense of turning.
-    - `rate`: its rate of change (rad/s).
-    - `speed`, `phase`: the straight line `speed * time + phase` through the angle.
-    - `noise`: standard deviation of the raw samples about the smoothed angle (rad).
-    - `window`: number of samples in each of the parabolas that smooth it.
-    """
+    """The measured motion of a drive, such as the cam of a cam-follower."""
 
     angle: Float[np.ndarray, " k"]
+    """Smoothed angle (rad), unwrapped, counted in the sense of turning."""
     rate: Float[np.ndarray, " k"]
+    """Its rate of change (rad/s)."""
     speed: float
+    """The straight line `speed * time + phase` through the angle."""
     phase: float
+    """The straight line `speed * time + phase` through the angle."""
     noise: float
+    """Standard deviation of the raw samples about the smoothed angle (rad)."""
     window: int
+    """Number of samples in each of the parabolas that smooth it."""
 
     @property
     def clock(self) -> Float[np.ndarray, " k"]:

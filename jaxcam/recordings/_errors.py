@@ -1,4 +1,4 @@
-"""What is raised when a recording or a rig file cannot be used."""
+"""Errors raised when a recording or a rig file cannot be used."""
 
 
 class RecordingError(ValueError):

@@ -13,31 +13,28 @@ from ._errors import RecordingError
 
 @dataclasses.dataclass(frozen=True)
 class Recording:
-    """One run of one rig, in SI units.
-
-    Arguments:
-
-    - `name`: the name of the run, for tables and messages.
-    - `time`: seconds, shape `(k,)`, strictly increasing.
-    - `channels`: what was measured, each of shape `(k,)`. The end of a name is the
-        unit: `follower_angle_rad`, `gyro_rad_s`, `height_m`.
-    - `nominal_speed`: speed of the drive as the file name states it (rad/s), or `None`.
-    - `meta`: anything else that is known (the file, the piece of it, ...).
-    - `constants`: what is known of this run alone, by names of fields of the system
-        that it is a run of: `{"mass": 0.31}`. A fit takes them as they are.
-    """
+    """One run of one rig, in SI units."""
 
     name: str
+    """The name of the run, for tables and messages."""
     time: Float[np.ndarray, " k"]
+    """Seconds, shape `(k,)`, strictly increasing."""
     channels: Mapping[str, Float[np.ndarray, " k"]]
+    """What was measured, each of shape `(k,)`. The end of a name is the unit:
+    `follower_angle_rad`, `gyro_rad_s`, `height_m`."""
     nominal_speed: float | None = None
+    """Speed of the drive as the file name states it (rad/s), or `None`."""
     meta: Mapping[str, Any] = dataclasses.field(default_factory=dict)
+    """Anything else that is known (the file, the piece of it, ...)."""
     constants: Mapping[str, float] = dataclasses.field(default_factory=dict)
+    """What is known of this run alone, by names of fields of the system that it is a
+    run of: `{"mass": 0.31}`. A fit takes them as they are."""
 
     def __getitem__(self, channel: str) -> Float[np.ndarray, " k"]:
         """The samples of one channel, shape `(k,)`.
 
-        **Raises:** `RecordingError` that lists the channels there are.
+        Raises:
+            RecordingError: That lists the channels there are.
         """
         if channel not in self.channels:
             raise RecordingError(
@@ -62,7 +59,8 @@ class Recording:
     def between(self, start: float, stop: float) -> "Recording":
         """The part with `start <= time < stop`, under the same name.
 
-        **Raises:** `RecordingError` where fewer than two samples are left.
+        Raises:
+            RecordingError: Where fewer than two samples are left.
         """
         keep = (self.time >= start) & (self.time < stop)
         if keep.sum() < 2:

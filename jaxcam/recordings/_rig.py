@@ -66,20 +66,19 @@ class References:
 
     They fix what a strength means and are not fitted; by default, those of the thesis'
     cam-follower.
-
-    - `spring_center`: angle (rad) about which a nonlinear spring is symmetric.
-    - `impact_speed`: approach speed (rad/s) in a restitution that falls with it.
-    - `profile_lead`: phase (rad) of an error of the cam's profile twice per turn.
-    - `stribeck_speed`: speed (rad/s) up to which friction is larger.
-    - `slip_speed`: speed (rad/s) within which dry friction changes sign, far below the
-        speeds of the motion; `free_slip_speed` in friction that varies with position.
     """
 
     spring_center: float = 0.27
+    """Angle (rad) about which a nonlinear spring is symmetric."""
     impact_speed: float = 0.3
+    """Approach speed (rad/s) in a restitution that falls with it."""
     profile_lead: float = 0.7
+    """Phase (rad) of an error of the cam's profile twice per turn."""
     stribeck_speed: float = 0.1
+    """Speed (rad/s) up to which friction is larger."""
     slip_speed: float = 0.015
+    """Speed (rad/s) within which dry friction changes sign, far below the speeds of the
+    motion; `free_slip_speed` in friction that varies with position."""
     free_slip_speed: float = 0.01
 
     @classmethod
@@ -108,7 +107,7 @@ class References:
 
 @dataclasses.dataclass(frozen=True)
 class Rig:
-    """What `rig.toml` says, typed and checked; `system` turns it into a model.
+    """The content of `rig.toml`, typed and checked; `system` turns it into a model.
 
     Lengths are m, the inertia kg m^2, the stiffness N/m. Only the ratio of stiffness
     and inertia can be seen in a recording.
@@ -131,7 +130,8 @@ class Rig:
     def replace(self, **values: float) -> "Rig":
         """The rig with other nominal values; tolerances stay.
 
-        **Raises:** `RigError` for a name that is not a quantity of the rig.
+        Raises:
+            RigError: For a name that is not a quantity of the rig.
         """
         changes = {}
         for name, value in values.items():
@@ -160,11 +160,10 @@ class Rig:
     ) -> CamFollower:
         """The nominal rig as a `CamFollower` with its cam at `speed` (rad/s).
 
-        **Arguments:**
-
-        - `speed`: speed of the cam (rad/s).
-        - `phase`: angle that the cam has turned at time zero (rad).
-        - `restitution`: another law than the rig's constant one.
+        Args:
+            speed: Speed of the cam (rad/s).
+            phase: Angle that the cam has turned at time zero (rad).
+            restitution: Another law than the rig's constant one.
         """
         if restitution is None:
             restitution = ConstantRestitution(self.restitution.array)

@@ -23,22 +23,20 @@ class Wandering(HybridSystem):
 
     The drive turns at `speed (1 + depth w)` with w = 0.7 cos(2 pi 0.31 t) + 0.3 cos(2
     pi 0.87 t): two slow tones that have no simple ratio.
-
-    **Arguments:**
-
-    - `base`: the system.
-    - `depth`: relative size of the wandering.
-    - `speed`, `phase`: pick both out of `base`.
     """
 
     base: HybridSystem
+    """The system."""
     depth: float = 2e-4
+    """Relative size of the wandering."""
     speed: Callable[[Any], Array] = eqx.field(
         default=lambda system: system.speed, static=True
     )
+    """Pick both out of `base`."""
     phase: Callable[[Any], Array] = eqx.field(
         default=lambda system: system.phase, static=True
     )
+    """Pick both out of `base`."""
 
     @property
     def state_names(self) -> tuple[str, ...]:  # pyright: ignore
@@ -107,18 +105,20 @@ def record(
 ) -> Recording:
     """Simulate a system and read it through sensors.
 
-    **Arguments:**
+    Args:
+        system: A driven one may be a `Wandering`.
+        sensors: A `jaxcam.fitting.Sensor` for each channel.
+        duration: How long (s) to record, and to wait before.
+        settle: How long (s) to record, and to wait before.
+        rng: The source of the noise.
+        state: To start from `(n,)`; `None` for the release point.
+        interval: Between samples (s).
+        drive: Noise and resolution (rad) of an encoder on the drive of a `Wandering`,
+            recorded as `drive_channel`.
+        drive_channel: Name of that channel.
 
-    - `system`: a driven one may be a `Wandering`.
-    - `sensors`: a `jaxcam.fitting.Sensor` for each channel.
-    - `duration`, `settle`: how long (s) to record, and to wait before.
-    - `rng`: the source of the noise.
-    - `state`: to start from `(n,)`; `None` for the release point.
-    - `interval`: between samples (s).
-    - `drive`: noise and resolution (rad) of an encoder on the drive of a `Wandering`,
-        recorded as `drive_channel`.
-
-    **Raises:** `RecordingError` where the simulation did not come to its end.
+    Raises:
+        RecordingError: Where the simulation did not come to its end.
     """
     trajectory = simulate(system, state, 0.0, settle + duration, max_steps=1 << 17)
     if not bool(trajectory.successful):

@@ -1,4 +1,4 @@
-"""Many motions: sections, bifurcation diagrams, basins; on threads or a cluster."""
+"""Compute bifurcation diagrams, charts and basins of attraction of many motions."""
 
 from ._basins import basins as basins
 from ._basins_result import Basins as Basins

@@ -32,25 +32,25 @@ def basins(
     progress: Callable[[Progress], None] | None = None,
     block: int | None = None,
 ) -> Basins:
-    """Which attractor each state of a grid ends on.
+    """Compute basins of attraction: the attractor on which each state of a grid ends.
 
-    Motions are followed and looked at once a turn. Those that repeat are on the same
-    attractor where their orbits agree; those that do not are where they visit common
+    Motions are simulated and sampled once per period. Periodic motions are on the same
+    attractor where their orbits agree; other motions are where they visit common
     cells. Neither depends on the order of states, on blocks, or on the executor.
 
     Args:
-        system: A hybrid system, or a section that is taken once a turn.
+        system: A hybrid system, or a section that is sampled once per period.
         grid: A [`jaxcam.sweeps.Grid`][] of initial states; those behind the constraint
             are left out.
-        turns: How many are simulated, of which the last `keep` are looked at; periods
-            up to `keep / 2` are found.
-        period_tolerance: For finding periods.
-        same: Orbits that differ by less, in units of `scale`, are one.
-        reruns: How often motions that do not repeat yet go on, each time for twice as
-            many turns.
-        scale: Size of the motions, shape `(n,)`; without, the largest extent or
+        turns: Number of periods simulated.
+        keep: Number of samples used; periods up to `keep / 2` are detected.
+        period_tolerance: Tolerance for detecting periods.
+        same: Orbits that differ by less, in units of `scale`, are the same attractor.
+        reruns: Number of extensions of non-periodic runs, each twice as long as the one
+            before.
+        scale: Scale of the motions, shape `(n,)`; default the largest extent or
             coordinate of the grid, or the scale of `known`. It matters for a grid that
-            is small beside the attractors.
+            is small compared with the attractors.
         known: Basins of the same system whose attractors keep their numbers here, for
             example when zooming in.
         out: As for [`jaxcam.sweeps.blocks.run_blocks`][].
@@ -58,14 +58,21 @@ def basins(
         executor: As for [`jaxcam.sweeps.blocks.run_blocks`][].
         workers: As for [`jaxcam.sweeps.blocks.run_blocks`][].
         progress: As for [`jaxcam.sweeps.blocks.run_blocks`][].
-        block: Rows of the grid's first component that are computed together.
+        block: Rows of the grid's first component computed together.
 
     Returns:
         [`jaxcam.sweeps.Basins`][].
 
     Raises:
-        ValueError: That names the fix.
-        RuntimeError: Where workers were lost.
+        ValueError: An argument is invalid; the message names the fix.
+        RuntimeError: Workers were lost.
+
+    Examples:
+        >>> from jaxcam import sweeps
+        >>> cubic = sweeps.Map(lambda x, p: 1.5 * x - 0.5 * x**3)
+        >>> found = sweeps.basins(cubic, sweeps.Grid([-1.0], [1.0], [10]))
+        >>> len(found.names)
+        2
     """
     section = as_section(system)
     check_turns(turns, keep, period_tolerance, reruns)

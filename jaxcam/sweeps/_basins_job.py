@@ -1,4 +1,4 @@
-"""What the blocks of basins are, and what each computes."""
+"""The blocks of a basin computation."""
 
 import functools
 from collections.abc import Callable

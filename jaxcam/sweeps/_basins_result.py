@@ -11,20 +11,29 @@ from .blocks import SWEEP
 
 
 class Share(NamedTuple):
-    """Part of the states that end on an attractor, and its standard error."""
+    """Fraction of the states that end on an attractor, and its standard error."""
 
     share: float
+    """The fraction, from 0 to 1."""
     stderr: float
+    """Its standard error."""
 
 
 class Basins:
-    """What [`jaxcam.sweeps.basins`][] returns.
+    """The result of [`jaxcam.sweeps.basins`][].
 
     `dataset` has one dimension for each component of the state, and `attractor` (the
     number of the one that each state ends on, -1 if it escapes to infinity, -2 if it
     failed, -3 if it cannot start), `impacts` and `turns` (see
     [`jaxcam.sweeps.attractors.Labels`][]); along `number`, the attractors: `name` and
     `orbit`.
+
+    Examples:
+        >>> from jaxcam import sweeps
+        >>> cubic = sweeps.Map(lambda x, p: 1.5 * x - 0.5 * x**3)
+        >>> found = sweeps.basins(cubic, sweeps.Grid([-1.0], [1.0], [10]))
+        >>> [share.share for share in found.shares.values()]
+        [0.5, 0.5]
     """
 
     def __init__(self, dataset: xarray.Dataset, grid: Grid):
@@ -43,27 +52,32 @@ class Basins:
 
     @property
     def labels(self) -> np.ndarray:
-        """(attractors, 2) impacts and turns of each attractor, as numbers."""
+        """Impacts and periods of each attractor, as numbers, shape
+        `(attractors, 2)`.
+        """
         both = (self.dataset["orbit_impacts"], self.dataset["orbit_turns"])
         return np.stack([part.values for part in both], axis=1)
 
     @property
     def orbits(self) -> np.ndarray:
-        """(attractors, points, n) points of each attractor, filled up with NaN."""
+        """Points of each attractor, padded with NaN, shape
+        `(attractors, points, n)`.
+        """
         return self.dataset["orbit"].values
 
     @property
     def scale(self) -> np.ndarray:
-        """(n,) size of the motions, in whose units orbits are compared."""
+        """Scale of the motions, in whose units orbits are compared, shape `(n,)`."""
         return np.array(json.loads(self.dataset.attrs[SWEEP])["scale"])
 
     @property
     def shares(self) -> dict[str, Share]:
-        """Part of the states that can start which ends on each attractor.
+        """Fraction of the admissible states that ends on each attractor (basin
+        stability).
 
         The standard error sqrt(p (1 - p) / N) is that of states drawn at random (Menck
-        et al., Nature Physics 9, 2013); of a grid it is an upper bound where basins are
-        larger than its cells.
+        et al., Nature Physics 9, 2013); for a grid it is an upper bound where basins
+        are larger than its cells.
         """
         number = self.attractor
         number = number[number != -3]

@@ -1,4 +1,4 @@
-"""How mixed basins are, and how rough the boundary between them is."""
+"""Measure the mixing of basins, and the roughness of their boundary."""
 
 from typing import NamedTuple
 
@@ -9,7 +9,9 @@ class BasinEntropy(NamedTuple):
     """Basin entropy, and that of the boxes on the boundary alone (nats)."""
 
     entropy: float
+    """Average over all boxes (nats)."""
     boundary_entropy: float
+    """Average over the boxes that contain a boundary (nats)."""
 
     @property
     def fractal(self) -> bool:
@@ -21,16 +23,19 @@ class Uncertainty(NamedTuple):
     """The uncertainty exponent of a boundary, with its standard error."""
 
     exponent: float
+    """The uncertainty exponent."""
     stderr: float
+    """Its standard error."""
     dimension: float
-    """box-counting dimension of the boundary: that of the grid less the exponent."""
+    """Box-counting dimension of the boundary: that of the grid less the exponent."""
     distance: np.ndarray
-    """Distances (cells) and fractions of uncertain states that the fit goes through."""
+    """Distances used in the fit (cells)."""
     fraction: np.ndarray
+    """Fraction of uncertain states at these distances."""
 
 
 def basin_entropy(attractor, box: int = 5) -> BasinEntropy:
-    """Entropy of the attractors within boxes of a grid, averaged over the boxes.
+    """Return the basin entropy: the entropy of attractors within boxes, averaged.
 
     Daza et al., Scientific Reports 6, 31416 (2016).
 
@@ -39,8 +44,17 @@ def basin_entropy(attractor, box: int = 5) -> BasinEntropy:
             start (-3) are left out.
         box: Cells along each side of a box.
 
+    Returns:
+        A `BasinEntropy`.
+
     Raises:
-        ValueError: For a box that does not fit into the grid.
+        ValueError: The box does not fit into the grid.
+
+    Examples:
+        >>> from jaxcam.sweeps import basin_entropy
+        >>> chequered = np.indices((8, 8)).sum(0) % 2
+        >>> round(basin_entropy(chequered, box=4).entropy, 4)  # ln 2
+        0.6931
     """
     attractor = np.asarray(attractor)
     sides = [k // box for k in attractor.shape]
@@ -67,18 +81,27 @@ def basin_entropy(attractor, box: int = 5) -> BasinEntropy:
 
 
 def uncertainty_exponent(attractor, distances=(1, 2, 4, 8, 16)) -> Uncertainty:
-    """How fast the fraction of uncertain states falls with the error of the state.
+    """Return the exponent with which the fraction of uncertain states decreases.
 
-    A state is uncertain where one at the given distance along an axis ends elsewhere;
-    their fraction goes as distance^exponent (McDonald et al., Physica D 17, 1985).
+    A state is uncertain if one at the given distance along an axis ends elsewhere;
+    their fraction scales as distance^exponent (McDonald et al., Physica D 17, 1985).
 
     Args:
         attractor: Numbers of attractors on a grid of any dimension; pairs with a state
             that cannot start (-3) are left out.
-        distances: In cells; the longest must fit into the grid.
+        distances: Distances in cells; the longest must fit into the grid.
+
+    Returns:
+        An `Uncertainty`.
 
     Raises:
-        ValueError: Where fewer than two distances show uncertain states.
+        ValueError: Fewer than two distances show uncertain states.
+
+    Examples:
+        >>> from jaxcam.sweeps import uncertainty_exponent
+        >>> halves = (np.arange(64)[:, None] < 32) * np.ones((1, 64), dtype=int)
+        >>> round(uncertainty_exponent(halves).dimension, 1)  # a straight boundary
+        1.0
     """
     attractor = np.asarray(attractor)
     axes = [axis for axis, k in enumerate(attractor.shape) if k > 1]

@@ -9,32 +9,43 @@ from ._inputs import as_section
 
 
 class CellMapping(NamedTuple):
-    """Where the cells of a grid lead, in the shape of the grid."""
+    """The destination of each cell of a grid, in the shape of the grid."""
 
     group: np.ndarray
-    """Number of the group that a cell leads to; -1 for the sink cell."""
+    """Index of the group on which a cell ends; -1 for the sink cell."""
     period: np.ndarray
-    """Cells of the cycle that it leads to; 0 for the sink cell."""
+    """Number of cells of the cycle on which it ends; 0 for the sink cell."""
     steps: np.ndarray
-    """Turns until that is reached."""
+    """Number of applications of the map until that is reached."""
     cyclic: np.ndarray
     """Whether the cell is part of a cycle."""
 
 
 def cell_mapping(system, grid: Grid, *, turns: int = 1) -> CellMapping:
-    """Map the centre of every cell once, and follow the cells from then on.
+    """Map the centre of every cell once, and follow the cells (simple cell mapping).
 
     All states outside of the grid, and those that cannot start, are one sink cell,
-    which leads to itself. Cells are an approximation: a cycle of cells is an attractor
-    where they are small, and groups are numbered by their first cell. Compare with
-    [`jaxcam.sweeps.basins`][], which follows each motion itself.
+    which maps to itself. Cells are an approximation: a cycle of cells is an attractor
+    where they are small, and groups are numbered by their first cell (Hsu, Global
+    analysis by cell mapping, 1992). Compare with [`jaxcam.sweeps.basins`][], which
+    simulates each motion itself.
 
     Args:
-        system: A hybrid system, or a section that is taken once a turn.
-        turns: Of one application of the map.
+        system: A hybrid system, or a section that is sampled once per period.
+        grid: A [`jaxcam.sweeps.Grid`][] of states.
+        turns: Number of periods of one application of the map.
+
+    Returns:
+        A `CellMapping`.
 
     Raises:
-        ValueError: For another section, or fewer than one turn.
+        ValueError: Another kind of section, or fewer than one period.
+
+    Examples:
+        >>> from jaxcam import sweeps
+        >>> cubic = sweeps.Map(lambda x, p: 1.5 * x - 0.5 * x**3)
+        >>> sweeps.cell_mapping(cubic, sweeps.Grid([-1.5], [1.5], [30])).group.shape
+        (30,)
     """
     section = as_section(system)
     if not section.regular or turns < 1:

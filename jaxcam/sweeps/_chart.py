@@ -48,33 +48,40 @@ def chart(
     progress: Callable[[Progress], None] | None = None,
     block: int | None = None,
 ) -> Chart:
-    """The label of the motion at each pair of values of two parameters.
+    """Compute the label of the motion at each pair of values of two parameters.
 
     Args:
-        system: A hybrid system, or a section that is taken once a turn.
+        system: A hybrid system, or a section that is sampled once per period.
         where: Two parameters: `("speed", "stiffness")`, or two functions.
-        first: Their values, shapes `(k,)` and `(l,)`.
-        second: Their values, shapes `(k,)` and `(l,)`.
-        states: Where motions start: `(n,)`, or `(starts, n)`; in contact at rest
-            without.
+        first: Values of the first parameter, shape `(k,)`.
+        second: Values of the second parameter, shape `(l,)`.
+        states: Initial states, `(n,)` or `(starts, n)`; default in contact at rest.
         turns: As for [`jaxcam.sweeps.basins`][].
         keep: As for [`jaxcam.sweeps.basins`][].
         period_tolerance: As for [`jaxcam.sweeps.basins`][].
         reruns: As for [`jaxcam.sweeps.basins`][].
-        exponents: With it, the largest Lyapunov exponent over so many further turns.
+        exponents: With it, the largest Lyapunov exponent over so many further periods.
         out: As for [`jaxcam.sweeps.blocks.run_blocks`][].
         resume: As for [`jaxcam.sweeps.blocks.run_blocks`][].
         executor: As for [`jaxcam.sweeps.blocks.run_blocks`][].
         workers: As for [`jaxcam.sweeps.blocks.run_blocks`][].
         progress: As for [`jaxcam.sweeps.blocks.run_blocks`][].
-        block: Values of the second parameter that are computed together.
+        block: Number of values of the second parameter computed together.
 
     Returns:
         A [`jaxcam.sweeps.Chart`][].
 
     Raises:
-        ValueError: That names the fix.
-        RuntimeError: Where workers were lost.
+        ValueError: An argument is invalid; the message names the fix.
+        RuntimeError: Workers were lost.
+
+    Examples:
+        >>> from jaxcam import sweeps
+        >>> f = lambda x, p: p["a"] + p["b"] * x - x**2
+        >>> quadratic = sweeps.Map(f, {"a": 0.0, "b": 0.5})
+        >>> found = sweeps.chart(quadratic, ("a", "b"), [0.0, 0.1], [0.4, 0.5], [0.1])
+        >>> found.labels.shape
+        (2, 2, 1)
     """
     section = as_section(system)
     check_turns(turns, keep, period_tolerance, reruns)

@@ -7,11 +7,19 @@ from .attractors import APERIODIC, label_names, Labels
 
 
 class Chart:
-    """What [`jaxcam.sweeps.chart`][] returns.
+    """The result of [`jaxcam.sweeps.chart`][].
 
     `dataset` has a dimension for each parameter, the second one first, and `start`; the
     variables are `impacts` and `turns` (the label), `code` (0, or why a motion failed),
     and, if asked for, `exponent` and `exponent_stderr` (1/s).
+
+    Examples:
+        >>> from jaxcam import sweeps
+        >>> f = lambda x, p: p["a"] + p["b"] * x - x**2
+        >>> quadratic = sweeps.Map(f, {"a": 0.0, "b": 0.5})
+        >>> found = sweeps.chart(quadratic, ("a", "b"), [0.0, 0.1], [0.4, 0.5], [0.1])
+        >>> found.parameters
+        ('a', 'b')
     """
 
     def __init__(self, dataset: xarray.Dataset):
@@ -25,17 +33,19 @@ class Chart:
 
     @property
     def first(self) -> np.ndarray:
-        """(k,) values of the first parameter."""
+        """Values of the first parameter, shape `(k,)`."""
         return self.dataset[self.parameters[0]].values
 
     @property
     def second(self) -> np.ndarray:
-        """(l,) values of the second parameter."""
+        """Values of the second parameter, shape `(l,)`."""
         return self.dataset[self.parameters[1]].values
 
     @property
     def labels(self) -> np.ndarray:
-        """(l, k, starts) labels in words; chaotic where an exponent says so."""
+        """Labels in words, shape `(l, k, starts)`; "chaotic" where an exponent says
+        so.
+        """
         numbers = Labels(self.dataset["impacts"].values, self.dataset["turns"].values)
         found = label_names(numbers)
         if "exponent" in self.dataset:

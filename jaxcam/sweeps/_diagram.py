@@ -38,36 +38,43 @@ def diagram(
     progress: Callable[[Progress], None] | None = None,
     block: int | None = None,
 ) -> Diagram:
-    """The points that motions settle on, over the values of a parameter.
+    """Compute a bifurcation diagram: settled motions over the values of a parameter.
 
     Args:
-        system: A hybrid system, seen once a period, or a section: with
-            [`jaxcam.sweeps.ImpactSection`][] the diagram is one of impacts, with
-            [`jaxcam.sweeps.Map`][] one of a map.
-        where: The parameter that varies: `lambda s: s.speed`, or `"speed"`.
-        values: Of the parameter, shape `(points,)`.
-        states: Where motions start: `(n,)`; `(starts, n)` for several of each value;
-            `(points, starts, n)` for others at each, such as those of
-            [`jaxcam.sweeps.monte_carlo`][]. Without, in contact at rest.
-        turns: How many are simulated, of which the last `keep` are kept.
-        direction: "each" value from the same start; or "up", "down" or "both" ways with
-            the state carried from one value to the next, which shows hysteresis.
-        dwell: s to wait at each value and s to store, as a rig is driven up or down, in
-            place of `turns` and `keep`. Samples that a value has no turns for are NaN.
-        period_tolerance: For finding periods, up to `keep / 2`.
+        system: A hybrid system, sampled once per period, or a section such as
+            [`jaxcam.sweeps.ImpactSection`][] or [`jaxcam.sweeps.Map`][].
+        where: The parameter: `lambda s: s.speed`, or `"speed"`.
+        values: Values of the parameter, shape `(points,)`.
+        states: Initial states: `(n,)`; `(starts, n)` for several at each value;
+            `(points, starts, n)` for others at each, such as from
+            [`jaxcam.sweeps.monte_carlo`][]. Default: in contact at rest.
+        turns: Number of periods simulated.
+        keep: Number of last periods that are kept.
+        direction: "each" value from the same start; "up", "down" or "both" carry the
+            state from one value to the next, which shows hysteresis.
+        dwell: Times (s) to wait and to record at each value, instead of `turns`,
+            `keep`.
+        period_tolerance: Tolerance for detecting periods.
         out: As for [`jaxcam.sweeps.blocks.run_blocks`][].
         resume: As for [`jaxcam.sweeps.blocks.run_blocks`][].
         executor: As for [`jaxcam.sweeps.blocks.run_blocks`][].
         workers: As for [`jaxcam.sweeps.blocks.run_blocks`][].
         progress: As for [`jaxcam.sweeps.blocks.run_blocks`][].
-        block: Values that are computed together and stored at once.
+        block: Number of values computed together and stored at once.
 
     Returns:
         A [`jaxcam.sweeps.Diagram`][].
 
     Raises:
-        ValueError: That names the fix.
-        RuntimeError: Where workers were lost.
+        ValueError: An argument is invalid; the message names the fix.
+        RuntimeError: Workers were lost.
+
+    Examples:
+        >>> from jaxcam import sweeps
+        >>> logistic = sweeps.Map(lambda x, p: p["mu"] * x * (1 - x), {"mu": 3.2})
+        >>> found = sweeps.diagram(logistic, "mu", [2.8, 3.2], [0.3], keep=16)
+        >>> found.states.shape
+        (2, 1, 16, 1)
     """
     section = as_section(system)
     check_turns(turns, keep, period_tolerance)

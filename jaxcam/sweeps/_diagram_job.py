@@ -1,4 +1,4 @@
-"""What the blocks of a bifurcation diagram are, and what each computes."""
+"""The blocks of a bifurcation diagram."""
 
 import functools
 from collections.abc import Callable

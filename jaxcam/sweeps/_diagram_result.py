@@ -12,20 +12,31 @@ class Range(NamedTuple):
     """Neighbouring values of the parameter with motions of one label."""
 
     label: str
+    """The label in words."""
     low: float
+    """Smallest value of the parameter."""
     high: float
+    """Largest value of the parameter."""
     direction: int
-    """1 for values gone through upwards, -1 downwards, 0 where each begins anew."""
+    """1 for values visited upwards, -1 downwards, 0 where each starts anew."""
 
 
 class Diagram:
-    """What [`jaxcam.sweeps.diagram`][] returns.
+    """The result of [`jaxcam.sweeps.diagram`][].
 
     `dataset` has the dimensions point (a value of the parameter, in the order in which
-    they were gone through), start, sample and component, and the variables `state`,
-    `hits` (impacts since the sample before), `impacts` and `turns` (the label, see
+    they were visited), start, sample and component, and the variables `state`, `hits`
+    (impacts since the previous sample), `impacts` and `turns` (the label, see
     [`jaxcam.sweeps.attractors.Labels`][]), `code` (0, or why a motion failed), and,
-    where samples are not a turn apart, `time` (s) and `phase` (turns, from 0 to 1).
+    where samples are not a period apart, `time` (s) and `phase` (in periods, from 0 to
+    1).
+
+    Examples:
+        >>> from jaxcam import sweeps
+        >>> logistic = sweeps.Map(lambda x, p: p["mu"] * x * (1 - x), {"mu": 3.2})
+        >>> found = sweeps.diagram(logistic, "mu", [2.8, 3.2], [0.3], keep=16)
+        >>> found.parameter, found.values.tolist()
+        ('mu', [2.8, 3.2])
     """
 
     def __init__(self, dataset: xarray.Dataset):
@@ -39,29 +50,33 @@ class Diagram:
 
     @property
     def values(self) -> np.ndarray:
-        """(points,) values of the parameter."""
+        """Values of the parameter, shape `(points,)`."""
         return self.dataset[self.parameter].values
 
     @property
     def states(self) -> np.ndarray:
-        """(points, starts, keep, n) the points that motions settled on."""
+        """Samples of the settled motions, shape `(points, starts, keep, n)`."""
         return self.dataset["state"].values
 
     @property
     def direction(self) -> np.ndarray:
-        """(points,) 1 for values gone through upwards, -1 downwards, else 0."""
+        """1 for values visited upwards, -1 downwards, else 0; shape `(points,)`."""
         return self.dataset["direction"].values
 
     @property
     def labels(self) -> np.ndarray:
-        """(points, starts) labels in words, such as P(1,1) or P(inf,1)."""
+        """Labels in words, such as P(1,1) or P(inf,1), shape `(points, starts)`."""
         numbers = Labels(self.dataset["impacts"].values, self.dataset["turns"].values)
         return label_names(numbers)
 
     def ranges(self, start: int = 0) -> list[Range]:
-        """The labels in order, each with the values over which it was met.
+        """Return the labels in order, each with its range of parameter values.
 
-        **Arguments:** `start`: which of several starts.
+        Args:
+            start: Index of the start, if there are several.
+
+        Returns:
+            A list of `Range`.
         """
         found: list[Range] = []
         labels = self.labels[:, start]

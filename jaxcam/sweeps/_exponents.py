@@ -16,10 +16,12 @@ from .sections import AbstractSection
 
 
 class Exponents(NamedTuple):
-    """Largest exponent of each lane (1/s), and its standard error."""
+    """Largest Lyapunov exponents (1/s) and their standard errors."""
 
     largest: np.ndarray
+    """Largest exponent of each motion (1/s), shape `(lanes,)`."""
     stderr: np.ndarray
+    """Its standard error (1/s), shape `(lanes,)`."""
 
     @property
     def chaotic(self) -> np.ndarray:
@@ -36,17 +38,29 @@ def largest_exponents(
     values=None,
     progress: Callable[[float], None] | None = None,
 ) -> Exponents:
-    """Exponents of motions from states that have settled, by `variational`.
+    """Compute the largest Lyapunov exponents of motions from settled states.
 
     Args:
-        states: Shape `(lanes, n)`; lanes that are NaN stay so.
-        turns: How many are averaged, 16 or more.
+        section: The section, as for [`jaxcam.sweeps.diagram`][].
+        states: Settled states, shape `(lanes, n)`; rows that are NaN stay NaN.
+        turns: Number of periods averaged, at least 16.
         where: As for a section; motions of one second parameter are computed together.
-        values: As for a section; motions of one second parameter are computed together.
+        values: As for a section.
         progress: Called with the part that is done.
 
+    Returns:
+        An `Exponents`.
+
     Raises:
-        ValueError: For a map, whose exponents are not computed here.
+        ValueError: The section is a map, whose exponents are not computed here.
+
+    Examples:
+        >>> from jaxcam import sweeps
+        >>> from jaxcam.models import ImpactOscillator
+        >>> section = sweeps.Stroboscopic(ImpactOscillator(omega=2.8, wall=-0.5))
+        >>> states = jnp.array([[-0.8, 1.0]])
+        >>> sweeps.largest_exponents(section, states, 16).largest.shape
+        (1,)
     """
     system = section.system
     if not isinstance(system, HybridSystem):

@@ -18,16 +18,20 @@ from .blocks import Progress
 
 
 class FollowedBasins(NamedTuple):
-    """What [`jaxcam.sweeps.follow_basins`][] returns."""
+    """The result of [`jaxcam.sweeps.follow_basins`][]."""
 
     values: np.ndarray
+    """Values of the parameter."""
     basins: tuple[Basins, ...]
+    """Basins at each value."""
     numbers: tuple[np.ndarray, ...]
-    """For each value, the number that each of its attractors has throughout."""
+    """For each value, the number that each of its attractors keeps throughout."""
     shares: np.ndarray
-    """(values, numbers) part of the states that ends on each; 0 where it is not met."""
+    """Fraction of the states that ends on each attractor, shape `(values, numbers)`; 0
+    where it does not exist."""
     names: np.ndarray
-    """(values, numbers) its name there, empty where it is not met."""
+    """Name of each attractor, shape `(values, numbers)`; empty where it does not exist.
+    """
 
 
 def follow_basins(
@@ -42,20 +46,34 @@ def follow_basins(
     progress: Callable[[Progress], None] | None = None,
     **options,
 ) -> FollowedBasins:
-    """Basins at each value of a parameter, with attractors matched to those before.
+    """Compute basins at each value of a parameter, and match attractors between values.
 
     Args:
-        where: The parameter, and its values in the order to go through.
-        values: The parameter, and its values in the order to go through.
+        system: A hybrid system, or a section that is sampled once per period.
+        where: The parameter: `lambda s: s.speed`, or `"speed"`.
+        values: Values of the parameter, in the order to visit.
+        grid: A [`jaxcam.sweeps.Grid`][] of initial states.
+        turns: Number of periods simulated.
         most: Distance of two orbits, in units of the first scale, beyond which they are
-            not the same attractor, moved. Pairs are chosen so that all distances
-            together are smallest; the label may change, as it does where P(1,1) turns
-            into P(2,2).
-        out: Folder, in which there will be one sweep for each value.
-        ?- everything else: a: - everything else: as for [`jaxcam.sweeps.basins`][].
+            not the same attractor. Pairs are chosen so that the sum of distances is
+            smallest; the label may change, as where P(1,1) turns into P(2,2).
+        out: Folder in which one sweep is stored for each value.
+        progress: Called with the fraction done.
+        options: As for [`jaxcam.sweeps.basins`][].
+
+    Returns:
+        A `FollowedBasins`.
 
     Raises:
-        ValueError: as [`jaxcam.sweeps.basins`][].
+        ValueError: As for [`jaxcam.sweeps.basins`][].
+
+    Examples:
+        >>> from jaxcam import sweeps
+        >>> cubic = sweeps.Map(lambda x, p: p["a"] * x - 0.5 * x**3, {"a": 1.5})
+        >>> grid = sweeps.Grid([-1.0], [1.0], [10])
+        >>> found = sweeps.follow_basins(cubic, "a", [1.4, 1.5], grid)
+        >>> found.shares.tolist()
+        [[0.5, 0.5], [0.5, 0.5]]
     """
     section = as_section(system)
     picked = pick(where, section.system)

@@ -5,21 +5,25 @@ import numpy as np
 
 
 class Grid(eqx.Module):
-    """A box of states, cut into equal cells.
+    """A box of states, divided into equal cells.
 
     Raises:
-        ValueError: Where they do not fit together.
+        ValueError: Lengths do not fit together.
+
+    Examples:
+        >>> from jaxcam.sweeps import Grid
+        >>> Grid([0.0, -1.0], [1.0, 1.0], [4, 2]).states().shape
+        (8, 2)
     """
 
     low: tuple[float, ...] = eqx.field(converter=lambda x: tuple(map(float, x)))
-    """Corners of the box, one number for each component of the state."""
+    """Lower corner of the box, one number per component of the state."""
     high: tuple[float, ...] = eqx.field(converter=lambda x: tuple(map(float, x)))
-    """Corners of the box, one number for each component of the state."""
+    """Upper corner of the box, one number per component of the state."""
     shape: tuple[int, ...] = eqx.field(
         converter=lambda x: tuple(map(int, x)), static=True
     )
-    """Number of cells along each component; 1 where it does not vary, with `low` and
-    `high` alike or not."""
+    """Number of cells along each component; 1 where it does not vary."""
 
     def __check_init__(self):
         if not len(self.low) == len(self.high) == len(self.shape) > 0:
@@ -47,14 +51,26 @@ class Grid(eqx.Module):
         return np.array(self.high) - np.array(self.low)
 
     def centres(self, axis: int) -> np.ndarray:
-        """Centres of the cells along one component."""
+        """Return the centres of the cells along one component.
+
+        Args:
+            axis: Index of the component.
+
+        Returns:
+            Shape `(cells,)`.
+        """
         count = self.shape[axis]
         return self.low[axis] + self.sizes[axis] * (np.arange(count) + 0.5)
 
     def states(self, first: int = 0, last: int | None = None) -> np.ndarray:
-        """Centres of the cells, shape `(lanes, n)`, the last component fastest.
+        """Return the centres of the cells, the last component fastest.
 
-        **Arguments:** only rows `first` to `last` of the first component, if given.
+        Args:
+            first: First row of the first component.
+            last: Row of the first component at which to stop; default all.
+
+        Returns:
+            Shape `(lanes, n)`.
         """
         axes = [self.centres(i) for i in range(len(self.shape))]
         axes[0] = axes[0][first:last]
@@ -62,7 +78,14 @@ class Grid(eqx.Module):
         return np.stack([part.ravel() for part in parts], axis=1)
 
     def cells(self, states) -> np.ndarray:
-        """Which cell each state is in, numbered as `states`; -1 outside."""
+        """Return the index of the cell of each state; -1 outside.
+
+        Args:
+            states: States, shape `(lanes, n)`.
+
+        Returns:
+            Indices as in `states`, shape `(lanes,)`.
+        """
         states = np.asarray(states, dtype=float)
         sizes = np.where(self.sizes > 0, self.sizes, 1.0)
         with np.errstate(invalid="ignore"):

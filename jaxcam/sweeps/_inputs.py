@@ -1,4 +1,4 @@
-"""What the sweeps accept, and what they say about the rest."""
+"""Check the inputs of sweeps."""
 
 import numpy as np
 

@@ -11,14 +11,27 @@ from .blocks import checked, SWEEP
 
 
 def load_sweep(path: str | Path) -> Diagram | Basins | Chart:
-    """A stored sweep, after a look at the checksums of all of its blocks.
+    """Load a stored sweep after verifying the checksums of all of its blocks.
 
     Without jaxcam, `xarray.open_dataset(path, engine="zarr", consolidated=False)` reads
     the same, unchecked.
 
+    Args:
+        path: Folder of the sweep.
+
+    Returns:
+        The result as it was returned.
+
     Raises:
-        ValueError: That names the blocks that are missing or damaged, or where there is
-            no sweep, or one that is not finished.
+        ValueError: Blocks are missing or damaged (the message names them), or the
+            folder holds no sweep or an unfinished one.
+
+    Examples:
+        >>> from jaxcam import sweeps
+        >>> cubic = sweeps.Map(lambda x, p: 1.5 * x - 0.5 * x**3)
+        >>> _ = sweeps.basins(cubic, sweeps.Grid([-1.0], [1.0], [10]), out="cubic.zarr")
+        >>> sweeps.load_sweep("cubic.zarr").attractor.shape
+        (10,)
     """
     dataset = checked(path)
     identity = json.loads(dataset.attrs[SWEEP])

@@ -4,20 +4,26 @@ import numpy as np
 
 
 def monte_carlo(low, high, count: int, seed: int = 0, points: int | None = None):
-    """States drawn evenly from a box. (3.26)
+    """Draw states uniformly from a box (thesis, eq. 3.26).
 
     Args:
-        low: Corners of the box, shape `(n,)`.
-        high: Corners of the box, shape `(n,)`.
-        count: How many.
-        points: With it, others for each of so many values of a parameter.
+        low: Lower corner of the box, shape `(n,)`.
+        high: Upper corner of the box, shape `(n,)`.
+        count: Number of states.
+        seed: Seed of the random numbers.
+        points: With it, a separate set for each of so many values of a parameter.
 
     Returns:
         Shape `(count, n)`, or `(points, count, n)`. Those of the first values do not
             depend on how many follow.
 
     Raises:
-        ValueError: For corners that do not fit, or no states.
+        ValueError: The corners do not fit together, or `count` is below one.
+
+    Examples:
+        >>> from jaxcam.sweeps import monte_carlo
+        >>> monte_carlo([0.0, -1.0], [1.0, 1.0], 5).shape
+        (5, 2)
     """
     low, high = np.asarray(low, dtype=float), np.asarray(high, dtype=float)
     if low.shape != high.shape or low.ndim != 1 or not np.all(low <= high):

@@ -93,7 +93,7 @@ def nominal_rig(rotation: str = "clockwise") -> CamFollower:
 
 
 def free(observed: Observed):
-    """What is fitted, in the order of `NAMES`; x0 and J only set scales."""
+    """Return the fitted numbers, in the order of `NAMES`; x0 and J only set scales."""
     system = observed.system
     return [
         system.profile.eccentricity,  # pyright: ignore

@@ -62,7 +62,7 @@ FOLD, FLIP = (1.0, 1.0), (-1.0, -1.0)
 def point_on_line(
     system: CamFollower, guess: SpecialPoint, line: tuple[float, float]
 ) -> SpecialPoint:
-    """Where the branch meets a line; `guess.parameter` in rad/s."""
+    """Return where the branch meets a line; `guess.parameter` in rad/s."""
     system = eqx.tree_at(speed_of, system, guess.parameter)
     return _point(system, guess.orbit, jnp.asarray(line[0]), jnp.asarray(line[1]))
 
@@ -70,7 +70,7 @@ def point_on_line(
 def along_traces(
     system: CamFollower, start: ImpactOrbit, trace: float, stride: float = 0.1
 ) -> SpecialPoint:
-    """Where the sum of the multipliers is `trace`, reached from 148 rpm.
+    """Return where the sum of the multipliers is `trace`, reached from 148 rpm.
 
     The trace is monotonic along the branch, also around the fold, where the speed is
     not.

@@ -45,21 +45,29 @@ TARGETS: dict[str, Target] = _discovered()
 
 
 def reproduce(name: str, system: CamFollower, size: str = SIZES[0]) -> "pd.DataFrame":
-    """A table of the thesis or the numbers of a figure, printed beside computed.
+    """Reproduce a table of the thesis, or the numbers of a figure, next to the printed
+    ones.
 
     Args:
         name: A key of [`jaxcam.thesis.TARGETS`][], such as "table-5.2".
         system: The rig, such as `jaxcam.models.preset("calibrated")`.
-        size: "full" for diagrams and basins as fine as published ones.
+        size: "default", or "full" for diagrams and basins at the resolution of the
+            published ones.
 
     Returns:
         Columns quantity, printed, computed, unit, difference, relative (the difference
             over the size of the printed value); speeds in rpm and everything else in SI
-            units. NaN where the rig has no such thing, and under printed where the
+            units. NaN where the rig has no such quantity, and under printed where the
             thesis draws something but gives no number.
 
     Raises:
-        ValueError: For an unknown name or size.
+        ValueError: The name or size is unknown.
+
+    Examples:
+        >>> from jaxcam.models import preset
+        >>> from jaxcam.thesis import TARGETS, reproduce
+        >>> "table-4.4" in TARGETS
+        True
     """
     if name not in TARGETS:
         known = ", ".join(TARGETS)

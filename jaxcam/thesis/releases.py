@@ -35,7 +35,7 @@ def _release(system, time):
 
 
 def sticking_time(run: Trajectory) -> float:
-    """How long contact lasts in a run (s), apart from one at its very start."""
+    """Return the duration of contact in a run (s), except for one at its very start."""
     contacts = run.contacts
     later = np.asarray(contacts.start) > float(run.t0)
     return float(np.sum((np.asarray(contacts.end) - np.asarray(contacts.start))[later]))

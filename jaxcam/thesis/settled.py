@@ -39,7 +39,7 @@ class ShownMotion(NamedTuple):
 
 
 class SettledMotion(NamedTuple):
-    """What it settles on."""
+    """The settled motion."""
 
     case: ShownMotion
     impacts: int

@@ -1,4 +1,4 @@
-"""What a target is: printed values, the computation, the drawing."""
+"""A target: printed values, the computation, the drawing."""
 
 import dataclasses
 from collections.abc import Callable, Iterable
@@ -22,24 +22,27 @@ SIZES = ("default", "full")
 
 @dataclasses.dataclass(frozen=True)
 class Target:
-    """A table of the thesis, or a figure: its numbers and its drawing."""
+    """A table or figure of the thesis: its numbers and its drawing."""
 
     title: str
+    """Title of the table or figure."""
     compute: Callable[..., Rows]
     """Takes the rig; returns rows of quantity, printed and computed value, and unit."""
     draw: Callable[..., Figure] | None = None
-    """Takes the rig; tables have no drawing."""
+    """Takes the rig and returns the figure; tables have no drawing."""
     sized: bool = False
     """Whether both also take a size, "default" or "full"."""
     note: str = ""
-    """What to know of it when comparing."""
+    """Remark for the comparison."""
 
     def table(self, system: CamFollower, size: str = SIZES[0]) -> "pd.DataFrame":
-        """Printed beside computed, as [`jaxcam.thesis.reproduce`][] returns it."""
+        """Return printed next to computed values, as [`jaxcam.thesis.reproduce`][]
+        does.
+        """
         return frame(self.compute(system, *self._size(size)))
 
     def figure(self, system: CamFollower, size: str = SIZES[0]) -> Figure | None:
-        """The drawing, in the style that is set; None for a table."""
+        """Return the drawing in the current style; None for a table."""
         return self.draw(system, *self._size(size)) if self.draw else None
 
     def _size(self, size: str) -> tuple[str, ...]:

@@ -17,22 +17,31 @@ from .complementarity import explain, lemke
 
 
 class SteppedMotion(NamedTuple):
-    """A motion at the ends of its steps; the first row is the start."""
+    """A motion at the ends of its steps; the first row is the start.
+
+    Examples:
+        >>> from jaxcam.models import BouncingBall
+        >>> from jaxcam.timestepping import moreau
+        >>> moreau(BouncingBall(), [1.0, 0.0], 0.0, 1.0, 100).percussion.shape
+        (100, 1)
+    """
 
     time: Float[Array, " times"]
-    """(steps + 1,) s."""
+    """Times (s), shape `(steps + 1,)`."""
     state: Float[Array, "times n"]
-    """(steps + 1, n)."""
+    """States, shape `(steps + 1, n)`."""
     percussion: Float[Array, "steps m"]
-    """(steps, m) change of each normal velocity by impacts and contact."""
+    """Change of each normal velocity by impacts and contact, shape `(steps, m)`."""
     gap: Float[Array, "times m"]
-    """(steps + 1, m)."""
+    """Gaps, shape `(steps + 1, m)`."""
 
     def rests_from(self, constraint: int = 0) -> float:
-        """The time (s) from which contact pushes in every step up to the end.
+        """Return the time (s) from which contact acts in every step up to the end.
 
-        Where chatter ends in rest this is the accumulation time, within a few steps.
-        NaN where there is no contact in the last step.
+        Where chatter ends in contact this is the accumulation time, within a few steps.
+
+        Returns:
+            The time; NaN where there is no contact in the last step.
         """
         pushed = np.asarray(self.percussion[:, constraint]) > 0
         if not pushed[-1]:
@@ -44,21 +53,35 @@ class SteppedMotion(NamedTuple):
 def moreau(
     system: HybridSystem, state: VectorLike, t0, t1, steps: int
 ) -> SteppedMotion:
-    """The motion from `t0` to `t1` by `steps` steps that know nothing of events.
+    """Simulate from `t0` to `t1` by `steps` time steps without event detection
+    (Moreau).
 
-    A step flies freely, by the midpoint rule. Where that ends behind a constraint, the
-    velocities jump half way, by what complementarity asks for: each normal velocity at
-    the end is at least what the impact law would leave, never negative, and more only
-    where nothing pushes (after J. J. Moreau, Unilateral contact and dry friction in
-    finite freedom dynamics, 1988). Impacts, several at once, chatter and sticking are
-    all this one rule, nothing is tuned, and the error is of order one in the step: gaps
-    are violated by as much.
+    A step flies freely, by the midpoint rule. If that ends behind a constraint, the
+    velocities jump halfway, by complementarity: each normal velocity at the end is at
+    least that of the impact law, never negative, and larger only where no percussion
+    acts (after J. J. Moreau, Unilateral contact and dry friction in finite freedom
+    dynamics, 1988). Impacts, simultaneous impacts, chatter and sticking follow from
+    this one rule without tuning. The error is of order one in the step, and gaps are
+    violated by as much.
 
-    **Arguments:** any [`jaxcam.hybrid.HybridSystem`][], a state with every gap >= 0,
-    times (s) and the number of steps. Each number of steps is compiled once.
+    Args:
+        system: The system.
+        state: Initial state with every gap >= 0, shape `(n,)`.
+        t0: Start time (s).
+        t1: End time (s).
+        steps: Number of steps; each number is compiled once.
+
+    Returns:
+        A [`jaxcam.timestepping.SteppedMotion`][].
 
     Raises:
-        ValueError: Where a step has no solution, or the motion is not finite.
+        ValueError: A step has no solution, or the motion is not finite.
+
+    Examples:
+        >>> from jaxcam.models import BouncingBall
+        >>> from jaxcam.timestepping import moreau
+        >>> moreau(BouncingBall(), [1.0, 0.0], 0.0, 1.0, 100).state.shape
+        (101, 2)
     """
     state = real_array(state)
     t0, t1 = float(t0), float(t1)

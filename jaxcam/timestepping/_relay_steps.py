@@ -1,4 +1,4 @@
-"""Backward Euler steps of a relay system. (3.2)-(3.4)"""
+"""Backward Euler steps of a relay system (thesis, eqs. 3.2-3.4)."""
 
 from typing import NamedTuple
 
@@ -18,25 +18,41 @@ class RelayMotion(NamedTuple):
     """A relay system's motion at the ends of the steps; the first row is the start."""
 
     time: Float[Array, " times"]
-    """(steps + 1,) s."""
+    """Times (s), shape `(steps + 1,)`."""
     state: Float[Array, "times n"]
-    """(steps + 1, n)."""
+    """States, shape `(steps + 1, n)`."""
     inputs: Float[Array, "steps m"]
-    """(steps, m) inputs u and outputs y over each step."""
+    """Inputs u over each step, shape `(steps, m)`."""
     outputs: Float[Array, "steps m"]
+    """Outputs y over each step, shape `(steps, m)`."""
 
 
 def relay_steps(system: RelaySystem, state: VectorLike, t1, steps: int) -> RelayMotion:
-    """The motion from time zero to `t1` by `steps` backward Euler steps.
+    """Simulate a relay system from time zero to `t1` by `steps` backward Euler steps.
 
-    Switches are not located and sliding is nothing special: infinitely many events in
-    finite time cost no more than none. The error is of order one in the step (M. K.
-    Camlibel, W. P. M. H. Heemels, J. M. Schumacher, Consistency of a time-stepping
-    method for a class of piecewise-linear networks, 2002).
+    Switches are not located and sliding needs no special treatment: infinitely many
+    events in finite time cost no more than none. The error is of order one in the step
+    (M. K. Camlibel, W. P. M. H. Heemels, J. M. Schumacher, Consistency of a
+    time-stepping method for a class of piecewise-linear networks, 2002).
+
+    Args:
+        system: The system.
+        state: Initial state, shape `(n,)`.
+        t1: End time (s).
+        steps: Number of steps.
+
+    Returns:
+        A `RelayMotion`.
 
     Raises:
-        ValueError: Where a step has no solution or more than one: I - h A is singular,
-            or C (I/h - A)^-1 B + D is no P-matrix.
+        ValueError: A step has no solution or more than one: I - h A is singular, or C
+            (I/h - A)^-1 B + D is no P-matrix.
+
+    Examples:
+        >>> from jaxcam.timestepping import RelaySystem, relay_steps
+        >>> system = RelaySystem([[-1.0]], [[1.0]], [[1.0]])
+        >>> relay_steps(system, [1.0], 1.0, 50).state.shape
+        (51, 1)
     """
     state = real_array(state)
     n = system.A.shape[0]

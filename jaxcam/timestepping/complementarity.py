@@ -17,24 +17,31 @@ SOLVED, RAY, EXHAUSTED = 0, 1, 2
 
 
 class Pivoting(NamedTuple):
-    """Where Lemke's method ended."""
+    """The result of Lemke's method."""
 
     z: Float[Array, " m"]
-    """(m,) the solution, and w = M z + q."""
+    """The solution, shape `(m,)`."""
     w: Float[Array, " m"]
+    """w = M z + q, shape `(m,)`."""
     code: Int[Array, ""]
     """0 solved, 1 ended on a ray (no solution is known), 2 out of pivots."""
 
 
 def lemke(matrix: Float[Array, "m m"], vector: Float[Array, " m"]) -> Pivoting:
-    """z >= 0, w = M z + q >= 0, z . w = 0; for use inside `jit`, `scan` and `vmap`.
+    """Solve z >= 0, w = M z + q >= 0, z . w = 0; for use inside `jit`, `scan` and
+    `vmap`.
 
     Lemke's complementary pivots with the lexicographic rule, which cannot cycle (R. W.
     Cottle, J.-S. Pang, R. E. Stone, The Linear Complementarity Problem, 1992, section
     4.4). Where M is copositive-plus a ray means that there is no solution; for other M
     it means that none was found.
 
-    **Arguments:** M, shape `(m, m)`, and q, shape `(m,)`.
+    Args:
+        matrix: M, shape `(m, m)`.
+        vector: q, shape `(m,)`.
+
+    Returns:
+        A [`jaxcam.timestepping.complementarity.Pivoting`][].
     """
     m = vector.shape[0]
     one = jnp.ones(m, dtype=vector.dtype)
@@ -86,10 +93,18 @@ def lemke(matrix: Float[Array, "m m"], vector: Float[Array, " m"]) -> Pivoting:
 def solve_lcp(
     matrix: Float[ArrayLike, "m m"], vector: Float[ArrayLike, " m"]
 ) -> Float[Array, " m"]:
-    """The z of [`jaxcam.timestepping.complementarity.lemke`][], or an error.
+    """Return the z of [`jaxcam.timestepping.complementarity.lemke`][], or raise an
+    error.
+
+    Args:
+        matrix: M, shape `(m, m)`.
+        vector: q, shape `(m,)`.
+
+    Returns:
+        Shape `(m,)`.
 
     Raises:
-        ValueError: Where Lemke's method finds no solution.
+        ValueError: Lemke's method finds no solution.
     """
     matrix = jnp.asarray(matrix, dtype=jnp.float64)
     vector = jnp.asarray(vector, dtype=jnp.float64)

@@ -17,22 +17,29 @@ def _matrix(value) -> jax.Array:
 
 
 class RelaySystem(eqx.Module):
-    """x' = A x + B u, y = C x + D u, each u_i the relay of -y_i. (3.1)
+    """Linear system with relays: x' = A x + B u, y = C x + D u, each u_i the relay of
+    -y_i.
 
     A relay gives 1 for y < 0, -1 for y > 0, and anything between where y = 0, which is
-    what sliding needs.
-
-    **Arguments:** matrices of shapes `(n, n)`, `(n, m)`, `(m, n)` and `(m, m)`; no D
-    means zero.
+    what sliding needs (thesis, eq. 3.1). D is zero by default.
 
     Raises:
-        ValueError: Where the shapes do not fit.
+        ValueError: The shapes do not fit.
+
+    Examples:
+        >>> from jaxcam.timestepping import RelaySystem
+        >>> RelaySystem([[-1.0]], [[1.0]], [[1.0]]).D.shape
+        (1, 1)
     """
 
     A: Float[Array, "n n"]
+    """Shape `(n, n)`."""
     B: Float[Array, "n m"]
+    """Shape `(n, m)`."""
     C: Float[Array, "m n"]
+    """Shape `(m, n)`."""
     D: Float[Array, "m m"]
+    """Shape `(m, m)`."""
 
     def __init__(self, A, B, C, D=None):
         self.A, self.B, self.C = _matrix(A), _matrix(B), _matrix(C)
@@ -50,11 +57,15 @@ class RelaySystem(eqx.Module):
 def relay_problem(
     matrix: Float[Array, "m m"], vector: Float[Array, " m"]
 ) -> tuple[Float[Array, " m"], Float[Array, " m"], Pivoting]:
-    """u and y with y = M u + q and each u_i the relay of -y_i. (3.3)
+    """Solve y = M u + q with each u_i the relay of -y_i (thesis, eq. 3.3).
 
-    As a complementarity problem of twice the size, of 1 + u with the positive part of y
-    and 1 - u with its negative part. It always has a solution, since u is bounded; only
-    one where M is a P-matrix.
+    It is a complementarity problem of twice the size, of 1 + u with the positive part
+    of y and 1 - u with its negative part. It always has a solution, since u is bounded;
+    a unique one where M is a P-matrix.
+
+    Args:
+        matrix: M, shape `(m, m)`.
+        vector: q, shape `(m,)`.
 
     Returns:
         u and y, shape `(m,)`, and how the pivoting ended.
@@ -69,10 +80,16 @@ def relay_problem(
 
 
 def is_p_matrix(matrix: Float[ArrayLike, "m m"]) -> bool:
-    """Whether all principal minors are positive: one solution for every vector.
+    """Return whether all principal minors are positive: one solution for every vector.
+
+    Args:
+        matrix: Shape `(m, m)`.
+
+    Returns:
+        Whether it is a P-matrix.
 
     Raises:
-        ValueError: For more than 14 rows; there are 2^m minors.
+        ValueError: The matrix has more than 14 rows; there are 2^m minors.
     """
     values = np.asarray(matrix)
     m = values.shape[0]

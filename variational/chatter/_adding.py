@@ -16,7 +16,8 @@ from ._scalar import check_chatter_system
 def adding_thresholds(
     system: HybridSystem, where: Where, interruption, beyond, count: int = 8
 ) -> Float[Array, " count"]:
-    """Parameter values at which the orbit from release grazes and loses an impact.
+    """Return parameter values at which the orbit from release grazes and loses an
+    impact.
 
     Past the interruption the motion that starts at release has finitely many impacts
     before the next release. Their number falls by one where one of them grazes; these
@@ -26,12 +27,19 @@ def adding_thresholds(
     Args:
         system: As in [`variational.chatter_interruption`][].
         where: As in [`variational.chatter_interruption`][].
-        interruption: The parameter value where complete chattering ends.
+        interruption: The parameter value at which complete chattering ends.
         beyond: A value on the interrupted side; thresholds between the two are found.
-        count: How many, farthest first.
+        count: Number of thresholds.
 
     Returns:
-        Shape `(count,)`, in the parameter's unit.
+        Shape `(count,)`, in the parameter's unit, farthest first.
+
+    Examples:
+        >>> from jaxcam.models import ImpactOscillator
+        >>> from variational import adding_thresholds
+        >>> system = ImpactOscillator(omega=1.0, restitution=0.5)
+        >>> adding_thresholds(system, "omega", 0.6071945, 0.8, count=2).shape
+        (2,)
     """
     check_chatter_system(system)
     along = line(system, where)

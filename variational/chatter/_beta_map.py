@@ -16,27 +16,30 @@ _IMPACTS = 4000
 
 
 class BetaMap(eqx.Module):
-    """What remains of a chattering sequence after its last impact.
+    """The deviation left by a chattering sequence after its last impact.
 
     With tau* the time from release of the first impact, the motion after the last one
-    is, at tau_P after release, (6.54) and (6.94) with c the jerk
+    is, at tau_P after release (thesis, eqs. 6.54 and 6.94), with c the jerk
 
         velocity = c (tau_P^2 / 2 + beta tau*^2),
         gap = c (tau_P^3 / 6 + beta tau*^2 tau_P + gamma tau*^3).
     """
 
     beta: Float[Array, "..."]
-    """(P^2 (lambda - 1/2)) at the last impact, P the product of the h (6.43)."""
+    """P^2 (lambda - 1/2) at the last impact, P the product of the h (thesis, eq. 6.43).
+    """
     gamma: Float[Array, "..."]
-    """(P^3 (1/3 - lambda)) there, the term that (6.55) drops."""
+    """P^3 (1/3 - lambda) there, the term that thesis eq. 6.55 drops."""
     impacts: Int[Array, "..."]
     """Number of impacts that follow the first."""
 
 
 def beta_parts(lam, r) -> BetaMap:
-    """Iterate the lambda-map to the last impact. (6.43)-(6.44), (6.97)
+    """Iterate the lambda-map to the last impact (thesis, eqs. 6.43, 6.44 and 6.97).
 
-    **Arguments:** `lam` >= 0 and `r` in (0, 1), dimensionless, broadcast.
+    Args:
+        lam: Dimensionless, >= 0, any shape.
+        r: Coefficient of restitution in (0, 1), broadcast against `lam`.
 
     Returns:
         A [`variational.chatter.BetaMap`][]. Zero up to lambda_bar, where chattering
@@ -53,13 +56,20 @@ def beta_parts(lam, r) -> BetaMap:
 
 
 def beta_map(lam, r) -> Float[Array, "..."]:
-    """beta(lambda): deviation that an interrupted chattering sequence leaves. (6.97)
+    """Return beta(lambda): the deviation left by an interrupted chattering sequence.
 
-    **Arguments:** `lam` >= 0 and `r` in (0, 1), dimensionless, broadcast.
+    Args:
+        lam: Dimensionless, >= 0, any shape.
+        r: Coefficient of restitution in (0, 1), broadcast against `lam`.
 
     Returns:
-        Beta, dimensionless: 0 up to lambda_bar, then lobes between square-root corners,
-            each q^-1 wider and p^-2 higher than the one before.
+        Beta, dimensionless (thesis, eq. 6.97): 0 up to lambda_bar, then lobes between
+            square-root corners, each q^-1 wider and p^-2 higher than the one before.
+
+    Examples:
+        >>> from variational import beta_map
+        >>> float(beta_map(0.01, 0.5))
+        0.0
     """
     return beta_parts(lam, r).beta
 

@@ -1,4 +1,4 @@
-"""Where sticking ends, and the coordinates of chattering around it."""
+"""Compute the release from sticking, and the coordinates of chattering around it."""
 
 import equinox as eqx
 import jax
@@ -24,39 +24,58 @@ _SAMPLES = 256
 
 
 class ChatterFrame(eqx.Module):
-    """Release point, and the scales of chattering that ends there.
+    """Release point and scales of the chattering that ends there.
 
-    Times of the frame's methods are those of the system; tau is time less `release`.
+    Times in the methods are those of the system; tau is time less `release`.
     """
 
     release: Float[Array, ""]
-    """Time of release, phi_alpha of the thesis counted as a time."""
+    """Time of release (s), phi_alpha of the thesis counted as a time."""
     state: Float[Array, " n"]
-    """(n,) state there."""
+    """State there, shape `(n,)`."""
     jerk: Float[Array, ""]
-    """C, the rate of the relative acceleration there, > 0 (6.76), (6.112)."""
+    """Rate c of the relative acceleration there, > 0 (thesis, eqs. 6.76 and 6.112)."""
     restitution: Float[Array, ""]
     """Coefficient of restitution of slow impacts there."""
 
     def coordinate(self, time, speed) -> Float[Array, "..."]:
-        """lambda = v / (c tau^2) of an impact with rebound speed v. (6.84), (6.98)"""
+        """Return lambda = v / (c tau^2) of an impact (thesis, eqs. 6.84 and 6.98).
+
+        Args:
+            time: Time of the impact (s).
+            speed: Rebound speed v.
+
+        Returns:
+            Dimensionless, in the broadcast shape.
+        """
         tau = time - self.release
         return speed / (self.jerk * tau * tau)
 
     def gradient(self, time, speed) -> Float[Array, "2"]:
-        """C = (C1, C2): derivatives of lambda by rebound speed and time. (6.100)"""
+        """Return C = (C1, C2): derivatives of lambda by rebound speed and time.
+
+        Args:
+            time: Time of the impact (s).
+            speed: Rebound speed.
+
+        Returns:
+            Shape `(2,)` (thesis, eq. 6.100).
+        """
         tau = time - self.release
         first = 1 / (self.jerk * tau * tau)
         return jnp.stack([first, -2 * speed * first / tau])
 
     def at_section(self, time, speed, section) -> Float[Array, "2"]:
-        """Gap and normal velocity at a section after the last impact. (6.94)-(6.96)
+        """Return gap and normal velocity at a section after the last impact.
 
-        **Arguments:** `time` and rebound `speed` of an impact before release;
-        `section`, the time of the section, after release.
+        Args:
+            time: Time of an impact before release (s).
+            speed: Its rebound speed.
+            section: Time of the section, after release (s).
 
         Returns:
-            Shape `(2,)`. Unlike (6.55) the term of order tau*^3 is kept.
+            Shape `(2,)` (thesis, eqs. 6.94-6.96); unlike thesis eq. 6.55 the term of
+                order tau*^3 is kept.
         """
         tau, after = time - self.release, section - self.release
         parts = beta_parts(self.coordinate(time, speed), self.restitution)
@@ -66,18 +85,25 @@ class ChatterFrame(eqx.Module):
 
 
 def chatter_frame(system: HybridSystem, time=0.0) -> ChatterFrame:
-    """Release point and scales of chattering; differentiable in the parameters.
+    """Return release point and scales of chattering; differentiable in the parameters.
 
     Args:
-        system: Two states, one constraint, with a period.
-        time: The release is the first at or after it, of the stretch of contact that
-            ends before the contact acceleration is greatest.
+        system: A system with two states, one constraint and a period.
+        time: The release returned is the first at or after this time (s), of the
+            stretch of contact that ends before the contact acceleration is greatest.
 
     Returns:
         A [`variational.chatter.ChatterFrame`][]; NaN where the period has no release.
 
     Raises:
-        ValueError: For a system without a period.
+        ValueError: The system has no period.
+
+    Examples:
+        >>> from jaxcam.models import ImpactOscillator
+        >>> from variational import chatter_frame
+        >>> system = ImpactOscillator(omega=0.5, restitution=0.5)
+        >>> round(float(chatter_frame(system).release), 6)  # pi / (2 omega)
+        3.141593
     """
     check_chatter_system(system)
     return _frame(as_arrays(system), jnp.asarray(time, jnp.float64))
@@ -124,12 +150,15 @@ def frame_at(system, release, state) -> ChatterFrame:
 
 
 def parameter_incidence(system: HybridSystem, where: Where, time=0.0) -> ChatterFrame:
-    """Derivatives of the release point and its scales by a parameter. (6.114)-(6.115)
+    """Return the derivatives of the release point and its scales by a parameter.
 
-    `release` is then the rate of change of the time of release, `jerk` that of c: what
-    the thesis estimates from perturbed simulations.
+    `release` is then the rate of change of the time of release, `jerk` that of c
+    (thesis, eqs. 6.114 and 6.115, where they are estimated from perturbed simulations).
 
-    **Arguments:** as in [`variational.chatter_frame`][]; `where` picks the parameter.
+    Args:
+        system: A system with two states, one constraint and a period.
+        where: Picks the parameter.
+        time: As in [`variational.chatter_frame`][].
 
     Returns:
         A [`variational.chatter.ChatterFrame`][] of derivatives, in units of the frame

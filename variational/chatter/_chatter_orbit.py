@@ -33,22 +33,23 @@ _NEAR = 1e-12
 
 
 class ChatterOrbit(eqx.Module):
-    """The motion that starts at release, up to contact; where its chattering ends."""
+    """The motion from release to contact, and the accumulation of its chattering."""
 
     frame: ChatterFrame
-    """Where it starts; releases follow a period apart."""
+    """The release from which it starts; releases follow a period apart."""
     accumulation: Float[Array, ""]
-    """When the impacts accumulate; NaN where they do not before the last release."""
+    """Time at which the impacts accumulate (s); NaN if they do not before the last
+    release."""
     complete: Bool[Array, ""]
-    """Whether they do, in the last of the periods asked for and not before."""
+    """Whether they accumulate in the last of the given periods and not before."""
     margin: Float[Array, ""]
     """Signed distance from the interruption in the last period: zero where accumulation
     and release coincide, negative where chattering is complete, smooth in the
     parameters except where an earlier impact grazes; NaN for a period without impact,
     or where contact comes in an earlier one."""
     impacts: Int[Array, ""]
-    """Impacts listed: of a complete sequence those until the completion map takes over,
-    of an interrupted one all."""
+    """Number of impacts listed: of a complete sequence those until the completion map
+    takes over, of an interrupted one all."""
 
 
 class _Search(NamedTuple):
@@ -75,7 +76,7 @@ class _Search(NamedTuple):
 def chatter_accumulation(
     system: HybridSystem, time=0.0, periods: int = 1
 ) -> ChatterOrbit:
-    """Where the chattering of an orbit that sticks once in some periods accumulates.
+    """Compute where the chattering of an orbit that sticks once per period accumulates.
 
     Such an orbit forgets its past while it sticks: it leaves the release point without
     relative velocity, so the motion from there decides. It is interrupted where
@@ -83,16 +84,25 @@ def chatter_accumulation(
     equation. With K the coordinate in which the lambda-map is multiplication by 1/q
     ([`variational.koenigs`][]), q^k K(lambda_k) is the same for every impact k of the
     last period up to terms of order q^k tau_k, and it is zero at the interruption.
+    The function is pure; it may be compiled, batched and differentiated forward.
 
-    **Arguments:** a system with two states, one constraint and a period; `time` as in
-    [`variational.chatter_frame`][]; `periods`, from release to the release after
-    sticking. Pure; may be compiled, batched and differentiated forward.
+    Args:
+        system: A system with two states, one constraint and a period.
+        time: As in [`variational.chatter_frame`][].
+        periods: Number of forcing periods from release to the release after sticking.
 
     Returns:
         A [`variational.chatter.ChatterOrbit`][].
 
     Raises:
-        ValueError: For a system without a period.
+        ValueError: The system has no period.
+
+    Examples:
+        >>> from jaxcam.models import ImpactOscillator
+        >>> from variational import chatter_accumulation
+        >>> system = ImpactOscillator(omega=0.5, restitution=0.5)
+        >>> bool(chatter_accumulation(system).complete)
+        True
     """
     check_chatter_system(system)
     return _orbit(as_arrays(system), jnp.asarray(time, jnp.float64), periods)

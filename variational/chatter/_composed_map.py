@@ -9,8 +9,8 @@ mu the distance of the parameter from the interruption,
     epsilon' = tau*^2 beta(lambda_bar + C A B epsilon + lambda_mu mu),
 
 where the deviation is first carried to where it is small, since it grows linearly in
-the coordinate K of [`variational.koenigs`][] only.
-(6.104) and (6.116) leave out tau*^2; the thesis' K_beta appears to stand for it.
+the coordinate K of [`variational.koenigs`][] only (thesis, eqs. 6.104 and 6.116). leave
+out tau*^2; the thesis' K_beta appears to stand for it.
 """
 
 import equinox as eqx
@@ -43,35 +43,41 @@ _LINEAR = 1e-8
 
 
 class ComposedMap(eqx.Module):
-    """Local theory of one turn around the interruption of complete chattering."""
+    """Local theory of one period around the interruption of complete chattering."""
 
     frame: ChatterFrame
-    """Its release lies between the section at the start of the turn and the next."""
+    """The frame whose release lies between the section at the start of the period and
+    the next."""
     section: Float[Array, ""]
-    """Time of the section at the end of the turn."""
+    """Time of the section at the end of the period (s)."""
     state: Float[Array, "2"]
-    """(2,) state there of the orbit that sticks until release; its gap and velocity."""
+    """State there of the orbit that sticks until release, shape `(2,)`."""
     relative: Float[Array, "2"]
+    """Gap and normal velocity of that state, shape `(2,)`."""
     time: Float[Array, ""]
-    """Time and rebound speed of D* on the orbit from release, and its lambda."""
+    """Time of D* on the orbit from release (s)."""
     speed: Float[Array, ""]
+    """Rebound speed of D*."""
     lam: Float[Array, ""]
+    """Lambda of D*."""
     lambda_bar: Float[Array, ""]
     """Fixed point of the lambda-map."""
     matrix: Float[Array, "2 2"]
-    """A: rebound speed and time of D* by the state at the section (6.107)."""
+    """A: rebound speed and time of D* by the state at the section, shape `(2, 2)`
+    (thesis, eq. 6.107)."""
     vector: Float[Array, "2"]
-    """B: state at the section by epsilon, and gap and velocity by epsilon (6.103)."""
+    """B: state at the section by epsilon, shape `(2,)` (thesis, eq. 6.103)."""
     relative_vector: Float[Array, "2"]
+    """Gap and velocity at the section by epsilon, shape `(2,)` (thesis, eq. 6.103)."""
     covector: Float[Array, "2"]
-    """C: lambda by rebound speed and time of D*, (6.100), and by the parameter (6.114).
-    """
+    """C: lambda by rebound speed and time of D*, shape `(2,)` (thesis, eq. 6.100)."""
     by_parameter: Float[Array, ""]
+    """Lambda by the parameter (thesis, eq. 6.114)."""
     incidence: Float[Array, ""]
     """Change of lambda - lambda_bar with the parameter, D* moving with the orbit."""
     drift: Float[Array, "2"]
-    """Change of gap and velocity at the section with the parameter, epsilon = 0
-    (6.115)."""
+    """Change of gap and velocity at the section with the parameter, epsilon = 0, shape
+    `(2,)` (thesis, eq. 6.115)."""
 
     @property
     def tau(self) -> Float[Array, ""]:
@@ -80,11 +86,11 @@ class ComposedMap(eqx.Module):
 
     @property
     def feedback(self) -> Float[Array, ""]:
-        """C A B: how much epsilon moves the next lambda."""
+        """C A B: derivative of the next lambda by epsilon."""
         return self.covector @ self.matrix @ self.vector
 
     def __call__(self, epsilon, parameter=0.0) -> Float[Array, "..."]:
-        """epsilon of the next turn. (6.109), (6.116)
+        """epsilon of the next turn (thesis, eqs. 6.109 and 6.116).
 
         **Arguments:** `epsilon`, in the unit of time squared; `parameter`, its distance
         from the interruption; broadcast.
@@ -92,9 +98,11 @@ class ComposedMap(eqx.Module):
         return self._left(self.feedback * epsilon + self.incidence * parameter)
 
     def at_section(self, speed=0.0, time=0.0) -> Float[Array, "... 2"]:
-        """Gap and velocity at the section after D* itself is moved. (6.104)
+        """Return gap and velocity at the section after D* is moved (thesis, eq. 6.104).
 
-        **Arguments:** changes of the rebound speed and time of D*, broadcast.
+        Args:
+            speed: Change of the rebound speed of D*.
+            time: Change of the time of D* (s).
 
         Returns:
             Shape `(..., 2)`.
@@ -104,12 +112,13 @@ class ComposedMap(eqx.Module):
         return self._section(self.tau**2 * parts.beta, 0.0)
 
     def along_parameter(self, parameter) -> Float[Array, "... 2"]:
-        """Gap and velocity at the section of the orbit from release. (6.114)-(6.115)
+        """Return gap and velocity at the section of the orbit from release.
 
-        **Arguments:** distance of the parameter from the interruption, any shape.
+        Args:
+            parameter: Distance of the parameter from the interruption, any shape.
 
         Returns:
-            Shape `(..., 2)`.
+            Shape `(..., 2)` (thesis, eqs. 6.114 and 6.115).
         """
         return self._section(self._left(self.incidence * parameter), parameter)
 
@@ -139,21 +148,29 @@ class ComposedMap(eqx.Module):
 def composed_map(
     system: HybridSystem, where: Where, rank: int, phase=0.0
 ) -> ComposedMap:
-    """Compose beta with the rest of the turn, all derivatives by differentiation.
+    """Compose beta with the rest of the period, all derivatives by differentiation.
 
     Args:
-        system: At the interruption ([`variational.chatter_interruption`][]).
+        system: The system at the interruption ([`variational.chatter_interruption`][]).
         where: Picks the parameter.
         rank: Number of the impact D* after release, from 0. The later it is, the better
-            the lambda-map describes what follows, and the smaller the deviations for
-            which A and C are linear: they move D* by much less than tau*.
-        phase: Of the section, in periods, in the flight after release.
+            the lambda-map describes the following impacts, and the smaller the
+            deviations for which A and C are linear: they move D* by much less than
+            tau*.
+        phase: Phase of the section, in periods, in the flight after release.
 
     Returns:
         A [`variational.chatter.ComposedMap`][].
 
     Raises:
-        ValueError: For a system without a period.
+        ValueError: The system has no period.
+
+    Examples:
+        >>> from jaxcam.models import ImpactOscillator
+        >>> from variational import composed_map
+        >>> system = ImpactOscillator(omega=0.6071945, restitution=0.5)
+        >>> composed_map(system, "omega", 24, phase=0.35).matrix.shape
+        (2, 2)
     """
     check_chatter_system(system)
     system = as_arrays(system)
@@ -225,13 +242,23 @@ def _compose(along, value, rank, phase) -> ComposedMap:
 def simulated_at_section(
     system: HybridSystem, composed: ComposedMap, speed
 ) -> SectionArrival:
-    """What `ComposedMap.at_section` predicts, by the exact motion.
+    """Compute by the exact motion the result that `ComposedMap.at_section` predicts.
 
-    **Arguments:** `system` at the interruption; `speed`, changes of the rebound speed
-    of D*, shape `(k,)`.
+    Args:
+        system: The system at the interruption.
+        composed: The local theory of the system.
+        speed: Changes of the rebound speed of D*, shape `(k,)`.
 
     Returns:
         A [`variational.chatter.SectionArrival`][] with a leading axis.
+
+    Examples:
+        >>> from jaxcam.models import ImpactOscillator
+        >>> from variational import composed_map, simulated_at_section
+        >>> system = ImpactOscillator(omega=0.6071945, restitution=0.5)
+        >>> composed = composed_map(system, "omega", 24, phase=0.35)
+        >>> simulated_at_section(system, composed, jnp.zeros(2)).gap.shape
+        (2,)
     """
     system = as_arrays(system).prepared()
     speeds = composed.speed + jnp.asarray(speed, jnp.float64)
@@ -242,12 +269,15 @@ def simulated_at_section(
 def simulated_by_parameter(
     system: HybridSystem, where: Where, changes, phase=0.0
 ) -> SectionArrival:
-    """The orbit from release, followed over a turn at other values of the parameter.
+    """Follow the orbit from release over a period at other values of the parameter.
 
-    What [`variational.chatter.ComposedMap.along_parameter`][] predicts.
+    [`variational.chatter.ComposedMap.along_parameter`][] predicts the result.
 
-    **Arguments:** `system` at the interruption; `where` picks the parameter; `changes`
-    of it, shape `(k,)`; `phase` of the section, in periods.
+    Args:
+        system: The system at the interruption.
+        where: Picks the parameter.
+        changes: Changes of the parameter, shape `(k,)`.
+        phase: Phase of the section, in periods.
 
     Returns:
         A [`variational.chatter.SectionArrival`][] with a leading axis, at the section

@@ -1,4 +1,4 @@
-"""Free flight with a gap that keeps its relative accuracy however low it is.
+"""Integrate free flight with state, normal velocity and gap.
 
 Gap and normal velocity are integrated on their own from the surface, beside the state:
 z' = v, v' = a, from the speed that the impact leaves, where a is the normal
@@ -36,15 +36,21 @@ def flight_rates(system: HybridSystem, time: ArrayLike = 0.0):
 
 
 def on_flight(state, speed, height: ArrayLike = 0.0):
-    """What is integrated: state, normal velocity and gap."""
+    """Return the integrated rates: state, normal velocity and gap."""
     beside = jnp.stack([jnp.asarray(b, jnp.float64) for b in (speed, height)])
     return jnp.concatenate([state, beside])
 
 
 def fly(system: HybridSystem, time, state, speed, duration, height: ArrayLike = 0.0):
-    """Free flight for a given time, without a look at the constraint.
+    """Integrate a free flight of given duration, without event detection.
 
-    **Arguments:** as in [`variational.chatter.next_impact`][]; `duration` >= 0.
+    Args:
+        system: The system, already `prepared`.
+        time: Time of the start (s).
+        state: State, shape `(n,)`.
+        speed: Normal velocity at the start.
+        duration: Duration of the flight (s), >= 0.
+        height: Gap at the start.
 
     Returns:
         State `(n,)`, gap and normal velocity at the end; the gap keeps its relative

@@ -20,31 +20,41 @@ class ImpactCurve(eqx.Module):
     """Points in the plane of impact time and rebound speed; NaN where there is none."""
 
     time: Float[Array, "..."]
+    """Times of the impacts (s)."""
     speed: Float[Array, "..."]
+    """Rebound speeds."""
 
 
 class GrazingManifold(eqx.Module):
-    """Impacts that lead to, or follow from, an impact without speed. (6.16)"""
+    """Impacts that lead to, or follow from, an impact without speed (thesis,
+    eq. 6.16).
+    """
 
     grazing: Float[Array, " points"]
-    """(points,) phases outside contact at which the motion grazes."""
+    """Times outside contact at which the motion grazes, shape `(points,)`."""
     before: ImpactCurve
-    """(n, points) S^1..S^n, impacts whose n-th successor grazes (6.13), (6.15)."""
+    """S^1..S^n, impacts whose n-th successor grazes, shape `(n, points)` (thesis,
+    eqs. 6.13 and 6.15)."""
     after: ImpactCurve
-    """(n, points) W^1..W^n, the n-th successors of grazing impacts (6.14), (6.15)."""
+    """W^1..W^n, the n-th successors of grazing impacts, shape `(n, points)` (thesis,
+    eqs. 6.14 and 6.15)."""
 
 
 def grazing_manifold(
     system: HybridSystem, n: int = 4, points: int = 200, horizon: float = 2.0
 ) -> GrazingManifold:
-    """Pre-images S^k and images W^k of the line of impacts without speed. (6.13)-(6.16)
+    """Return pre-images S^k and images W^k of the line of impacts without speed.
 
-    The line is taken where the constraint would let go, outside the sticking set Z: a
-    motion that grazes there touches the constraint from outside.
+    The line is taken where the constraint would release, outside the sticking set Z: a
+    motion that grazes there touches the constraint from outside (thesis,
+    eqs. 6.13-6.16).
 
-    **Arguments:** a system with two states, one constraint, a period, and restitution
-    above zero; `n`, how many of each; `points` on the line; `horizon`, the longest
-    flight, in periods.
+    Args:
+        system: A system with two states, one constraint and a period; restitution above
+            zero.
+        n: Number of pre-images and of images.
+        points: Number of points on the line.
+        horizon: Longest flight, in periods.
 
     Returns:
         A [`variational.chatter.GrazingManifold`][]; times are not taken modulo the
@@ -52,7 +62,14 @@ def grazing_manifold(
             impact is NaN.
 
     Raises:
-        ValueError: For a system without a period.
+        ValueError: The system has no period.
+
+    Examples:
+        >>> from jaxcam.models import ImpactOscillator
+        >>> from variational import grazing_manifold
+        >>> system = ImpactOscillator(omega=0.5, restitution=0.5)
+        >>> grazing_manifold(system, n=1, points=8).before.time.shape
+        (1, 8)
     """
     check_chatter_system(system)
     return _manifold(as_arrays(system).prepared(), n, points, horizon)
@@ -97,25 +114,34 @@ def _manifold(system, n, points, horizon) -> GrazingManifold:
 def chattering_region(
     system: HybridSystem, points: int = 64, impacts: int = 16, near: float = 1e-3
 ) -> ImpactCurve:
-    """Upper boundary of the region D in which chattering is complete. (6.20), (6.91)
+    """Return the upper boundary of the region D in which chattering is complete.
 
     The boundary C consists of impacts whose sequence accumulates exactly at release.
     Close to release it is the parabola of lambda_bar; from there it is continued
-    backwards by the impact map, which keeps it.
+    backwards by the impact map, under which it is invariant (thesis, eqs. 6.20 and
+    6.91).
 
     Args:
-        system: Two states, one constraint, a period; restitution above zero.
-        points: On each piece between an impact and the one before.
-        impacts: How many pieces.
-        near: Time from release, in periods, at which the parabola is trusted; its
-            relative error there is of that order, and the backward map reduces it.
+        system: A system with two states, one constraint and a period; restitution above
+            zero.
+        points: Number of points on each piece between an impact and the one before.
+        impacts: Number of pieces.
+        near: Time from release, in periods, at which the parabola is used; its relative
+            error there is of that order, and the backward map reduces it.
 
     Returns:
-        A [`variational.chatter.ImpactCurve`][], shape `(impacts * points,)`, ordered
+        An [`variational.chatter.ImpactCurve`][], shape `(impacts * points,)`, ordered
             backwards in time from release; D lies between it and speed zero.
 
     Raises:
-        ValueError: For a system without a period.
+        ValueError: The system has no period.
+
+    Examples:
+        >>> from jaxcam.models import ImpactOscillator
+        >>> from variational import chattering_region
+        >>> system = ImpactOscillator(omega=0.5, restitution=0.5)
+        >>> chattering_region(system, points=8, impacts=2).speed.shape
+        (16,)
     """
     check_chatter_system(system)
     return _boundary(as_arrays(system).prepared(), points, impacts, near)

@@ -23,38 +23,40 @@ _GAUSS, _GAUSS_WEIGHTS = (_GAUSS + 1) / 2, _GAUSS_WEIGHTS / 2
 
 
 class ImpactPoint(eqx.Module):
-    """Just after an impact."""
+    """The state just after an impact."""
 
     time: Float[Array, "..."]
-    """Time of the impact."""
+    """Time of the impact (s)."""
     state: Float[Array, "... n"]
-    """(n,) state after it."""
+    """State after it, shape `(n,)`."""
     speed: Float[Array, "..."]
-    """Normal velocity after it, > 0; known better than the state's own."""
+    """Normal velocity after it, > 0, more accurate than computed from the state."""
     approach: Float[Array, "..."]
     """Normal velocity before it, < 0."""
     found: Bool[Array, "..."]
-    """Whether there was one before the horizon."""
+    """Whether there was an impact before the horizon."""
 
 
 def next_impact(
     system: HybridSystem, time, state, speed, horizon, height: ArrayLike = 0.0
 ) -> ImpactPoint:
-    """The next impact of a motion that leaves the surface, and the state after it.
+    """Return the next impact of a motion that leaves the surface, and the state after
+    it.
 
-    Pure; may be compiled, batched and differentiated forward, also twice.
+    The function is pure; it may be compiled, batched and differentiated forward, also
+    twice.
 
     Args:
-        system: With one constraint, already `prepared`.
-        time: On the surface, after an impact or at release; shape `(n,)`.
-        state: On the surface, after an impact or at release; shape `(n,)`.
+        system: A system with one constraint, already `prepared`.
+        time: Time of the start (s).
+        state: State on the surface, after an impact or at release, shape `(n,)`.
         speed: Normal velocity there, >= 0 (0 at release).
-        horizon: How long to wait for an impact, in units of time.
-        height: Gap at the start, > 0 for a motion that is already in flight; `speed`
-            may then have either sign.
+        horizon: Longest flight time (s).
+        height: Gap at the start, > 0 for a motion already in flight; `speed` may then
+            have either sign.
 
     Returns:
-        A [`variational.chatter.ImpactPoint`][].
+        An [`variational.chatter.ImpactPoint`][].
     """
     time = jnp.asarray(time, jnp.float64)
     longest = longest_step(system, horizon)
@@ -115,16 +117,25 @@ def rebound_speed(system: HybridSystem, time, before, approach):
 
 
 def impact_map(system: HybridSystem, time, speed, *, horizon=None):
-    """P_I: time and rebound speed of an impact to those of the next. (6.10)
+    """Map time and rebound speed of an impact to those of the next: P_I.
 
-    Exact, where (6.10) is its first order at small speed. The rebound speed is the
-    normal velocity after the impact; the thesis' v is that before it.
+    It is exact; thesis eq. 6.10 is its first order at small speed. The rebound speed is
+    the normal velocity after the impact; the thesis' v is that before it.
 
-    **Arguments:** a system with two states and one constraint; `time`; `speed` >= 0 in
-    the units of the gap over time; `horizon`, the longest wait (a period by default).
+    Args:
+        system: A system with two states and one constraint.
+        time: Time of the impact (s).
+        speed: Rebound speed, >= 0, in the units of the gap over time.
+        horizon: Longest flight time (s); default one period.
 
     Returns:
         Time and rebound speed of the next impact; NaN where there is none.
+
+    Examples:
+        >>> from jaxcam.models import BouncingBall
+        >>> from variational import impact_map
+        >>> [round(float(x), 6) for x in impact_map(BouncingBall(), 0.0, 0.981)]
+        [0.2, 0.7848]
     """
     system = as_arrays(system)
     time = jnp.asarray(time, jnp.float64)
@@ -145,10 +156,24 @@ def _impact_map(system, time, speed, horizon):
 
 
 def impact_jacobian(system: HybridSystem, time, speed) -> Float[Array, "2 2"]:
-    """Derivative of P_I by time and rebound speed. (6.11)-(6.12)
+    """Return the derivative of P_I by time and rebound speed.
 
     Its determinant is r^2 v0/v1 times the change of phase volume in flight; it is
-    singular where the next impact grazes, v1 = 0.
+    singular where the next impact grazes, v1 = 0 (thesis, eqs. 6.11-6.12).
+
+    Args:
+        system: The system.
+        time: Time of the impact (s).
+        speed: Rebound speed, >= 0.
+
+    Returns:
+        Shape `(2, 2)`.
+
+    Examples:
+        >>> from jaxcam.models import BouncingBall
+        >>> from variational import impact_jacobian
+        >>> np.asarray(impact_jacobian(BouncingBall(), 0.0, 0.981)).round(4).tolist()
+        [[1.0, 0.2039], [0.0, 0.8]]
     """
     time = jnp.asarray(time, jnp.float64)
     speed = jnp.asarray(speed, jnp.float64)
@@ -158,10 +183,16 @@ def impact_jacobian(system: HybridSystem, time, speed) -> Float[Array, "2 2"]:
 
 
 def surface_state(system: HybridSystem, time, speed, guess=None):
-    """State on the surface with normal velocity `speed`, shape `(2,)`.
+    """Return the state on the surface with normal velocity `speed`.
 
-    **Arguments:** a system with two states and one constraint, scalars `time` and
-    `speed`, and a state to start Newton's method from (zeros by default).
+    Args:
+        system: A system with two states and one constraint.
+        time: Time (s).
+        speed: Normal velocity, a scalar.
+        guess: State from which Newton's method starts; default zeros.
+
+    Returns:
+        State, shape `(2,)`.
     """
     guess = jnp.zeros(2) if guess is None else guess
     rest = contact_state(system, time[None], guess)[0]

@@ -36,7 +36,7 @@ frozen = jax.lax.stop_gradient
 
 
 class SearchState(NamedTuple):
-    """Where the motion is, and what the next step is for."""
+    """The state of the search: the motion, and the purpose of the next step."""
 
     time: Float[Array, ""]
     y: Float[Array, " n+2"]
@@ -129,7 +129,7 @@ def search_step(
 
 
 def _next(f: SearchState, end, wrong, rate) -> tuple[SearchState, Bool[Array, ""]]:
-    """What the next step is for, and how long; whether this one is taken."""
+    """Return purpose and length of the next step, and whether this one is taken."""
     size = jnp.max(jnp.abs(wrong) / (TOLERANCE * (1 + jnp.abs(end))))
     fall, rise, gap, pull = frozen(f.y[-2]), end[-2], end[-1], rate[-2]
     searches, bottoms = f.mode == _SEARCH, f.mode == _BOTTOM

@@ -50,29 +50,38 @@ def line(system: HybridSystem, where: Where) -> Line:
 
 
 class Interruption(eqx.Module):
-    """Where complete chattering ends at the release point."""
+    """The parameter value at which complete chattering ends at the release point."""
 
     value: Float[Array, ""]
     """The parameter, in its own unit."""
     converged: Bool[Array, ""]
     """Whether the bracket was closed to rounding."""
     ends: Float[Array, "2"]
-    """Margin at the two ends of the bracket, and its slope at `value`."""
+    """Margin at the two ends of the bracket, shape `(2,)`."""
     slope: Float[Array, ""]
+    """Derivative of the margin by the parameter at `value`."""
     turns: Int[Array, ""]
-    """Evaluations of one turn."""
+    """Number of evaluations of one period."""
 
 
 def interruption_in(
     system: HybridSystem, where: Where, low, high, periods: int = 1
 ) -> Interruption:
-    """The interruption between two values of a parameter; for use inside `jit`.
+    """Find the interruption between two values of a parameter; for use inside `jit`.
 
-    Safeguarded Newton on the margin. The value is differentiable forward in every other
+    Safeguarded Newton on the margin. The value is forward-differentiable in every other
     parameter of the system (implicit function theorem). Nothing is raised: `converged`
     is false where the margin does not change sign.
 
-    **Arguments:** as in [`variational.chatter_interruption`][].
+    Args:
+        system: A system with two states, one constraint and a period.
+        where: Picks the parameter.
+        low: Lower end of the bracket.
+        high: Upper end of the bracket.
+        periods: Number of forcing periods in one period of the orbit.
+
+    Returns:
+        An [`variational.chatter.Interruption`][].
     """
     low, high = jnp.asarray(low, jnp.float64), jnp.asarray(high, jnp.float64)
     return _solve(line(system, where), low, high, periods=periods)
@@ -174,28 +183,36 @@ def chatter_interruption(
     bracket: tuple[float, float],
     periods: int = 1,
 ) -> Float[Array, ""]:
-    """The parameter value at which complete chattering ends at the release point.
+    """Find the parameter value at which complete chattering ends at the release point.
 
-    There the impacts of the orbit that sticks once in so many periods accumulate at the
-    very moment of release: on one side it is periodic and sticks, on the other it does
-    not stick then and is followed by lobes of periodic windows and chaos (section 5.4,
-    chapter 6).
+    There the impacts of the orbit that sticks once in `periods` forcing periods
+    accumulate exactly at release: on one side the orbit is periodic and sticks, on the
+    other it does not stick then and is followed by lobes of periodic windows and chaos
+    (thesis, section 5.4 and chapter 6).
 
     Args:
-        system: Two states, one constraint and a period.
+        system: A system with two states, one constraint and a period.
         where: Picks the parameter: `lambda system: system.speed`, or `"speed"`.
-        bracket: Two values of it, chattering complete at one and interrupted at the
-            other. With several periods, near the interruption: elsewhere contact may
-            come earlier, which counts as interrupted too.
-        periods: Of the forcing in one of the orbit.
+        bracket: Two values of the parameter, with complete chattering at one and
+            interrupted chattering at the other. With several periods, near the
+            interruption: elsewhere contact may come earlier, which counts as
+            interrupted too.
+        periods: Number of forcing periods in one period of the orbit.
 
     Returns:
-        The value, in the parameter's unit; differentiable forward in the other
+        The value, in the parameter's unit; forward-differentiable in the other
             parameters.
 
     Raises:
-        ValueError: Where the bracket holds no interruption, as far as the values can be
-            seen.
+        ValueError: The bracket holds no interruption (checked where the values are
+            known).
+
+    Examples:
+        >>> from jaxcam.models import ImpactOscillator
+        >>> from variational import chatter_interruption
+        >>> system = ImpactOscillator(omega=1.0, restitution=0.5)
+        >>> round(float(chatter_interruption(system, "omega", (0.4, 0.8))), 4)
+        0.6072
     """
     check_chatter_system(system)
     low, high = bracket

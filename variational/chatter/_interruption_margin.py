@@ -29,7 +29,7 @@ _NEAR = 1e-12
 
 
 class _Sequence(NamedTuple):
-    """What the impacts so far say."""
+    """The state of the sequence after the impacts so far."""
 
     over: Bool[Array, ""]
     turn: Int[Array, ""]
@@ -121,7 +121,7 @@ def _margin(system, frame: ChatterFrame, *, periods: int) -> Float[Array, ""]:
 
 
 def _heard(system, frame, periods: int, s: _Sequence, f: SearchState) -> _Sequence:
-    """What the impact says that the flight has just left."""
+    """Return the state of the sequence after the impact that was just passed."""
     period = jnp.asarray(system.period, jnp.float64)
     law = scaling_law(frozen(frame.restitution))
     since, speed = f.time - frame.release, f.y[-2]

@@ -2,8 +2,8 @@
 
 Close to the release point of sticking the relative acceleration is c tau, with tau the
 time from release and c the jerk there. An impact at tau < 0 that leaves with speed v
-has lambda = v / (c tau^2); the next one is at h(lambda) tau with f(lambda). (6.28)-
-(6.37)
+has lambda = v / (c tau^2); the next one is at h(lambda) tau with f(lambda) (thesis,
+eqs. 6.28-6.37).
 """
 
 import jax.numpy as jnp
@@ -13,28 +13,32 @@ from jaxcam.hybrid.lowering import while_loop
 
 
 LAMBDA_MAX = 3 / 8
-"""Above it the motion does not return (6.47); above 1/3 it does so after release."""
+"""Above it the motion does not return (thesis, eq. 6.47); above 1/3 it does so after
+release."""
 
 
 def _root(lam):
-    """s = sqrt(1 - 8 lambda / 3), NaN where there is no next impact. (6.32)"""
+    """s = sqrt(1 - 8 lambda / 3), NaN where there is no next impact (thesis,
+    eq. 6.32).
+    """
     return jnp.sqrt(1 - 8 * lam / 3)
 
 
 def hop_ratio(lam) -> Float[Array, "..."]:
-    """h(lambda): time from release at the next impact, over that at this one. (6.33)
+    """Return h(lambda): time from release at the next impact over that at this one.
 
-    **Arguments:** `lam`, dimensionless, any shape, between 0 and 3/8.
+    Args:
+        lam: Dimensionless, any shape, between 0 and 3/8.
 
     Returns:
-        h, between 1 and -1/2; negative where the next impact comes after release; NaN
-            above 3/8, where there is none.
+        h, between 1 and -1/2 (thesis, eq. 6.33); negative where the next impact comes
+            after release; NaN above 3/8, where there is none.
     """
     return (3 * _root(lam) - 1) / 2
 
 
 def lambda_map(lam, r) -> Float[Array, "..."]:
-    """f(lambda): the coordinate of the next impact. (6.36), (6.89)
+    """Return f(lambda): the coordinate of the next impact (thesis, eqs. 6.36 and 6.89).
 
     Args:
         lam: Dimensionless, any shape, between 0 and 3/8.
@@ -43,6 +47,12 @@ def lambda_map(lam, r) -> Float[Array, "..."]:
     Returns:
         f, with a pole at 1/3 where the next impact falls on release; NaN above 3/8,
             where the motion does not return.
+
+    Examples:
+        >>> from variational import lambda_map, scaling_law
+        >>> fixed = scaling_law(0.5).lambda_bar
+        >>> abs(float(lambda_map(fixed, 0.5) - fixed)) < 1e-12
+        True
     """
     s = _root(lam)
     # 3 s (1 - s) = 8 lambda s / (1 + s) keeps all digits of a small lambda
@@ -50,9 +60,19 @@ def lambda_map(lam, r) -> Float[Array, "..."]:
 
 
 def lambda_inverse(lam, r) -> Float[Array, "..."]:
-    """The impact before, at lambda in [0, 1/3): f(lambda_inverse(lam, r)) = lam.
+    """Return the coordinate of the impact before: f(lambda_inverse(lam, r)) = lam.
 
-    **Arguments:** `lam` >= 0, dimensionless; `r`, coefficient of restitution.
+    Args:
+        lam: Dimensionless, >= 0.
+        r: Coefficient of restitution.
+
+    Returns:
+        Lambda in [0, 1/3), in the broadcast shape.
+
+    Examples:
+        >>> from variational import lambda_inverse, lambda_map
+        >>> round(float(lambda_map(lambda_inverse(0.2, 0.5), 0.5)), 9)
+        0.2
     """
     lam = jnp.asarray(lam)
     root = jnp.sqrt(9 * r * r + 24 * r * lam)
@@ -62,13 +82,26 @@ def lambda_inverse(lam, r) -> Float[Array, "..."]:
 
 
 def koenigs(lam, lambda_bar, r, q) -> Float[Array, ""]:
-    """Coordinate in which the lambda-map is multiplication: K(f(lambda)) = K(lambda)/q.
+    """Return the coordinate in which the lambda-map is multiplication.
 
-    The limit of (f^-n(lambda) - lambda_bar) q^-n: zero at lambda_bar, with slope one;
-    negative where chattering completes before release, positive where it does not.
+    K(f(lambda)) = K(lambda)/q; K is the limit of (f^-n(lambda) - lambda_bar) q^-n: zero
+    at lambda_bar, with slope one; negative where chattering completes before release,
+    positive where it does not (G. Koenigs' linearisation of a map at a fixed point).
 
-    **Arguments:** scalars; `lam` >= 0; `lambda_bar` and `q` as in
-    [`variational.scaling_law`][].
+    Args:
+        lam: A scalar, dimensionless, >= 0.
+        lambda_bar: Fixed point, as in [`variational.scaling_law`][].
+        r: Coefficient of restitution of slow impacts.
+        q: Scale, as in [`variational.scaling_law`][].
+
+    Returns:
+        A scalar.
+
+    Examples:
+        >>> from variational import koenigs, scaling_law
+        >>> law = scaling_law(0.5)
+        >>> abs(float(koenigs(law.lambda_bar, law.lambda_bar, 0.5, law.q))) < 1e-12
+        True
     """
     bar_root = jnp.sqrt(9 * r * r + 24 * r * lambda_bar)
     bar_top = 6 * lambda_bar + 3 * r + bar_root

@@ -20,61 +20,76 @@ _ROW = 32
 
 
 class Lobes(eqx.Module):
-    """Lobes of the stroboscopic map, found by the number of impacts of a turn."""
+    """Lobes of the stroboscopic map, found by the number of impacts in a period."""
 
     corners: np.ndarray
-    """(k + 1,) where they begin and end: the turn grazes there; farthest first."""
+    """Ends of the lobes, where the motion grazes, farthest first, shape `(k + 1,)`."""
     values: np.ndarray
-    """(k + 1,) the map there."""
+    """The map at the corners, shape `(k + 1,)`."""
     points: np.ndarray
-    """(k, samples) points of each lobe, from its outer corner inwards; the map and its
-    slope there."""
+    """Points of each lobe, from its outer corner inwards, shape `(k, samples)`."""
     images: np.ndarray
+    """The map at these points, shape `(k, samples)`."""
     slopes: np.ndarray
+    """Slope of the map at these points, shape `(k, samples)`."""
     accumulation: float
-    """Where the lobes accumulate, and the map there."""
+    """Point at which the lobes accumulate."""
     limit: float
+    """The map at the accumulation."""
     scan: np.ndarray
-    """The whole measured map: (n,) points, images and numbers of impacts."""
+    """Points of the whole measured map, shape `(n,)`."""
     scanned: np.ndarray
+    """The map at these points, shape `(n,)`."""
     impacts: np.ndarray
+    """Number of impacts at these points, shape `(n,)`."""
 
 
 class LocalMap(eqx.Module):
-    """The fitted map (5.2)-(5.5): one lobe, repeated with two scales."""
+    """The fitted map (thesis, eqs. 5.2-5.5): one lobe, repeated with two scales."""
 
     Q: Float[Array, ""]
-    """Logarithms of the scales of the image and of the point (5.2)."""
+    """Logarithm of the scale of the image (thesis, eq. 5.2)."""
     M: Float[Array, ""]
+    """Logarithm of the scale of the point (thesis, eq. 5.2)."""
     delta_pi: Float[Array, ""]
-    """Height and width of the first lobe; x_1 = x_0 - width."""
+    """Height of the first lobe."""
     delta_x: Float[Array, ""]
+    """Width of the first lobe; x_1 = x_0 - width."""
     coefficients: Float[Array, " n"]
-    """c_0..c_n and d of (5.3), in powers of x - x_0."""
+    """Coefficients c_0..c_n of thesis eq. 5.3, in powers of x - x_0."""
     root: Float[Array, ""]
+    """Coefficient d of the root in thesis eq. 5.3."""
     x_0: Float[Array, ""]
-    """Right end of the first lobe and the map there."""
+    """Right end of the first lobe."""
     p_0: Float[Array, ""]
+    """The map at `x_0`."""
 
     @property
     def x_inf(self) -> Float[Array, ""]:
-        """Where the lobes accumulate. (5.5)"""
+        """Point at which the lobes accumulate (thesis, eq. 5.5)."""
         return self.x_0 - self.delta_x / (1 - jnp.exp(self.M))
 
     @property
     def alpha_inf(self) -> Float[Array, ""]:
-        """The map at the accumulation and beyond it. (5.5)"""
+        """The map at the accumulation and beyond it (thesis, eq. 5.5)."""
         return self.p_0 + self.delta_pi / (1 - jnp.exp(self.Q))
 
     def lobe(self, x) -> Float[Array, "..."]:
-        """p(x) of the first lobe. (5.3)"""
+        """Return p(x) of the first lobe (thesis, eq. 5.3).
+
+        Args:
+            x: Points, any shape.
+
+        Returns:
+            The map, in the shape of `x`.
+        """
         y = x - self.x_0
         smooth = jnp.polyval(self.coefficients[::-1], y)
         inside = jnp.maximum(y / -self.delta_x, 0.0)
         return smooth + self.root * jnp.sqrt(jnp.abs(self.delta_x) * inside)
 
     def __call__(self, x) -> Float[Array, "..."]:
-        """The map: constant beyond the accumulation, else lobe j of (5.4).
+        """The map: constant beyond the accumulation, else lobe j of thesis eq. 5.4.
 
         NaN outside the first lobe, of which the fit knows nothing.
         """
@@ -104,24 +119,35 @@ def find_lobes(
     samples: int = 64,
     most: int = 8,
 ) -> Lobes:
-    """Measure the stroboscopic map around the interruption and find its lobes. (5.1)
+    """Measure the stroboscopic map around the interruption and find its lobes.
 
-    A lobe ends where the number of impacts of the turn changes; those places are
-    bisected to rounding.
+    A lobe ends where the number of impacts changes, to rounding (thesis, eq. 5.1).
 
     Args:
-        system: With two states, one constraint and a period, near the interruption.
-        state: Shape `(2,)`, at time `phase` x period, on the sticking orbit.
-        deviations: Shape `(n,)`, of `component` of the state, in order and across the
-            accumulation point.
-        direction: Shape `(2,)`, along which the state deviates; only `component` does
-            by default, as in the thesis. Motions leave the lobes along the `vector` of
-            a [`variational.chatter.ComposedMap`][], so the map that is iterated needs
-            that.
-        samples: Points measured in each lobe; `most`: how many lobes.
+        system: As for [`variational.chatter_frame`][], near the interruption.
+        state: State at time `phase` x period on the sticking orbit, shape `(2,)`.
+        deviations: Deviations of `component`, `(n,)`, across the accumulation.
+        phase: Phase of the section, in periods.
+        component: Component of the state that deviates.
+        direction: Direction along which the state deviates, shape `(2,)`; default
+            `component` alone. A map to iterate needs `ComposedMap.vector`.
+        samples: Number of points measured in each lobe.
+        most: Largest number of lobes.
+
+    Returns:
+        The [`variational.chatter.Lobes`][].
 
     Raises:
-        ValueError: Where fewer than two lobes are found.
+        ValueError: Fewer than two lobes are found.
+
+    Examples:
+        >>> from jaxcam.models import ImpactOscillator
+        >>> from variational import composed_map, find_lobes
+        >>> system = ImpactOscillator(omega=0.6071945, restitution=0.5)
+        >>> state = composed_map(system, "omega", 24, phase=0.3).state
+        >>> lobes = find_lobes(system, state, np.linspace(-0.1, 0.1), phase=0.3, most=2)
+        >>> len(lobes.corners)
+        3
     """
     check_chatter_system(system)
     system = as_arrays(system)
@@ -184,7 +210,7 @@ def find_lobes(
 
 
 def _corners(turn, accumulation, farthest, most: int) -> np.ndarray:
-    """Where the number of impacts of the turn changes, from the farthest inwards."""
+    """Return where the number of impacts of the period changes, farthest first."""
     number = turn(np.array([farthest]))[2][0]
     corners = []
     for k in range(1, most + 2):
@@ -236,11 +262,26 @@ def _bisect(turn: Callable, near: float, far: float, is_near: Callable):
 
 
 def fit_local_map(lobes: Lobes) -> LocalMap:
-    """Fit (5.2)-(5.5): scales by lines through logarithms, one lobe by (5.3).
+    """Fit thesis eqs. 5.2-5.5: scales by lines through logarithms, one lobe by eq. 5.3.
 
     The cubic with a root passes through both ends of the first lobe and has the
     measured slope where that is 1, 0 and -1; a slope that the lobe does not have is
     replaced by its nearest.
+
+    Args:
+        lobes: The measured lobes.
+
+    Returns:
+        A [`variational.chatter.LocalMap`][].
+
+    Examples:
+        >>> from jaxcam.models import ImpactOscillator
+        >>> from variational import composed_map, find_lobes, fit_local_map
+        >>> system = ImpactOscillator(omega=0.6071945, restitution=0.5)
+        >>> state = composed_map(system, "omega", 24, phase=0.3).state
+        >>> lobes = find_lobes(system, state, np.linspace(-0.1, 0.1), phase=0.3, most=2)
+        >>> fit_local_map(lobes).coefficients.ndim
+        1
     """
     width, height = np.abs(np.diff(lobes.corners)), np.abs(np.diff(lobes.values))
     k = np.arange(len(width))
@@ -284,13 +325,25 @@ def _where_slope(points, slopes, wanted):
 def iterate_local_map(
     local: LocalMap, shifts, turns: int = 400, keep: int = 100
 ) -> Float[Array, "shifts keep"]:
-    """Attractor of the fitted map, moved sideways by each of `shifts`. (Figure 5.28)
+    """Iterate the fitted map, shifted by each of `shifts` (thesis, Figure 5.28).
 
-    **Arguments:** `shifts`, shape `(k,)`, in the units of x: the map of x is that of x
-    + shift; iterates in all, and how many of the last to keep.
+    Args:
+        local: The fitted map.
+        shifts: Shifts in the units of x, shape `(k,)`; the map of x is that of x +
+            shift.
+        turns: Number of iterations.
+        keep: Number of last iterates to keep.
 
     Returns:
-        Shape `(k, keep)`.
+        Iterates, shape `(k, keep)`.
+
+    Examples:
+        >>> from variational import iterate_local_map
+        >>> from variational.chatter import LocalMap
+        >>> numbers = (-1.0, -1.0, 1.0, 1.0, [0.0, 1.0], 0.5, 1.0, 0.0)
+        >>> local = LocalMap(*map(jnp.asarray, numbers))
+        >>> iterate_local_map(local, jnp.zeros(3), turns=20, keep=5).shape
+        (3, 5)
     """
     return _iterate(local, jnp.asarray(shifts, jnp.float64), turns, keep)
 

@@ -19,30 +19,66 @@ class Reversed(HybridSystem):
 
     Its impacts undo those of `forward`: the speed is divided by the restitution. For
     one constraint, and restitution above zero.
+
+    Examples:
+        >>> from jaxcam.models import BouncingBall
+        >>> from variational import Reversed
+        >>> Reversed(BouncingBall()).impact(0.0, jnp.array([0.0, -0.8])).tolist()
+        [0.0, 1.0]
     """
 
     active: ClassVar[bool] = True
+    """Impacts add energy in reversed time."""
 
     forward: HybridSystem
+    """The system in forward time."""
 
     def prepared(self) -> "Reversed":
-        """The same motion, cheaper to evaluate."""
+        """Return an equivalent system that is cheaper to evaluate.
+
+        Returns:
+            A `Reversed` of the prepared system.
+        """
         return Reversed(self.forward.prepared())
 
     def check(self) -> None:
-        """Raise `ValueError` where a parameter of `forward` has no meaning."""
+        """Raise `ValueError` if a parameter of `forward` has no physical meaning."""
         self.forward.check()
 
     def vector_field(self, t, state) -> jax.Array:
-        """Minus the field of `forward`."""
+        """Return minus the field of `forward`.
+
+        Args:
+            t: Time (s).
+            state: State, shape `(n,)`.
+
+        Returns:
+            Rates per second, shape `(n,)`.
+        """
         return -self.forward.vector_field(-jnp.asarray(t), state)
 
     def gap(self, t, state) -> jax.Array:
-        """The gap of `forward`."""
+        """Return the gap of `forward`.
+
+        Args:
+            t: Time (s).
+            state: State, shape `(n,)`.
+
+        Returns:
+            A scalar.
+        """
         return self.forward.gap(-jnp.asarray(t), state)
 
     def impact(self, t, state) -> jax.Array:
-        """The state from which an impact of `forward` leads to `state`."""
+        """Return the state from which an impact of `forward` leads to `state`.
+
+        Args:
+            t: Time (s).
+            state: State, shape `(n,)`.
+
+        Returns:
+            State, shape `(n,)`.
+        """
         time = -jnp.asarray(t)
         direction = normal_directions(self.forward, time, state)[0]
 

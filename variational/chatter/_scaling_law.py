@@ -12,30 +12,40 @@ class ScalingLaw(eqx.Module):
     """Fixed point of the lambda-map and the scales that follow from it."""
 
     lambda_bar: Float[Array, "..."]
-    """Fixed point: impacts with this lambda accumulate exactly at release (6.45)."""
+    """Fixed point: impacts with this lambda accumulate exactly at release (thesis,
+    eq. 6.45)."""
     p: Float[Array, "..."]
     """h(lambda_bar): each impact is closer to release by this factor."""
     q: Float[Array, "..."]
-    """1 / f'(lambda_bar): each lobe is closer to lambda_bar by this factor (6.49)."""
+    """1 / f'(lambda_bar): each lobe is closer to lambda_bar by this factor (thesis,
+    eq. 6.49)."""
     kappa: Float[Array, "..."]
-    """Exponent of the envelope |beta| <= |lambda - lambda_bar|^kappa (6.53)."""
+    """Exponent of the envelope |beta| <= |lambda - lambda_bar|^kappa (thesis,
+    eq. 6.53)."""
 
 
 def scaling_law(r) -> ScalingLaw:
-    """Scales p and q and exponent kappa at the interruption of complete chattering.
+    """Return the scales p, q and the exponent kappa at the interruption of chattering.
 
-    With s = sqrt(1 - 8 lambda / 3) the fixed point of (6.36) is a root of
+    With s = sqrt(1 - 8 lambda / 3) the fixed point of thesis eq. 6.36 is a root of
     9 s^3 + 3 s^2 - (5 + 8 r) s + 1 in (1/3, 1); the other positive root has p < 0: it
     stands for an impact after release and is not a fixed point of a motion. Then
     p = (3 s - 1)/2 and 1/q = (1 + s)^2/(4 s^2 p).
 
-    **Arguments:** `r`, coefficient of restitution of slow impacts, any shape.
+    Args:
+        r: Coefficient of restitution of slow impacts, any shape.
 
     Returns:
         A [`variational.chatter.ScalingLaw`][], dimensionless, in the shape of `r`.
 
     Raises:
-        ValueError: For r outside (0, 1), where it can be seen.
+        ValueError: r lies outside (0, 1) (checked where its value is known).
+
+    Examples:
+        >>> from variational import scaling_law
+        >>> law = scaling_law(0.5)
+        >>> bool((0 < law.q) & (law.q < law.p) & (law.p < 1))
+        True
     """
     if not isinstance(r, Tracer):
         values = np.asarray(r)

@@ -24,14 +24,17 @@ _SMALL = 1e-12
 
 
 class SectionArrival(eqx.Module):
-    """Arrival at a section."""
+    """The state of a motion when it arrives at a section."""
 
     state: Float[Array, "... n"]
-    """(n,) state; gap and normal velocity there, known better than the state's own."""
+    """State, shape `(n,)`."""
     gap: Float[Array, "..."]
+    """Gap there, more accurate than computed from the state."""
     velocity: Float[Array, "..."]
+    """Normal velocity there, more accurate than computed from the state."""
     impacts: Int[Array, "..."]
-    """Impacts on the way; of a complete sequence those before it became negligible."""
+    """Number of impacts on the way; of a complete sequence those before it became
+    negligible."""
     stuck: Bool[Array, "..."]
     """Whether the motion stuck on the way."""
 
@@ -55,12 +58,15 @@ def to_section(
 ) -> SectionArrival:
     """Follow a motion, impact by impact, to the time `section`.
 
-    A sequence that becomes negligible before release has completed: the motion goes on
-    from the release point of `frame`.
+    A sequence that becomes negligible before release has completed: the motion
+    continues from the release point of `frame`.
 
-    **Arguments:** `system`, already `prepared`; `frame`, whose release lies between the
-    start and the section; `start`, of which time, state and speed are used; `section`,
-    a time; `height`, the gap at the start, > 0 in flight.
+    Args:
+        system: The system, already `prepared`.
+        frame: The frame whose release lies between the start and the section.
+        start: The start, of which time, state and speed are used.
+        section: Time of the section (s).
+        height: Gap at the start, > 0 in flight.
 
     Returns:
         A [`variational.chatter.SectionArrival`][].
@@ -107,17 +113,27 @@ def to_section(
 
 
 def section_turn(system: HybridSystem, state, phase=0.0) -> SectionArrival:
-    """The stroboscopic map through chattering: state at a phase to that a turn later.
+    """Apply the stroboscopic map through chattering: state at a phase to that a period
+    later.
 
-    Exact to rounding however many and however low the impacts, unlike a simulation
-    that completes chattering near its interruption. (5.1)
+    It is exact to rounding however many and however low the impacts, unlike a
+    simulation that completes chattering near its interruption (thesis, eq. 5.1). The
+    function is pure; it may be compiled, batched and differentiated forward.
 
-    **Arguments:** a system with two states, one constraint and a period; `state`, shape
-    `(2,)`, in flight at time `phase` x period. Pure; may be compiled, batched and
-    differentiated forward.
+    Args:
+        system: A system with two states, one constraint and a period.
+        state: State in flight at time `phase` x period, shape `(2,)`.
+        phase: Phase of the section, in periods.
 
     Returns:
         A [`variational.chatter.SectionArrival`][].
+
+    Examples:
+        >>> from jaxcam.models import ImpactOscillator
+        >>> from variational import section_turn
+        >>> system = ImpactOscillator(omega=0.5, restitution=0.5)
+        >>> bool(section_turn(system, jnp.array([-0.5, 0.0]), 0.5).stuck)
+        True
     """
     check_chatter_system(system)
     return _turn(as_arrays(system), jnp.asarray(state, jnp.float64), phase)
@@ -141,12 +157,17 @@ def flight_start(system, time, state):
 
 
 def release_impacts(system: HybridSystem, count: int, time=0.0) -> ImpactPoint:
-    """The first `count` impacts of the orbit that starts at release.
+    """Return the first `count` impacts of the orbit that starts at release.
+
+    Args:
+        system: The system.
+        count: Number of impacts.
+        time: As in [`variational.chatter_frame`][].
 
     Returns:
-        A [`variational.chatter.ImpactPoint`][] with a leading axis of impacts; its
-            times are those of the turn that starts at the release of
-            `chatter_frame(system, time)`, and `found` is false from the first flight on
+        A [`variational.chatter.ImpactPoint`][] with a leading axis of impacts. Its
+            times are those of the period that starts at the release of
+            `chatter_frame(system, time)`; `found` is false from the first flight on
             that does not return.
     """
     check_chatter_system(system)
@@ -194,9 +215,16 @@ def impact_after(system, time, state, speed, height, rank) -> ImpactPoint:
 
 
 def section_to_impact(system: HybridSystem, state, phase, rank) -> ImpactPoint:
-    """Theta: from a state at a section to an impact after it. (6.105)
+    """Map a state at a section to an impact after it: Theta of thesis eq. 6.105.
 
-    **Arguments:** as in [`variational.section_turn`][]; `rank`, 0 for the first impact.
+    Args:
+        system: A system with two states, one constraint and a period.
+        state: State in flight at time `phase` x period, shape `(2,)`.
+        phase: Phase of the section, in periods.
+        rank: Number of the impact, 0 for the first.
+
+    Returns:
+        An [`variational.chatter.ImpactPoint`][].
     """
     check_chatter_system(system)
     system = as_arrays(system).prepared()

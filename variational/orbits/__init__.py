@@ -1,4 +1,4 @@
-"""Periodic orbits: equations, seeds, admissibility, monodromy, and their derivatives.
+"""Compute periodic orbits; `continuation` and `jaxcam.fitting` build on this package.
 
 What `continuation` and `jaxcam.fitting` build on; the face of it is `variational`.
 """

@@ -28,7 +28,7 @@ def inadmissible(
     period: Any,
     steps: int,
 ) -> str | None:
-    """Why a solution is no orbit, or None.
+    """Return why a solution is not admissible, or None.
 
     **Arguments:** lowest gap of each flight and approach speed of each impact, by their
     numbers, the error of the flights and the size of gaps, as in
@@ -56,7 +56,7 @@ def inadmissible(
 
 
 def refuse(shooting: Shooting, u, system: HybridSystem) -> str | None:
-    """Why a solution of the equations is no orbit, or None."""
+    """Return why a solution of the equations is not admissible, or None."""
     seen, period = _look(shooting, jnp.asarray(u), system)
     gaps, speeds = (
         dict(enumerate(map(float, row))) for row in (seen.gaps, seen.speeds)

@@ -1,4 +1,4 @@
-"""How large each gap of a motion is, for comparisons that know no units."""
+"""Scale of each gap of a motion, for comparisons without units."""
 
 import jax
 import jax.numpy as jnp
@@ -15,7 +15,7 @@ def gap_sizes(
     state: Float[ArrayLike, " n"],
     period: Float[ArrayLike, ""],
 ) -> Float[Array, " m"]:
-    """What each gap is small or large beside, in its units.
+    """Return the scale of each gap, in its units.
 
     Its change, at most, where each component of the state changes by
     [`jaxcam.hybrid.sizes.component_sizes`][].

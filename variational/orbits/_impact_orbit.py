@@ -18,22 +18,22 @@ from ._shooting import Shooting
 
 
 class ImpactOrbit(eqx.Module):
-    """A periodic orbit that flies between impacts, without sustained contact."""
+    """A periodic orbit with impacts and without sustained contact."""
 
     times: Float[Array, " k"]
-    """Shape `(k,)`, the impacts of one period of the orbit (s), increasing."""
+    """Times of the impacts of one period of the orbit (s), increasing, shape `(k,)`."""
     states: Float[Array, "k n"]
-    """Shape `(k, n)`, the state just after each of them."""
+    """State just after each impact, shape `(k, n)`."""
     constraints: tuple[int, ...] | None = eqx.field(static=True, default=None)
-    """Which constraint each impact hits; the first by default."""
+    """Constraint that each impact hits; default the first."""
     periods: int = eqx.field(static=True, default=1)
-    """Of the forcing, after which the orbit repeats."""
+    """Number of forcing periods after which the orbit repeats."""
     steps: int = eqx.field(static=True, default=32)
     """Runge-Kutta steps of order 8 in each flight."""
 
     @property
     def number(self) -> int:
-        """How many impacts the orbit has."""
+        """Number of impacts."""
         return self.times.shape[0]
 
     @property
@@ -43,24 +43,53 @@ class ImpactOrbit(eqx.Module):
         return Shooting(hit, self.periods, self.states.shape[1], self.steps)
 
     def unknowns(self, system: HybridSystem) -> Float[Array, " u"]:
-        """The unknowns of these equations."""
+        """Return the unknowns of these equations.
+
+        Args:
+            system: The system.
+
+        Returns:
+            Shape `(u,)`.
+        """
         phases = self.times / system.period
         return jnp.concatenate([phases[:, None], self.states], axis=1).ravel()
 
     def moved(self, unknowns: Float[Array, " u"], system: HybridSystem):
-        """The orbit of the same kind with other unknowns."""
+        """Return the orbit of the same kind with other unknowns.
+
+        Args:
+            unknowns: Unknowns of the equations, shape `(u,)`.
+            system: The system.
+
+        Returns:
+            An `ImpactOrbit`.
+        """
         rows = unknowns.reshape(self.number, -1)
         times = rows[:, 0] * system.period
         return eqx.tree_at(lambda o: (o.times, o.states), self, (times, rows[:, 1:]))
 
 
 def impact_orbit(system: HybridSystem, guess: ImpactOrbit) -> ImpactOrbit:
-    """The orbit near `guess`, differentiable with respect to every parameter.
+    """Return the periodic orbit near `guess`, differentiable in every parameter.
+
+    Whether its flights stay clear of the constraints is not checked; see
+    [`variational.orbits.clearance`][].
+
+    Args:
+        system: The system.
+        guess: An orbit near the one sought.
 
     Returns:
         A [`variational.orbits.ImpactOrbit`][], NaN where there is none near the guess.
-            That its flights stay clear of the constraints is not looked at; see
-            [`variational.orbits.clearance`][].
+
+    Examples:
+        >>> from jaxcam.models import ImpactOscillator
+        >>> from variational import impact_orbit
+        >>> from variational.orbits import one_impact_orbits
+        >>> system = ImpactOscillator(omega=2.8, restitution=0.8, wall=-0.5)
+        >>> found = one_impact_orbits(system, jnp.array([-0.5, 0.0]))
+        >>> impact_orbit(ImpactOscillator(2.8, 0.8, -0.49), found[0]).times.shape
+        (1,)
     """
 
     def residual(unknowns):
@@ -70,10 +99,14 @@ def impact_orbit(system: HybridSystem, guess: ImpactOrbit) -> ImpactOrbit:
 
 
 def orbit_monodromy(system: HybridSystem, orbit: ImpactOrbit) -> Float[Array, "n n"]:
-    """How a deviation at a fixed phase grows over one period of the orbit.
+    """Return the monodromy matrix of an orbit, starting just after the first impact.
 
     Product of flight transition matrices and saltation matrices, in the order of the
-    motion, beginning just after the first impact.
+    motion.
+
+    Args:
+        system: The system.
+        orbit: The periodic orbit.
 
     Returns:
         Shape `(n, n)`. Its eigenvalues are the Floquet multipliers.
@@ -82,20 +115,61 @@ def orbit_monodromy(system: HybridSystem, orbit: ImpactOrbit) -> Float[Array, "n
 
 
 def orbit_trace(system: HybridSystem, orbit: ImpactOrbit) -> Float[Array, ""]:
-    """Sum of the Floquet multipliers."""
+    """Return the sum of the Floquet multipliers of an orbit.
+
+    Args:
+        system: The system.
+        orbit: The periodic orbit.
+
+    Returns:
+        A scalar.
+
+    Examples:
+        >>> from jaxcam.models import ImpactOscillator
+        >>> from variational import orbit_trace
+        >>> from variational.orbits import one_impact_orbits
+        >>> system = ImpactOscillator(omega=2.8, restitution=0.8, wall=-0.5)
+        >>> found = one_impact_orbits(system, jnp.array([-0.5, 0.0]))
+        >>> orbit_trace(system, found[0]).shape
+        ()
+    """
     return jnp.trace(orbit_monodromy(system, orbit))
 
 
 def orbit_determinant(system: HybridSystem, orbit: ImpactOrbit) -> Float[Array, ""]:
-    """Product of the Floquet multipliers."""
+    """Return the product of the Floquet multipliers of an orbit.
+
+    Args:
+        system: The system.
+        orbit: The periodic orbit.
+
+    Returns:
+        A scalar.
+
+    Examples:
+        >>> from jaxcam.models import ImpactOscillator
+        >>> from variational import orbit_determinant
+        >>> from variational.orbits import one_impact_orbits
+        >>> system = ImpactOscillator(omega=2.8, restitution=0.8, wall=-0.5)
+        >>> found = one_impact_orbits(system, jnp.array([-0.5, 0.0]))
+        >>> round(float(orbit_determinant(system, found[0])), 6)
+        0.64
+    """
     return jnp.linalg.det(orbit_monodromy(system, orbit))
 
 
 def clearance(system: HybridSystem, orbit: ImpactOrbit) -> Float[Array, ""]:
-    """Minimum admissibility margin: positive for an orbit that is real.
+    """Return the minimum admissibility margin: positive for a physical orbit.
 
     The least of the approach and rebound speeds of its impacts, the durations of its
     flights, and the lowest gap within each flight.
+
+    Args:
+        system: The system.
+        orbit: The periodic orbit.
+
+    Returns:
+        A scalar.
     """
     shooting, u = orbit.shooting, orbit.unknowns(system)
     seen = shooting.seen(u, system)

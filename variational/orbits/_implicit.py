@@ -16,12 +16,15 @@ def implicit_root(
     residual: Callable[[Float[Array, " n"]], Float[Array, " n"]],
     guess: Float[Array, " n"],
 ) -> Float[Array, " n"]:
-    """The root of `residual` near `guess`, with exact derivatives.
+    """Find the root of `residual` near `guess`, with exact derivatives.
 
     Newton's method, with steps halved until the residual falls. The derivative with
     respect to everything that `residual` closes over comes from the implicit function
-    theorem.
-    Works under `jit`, `vmap`, `jvp` and `vjp`.
+    theorem. It works under `jit`, `vmap`, `jvp` and `vjp`.
+
+    Args:
+        residual: Function whose root is sought, shape `(n,)` to `(n,)`.
+        guess: Start of the iteration, shape `(n,)`.
 
     Returns:
         Shape `(n,)`; NaN where Newton's method does not converge.

@@ -24,7 +24,7 @@ def nodes_of(system: HybridSystem, start, end, steps: int):
 def lowest_times(
     system: HybridSystem, start, end, steps: int, whole_turn: bool = False, nodes=None
 ) -> tuple[Float[Array, " m"], Float[Array, " m"]]:
-    """When each gap has its lowest minimum within a flight, and the gap there.
+    """Return when each gap has its lowest minimum within a flight, and the gap there.
 
     A minimum lies where the normal velocity rises through zero; the ends of the flight,
     where it starts and ends in contact, do not count. With `whole_turn` the flight is a
@@ -113,8 +113,7 @@ def gap_or_speed(
 
 
 def _rise(speeds, changes):
-    """Where a velocity rises through zero in each step, on the cubic through the values
-    and slopes at its ends.
+    """Return where a velocity rises through zero in each step, by a cubic.
 
     After a fall within the same step too: a low bounce may be shorter than a step.
 

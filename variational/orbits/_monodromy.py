@@ -24,18 +24,28 @@ def monodromy(
     method: Method = "product",
     settings: Settings | None = None,
 ) -> Float[Array, "n n"]:
-    """The monodromy matrix: state after one period by state at its start.
+    """Return the monodromy matrix: derivative of the state after one period.
 
     Args:
+        system: The system.
         orbit: From [`variational.orbit_of`][] or `continuation.periodic_orbit`.
         method: "product" multiplies the transition matrices of the flights and the
             saltation matrices of the recorded events; "flow" differentiates the event
-            loop. The first is right at every impact speed, the second loses one digit
-            for each of the impact speed, because it has to find the impacts again.
-        settings: Accuracy of "flow"; a tolerance of 1e-12 by default.
+            loop. The first is accurate at every impact speed; the second loses one
+            digit per decade of decreasing impact speed, because it has to locate the
+            impacts again.
+        settings: Accuracy of "flow"; default a tolerance of 1e-12.
 
     Returns:
         Shape `(n, n)`.
+
+    Examples:
+        >>> import continuation, variational
+        >>> from jaxcam.models import ImpactOscillator
+        >>> system = ImpactOscillator(omega=2.8, restitution=0.8, wall=-0.5)
+        >>> orbit = continuation.periodic_orbit(system, guess=[-0.8, 1.0])
+        >>> variational.monodromy(system, orbit).shape
+        (2, 2)
     """
     made = turn_derivative(system, orbit, method=method, settings=settings)
     return made.state
@@ -49,19 +59,32 @@ def turn_derivative(
     method: Method = "product",
     settings: Settings | None = None,
 ) -> TurnDerivative:
-    """Derivatives of a turn by state, period, phase and parameters.
+    """Return the derivatives of one period by state, period, phase and parameters.
+
+    The forcing's period does not follow the parameters: add `period` times its own
+    derivative where it should.
 
     Args:
+        system: The system.
+        orbit: The periodic orbit.
         where: Picks a parameter of the system, or several, as for
-            [`jaxcam.parameters.pick`][]; none by default.
-        ?- the others as for : - the others as for [`variational.monodromy`][].
+            [`jaxcam.parameters.pick`][]; default none.
+        method: As for [`variational.monodromy`][].
+        settings: Accuracy of "flow"; default a tolerance of 1e-12.
 
     Returns:
-        A [`variational.orbits.TurnDerivative`][]. The forcing's period does not follow
-            the parameters: add `period` times its own derivative where it should.
+        A [`variational.orbits.TurnDerivative`][].
 
     Raises:
-        ValueError: For another method.
+        ValueError: `method` is unknown.
+
+    Examples:
+        >>> import continuation, variational
+        >>> from jaxcam.models import ImpactOscillator
+        >>> system = ImpactOscillator(omega=2.8, restitution=0.8, wall=-0.5)
+        >>> orbit = continuation.periodic_orbit(system, guess=[-0.8, 1.0])
+        >>> variational.turn_derivative(system, orbit, "wall").parameters.shape
+        (2, 1)
     """
     if method not in ("product", "flow"):
         raise ValueError(f'method is {method!r}; choose "product" or "flow"')

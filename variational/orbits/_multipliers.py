@@ -8,12 +8,19 @@ from jaxtyping import Array, Complex, Float
 def eigenvalues(
     matrix: Float[Array, "n n"], determinant: Float[Array, ""] | None = None
 ) -> Complex[Array, " n"]:
-    """Eigenvalues of a real matrix, the largest modulus first.
+    """Return the eigenvalues of a real matrix, largest modulus first.
 
     Near grazing the entries grow like one over the impact speed while the determinant
-    stays as it is. For n = 2 the larger root of mu^2 - trace mu + det is computed
-    without cancellation and the smaller one as det over it, so that both are right
-    where `determinant` is known better than the entries give it.
+    stays bounded. For n = 2 the larger root of mu^2 - trace mu + det is computed
+    without cancellation and the smaller one as det over it, so that both are accurate
+    where `determinant` is known better than from the entries.
+
+    Args:
+        matrix: A real matrix, shape `(n, n)`.
+        determinant: Its determinant, if known more accurately.
+
+    Returns:
+        Shape `(n,)`, complex.
     """
     if matrix.shape[0] == 2:
         return _two(matrix, determinant)

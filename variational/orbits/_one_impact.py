@@ -15,22 +15,22 @@ _PHASES, _SPEEDS = 12, 8
 
 
 def one_impact_orbits(system: HybridSystem, state) -> list[ImpactOrbit]:
-    """Orbits that hit once in a period of the forcing, stable or not.
+    """Find the orbits with one impact per forcing period, stable or not.
 
-    Newton's method from a grid of impacts: phases over one period, and rebound speeds
-    around the one that a body thrown against the mean acceleration of contact needs to
-    return after one period.
+    Newton's method starts from a grid of impacts: phases over one period, and rebound
+    speeds around the one that a body thrown against the mean acceleration of contact
+    needs to return after one period.
 
-    **Arguments:** a system with a `period`, two states and one constraint, and a state
-    near its surface, shape `(2,)`.
+    Args:
+        system: A system with a `period`, two states and one constraint.
+        state: A state near its surface, shape `(2,)`.
 
     Returns:
-        Those whose flight stays clear of the constraint, with impacts in the first
-            period, in the order of the sum of their multipliers: a saddle comes last.
-            The list may be empty.
+        The admissible orbits, with impacts in the first period, in the order of the sum
+            of their multipliers, so that a saddle comes last. The list may be empty.
 
     Raises:
-        ValueError: For a system without a period.
+        ValueError: The system has no period.
     """
     if system.period is None:
         raise ValueError("One impact a period needs a system with a `period`.")

@@ -26,30 +26,44 @@ class Event(NamedTuple):
     """One event of an orbit: "impact", "stick" or "release", and which constraint."""
 
     kind: str
+    """"impact", "stick" or "release"."""
     constraint: int
+    """Index of the constraint."""
 
 
 class Orbit(eqx.Module):
-    """One period of a motion that repeats."""
+    """One period of a periodic motion.
+
+    Examples:
+        >>> from jaxcam.models import BouncingBall
+        >>> from variational import orbit_of
+        >>> orbit = orbit_of(BouncingBall(restitution=1.0), [9.81 / 8, 0.0], period=1.0)
+        >>> round(float(orbit.determinant), 6)
+        1.0
+    """
 
     state: Float[Array, " n"]
-    """(n,) state at `time`."""
+    """State at `time`, shape `(n,)`."""
     time: Float[Array, ""]
-    """S, where the turn starts."""
+    """Start of the period (s)."""
     period: Float[Array, ""]
-    """S, of the whole orbit: several periods of the forcing for a subharmonic."""
+    """Period of the orbit (s): several forcing periods for a subharmonic."""
     impacts: Impacts
+    """The impacts of one period."""
     contacts: Contacts
+    """The intervals of sustained contact in one period."""
     closure: Float[Array, ""]
-    """Largest deviation of the state after one period, as it was given."""
+    """Largest deviation of the given state after one period."""
     monodromy: Float[Array, "n n"]
-    """(n, n) derivative of the state after one period with respect to `state`."""
+    """Derivative of the state after one period with respect to `state`, shape `(n, n)`.
+    """
     determinant: Float[Array, ""]
-    """Its determinant, from flights and impacts one by one."""
+    """Determinant of the monodromy matrix, computed flight by flight and impact by
+    impact."""
     pieces: TurnPieces
-    """The turn cut at its events."""
+    """The period cut at its events."""
     sticks: bool = eqx.field(static=True)
-    """Whether there is contact in the turn."""
+    """Whether the orbit has sustained contact."""
 
     def __str__(self) -> str:
         return repr(self) if is_traced(self) else self._table().text()
@@ -81,7 +95,7 @@ class Orbit(eqx.Module):
 
     @property
     def multipliers(self) -> Complex[Array, " n"]:
-        """Floquet multipliers, the largest modulus first."""
+        """Floquet multipliers, largest modulus first, shape `(n,)`."""
         return eigenvalues(self.monodromy, self.determinant)
 
     @property
@@ -91,7 +105,7 @@ class Orbit(eqx.Module):
 
     @property
     def signature(self) -> tuple[Event, ...]:
-        """The events of the turn in order.
+        """Events of one period, in order.
 
         Of a completed chatter it lists the impacts up to the completion.
         """
@@ -107,27 +121,35 @@ def orbit_of(
     settings: Settings | None = None,
     closure: float = 1e-6,
 ) -> Orbit:
-    """The orbit through `state` at `t0`, from one run over its period.
+    """Return the periodic orbit through `state` at `t0`, from one run over its period.
 
-    The impacts of an orbit without contact are then improved as a boundary value
-    problem, so that they, and the multipliers, are right at every impact speed.
+    The impacts of an orbit without contact are then refined as a boundary value
+    problem, so that the impacts and the multipliers are accurate at every impact speed.
 
     Args:
-        state: Shape `(n,)`, of a motion that returns to it. At an impact it may be the
-            state before or after: the orbit then starts halfway through its first
+        system: The system.
+        state: A state to which the motion returns, shape `(n,)`. At an impact it may be
+            the state before or after; the orbit then starts halfway through its first
             flight, because the flow jumps at an impact and has no derivative from
             there.
-        period: s; the forcing's own without.
+        period: Period (s); default the forcing's own.
         t0: s.
-        settings: Accuracy of the run; a tolerance of 1e-12 by default.
-        closure: The deviation after one period that is allowed, relative to
+        settings: Accuracy of the run; default a tolerance of 1e-12.
+        closure: Deviation after one period that is allowed, relative to
             [`jaxcam.hybrid.sizes.component_sizes`][].
 
     Returns:
         A [`variational.Orbit`][] with its monodromy matrix.
 
     Raises:
-        ValueError: Where the run fails, or the state does not return.
+        ValueError: The run fails, or the state does not return.
+
+    Examples:
+        >>> from jaxcam.models import BouncingBall
+        >>> from variational import orbit_of
+        >>> orbit = orbit_of(BouncingBall(restitution=1.0), [9.81 / 8, 0.0], period=1.0)
+        >>> [event.kind for event in orbit.signature]
+        ['impact']
     """
     refuse_tracers("orbit_of", "jaxcam.hybrid.flow", system, state, period, t0)
     settings = Settings(tolerance=1e-12) if settings is None else settings

@@ -26,7 +26,7 @@ _ALLOWED = 1e-12
 
 
 def steps_for(system: HybridSystem, starts, ends) -> int:
-    """How many steps each of these flights needs for an error of about 1e-12.
+    """Return the number of steps of each flight for an error of about 1e-12.
 
     **Arguments:** times and states `(m, 1 + n)` at the starts, times `(m,)` of the
     ends.
@@ -57,14 +57,19 @@ def _errors(system, starts, ends, steps: int):
 def seed(
     system: HybridSystem, motion: "Trajectory | Orbit", periods: int
 ) -> tuple[Shooting, Float[np.ndarray, " u"]]:
-    """The equations of the orbit that one turn of a motion shows, and its unknowns.
+    """Return the equations of the orbit that one period of a motion shows, and the
+    unknowns.
 
     Args:
+        system: The system.
         motion: An orbit, or a run over one period of it, near it.
-        periods: The number of forcing periods in it; 0 without forcing.
+        periods: Number of forcing periods in it; 0 without forcing.
+
+    Returns:
+        The equations, and the unknowns, shape `(u,)`.
 
     Raises:
-        ValueError: Where the motion sticks, or hits nothing without forcing.
+        ValueError: The motion sticks, or has no impact and no forcing.
     """
     if int(motion.contacts.count):
         raise ValueError(

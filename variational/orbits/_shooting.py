@@ -27,19 +27,21 @@ from ._lowest_gap import gap_or_speed, lowest_times, nodes_of
 
 
 class Seen(NamedTuple):
-    """What decides whether a solution of the equations is an orbit, and its flights."""
+    """Admissibility of a solution of the shooting equations, and its flights."""
 
     gaps: Float[Array, " flights"]
-    """(m,) lowest gap inside each flight; of the whole turn without impacts."""
+    """Lowest gap inside each flight, or of the whole orbit without impacts, shape
+    `(m,)`."""
     speeds: Float[Array, " m"]
-    """(m,) approach speed of each impact, positive where it is physical."""
+    """Approach speed of each impact, positive where it is physical, shape `(m,)`."""
     error: Float[Array, ""]
     """Estimated error of the flights, relative to 1 + |x|."""
     gap_size: Float[Array, ""]
-    """What a gap is large or small beside, in its units."""
+    """Scale of the gaps, in their units."""
     times: Float[Array, "flights nodes"]
-    """(flights, 1 + steps) and (flights, 1 + steps, n) at the ends of all steps."""
+    """Times at the ends of all steps (s), shape `(flights, 1 + steps)`."""
     states: Float[Array, "flights nodes n"]
+    """States there, shape `(flights, 1 + steps, n)`."""
 
 
 class Shooting(eqx.Module):
@@ -48,11 +50,12 @@ class Shooting(eqx.Module):
     The unknowns u are, for each impact, its phase (time in forcing periods) and the
     state after it: shape `(m (1 + n),)`. Without impacts they are the state at time
     zero, shape `(n,)`. For a system without forcing the first phase is zero, its place
-    taken by the period (s), and phases count periods of the orbit.
+    is taken by the period (s), and phases count periods of the orbit (multiple
+    shooting; thesis, eq. 3.42).
     """
 
     constraints: tuple[int, ...] = eqx.field(static=True)
-    """Which constraint each impact hits, in order."""
+    """Constraint that each impact hits, in order."""
     periods: int = eqx.field(static=True)
     """Forcing periods until the orbit repeats; 0 for a system without forcing."""
     dimension: int = eqx.field(static=True)
@@ -61,7 +64,15 @@ class Shooting(eqx.Module):
     """Runge-Kutta steps of order eight in each flight."""
 
     def residual(self, u, system: HybridSystem) -> Float[Array, " u"]:
-        """Zero for an orbit: gap at each impact, and what its law misses."""
+        """Return the residual: gap at each impact, and the mismatch of its law.
+
+        Args:
+            u: Unknowns of the equations, shape `(u,)`.
+            system: The system.
+
+        Returns:
+            Shape `(u,)`, zero for an orbit.
+        """
         if not self.constraints:
             end = self.period(u, system)
             start = jnp.zeros_like(end)
@@ -77,13 +88,29 @@ class Shooting(eqx.Module):
         return jax.vmap(one)(ends, before, self.hit()).reshape(-1)
 
     def period(self, u, system: HybridSystem) -> Float[Array, ""]:
-        """Period of the orbit (s)."""
+        """Return the period of the orbit (s).
+
+        Args:
+            u: Unknowns of the equations, shape `(u,)`.
+            system: The system.
+
+        Returns:
+            A scalar.
+        """
         if self.periods == 0:
             return u[0]
         return jnp.asarray(self.periods * system.period, dtype=jnp.float64)
 
     def segments(self, u, system: HybridSystem):
-        """Starts and ends of the flights: times (s) and states, two `(m, 1 + n)`."""
+        """Return starts and ends of the flights: times (s) and states.
+
+        Args:
+            u: Unknowns of the equations, shape `(u,)`.
+            system: The system.
+
+        Returns:
+            Two arrays, `(m, 1 + n)` each.
+        """
         starts = u.reshape(len(self.constraints), 1 + self.dimension)
         if self.periods == 0:
             starts = starts.at[0, 0].set(0.0)
@@ -93,7 +120,15 @@ class Shooting(eqx.Module):
         return starts * scale[None, :], ends * scale[None, :]
 
     def flights(self, u, system: HybridSystem):
-        """Starts `(m, 1 + n)` and end times `(m,)` of all flights."""
+        """Return starts and end times of all flights.
+
+        Args:
+            u: Unknowns of the equations, shape `(u,)`.
+            system: The system.
+
+        Returns:
+            Starts `(m, 1 + n)` and end times `(m,)`.
+        """
         if self.constraints:
             starts, ends = self.segments(u, system)
             return starts, ends[:, 0]
@@ -101,17 +136,39 @@ class Shooting(eqx.Module):
         return start[None], self.period(u, system)[None]
 
     def hit(self) -> Int[Array, " m"]:
-        """Index of the constraint that ends each flight."""
+        """Return the index of the constraint that ends each flight.
+
+        Returns:
+            Shape `(m,)`.
+        """
         return jnp.asarray(self.constraints[1:] + self.constraints[:1])
 
     def arrivals(self, system: HybridSystem, starts, ends) -> Float[Array, "m n"]:
-        """States before the impacts that end the flights."""
+        """Return the states before the impacts that end the flights.
+
+        Args:
+            system: The system.
+            starts: Starts of the flights, `(m, 1 + n)`.
+            ends: End times, `(m,)` (s).
+
+        Returns:
+            Shape `(m, n)`.
+        """
         return jax.vmap(
             lambda a, b: flight_end(system, a[0], a[1:], b[0], steps=self.steps)
         )(starts, ends)
 
     def speeds(self, system: HybridSystem, ends, before) -> Float[Array, " m"]:
-        """Approach speeds from the states `before` the impacts at times `ends` (s)."""
+        """Return the approach speeds of the impacts.
+
+        Args:
+            system: The system.
+            ends: Times of the impacts, `(m,)` (s).
+            before: States before the impacts, `(m, n)`.
+
+        Returns:
+            Shape `(m,)`.
+        """
         found = jax.vmap(lambda t, x, which: -normal_velocity(system, t, x)[which])(
             ends, before, self.hit()
         )
@@ -121,9 +178,17 @@ class Shooting(eqx.Module):
     # -- admissibility
 
     def seen(self, u, system: HybridSystem) -> Seen:
-        """Lowest gaps, approach speeds and error, from one integration of the flights.
+        """Return lowest gaps, approach speeds and error, from one integration of the
+        flights.
 
-        For derivatives take `gap_or_speed`.
+        For derivatives use `gap_or_speed`.
+
+        Args:
+            u: Unknowns of the equations, shape `(u,)`.
+            system: The system.
+
+        Returns:
+            A [`variational.orbits.Seen`][].
         """
         starts, ends = self.flights(u, system)
 
@@ -143,19 +208,44 @@ class Shooting(eqx.Module):
         return Seen(lowest, speeds, jnp.max(wrong), size, times, states)
 
     def approach(self, u, system: HybridSystem) -> Float[Array, " m"]:
-        """Approach speed of each impact; differentiable."""
+        """Return the approach speed of each impact; differentiable.
+
+        Args:
+            u: Unknowns of the equations, shape `(u,)`.
+            system: The system.
+
+        Returns:
+            Shape `(m,)`.
+        """
         starts, ends = self.segments(u, system)
         return self.speeds(system, ends[:, 0], self.arrivals(system, starts, ends))
 
     def gap_or_speed(self, number, u, system: HybridSystem) -> Float[Array, ""]:
-        """The lowest gap of flight `number`, or from m on the speed of an impact;
-        differentiable."""
+        """Return the lowest gap of a flight or the speed of an impact; differentiable.
+
+        Args:
+            number: Index of the flight, or m plus the index of the impact.
+            u: Unknowns of the equations, shape `(u,)`.
+            system: The system.
+
+        Returns:
+            A scalar.
+        """
         starts, ends = self.flights(u, system)
         hit = self.hit() if self.constraints else None
         return gap_or_speed(system, starts, ends, number, hit, self.steps)
 
     def stroboscopic(self, u, system: HybridSystem, seen: Seen):
-        """States at time zero and each forcing period after it, `(periods, n)`."""
+        """Return the states at time zero and each forcing period after it.
+
+        Args:
+            u: Unknowns of the equations, shape `(u,)`.
+            system: The system.
+            seen: The flights, from `seen`.
+
+        Returns:
+            Shape `(periods, n)`.
+        """
         times, states = seen.times, seen.states
         length = self.periods * system.period
 

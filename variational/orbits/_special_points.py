@@ -1,4 +1,4 @@
-"""Where orbits of impacts appear, lose their stability or graze; where contact is lost.
+"""Compute special points of orbits with impacts: fold, flip, graze, detachment.
 
 Each point is the root of a smooth system of equations in which the parameter is one
 more unknown, so that it can be differentiated with respect to all the others.
@@ -21,12 +21,12 @@ from ._shooting import Shooting
 
 
 class SpecialPoint(eqx.Module):
-    """A value of the parameter at which something happens, and where it happens."""
+    """A special value of a parameter, and the orbit there."""
 
     parameter: Float[Array, ""]
     """Value of the parameter, in its own unit."""
     orbit: ImpactOrbit
-    """The impacts of the orbit, behind its graze if it has one; for a detachment the
+    """The impacts of the orbit, after its graze if it has one; for a detachment the
     time and state of the contact."""
 
 
@@ -56,14 +56,28 @@ def orbit_where(
     guess: ImpactOrbit,
     test: Callable[[Float[Array, "n n"]], Float[Array, ""]],
 ) -> SpecialPoint:
-    """The orbit, and the parameter, for which a function of the monodromy is zero.
+    """Find the parameter value for which a function of the monodromy matrix is zero.
 
-    **Arguments:** the system with the parameter near the point, `where` that picks the
-    parameter, the orbit near it, and `test(matrix)` with the matrix of
-    [`variational.orbits.orbit_monodromy`][].
+    Args:
+        system: The system, with the parameter near the point.
+        where: Picks the parameter.
+        guess: The orbit near the point.
+        test: Function of the matrix of [`variational.orbits.orbit_monodromy`][].
 
     Returns:
-        NaN where Newton's method does not converge.
+        The parameter and the orbit; NaN where Newton's method does not converge.
+
+    Examples:
+        >>> from jaxcam.models import ImpactOscillator
+        >>> from variational import orbit_trace, orbit_where
+        >>> from variational.orbits import one_impact_orbits
+        >>> system = ImpactOscillator(omega=2.8, restitution=0.8, wall=-0.5)
+        >>> orbit = one_impact_orbits(system, jnp.array([-0.5, 0.0]))[0]
+        >>> trace = orbit_trace(system, orbit)
+        >>> test = lambda matrix: jnp.trace(matrix) - trace
+        >>> point = orbit_where(system, lambda s: s.wall, orbit, test)
+        >>> round(float(point.parameter), 6)
+        -0.5
     """
     return _where(system, where, guess, lambda *orbit: test(monodromy_of(*orbit)))
 
@@ -71,7 +85,25 @@ def orbit_where(
 def fold_of_orbit(
     system: HybridSystem, where: Callable[[Any], Any], guess: ImpactOrbit
 ) -> SpecialPoint:
-    """The parameter at which a multiplier of the orbit is +1; see `orbit_where`."""
+    """Find the parameter value at which a multiplier of the orbit is +1.
+
+    Args:
+        system: The system, with the parameter near the fold.
+        where: Picks the parameter.
+        guess: The orbit near the fold.
+
+    Returns:
+        The parameter and the orbit; NaN where Newton's method does not converge.
+
+    Examples:
+        >>> from jaxcam.models import ImpactOscillator
+        >>> from variational import fold_of_orbit
+        >>> from variational.orbits import one_impact_orbits
+        >>> system = ImpactOscillator(omega=2.8, restitution=0.8, wall=0.0)
+        >>> orbit = one_impact_orbits(system, jnp.array([0.0, 0.0]))[0]
+        >>> fold_of_orbit(system, lambda s: s.wall, orbit).orbit.number
+        1
+    """
 
     def test(matrix):
         return jnp.linalg.det(matrix - jnp.eye(matrix.shape[0]))
@@ -82,7 +114,25 @@ def fold_of_orbit(
 def flip_of_orbit(
     system: HybridSystem, where: Callable[[Any], Any], guess: ImpactOrbit
 ) -> SpecialPoint:
-    """The parameter at which a multiplier of the orbit is -1; see `orbit_where`."""
+    """Find the parameter value at which a multiplier of the orbit is -1.
+
+    Args:
+        system: The system, with the parameter near the flip.
+        where: Picks the parameter.
+        guess: The orbit near the flip.
+
+    Returns:
+        The parameter and the orbit; NaN where Newton's method does not converge.
+
+    Examples:
+        >>> from jaxcam.models import ImpactOscillator
+        >>> from variational import flip_of_orbit
+        >>> from variational.orbits import one_impact_orbits
+        >>> system = ImpactOscillator(omega=2.8, restitution=0.8, wall=0.0)
+        >>> orbit = one_impact_orbits(system, jnp.array([0.0, 0.0]))[0]
+        >>> flip_of_orbit(system, lambda s: s.wall, orbit).orbit.number
+        1
+    """
 
     def test(matrix):
         return jnp.linalg.det(matrix + jnp.eye(matrix.shape[0]))
@@ -93,22 +143,34 @@ def flip_of_orbit(
 def graze_of_orbit(
     system: HybridSystem, where: Callable[[Any], Any], guess: ImpactOrbit
 ) -> SpecialPoint:
-    """The parameter at which a periodic orbit grazes, differentiable in all others.
+    """Find the parameter value at which a periodic orbit grazes.
 
-    A graze is an impact without speed. The square root of a grazing bifurcation is in
-    the orbits behind it, not in the graze.
+    The value is differentiable in all other parameters. A graze is an impact without
+    speed; the square root of a grazing bifurcation is in the orbits behind it, not in
+    the graze. Whether the gap has a minimum there, not a maximum, and is open elsewhere
+    is not checked; see [`jaxcam.hybrid.surface.normal_acceleration`][].
 
     Args:
-        system: Near the graze; `where` picks the parameter.
+        system: The system, with the parameter near the graze.
+        where: Picks the parameter.
         guess: The graze first, then the impacts of the orbit in the order in which they
             follow it, up to one period later; the graze alone for an orbit without
             impacts. Its `constraints` say which constraint is touched, and which are
             hit.
 
     Returns:
-        The orbit begins with the graze. NaN where Newton's method does not converge.
-            That the gap has a minimum there, not a maximum, and is open elsewhere is
-            not looked at; see [`jaxcam.hybrid.surface.normal_acceleration`][].
+        The parameter and the orbit, which begins with the graze; NaN where Newton's
+            method does not converge.
+
+    Examples:
+        >>> from jaxcam.models import ImpactOscillator
+        >>> from variational import graze_of_orbit
+        >>> from variational.orbits import ImpactOrbit
+        >>> system = ImpactOscillator(omega=2.0, wall=0.3)
+        >>> guess = ImpactOrbit(jnp.array([1.6]), jnp.array([[0.33, 0.0]]))
+        >>> point = graze_of_orbit(system, lambda s: s.wall, guess)
+        >>> round(float(point.parameter), 6)
+        0.333333
     """
 
     def speed(shooting, u, system):
@@ -125,16 +187,28 @@ def detachment(
     *,
     constraint: int = 0,
 ) -> SpecialPoint:
-    """The parameter at which sustained contact is lost for the first time.
+    """Find the parameter value at which sustained contact is first lost.
 
-    There the acceleration that contact suppresses touches zero: gap, normal velocity,
-    acceleration and jerk vanish together. (2.30)-(2.32)
+    The acceleration that contact suppresses touches zero there: gap, normal velocity,
+    acceleration and jerk vanish together (thesis, eqs. 2.30-2.32).
 
-    **Arguments:** the system near the detachment, `where` that picks the parameter, and
-    time (s) and state near the weakest contact, shape `(2,)`.
+    Args:
+        system: The system, with the parameter near the detachment.
+        where: Picks the parameter.
+        t: Time near the weakest contact (s).
+        state: State near the weakest contact, shape `(2,)`.
+        constraint: Index of the constraint.
 
     Returns:
-        NaN where Newton's method does not converge.
+        The parameter, time and state; NaN where Newton's method does not converge.
+
+    Examples:
+        >>> from jaxcam.models import ImpactOscillator
+        >>> from variational import detachment
+        >>> system = ImpactOscillator(omega=1.0, wall=-0.9)
+        >>> point = detachment(system, lambda s: s.wall, 3.1, jnp.array([-0.9, 0.0]))
+        >>> round(float(point.parameter), 6)
+        -1.0
     """
 
     def residual(unknowns):
@@ -149,10 +223,27 @@ def detachment(
 def release_near(
     system: HybridSystem, t, state: Float[Array, " 2"], *, constraint: int = 0
 ) -> tuple[Float[Array, ""], Float[Array, " 2"]]:
-    """Time (s) and state of the release from contact near `t` and `state`.
+    """Return time and state of the release from contact near `t` and `state`.
 
-    The root of gap, normal velocity and acceleration, differentiable in all parameters.
-    [`jaxcam.hybrid.surface.release_point`][] finds a place to start from.
+    It is the root of gap, normal velocity and acceleration, differentiable in all
+    parameters. [`jaxcam.hybrid.surface.release_point`][] finds a place to start from.
+
+    Args:
+        system: The system.
+        t: Time near the release (s).
+        state: State near the release, shape `(2,)`.
+        constraint: Index of the constraint.
+
+    Returns:
+        Time of release (s) and state there, shape `(2,)`.
+
+    Examples:
+        >>> from jaxcam.models import ImpactOscillator
+        >>> from variational import release_near
+        >>> system = ImpactOscillator(omega=1.0, wall=0.5)
+        >>> time, _ = release_near(system, 1.0, jnp.array([0.5, 0.0]))
+        >>> round(float(time), 6)
+        1.047198
     """
 
     def residual(unknowns):

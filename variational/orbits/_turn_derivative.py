@@ -1,4 +1,4 @@
-"""What the state at the end of a turn depends on, from its pieces."""
+"""Compute the derivatives of the state at the end of a period, from its pieces."""
 
 from collections.abc import Callable
 
@@ -16,23 +16,24 @@ from ._product import product_of, with_all_constraints
 
 
 class TurnDerivative(eqx.Module):
-    """How the state at the end of a turn depends on what it started with."""
+    """Derivatives of the state at the end of one period."""
 
     state: Float[Array, "n n"]
-    """(n, n) by the state at the start: the monodromy matrix of a periodic orbit."""
+    """By the state at the start, shape `(n, n)`: the monodromy matrix of a periodic
+    orbit."""
     period: Float[Array, " n"]
-    """(n,) by the period, that is, by the time at which the turn ends."""
+    """By the period, that is, by the time at which it ends, shape `(n,)`."""
     phase: Float[Array, " n"]
-    """(n,) by the time of the start, at the same length."""
+    """By the time of the start, at the same length, shape `(n,)`."""
     parameters: Float[Array, "n q"]
-    """(n, q) by the parameters picked, at the same times."""
+    """By the parameters picked, at the same times, shape `(n, q)`."""
     determinant: Float[Array, ""]
-    """Determinant of `state`; zero where the turn sticks."""
+    """Determinant of `state`; zero where the motion sticks."""
     condition: Float[Array, ""]
-    """The relative error of `state` that a relative error of one in each flight and
-    each saltation matrix makes."""
+    """Relative error of `state` per relative error in each flight and saltation matrix.
+    """
     sticks: bool = eqx.field(static=True)
-    """Whether there is contact in the turn, which forgets what came before."""
+    """Whether there is sustained contact, which forgets the past."""
 
 
 def picked(system, where: Pick | None) -> Float[Array, " q"]:

@@ -1,4 +1,4 @@
-"""How sure a verdict is: bootstrap, held-out records, what is left over, limits."""
+"""Assess a verdict: bootstrap, held-out records, residual structure, limits."""
 
 from ._choice import Choice as Choice, choose as choose, Outside as Outside
 from ._held_out import HeldOut as HeldOut, rms_of as rms_of

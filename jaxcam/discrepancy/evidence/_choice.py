@@ -36,7 +36,7 @@ class Outside(NamedTuple):
 
 @dataclasses.dataclass(frozen=True)
 class Choice:
-    """What a search ended with, and the evidence for it.
+    """The result of a search, and the evidence for it.
 
     - `found`: the best subset; `best`: the part of it that is named; `before`: no term,
         the parameters of the rig held within their tolerances.

@@ -1,4 +1,4 @@
-"""How sure a named term is: the bootstrap of blocks of the records."""
+"""Assess a named term by a block bootstrap of the records."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -48,7 +48,7 @@ def _size(trials: Trials, best: Trial, name: str, deviation) -> float:
 
 
 class Needs(NamedTuple):
-    """What parts of a model are needed, by the redrawn sets and by all data.
+    """The parts of a model that are needed, by the bootstrap samples and by all data.
 
     - `inclusion`: share of the redrawn sets that would keep a part.
     - `deviation`: of each free parameter, over the redrawn sets.
@@ -139,7 +139,7 @@ def _inside(found: Fit) -> list[str]:
 
 
 def _lost(information, score, value, free, gone, top: float) -> float:
-    """What is lost where some strengths are zero and all else is fitted again."""
+    """Return the loss when some strengths are zero and all else is fitted again."""
     step = np.zeros(len(value))
     step[gone] = -value[gone]
     lost = step @ information @ step - 2 * step @ score

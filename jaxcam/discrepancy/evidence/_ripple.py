@@ -24,18 +24,16 @@ _TINY = 1e-300
 
 @dataclasses.dataclass(frozen=True)
 class Ripple:
-    """Ripple of the speed once a turn: `eps` and `psi` (rad) with their errors.
-
-    - `gain`: growth of twice the log-likelihood, over what leakage explains.
-    - `p_value`: of no ripple. `count`: samples. `per_record`: eps of each record.
-    """
+    """Ripple of the speed once a turn: `eps` and `psi` (rad) with their errors."""
 
     eps: float
     eps_stderr: float
     psi: float
     psi_stderr: float
     gain: float
+    """Growth of twice the log-likelihood, over what leakage explains."""
     p_value: float
+    """Of no ripple. `count`: samples. `per_record`: eps of each record."""
     count: int
     dispersion: float
     per_record: dict[str, tuple[float, float]]

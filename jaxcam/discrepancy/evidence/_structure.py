@@ -1,4 +1,4 @@
-"""What a fit leaves over: shapes that would still gain, and where they live."""
+"""Analyse the residual of a fit: shapes that would still gain, and their location."""
 
 import dataclasses
 import enum
@@ -34,7 +34,7 @@ _TINY = 1e-300
 
 
 class Form(enum.StrEnum):
-    """How a structure is looked for; equal to its name as a string."""
+    """The form in which a structure is sought; equal to its name as a string."""
 
     TERM = "term"
     FUNCTION = "function"
@@ -44,40 +44,39 @@ class Form(enum.StrEnum):
 
 @dataclasses.dataclass(frozen=True)
 class Structure:
-    """One way in which what is left over might not be noise.
-
-    - `gain`: growth of twice the log-likelihood; `threshold`: what chance and the
-        number of parameters would demand.
-    - `predicted_gain`: growth in half of the records with what the other half says,
-        where `gain` is above its threshold; negative for what differs from record to
-        record.
-    - `variable`, `grid`, `value`, `stderr` `(k,)`: the shape, where there is one;
-        `quantity` is what its value is.
-    - `form`: an unlisted term, a free function, a vibration, or residuals that are
-        correlated in time.
-    """
+    """One way in which what is left over might not be noise."""
 
     name: str
     sentence: str
     where: str
     region: str
     gain: float
+    """Growth of twice the log-likelihood; `threshold`: what chance and the number of
+    parameters would demand."""
     threshold: float
     count: int
     unit: str = ""
     variable: str = ""
+    """The shape, where there is one; `quantity` is what its value is."""
     grid: Float[np.ndarray, " k"] = dataclasses.field(
         default_factory=lambda: np.zeros(0)
     )
+    """The shape, where there is one; `quantity` is what its value is."""
     value: Float[np.ndarray, " k"] = dataclasses.field(
         default_factory=lambda: np.zeros(0)
     )
+    """The shape, where there is one; `quantity` is what its value is."""
     stderr: Float[np.ndarray, " k"] = dataclasses.field(
         default_factory=lambda: np.zeros(0)
     )
+    """The shape, where there is one; `quantity` is what its value is."""
 
     predicted_gain: float = math.inf
+    """Growth in half of the records with what the other half says, where `gain` is
+    above its threshold; negative for what differs from record to record."""
     form: Form = Form.FUNCTION
+    """An unlisted term, a free function, a vibration, or residuals that are correlated
+    in time."""
     quantity: str = ""
 
     @property
@@ -86,7 +85,7 @@ class Structure:
 
     @property
     def place(self) -> str:
-        """Where the shape is largest in units of its error."""
+        """Return the place at which the shape is largest in units of its error."""
         if not len(self.grid):
             return self.region
         score = np.abs(self.value) / np.maximum(self.stderr, _TINY)
@@ -179,7 +178,7 @@ def _shape(
     seen: VisitedStates,
     policy: Policy,
 ) -> dict[str, Any]:
-    """What a shape looks like, once it is fitted."""
+    """Return a fitted shape as a function."""
     if not isinstance(term, Shape):
         return {}
     both = np.union1d(free, own)

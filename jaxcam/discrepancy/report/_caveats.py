@@ -1,4 +1,4 @@
-"""What a reader must know of a verdict before it is believed."""
+"""Caveats that a reader must know before relying on a verdict."""
 
 import dataclasses
 import enum
@@ -10,7 +10,7 @@ from ._words import listed, number, quantity
 
 
 class Reason(enum.StrEnum):
-    """Why there is a caveat; equal to its name as a string."""
+    """The reason of a caveat; equal to its name as a string."""
 
     SMALL_REMAINDER = "small remainder"
     IN_DOUBT = "in doubt"
@@ -28,14 +28,12 @@ class Reason(enum.StrEnum):
 
 @dataclasses.dataclass(frozen=True)
 class Caveat:
-    """One reservation about a verdict.
-
-    - `reason`: a `Reason`. `terms`: names of those it is about, if any.
-    - `sentence`: in words, also by `str`.
-    """
+    """One reservation about a verdict."""
 
     reason: Reason
+    """A `Reason`. `terms`: names of those it is about, if any."""
     sentence: str
+    """In words, also by `str`."""
     terms: tuple[str, ...] = ()
 
     def __str__(self) -> str:
@@ -180,7 +178,9 @@ def _named_in_doubt(trials: Trials, name: str, share: float) -> Caveat:
 
 
 def _against(trials: Trials, share: float) -> str:
-    """What speaks against a term that gains in a share of the bootstrap samples."""
+    """Return the evidence against a term that gains in a share of the bootstrap
+    samples.
+    """
     if share >= trials.policy.sure:
         return "its strength varies so much between stretches that it might be zero"
     return f"it gains in {share:.0%} of the redrawn sets of stretches only"

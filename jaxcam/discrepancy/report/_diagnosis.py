@@ -1,4 +1,4 @@
-"""What was found: the verdict, its evidence, and how it is written down."""
+"""The result of a diagnosis: verdict, evidence, and how it is written."""
 
 import dataclasses
 import enum
@@ -18,7 +18,7 @@ from ._words import number
 
 
 class Verdict(enum.StrEnum):
-    """What a diagnosis says; equal to its name as a string."""
+    """The verdict of a diagnosis; equal to its name as a string."""
 
     EFFECT = "effect"
     NONE = "none"
@@ -40,30 +40,28 @@ class Alternative(NamedTuple):
 
 @dataclasses.dataclass(frozen=True)
 class Effect:
-    """One thing that the model lacks.
-
-    - `parameters`: its numbers. `where`: `"flight"`, `"impact"`, `"contact"`, `"drive"`
-        or `"sensor"`; `region` in words; `records` in which it can be seen.
-    - `term`: whether it is one that has a name; otherwise it is the unknown.
-    - `delta_bic`: of the model with it, less that of the model without it.
-    - `heldout_gain_nats`: log-likelihood gained on data that no parameter has seen.
-    - `inclusion`: part of the redrawn data sets in which it would be named; `None`
-        where that was not asked, of what is unknown and has no function.
-    - `share`: part of what is missing that it explains; `None` for the drive, which is
-        judged by its own channel. Of what is unknown, the part that nothing explains.
-    """
+    """One thing that the model lacks."""
 
     name: str
     sentence: str
     parameters: dict[str, Value]
+    """Its numbers. `where`: `"flight"`, `"impact"`, `"contact"`, `"drive"` or
+    `"sensor"`; `region` in words; `records` in which it can be seen."""
     where: str
     region: str
     records: tuple[str, ...]
     delta_bic: float
+    """Of the model with it, less that of the model without it."""
     heldout_gain_nats: float
+    """Log-likelihood gained on data that no parameter has seen."""
     inclusion: float | None
+    """Part of the redrawn data sets in which it would be named; `None` where that was
+    not asked, of what is unknown and has no function."""
     term: bool = True
+    """Whether it is one that has a name; otherwise it is the unknown."""
     share: float | None = None
+    """Part of the misfit that it explains; of what is unknown, the part that nothing
+    explains. `None` for the drive, which is judged by its own channel."""
 
     def to_json(self) -> dict[str, Any]:
         return {
@@ -87,52 +85,56 @@ class Effect:
 
 @dataclasses.dataclass(frozen=True, repr=False)
 class Diagnosis:
-    """The answer to: what physics did the model leave out?
-
-    - `verdict`: a `Verdict`: `"effect"`, `"none"` or `"unknown"`.
-    - `effects`: what is missing.
-    - `alternatives`: other subsets, each an `Alternative`, the best first.
-    - `heldout_before`, `heldout_after`, `noise_floor`: rms of the residuals (`unit`) on
-        stretches that no parameter has seen, one flight ahead.
-    - `rig`: fitted parameters with what is missing in the model.
-    - `before`, `after`: the fits of the textbook model and of the one chosen.
-    - `left_before`, `left_after`: shapes that the residuals were asked for.
-    - `unseen`: residuals of both on stretches not seen.
-    - `ripple`: of the drive. `pulls`: how far each parameter went without the effects,
-        held within the tolerances, and with them, in tolerances. `limits`: least
-        strength of each term that would have been named. `hides`: the parameter that
-        would take up most of each term.
-    - `caveats`: each a `Caveat`, a reason with its sentence.
-    - `policy`: by which it was decided.
-    - `missing`: what has no name, as functions that were fitted with the rig; `after`
-        is the model with them.
-    - `misfit`: shares of what the textbook model leaves unexplained that are in
-        `"flight"`, at an `"impact"` and in `"contact"`; empty where it is noise.
-    """
+    """The answer to: what physics did the model leave out?"""
 
     case: str
     verdict: Verdict
+    """A `Verdict`: `"effect"`, `"none"` or `"unknown"`."""
     effects: tuple[Effect, ...]
+    """What is missing."""
     alternatives: tuple[Alternative, ...]
+    """Other subsets, each an `Alternative`, the best first."""
     heldout_before: float
+    """Rms of the residuals (`unit`) on stretches that no parameter has seen, one flight
+    ahead."""
     heldout_after: float
+    """Rms of the residuals (`unit`) on stretches that no parameter has seen, one flight
+    ahead."""
     noise_floor: float
+    """Rms of the residuals (`unit`) on stretches that no parameter has seen, one flight
+    ahead."""
     unit: str
     rig: dict[str, Value]
+    """Fitted parameters with what is missing in the model."""
     summary: str
     before: Fit
+    """The fits of the textbook model and of the one chosen."""
     after: Fit
+    """The fits of the textbook model and of the one chosen."""
     left_before: tuple[Structure, ...]
+    """Shapes that the residuals were asked for."""
     left_after: tuple[Structure, ...]
+    """Shapes that the residuals were asked for."""
     unseen: tuple[list[Residuals], list[Residuals]]
+    """Residuals of both on stretches not seen."""
     ripple: Ripple | None
+    """Of the drive. `pulls`: how far each parameter went without the effects, held
+    within the tolerances, and with them, in tolerances. `limits`: least strength of
+    each term that would have been named. `hides`: the parameter that would take up most
+    of each term."""
     pulls: dict[str, tuple[float, float]]
     limits: dict[str, Value]
     hides: dict[str, str]
     caveats: tuple[Caveat, ...]
+    """Each a `Caveat`, a reason with its sentence."""
     policy: Policy = Policy()
+    """By which it was decided."""
     missing: tuple[MissingFunction, ...] = ()
+    """What has no name, as functions that were fitted with the rig; `after` is the
+    model with them."""
     misfit: dict[str, float] = dataclasses.field(default_factory=dict)
+    """Shares of what the textbook model leaves unexplained that are in `"flight"`, at
+    an `"impact"` and in `"contact"`; empty where it is noise."""
 
     def __repr__(self) -> str:
         return self._table().text()

@@ -1,4 +1,4 @@
-"""What is reported of an effect: its numbers, where it is seen, and the evidence."""
+"""Report an effect: its numbers, its location, and the evidence."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -55,7 +55,9 @@ def missing_effects(
     choice: Choice,
     divided: Shares,
 ) -> list[Effect]:
-    """What has no name, all functions together, and the terms named beside it."""
+    """Return the effects without a name, all functions together, and the named
+    terms.
+    """
     fitted, held, policy = missing.fit, choice.held.total, trials.policy
     blocks = blocks_of(fitted.problem, fitted.point, names=fitted.free)
     labels = [one.label for one in missing.functions]
@@ -170,7 +172,11 @@ def drive_effect(ripple: Ripple, policy: Policy) -> Effect:
 
 
 def unknown_effect(trials: Trials, choice: Choice, share: float) -> Effect:
-    """What is left over and has no name; `share` of what is missing."""
+    """Return the effect of the residual structure that has no name.
+
+    Args:
+        share: Part of the misfit that nothing explains.
+    """
     first, problem = choice.unexplained[0], trials.problem
     return Effect(
         Verdict.UNKNOWN,

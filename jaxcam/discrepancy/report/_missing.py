@@ -33,7 +33,7 @@ _ARGUMENT_NAMES = {Variable.APPROACH: "speed"}
 
 @dataclasses.dataclass(frozen=True)
 class MissingFunction:
-    """What has no name: a function that was fitted together with the rig.
+    """A missing force without a name: a function that was fitted together with the rig.
 
     - `kind`: `"force"`, what is to be added to the acceleration; `"restitution"`, what
         the coefficient is to be multiplied with; `"surface"` and `"sensor"`, what is to
@@ -147,7 +147,7 @@ def _unit(family: Family) -> str:
 
 
 def _words(family: Family, kind: str, along, value, error) -> str:
-    """What a function is and where it is largest beside its error."""
+    """Describe a function, and where it is largest compared with its error."""
     of = " and ".join(family.arguments)
     if family.factor is Factor.VELOCITY:
         what = f"damping that depends on the {family.argument}"

@@ -69,7 +69,7 @@ def summary_of_functions(
     floor: float,
     unit: str,
 ) -> str:
-    """What has no name, what stands beside it, and by how much the fit improves.
+    """Summarise functions without a name, the named terms, and the gain of the fit.
 
     **Arguments:** the functions, all effects, stretches that were not seen, what is
     left in units of the noise, the noise and its unit.

@@ -211,7 +211,7 @@ def _rig_values(
 def _pulls(
     question: Question, within: Fit, best: Fit
 ) -> dict[str, tuple[float, float]]:
-    """How far parameters went from nominal, without and with the terms."""
+    """Return the distances of parameters from nominal, without and with the terms."""
     found, problem = {}, question.problem
     for name in question.rig:
         place = problem.names.index(name)

@@ -1,4 +1,4 @@
-"""What records say of parameters about a point, block by block."""
+"""Linearise the records about a point, block by block."""
 
 import dataclasses
 from collections.abc import Sequence

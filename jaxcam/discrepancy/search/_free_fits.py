@@ -18,7 +18,7 @@ from ._slots import filled, Free
 
 
 class Missing(NamedTuple):
-    """What was found: `functions` and `names` of terms, fitted together with the rig.
+    """The result: `functions` and `names` of terms, fitted together with the rig.
 
     - `score`: minus twice the logarithm of the evidence (the BIC where there is no
         function).
@@ -33,7 +33,7 @@ class Missing(NamedTuple):
 
 
 class Subset(NamedTuple):
-    """What is to be fitted: functions and names of terms in a problem."""
+    """A subset to fit: functions and names of terms in a problem."""
 
     problem: Problem
     functions: tuple[Free, ...]
@@ -149,7 +149,7 @@ class FreeFits:
         return own
 
     def prices(self, found: Missing) -> dict[str, float]:
-        """What each term and function of a fit must gain to be worth its freedom."""
+        """Return the gain that each term and function of a fit must exceed."""
         heat = heat_of(found.fit)
         number = heat * math.log(found.problem.samples)
         prices = {

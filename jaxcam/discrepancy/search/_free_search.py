@@ -142,7 +142,7 @@ class FreeSearch:
         return heat_of(best.fit) < self.policy.as_noise and not close
 
     def _small(self, found: Missing) -> float:
-        """What may be left over of what was explained."""
+        """Return the tolerated residual gain, given the explained one."""
         return self.policy.small * max(self.cost - found.fit.cost, 0.0)
 
     def _least(self) -> float:
@@ -152,7 +152,9 @@ class FreeSearch:
         return (math.sqrt(least) + self.policy.beyond) ** 2
 
     def _leads(self, problem: Problem, found: Missing, apart: bool) -> list[_Lead]:
-        """What promises most, by a quadratic likelihood about a fit."""
+        """Return the most promising candidate, by a quadratic likelihood about a
+        fit.
+        """
         self.progress("looking for functions of what is left over", None)
         policy = self.policy
         heat = heat_of(found.fit)
@@ -292,7 +294,7 @@ class FreeSearch:
         return self.fits.fitted(*self._without(found, labels.get(label, label)))
 
     def _without(self, found: Missing, out: Free | str) -> tuple[Subset, Point]:
-        """What is left without a function or a term, and where to fit it from."""
+        """Return the subset without a function or a term, and a start for its fit."""
         functions = tuple(f for f in found.functions if f is not out)
         names = found.names - {out} if isinstance(out, str) else found.names
         values = found.fit.point.values

@@ -1,4 +1,4 @@
-"""What freeing parameters gains, by a quadratic likelihood."""
+"""Compute the gain of freeing parameters, by a quadratic likelihood."""
 
 import numpy as np
 

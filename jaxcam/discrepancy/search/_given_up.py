@@ -1,4 +1,4 @@
-"""When a fit is given up: it crawls far from the data, or is late.
+"""Stop a fit early: it makes little progress far from the data, or is late.
 
 Without the right term a fit may find no end of small steps, in a valley that leads
 nowhere; the right one needs a few large ones.
@@ -16,7 +16,7 @@ def given_up(
     beaten: float = math.inf,
     decides: float = -math.inf,
 ) -> Callable[[Sequence[float]], bool]:
-    """What tells `jaxcam.fitting.fit` to stop.
+    """Return the callback that tells `jaxcam.fitting.fit` to stop.
 
     A fit is late where it has not beaten a cost after so many attempts; it crawls where
     it explains little and its last steps took many attempts and gained next to nothing.

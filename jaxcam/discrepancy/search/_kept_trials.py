@@ -31,7 +31,7 @@ _BROKEN = (
 
 
 class Ended(NamedTuple):
-    """Where a fit ended, whether at an optimum, and after how many iterations."""
+    """The end of a fit, whether at an optimum, and after how many iterations."""
 
     point: Point
     converged: bool
@@ -39,7 +39,7 @@ class Ended(NamedTuple):
 
 
 class KeptTrials:
-    """Where the fit of each subset of terms ended, one small file a subset.
+    """The results of the fits of each subset of terms, one small file per subset.
 
     A file counts only for the same recordings, parameters, rig and policy; one that was
     cut off while it was written, or that belongs to another problem, is passed over.
@@ -51,7 +51,7 @@ class KeptTrials:
         self.folder, self.mark = folder, _mark_of(problem, policy)
 
     def get(self, names: Iterable[str]) -> Ended | None:
-        """Where a fit ended, or `None`."""
+        """Return the end of a fit, or `None`."""
         try:
             with (
                 self._file(names).open("rb") as stream,

@@ -52,7 +52,7 @@ class LocalForce(Term):
 
 
 class Response(NamedTuple):
-    """What the pieces of all records say of a force at their nodes.
+    """The response of the pieces of all records to a force at their nodes.
 
     - `point`: about which; `free`: names of the parameters that are free.
     - `pieces`: `LinearPieces` with `n` columns for the state, `m` for the parameters

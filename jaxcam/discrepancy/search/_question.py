@@ -1,4 +1,4 @@
-"""What is asked: recordings, and a system with terms inside it."""
+"""The question: recordings, and a system with terms inside it."""
 
 import dataclasses
 import math
@@ -19,7 +19,7 @@ Report = Callable[[str, float | None], None]
 
 
 class Shown(NamedTuple):
-    """How a fitted parameter is reported: divided by something, with another name."""
+    """The report of a fitted parameter: divided by a constant, with another name."""
 
     name: str
     divisor: float

@@ -1,4 +1,4 @@
-"""How rough a free function is: by the marginal likelihood of its coefficients."""
+"""Choose the roughness of a free function by its marginal likelihood."""
 
 import math
 from typing import NamedTuple
@@ -12,7 +12,7 @@ from ..terms import Family
 
 
 class Roughness(NamedTuple):
-    """What prior suits a function best.
+    """The prior that suits a function best.
 
     - `gain`: twice the logarithm of the marginal likelihood, less that of no function.
     - `length`: of correlation. `size`: standard deviation of the function.
@@ -61,7 +61,9 @@ def roughness(
 def occam(
     information, free, own, spread: Float[np.ndarray, " k"], alike: float
 ) -> float:
-    """What the freedom of a function costs: `log det(1 + S A S)` for prior errors S."""
+    """Return the Occam factor of a function: `log det(1 + S A S)` for prior errors
+    S.
+    """
     inside, _ = beside(information, np.zeros(len(information)), free, own, alike)
     values = np.linalg.eigvalsh(inside * np.outer(spread, spread))
     return float(np.sum(np.log1p(np.maximum(values, 0.0))))

@@ -13,7 +13,9 @@ from ._vibration_scan import Periodogram
 
 
 class Search:
-    """Which subsets are tried, and in what order: never by the greatest gain alone."""
+    """The search over subsets: in which order they are tried, not by greatest gain
+    alone.
+    """
 
     def __init__(self, trials: Trials):
         self.trials, self.policy = trials, trials.policy
@@ -173,7 +175,7 @@ class Search:
         return [names for _, names in found[: self.policy.tried]]
 
     def _promises(self, trial: Trial, scan: Periodogram) -> dict[frozenset[str], float]:
-        """What the scores say of each further term: the BIC it would lead to."""
+        """Return the BIC that each further term promises, by its score."""
         blocks = self.trials.blocks(trial)
         information, score = blocks.total()
         free = blocks.rows(self.trials.parameters(trial.names))

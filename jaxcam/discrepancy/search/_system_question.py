@@ -41,7 +41,7 @@ _RESOLVED = 0.3
 
 @dataclasses.dataclass(frozen=True)
 class _OfBase:
-    """What picks a field out of the system that a `WithTerms` holds.
+    """A picker of a field of the system inside a `WithTerms`.
 
     Equal for equal picks, so that diagnoses of one rig share compiled programs.
     """
@@ -159,7 +159,7 @@ def system_question(
 
 
 def _drives(recordings: Sequence[Segments], channel: str | None) -> dict[str, Any]:
-    """What is asked of a drive, with the noise that its encoder shows."""
+    """Return the questions about a drive, with the noise of its encoder."""
     if channel is None:
         return {}
     runs = tuple(part.recording for part in recordings)

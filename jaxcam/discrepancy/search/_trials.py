@@ -223,7 +223,7 @@ class Trials:
         return predicted_gain(blocks, free, blocks.rows(added), self.policy) > 0
 
     def response(self, names: frozenset[str]) -> Response:
-        """What a force at any time would gain beside a fit."""
+        """Return the gain of a force at any time, in addition to a fit."""
         if names not in self._responses:
             point = self.known[names].fit.point
             free = self.parameters(names)

@@ -1,4 +1,4 @@
-"""What a fit without the missing terms makes of the rig, within its tolerances."""
+"""Report the fit without the missing terms, within the tolerances of the rig."""
 
 import dataclasses
 from collections.abc import Sequence

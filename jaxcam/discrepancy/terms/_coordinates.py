@@ -1,4 +1,4 @@
-"""Which components of a state are coordinates, and which are their velocities."""
+"""Tell which components of a state are coordinates, and which are velocities."""
 
 import jax
 import jax.numpy as jnp

@@ -19,7 +19,7 @@ _MARGIN = 0.15
 
 
 class Factor(enum.StrEnum):
-    """What a free function is multiplied with; equal to its name as a string."""
+    """The factor of a free function; equal to its name as a string."""
 
     ONE = "one"
     VELOCITY = "velocity"
@@ -50,7 +50,7 @@ class Family:
 
     @property
     def name(self) -> str:
-        """Where and what of, such as `flight position velocity`."""
+        """Return location and arguments, such as `flight position velocity`."""
         parts = [self.where, self.argument]
         if self.factor is not Factor.ONE:
             parts.append(self.factor)
@@ -116,7 +116,7 @@ class Family:
 def free_basis(
     family: Family, at: Float[np.ndarray, " n"], count: int
 ) -> Float[np.ndarray, "n count"]:
-    """What each coefficient of a function adds to it, without its factor."""
+    """Return the contribution of each coefficient of a function, without its factor."""
     rates, shifts = (np.asarray(x) for x in family.waves(count - 1))
     sines = np.sin(np.outer(at, rates) + shifts)
     jump = np.tanh(at / family.slip) if family.jumps else np.zeros(len(at))

@@ -24,8 +24,8 @@ from ._where import Where
 # Knots of the spline that stands for a function: two to the edge of a form, which is
 # smooth over a hundredth of the range
 _KNOTS = 256
-#: arguments in the order of the weights that pick one of them
 _ARGUMENTS = (Variable.POSITION, Variable.VELOCITY, Variable.PHASE, Variable.TIME)
+"""Arguments in the order of the weights that pick one of them."""
 _FACTORS = (Factor.ONE, Factor.VELOCITY, Factor.DIRECTION, Factor.DEFLECTION)
 
 
@@ -139,7 +139,7 @@ class FreeFunction(Term):
         )
 
     def place(self, argument) -> Place:
-        """What a form sees of an argument."""
+        """Return an argument in the scalings that a form uses."""
         width = self.high - self.low
         return Place(argument, (argument - self.low) / width, argument / width)
 
@@ -214,7 +214,7 @@ class FreeRestitution(FreeFunction):
 
 
 class FreeSurface(FreeFunction):
-    """How much higher the surface is."""
+    """A correction to the height of the surface."""
 
     name: ClassVar[str] = "free_surface"
 

@@ -314,18 +314,18 @@ def library(
 ) -> tuple[Term, ...]:
     """All terms that `diagnose` tries by default.
 
-    **Arguments:**
-
-    - `turned`: whether the system has a drive, without which no cam can be out of
-        round.
-    - `references`: constants of the forms, which belong to a rig (`rig.references`):
-        where a nonlinear spring is symmetric, at which speed a restitution is stated.
-    - `clocked`: whether anything happens at a known time, such as by a drive (the
-        default) or a measured input. Otherwise a lag is another beginning of time.
-    - `extended`: whether to add terms that most rigs have as parameters already, or
-        that take longer to look for: forces by position with an edge, friction that
-        differs by direction, speed or place, a restitution as a power. Their constants
-        come from the recordings.
+    Args:
+        turned: Whether the system has a drive, without which no cam can be out of
+            round.
+        references: Constants of the forms, which belong to a rig (`rig.references`):
+            where a nonlinear spring is symmetric, at which speed a restitution is
+            stated.
+        clocked: Whether anything happens at a known time, such as by a drive (the
+            default) or a measured input. Otherwise a lag is another beginning of time.
+        extended: Whether to add terms that most rigs have as parameters already, or
+            that take longer to look for: forces by position with an edge, friction that
+            differs by direction, speed or place, a restitution as a power. Their
+            constants come from the recordings.
     """
     slip = references.slip_speed
     found: list[Term] = [

@@ -16,7 +16,7 @@ _EDGE = 0.01
 
 
 class Place(NamedTuple):
-    """Where a form is evaluated.
+    """The arguments at which a form is evaluated.
 
     `x`: the argument; `u`: its share of the range, and `v`: the argument itself in
     ranges.
@@ -151,5 +151,5 @@ ON_A_LINE = (
 OF_SPEED = (FORWARD, FALLING)
 OF_PHASE = (*HARMONICS, HALF_TURN, ARC, BUMP_IN_TURN)
 
-#: all forms, in the order of their numbers in a compiled program
 PRIMITIVES = (*ON_A_LINE, *OF_SPEED, *OF_PHASE)
+"""All forms, in the order of their numbers in a compiled program."""

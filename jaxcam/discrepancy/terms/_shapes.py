@@ -24,7 +24,7 @@ _END = 1 - 1e-12
 
 
 class Variable(enum.StrEnum):
-    """What a free function depends on; equal to its name as a string."""
+    """An argument of a free function; equal to its name as a string."""
 
     POSITION = "position"
     VELOCITY = "velocity"

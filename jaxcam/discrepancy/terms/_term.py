@@ -24,7 +24,8 @@ _METHODS = {
 
 
 class Motion(NamedTuple):
-    """What a term sees: time (s), position, velocity, the drive, and the whole state.
+    """The motion as a term sees it: time (s), position, velocity, drive and whole
+    state.
 
     `position` and `velocity` are those of the term's `coordinate`. `phase` is the angle
     that the drive has turned (rad), or time itself without a drive; `rate` the drive's
@@ -41,8 +42,8 @@ class Motion(NamedTuple):
     pushed: Any = 0.0
 
 
-#: stands in units for that of the coordinate that a term acts on
 MOTION = "[q]"
+"""Stands in units for that of the coordinate that a term acts on."""
 
 
 # where a term acts is left out of files that do not say it
@@ -60,14 +61,14 @@ def strength(
 ):
     """A field of a term that is fitted.
 
-    **Arguments:**
-
-    - `unit`: for tables; `[q]` in it stands for the unit of the coordinate.
-    - `size`: a change that matters; it does not influence the result.
-    - `lower`, `upper`: signs that physics demands.
-    - `inner`: a number without effect while the strengths are zero, such as an edge. It
-        is fitted from the best of the term's `starts`, or, without any, is a frequency
-        (Hz) that a scan finds.
+    Args:
+        unit: For tables; `[q]` in it stands for the unit of the coordinate.
+        size: A change that matters; it does not influence the result.
+        lower: Signs that physics demands.
+        upper: Signs that physics demands.
+        inner: A number without effect while the strengths are zero, such as an edge. It
+            is fitted from the best of the term's `starts`, or, without any, is a
+            frequency (Hz) that a scan finds.
     """
     metadata = {
         "strength": Strength("", unit, size, lower, upper, inner),
@@ -109,7 +110,8 @@ class Term(eqx.Module):
     that is pushed and whose position and velocity are seen; `constraint`, that of the
     gap whose surface or restitution is another; `motion_unit`, that of the coordinate.
 
-    **Raises:** `TypeError` for a subclass whose own `acts` is not what it overrides.
+    Raises:
+        TypeError: For a subclass whose own `acts` is not what it overrides.
     """
 
     name: ClassVar[str] = ""
@@ -142,12 +144,14 @@ class Term(eqx.Module):
             cls.where = acts[0]
 
     def acceleration(self, motion: Motion):
-        """What is added to the acceleration in flight."""
+        """Return the acceleration added in flight."""
         del motion
         return 0.0
 
     def contact(self, motion: Motion):
-        """How much higher the surface is, in units of the gap; of time and phase."""
+        """Return the added height of the surface, in units of the gap; of time and
+        phase.
+        """
         del motion
         return 0.0
 
@@ -196,7 +200,7 @@ class Term(eqx.Module):
         return unit.replace(MOTION, self.motion_unit)
 
     def reported(self, values: Mapping[str, Value]) -> dict[str, Value]:
-        """What a report gives for its strengths, by name; here the strengths."""
+        """Return the reported strengths, by name; here the strengths."""
         return dict(values)
 
     def parameters(self, place: int) -> list[Parameter]:
@@ -218,8 +222,8 @@ class SensorTerm(Term):
     """A fault of the sensor of the motion: it acts on a field of that sensor."""
 
     where: ClassVar[str] = Where.SENSOR
-    #: fields of `jaxcam.fitting.Sensor`, one for each strength
     fields: ClassVar[tuple[str, ...]] = ()
+    """Fields of `jaxcam.fitting.Sensor`, one for each strength."""
 
     def parameters(self, place: int) -> list[Parameter]:
         del place

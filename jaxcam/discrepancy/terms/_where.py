@@ -4,7 +4,7 @@ import enum
 
 
 class Where(enum.StrEnum):
-    """Where something acts; equal to its name as a string."""
+    """The place at which something acts; equal to its name as a string."""
 
     FLIGHT = "flight"
     IMPACT = "impact"

@@ -13,22 +13,19 @@ from ._where import Where
 class WithTerms(HybridSystem):
     """A system and terms added to it.
 
-    **Arguments:**
-
-    - `base`: the system.
-    - `terms`: what is added, each a `Term`. Without effect while strengths are zero.
-    - `coordinates`: for each coordinate, which component of the state it is and which
-        its velocity. A term pushes that of its `coordinate`.
-
     The gap of a term's `constraint` becomes that of the base less the term's `contact`,
     and the restitution coefficient there that of the base times its `restitution`.
     """
 
     base: HybridSystem
+    """The system."""
     terms: tuple[Term, ...] = ()
+    """What is added, each a `Term`. Without effect while strengths are zero."""
     coordinates: tuple[tuple[int, int], ...] = eqx.field(
         default=((0, 1),), static=True, metadata={"spare": True}
     )
+    """For each coordinate, which component of the state it is and which its velocity. A
+    term pushes that of its `coordinate`."""
 
     @property
     def state_names(self) -> tuple[str, ...]:  # pyright: ignore
@@ -60,7 +57,7 @@ class WithTerms(HybridSystem):
         self.base.check()
 
     def motion(self, t, state, coordinate: int = 0, field=None) -> Motion:
-        """What the terms of a coordinate see of a state.
+        """Return the state as the terms of a coordinate see it.
 
         **Arguments:** `field` is the rate of change of the state, if it is known.
         """

@@ -35,9 +35,11 @@ class Columns:
 
 
 def free_columns(problem: Problem, free: Iterable[str] | None) -> Columns:
-    """Which numbers of a problem are free, by the names of parameters (`None`: all).
+    """Return which numbers of a problem are free, by the names of parameters (`None`:
+    all).
 
-    **Raises:** `ValueError` for an unknown name, or one whose values are known.
+    Raises:
+        ValueError: For an unknown name, or one whose values are known.
     """
     if free is None:
         free = [one.name for one in problem.parameters if one.known is None]
@@ -105,7 +107,8 @@ def invert_information(
     less than rounding makes it. What cannot be seen (a zero on the diagonal) gets an
     infinite variance.
 
-    **Raises:** `ValueError` where it is not finite, as that of a model with NaN.
+    Raises:
+        ValueError: Where it is not finite, as that of a model with NaN.
     """
     if not np.all(np.isfinite(information)):
         raise ValueError(

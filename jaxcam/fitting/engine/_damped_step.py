@@ -31,7 +31,9 @@ def damped_step(problem, columns, blocks, point, damping, prior):
 
 
 def _state_gain(blocks: Blocks, found) -> float:
-    """What the states alone would gain: scores times steps at unchanged parameters."""
+    """Return the gain of the states alone: scores times steps at unchanged
+    parameters.
+    """
     none = jnp.zeros((found.score.shape[0], found.score.shape[1]))
     return float(jnp.sum(blocks.s * state_steps(found, none)))
 

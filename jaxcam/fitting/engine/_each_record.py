@@ -12,7 +12,7 @@ T = TypeVar("T")
 
 
 def each_record(function: Callable[[int], T], records: int) -> T:
-    """What `function` makes of each number below `records`, stacked along a new axis.
+    """Stack the results of `function` for each number below `records` along a new axis.
 
     Calls run in threads, so nothing may be traced here. The result does not depend on
     the number of cores.

@@ -1,4 +1,4 @@
-"""What is known of each record alone, as parameters that no fit changes."""
+"""Treat constants known for each record as parameters that no fit changes."""
 
 import difflib
 import math

@@ -1,4 +1,4 @@
-"""How likely a sample is, with the derivatives that Fisher scoring needs."""
+"""Likelihood of a sample, with the derivatives that Fisher scoring needs."""
 
 import math
 from typing import NamedTuple

@@ -1,4 +1,4 @@
-"""What each piece and joint of one record says, linear about a point."""
+"""Linearise each piece and joint of one record about a point."""
 
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -24,7 +24,8 @@ class Sharpness(NamedTuple):
 
 
 class Extras(NamedTuple):
-    """What else a program needs: reference states of contact and the joints' errors.
+    """Further arguments of a program: reference states of contact and the joints'
+    errors.
 
     `weight` `(r, k)` and `rest_weight` `(r, kc)` of the data of each piece.
     """
@@ -41,21 +42,29 @@ class LinearPieces(NamedTuple):
     The first `n` of `a = n + m` columns are the state at the beginning of the piece,
     the others what else varies.
 
-    - `information`, `slope`: of the samples of each piece in flight.
-    - `pp`, `p`: of all samples in contact, by what else varies.
-    - `later`, `earlier`, `direct`: rows of each joint for the state after it, for the
-        columns of the piece before it, and for what else varies, in units of the
-        joint's error. `tied`: how far the joint is off.
     - `end`: the state at the end of each piece, by its columns.
     """
 
     information: Float[Array, "k a a"]
+    """Of the samples of each piece in flight."""
     slope: Float[Array, "k a"]
+    """Of the samples of each piece in flight."""
     pp: Float[Array, "m m"]
+    """Of all samples in contact, by what else varies."""
     p: Float[Array, " m"]
+    """Of all samples in contact, by what else varies."""
     later: Float[Array, "k e n"]
+    """Rows of each joint for the state after it, for the columns of the piece before
+    it, and for what else varies, in units of the joint's error. `tied`: how far the
+    joint is off."""
     earlier: Float[Array, "k e a"]
+    """Rows of each joint for the state after it, for the columns of the piece before
+    it, and for what else varies, in units of the joint's error. `tied`: how far the
+    joint is off."""
     direct: Float[Array, "k e m"]
+    """Rows of each joint for the state after it, for the columns of the piece before
+    it, and for what else varies, in units of the joint's error. `tied`: how far the
+    joint is off."""
     tied: Float[Array, "k e"]
     flown_cost: Float[Array, " k"]
     joint_cost: Float[Array, " k"]

@@ -27,8 +27,9 @@ from ._pieces import Pieces
 
 
 class Point(NamedTuple):
-    """What varies: values `(r, q)` of the parameters of each record, in their units,
-    and the state `(r, k, n)` at the beginning of each piece."""
+    """The varying numbers: values `(r, q)` of the parameters of each record, in their
+    units, and the state `(r, k, n)` at the beginning of each piece.
+    """
 
     values: Float[Array, "r q"]
     states: Float[Array, "r k n"]
@@ -39,7 +40,8 @@ def _as_it_is(model: Model) -> Model:
 
 
 class Layout(eqx.Module):
-    """Where the parameters are in a model: its leaves, and which of them are fitted.
+    """The location of the parameters in a model: its leaves, and which of them are
+    fitted.
 
     `ready` works out what a model needs at every step, once for all of them.
     """

@@ -1,4 +1,4 @@
-"""What is fitted: a system, the drive that turns it, and the sensors that watch it."""
+"""The model to fit: a system, its drive, and its sensors."""
 
 from collections.abc import Callable, Mapping
 
@@ -18,26 +18,27 @@ def _number(default: float):
 
 
 class Sensor(eqx.Module):
-    """How one channel of a recording comes out of the state x(t).
+    """A sensor: the map from the state x(t) to one channel of a recording.
 
     The sensor sees `offset + gain * observe(x(t - lag))`, through a first-order filter
     where it has a bandwidth, with white noise, rounded to its resolution and cut off
     at its limit. The likelihood is that of such samples: a rounded one says in which
     interval it was, a saturated one only that it was beyond the limit.
 
-    **Arguments:**
-
-    - `observe`: a component of the state, or a function of the state.
-    - `noise`: standard deviation of the noise, in the units of the channel.
-    - `resolution`: smallest step of the channel; zero for a continuous one.
-    - `limit`: largest magnitude that it can show.
-    - `bandwidth_hz`: of a first-order filter (Hz); infinite for none.
-    - `gain`, `offset`, `lag` (s): parameters that can be fitted like those of the
-        system. The lag must be short beside what the motion takes to change.
-    - `tails`: degrees of freedom of a Student distribution for noise with outliers;
-        infinite for a Gaussian one.
-    - `error`: what else it shows in a fit, `error(system, t, value, slope)` of what
-        there is to be seen and of its rate of change; nothing by default.
+    Args:
+        observe: A component of the state, or a function of the state.
+        noise: Standard deviation of the noise, in the units of the channel.
+        resolution: Smallest step of the channel; zero for a continuous one.
+        limit: Largest magnitude that it can show.
+        bandwidth_hz: Of a first-order filter (Hz); infinite for none.
+        gain: A parameter that can be fitted like those of the system.
+        offset: Another one, in the units of the channel.
+        lag: Another one (s); it must be short compared with the time in which the
+            motion changes.
+        tails: Degrees of freedom of a Student distribution for noise with outliers;
+            infinite for a Gaussian one.
+        error: What else the sensor shows in a fit, `error(system, t, value, slope)` of
+            the value and its rate of change; nothing by default.
     """
 
     observe: int | Callable[[Array], Array] = eqx.field(static=True)
@@ -69,7 +70,7 @@ class Sensor(eqx.Module):
         return self.bandwidth_hz != float("inf")
 
     def seen(self, state: Float[Array, " n"]) -> Array:
-        """What there is to be seen of a state, before gain and offset."""
+        """Return the measured quantity of a state, before gain and offset."""
         if isinstance(self.observe, int):
             return state[self.observe]
         return jnp.asarray(self.observe(state))
@@ -83,8 +84,8 @@ class Turning(eqx.Module):
     an offset between its angle and the encoder's.
 
     **Arguments:** functions that pick both out of the system, such as
-    `lambda s: s.speed` and, where the system is a field of another, `lambda s:
-    s.base.speed`.
+    `lambda s: s.speed` and, where the system is a field of another,
+    `lambda s: s.base.speed`.
     """
 
     speed: Callable[[HybridSystem], Array] = eqx.field(static=True)
@@ -104,15 +105,12 @@ class Input(eqx.Module):
     While a recording is predicted, the system has the value that its own recording had,
     each sample held until the next one, as digital controllers do; over a step of the
     integration, its mean.
-
-    **Arguments:**
-
-    - `channel`: of the recordings.
-    - `value`: picks the field out of the system, such as `lambda s: s.force`.
     """
 
     channel: str = eqx.field(static=True)
+    """Of the recordings."""
     value: Callable[[HybridSystem], Array] = eqx.field(static=True)
+    """Picks the field out of the system, such as `lambda s: s.force`."""
 
     def at(self, system, t, level, rate):
         """The system with its input at `level`."""
@@ -121,19 +119,14 @@ class Input(eqx.Module):
 
 
 class Model(eqx.Module):
-    """A system and the sensors that see it; what parameters are picked from.
-
-    **Arguments:**
-
-    - `system`: any `HybridSystem`.
-    - `sensors`: a `Sensor` for each channel that is fitted.
-    - `drive`: for a system that is turned by a measured drive, or that has a measured
-        input.
-    """
+    """A system and the sensors that see it; what parameters are picked from."""
 
     system: HybridSystem
+    """Any `HybridSystem`."""
     sensors: Mapping[str, Sensor]
+    """A `Sensor` for each channel that is fitted."""
     drive: Turning | Input | None = None
+    """For a system that is turned by a measured drive, or that has a measured input."""
 
     def driven(self, t, angle, rate) -> HybridSystem:
         """The system as it is near time `t`."""

@@ -1,4 +1,4 @@
-"""What is fitted, and what is known of it beforehand."""
+"""A parameter to fit, and its prior knowledge."""
 
 import dataclasses
 import math
@@ -11,35 +11,32 @@ from ._model import Model
 
 @dataclasses.dataclass(frozen=True)
 class Parameter:
-    """One number of a model that may be fitted.
-
-    **Arguments:**
-
-    - `name`: for tables, and to free it.
-    - `where`: picks it out of a `Model`: `lambda m: m.system.stiffness`.
-    - `tolerance`: how far it may be from `nominal`, as a maker states it: plus or minus
-        so much, anything in between equally likely. The fit uses a Gaussian of the same
-        standard deviation, `tolerance / sqrt(3)`. Infinite: nothing is known.
-    - `nominal`: by default, the value that the model has.
-    - `scale`: size of a change that matters; by default the tolerance, or else a
-        hundredth of the value. It does not influence the result.
-    - `lower`, `upper`: bounds that hold whatever the data say.
-    - `per_record`: whether every record has a value of its own.
-    - `unit`: for tables.
-    - `known`: a value for each record, which no fit changes. `Problem.build` makes such
-        parameters of the `constants` of recordings.
-    """
+    """One number of a model that may be fitted."""
 
     name: str
+    """For tables, and to free it."""
     where: Callable[[Model], Array]
+    """Picks it out of a `Model`: `lambda m: m.system.stiffness`."""
     tolerance: float = math.inf
+    """How far it may be from `nominal`, as a maker states it: plus or minus so much,
+    anything in between equally likely. The fit uses a Gaussian of the same standard
+    deviation, `tolerance / sqrt(3)`. Infinite: nothing is known."""
     nominal: float | None = None
+    """By default, the value that the model has."""
     scale: float | None = None
+    """Size of a change that matters; by default the tolerance, or else a hundredth of
+    the value. It does not influence the result."""
     lower: float = -math.inf
+    """Bounds that hold whatever the data say."""
     upper: float = math.inf
+    """Bounds that hold whatever the data say."""
     per_record: bool = False
+    """Whether every record has a value of its own."""
     unit: str = ""
+    """For tables."""
     known: tuple[float, ...] | None = None
+    """A value for each record, which no fit changes. `Problem.build` makes such
+    parameters of the `constants` of recordings."""
 
     def __post_init__(self):
         if not self.tolerance > 0:

@@ -1,4 +1,4 @@
-"""How long a piece of a flight may be: half an oscillation of what it shows."""
+"""Limit the length of a flight's pieces: half an oscillation of the measured motion."""
 
 import numpy as np
 from jaxtyping import Float

@@ -1,4 +1,4 @@
-"""What a model says of one piece: its samples, its end, and its joint."""
+"""Predict one piece: its samples, its end, and its joint."""
 
 from typing import NamedTuple
 
@@ -170,7 +170,7 @@ def _errors(model: Model, start, step, place, along, value, slope):
 
 
 class Joint(NamedTuple):
-    """How far two pieces are from what the model makes of their joint.
+    """The distance of two pieces from the joint that the model predicts.
 
     `state` `(n,)`: the later piece less what follows from the earlier one. `gap`: at
     the impact.

@@ -73,7 +73,7 @@ _STEPS, _MOST_STEPS = 10, 160
 
 
 class Weights(eqx.Module):
-    """How much the data of each piece count: `(r, k)` in flight, `(r, kc)` at rest."""
+    """Weights of the data of each piece: `(r, k)` in flight, `(r, kc)` in contact."""
 
     flown: Float[np.ndarray, "r k"]
     rested: Float[np.ndarray, "r kc"]
@@ -85,20 +85,21 @@ class Problem:
 
     Built by `Problem.build`.
 
-    - `model`: at its nominal parameters.
-    - `parameters`: what may be fitted.
     - `records`: names of the recordings.
-    - `pieces`, `spans`: what the recordings were cut into.
-    - `start`: the nominal parameters and the states that the data suggest.
     """
 
     model: Model
+    """At its nominal parameters."""
     parameters: tuple[Parameter, ...]
+    """What may be fitted."""
     segments: tuple[Segments, ...]
     pieces: Pieces
+    """What the recordings were cut into."""
     spans: tuple[tuple[list[Span], list[Span]], ...]
+    """What the recordings were cut into."""
     layout: Layout
     start: Point
+    """The nominal parameters and the states that the data suggest."""
     extras: Extras
 
     @staticmethod
@@ -107,17 +108,17 @@ class Problem:
     ) -> "Problem":
         """Cut the recordings into pieces and find a state to start each of them from.
 
-        **Arguments:**
+        Args:
+            model: A system with its sensors, at nominal parameters.
+            segments: Recordings from `jaxcam.recordings.segment_case` or `segment`;
+                what is in their `constants` becomes a parameter that no fit changes.
+            parameters: Those that may be fitted, free or not.
 
-        - `model`: a system with its sensors, at nominal parameters.
-        - `segments`: recordings from `jaxcam.recordings.segment_case` or `segment`;
-            what is in their `constants` becomes a parameter that no fit changes.
-        - `parameters`: those that may be fitted, free or not.
-
-        **Raises:** `RecordingError` for a missing channel, a record without flight, or
-        a constant that is no number of the system;
-        `ValueError` for a parameter that is not one number of the model, or a model
-        that gives none where the data are.
+        Raises:
+            RecordingError: For a missing channel, a record without flight, or a
+                constant that is no number of the system.
+            ValueError: For a parameter that is not one number of the model, or a model
+                that gives none where the data are.
         """
         segments = tuple(segments)
         if not segments:
@@ -197,7 +198,11 @@ class Problem:
         return longest_flight(self.spans)
 
     def parameter(self, name: str) -> Parameter:
-        """**Raises:** `ValueError` that lists the names there are."""
+        """
+
+        Raises:
+            ValueError: That lists the names there are.
+        """
         for parameter in self.parameters:
             if parameter.name == name:
                 return parameter
@@ -237,7 +242,7 @@ class Problem:
         )
 
     def weighted(self, weights: Weights | None) -> Extras:
-        """What the compiled programs need, with some weights."""
+        """Return the arguments of the compiled programs, with some weights."""
         weights = weights or self.everything()
         return self.extras._replace(
             weight=jnp.asarray(weights.flown), rest_weight=jnp.asarray(weights.rested)

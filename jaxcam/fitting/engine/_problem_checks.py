@@ -1,4 +1,4 @@
-"""What a problem is refused for before anything is fitted, in sentences."""
+"""Refuse an invalid problem before anything is fitted; each message is a sentence."""
 
 import equinox as eqx
 import jax
@@ -52,8 +52,9 @@ def refuse_repeated(parameters) -> None:
 def parameter_places(model: Model, parameters) -> tuple[int, ...]:
     """Index of each parameter among the leaves of a model, for a `Layout`.
 
-    **Raises:** `ValueError` for a parameter that is not one number of the model, or
-    the same one as another.
+    Raises:
+        ValueError: For a parameter that is not one number of the model, or the same one
+            as another.
     """
     leaves, tree = jax.tree.flatten(model)
     numbered = jax.tree.unflatten(tree, list(range(len(leaves))))

@@ -1,4 +1,4 @@
-"""How sharp the joints between pieces are: as sharp as drive and samples can tell."""
+"""Choose the sharpness of the joints between pieces, from drive and samples."""
 
 import equinox as eqx
 import jax
@@ -41,7 +41,7 @@ def shared_width(free: int, most: int) -> int:
 
 
 def joint_sharpness(layout: Layout, pieces: Pieces, point: Point, guess) -> Extras:
-    """How sharp the joints are: as sharp as the drive, and as the samples can tell."""
+    """Return the sharpness of the joints, as far as drive and samples resolve it."""
     records, width = pieces.joint.shape
     size = point.states.shape[-1]
     one = jnp.ones((records, width, size))

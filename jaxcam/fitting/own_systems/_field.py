@@ -6,7 +6,7 @@ from typing import Any
 
 @dataclasses.dataclass(frozen=True)
 class Field:
-    """What picks a number out of a system or a model: `Field("spring.stiffness")`.
+    """A picker of a number of a system or a model: `Field("spring.stiffness")`.
 
     Two of the same name are equal and have the same hash, so that problems of the same
     rig share compiled programs, as those with a new `lambda` each do not.

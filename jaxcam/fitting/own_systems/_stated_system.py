@@ -18,8 +18,8 @@ from ._field import Field
 from ._system_file import fault
 
 
-#: a number, or what a field holds that is none
 Stated: TypeAlias = float | bool | str
+"""A number, or what a field holds that is none."""
 
 
 def stated_system(
@@ -32,15 +32,15 @@ def stated_system(
 ) -> HybridSystem:
     """The system with some of its fields as a file states them.
 
-    **Arguments:**
+    Args:
+        values: By the names of fields, dotted for those of a part of the system, which
+            must have a default then.
+        fitted: Names among these that have to be numbers.
+        measured: Fields that follow a channel, and what they hold without a default and
+            without a value in the file.
 
-    - `values`: by the names of fields, dotted for those of a part of the system, which
-        must have a default then.
-    - `fitted`: names among these that have to be numbers.
-    - `measured`: fields that follow a channel, and what they hold without a default
-        and without a value in the file.
-
-    **Raises:** `RigError`, one sentence that names the file, the field and the fix.
+    Raises:
+        RigError: One sentence that names the file, the field and the fix.
     """
     known = inspect.signature(cls).parameters
     for name in (*values, *measured):

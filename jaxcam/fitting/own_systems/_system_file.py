@@ -26,7 +26,8 @@ def system_class(named: str, folder: str | Path = ".") -> type[HybridSystem]:
 
     **Arguments:** `named` is `FILE.py:CLASS`, the file seen from `folder`.
 
-    **Raises:** `RigError`, one sentence that names the file and the fix.
+    Raises:
+        RigError: One sentence that names the file and the fix.
     """
     path, name = split_name(named)
     file = Path(folder) / path
@@ -76,7 +77,7 @@ def split_name(named: str) -> tuple[str, str]:
 
 
 def fault(error: BaseException, file: Path | None = None) -> str:
-    """What somebody else's code raised, and in which line of the file."""
+    """Describe an error raised by a user's code, with the line of the file."""
     lines = [
         frame.lineno
         for frame in traceback.extract_tb(error.__traceback__)
@@ -92,7 +93,7 @@ def fault(error: BaseException, file: Path | None = None) -> str:
 
 
 def _module(file: Path) -> ModuleType:
-    """What a file defines, run once as long as it stays the same."""
+    """Return the definitions of a file, run once as long as it stays the same."""
     if file.suffix != ".py":
         raise RigError(f"{file}: name a Python file and a class, as in cart.py:Cart.")
     if not file.is_file():

@@ -21,8 +21,8 @@ class FreeFall(eqx.Module):
     """A system, and the state in which it was let go."""
 
     system: HybridSystem
-    #: (n,), or its components one by one
     state: Float[Array, " n"] | tuple[Float[Array, ""], ...]
+    """(n,), or its components one by one."""
 
 
 def fit_free_fall(
@@ -42,21 +42,22 @@ def fit_free_fall(
     The motion of the rig sees inertia and stiffness only through M = J/K (4.9): pick
     one of them with `where` and hold the other.
 
-    **Arguments:**
+    Args:
+        where: Picks the parameter of the system.
+        times: Shape `(k,)`, increasing (s); before the first impact.
+        measured: Shape `(k,)`, one component of the state.
+        error: Standard error of a sample, in the unit of the component.
+        state: Guess of the state at `times[0]`, shape `(n,)`.
+        observe: Which component is measured.
+        name: Of the parameter, for the report.
+        steps: Runge-Kutta steps of order 8 between two samples.
 
-    - `where`: picks the parameter of the system.
-    - `times`: shape `(k,)`, increasing (s); before the first impact.
-    - `measured`: shape `(k,)`, one component of the state.
-    - `error`: standard error of a sample, in the unit of the component.
-    - `state`: guess of the state at `times[0]`, shape `(n,)`.
-    - `observe`: which component is measured.
-    - `name`: of the parameter, for the report.
-    - `steps`: Runge-Kutta steps of order 8 between two samples.
+    Returns:
+        A [`jaxcam.fitting.published.PublishedFit`][] whose `model` has the fields
+            `system` and `state`.
 
-    **Returns:** a [`jaxcam.fitting.published.PublishedFit`][] whose `model` has the
-    fields `system` and `state`.
-
-    **Raises:** `ValueError` for times that do not increase.
+    Raises:
+        ValueError: For times that do not increase.
     """
     times, measured = np.asarray(times, dtype=float), np.asarray(measured, dtype=float)
     state = np.asarray(state, dtype=float)

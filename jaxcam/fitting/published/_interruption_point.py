@@ -29,10 +29,11 @@ def interruption_of_chattering(
     the parameter; two values of it, wide around the published one, with chattering
     complete at one of them only; `periods` from release to the release after sticking.
 
-    **Returns:** the parameter, in its own unit; NaN where the bracket holds no
-    interruption.
+    Returns:
+        The parameter, in its own unit; NaN where the bracket holds no interruption.
 
-    **Raises:** `ValueError` for a system without a period.
+    Raises:
+        ValueError: For a system without a period.
     """
     system = as_arrays(system)
     found = interruption_in(system, where, *bracket, periods)

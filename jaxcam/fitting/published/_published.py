@@ -32,23 +32,21 @@ _XTOL = 1e-10
 class Published(eqx.Module):
     """Printed numbers, and the function that computes them from the model.
 
-    **Arguments:**
-
-    - `name`: what they are, for the report.
-    - `compute`: takes the model and returns `(k,)`; differentiable, as
-        [`variational.impact_orbit`][] and [`variational.fold_of_orbit`][] are.
-    - `values`: shape `(k,)`, as printed.
-    - `errors`: standard errors, a number or shape `(k,)`. A number printed with its
-        last digit at 10^-m has 10^-m / sqrt(12) from rounding alone; see
-        [`jaxcam.fitting.published.rounding_error`][].
-
-    **Raises:** `ValueError` for an error that is not positive.
+    Raises:
+        ValueError: For an error that is not positive.
     """
 
     name: str = eqx.field(static=True)
+    """What they are, for the report."""
     compute: Callable[[Any], Float[Array, " k"]]
+    """Takes the model and returns `(k,)`; differentiable, as
+    [`variational.impact_orbit`][] and [`variational.fold_of_orbit`][] are."""
     values: Float[np.ndarray, " k"]
+    """Shape `(k,)`, as printed."""
     errors: Float[np.ndarray, " k"]
+    """Standard errors, a number or shape `(k,)`. A number printed with its last digit
+    at 10^-m has 10^-m / sqrt(12) from rounding alone; see
+    [`jaxcam.fitting.published.rounding_error`][]."""
 
     def __init__(self, name: str, compute, values, errors):
         self.name = name
@@ -85,22 +83,23 @@ def fit_published(
     start is far from the data, their errors are taken ten, a hundred, ... times as
     large first: a path that bends less.
 
-    **Arguments:**
+    Args:
+        model: A system, or any Module with one in it, at the nominal values.
+        where: The scalars of it that are free, as a tuple or list; the centres of the
+            priors.
+        published: The data.
+        names: One for each free parameter.
+        tolerances: Standard deviations of the priors, in the units of the parameters;
+            infinity for none.
+        start: Values to begin at instead of the nominal ones.
+        max_steps: Most evaluations at one scale of the errors.
 
-    - `model`: a system, or any Module with one in it, at the nominal values.
-    - `where`: the scalars of it that are free, as a tuple or list; the centres of the
-        priors.
-    - `published`: the data.
-    - `names`: one for each free parameter.
-    - `tolerances`: standard deviations of the priors, in the units of the parameters;
-        infinity for none.
-    - `start`: values to begin at instead of the nominal ones.
-    - `max_steps`: most evaluations at one scale of the errors.
+    Returns:
+        A [`jaxcam.fitting.published.PublishedFit`][].
 
-    **Returns:** a [`jaxcam.fitting.published.PublishedFit`][].
-
-    **Raises:** `ValueError` where lengths differ, a tolerance is not positive, or a
-    quantity cannot be computed at the start.
+    Raises:
+        ValueError: Where lengths differ, a tolerance is not positive, or a quantity
+            cannot be computed at the start.
     """
     nominal, unravel = _picked(model, where)
     priors = np.asarray(tolerances, dtype=float)

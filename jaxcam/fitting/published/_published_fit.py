@@ -1,4 +1,4 @@
-"""What a fit to published numbers found, and what it could not see."""
+"""The result of a fit to published numbers, and its undetermined combinations."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -18,29 +18,32 @@ if TYPE_CHECKING:
 class PublishedFit:
     """Result of [`jaxcam.fitting.fit_published`][].
 
-    - `model`: with the estimates in it.
     - `estimates`, `stderr`, `covariance`: `(p,)`, `(p,)`, `(p, p)`; priors
         included, errors of the data as stated.
-    - `shares`, `directions`: `(p,)` and `(p, p)`; how much of what is known of each
-        combination of parameters comes from the data and not from the priors (1 all, 0
-        nothing), ascending, and the combinations, one a row, in units of the
-        tolerances.
     - `chi_square`: of the data alone.
-    - `steps`, `converged`: iterations, and whether the last stage met its tolerance.
     """
 
     model: Any
+    """With the estimates in it."""
     names: tuple[str, ...]
     nominal: Float[np.ndarray, " p"]
     tolerances: Float[np.ndarray, " p"]
     estimates: Float[np.ndarray, " p"]
     covariance: Float[np.ndarray, "p p"]
     shares: Float[np.ndarray, " p"]
+    """`(p,)` and `(p, p)`; how much of what is known of each combination of parameters
+    comes from the data and not from the priors (1 all, 0 nothing), ascending, and the
+    combinations, one a row, in units of the tolerances."""
     directions: Float[np.ndarray, "p p"]
+    """`(p,)` and `(p, p)`; how much of what is known of each combination of parameters
+    comes from the data and not from the priors (1 all, 0 nothing), ascending, and the
+    combinations, one a row, in units of the tolerances."""
     published: tuple[Any, ...]
     predicted: Float[np.ndarray, " n"]
     steps: int
+    """Iterations, and whether the last stage met its tolerance."""
     converged: bool
+    """Iterations, and whether the last stage met its tolerance."""
 
     @staticmethod
     def build(
@@ -95,7 +98,8 @@ class PublishedFit:
     def ellipse(self, names: Sequence[str], level: float = 0.95) -> Ellipse:
         """Joint confidence region of two or more parameters, the others left free.
 
-        **Raises:** as in [`jaxcam.fitting.Fit`][].
+        Raises:
+            ValueError: as in [`jaxcam.fitting.Fit`][].
         """
         return ellipse_of(names, self.names, self.estimates, self.covariance, level)
 

@@ -238,7 +238,7 @@ def _next_length(plan, carried, attempt, longest):
 
 
 def _struck(carried, attempt):
-    """When each of several constraints was hit last, and how many hops are hidden."""
+    """Return when each of several constraints was hit last, and the hidden flights."""
     if not carried.struck:
         return carried.struck, carried.crowded
     struck = tuple(

@@ -106,7 +106,9 @@ class Functions:
         return tuple(self._field(t, _pack(x), _pack(contact)))
 
     def pairs(self, t, x) -> dict[int, int]:
-        """Which components of the state are rates of others: see `rates_among`."""
+        """Return which components of the state are rates of others: see
+        `rates_among`.
+        """
         return rates_among(x, tuple(self._free(t, _pack(x))))
 
     def jets(self, t, x, contact) -> list[Jet]:

@@ -110,7 +110,7 @@ def _value_and_slope(c, s):
 
 
 def crossing(c, halvings: int = 3, newtons: int = 2):
-    """Where in (0, 1) the polynomial falls below zero, given that it does by the end.
+    """Return where in (0, 1) the polynomial falls below zero, given that it does.
 
     A few halvings find the neighbourhood, Newton inside the bracket finds the root.
     """
@@ -133,7 +133,7 @@ def crossing(c, halvings: int = 3, newtons: int = 2):
 
 
 def lowest_point(polynomial: Bernstein, c):
-    """Where in (0, 1) the polynomial is suspected to dip: its minimum, nearly."""
+    """Return the suspected minimum of the polynomial in (0, 1)."""
     b = polynomial.coefficients
     s, best = jnp.full_like(c[0], 1 / 7), b[1]
     for k in range(2, 7):

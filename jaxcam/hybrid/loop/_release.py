@@ -82,7 +82,9 @@ def lets_go_before(jet: Jet, offset, scale, rounding):
 
 
 def _root(a0, s0, a1, s1):
-    """Where in (0, 1) the cubic rises through zero; from the chord, by Newton."""
+    """Return where in (0, 1) the cubic rises through zero; from the chord, by
+    Newton.
+    """
     rise = a1 - a0
     c2 = 3 * rise - 2 * s0 - s1
     c3 = s0 + s1 - 2 * rise

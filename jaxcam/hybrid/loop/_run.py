@@ -199,7 +199,7 @@ def _unpack(log, functions: Functions) -> Log:
 
 
 def rows_of_kind(log: Log, *wanted: RowKind):
-    """Which rows are of one of the kinds."""
+    """Return a mask of the rows of one of the kinds."""
     mask = log.kind == float(wanted[0])
     for w in wanted[1:]:
         mask = mask | (log.kind == float(w))

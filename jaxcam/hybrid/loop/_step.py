@@ -17,7 +17,7 @@ from ._select import any_of, select
 
 
 class StepEnd(NamedTuple):
-    """Where a step ends."""
+    """The end of a step."""
 
     length: Any
     t: Any

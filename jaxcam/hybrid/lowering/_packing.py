@@ -9,7 +9,7 @@ import numpy as np
 
 
 class Packing(NamedTuple):
-    """Where the leaves of a pytree are: hashable, so that programs are found by it."""
+    """The structure of a packed pytree: hashable, so that programs are found by it."""
 
     structure: Any
     shapes: tuple

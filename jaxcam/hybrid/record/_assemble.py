@@ -85,7 +85,7 @@ def assemble(
 
 
 def _places(xp: ModuleType, mask, size: int, fill: int):
-    """Where a mask holds: `size` indices, those that are missing `fill`."""
+    """Return `size` indices at which a mask holds, padded with `fill`."""
     if xp is jnp:
         return jnp.nonzero(mask, size=size, fill_value=fill)[0]
     found = np.flatnonzero(mask)[:size]

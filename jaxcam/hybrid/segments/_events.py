@@ -71,7 +71,9 @@ class Flown(NamedTuple):
         return min(found, key=lambda e: times[e.row] + e.length, default=None)
 
     def _crossing(self, k, curve, before, slope, tiny):
-        """Where a level first goes below zero, seen from points in the steps."""
+        """Return where a level first falls below zero, seen from points in the
+        steps.
+        """
         if before <= tiny:
             # leaves the surface: its rate may be zero up to rounding
             slope = max(slope, 0.0)
@@ -115,7 +117,7 @@ class Flown(NamedTuple):
         return PieceEnd(k, i, float(h))
 
     def _bottom(self, k, i, low, high):
-        """Where the level is lowest between two lengths, by halving its rate."""
+        """Return where the level is lowest between two lengths, by halving its rate."""
         for _ in range(50):
             middle = (low + high) / 2
             falls = self.probe(i, middle).rate[k] < 0

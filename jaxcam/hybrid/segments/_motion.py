@@ -226,7 +226,7 @@ class CompiledMotion(eqx.Module):
 
     @_compiled
     def extents(self, t, x):
-        """Where components are measured from, and their first scales, two `(n,)`."""
+        """Return the origins of the components, and their first scales, two `(n,)`."""
         gradient = jax.jacfwd(lambda y: gaps(self.system, t, y))(x)
         lifts = gradient / jnp.sum(gradient * gradient, axis=1)[:, None]
         jets = [Jet(*row) for row in jnp.stack(self._free_series(3)(t, x), axis=1)]

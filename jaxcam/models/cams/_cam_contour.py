@@ -15,20 +15,21 @@ from ._eccentric_circle import EccentricCircle
 
 
 class CamContour(NamedTuple):
-    """A cam's shape; every field has shape `(angles,)`, one for each cam angle.
+    """Contour of a cam; every field has shape `(angles,)`.
 
-    A radius of curvature that is not positive means that the follower's motion cannot
-    be had: the contour would cut itself off (undercutting). Choose a larger base
-    circle, or a smaller roller.
+    A radius of curvature that is not positive means that the contour cannot be made: it
+    would cut itself off (undercutting). Choose a larger base circle, or a smaller
+    roller.
     """
 
     x: Float[Array, " angles"]
-    """Contact point in the frame of the cam (m)."""
+    """x-coordinate of the contact point in the frame of the cam (m)."""
     y: Float[Array, " angles"]
+    """y-coordinate of the contact point in the frame of the cam (m)."""
     radius_of_curvature: Float[Array, " angles"]
-    """Positive where the contour is convex (m)."""
+    """Radius of curvature (m), positive where the contour is convex."""
     pressure_angle: Float[Array, " angles"]
-    """Between the contact force and the motion of the point where it acts (rad)."""
+    """Angle between the contact force and the motion of the point of contact (rad)."""
     arm: Float[Array, " angles"]
     """Lever of the contact force about the hinge (m); 1 for a translating follower."""
 
@@ -36,10 +37,22 @@ class CamContour(NamedTuple):
 def flat_translating_contour(
     profile: Callable[[Any], Any], base_radius, cam_angles: Float[ArrayLike, " angles"]
 ) -> CamContour:
-    """The cam of a flat-faced follower that slides along a line through its axis.
+    """Return the cam contour for a flat-faced follower that slides along a line through
+    its axis.
 
-    **Arguments:** a profile whose lift is a length (m), the distance of the face from
-    the axis at lift zero (m), and cam angles (rad).
+    Args:
+        profile: Lift as a length (m), as a function of the cam angle (rad).
+        base_radius: Distance of the face from the axis at lift zero (m).
+        cam_angles: Cam angles (rad), shape `(angles,)`.
+
+    Returns:
+        A [`jaxcam.models.cams.CamContour`][].
+
+    Examples:
+        >>> from jaxcam.models import flat_translating_contour
+        >>> lift = lambda angle: 0.002 * (1 - jnp.cos(angle))
+        >>> flat_translating_contour(lift, 0.02, jnp.linspace(0, 6, 5)).x.shape
+        (5,)
     """
 
     def one(angle):
@@ -59,23 +72,30 @@ def flat_oscillating_contour(
     center: tuple | None = None,
     half_height=None,
 ) -> CamContour:
-    """The cam of a flat-faced follower hinged at the origin, as in the thesis' rig.
+    """Return the cam contour for a flat-faced follower hinged at the origin.
 
     The common normal meets the line from the hinge to the axis of the cam where both
     bodies have one velocity, which gives the contact point from lift and slope alone.
 
     Args:
-        profile: Lift is the angle of the follower (rad).
-        cam_angles: rad, shape `(angles,)`.
-        center: The axis of the cam (x0, y0) from the hinge (m), and.
-        half_height: Distance of the face from the hinge (m); both are known for an
-            [`jaxcam.models.EccentricCircle`][] .
+        profile: Angle of the follower (rad) as a function of the cam angle (rad).
+        cam_angles: Cam angles (rad), shape `(angles,)`.
+        center: Axis of the cam (x0, y0) from the hinge (m); known for an
+            [`jaxcam.models.EccentricCircle`][].
+        half_height: Distance of the face from the hinge (m); known for an
+            [`jaxcam.models.EccentricCircle`][].
 
     Returns:
         The contour about the cam's axis.
 
     Raises:
-        ValueError: Where the axis or the half height is not known.
+        ValueError: The axis or the half height is unknown.
+
+    Examples:
+        >>> from jaxcam.models import EccentricCircle, flat_oscillating_contour
+        >>> contour = flat_oscillating_contour(EccentricCircle(), jnp.linspace(0, 6, 5))
+        >>> np.asarray(contour.radius_of_curvature).round(6).tolist()
+        [0.045, 0.045, 0.045, 0.045, 0.045]
     """
     if isinstance(profile, EccentricCircle):
         if center is None:
@@ -116,10 +136,24 @@ def roller_translating_contour(
     *,
     offset=0.0,
 ) -> CamContour:
-    """The cam of a roller whose centre slides along the line x = `offset`.
+    """Return the cam contour for a roller whose centre slides along the line x =
+    `offset`.
 
-    **Arguments:** a profile whose lift is a length (m), the radius of the base circle
-    and of the roller (m), cam angles (rad), and the offset of the line (m).
+    Args:
+        profile: Lift as a length (m), as a function of the cam angle (rad).
+        base_radius: Radius of the base circle (m).
+        roller_radius: Radius of the roller (m).
+        cam_angles: Cam angles (rad), shape `(angles,)`.
+        offset: Offset of the line (m).
+
+    Returns:
+        A [`jaxcam.models.cams.CamContour`][].
+
+    Examples:
+        >>> from jaxcam.models import roller_translating_contour
+        >>> lift = lambda angle: 0.002 * (1 - jnp.cos(angle))
+        >>> roller_translating_contour(lift, 0.02, 0.005, jnp.linspace(0, 6, 5)).y.shape
+        (5,)
     """
     start = jnp.sqrt((base_radius + roller_radius) ** 2 - jnp.asarray(offset) ** 2)
 
@@ -139,11 +173,25 @@ def roller_oscillating_contour(
     roller_radius,
     cam_angles: Float[ArrayLike, " angles"],
 ) -> CamContour:
-    """The cam of a roller on an arm that swings about a pivot.
+    """Return the cam contour for a roller on an arm that swings about a pivot.
 
-    **Arguments:** a profile whose lift is the arm's angle (rad) from the x-axis, the
-    pivot (m) from the cam's axis, the arm's length and the roller's radius (m), and cam
-    angles (rad).
+    Args:
+        profile: Angle of the arm (rad) from the x-axis, as a function of the cam angle
+            (rad).
+        pivot: Pivot (m) from the cam's axis.
+        arm_length: Length of the arm (m).
+        roller_radius: Radius of the roller (m).
+        cam_angles: Cam angles (rad), shape `(angles,)`.
+
+    Returns:
+        A [`jaxcam.models.cams.CamContour`][].
+
+    Examples:
+        >>> from jaxcam.models import roller_oscillating_contour
+        >>> swing = lambda angle: 2.7 + 0.05 * jnp.cos(angle)
+        >>> angles = jnp.linspace(0, 6, 5)
+        >>> roller_oscillating_contour(swing, (0.06, 0.0), 0.05, 0.005, angles).x.shape
+        (5,)
     """
 
     def center(lift):

@@ -15,9 +15,14 @@ _TAIL = 1e-13
 
 
 class EccentricCircle(CamProfile):
-    """A flat follower, hinged at the origin, on an eccentric circular cam. (4.23)
+    """A flat follower, hinged at the origin, on an eccentric circular cam.
 
-    The defaults are Table 4.4.
+    The contact angle is that of the thesis, eq. 4.23; the defaults are its Table 4.4.
+
+    Examples:
+        >>> from jaxcam.models import EccentricCircle
+        >>> EccentricCircle().prepared().cosines.shape
+        (12,)
     """
 
     radius: jax.Array = parameter(0.045)
@@ -25,9 +30,9 @@ class EccentricCircle(CamProfile):
     eccentricity: jax.Array = parameter(0.015)
     """Distance of its centre from the axis it turns about, e (m)."""
     center_x: jax.Array = parameter(0.249)
-    """The axis it turns about (x0, y0), from the follower's hinge (m)."""
+    """x-coordinate of the cam's axis from the follower's hinge, x0 (m)."""
     center_y: jax.Array = parameter(0.0)
-    """The axis it turns about (x0, y0), from the follower's hinge (m)."""
+    """y-coordinate of the cam's axis from the follower's hinge, y0 (m)."""
     half_height: jax.Array = parameter(0.021)
     """Distance of the follower's flat face from its hinge, d (m)."""
     harmonics: int = eqx.field(default=12, static=True)
@@ -46,14 +51,17 @@ class EccentricCircle(CamProfile):
         return jnp.arcsin(height / jnp.sqrt(x * x + y * y)) + jnp.arctan2(y, x)
 
     def prepared(self) -> FourierProfile:
-        """The same profile as a Fourier series, differentiable in the geometry.
+        """Return the same profile as a Fourier series, differentiable in the geometry.
 
-        The coefficients come from an FFT of (4.23) over one turn.
+        The coefficients come from an FFT of thesis eq. 4.23 over one turn.
+
+        Returns:
+            A [`jaxcam.models.FourierProfile`][].
 
         Raises:
-            ValueError: If the harmonics left out add up to more than 1e-13 rad. Inside
-                `jax.jit` the values cannot be seen and nothing is raised; call `check`
-                before.
+            ValueError: The omitted harmonics add up to more than 1e-13 rad. Inside
+                `jax.jit` the values are unknown and nothing is raised; call `check`
+                first.
         """
         mean, cosines, sines, left_out = _series(self)
         if is_concrete(left_out) and not left_out <= _TAIL:

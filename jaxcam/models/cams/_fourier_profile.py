@@ -17,15 +17,21 @@ class FourierProfile(CamProfile):
     number of harmonics.
 
     Raises:
-        ValueError: If the two lists are empty or differ in length.
+        ValueError: The two lists are empty or differ in length.
+
+    Examples:
+        >>> from jaxcam.models import FourierProfile
+        >>> profile = FourierProfile(0.1, [0.02], [0.0])
+        >>> round(float(profile(0.0)), 6)
+        0.12
     """
 
     mean: jax.Array = parameter()
     """Contact angle averaged over a turn (rad)."""
     cosines: jax.Array = parameter()
-    """Coefficients of harmonics 1, 2, ... (rad), both of shape `(harmonics,)`."""
+    """Cosine coefficients of harmonics 1, 2, ... (rad), shape `(harmonics,)`."""
     sines: jax.Array = parameter()
-    """Coefficients of harmonics 1, 2, ... (rad), both of shape `(harmonics,)`."""
+    """Sine coefficients of harmonics 1, 2, ... (rad), shape `(harmonics,)`."""
 
     def __check_init__(self):
         if self.cosines.shape != self.sines.shape or self.cosines.size == 0:

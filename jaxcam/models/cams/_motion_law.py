@@ -1,4 +1,4 @@
-"""How a follower moves through one segment of a cam's motion program."""
+"""Laws of motion of one segment of a cam's motion program."""
 
 import math
 from typing import NamedTuple
@@ -8,21 +8,28 @@ class LawPiece(NamedTuple):
     """`polynomial(u) + amplitude sin(frequency u + phase)` up to the fraction `end`."""
 
     end: float
+    """Fraction u at which the piece ends."""
     polynomial: tuple[float, ...]
     """Coefficients, lowest power first."""
     amplitude: float = 0.0
+    """Amplitude of the sine."""
     frequency: float = 0.0
+    """Frequency of the sine (rad per unit of u)."""
     phase: float = 0.0
+    """Phase of the sine (rad)."""
 
 
 class MotionLaw(NamedTuple):
-    """A rise from 0 to 1 while the fraction u of the segment goes from 0 to 1.
+    """A normalised rise from 0 to 1 while the fraction u of the segment goes from 0 to
+    1.
 
     Laws of your own are made of the same pieces; the last one ends at 1.
     """
 
     name: str
+    """Name of the law."""
     pieces: tuple[LawPiece, ...]
+    """Pieces of the law, in order."""
 
 
 _PI = math.pi

@@ -21,48 +21,65 @@ _CLOSED = 1e-9
 
 
 class Segment(NamedTuple):
-    """One segment of a motion program."""
+    """One segment of a motion program.
+
+    Examples:
+        >>> from jaxcam.models import Segment
+        >>> Segment("cycloidal", np.pi / 2, 0.01).law
+        'cycloidal'
+    """
 
     law: str | MotionLaw
     """A name in [`jaxcam.models.cams.MOTION_LAWS`][], or a
     [`jaxcam.models.cams.MotionLaw`][]."""
     width: Any
-    """Cam angle that it takes (rad)."""
+    """Cam angle of the segment (rad)."""
     rise: Any = 0.0
     """Change of the lift over it; negative for a fall, 0 for a dwell."""
 
 
 class Joint(NamedTuple):
-    """Where two pieces of a program meet: the cam's angle (rad) and what jumps there.
+    """Joints of a motion program, and the jumps there.
 
     `jumps`, shape `(joints, 4)`: of lift, velocity, acceleration and jerk, for each
     radian of the cam.
     """
 
     angle: Float[Array, " joints"]
+    """Cam angle of each joint (rad), shape `(joints,)`."""
     jumps: Float[Array, "joints 4"]
+    """Jumps of lift, velocity, acceleration and jerk, per radian of the cam, shape
+    `(joints, 4)`."""
 
 
 class MotionProgram(CamProfile):
-    """A lift made of segments, one after the other, closed over a turn.
+    """A cam profile made of segments, one after the other, closed over a turn.
 
     The lift is an angle (rad) for an oscillating follower and a length (m) for a
-    translating one. The program is played in its order by a cam whose angle grows,
-    which for [`jaxcam.models.CamFollower`][] means `rotation="counterclockwise"`.
-
-    Args:
-        segments: A list of [`jaxcam.models.Segment`][]; their widths add up to a turn
-            and their rises to zero.
+    translating one. The program runs in order on a cam whose angle grows, which for
+    [`jaxcam.models.CamFollower`][] means `rotation="counterclockwise"`. It is made from
+    a list of [`jaxcam.models.Segment`][], whose widths add up to a turn and whose rises
+    add up to zero.
 
     Raises:
-        ValueError: For an unknown law, or a program that does not close.
+        ValueError: A law is unknown, or the program does not close.
+
+    Examples:
+        >>> from jaxcam.models import MotionProgram, Segment
+        >>> rises = (0.01, -0.01)
+        >>> program = MotionProgram([Segment("cycloidal", np.pi, r) for r in rises])
+        >>> round(float(program(np.pi)), 6)
+        0.01
     """
 
     widths: jax.Array
+    """Cam angle of each segment (rad)."""
     rises: jax.Array
+    """Change of the lift over each segment."""
     base: jax.Array
     """Lift at cam angle zero, where the first segment begins."""
     laws: tuple[MotionLaw, ...] = eqx.field(static=True)
+    """Law of each segment."""
 
     def __init__(self, segments: Iterable[Segment], base=0.0):
         segments = [Segment(*segment) for segment in segments]
@@ -79,7 +96,9 @@ class MotionProgram(CamProfile):
         return self.prepared()(cam_angle)
 
     def prepared(self) -> "MotionPieces":
-        """The program as a table of pieces, differentiable in widths and rises."""
+        """Return the program as a table of pieces, differentiable in widths and
+        rises.
+        """
         ends = jnp.cumsum(self.widths)
         begins = ends - self.widths
         lifts = self.base + jnp.cumsum(self.rises) - self.rises
@@ -97,17 +116,25 @@ class MotionProgram(CamProfile):
         )
 
     def derivatives(self, cam_angle) -> Float[Array, "... 4"]:
-        """Lift, velocity, acceleration, jerk for each radian of the cam.
+        """Return lift, velocity, acceleration and jerk per radian of the cam (s, v, a,
+        j).
 
-        At a joint, the values just after it. What a handbook calls s, v, a, j.
+        At a joint, the values just after it.
+
+        Returns:
+            Shape `(..., 4)`.
         """
         pieces = self.prepared()
         return pieces.jet(pieces.local(cam_angle)[0], cam_angle)
 
     def joints(self) -> Joint:
-        """Where the pieces meet, with the jumps of lift, velocity, acceleration, jerk.
+        """Return the joints of the pieces, with the jumps of lift, velocity,
+        acceleration, jerk.
 
-        Laws in several pieces have joints inside their segment.
+        Laws of several pieces have joints inside their segment.
+
+        Returns:
+            A [`jaxcam.models.cams.Joint`][].
         """
         pieces = self.prepared()
         count = pieces.starts.shape[0]
@@ -140,22 +167,24 @@ class MotionProgram(CamProfile):
 
 
 class MotionPieces(CamProfile):
-    """A program as pieces of polynomials and sines; `MotionProgram.prepared` makes it.
-
-    **Arguments:** for each piece, all of shape `(pieces,)`: the cam angles (rad) where
-    it starts (`starts`) and where the fraction u is zero (`origins`), the angle over
-    which u grows by one (`widths`), and the numbers of
-    `polynomial(u) + amplitude sin(frequency u + phase)`; `coefficients` has shape
-    `(pieces, powers)`, lowest power first.
+    """A program as pieces of polynomials and sines; made by
+    `MotionProgram.prepared`.
     """
 
     starts: jax.Array = parameter()
+    """Cam angle at which each piece begins (rad), shape `(pieces,)`."""
     origins: jax.Array = parameter()
+    """Cam angle at which the fraction u is zero (rad), shape `(pieces,)`."""
     widths: jax.Array = parameter()
+    """Cam angle over which u grows by one (rad), shape `(pieces,)`."""
     coefficients: jax.Array = parameter()
+    """Coefficients of `polynomial(u)`, lowest power first, shape `(pieces, powers)`."""
     amplitudes: jax.Array = parameter()
+    """Amplitude in `amplitude sin(frequency u + phase)`, shape `(pieces,)`."""
     frequencies: jax.Array = parameter()
+    """Frequency of the sine, shape `(pieces,)`."""
     phases: jax.Array = parameter()
+    """Phase of the sine, shape `(pieces,)`."""
 
     def __call__(self, cam_angle) -> jax.Array:
         piece, u = self.local(cam_angle)
@@ -167,7 +196,9 @@ class MotionPieces(CamProfile):
         return value + self.amplitudes[piece] * wave
 
     def local(self, cam_angle):
-        """The piece in force at an angle, and the fraction of its segment passed."""
+        """Return the piece in force at an angle, and the fraction of its segment
+        passed.
+        """
         angle = jnp.mod(cam_angle, _TURN)
         # unrolled: an inner loop would keep a simulation's loop from fusing
         after = jnp.searchsorted(
@@ -177,14 +208,14 @@ class MotionPieces(CamProfile):
         return piece, (angle - self.origins[piece]) / self.widths[piece]
 
     def ends(self) -> Float[Array, " pieces"]:
-        """Cam angle at which each piece ends (rad)."""
+        """Return the cam angle at which each piece ends (rad), shape `(pieces,)`."""
         turn = jnp.full_like(self.starts[:1], _TURN)
         return jnp.concatenate([self.starts[1:], turn])
 
     def jet(self, piece, cam_angle) -> Float[Array, "... 4"]:
-        """Value and three derivatives of given pieces, continued to any angle.
+        """Return value and three derivatives of given pieces, continued to any angle.
 
-        A joint has one value on either side; which is meant is said by the piece.
+        A joint has one value on either side; the piece says which is meant.
         """
         cam_angle = jnp.asarray(cam_angle, dtype=float)
         angle = jnp.where(cam_angle == _TURN, cam_angle, jnp.mod(cam_angle, _TURN))

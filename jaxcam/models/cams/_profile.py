@@ -8,10 +8,19 @@ from jaxtyping import Array, Real
 
 
 class CamProfile(eqx.Module):
-    """The follower's contact angle as a function of the cam's angle.
+    """The contact angle of the follower as a function of the cam's angle.
 
     A profile is periodic over one turn and at least three times continuously
     differentiable, because release from the cam depends on the jerk of the gap.
+
+    Examples:
+        >>> from jaxcam.models import CamProfile
+        >>> class Cosine(CamProfile):
+        ...     lift: float = 0.01
+        ...     def __call__(self, cam_angle):
+        ...         return self.lift * jnp.cos(cam_angle)
+        >>> float(Cosine()(0.0))
+        0.01
     """
 
     @abc.abstractmethod
@@ -19,9 +28,9 @@ class CamProfile(eqx.Module):
         """Follower angle (rad) in contact at `cam_angle` (rad), elementwise."""
 
     def prepared(self) -> "CamProfile":
-        """An equal profile that is cheaper to evaluate many times."""
+        """Return an equivalent profile that is cheaper to evaluate many times."""
         return self
 
     def check(self) -> None:
-        """Raise `ValueError` where the profile has no meaning as it stands."""
+        """Raise `ValueError` for an invalid profile."""
         return None

@@ -24,21 +24,28 @@ _HERMITE = np.array(
 
 
 class SplineProfile(CamProfile):
-    """The periodic quintic spline through a table of points, continuous to order four.
+    """Periodic quintic spline through a table of points, continuous to order four.
 
-    The coefficients need a dense solve of twice as many unknowns as points. They are
-    found once for each simulation; thousands of points are better smoothed first.
+    The coefficients need a dense solve of twice as many unknowns as points, once per
+    simulation; smooth thousands of points first.
 
     Raises:
-        ValueError: If the table is too short, is not finite or not increasing, spans
-            more than a turn, does not close, or looks like degrees.
+        ValueError: The table is too short, not finite or not increasing, spans more
+            than a turn, does not close, or appears to be in degrees.
+
+    Examples:
+        >>> from jaxcam.models import SplineProfile
+        >>> angles = np.linspace(0, 2 * np.pi, 12, endpoint=False)
+        >>> profile = SplineProfile(angles, 0.01 * np.cos(angles)).prepared()
+        >>> round(float(profile(0.0)), 6)
+        0.01
     """
 
     angles: jax.Array
     """Cam angles (rad), shape `(points,)`, strictly increasing within one turn, evenly
     spaced or not. The first point may be repeated a turn later."""
     lifts: jax.Array
-    """The follower's contact angles there (rad), shape `(points,)`."""
+    """Contact angles of the follower there (rad), shape `(points,)`."""
 
     def __init__(self, angles, lifts):
         angles, lifts = as_parameter(angles), as_parameter(lifts)
@@ -57,13 +64,13 @@ class SplineProfile(CamProfile):
         return self.prepared()(cam_angle)
 
     def prepared(self) -> "PiecewiseProfile":
-        """The spline's polynomial pieces, differentiable in the table."""
+        """Return the spline's polynomial pieces, differentiable in the table."""
         widths = jnp.diff(self.angles, append=self.angles[:1] + _TURN)
         coefficients = _quintic_pieces(widths, self.lifts)
         return PiecewiseProfile(self.angles, widths, coefficients)
 
     def check(self) -> None:
-        """Raise `ValueError` for a table that is no profile."""
+        """Raise `ValueError` for an invalid table."""
         _checked_table(np.asarray(self.angles), np.asarray(self.lifts))
 
 

@@ -31,19 +31,19 @@ def compare(
 ) -> Comparison:
     """One recording against a model.
 
-    **Arguments:**
+    Args:
+        system: The model. A `CamFollower` is compared at the measured angle of its cam,
+            whatever its own speed.
+        segments: The recording, cut into its parts.
+        observe: What the channels are of the state: `{"height_m": 0}` is the first
+            component; a function of the state gives anything else. By default the
+            channel that was cut is the first component.
+        noise: Standard deviations of the channels, where they are known; otherwise they
+            are measured.
+        clock: Time of the model at each sample (s).
 
-    - `system`: the model. A `CamFollower` is compared at the measured angle of its
-        cam, whatever its own speed.
-    - `segments`: the recording, cut into its parts.
-    - `observe`: what the channels are of the state: `{"height_m": 0}` is the first
-        component; a function of the state gives anything else. By default the channel
-        that was cut is the first component.
-    - `noise`: standard deviations of the channels, where they are known; otherwise
-        they are measured.
-    - `clock`: time of the model at each sample (s).
-
-    **Raises:** `RecordingError` where a channel is missing.
+    Raises:
+        RecordingError: Where a channel is missing.
     """
     observe = dict(observe or {segments.channel: 0})
     known = {segments.channel: segments.noise, **(noise or {})}
@@ -74,10 +74,9 @@ def compare(
 def compare_case(rig: Rig, case: Sequence[Segments]) -> Comparison:
     """All recordings of a cam-follower against its nominal model.
 
-    **Arguments:**
-
-    - `rig`: the model; another set of values by `rig.replace(...)`.
-    - `case`: from `segment_case`.
+    Args:
+        rig: The model; another set of values by `rig.replace(...)`.
+        case: From `segment_case`.
     """
     found = []
     for segments in case:

@@ -1,4 +1,4 @@
-"""What a comparison of recordings with a model says: by mode, in words and numbers."""
+"""The result of a comparison with a model: by mode, in words and numbers."""
 
 import dataclasses
 import math
@@ -12,50 +12,54 @@ from rich.table import Table
 
 @dataclasses.dataclass(frozen=True)
 class Residuals:
-    """Recording minus model in one mode of one recording.
-
-    - `mode`: `"flight"`, `"contact"`, `"impact place"` or `"impact speed"`.
-    - `time`: seconds of the record; `turned`: angle of the cam (rad), or nothing.
-    - `value`: the differences, in `unit`; `stderr`: what the noise alone would give.
-    - `piece`: which flight, contact or impact each one belongs to.
-    - `fitted`: number of parameters that were fitted to them.
-    """
+    """Recording minus model in one mode of one recording."""
 
     record: str
     mode: str
+    """`"flight"`, `"contact"`, `"impact place"` or `"impact speed"`."""
     channel: str
     unit: str
     time: Float[np.ndarray, " k"]
+    """Seconds of the record; `turned`: angle of the cam (rad), or nothing."""
     turned: Float[np.ndarray, " k"]
     value: Float[np.ndarray, " k"]
+    """The differences, in `unit`; `stderr`: what the noise alone would give."""
     stderr: Float[np.ndarray, " k"]
     piece: Int[np.ndarray, " k"]
+    """Which flight, contact or impact each one belongs to."""
     fitted: int = 0
+    """Number of parameters that were fitted to them."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Row:
-    """One mode of a comparison.
-
-    - `count`: flights, contacts or impacts; `samples`: numbers compared.
-    - `rms`, `noise`: in `unit`; `ratio`: what is left, in units of the noise: one
-        where the model says all that the sensors can see.
-    - `worst_record`, `worst_time`, `worst_phase`: the middle of the 10 ms in which the
-        mean difference is the most significant; `worst_score`: how many standard
-        errors it is there. The phase is the angle of the cam within its turn (rad).
-    """
+    """One mode of a comparison."""
 
     mode: str
     channel: str
     unit: str
     count: int
+    """Flights, contacts or impacts; `samples`: numbers compared."""
     samples: int
     rms: float
+    """In `unit`; `ratio`: what is left, in units of the noise: one where the model says
+    all that the sensors can see."""
     noise: float
+    """In `unit`; `ratio`: what is left, in units of the noise: one where the model says
+    all that the sensors can see."""
     ratio: float
     worst_record: str
+    """The middle of the 10 ms in which the mean difference is the most significant;
+    `worst_score`: how many standard errors it is there. The phase is the angle of the
+    cam within its turn (rad)."""
     worst_time: float
+    """The middle of the 10 ms in which the mean difference is the most significant;
+    `worst_score`: how many standard errors it is there. The phase is the angle of the
+    cam within its turn (rad)."""
     worst_phase: float
+    """The middle of the 10 ms in which the mean difference is the most significant;
+    `worst_score`: how many standard errors it is there. The phase is the angle of the
+    cam within its turn (rad)."""
     worst_score: float
 
 
@@ -83,7 +87,8 @@ class Comparison:
     def row(self, mode: str, channel: str | None = None) -> Row:
         """The row of a mode.
 
-        **Raises:** `KeyError` that names the modes there are.
+        Raises:
+            KeyError: That names the modes there are.
         """
         for row in self.rows:
             if row.mode == mode and channel in (None, row.channel):
@@ -113,7 +118,7 @@ class Comparison:
         return table
 
     def sentence(self) -> str:
-        """What was found, in words."""
+        """Summarise the comparison in words."""
         words = [_words(row) for row in self.rows]
         if not words:
             return "Nothing could be compared: " + " ".join(self.notes)
@@ -154,7 +159,7 @@ def _row(parts: list[Residuals]) -> Row:
 
 
 def _worst(parts: list[Residuals]) -> tuple[str, float, float, float]:
-    """Where the mean of 10 ms of one piece is the most significant."""
+    """Return the piece of 10 ms with the most significant mean."""
     best = ("", float("nan"), float("nan"), 0.0)
     for part in parts:
         scaled = part.value / part.stderr

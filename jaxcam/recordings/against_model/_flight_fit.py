@@ -19,8 +19,8 @@ from .._errors import RecordingError
 from ..cut import fit_local, padded
 
 
-#: how a channel comes out of the state: a component, or a function of it
 Observe = Mapping[str, int | Callable[[Array], Array]]
+"""How a channel comes out of the state: a component, or a function of it."""
 
 _ITERATIONS = 8
 # Change (in units of the noise) that halving the steps may make to a flight

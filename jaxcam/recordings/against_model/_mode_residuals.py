@@ -1,4 +1,4 @@
-"""What a model misses in each mode: in flight, on the surface, at impacts."""
+"""Errors of a model in each mode: in flight, in contact, at impacts."""
 
 import equinox as eqx
 import jax
@@ -112,7 +112,7 @@ def in_contact(system, segments, pick, clock) -> list[Residuals]:
 
 
 def at_impacts(system, segments, pick, clock) -> list[Residuals]:
-    """Where impacts happened, and what became of the approach speed."""
+    """Return the positions of impacts, and the change of the approach speed."""
     found = segments.impacts
     sharp = found.time_stderr < 2 * segments.recording.interval
     if not np.any(sharp):
@@ -160,7 +160,9 @@ def at_impacts(system, segments, pick, clock) -> list[Residuals]:
 
 
 def _distance(system, pick, clock, state) -> Float[np.ndarray, " k"]:
-    """How far the channel is from its value on the surface, shape `(k,)`."""
+    """Return the distance of the channel from its value on the surface, shape
+    `(k,)`.
+    """
     off = _off_surface(system, pick, padded(clock), padded(state))
     return np.asarray(off)[: len(clock)]
 

@@ -1,4 +1,4 @@
-"""Where a record stays near the surface for so long that it is contact.
+"""Find long stretches near the surface without impacts, which count as contact.
 
 The rule has two thresholds and a duration, so that noise alone makes no cut: a
 contact stays within four times the noise for 5 ms; a flight rises above six times the

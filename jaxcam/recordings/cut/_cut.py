@@ -158,7 +158,7 @@ def _spans(count: int, resting: list[Span], marks: list[int]) -> list[Span]:
 
 
 def _crossed(motion: Motion, first: int, place: int, last: int) -> dict:
-    """What the flights on both sides say about an impact; they meet at its time."""
+    """Estimate an impact from the flights on both sides, which meet at its time."""
     before = motion.fit(first, place, at_end=True)
     after = motion.fit(place, last, at_end=False)
     origin = float(motion.time[place] - motion.interval / 2)
@@ -283,7 +283,7 @@ def _contact(motion, span, boundaries, flights, restitution) -> Contact:
 
 
 def settling_time(flight: Flight, restitution: float) -> float:
-    """When the bounces after a landing have died out, if it was as late as it may be.
+    """Return the latest time at which the impacts after a landing have died out.
 
     They shrink by the restitution in duration: the rest of a geometric series.
     """

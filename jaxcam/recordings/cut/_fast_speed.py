@@ -1,4 +1,4 @@
-"""How fast a motion is, and how fast its speed changes."""
+"""Measure the speed of a motion, and its rate of change."""
 
 import math
 from collections.abc import Sequence

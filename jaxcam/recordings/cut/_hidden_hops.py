@@ -1,4 +1,4 @@
-"""Where a follower may have left its cam by less than the encoder shows.
+"""Find flights that are lower than the encoder resolves.
 
 Just above the speed at which the valve floats, the follower hops by a few times the
 noise once a turn. Samples of such a hop look like contact. The rig file says where it

@@ -1,4 +1,4 @@
-"""Where a flight ends in an impact and the next begins.
+"""Find the ends of flights in impacts.
 
 A jump in velocity cuts a flight in two, however fast the impact is over.
 """

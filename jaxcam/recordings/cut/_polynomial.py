@@ -69,7 +69,7 @@ def fit_local(
 def crossing(
     before: LocalFit, after: LocalFit, time: float, reach: float
 ) -> tuple[float, float]:
-    """Where two fits meet, and the standard error of that time (s), by Newton.
+    """Return where two fits meet, and the standard error of that time (s), by Newton.
 
     The search goes no further than `reach` (s) from `time`, where both were fitted.
     """

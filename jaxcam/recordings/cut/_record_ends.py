@@ -1,4 +1,4 @@
-"""What the ends of a record hide: impacts next to them, and bounces before it began."""
+"""Find impacts near the ends of a record, and impacts before it began."""
 
 import dataclasses
 

@@ -1,4 +1,4 @@
-"""When the follower left the surface: slowly, so a threshold is always late."""
+"""Locate the release, which is slow, so that a threshold is always late."""
 
 import numpy as np
 from jaxtyping import Float

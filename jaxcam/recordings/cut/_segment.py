@@ -28,14 +28,14 @@ def segment_case(
 ) -> tuple[Segments, ...]:
     """Cut all recordings of a cam-follower rig, with one surface for all of them.
 
-    **Arguments:**
+    Args:
+        recordings: A `Case`, or any recordings of the same rig.
+        rig: Its nominal geometry, tolerances and sensors.
+        surface: The profile, where it is known; otherwise it is estimated from the
+            impacts and contacts of all recordings.
 
-    - `recordings`: a `Case`, or any recordings of the same rig.
-    - `rig`: its nominal geometry, tolerances and sensors.
-    - `surface`: the profile, where it is known; otherwise it is estimated from the
-        impacts and contacts of all recordings.
-
-    **Raises:** `RecordingError` where a channel is missing or the cam cannot be read.
+    Raises:
+        RecordingError: Where a channel is missing or the cam cannot be read.
     """
     recordings = tuple(recordings)
     drives = [read_drive(recording) for recording in recordings]
@@ -68,25 +68,30 @@ def segment(
 ) -> Segments:
     """Cut a recording of any system with one constraint, or two that face each other.
 
-    **Arguments:**
+    Args:
+        recording: The motion.
+        channel: The motion.
+        contact: What the channel would be in contact at each sample, shape `(k,)` or
+            one number; the motion is above it. `None` without `upper`: the whole record
+            is one flight.
+        contact_rate: Its rate of change; by default from differences of `contact`.
+        upper: The same of a second surface that the motion is below, as the far one of
+            two stops.
+        upper_rate: The same of a second surface that the motion is below, as the far
+            one of two stops.
+        tolerance: How far (in the units of the channel) each surface may be from where
+            it is stated, by default nothing. Within it, it is put where the impacts
+            are.
+        noise: Standard deviation of a sample; by default it is measured.
+        restitution: Expected, for the bounces that are too low to be seen.
 
-    - `recording`, `channel`: the motion.
-    - `contact`: what the channel would be in contact at each sample, shape `(k,)` or
-        one number; the motion is above it. `None` without `upper`: the whole record is
-        one flight.
-    - `contact_rate`: its rate of change; by default from differences of `contact`.
-    - `upper`, `upper_rate`: the same of a second surface that the motion is below, as
-        the far one of two stops.
-    - `tolerance`: how far (in the units of the channel) each surface may be from where
-        it is stated, by default nothing. Within it, it is put where the impacts are.
-    - `noise`: standard deviation of a sample; by default it is measured.
-    - `restitution`: expected, for the bounces that are too low to be seen.
+    Returns:
+        The parts. Every impact in `impacts` has a positive speed of approach to the
+            surface that it is on.
 
-    **Returns:** the parts. Every impact in `impacts` has a positive speed of approach
-    to the surface that it is on.
-
-    **Raises:** `ValueError` where the surfaces have not one number for each sample, or
-    where the upper one is not above the other.
+    Raises:
+        ValueError: Where the surfaces have not one number for each sample, or where the
+            upper one is not above the other.
     """
     samples = recording[channel]
     noise = noise or measured_noise(samples)

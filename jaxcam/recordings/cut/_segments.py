@@ -12,20 +12,18 @@ from ._surface import Surface
 
 @dataclasses.dataclass(frozen=True)
 class Boundary:
-    """Where one part ends and the next begins.
-
-    - `time`, `stderr`: seconds; the error is not a number at the ends of the record.
-    - `kind`: `"impact"` (flight to flight), `"several impacts"` (too close together to
-        be told apart), `"landing"` (flight to contact, with
-        bounces too low to be seen), `"release"` (contact to flight) or `"end of
-        record"`.
-    - `evidence`: why it is there, in words.
-    """
+    """The boundary between one part and the next."""
 
     time: float
+    """Seconds; the error is not a number at the ends of the record."""
     stderr: float
+    """Seconds; the error is not a number at the ends of the record."""
     kind: str
+    """`"impact"` (flight to flight), `"several impacts"` (too close together to be told
+    apart), `"landing"` (flight to contact, with bounces too low to be seen),
+    `"release"` (contact to flight) or `"end of record"`."""
     evidence: str
+    """Why it is there, in words."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -65,33 +63,36 @@ class Contact:
 
 @dataclasses.dataclass(frozen=True)
 class Impacts:
-    """Impacts between two flights that were both seen, one entry each.
-
-    - `time`, `time_stderr`: seconds.
-    - `angle`, `angle_stderr`: the measured channel at the impact, and the error of its
-        distance from the surface.
-    - `turned`: what the cam has turned (rad), or not a number without a drive.
-    - `before`, `after`: rate of the channel on either side, and their errors.
-    - `approach`, `separation`: speeds relative to the surface, both positive.
-    - `surface_stderr`: error of the speed of the surface, which both share.
-    - `flight`: index of the flight that ends here; the next one begins here.
-    - `side`: which surface was hit, 0 the one below the motion, 1 the one above.
-    """
+    """Impacts between two flights that were both seen, one entry each."""
 
     time: Float[np.ndarray, " k"]
+    """Seconds."""
     time_stderr: Float[np.ndarray, " k"]
+    """Seconds."""
     angle: Float[np.ndarray, " k"]
+    """The measured channel at the impact, and the error of its distance from the
+    surface."""
     angle_stderr: Float[np.ndarray, " k"]
+    """The measured channel at the impact, and the error of its distance from the
+    surface."""
     turned: Float[np.ndarray, " k"]
+    """What the cam has turned (rad), or not a number without a drive."""
     before: Float[np.ndarray, " k"]
+    """Rate of the channel on either side, and their errors."""
     before_stderr: Float[np.ndarray, " k"]
     after: Float[np.ndarray, " k"]
+    """Rate of the channel on either side, and their errors."""
     after_stderr: Float[np.ndarray, " k"]
     approach: Float[np.ndarray, " k"]
+    """Speeds relative to the surface, both positive."""
     separation: Float[np.ndarray, " k"]
+    """Speeds relative to the surface, both positive."""
     surface_stderr: Float[np.ndarray, " k"]
+    """Error of the speed of the surface, which both share."""
     flight: Int[np.ndarray, " k"]
+    """Index of the flight that ends here; the next one begins here."""
     side: Int[np.ndarray, " k"]
+    """Which surface was hit, 0 the one below the motion, 1 the one above."""
 
     @property
     def count(self) -> int:
@@ -116,28 +117,27 @@ class Impacts:
 
 @dataclasses.dataclass(frozen=True)
 class Segments:
-    """A recording cut into its parts.
-
-    - `channel`: the channel that the parts were found in.
-    - `gap`: its distance from the nearest surface, `(k,)`, or `None` in free flight.
-    - `noise`: standard deviation of the channel's samples.
-    - `clock`: time of the model at each sample (s): record time, or that of a drive
-        at constant speed.
-    - `drive`, `surface`: what the gap was computed with, for a cam-follower.
-    - `sure`: samples at which contact is no hidden hop, shape `(k,)`; `None`: all.
-    """
+    """A recording cut into its parts."""
 
     recording: Recording
     channel: str
+    """The channel that the parts were found in."""
     noise: float
+    """Standard deviation of the channel's samples."""
     clock: Float[np.ndarray, " k"]
+    """Time of the model at each sample (s): record time, or that of a drive at constant
+    speed."""
     flights: tuple[Flight, ...]
     contacts: tuple[Contact, ...]
     impacts: Impacts
     gap: Float[np.ndarray, " k"] | None = None
+    """Its distance from the nearest surface, `(k,)`, or `None` in free flight."""
     drive: Drive | None = None
+    """What the gap was computed with, for a cam-follower."""
     surface: Surface | None = None
+    """What the gap was computed with, for a cam-follower."""
     sure: Bool[np.ndarray, " k"] | None = None
+    """Samples at which contact is no hidden hop, shape `(k,)`; `None`: all."""
 
     def resting(self, contact: Contact) -> Bool[np.ndarray, " k"]:
         """Samples at which the follower rests: settled, and beyond doubt."""
@@ -148,7 +148,7 @@ class Segments:
         return rows if self.sure is None else rows & self.sure
 
     def sentence(self) -> str:
-        """What was found, in words."""
+        """Summarise the segments in words."""
         flown = sum(flight.last - flight.first for flight in self.flights)
         rested = sum(contact.last - contact.first for contact in self.contacts)
         total = len(self.recording)

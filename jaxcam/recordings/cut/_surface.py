@@ -30,23 +30,22 @@ _LEAST_TOLERANCE = 2e-4
 
 
 class Surface(eqx.Module):
-    """Contact angle (rad) as a function of the cam's angle: geometry and what is added.
-
-    - `profile`: the eccentric circle that fits best.
-    - `phase`: how far ahead of its measured angle the cam seems to be (rad).
-    - `cosines`, `sines`: amplitudes of harmonics 2 and 3 on top of it (rad).
-    - `bend`: amplitudes of what these cannot follow, as a dent; zero without one.
-    - `covariance`: of radius, eccentricity, centre, phase and amplitudes together.
-    - `sense`: -1 for a clockwise cam; the angle given is counted as it turns.
-    """
+    """Contact angle (rad) as a function of the cam's angle: geometry and harmonics."""
 
     profile: EccentricCircle
+    """The eccentric circle that fits best."""
     phase: Float[Array, ""]
+    """How far ahead of its measured angle the cam seems to be (rad)."""
     cosines: Float[Array, " harmonics"]
+    """Amplitudes of harmonics 2 and 3 on top of it (rad)."""
     sines: Float[Array, " harmonics"]
+    """Amplitudes of harmonics 2 and 3 on top of it (rad)."""
     bend: Float[Array, " waves"]
+    """Amplitudes of what the harmonics cannot follow, as a dent; zero without one."""
     covariance: Float[Array, " p p"]
+    """Of radius, eccentricity, centre, phase and amplitudes together."""
     sense: float = eqx.field(static=True)
+    """-1 for a clockwise cam; the angle given is counted as it turns."""
 
     def __call__(self, turned: Float[Array, "*k"]) -> Float[Array, "*k"]:
         order = jnp.asarray(_HARMONICS, dtype=float)

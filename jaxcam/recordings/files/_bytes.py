@@ -8,19 +8,20 @@ from pathlib import Path
 from .._errors import RecordingError
 
 
-#: Bytes of a table once it is inflated: ten minutes of a rig at 5 kHz, or an hour at
-#: 800 Hz. Reading takes about ten times as much memory.
 LARGEST = 100_000_000
-#: Numbers in a table, whatever they take in the file.
+"""Bytes of a table once it is inflated: ten minutes of a rig at 5 kHz, or an hour at
+800 Hz. Reading takes about ten times as much memory."""
 MOST = 15_000_000
+"""Numbers in a table, whatever they take in the file."""
 _GZIP = b"\x1f\x8b"
 
 
 def read_bytes(file: Path) -> bytes:
-    """What is in a file, not inflated.
+    """Return the content of a file, without decompression.
 
-    **Raises:** `RecordingError` for something other than a file, or a larger one than
-    `LARGEST`; `OSError` where it cannot be read.
+    Raises:
+        RecordingError: For something other than a file, or a larger one than `LARGEST`.
+        OSError: Where it cannot be read.
     """
     if file.is_dir():
         raise RecordingError(

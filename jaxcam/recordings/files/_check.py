@@ -1,4 +1,4 @@
-"""What is wrong with the numbers of a recording, in one sentence."""
+"""Describe what is wrong with the numbers of a recording, in one sentence."""
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -60,7 +60,8 @@ def find_gaps(
 def check_channels(recording: Recording) -> None:
     """Check that the channels of a recording can be what their names say.
 
-    **Raises:** `RecordingError` for a dead channel or a lever angle in degrees.
+    Raises:
+        RecordingError: For a dead channel or a lever angle in degrees.
     """
     for name, samples in recording.channels.items():
         # A force or a reference may well be constant; the motion itself may not.
@@ -82,7 +83,8 @@ def check_channels(recording: Recording) -> None:
 def check_drive(recording: Recording) -> None:
     """Compare the cam's speed with the one in the file's name.
 
-    **Raises:** `RecordingError` that names the unit the numbers look like.
+    Raises:
+        RecordingError: That names the unit the numbers look like.
     """
     angle = recording.channels.get("cam_angle_rad")
     nominal = recording.nominal_speed

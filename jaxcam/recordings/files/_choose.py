@@ -1,4 +1,4 @@
-"""Which columns of a file are the channels of a recording, in SI units."""
+"""Choose the columns of a file that are channels of a recording, in SI units."""
 
 import dataclasses
 import math
@@ -18,10 +18,10 @@ from ._table import LEFT_OUT, read_table
 from ._units import si
 
 
-#: Names of the columns in their order, `"-"` for one that is not read; or channels by
-#: the names that the file has for them, each with a factor where the unit at its end is
-#: not all: `{"Y1": ("height_mm", -0.8)}`.
 Columns: TypeAlias = Sequence[str] | Mapping[str, str | tuple[str, float]]
+"""Names of the columns in their order, `"-"` for one that is not read; or channels by
+the names that the file has for them, each with a factor where the unit at its end is
+not all: `{"Y1": ("height_mm", -0.8)}`."""
 TIME = "time_s"
 
 
@@ -107,7 +107,7 @@ def require(file: Path, found: Mapping[str, object], needed: Sequence[str]) -> N
 
 
 def _source(file: Path, names: Sequence[str] | None) -> Source:
-    """What is in a file, read according to its ending."""
+    """Return the content of a file, read according to its suffix."""
     name = file.name.lower()
     if name.endswith((".mat", ".parquet")):
         if names is not None:

@@ -1,4 +1,4 @@
-"""Where in a text table the names and the numbers stand, and what is between them."""
+"""Find names, numbers and separators in a text table."""
 
 import re
 from collections.abc import Sequence
@@ -7,10 +7,10 @@ from typing import NamedTuple
 from ._heading import is_time, is_unit
 
 
-#: between cells, the surest first; a space stands for any white space
 SEPARATORS = ("\t", ";", ",", " ")
-#: what begins a line that is no row
+"""Between cells, the surest first; a space stands for any white space."""
 COMMENTS = ("#", "%", "//")
+"""What begins a line that is no row."""
 # lines of a preamble, at most
 _PREAMBLE = 300
 # rows that must agree before they are believed to be the table

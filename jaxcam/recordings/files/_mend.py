@@ -34,7 +34,8 @@ def mend(recording: Recording, *, bridge: int = _BRIDGE) -> Mended:
     - Saturated samples of a rate (`..._rad_s`) are counted; a fit whose `Sensor` has
         that limit takes them for what they are.
 
-    **Raises:** `RecordingError` where time does not increase, or nothing is left.
+    Raises:
+        RecordingError: Where time does not increase, or nothing is left.
     """
     notes: list[str] = []
     channels = dict(recording.channels)

@@ -18,10 +18,10 @@ from ._mend import mend, Mended
 from ._table import SUFFIXES as TEXT
 
 
-#: what a recording of a cam-follower rig must contain
 CAM_FOLLOWER = ("cam_angle_rad", "follower_angle_rad")
-#: what the files of a case are called
+"""What a recording of a cam-follower rig must contain."""
 SUFFIXES = (*TEXT, ".mat", ".parquet", ".xlsx", ".xlsm")
+"""What the files of a case are called."""
 # text of any kind, read where a folder has nothing else
 _LAST_RESORT = (".txt", ".dat", ".xls", ".txt.gz", ".dat.gz")
 
@@ -41,24 +41,25 @@ def read_recordings(
     are converted and the column is renamed (`cam_angle_deg` -> `cam_angle_rad`), and so
     is one with its unit in brackets (`Time (ms)` -> `time_s`). One column is the time.
 
-    **Arguments:**
+    Args:
+        file: The file. `..._150.7rpm.csv` in its name is the nominal speed.
+        channels: Columns that must be there (SI names).
+        split: A column that numbers the runs in a file that holds several.
+        gaps: `"refuse"` a record with samples missing, `"split"` it in pieces, or
+            `"mend"` it: bridge short gaps, split at long ones and undo slips of an
+            encoder (see `mend`); what was done is in `meta["notes"]`.
+        columns: Names of the columns in their order, `"-"` for one that is not read, of
+            a file without a line of names; or a channel for each column whose name is
+            another, `{"Angle": "angle_deg", "Y1": ("height_m", -8e-4)}`, the second
+            with a factor. Only columns that are named or needed are read then, and rows
+            in which one of them is empty are left out.
+        rate: Samples a second, of a file without a time.
 
-    - `file`: the file. `..._150.7rpm.csv` in its name is the nominal speed.
-    - `channels`: columns that must be there (SI names).
-    - `split`: a column that numbers the runs in a file that holds several.
-    - `gaps`: `"refuse"` a record with samples missing, `"split"` it in pieces, or
-        `"mend"` it: bridge short gaps, split at long ones and undo slips of an encoder
-        (see `mend`); what was done is in `meta["notes"]`.
-    - `columns`: names of the columns in their order, `"-"` for one that is not read, of
-        a file without a line of names; or a channel for each column whose name is
-        another, `{"Angle": "angle_deg", "Y1": ("height_m", -8e-4)}`, the second with a
-        factor. Only columns that are named or needed are read then, and rows in which
-        one of them is empty are left out.
-    - `rate`: samples a second, of a file without a time.
+    Returns:
+        A tuple of `Recording`, one for each run and piece.
 
-    **Returns:** a tuple of `Recording`, one for each run and piece.
-
-    **Raises:** `RecordingError`, one sentence that says what to do.
+    Raises:
+        RecordingError: One sentence that says what to do.
     """
     file = Path(file)
     chosen = read_columns(
@@ -105,7 +106,8 @@ def read_recording(
 
     **Arguments:** as for `read_case`.
 
-    **Raises:** `RecordingError`, one sentence that says what to do.
+    Raises:
+        RecordingError: One sentence that says what to do.
     """
     (recording,) = read_recordings(file, channels=channels, columns=columns, rate=rate)
     return recording
@@ -125,20 +127,20 @@ def read_case(
     Files are text (CSV of any kind, `.tsv`, `.lvm`, each plain or gz), `.mat`, `.xlsx`
     or `.parquet`; where there are none of these, `.txt`, `.dat` and `.xls` are read.
 
-    **Arguments:**
+    Args:
+        channels: Columns that must be there (SI names); `()` for something other than a
+            cam-follower rig.
+        split: A column that numbers the runs in a file that holds several.
+        gaps: `"refuse"` a record with samples missing, `"split"` it in pieces, or
+            `"mend"` it (see `mend`).
+        columns: Names of the columns in their order, `"-"` for one that is not read, of
+            files without a line of names; or a channel for each column whose name is
+            another, `{"Angle": "angle_deg", "Y1": ("height_m", -8e-4)}`, the second
+            with a factor. Rows in which one of those is empty are left out.
+        rate: Samples a second, of files without a time.
 
-    - `channels`: columns that must be there (SI names); `()` for something other than a
-        cam-follower rig.
-    - `split`: a column that numbers the runs in a file that holds several.
-    - `gaps`: `"refuse"` a record with samples missing, `"split"` it in pieces, or
-        `"mend"` it (see `mend`).
-    - `columns`: names of the columns in their order, `"-"` for one that is not read, of
-        files without a line of names; or a channel for each column whose name is
-        another, `{"Angle": "angle_deg", "Y1": ("height_m", -8e-4)}`, the second with a
-        factor. Rows in which one of those is empty are left out.
-    - `rate`: samples a second, of files without a time.
-
-    **Raises:** `RecordingError`, one sentence that says what to do.
+    Raises:
+        RecordingError: One sentence that says what to do.
     """
     folder = Path(folder)
     if not folder.exists():

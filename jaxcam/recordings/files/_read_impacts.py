@@ -39,7 +39,8 @@ def read_impacts(file: str | Path, *, columns: Columns | None = None) -> ImpactT
 
     **Arguments:** the file, and the names of its columns as for `read_case`.
 
-    **Raises:** `RecordingError`, one sentence that names the row and the fix.
+    Raises:
+        RecordingError: One sentence that names the row and the fix.
     """
     file = Path(file)
     every = column_names(file, columns)

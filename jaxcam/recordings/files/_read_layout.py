@@ -1,4 +1,4 @@
-"""What a rig file says of the files of recordings: names of columns, and the rate."""
+"""Read the file layout in a rig file: names of columns, and the sampling rate."""
 
 import dataclasses
 import math
@@ -10,13 +10,13 @@ from .._errors import RigError
 from ._toml import known_keys, Section, shown_value
 
 
-#: keys of a rig file that are about files
 LAYOUT_KEYS = ("columns", "rate")
+"""Keys of a rig file that are about files."""
 
 
 @dataclasses.dataclass(frozen=True)
 class FileLayout:
-    """How the columns of recordings are called; see `read_case` for both."""
+    """Names of the columns of recordings; see `read_case` for both."""
 
     columns: Mapping[str, str | tuple[str, float]] | None = None
     rate: float | None = None

@@ -16,7 +16,8 @@ def read_rig(file: str | Path) -> Rig:
     A quantity is `{value = 0.045, tolerance = 0.002, unit = "m"}` or a bare number;
     `unit` may be left out, and is refused where it is not the SI unit.
 
-    **Raises:** `RigError`, one sentence that names the file and the key.
+    Raises:
+        RigError: One sentence that names the file and the key.
     """
     file = Path(file)
     tables = read_tables(file)

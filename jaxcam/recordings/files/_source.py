@@ -1,4 +1,4 @@
-"""What a file holds before anything is chosen from it: columns by their names."""
+"""The columns of a file by their names, before anything is chosen."""
 
 import dataclasses
 import difflib

@@ -18,8 +18,8 @@ from ._text import Lines, read_lines
 
 
 SUFFIXES = (".csv", ".csv.gz", ".tsv", ".tsv.gz", ".lvm", ".lvm.gz")
-#: what a column is called that is not to be read
 LEFT_OUT = "-"
+"""What a column is called that is not to be read."""
 
 
 def read_table(file: Path, names: Sequence[str] | None = None) -> Source:

@@ -20,7 +20,7 @@ _LONGEST = 200
 
 
 def read_tables(file: Path) -> dict[str, Any]:
-    """What is in the file, not looked at."""
+    """Return the tables of the file, unchecked."""
     if not file.is_file():
         raise RigError(f"{file}: there is no such file; give the path of a rig.toml.")
     with file.open("rb") as stream:
@@ -130,7 +130,7 @@ class Section:
         return tolerance
 
     def error(self, key: str, what: str) -> RigError:
-        """What is wrong with a key, as a sentence to be raised."""
+        """Return a sentence that says what is wrong with a key, to be raised."""
         name = printable(key)
         return RigError(f"{self.file}: `{name}` in [{self.name}] {what}; correct it.")
 

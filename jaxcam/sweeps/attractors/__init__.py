@@ -1,4 +1,4 @@
-"""What motions settle on, and how it is labelled."""
+"""Attractors of motions, and their labels."""
 
 from ._attractors import (
     attractor_names as attractor_names,

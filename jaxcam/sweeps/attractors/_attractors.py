@@ -14,7 +14,7 @@ NONE = {ESCAPED: -1, FAILED: -2, OUTSIDE: -3}
 
 
 class Attractors(NamedTuple):
-    """What motions end on, periodic ones first, by period, impacts and place."""
+    """The attractors of motions, periodic ones first, by period, impacts and place."""
 
     impacts: np.ndarray
     turns: np.ndarray

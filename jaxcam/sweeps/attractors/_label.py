@@ -19,7 +19,7 @@ _STEADY = 0.9
 
 
 class Labels(NamedTuple):
-    """What each lane has settled on, as small integers.
+    """The attractor type of each lane, as small integers.
 
     `turns` is the period in turns (or in points, on a section that is not taken once a
     turn), or one of `APERIODIC`, `ESCAPED`, `FAILED`, `OUTSIDE`; `impacts` counts those
@@ -27,21 +27,24 @@ class Labels(NamedTuple):
     """
 
     impacts: np.ndarray
+    """Impacts of one orbit, or one of `STICKING`, `CONTACT`, `UNCOUNTED`."""
     turns: np.ndarray
+    """Period in forcing periods (or points, on other sections), or one of `APERIODIC`,
+    `ESCAPED`, `FAILED`, `OUTSIDE`."""
 
 
 def periods(states, period_tolerance: float = 1e-6, sizes=None) -> np.ndarray:
-    """Smallest number of points after which each lane repeats; 0 where none does.
+    """Return the smallest period of each lane, in points; 0 where there is none.
 
-    A motion that spirals in towards an orbit looks, for a while, as if it had a
-    multiple of its period. It counts as not repeating until its points stop
+    A motion that spirals in towards an orbit appears, for a while, to have a
+    multiple of its period. It counts as not periodic until its points stop
     approaching.
 
     Args:
-        states: Shape `(lanes, keep, n)`; periods up to `keep / 2` are found, so that
-            each is seen twice.
+        states: Samples, shape `(lanes, keep, n)`; periods up to `keep / 2` are
+            detected, so that each is seen twice.
         period_tolerance: Allowed difference of two states, relative to `sizes`.
-        sizes: Shape `(lanes, n)`, of each component; by default its largest value.
+        sizes: Scale of each component, shape `(lanes, n)`; default its largest value.
 
     Returns:
         Shape `(lanes,)`.
@@ -84,10 +87,16 @@ def _still_nearing(states, n: int) -> np.ndarray:
 def label(
     samples: Samples, period_tolerance: float = 1e-6, impacting: bool = True, sizes=None
 ) -> Labels:
-    """The label of each lane.
+    """Return the label of each lane.
 
-    **Arguments:** `impacting`: whether impacts are counted; they are not for a map;
-    `period_tolerance`, `sizes`: as of [`jaxcam.sweeps.attractors.periods`][].
+    Args:
+        samples: Samples of a section.
+        period_tolerance: As for [`jaxcam.sweeps.attractors.periods`][].
+        impacting: Whether impacts are counted; they are not for a map.
+        sizes: As for [`jaxcam.sweeps.attractors.periods`][].
+
+    Returns:
+        The labels.
     """
     turns = periods(samples.states, period_tolerance, sizes)
     index = np.maximum(turns, 1)[:, None] - 1

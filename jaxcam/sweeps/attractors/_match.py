@@ -35,7 +35,7 @@ def match_orbits(first, second, scale, most: float, labels=None) -> dict[int, in
 
 
 def orbit_distance(first, second, scale) -> float:
-    """How far the points of one orbit are from the other, on average, either way."""
+    """Return the mean distance of the points of two orbits, in either direction."""
     a, b = (np.asarray(orbit) / scale for orbit in (first, second))
     a, b = a[np.all(np.isfinite(a), axis=1)], b[np.all(np.isfinite(b), axis=1)]
     if not len(a) or not len(b):

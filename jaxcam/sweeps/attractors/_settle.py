@@ -17,9 +17,22 @@ def settle(
     where=None,
     values=None,
 ) -> tuple[Samples, Labels]:
-    """Sample motions and label them; those that do not repeat yet go on.
+    """Sample motions and label them, and extend the runs of those that are not
+    periodic.
 
-    **Arguments:** `reruns`: how often they go on, each time for twice as many turns.
+    Args:
+        section: The section.
+        states: Initial states, shape `(lanes, n)`.
+        turns: Number of periods.
+        keep: Number of samples kept.
+        period_tolerance: Tolerance for detecting periods.
+        reruns: Number of extensions of non-periodic runs, each twice as long as the one
+            before.
+        where: Picks a parameter, or several.
+        values: Value of the parameter in each lane.
+
+    Returns:
+        Samples and labels.
     """
     values = None if values is None else np.asarray(values, dtype=float)
     samples = section.sample(states, turns, keep, where=where, values=values)

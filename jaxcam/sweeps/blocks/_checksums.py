@@ -24,7 +24,7 @@ UNREADABLE = (OSError, ValueError, RuntimeError, TypeError, LookupError, Attribu
 
 
 def faults(group: zarr.Group) -> list[str]:
-    """What is wrong with each block, or empty words: it is as it was written."""
+    """Return the fault of each block, or an empty text where it is intact."""
     units, size = int(group.attrs["units"]), int(group.attrs["block"])  # pyright: ignore
     found = []
     for block in range(-(-units // size)):
@@ -139,7 +139,7 @@ def _plain(values: np.ndarray) -> np.ndarray:
 
 
 def stored_identity(path: Path) -> dict | None:
-    """What the sweep at a path is of; None where there is no sweep."""
+    """Return the identity of the sweep at a path; None where there is no sweep."""
     try:
         attributes = dict(zarr.open_group(str(path), mode="r").attrs)
         if attributes.get("format") != FORMAT or attributes.get("version") != VERSION:

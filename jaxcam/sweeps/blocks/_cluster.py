@@ -8,24 +8,27 @@ from contextlib import contextmanager
 
 @contextmanager
 def cluster(address: str, workers: int | None = None) -> Iterator[Executor]:
-    """An executor on a Dask cluster; give it as `executor`.
+    """Return a context with an executor on a Dask cluster, to be passed as `executor`.
 
     ```python
     with jaxcam.sweeps.cluster("local", workers=2) as executor:
         jaxcam.sweeps.basins(system, grid, 100, executor=executor)
     ```
 
-    A worker that is lost in the middle is replaced by another one, and its blocks are
+    A worker that is lost is replaced, and its blocks are
     computed again. Code that runs it must be guarded by `if __name__ == "__main__":`.
 
     Args:
-        address: "local" for processes of one thread each on this machine, which end
-            with the context; or "tcp://host:port" of a scheduler that runs.
-        workers: How many local processes; one a core without.
+        address: "local" for single-threaded processes on this machine, which end with
+            the context; or "tcp://host:port" of a running scheduler.
+        workers: Number of local processes; default one per core.
+
+    Returns:
+        A context manager that yields the executor.
 
     Raises:
-        ValueError: For another address, or one where nobody answers; where Dask is not
-            installed.
+        ValueError: The address is invalid, the scheduler cannot be reached, or Dask is
+            not installed.
     """
     try:
         from distributed import Client, LocalCluster

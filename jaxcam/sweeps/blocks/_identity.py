@@ -1,4 +1,6 @@
-"""What a sweep is of, as plain JSON: kept with its results, compared on resuming."""
+"""The identity of a sweep as plain JSON: kept with its results, compared on
+resuming.
+"""
 
 import dataclasses
 import hashlib

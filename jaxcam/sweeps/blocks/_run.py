@@ -29,28 +29,42 @@ _LOST = ("KilledWorker", "FutureCancelledError")
 
 
 class Progress(NamedTuple):
-    """How far a sweep is, in blocks and seconds."""
+    """Progress of a sweep, in blocks and seconds."""
 
     done: int
+    """Number of finished blocks."""
     total: int
+    """Number of blocks."""
     elapsed: float
+    """Time since the start (s)."""
     remaining: float
-    """Expected time until the end, NaN before the first block."""
+    """Expected time until the end (s), NaN before the first block."""
 
 
 class AbstractJob(abc.ABC):
-    """A sweep cut into blocks.
+    """A sweep divided into blocks.
 
-    A block depends on nothing but what the job is of; where `chained` is set also on
-    the block before it.
+    A block depends only on the fields of the job; if `chained` is set, also on the
+    previous block.
     """
 
     layout: StoreLayout
+    """What the sweep stores."""
     chained: bool = False
+    """Whether a block needs the result of the previous one."""
 
     @abc.abstractmethod
     def work(self, block: int, before: Arrays | None) -> Callable[[], Arrays]:
-        """A block as something that can be sent to another process and called there."""
+        """Return a block as a function that can be sent to another process and called
+        there.
+
+        Args:
+            block: Index of the block.
+            before: Result of the previous block, if `chained`.
+
+        Returns:
+            A function without arguments.
+        """
 
 
 def run_blocks(
@@ -62,20 +76,25 @@ def run_blocks(
     workers: int | None = None,
     progress: Callable[[Progress], None] | None = None,
 ) -> Store:
-    """Compute the blocks that are missing and store each as it finishes.
+    """Compute the missing blocks of a sweep and store each as it finishes.
 
     Args:
-        out: Folder of a Zarr group; in memory without.
-        resume: Whether to go on with what is in the folder. Blocks that are missing or
-            damaged are computed again.
-        executor: Any `concurrent.futures.Executor`; without, `workers` threads, one a
-            core if that is not given either. Results do not depend on it.
-        progress: Called after each block, with a [`jaxcam.sweeps.blocks.Progress`][].
+        job: The sweep.
+        out: Folder of a Zarr group; default in memory.
+        resume: Continue with the content of the folder. Missing or damaged blocks are
+            computed again.
+        executor: Any `concurrent.futures.Executor`; default `workers` threads. Results
+            do not depend on it.
+        workers: Number of threads; default one per core.
+        progress: Called after each block with a [`jaxcam.sweeps.blocks.Progress`][].
+
+    Returns:
+        The store with the results.
 
     Raises:
-        ValueError: For a folder with something else in it.
-        RuntimeError: Where workers were lost. An interruption (Ctrl-C) loses the blocks
-            in work only.
+        ValueError: The folder holds something else.
+        RuntimeError: Workers were lost. An interruption (Ctrl-C) loses only the blocks
+            in progress.
     """
     layout = job.layout
     store = Memory(layout) if out is None else OnDisk(out, layout, resume)

@@ -1,4 +1,4 @@
-"""Where the blocks of a sweep are kept as they finish, and how they lie there."""
+"""Stores for the blocks of a sweep, and their layout."""
 
 import json
 from collections.abc import Mapping
@@ -14,24 +14,33 @@ FORMAT, VERSION = "jaxcam sweep", 1
 
 
 class StoredVariable(NamedTuple):
-    """One array of a sweep: its first dimension is that of the blocks."""
+    """One array of a sweep, with the blocks along its first dimension."""
 
     dims: tuple[str, ...]
+    """Names of the dimensions."""
     tail: tuple[int, ...]
-    """Without the first dimension."""
+    """Shape without the first dimension."""
     dtype: Any
+    """Type of the numbers."""
     attributes: Mapping[str, Any] = {}
+    """Attributes, such as units."""
 
 
 class StoreLayout(NamedTuple):
-    """What a sweep stores: `units` along the first dimension, `block` at a time."""
+    """Layout of a stored sweep: `units` along the first dimension, `block` at a
+    time.
+    """
 
     units: int
+    """Length of the first dimension."""
     block: int
+    """Units per block."""
     variables: Mapping[str, StoredVariable]
+    """Arrays by name."""
     coordinates: Mapping[str, tuple[str, Any, Mapping[str, Any]]]
+    """Dimension, values and attributes of each coordinate."""
     identity: Mapping[str, Any]
-    """What the sweep is of, as JSON; two sweeps are the same where this is."""
+    """Description of the sweep, as JSON; equal for equal sweeps."""
 
     @property
     def blocks(self) -> int:
@@ -43,7 +52,7 @@ class StoreLayout(NamedTuple):
 
 @runtime_checkable
 class Store(Protocol):
-    """What the blocks are put into and read from."""
+    """A store for blocks."""
 
     layout: StoreLayout
 

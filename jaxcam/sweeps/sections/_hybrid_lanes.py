@@ -95,7 +95,7 @@ def turn_lengths(system: HybridSystem, period, where=None, values=None) -> np.nd
 
 
 def lane_sizes(system: HybridSystem, times, states, turns, where=None, values=None):
-    """How large each component of each motion is, shape `(lanes, n)`."""
+    """Return the scale of each component of each motion, shape `(lanes, n)`."""
     batched, shared = split_lanes(as_arrays(system), where, values)
     times, turns = (
         jnp.broadcast_to(jnp.asarray(x, float), (len(states),)) for x in (times, turns)

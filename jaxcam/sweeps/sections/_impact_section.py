@@ -14,27 +14,35 @@ from ._system_section import AbstractSystemSection
 
 
 class ImpactSection(AbstractSystemSection):
-    """States just after each impact, with the time of it.
+    """Impact section: states just after each impact, with its time.
 
-    A chattering sequence is listed up to the impact after which the rest of it is
-    summed; `Settings(chatter_depth=...)` says how far.
+    A chattering sequence is listed up to the impact after which it is completed
+    analytically; set `Settings(chatter_depth=...)` to list more.
+
+    Examples:
+        >>> from jaxcam.models import ImpactOscillator
+        >>> from jaxcam.sweeps import ImpactSection
+        >>> ImpactSection(ImpactOscillator()).regular
+        False
     """
 
     system: HybridSystem
-    """As of [`jaxcam.sweeps.Stroboscopic`][]."""
+    """As for [`jaxcam.sweeps.Stroboscopic`][]."""
     t0: float = 0.0
-    """s, where motions start."""
+    """Start time (s)."""
     period: float | None = None
-    """As of [`jaxcam.sweeps.Stroboscopic`][]."""
+    """As for [`jaxcam.sweeps.Stroboscopic`][]."""
     settings: Settings | None = None
-    """Accuracy; by default a tolerance of 1e-9 and chatter listed down to a hundredth
-    of the fastest rebound."""
+    """Accuracy; default a tolerance of 1e-9 and chatter listed down to a hundredth of
+    the fastest rebound."""
     lanes: int = eqx.field(default=128, static=True)
-    """As of [`jaxcam.sweeps.Stroboscopic`][]."""
+    """As for [`jaxcam.sweeps.Stroboscopic`][]."""
     max_steps: int = eqx.field(default=1_000_000, static=True)
-    """As of [`jaxcam.sweeps.Stroboscopic`][]."""
+    """As for [`jaxcam.sweeps.Stroboscopic`][]."""
     regular: bool = eqx.field(default=False, static=True, init=False)
+    """Samples are not one period apart."""
     impacting: bool = eqx.field(default=True, static=True, init=False)
+    """Impacts are counted."""
 
     def sample(self, states, turns, keep, *, where=None, values=None) -> Samples:
         states = np.asarray(states, dtype=float)

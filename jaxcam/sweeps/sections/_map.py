@@ -15,9 +15,16 @@ from ._section import AbstractSection
 
 
 class Map(AbstractSection):
-    """A map `function(state, parameters) -> state`; a turn is one iteration.
+    """A map `function(state, parameters) -> state`; a period is one iteration.
 
-    A motion that leaves for infinity keeps the points it had; its code is 3.
+    A motion that diverges keeps the points it had; its code is 3.
+
+    Examples:
+        >>> from jaxcam import sweeps
+        >>> henon = lambda x, p: jnp.stack([p["a"] - x[0] ** 2 + p["b"] * x[1], x[0]])
+        >>> section = sweeps.Map(henon, {"a": 1.4, "b": 0.3})
+        >>> section.sample(np.zeros((1, 2)), turns=20, keep=5).states.shape
+        (1, 5, 2)
     """
 
     function: Callable[[Float[Array, " n"], Any], Float[Array, " n"]] = eqx.field(
@@ -29,9 +36,11 @@ class Map(AbstractSection):
     t0: float
     """Number of the first iteration."""
     components: tuple[tuple[str, str], ...] = eqx.field(static=True)
-    """Name and unit of each component of the state; x1, x2, ... without."""
+    """Name and unit of each component of the state; default x1, x2, ..."""
     regular: bool = eqx.field(static=True)
+    """Samples are one iteration apart."""
     impacting: bool = eqx.field(static=True)
+    """Impacts are not counted."""
 
     def __init__(
         self,

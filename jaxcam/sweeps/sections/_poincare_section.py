@@ -13,11 +13,17 @@ from ._system_section import AbstractSystemSection
 
 
 class PoincareSection(AbstractSystemSection):
-    """Where motions cross `function(t, state) = 0`, and when.
+    """Poincare section: crossings of `function(t, state) = 0`, with their times.
 
-    Motions are made one after the other by
-    [`jaxcam.simulate`][jaxcam.hybrid.simulate]: right for dozens of them, slow for
+    Motions are computed one after the other by
+    [`jaxcam.simulate`][jaxcam.hybrid.simulate]: suited to dozens of them, slow for
     thousands.
+
+    Examples:
+        >>> from jaxcam.models import ImpactOscillator
+        >>> from jaxcam.sweeps import PoincareSection
+        >>> PoincareSection(ImpactOscillator(), lambda t, state: state[1]).direction
+        1
     """
 
     system: HybridSystem
@@ -27,13 +33,15 @@ class PoincareSection(AbstractSystemSection):
     direction: int = eqx.field(default=1, static=True)
     """+1 for rising crossings, -1 for falling ones, 0 for both."""
     t0: float = 0.0
-    """s, where motions start."""
+    """Start time (s)."""
     period: float | None = None
-    """s, length of a turn; the system's own forcing period by default."""
+    """Length of a period (s); default the system's forcing period."""
     settings: Settings | None = None
-    """Accuracy; that of `simulate` by default."""
+    """Accuracy; default that of `simulate`."""
     regular: bool = eqx.field(default=False, static=True, init=False)
+    """Samples are not one period apart."""
     impacting: bool = eqx.field(default=True, static=True, init=False)
+    """Impacts are counted."""
 
     def sample(self, states, turns, keep, *, where=None, values=None) -> Samples:
         states = np.asarray(states, dtype=float)
@@ -84,8 +92,22 @@ class PoincareSection(AbstractSystemSection):
 
 
 def return_times(samples: Samples) -> np.ndarray:
-    """Times between consecutive points on a section, shape `(lanes, keep - 1)`.
+    """Return the times between consecutive points on a section.
 
     s, or iterations of a map; NaN where a point is missing.
+
+    Args:
+        samples: Samples of a section.
+
+    Returns:
+        Times (s, or iterations of a map), shape `(lanes, keep - 1)`; NaN where a point
+            is missing.
+
+    Examples:
+        >>> from jaxcam import sweeps
+        >>> section = sweeps.Map(lambda x, p: x / 2)
+        >>> samples = section.sample(np.ones((1, 1)), turns=6, keep=4)
+        >>> sweeps.return_times(samples).tolist()
+        [[1.0, 1.0, 1.0]]
     """
     return np.diff(samples.times, axis=1)

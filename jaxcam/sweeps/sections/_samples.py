@@ -1,4 +1,4 @@
-"""What a section sees of many motions."""
+"""Samples of many motions on a section."""
 
 from typing import NamedTuple
 
@@ -6,22 +6,24 @@ import numpy as np
 
 
 class Samples(NamedTuple):
-    """The last points of many motions on a section, as numpy arrays."""
+    """The last points of many motions on a section, as NumPy arrays."""
 
     states: np.ndarray
-    """(lanes, keep, n); NaN where a lane failed or has fewer points."""
+    """Points, shape `(lanes, keep, n)`; NaN where a lane failed or has fewer points."""
     times: np.ndarray
-    """(lanes, keep) when they were taken: s, or iterations of a map."""
+    """Times of the points (s, or iterations of a map), shape `(lanes, keep)`."""
     hits: np.ndarray
-    """(lanes, keep) impacts since the point before, and how many completed a chatter.
-    """
+    """Impacts since the previous point, shape `(lanes, keep)`."""
     rests: np.ndarray
+    """Completed chatter sequences since the previous point, shape `(lanes, keep)`."""
     final: np.ndarray
-    """(lanes, n) state at the end, one whole number of turns after the start."""
+    """State at the end, a whole number of periods after the start, shape `(lanes, n)`.
+    """
     contact: np.ndarray
-    """(lanes,) whether contact lasted throughout."""
+    """Whether contact lasted throughout, shape `(lanes,)`."""
     code: np.ndarray
-    """(lanes,) 0, or why there is no result: an index into `RESULTS`, or `BEHIND`."""
+    """0, or why there is no result: an index into `RESULTS`, or `BEHIND`; shape
+    `(lanes,)`."""
 
 
 BEHIND = -1

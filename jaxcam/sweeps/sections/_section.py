@@ -14,15 +14,14 @@ from ._samples import Samples
 class AbstractSection(eqx.Module):
     """A way to sample many motions of one system.
 
-    A lane is one motion. What a section says of it depends on its start and its
-    parameters alone, not on the lanes beside it; everything else in this package
-    relies on that.
+    A lane is one motion. Its samples depend on its start and its parameters alone, not
+    on the other lanes; everything else in this package relies on that.
     """
 
     system: AbstractVar[Any]
-    """Whose leaves are the parameters."""
+    """Its leaves are the parameters."""
     regular: AbstractVar[bool]
-    """Whether samples are a turn apart, so that a label P(m, n) says n turns."""
+    """Whether samples are one period apart, so that a label P(m, n) means n periods."""
     impacting: AbstractVar[bool]
     """Whether impacts are counted."""
 
@@ -36,14 +35,15 @@ class AbstractSection(eqx.Module):
         where: Callable | None = None,
         values=None,
     ) -> Samples:
-        """The last `keep` points within `turns` turns.
+        """Return the last `keep` points within `turns` periods.
 
         Args:
-            states: Shape `(lanes, n)`, where each lane starts.
-            where: `where(system)` picks a parameter, which takes `values[i]` in lane i;
-                or a tuple of parameters, which take the row `values[i]`.
-            values: `where(system)` picks a parameter, which takes `values[i]` in lane
-                i; or a tuple of parameters, which take the row `values[i]`.
+            states: Initial state of each lane, shape `(lanes, n)`.
+            turns: Number of periods.
+            keep: Number of points.
+            where: Picks a parameter, or several.
+            values: Value of the parameter in each lane, shape `(lanes,)`, or one row
+                per lane.
 
         Returns:
             [`jaxcam.sweeps.sections.Samples`][]. A lane that cannot start has the code
@@ -52,15 +52,22 @@ class AbstractSection(eqx.Module):
 
     @abc.abstractmethod
     def starts(self, where: Callable | None = None, values=None) -> np.ndarray:
-        """Where a lane starts if nothing is said, shape `(lanes, n)`.
+        """Return the default start of each lane.
+
+        Returns:
+            Shape `(lanes, n)`.
 
         Raises:
-            ValueError: For a system without such a place.
+            ValueError: The system has no default start.
         """
 
     @abc.abstractmethod
     def turn(self, where: Callable | None = None, values=None) -> np.ndarray:
-        """Length of a turn (s, or iterations), shape `(lanes,)`, or `(1,)` for all."""
+        """Return the length of a period (s, or iterations).
+
+        Returns:
+            Shape `(lanes,)`, or `(1,)` for all.
+        """
 
     def sizes(
         self,
@@ -69,10 +76,13 @@ class AbstractSection(eqx.Module):
         where: Callable | None = None,
         values=None,
     ) -> np.ndarray:
-        """How large each component is in each lane, shape `(lanes, n)`.
+        """Return the scale of each component in each lane.
 
-        Two states are equal where their difference is small beside this. By default
-        the largest value among the start (`states`) and the samples.
+        Two states are equal where their difference is small compared with it. By
+        default the largest value among the start (`states`) and the samples.
+
+        Returns:
+            Shape `(lanes, n)`.
         """
         del where, values
         seen = np.where(np.isfinite(samples.states), np.abs(samples.states), 0.0)
@@ -81,11 +91,13 @@ class AbstractSection(eqx.Module):
 
     @abc.abstractmethod
     def lifted(self, states, where: Callable | None = None, values=None) -> np.ndarray:
-        """The states, moved out of the constraint where a parameter moved it there."""
+        """Return the states, moved out of the constraint where a parameter moved it
+        there.
+        """
 
     @abc.abstractmethod
     def names(self, n: int) -> tuple[tuple[str, str], ...]:
-        """Name and unit of each of the `n` components of a state."""
+        """Return name and unit of each of the `n` components of a state."""
 
 
 def system_names(system, n: int) -> tuple[tuple[str, str], ...]:

@@ -10,23 +10,32 @@ from ._system_section import AbstractSystemSection
 
 
 class Stroboscopic(AbstractSystemSection):
-    """States at t0 + k period, k = 1, 2, ...; a turn is one period."""
+    """Stroboscopic section: states at t0 + k period, k = 1, 2, ...
+
+    Examples:
+        >>> from jaxcam.models import ImpactOscillator
+        >>> from jaxcam.sweeps import Stroboscopic
+        >>> Stroboscopic(ImpactOscillator()).regular
+        True
+    """
 
     system: HybridSystem
     """A [`jaxcam.hybrid.HybridSystem`][]."""
     t0: float = 0.0
-    """s, where motions start; its phase is that of the samples."""
+    """Start time (s); its phase is that of the samples."""
     period: float | None = None
-    """s, length of a turn; the system's own forcing period by default."""
+    """Sampling period (s); default the system's forcing period."""
     settings: Settings | None = None
-    """Accuracy; by default a tolerance of 1e-9 and chatter completed as soon as theory
+    """Accuracy; default a tolerance of 1e-9 and chatter completed as soon as the theory
     allows."""
     lanes: int = eqx.field(default=128, static=True)
-    """How many motions advance together in one compiled program."""
+    """Number of motions advanced together in one compiled program."""
     max_steps: int = eqx.field(default=1_000_000, static=True)
-    """Budget of attempted steps of a lane in one call."""
+    """Budget of attempted steps per motion in one call."""
     regular: bool = eqx.field(default=True, static=True, init=False)
+    """Samples are one period apart."""
     impacting: bool = eqx.field(default=True, static=True, init=False)
+    """Impacts are counted."""
 
     def sample(self, states, turns, keep, *, where=None, values=None) -> Samples:
         states = np.asarray(states, dtype=float)

@@ -1,4 +1,4 @@
-"""What the sections of a hybrid system have in common."""
+"""Common parts of the sections of a hybrid system."""
 
 import numpy as np
 from equinox import AbstractVar

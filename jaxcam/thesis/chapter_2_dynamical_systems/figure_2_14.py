@@ -28,7 +28,7 @@ DRAWN = 0.2, 0.7, 1.1, 1.4
 
 
 class Belted(NamedTuple):
-    """What a mass does on a belt of one speed, over one period of the forcing."""
+    """The motion of a mass on a belt of constant speed, over one forcing period."""
 
     belt: float
     highest: float

@@ -47,7 +47,7 @@ def compute(system: CamFollower) -> Rows:
 
 
 def _largest(r) -> float:
-    """Where the lambda-map stops being a number."""
+    """Return where the lambda-map stops being a number."""
     low, high = 0.34, 0.5
     for _ in range(60):
         middle = (low + high) / 2

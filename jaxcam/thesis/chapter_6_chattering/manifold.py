@@ -29,7 +29,7 @@ _POINTS = 400
 
 
 class Manifold(NamedTuple):
-    """What Figures 6.2 to 6.4 are made of."""
+    """The data of Figures 6.2 to 6.4."""
 
     system: CamFollower
     frame: ChatterFrame

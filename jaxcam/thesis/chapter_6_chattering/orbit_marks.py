@@ -23,7 +23,7 @@ _MARKS = (("^", "accumulation"), ("D", "release"), ("s", "section"))
 
 
 def compute_marks(system: CamFollower) -> Rows:
-    """Where the marks lie, beside Table 6.1."""
+    """Compute the positions of the marks, next to Table 6.1."""
     run, found = sticking_turn(system), sequence(system)
     period = float(found.system.period)
     release = float(found.frame.release) % period

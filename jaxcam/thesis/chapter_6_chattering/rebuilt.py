@@ -48,7 +48,7 @@ def error_of(found: Rebuilt) -> float:
 
 
 def lobe_rows(found: Rebuilt) -> Rows:
-    """What a prediction misses of the lobes, and how high they are."""
+    """Return the errors of a prediction of the lobes, and their heights."""
     return [
         ("median error over the range of the velocity", np.nan, error_of(found), ""),
         (
