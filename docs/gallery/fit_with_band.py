@@ -24,7 +24,7 @@ class Swing(jaxcam.HybridSystem):
         return state[0] + 100.0
 
     def impact(self, t, state):
-        return state
+        return state * jnp.array([1.0, -0.5])
 
 
 sensor = Sensor(0, noise=4e-3)
