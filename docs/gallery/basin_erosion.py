@@ -1,5 +1,5 @@
-"""How the wall takes states away from one motion and gives them to others: part of the
-initial states that end on each attractor, while the wall moves."""
+"""A wall that moves takes states away from one motion and gives them to others: part of
+the initial states that end on each attractor."""
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -10,12 +10,19 @@ from jaxcam.plotting import style
 
 
 system = ImpactOscillator(omega=2.6, restitution=0.8, damping=0.02)
-grid = sweeps.Grid((-3.0, -2.5), (0.0, 2.5), (40, 40))
-walls = np.linspace(0.0, 0.45, 10)
-found = sweeps.follow_basins(system, "wall", walls, grid, turns=150)
+grid = sweeps.Grid((-3.0, -2.5), (0.0, 2.5), (32, 32))
+walls = np.linspace(0.0, 0.4, 9)
+found = sweeps.follow_basins(system, "wall", walls, grid, turns=200)
+
+# an attractor may change its label on the way; those that are small are one band
+large = found.shares.max(axis=0) > 0.03
+labels = [" / ".join(sorted(set(names[names != ""]))) for names in found.names.T]
+bands = [*found.shares.T[large], found.shares.T[~large].sum(axis=0)]
+words = [*np.array(labels)[large], "others"]
 
 with style():
     figure, ax = plt.subplots()
-    bands = ax.stackplot(found.values, 100 * found.shares.T, alpha=0.9)
-for k, name in enumerate(found.names.T):
-    print(k, name, found.shares[:, k].round(2))
+    ax.stackplot(found.values, *(100 * np.array(bands)), labels=words, alpha=0.85)
+    ax.set(xlabel="position of the wall (–)", ylabel="part of the states (%)")
+    ax.set(xlim=(0.0, 0.4), ylim=(0, 100))
+    ax.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=3)

@@ -12,7 +12,7 @@ system = ImpactOscillator(omega=2.8, restitution=0.8, wall=0.0, damping=0.0)
 made = sweeps.diagram(
     system,
     lambda s: s.omega,
-    np.linspace(2.6, 4.2, 400),
+    np.linspace(2.6, 3.4, 400),
     [-0.5, 0.5],
     turns=300,
     keep=100,

@@ -24,7 +24,7 @@ class Swing(jaxcam.HybridSystem):
         return state[0] + 100.0
 
     def impact(self, t, state):
-        return state
+        return state * jnp.array([1.0, -0.5])
 
 
 sensor = Sensor(0, noise=4e-3)
@@ -43,9 +43,9 @@ found = fit(Problem.build(model, [cut], parameters))
 print(found)
 
 left = residuals(found)[0]
+rows = np.rint(left.time / 0.01).astype(int)
 fitted = np.full(len(recording), np.nan)
-fitted[np.searchsorted(recording.time, left.time)] = left.value
-fitted = recording["angle_rad"] - fitted
+fitted[rows] = recording["angle_rad"][rows] - left.value
 figure = compare_recording(
     recording, {"by the fit": fitted}, channel="angle_rad", noise=sensor.noise
 )

@@ -53,6 +53,8 @@ _CARD = """-   [![{title}](gallery/{name}-light.png#only-light){{ loading=lazy }
 
     **[{title}](#{anchor})**
 
+    {caption}
+
 """
 _PART = """
 ## {title} {{ #{anchor} }}

@@ -34,7 +34,7 @@ class Swing(jaxcam.HybridSystem):
         return state[0] + 100.0
 
     def impact(self, t, state):
-        return state
+        return state * jnp.array([1.0, -0.5])
 
 
 real, sensors = Swing(stiffness=150.0, air=0.25), {"angle_rad": Sensor(0, noise=2e-3)}

@@ -245,5 +245,5 @@ def _ranking(plt, found: Diagnosis):
     # from the same value in every report, so that a single bar has a scale too
     axis.set_xlim(0.05, max(1e2, 4 * max(delta for _, delta in pairs)))
     axis.invert_yaxis()
-    axis.set_xlabel("BIC above that of the verdict")
+    axis.set_xlabel("BIC above that of the verdict (–)")
     return figure

@@ -7,6 +7,7 @@ from html import escape
 from pathlib import Path
 
 from ..recordings.against_model import Row
+from ..tables import scaled
 from ._demo_branches import Branches, HEADINGS as HEADINGS_OF_BRANCHES
 from ._rests import HEADINGS, rest_rows, Rests
 
@@ -123,11 +124,14 @@ _MODES = ("mode", "ratio", "rms", "noise", "unit", "pieces", "most clearly in")
 
 
 def _cells(row: Row) -> tuple[str, ...]:
-    numbers = (f"{row.ratio:.2f}", f"{row.rms:.1e}", f"{row.noise:.1e}")
+    # the unit of the figures
+    factor, unit = scaled(row.unit, 4 * max(row.rms, row.noise))
+    sizes = (f"{factor * one:.2g}" for one in (row.rms, row.noise))
+    numbers = (f"{row.ratio:.2f}", *sizes)
     place = f"{row.worst_record}, {row.worst_time:.3f} s"
     if row.worst_phase == row.worst_phase:
         place += f", cam at {row.worst_phase:.2f} rad"
-    return (row.mode, *numbers, row.unit, str(row.count), place)
+    return (row.mode, *numbers, unit, str(row.count), place)
 
 
 def table_html(

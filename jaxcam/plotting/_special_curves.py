@@ -69,28 +69,30 @@ def special_curves(
     ax.set_xlabel(labelled(*((names[0], "-") if x_label is None else x_label)))
     ax.set_ylabel(labelled(*((names[1], "-") if y_label is None else y_label)))
     ax.margins(x=0.03, y=0.0)
-    for curve in several:
-        _name(ax, curve, scale)
+    for k, curve in enumerate(several):
+        # neighbours are named at different heights
+        _name(ax, curve, scale, 0.65 if k % 2 else 0.3)
     return figure_of(ax)
 
 
-def _name(ax: Axes, curve, scale) -> None:
-    """The kind of the curve along it, where it is a third of its way up."""
+def _name(ax: Axes, curve, scale, share: float) -> None:
+    """The kind of a curve, along it, at a share of its height."""
     values = scale * np.array([point.parameters for point in curve.points])
-    shown = ax.transData.transform(values)
-    middle = np.argmin(np.abs(shown[:, 1] - np.quantile(shown[:, 1], 0.35)))
-    near = shown[max(middle - 3, 0) : middle + 4]
+    height = values[:, 1]
+    wanted = height.min() + share * np.ptp(height)
+    middle = int(np.argmin(np.abs(height - wanted)))
+    near = values[max(middle - 3, 0) : middle + 4]
     along = near[-1] - near[0]
-    angle = np.rad2deg(np.arctan2(along[1], along[0]))
     kind = _kind(curve)
-    ax.annotate(
+    ax.text(
+        *values[middle],
         kind,
-        tuple(values[middle]),
-        xytext=(0, 0),
-        textcoords="offset points",
         ha="center",
         va="center",
-        rotation=(angle + 90) % 180 - 90,
+        # an angle in the data, which the axes turn as they are scaled
+        rotation=(np.rad2deg(np.arctan2(along[1], along[0])) + 90) % 180 - 90,
+        rotation_mode="anchor",
+        transform_rotates_text=True,
         fontsize="small",
         color=mark_of(kind)[1],
         path_effects=[withStroke(linewidth=5, foreground="white")],

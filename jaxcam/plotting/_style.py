@@ -19,6 +19,8 @@ SECTION = "#000000"
 RECORDED = "#ABABAB"
 BAND = "#BDBDBD"
 CAM = "#8A5F00"
+# a second thing of the same sort: another method, another manifold
+SECOND = "#009E73"
 # constraints side by side, in none of the colours of impact and contact
 _GAPS = (FLIGHT, "#009E73", "#CC79A7", "#56B4E9", SECTION)
 

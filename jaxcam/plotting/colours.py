@@ -7,5 +7,6 @@ from ._style import (
     FLIGHT as FLIGHT,
     IMPACT as IMPACT,
     RECORDED as RECORDED,
+    SECOND as SECOND,
     SECTION as SECTION,
 )

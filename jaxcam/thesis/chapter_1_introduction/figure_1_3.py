@@ -5,7 +5,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ...models import CamFollower, rad_s_to_rpm
-from ...plotting.colours import CONTACT, FLIGHT
+from ...plotting.colours import FLIGHT, SECOND
 from ..interruption import beside_interruption, INTERRUPTION, interruption
 from ..releases import draw_turn, released_turn, sticking_time
 from ..target import Rows, Target
@@ -35,7 +35,7 @@ def draw(system: CamFollower) -> Figure:
     complete, interrupted = both_sides(system)
     for rpm, colour, dashes in (
         (complete, FLIGHT, "solid"),
-        (interrupted, CONTACT, "dashed"),
+        (interrupted, SECOND, "dashed"),
     ):
         run = released_turn(system, rpm)
         for ax in axes:

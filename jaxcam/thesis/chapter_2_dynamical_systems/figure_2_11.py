@@ -50,8 +50,8 @@ def draw(system: CamFollower) -> Figure:
         ax.plot([-1, 1], [-1, 1], color="0.7", lw=0.8)
         ax.axvline(0, color="0.7", lw=0.8, ls=":")
         ax.set_title(name.replace(", ", ",\n"), loc="left", fontsize="medium")
-        ax.set_xlabel("$x_n$")
-    axes[0].set_ylabel("$x_{n+1}$")
+        ax.set_xlabel("$x_n$ (–)")
+    axes[0].set_ylabel("$x_{n+1}$ (–)")
     return figure
 
 

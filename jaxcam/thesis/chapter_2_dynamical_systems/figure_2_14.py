@@ -173,8 +173,8 @@ def draw(system: CamFollower) -> Figure:
     styles = zip(events.items(), (":", "-.", "--"), strict=True)
     for (name, event), dashes in styles:
         top.axvline(event.belt, color=IMPACT, ls=dashes, lw=1.4, label=name)
-    top.set_xlabel("speed of the belt")
-    top.set_ylabel("sticks, of a turn")
+    top.set_xlabel("speed of the belt (–)")
+    top.set_ylabel("part of a turn that sticks (–)")
     top.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=3)
     names = ("crosses", "crosses and sticks", "sticks", "slips")
     drawn = zip(DRAWN, names, strict=True)
@@ -191,8 +191,8 @@ def draw(system: CamFollower) -> Figure:
         ax.plot(*shown.T, color=CONTACT, lw=3.2)
         ax.axhline(one.belt, color="0.5", ls=":", lw=1)
         ax.set_title(f"{name}, {one.belt:.3g}", fontsize=11)
-        ax.set_xlabel("position")
-    figure.axes[1].set_ylabel("velocity")
+        ax.set_xlabel("position (–)")
+    figure.axes[1].set_ylabel("velocity (–)")
     return figure
 
 

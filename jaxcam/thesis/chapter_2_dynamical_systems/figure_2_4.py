@@ -31,7 +31,7 @@ def draw(system: CamFollower) -> Figure:
     points = np.asarray(map_diagram(LogisticMap(), lambda s: s.mu, values, keep=150))
     ax.plot(np.repeat(values, 150), points.ravel(), ",", color=FLIGHT, alpha=0.4)
     ax.set_xlabel(r"$\mu$")
-    ax.set_ylabel("x")
+    ax.set_ylabel("x (–)")
     return figure
 
 

@@ -39,7 +39,7 @@ def draw(system: CamFollower) -> Figure:
             ax.plot(mu, np.where(stable, np.nan, x), "--", color=FLIGHT, lw=0.9)
         ax.set_title(form.title, loc="left")
         ax.set_xlabel(r"$\mu$")
-    axes[0].set_ylabel("x, or radius")
+    axes[0].set_ylabel("x, or radius (–)")
     return figure
 
 

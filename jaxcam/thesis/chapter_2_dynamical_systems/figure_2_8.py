@@ -17,7 +17,7 @@ from variational import Reversed
 from ...hybrid import flow
 from ...maps import grow_manifold, Saddle, saddle_at
 from ...models import CamFollower, ImpactOscillator
-from ...plotting.colours import CONTACT, FLIGHT
+from ...plotting.colours import FLIGHT, SECOND
 from ..target import Rows, Target
 
 
@@ -111,14 +111,14 @@ def draw(system: CamFollower) -> Figure:
     figure, ax = plt.subplots(figsize=(6.8, 5.0))
     for sides, colour, name in (
         (found.unstable, FLIGHT, "unstable manifold"),
-        (found.stable, CONTACT, "stable manifold"),
+        (found.stable, SECOND, "stable manifold"),
     ):
         for k, side in enumerate(sides):
             ax.plot(*side.T, color=colour, lw=1.3, label=None if k else name)
     point = np.asarray(found.saddle.point)
     ax.plot(*point, "o", color="k", ms=6, label="saddle")
-    ax.set_xlabel("position")
-    ax.set_ylabel("velocity")
+    ax.set_xlabel("position (–)")
+    ax.set_ylabel("velocity (–)")
     ax.legend()
     return figure
 

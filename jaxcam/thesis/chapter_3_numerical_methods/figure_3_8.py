@@ -11,7 +11,7 @@ from variational.orbits import SpecialPoint
 
 from ... import plotting
 from ...models import CamFollower, rad_s_to_rpm, rpm_to_rad_s
-from ...plotting.colours import CONTACT, FLIGHT
+from ...plotting.colours import FLIGHT, SECOND
 from ..chapter_5_bifurcations.table_5_2 import FLIP_SPEED, FOLD_SPEED, TRACES
 from ..orbits import (
     along_traces,
@@ -123,7 +123,7 @@ def draw(system: CamFollower) -> Figure:
     angle = np.where(stable, branch.angle, np.nan)
     axes[2].plot(branch.speed, angle, "o-", ms=3, color=FLIGHT)
     for speed, word in ((branch.fold, "fold"), (branch.flip, "flip")):
-        axes[2].axvline(speed, color=CONTACT, lw=0.9)
+        axes[2].axvline(speed, color=SECOND, lw=0.9)
         axes[2].text(
             speed, 1.01, word, ha="center", transform=axes[2].get_xaxis_transform()
         )

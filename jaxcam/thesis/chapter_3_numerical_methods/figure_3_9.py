@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from ... import plotting
 from ...models import CamFollower, rad_s_to_rpm
-from ...plotting.colours import CONTACT, FLIGHT
+from ...plotting.colours import FLIGHT, SECOND
 from ..chapter_5_bifurcations.figure_5_24 import sticking_times
 from ..interruption import INTERRUPTION, interruption
 from ..remember import remembered
@@ -81,10 +81,10 @@ def draw(system: CamFollower) -> Figure:
     speeds, times, _ = sticking_times(system)
     axes[1].plot(speeds, 1e3 * times, color=FLIGHT, label="motion")
     speeds, times = np.array(sticking_along(branch)).T
-    axes[1].plot(speeds, 1e3 * times, "o", ms=3.5, color=CONTACT, label="followed")
+    axes[1].plot(speeds, 1e3 * times, "o", ms=3.5, color=SECOND, label="followed")
     axes[1].legend()
     for point in branch.special:
-        axes[1].axvline(scale * point.parameter, color=CONTACT, ls=":", lw=1.2)
+        axes[1].axvline(scale * point.parameter, color=SECOND, ls=":", lw=1.2)
     axes[1].axhline(0, color="0.4", lw=0.7)
     axes[1].set_xlabel("speed (rpm)")
     axes[1].set_ylabel("sticking time in a turn (ms)")

@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ...models import CamFollower, rpm_to_rad_s
-from ...plotting.colours import CONTACT, FLIGHT
+from ...plotting.colours import FLIGHT, SECOND
 from ..chapter_5_bifurcations.table_5_2 import PRODUCTS, SPEEDS
 from ..target import Rows, Target
 
@@ -29,9 +29,9 @@ def draw(system: CamFollower) -> Figure:
     r = [system.restitution(rpm_to_rad_s(s), jnp.zeros(())) for s in rpm]  # pyright: ignore
     ax.plot(rpm, np.asarray(r), color=FLIGHT, label="this rig")
     printed = np.sqrt(PRODUCTS)
-    ax.plot(SPEEDS, printed, "*", color=CONTACT, label="from Table 5.2")
+    ax.plot(SPEEDS, printed, "*", color=SECOND, label="from Table 5.2")
     ax.set_xlabel("speed (rpm)")
-    ax.set_ylabel("coefficient of restitution")
+    ax.set_ylabel("coefficient of restitution (–)")
     ax.legend()
     return figure
 

@@ -65,7 +65,7 @@ def draw(system: CamFollower) -> Figure:
     for ax in axes:
         ax.axvline(release, color=RECORDED, ls=":", lw=1.2)
     axes[1].set_xlim(0, period)
-    axes[1].set_ylabel("in contact")
+    axes[1].set_ylabel("in contact (–)")
     axes[1].set_xlabel("time (s)")
     axes[1].legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=3)
     return figure
