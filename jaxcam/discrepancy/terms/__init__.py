@@ -12,6 +12,18 @@ from ._families import (
     free_basis as free_basis,
 )
 from ._free_function import FREE as FREE, FreeFunction as FreeFunction
+from ._hidden_elements import (
+    HiddenElement as HiddenElement,
+    Hysteresis as Hysteresis,
+    Relaxation as Relaxation,
+    Resonator as Resonator,
+)
+from ._hidden_force import (
+    DIRECT as DIRECT,
+    HiddenForce as HiddenForce,
+    SHARED as SHARED,
+    STARTS as STARTS,
+)
 from ._library import (
     DriveRipple as DriveRipple,
     library as library,
