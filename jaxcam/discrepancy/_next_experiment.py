@@ -8,7 +8,7 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
-from ..fitting import Problem
+from ..fitting import Parameter, Problem
 from ..recordings import record, RecordingError, Rig, segment_case, Segments, Wandering
 from .report import Diagnosis
 from .search import Blocks, blocks_of, newton_step
@@ -52,12 +52,16 @@ def compare_experiments(
         terms whose BIC is not much worse stay free beside them, so that the best record
         also tells them apart. Where nothing was named, all terms, one at a time.
 
-    **Raises:** `ValueError` for a name that is no parameter.
+    **Raises:** `ValueError` for a name that is no parameter, or where a force with a
+        state of its own was found: what drove it is known of the records that there
+        are alone.
     """
+    _refuse_hidden(found)
     fit = found.after
     for name in asked or ():
         fit.problem.parameter(name)
-    problem = Problem.build(fit.problem.model, records, fit.problem.parameters)
+    parameters = [_of_others(one, len(records)) for one in fit.problem.parameters]
+    problem = Problem.build(fit.problem.model, records, parameters)
     values = np.repeat(np.asarray(fit.point.values)[:1], len(problem.segments), axis=0)
     point = problem.start._replace(values=jnp.asarray(values))
     known, more = blocks_of(fit.problem, fit.point), blocks_of(problem, point)
@@ -76,6 +80,21 @@ def compare_experiments(
         for k, name in enumerate(names)
     ]
     return tuple(sorted(made, key=lambda one: one.factor))
+
+
+def _refuse_hidden(found: Diagnosis) -> None:
+    if any(one.element is not None for one in found.missing):
+        raise ValueError(
+            "Experiments are not compared where a force with a state of its own was "
+            "found; simulate them with `found.system()` and look at the motion."
+        )
+
+
+def _of_others(parameter: Parameter, records: int) -> Parameter:
+    """A parameter that is known of each record, for others: as in the first one."""
+    if parameter.known is None:
+        return parameter
+    return dataclasses.replace(parameter, known=parameter.known[:1] * records)
 
 
 def next_experiments(
@@ -103,6 +122,7 @@ def next_experiments(
     """
     parts = found.after.problem.segments
     drives = [part.drive for part in parts if part.drive is not None]
+    _refuse_hidden(found)
     if not drives:
         raise ValueError(
             "The next experiment is proposed for a rig with a drive; simulate the "

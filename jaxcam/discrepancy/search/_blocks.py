@@ -100,11 +100,6 @@ def blocks_of(
     )
 
 
-def value_of(found: Fit, name: str) -> float:
-    """Value of a parameter that all records share."""
-    return float(found.point.values[0, found.problem.names.index(name)])
-
-
 def values_of(found: Fit, blocks: Blocks) -> np.ndarray:
     """Values of the parameters of some blocks at a fit, in their scales."""
     all_names = found.problem.names

@@ -11,7 +11,8 @@ from ...fitting import Fit, fit, Problem
 from ...fitting.engine import Point
 from ..policy import Policy
 from ..terms import Term
-from ._blocks import blocks_of
+from ._blocks import blocks_of, values_of
+from ._gains import gain
 from ._given_up import given_up
 from ._hidden_state import Hidden, recentred, started
 from ._roughness import occam, roughness
@@ -150,6 +151,38 @@ class FreeFits:
             rough = roughness(*quadratic, one.family, value, self.policy)
             found.append(dataclasses.replace(one, roughness=rough))
         return tuple(found)
+
+    def needed_parts(self, found: Missing, one: Hidden) -> tuple[int, ...]:
+        """Which parts of an element's force by the motion itself earn their number.
+
+        By the quadratic likelihood about the fit, the least needed one first.
+        """
+        heat = heat_of(found.fit)
+        problem = heated(filled(found.problem, found.functions), heat)
+        free = self.free(found)
+        blocks = blocks_of(problem, found.fit.point, names=free)
+        information, score = blocks.total()
+        value = values_of(found.fit, blocks)
+        named = dict(zip(one.direct, one.direct_parts))
+        kept, rows = list(one.direct), blocks.rows(free)
+        top = gain(information, score, rows)
+        while kept:
+            losses = {}
+            for part in kept:
+                gone = blocks.rows([named[k] for k in named if k not in kept])
+                gone = np.union1d(gone, blocks.rows([named[part]])).astype(int)
+                step = np.zeros(len(value))
+                step[gone] = -value[gone]
+                lost = step @ information @ step - 2 * step @ score
+                moved = score - information @ step
+                rest = np.setdiff1d(rows, gone)
+                losses[part] = (top + lost - gain(information, moved, rest)) / heat
+            least = min(losses, key=lambda part: losses[part])
+            count = len(one.direct) - len(kept) + 1
+            if losses[least] > count * math.log(problem.samples):
+                break
+            kept.remove(least)
+        return tuple(kept)
 
     def parts(self, found: Missing | Subset) -> dict[str, list[str]]:
         """The parameters of each term and function, by its label."""

@@ -24,7 +24,8 @@ class Driven:
     """The measured position of each record at equal times.
 
     `position` `(r, n)`, the last one repeated where a record is shorter than others;
-    `begin`, `interval` `(r,)`; `spread`: of all positions from their `middle`.
+    `begin`, `interval` `(r,)`; `spread`: of all positions from their `middle`;
+    `motion_unit`: of the position.
     """
 
     position: Float[np.ndarray, "r n"]
@@ -32,9 +33,10 @@ class Driven:
     interval: Float[np.ndarray, " r"]
     middle: float
     spread: float
+    motion_unit: str = ""
 
 
-def driven_by(problem: Problem) -> Driven | None:
+def driven_by(problem: Problem, motion_unit: str = "") -> Driven | None:
     """The position of the first coordinate as it was measured, smoothed in each flight.
 
     `None` where no sensor shows it.
@@ -55,6 +57,7 @@ def driven_by(problem: Problem) -> Driven | None:
         np.array([part.recording.interval for part in problem.segments]),
         (low + high) / 2,
         (high - low) / 2,
+        motion_unit,
     )
 
 

@@ -55,6 +55,10 @@ class Number:
         new = value * math.exp(change) if self.logarithm else value + change
         return min(max(new, self.low), self.high)
 
+    def near(self, value: float, change):
+        """The number after a small change, which can be differentiated."""
+        return value * jnp.exp(change) if self.logarithm else value + change
+
     def change(self, old: float, new: float) -> float:
         return math.log(new / old) if self.logarithm else new - old
 
@@ -127,6 +131,7 @@ HYSTERESIS = Kind(
     1,
     _hysteresis,
 )
+KINDS = (RESONANCE, RELAXATION, HYSTERESIS)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -211,21 +216,31 @@ class Hidden:
 
     def element(self, point: Point, names: Sequence[str]) -> HiddenElement:
         """What was found, for a simulation."""
-        values = np.asarray(point.values)[0]
+        return self.element_at(point.values[0], names)
+
+    def element_at(self, values, names: Sequence[str]) -> HiddenElement:
+        """The element with parameters `(q,)` at some values; can be differentiated."""
 
         def at(name):
-            return float(values[names.index(name)])
+            return values[names.index(name)]
 
-        moved = _moved(self, [at(name) for name in self.changes])
-        direct = [0.0] * DIRECT
+        numbers = {
+            number.name: number.near(value, at(name))
+            for number, value, name in zip(
+                self.kind.numbers, self.numbers, self.changes
+            )
+        }
+        outputs = {n: at(m) for n, m in zip(self.kind.outputs, self.outputs)}
+        direct: list[Any] = [0.0] * DIRECT
         for k, name in zip(self.direct, self.direct_parts):
             direct[k] = at(name)
+        constant, stiffness, damping = direct
         return self.kind.element(
-            **dict(zip((n.name for n in self.kind.numbers), moved)),
-            **{n: at(m) for n, m in zip(self.kind.outputs, self.outputs)},
-            constant=direct[0],
-            stiffness=direct[1],
-            damping=direct[2],
+            **numbers,
+            **outputs,
+            constant=constant,
+            stiffness=stiffness,
+            damping=damping,
             middle=self.driven.middle,
         )
 
@@ -276,9 +291,7 @@ def with_hidden(problem: Problem, hidden: Hidden) -> Problem:
     change: dict[str, dict[str, float]] = {}
     for k, name in enumerate(hidden.outputs):
         change[name] = {"scale": usual / max(float(size[k]), 1e-12)}
-    for number, value, name in zip(
-        hidden.kind.numbers, hidden.numbers, hidden.changes
-    ):
+    for number, value, name in zip(hidden.kind.numbers, hidden.numbers, hidden.changes):
         reach = hidden.kind.reach(number, hidden.numbers)
         low, high = number.span(value, reach)
         change[name] = {"scale": reach, "lower": low, "upper": high}

@@ -91,9 +91,7 @@ def periodogram(problem: Problem, response: Response, policy: Policy) -> Periodo
     return Periodogram(frequency, gain, separate, len(parts), cells, float(elsewhere))
 
 
-def scanned_frequencies(
-    problem: Problem, policy: Policy
-) -> Float[np.ndarray, " k"]:
+def scanned_frequencies(problem: Problem, policy: Policy) -> Float[np.ndarray, " k"]:
     """From a few periods in the longest record to a few steps of a flight a period."""
     length = max(part.recording.duration for part in problem.segments)
     interval = max(part.recording.interval for part in problem.segments)

@@ -41,4 +41,5 @@ from ._term import (
 )
 from ._value import Value as Value
 from ._where import Where as Where
+from ._with_hidden import WithHidden as WithHidden
 from ._with_terms import base_drive as base_drive, WithTerms as WithTerms

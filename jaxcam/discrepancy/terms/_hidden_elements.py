@@ -38,6 +38,22 @@ class HiddenElement(eqx.Module):
     middle: eqx.AbstractVar[FloatScalar]
 
     @abc.abstractmethod
+    def units(self, unit: str) -> tuple[str, ...]:
+        """Units of the hidden state, by that of the coordinate."""
+
+    @abc.abstractmethod
+    def scales(self) -> tuple[FloatScalar, ...]:
+        """Numbers that must be positive."""
+
+    def check(self) -> None:
+        """**Raises:** `ValueError` for a number that has no meaning."""
+        if not all(float(one) > 0 for one in self.scales()):
+            raise ValueError(
+                f"{type(self).__name__}: its frequency, time, limit or power must be "
+                f"positive."
+            )
+
+    @abc.abstractmethod
     def rate(self, position, velocity, hidden: Float[Array, " h"]) -> Array:
         """Rate of change of the hidden state."""
 
@@ -69,6 +85,12 @@ class Resonator(HiddenElement):
     damping: FloatScalar = _field()
     middle: FloatScalar = _field()
 
+    def units(self, unit):
+        return f"{unit} s^2", f"{unit} s"
+
+    def scales(self):
+        return (self.frequency,)
+
     def rate(self, position, velocity, hidden):
         del velocity
         w = 2 * jnp.pi * self.frequency
@@ -99,6 +121,12 @@ class Relaxation(HiddenElement):
     damping: FloatScalar = _field()
     middle: FloatScalar = _field()
 
+    def units(self, unit):
+        return (unit,)
+
+    def scales(self):
+        return (self.time,)
+
     def rate(self, position, velocity, hidden):
         del position
         return velocity - hidden / self.time
@@ -123,6 +151,12 @@ class Hysteresis(HiddenElement):
     stiffness: FloatScalar = _field()
     damping: FloatScalar = _field()
     middle: FloatScalar = _field()
+
+    def units(self, unit):
+        return (unit,)
+
+    def scales(self):
+        return self.limit, self.power
 
     def rate(self, position, velocity, hidden):
         del position

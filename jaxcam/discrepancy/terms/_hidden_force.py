@@ -93,7 +93,9 @@ class HiddenForce(Term):
             self.table, (row, first.astype(int), 0), (1, 4, SHARED + STARTS)
         )[0]
         a, b, c, d = u, u - 1, u - 2, u - 3
-        weights = jnp.stack([-b * c * d / 6, a * c * d / 2, -a * b * d / 2, a * b * c / 6])
+        weights = jnp.stack(
+            [-b * c * d / 6, a * c * d / 2, -a * b * d / 2, a * b * c / 6]
+        )
         force = (weights @ near) @ jnp.stack([*self.shared, *self.starts])
         return force + ByMotion(self.direct, self.middle).acceleration(motion)
 
