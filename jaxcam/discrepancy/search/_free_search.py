@@ -175,11 +175,14 @@ class FreeSearch:
             for where in (Where.FLIGHT, Where.IMPACT, Where.CONTACT)
         }
         forces = [f for f in self.families if f.where is Where.FLIGHT]
-        if slots[Where.FLIGHT]:
+        forces = forces if slots[Where.FLIGHT] else []
+        hidden = self.driven is not None and len(used) < self.policy.functions
+        hidden = hidden and not any(isinstance(f, Hidden) for f in found.functions)
+        if forces or hidden:
             response = force_response(problem, point, free)
-            slot = slots[Where.FLIGHT][0]
             for family in forces:
                 # one at a time: all of them at once would take gigabytes
+                slot = slots[Where.FLIGHT][0]
                 term = free_term(family, "new")
                 blocks = force_blocks(problem, response, [term])
                 information, score = (x / heat for x in blocks.total())
@@ -188,7 +191,8 @@ class FreeSearch:
                 zero = np.zeros(len(own))
                 rough = roughness(information, score, rows, own, family, zero, policy)
                 leads.append(_Lead(rough.gain, None, family, rough, slot))
-            leads += self._hidden_leads(problem, response, found, heat)
+            if hidden:
+                leads += self._hidden_leads(problem, response, heat)
         # impacts say nothing where they tie nothing
         elsewhere = (Where.CONTACT,) if apart else (Where.CONTACT, Where.IMPACT)
         for family in self.families:
@@ -223,15 +227,14 @@ class FreeSearch:
         return [lead for lead in leads if lead.gain > least][: self.policy.followed]
 
     def _hidden_leads(
-        self, problem: Problem, response: Response, found: Missing, heat: float
+        self, problem: Problem, response: Response, heat: float
     ) -> list[_Lead]:
         """What elements with a state of their own promise, one at most.
 
         A resonance that does less than a force at one frequency with any phase in each
         record is none that the motion drives.
         """
-        if self.driven is None or any(isinstance(f, Hidden) for f in found.functions):
-            return []
+        assert self.driven is not None
         self.progress("looking for forces with a state of their own", None)
         leads = []
         for one in promises(problem, response, self.driven, self.policy):
