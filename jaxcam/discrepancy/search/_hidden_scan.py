@@ -9,20 +9,15 @@ from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
 from ...fitting import Problem
 from ...fitting.engine import invert_information
 from ..policy import Policy
-from ..terms import HiddenForce
-from ._hidden_signals import (
-    at_times,
-    Driven,
-    hysteresis_signals,
-    relaxation_signals,
-    resonance_signals,
-)
+from ..terms import ByMotion, DIRECT
+from ._hidden_signals import at_times, Driven, hysteresis_signals
 from ._hidden_state import Hidden, HYSTERESIS, Kind, RELAXATION, RESONANCE
 from ._local_force import forces_at_nodes, Response
 from ._vibration_scan import scanned_frequencies
@@ -30,14 +25,14 @@ from ._vibration_scan import scanned_frequencies
 
 # Damping ratios of the grid; frequencies are as far apart as each of them makes a
 # resonance wide
-_RATIOS = (0.01, 0.04, 0.16)
+_RATIOS = (0.02, 0.1)
 # Ratio of neighbouring times of a relaxation
 _TIMES = 1.25
 # Limits of a hysteresis, in shares of the range of positions, and its other numbers
 _LIMITS = tuple(np.geomspace(0.03, 1.5, 12).tolist())
 _SHAPES = ((0.5, 1.0), (1.0, 1.0), (0.5, 2.0), (1.0, 2.0))
-# Cells that are worked out at once
-_AT_ONCE = 64
+# Forces at nodes, in numbers, that are worked out at once
+_AT_ONCE = 8_000_000
 # Parts of a diagonal that keep a matrix definite against rounding
 _STATES, _FORCES = 1e-13, 1e-9
 _TINY = 1e-300
@@ -64,8 +59,10 @@ def promises(
     chain = _Chain(problem, response, driven)
     for kind, cells in _grids(problem, driven, policy):
         best = None
-        for first in range(0, len(cells), _AT_ONCE):
-            some = cells[first : first + _AT_ONCE]
+        width = len(kind.outputs) + kind.starts
+        count = max(1, _AT_ONCE // (response.time.size * width))
+        for first in range(0, len(cells), count):
+            some = cells[first : first + count]
             gains, numbers = chain.gains(kind, some)
             k = int(np.argmax(gains))
             if best is None or gains[k] > best[0]:
@@ -112,16 +109,16 @@ class _Chain:
     """The pieces of all records, ready for forces that are given at their nodes.
 
     The parts of a force by the motion itself stand with the free parameters.
+
+    **Arguments:** the problem, its `Response` about a fit, and the position that drives
+    elements.
     """
 
     def __init__(self, problem: Problem, response: Response, driven: Driven):
         self.response, self.driven = response, driven
-        place = problem.model.system.terms  # pyright: ignore
-        empty = next(term for term in place if isinstance(term, HiddenForce))
-        direct = forces_at_nodes(problem, response, empty.by_motion(driven.middle))
-        self.direct = direct
-        size = len(response.prior) + direct.shape[-1]
-        self.size = size
+        by_motion = ByMotion([0.0] * DIRECT, jnp.asarray(driven.middle))
+        self.direct = forces_at_nodes(problem, response, [by_motion])
+        self.size = len(response.prior) + DIRECT
 
     def gains(self, kind: Kind, cells: Sequence[Sequence[float]]):
         """Gains of some cells, and strengths, starts and direct parts of each."""
@@ -187,8 +184,7 @@ def _columns(kind: Kind, cells, driven: Driven, response: Response):
         several = hysteresis_signals(driven, *np.array(cells).T)
         each = [(state, beside) for state, beside in zip(*several)]
     else:
-        signals = {RESONANCE: resonance_signals, RELAXATION: relaxation_signals}
-        each = [signals[kind](driven, *cell) for cell in cells]
+        each = [kind.signals(driven, cell) for cell in cells]
     times = response.time
     whole = np.empty((*times.shape, len(cells), len(kind.outputs) + kind.starts))
     for c, (outputs, free) in enumerate(each):

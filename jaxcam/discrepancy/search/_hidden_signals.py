@@ -2,7 +2,6 @@
 
 import dataclasses
 import math
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -164,12 +163,12 @@ def hysteresis_signals(
 
 
 def at_times(
-    driven: Driven, signals: Float[np.ndarray, "r n s"], time: Sequence
+    driven: Driven, signals: Float[np.ndarray, "r n s"], time
 ) -> Float[np.ndarray, "r k l s"]:
     """Signals at some times `(r, k, l)`, by straight lines."""
     found = []
     for signal, at, begin, interval in zip(
-        signals, np.asarray(time), driven.begin, driven.interval
+        signals, time, driven.begin, driven.interval
     ):
         place = np.clip((at - begin) / interval, 0, len(signal) - 1.001)
         first = place.astype(int)

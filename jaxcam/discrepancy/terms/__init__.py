@@ -19,6 +19,7 @@ from ._hidden_elements import (
     Resonator as Resonator,
 )
 from ._hidden_force import (
+    ByMotion as ByMotion,
     DIRECT as DIRECT,
     HiddenForce as HiddenForce,
     SHARED as SHARED,

@@ -46,6 +46,16 @@ class ByMotion(Term):
     def numbers(self) -> tuple[Array, ...]:
         return self.parts
 
+    def parameters(self, place: int) -> list[Parameter]:
+        return [
+            Parameter(
+                f"{self.name}_{k}",
+                lambda m, k=k: terms_of(m)[place].parts[k],  # pyright: ignore
+                scale=1.0,
+            )
+            for k in range(DIRECT)
+        ]
+
 
 class HiddenForce(Term):
     """A force that is a sum of signals, which differ from record to record.
@@ -98,10 +108,6 @@ class HiddenForce(Term):
         )
         force = (weights @ near) @ jnp.stack([*self.shared, *self.starts])
         return force + ByMotion(self.direct, self.middle).acceleration(motion)
-
-    def by_motion(self, middle: float) -> tuple[ByMotion]:
-        """Its parts by the motion itself, as a term that is without effect."""
-        return (ByMotion([0.0] * DIRECT, jnp.asarray(middle)),)
 
     def numbers(self) -> tuple[Array, ...]:
         return (*self.shared, *self.starts, *self.direct)
