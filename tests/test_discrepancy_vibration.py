@@ -7,10 +7,24 @@ from scipy.integrate import solve_ivp
 
 from jaxcam import HybridSystem
 from jaxcam.discrepancy import Policy
-from jaxcam.discrepancy.search import blocks_of, extended, force_blocks
+from jaxcam.discrepancy.search import (
+    added_gain,
+    blocks_of,
+    extended,
+    force_blocks,
+    newton_step,
+)
+from jaxcam.discrepancy.search._hidden_scan import _Chain
+from jaxcam.discrepancy.search._hidden_signals import driven_by
+from jaxcam.discrepancy.search._hidden_state import (
+    Hidden,
+    RELAXATION,
+    RESONANCE,
+    with_hidden,
+)
 from jaxcam.discrepancy.search._local_force import force_response
 from jaxcam.discrepancy.search._vibration_scan import periodogram
-from jaxcam.discrepancy.terms import WithTerms
+from jaxcam.discrepancy.terms import HiddenForce, WithTerms
 from jaxcam.discrepancy.terms._library import ExternalVibration
 from jaxcam.discrepancy.terms._shapes import ForceOfTime, ForceOfVelocity
 from jaxcam.fitting import fit, Model, Parameter, Problem, Sensor
@@ -155,3 +169,43 @@ def test_forces_at_nodes_say_what_terms_in_the_system_say(build):
         assert np.max(np.abs(mine - theirs) / size) < 3e-3 * (
             np.max(np.abs(theirs) / size)
         )
+
+
+@pytest.mark.parametrize(
+    ("kind", "numbers"), [(RELAXATION, (0.05,)), (RESONANCE, (6.1, 0.08))]
+)
+def test_the_scan_of_hidden_elements_promises_what_parameters_gain(
+    build, kind, numbers
+):
+    """Outputs, free motions of each record and parts by the motion: to 1 %."""
+    problem = build(0.15, 23.3, 1)
+    found = fit(problem, free=["stiffness"])
+    driven = driven_by(problem)
+    assert driven is not None
+    response = force_response(problem, found.point, found.free)
+    chain = _Chain(problem, response, driven)
+    (promised,), ((strengths, starts, direct),) = chain.gains(kind, [numbers])
+    # the same as parameters of the system, with free motions of which nothing is known
+    room = HiddenForce.empty(*driven.position.shape)
+    hidden = Hidden(
+        kind, driven, numbers, (1e6,) * len(kind.outputs), np.zeros((2, kind.starts))
+    )
+    wide = extended(problem, [room], found.point)
+    filled = with_hidden(wide, hidden)
+    names = [*hidden.outputs, *hidden.free_motions, *hidden.direct_parts]
+    blocks = blocks_of(filled, wide.start, 1, [*found.free, *names])
+    information, score = blocks.total()
+    free, new = blocks.rows(found.free), blocks.rows(names)
+    gained = added_gain(information, score, free, new, 1e-12)
+    assert gained > 10
+    assert promised == pytest.approx(gained, rel=0.01)
+    both = np.union1d(free, new)
+    step = newton_step(information, score, both)[0] * blocks.scale[both]
+    labels = np.array(blocks.names)[both]
+    for values, own in (
+        (strengths, hidden.outputs),
+        (direct, hidden.direct_parts),
+        (np.asarray(starts).T.ravel(), hidden.free_motions),
+    ):
+        expected = np.concatenate([step[labels == name] for name in own])
+        np.testing.assert_allclose(values, expected, rtol=0.05)

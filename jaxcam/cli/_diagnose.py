@@ -116,7 +116,9 @@ def _outlook(found, nominal, predict: bool, propose: bool, seed: int, report):
     if predict and found.verdict != discrepancy.Verdict.UNKNOWN:
         report("predicting with and without", None)
         outlook = Outlook(discrepancy.predictions(found))
-    if propose:
+    if propose and any(one.element is not None for one in found.missing):
+        report("proposing no record, as a force with a memory was found", None)
+    elif propose:
         proposed = discrepancy.next_experiments(
             found, nominal, seed=seed, progress=report
         )

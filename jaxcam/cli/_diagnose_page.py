@@ -8,7 +8,8 @@ import numpy as np
 
 from ..discrepancy import Diagnosis
 from ..discrepancy.evidence import Structure
-from ..discrepancy.terms import Variable
+from ..discrepancy.report import MissingFunction
+from ..discrepancy.terms import Relaxation, Variable
 from ..fitting import Residuals
 from ._residual_axes import Along, residual_label, shown_in, title_of
 
@@ -184,11 +185,22 @@ def _missing(plt, found: Diagnosis):
             axis.plot(along, value[row], color=color, label=label)
         neutral = 1.0 if one.kind == "restitution" else 0.0
         axis.axhline(neutral, color="k", lw=0.6)
-        axis.set_xlabel(labelled(name, unit_along(name, found.unit)))
+        axis.set_xlabel(labelled(name, _unit_of(one, name, found.unit)))
         axis.set_ylabel(labelled(one.kind, one.unit.replace("^2", "²")))
+        if one.kind == "resonance":
+            axis.set_xscale("log")
         if len(rows) > 1:
             axis.legend(fontsize=8)
     return figure
+
+
+def _unit_of(one: MissingFunction, argument: str, motion: str) -> str:
+    """Unit of an argument of what is missing, in a motion in this unit."""
+    if argument == "frequency":
+        return "Hz"
+    if argument == "memory":
+        return "s" if isinstance(one.element, Relaxation) else motion
+    return unit_along(argument, motion)
 
 
 def _shapes(plt, found: Diagnosis):

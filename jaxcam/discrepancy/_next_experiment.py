@@ -8,7 +8,7 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
-from ..fitting import Problem, Setup, Turning
+from ..fitting import Parameter, Problem, Setup, Turning
 from ..recordings import (
     record,
     Recording,
@@ -61,12 +61,15 @@ def compare_experiments(
             time.
 
     Raises:
-        ValueError: For a name that is no parameter.
+        ValueError: For a name that is no parameter, or where a force with a state of
+            its own was found: what drove it is known of the existing records alone.
     """
+    _refuse_hidden(found)
     fit = found.after
     for name in asked or ():
         fit.problem.parameter(name)
-    problem = Problem.build(fit.problem.model, records, fit.problem.parameters)
+    parameters = [_of_others(one, len(records)) for one in fit.problem.parameters]
+    problem = Problem.build(fit.problem.model, records, parameters)
     values = np.repeat(np.asarray(fit.point.values)[:1], len(problem.segments), axis=0)
     point = problem.start._replace(values=jnp.asarray(values))
     known, more = blocks_of(fit.problem, fit.point), blocks_of(problem, point)
@@ -85,6 +88,21 @@ def compare_experiments(
         for k, name in enumerate(names)
     ]
     return tuple(sorted(made, key=lambda one: one.factor))
+
+
+def _refuse_hidden(found: Diagnosis) -> None:
+    if any(one.element is not None for one in found.missing):
+        raise ValueError(
+            "Experiments are not compared where a force with a state of its own was "
+            "found; simulate them with `found.system()` and look at the motion."
+        )
+
+
+def _of_others(parameter: Parameter, records: int) -> Parameter:
+    """A parameter that is known of each record, for others: as in the first one."""
+    if parameter.known is None:
+        return parameter
+    return dataclasses.replace(parameter, known=parameter.known[:1] * records)
 
 
 def next_experiments(
@@ -118,6 +136,7 @@ def next_experiments(
     """
     parts = found.after.problem.segments
     drives = [part.drive for part in parts if part.drive is not None]
+    _refuse_hidden(found)
     model = found.model(0)
     turning = model.drive
     if not drives or not isinstance(turning, Turning):

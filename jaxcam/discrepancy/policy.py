@@ -198,6 +198,9 @@ class Policy:
     )
     followed: int = _bounds(3, "free functions and terms that are fitted at each turn")
     heats: int = _bounds(4, "fits of a free function while its prior settles")
+    recentred: int = _bounds(
+        12, "further fits while the numbers of a hidden element settle"
+    )
     heated: float = _bounds(
         1.5, "ratio of costs per sample below which its prior has settled"
     )

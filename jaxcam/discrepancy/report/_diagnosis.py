@@ -11,7 +11,7 @@ from ...hybrid import HybridSystem
 from ...tables import ShortTable
 from ..evidence import Ripple, Structure
 from ..policy import Policy
-from ..terms import FreeFunction, Value, Where, WithTerms
+from ..terms import FreeFunction, Value, Where, WithHidden, WithTerms
 from ._caveats import Caveat
 from ._missing import MissingFunction
 from ._words import number
@@ -174,6 +174,8 @@ class Diagnosis:
         """The system with the terms that were named and no others.
 
         A drive turns at the speed of that record. Faults of sensors are not part of it.
+        A force with a state of its own is a part of it with that state: the system is
+        then a `WithHidden`, whose additional components no impact changes.
         """
         model = self.model(record)
         system = model.system
@@ -197,7 +199,11 @@ class Diagnosis:
             angle, rate = (jnp.asarray(x) for x in (0.0, drive.speed))
             system = model.driven(0.0, angle, rate)
         base, pairs = system.base, system.coordinates  # pyright: ignore
-        return WithTerms(base, tuple(terms), pairs) if terms else base
+        whole = WithTerms(base, tuple(terms), pairs) if terms else base
+        for one in self.missing:
+            if one.element is not None:
+                whole = WithHidden(whole, one.element, pairs[0])
+        return whole
 
     @property
     def records(self) -> tuple[str, ...]:

@@ -9,7 +9,7 @@ from scipy.stats import chi2
 from ...fitting import Fit
 from ..evidence import Choice, Needs, Ripple, Shares
 from ..policy import Policy
-from ..search import Blocks, blocks_of, Missing, Trials, value_of
+from ..search import Blocks, blocks_of, Missing, Trials, values_of
 from ..terms import DriveRipple, Term, Value
 from ._diagnosis import Effect, Verdict
 from ._missing import MissingFunction, sentence_of
@@ -70,7 +70,7 @@ def missing_effects(
         Verdict.UNKNOWN,
         sentence_of(functions),
         {},
-        missing.functions[0].family.where,
+        missing.functions[0].where,
         "; ".join(one.words for one in functions),
         tuple(dict.fromkeys(seen)),
         missing.score - choice.before.bic,
@@ -137,10 +137,9 @@ def _of_term(
 def _seen_in(blocks: Blocks, found: Fit, names, policy: Policy) -> tuple[str, ...]:
     """Records in which the effect is more than chance."""
     rows = blocks.rows(names)
+    value = values_of(found, blocks)[rows]
     seen = []
     for k, record in enumerate(blocks.record):
-        value = np.array([value_of(found, blocks.names[r]) for r in rows])
-        value = value / blocks.scale[rows]
         inside = blocks.information[k][np.ix_(rows, rows)]
         if value @ inside @ value > chi2.isf(policy.shown_chance, len(rows)):
             seen.append(record)

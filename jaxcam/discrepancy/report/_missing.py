@@ -11,9 +11,10 @@ import numpy as np
 from jaxtyping import Float
 
 from ...fitting import Fit
-from ..search import Free, free_term, Missing
-from ..terms import Factor, Family, Variable, Where
+from ..search import Free, free_term, Hidden, Missing
+from ..terms import Factor, Family, HiddenElement, Resonator, Variable, Where
 from ._formula import formula_of
+from ._hidden import hidden_formula, hidden_table, hidden_unit, hidden_words
 
 
 _KINDS = {
@@ -37,12 +38,18 @@ class MissingFunction:
 
     - `kind`: `"force"`, what is to be added to the acceleration; `"restitution"`, what
         the coefficient is to be multiplied with; `"surface"` and `"sensor"`, what is to
-        be added to the surface and to what the sensor of the first coordinate shows.
+        be added to the surface and to what the sensor of the first coordinate shows;
+        `"resonance"`, a force by an oscillator that the motion drives.
     - `arguments`: what it depends on, each with its `grid`: `"position"`,
-        `"velocity"`, `"phase"`, `"time"` or `"speed"` (of approach).
+        `"velocity"`, `"phase"`, `"time"` or `"speed"` (of approach); `"frequency"`
+        (Hz), at which a resonance answers a deflection of one with a force of that
+        size; `"memory"`, of a force with a state of its own: for how long (s) it
+        remembers a deflection of one, or, for a hysteresis, how far the motion has come
+        since it turned round.
     - `value`, `stderr`: in `unit`, at the points of the grid, `(n,)` or `(n, m)`.
     - `words`: what it is, for an engineer. `records` in which it was looked for.
     - `formula`: of what the value is, where a form with a few numbers explains as much.
+    - `element`: of a resonance or a force with a memory, what a simulation needs.
     """
 
     kind: str
@@ -54,6 +61,7 @@ class MissingFunction:
     words: str
     records: tuple[str, ...]
     formula: str | None = None
+    element: HiddenElement | None = None
 
     def to_json(self) -> dict[str, Any]:
         table = {name: at.tolist() for name, at in zip(self.arguments, self.grid)}
@@ -81,8 +89,28 @@ def missing_functions(
     functions of two arguments, and the number of points of each grid.
     """
     return tuple(
-        _one(missing.fit, one, velocities, positions, points)
+        _hidden(missing.fit, one, points)
+        if isinstance(one, Hidden)
+        else _one(missing.fit, one, velocities, positions, points)
         for one in missing.functions
+    )
+
+
+def _hidden(found: Fit, hidden: Hidden, points: int) -> MissingFunction:
+    along, value, error, element = hidden_table(found, hidden, points)
+    unit = hidden.driven.motion_unit
+    resonant = isinstance(element, Resonator)
+    return MissingFunction(
+        "resonance" if resonant else "force",
+        ("frequency",) if resonant else ("memory",),
+        (along,),
+        value,
+        error,
+        hidden_unit(element, unit),
+        hidden_words(found, hidden, element, unit),
+        found.problem.records,
+        hidden_formula(element),
+        element,
     )
 
 

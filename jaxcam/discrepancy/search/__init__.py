@@ -3,7 +3,6 @@
 from ._blocks import (
     Blocks as Blocks,
     blocks_of as blocks_of,
-    value_of as value_of,
     values_of as values_of,
 )
 from ._extended import extended as extended, with_states as with_states
@@ -16,6 +15,7 @@ from ._gains import (
     predicted_gain as predicted_gain,
 )
 from ._given_up import given_up as given_up
+from ._hidden_state import Hidden as Hidden
 from ._kept_trials import KeptTrials as KeptTrials
 from ._local_force import force_blocks as force_blocks, Response as Response
 from ._question import Question as Question, Report as Report

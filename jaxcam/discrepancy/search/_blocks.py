@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from ...fitting import Fit, Problem
 from ...fitting.engine import (
@@ -24,7 +24,8 @@ class Blocks:
 
     A block is a stretch of one record. In units of the parameters' scales, the states
     eliminated: `information` `(b, g, g)`, `score` `(b, g)`; `prior` `(g,)` and
-    `pull` `(g,)` are what the tolerances add to both.
+    `pull` `(g,)` are what the tolerances add to both. `owner` `(g,)` is the number of
+    the record that a parameter is of, zero where all share it.
     """
 
     names: tuple[str, ...]
@@ -35,6 +36,7 @@ class Blocks:
     score: Float[np.ndarray, "b g"]
     prior: Float[np.ndarray, " g"]
     pull: Float[np.ndarray, " g"]
+    owner: Int[np.ndarray, " g"]
 
     def rows(self, names) -> np.ndarray:
         wanted = set(names)
@@ -94,16 +96,12 @@ def blocks_of(
         np.array(score),
         prior,
         pull,
+        np.maximum(columns.record, 0),
     )
-
-
-def value_of(found: Fit, name: str) -> float:
-    """Value of a parameter that all records share."""
-    return float(found.point.values[0, found.problem.names.index(name)])
 
 
 def values_of(found: Fit, blocks: Blocks) -> np.ndarray:
     """Values of the parameters of some blocks at a fit, in their scales."""
     all_names = found.problem.names
     columns = [all_names.index(name) for name in blocks.names]
-    return np.asarray(found.point.values)[0, columns] / blocks.scale
+    return np.asarray(found.point.values)[blocks.owner, columns] / blocks.scale

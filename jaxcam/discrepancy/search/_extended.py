@@ -43,6 +43,9 @@ def extended(problem: Problem, terms: Sequence[Term], at: Point) -> Problem:
     layout = Layout(model, parameter_places(model, parameters))
     fresh = np.array([float(p.where(model)) for p in more])
     fresh = np.tile(fresh, (len(problem.segments), 1))
+    for column, one in enumerate(more):
+        if one.known is not None:
+            fresh[:, column] = one.known
 
     def wider(values):
         return jnp.asarray(np.concatenate([np.asarray(values), fresh], axis=1))

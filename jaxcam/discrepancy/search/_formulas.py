@@ -13,6 +13,7 @@ import numpy as np
 
 from ..terms import Family, free_basis, Primitive
 from ._free_fits import FreeFits, heat_of, Missing, Subset
+from ._hidden_state import Hidden
 from ._roughness import beside, Roughness
 from ._slots import emptied, Free, free_term
 
@@ -28,7 +29,7 @@ def formulated(fits: FreeFits, found: Missing, small: float, progress) -> Missin
     steps of a flight cross costs them a little of their accuracy.
     """
     for one in found.functions:
-        if one.primitive is not None:
+        if isinstance(one, Hidden) or not one.smooth:
             continue
         trials = []
         for primitive, numbers in _promising(fits, found, one):

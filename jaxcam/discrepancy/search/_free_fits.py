@@ -3,7 +3,7 @@
 import dataclasses
 import math
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -11,10 +11,16 @@ from ...fitting import Fit, fit, Problem
 from ...fitting.engine import Point
 from ..policy import Policy
 from ..terms import Term
-from ._blocks import blocks_of
+from ._blocks import blocks_of, values_of
+from ._gains import gain
 from ._given_up import given_up
+from ._hidden_state import Hidden, recentred, started
 from ._roughness import occam, roughness
-from ._slots import filled, Free
+from ._slots import filled, Free, Part
+
+
+# The numbers of a hidden element have settled where they move by less of their reach
+_SETTLED = 0.02
 
 
 class Missing(NamedTuple):
@@ -25,7 +31,7 @@ class Missing(NamedTuple):
     - `problem`: with room for the functions; that of `fit` holds their priors.
     """
 
-    functions: tuple[Free, ...]
+    functions: tuple[Part, ...]
     names: frozenset[str]
     fit: Fit
     score: float
@@ -36,7 +42,7 @@ class Subset(NamedTuple):
     """A subset to fit: functions and names of terms in a problem."""
 
     problem: Problem
-    functions: tuple[Free, ...]
+    functions: tuple[Part, ...]
     names: frozenset[str]
 
 
@@ -69,8 +75,11 @@ class FreeFits:
         """A subset fitted, with the roughness that its functions turn out to have."""
         policy, functions = self.policy, subset.functions
         heat, point, found = 1.0, start, None
-        for turn in range(policy.heats):
-            last = turn + 1 == policy.heats
+        # the numbers of a hidden element move step by step
+        hidden = any(isinstance(one, Hidden) for one in functions)
+        turns = policy.heats + (policy.recentred if hidden else 0)
+        for turn in range(turns):
+            last = turn + 1 == turns
             problem = filled(subset.problem, functions)
             free = self.free(subset)
             found = fit(
@@ -87,6 +96,8 @@ class FreeFits:
             if functions and not last:
                 fresh = self._rougher(subset, functions, point, heat)
                 settled = settled and _alike(fresh, functions)
+                if not settled:
+                    point = _recentred(subset.problem, fresh, functions, point)
                 functions = functions if settled else fresh
             if settled:
                 break
@@ -121,11 +132,15 @@ class FreeFits:
                 _known(information, blocks, other)
         return information, score, blocks.rows(free), blocks.rows(one.coefficients)
 
-    def _rougher(self, subset, functions, point, heat) -> tuple[Free, ...]:
-        """The functions with the roughness that a fit of them suggests."""
+    def _rougher(self, subset, functions, point, heat) -> tuple[Part, ...]:
+        """The functions with the roughness that a fit of them suggests, and hidden
+        elements with the numbers that it suggests."""
         found = []
         for one in functions:
-            if one.primitive is not None:
+            if isinstance(one, Hidden):
+                found.append(recentred(subset.problem, one, point))
+                continue
+            if not one.smooth:
                 found.append(one)
                 continue
             quadratic = self.quadratic(
@@ -136,6 +151,38 @@ class FreeFits:
             rough = roughness(*quadratic, one.family, value, self.policy)
             found.append(dataclasses.replace(one, roughness=rough))
         return tuple(found)
+
+    def needed_parts(self, found: Missing, one: Hidden) -> tuple[int, ...]:
+        """Which parts of an element's force by the motion itself earn their number.
+
+        By the quadratic likelihood about the fit, the least needed one first.
+        """
+        heat = heat_of(found.fit)
+        problem = heated(filled(found.problem, found.functions), heat)
+        free = self.free(found)
+        blocks = blocks_of(problem, found.fit.point, names=free)
+        information, score = blocks.total()
+        value = values_of(found.fit, blocks)
+        named = dict(zip(one.direct, one.direct_parts))
+        kept, rows = list(one.direct), blocks.rows(free)
+        top = gain(information, score, rows)
+        while kept:
+            losses = {}
+            for part in kept:
+                gone = blocks.rows([named[k] for k in named if k not in kept])
+                gone = np.union1d(gone, blocks.rows([named[part]])).astype(int)
+                step = np.zeros(len(value))
+                step[gone] = -value[gone]
+                lost = step @ information @ step - 2 * step @ score
+                moved = score - information @ step
+                rest = np.setdiff1d(rows, gone)
+                losses[part] = (top + lost - gain(information, moved, rest)) / heat
+            least = min(losses, key=lambda part: losses[part])
+            count = len(one.direct) - len(kept) + 1
+            if losses[least] > count * math.log(problem.samples):
+                break
+            kept.remove(least)
+        return tuple(kept)
 
     def parts(self, found: Missing | Subset) -> dict[str, list[str]]:
         """The parameters of each term and function, by its label."""
@@ -158,23 +205,23 @@ class FreeFits:
             if t.name in found.names
         }
         for one in found.functions:
-            if one.primitive is None:
-                freedom = heat * self._freedom(found, found.fit, [one])
-            else:
-                freedom = number * one.primitive.count
-            prices[one.label] = freedom
+            price = one.price(found.problem.samples)
+            if one.smooth:
+                price += self._freedom(found, found.fit, [one])
+            prices[one.label] = heat * price
         return prices
 
     def score(self, subset: Subset, found: Fit) -> float:
         """Minus twice the logarithm of the evidence, up to a constant."""
         count = sum(len(t.strengths()) for t in self.terms if t.name in subset.names)
-        count += sum(f.primitive.count for f in subset.functions if f.primitive)
-        price = count * math.log(found.problem.samples)
-        rough = [one for one in subset.functions if one.primitive is None]
+        samples = found.problem.samples
+        price = count * math.log(samples)
+        price += sum(one.price(samples) for one in subset.functions)
+        rough = [one for one in subset.functions if one.smooth]
         return found.cost + price + self._freedom(subset, found, rough)
 
     def _freedom(
-        self, subset: Missing | Subset, found: Fit, functions: Sequence[Free]
+        self, subset: Missing | Subset, found: Fit, functions: Sequence[Any]
     ) -> float:
         """The share of some sums of sines in the logarithm of the evidence."""
         if not functions:
@@ -199,9 +246,9 @@ class FreeFits:
         return occam(information, rows, own, spread, self.policy.alike)
 
 
-def _known(information, blocks, one: Free) -> None:
+def _known(information, blocks, one: Part) -> None:
     """Add what the roughness of a function says of its coefficients."""
-    if one.primitive is None:
+    if isinstance(one, Free) and one.smooth:
         rows = blocks.rows(one.coefficients)
         spread = np.where(one.spread > 0, one.spread, one.roughness.size)
         information[rows, rows] += (blocks.scale[rows] / spread) ** 2
@@ -234,11 +281,24 @@ def unscaled(blocks, names, heat: float):
     return information * np.outer(unit, unit), score * unit
 
 
-def _alike(fresh: Sequence[Free], functions: Sequence[Free]) -> bool:
-    """Whether the roughness of functions has settled."""
-    return all(
-        a.primitive is not None
-        or a.roughness.length == b.roughness.length
-        and abs(math.log(a.roughness.size / b.roughness.size)) < 1.0
-        for a, b in zip(fresh, functions)
+def _alike(fresh: Sequence[Part], functions: Sequence[Part]) -> bool:
+    """Whether the roughness of functions, and what elements are, has settled."""
+    return all(_as_before(a, b) for a, b in zip(fresh, functions))
+
+
+def _as_before(fresh, one) -> bool:
+    if isinstance(fresh, Hidden):
+        return fresh.moved_from(one) < _SETTLED
+    return (
+        not fresh.smooth
+        or fresh.roughness.length == one.roughness.length
+        and abs(math.log(fresh.roughness.size / one.roughness.size)) < 1.0
     )
+
+
+def _recentred(problem: Problem, fresh, functions, point: Point) -> Point:
+    """The point for functions about other numbers of their hidden elements."""
+    for one, before in zip(fresh, functions):
+        if one is not before and isinstance(one, Hidden):
+            point = point._replace(values=started(problem, point.values, one))
+    return point

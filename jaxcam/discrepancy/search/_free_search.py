@@ -20,16 +20,21 @@ from ._blocks import blocks_of, values_of
 from ._formulas import formulated
 from ._free_fits import FreeFits, heat_of, heated, Missing, Subset, unscaled
 from ._gains import added_gain, gain
-from ._local_force import force_blocks, force_response
+from ._hidden_scan import Promise, promises
+from ._hidden_signals import driven_by
+from ._hidden_state import Hidden, KINDS, RESONANCE, started
+from ._local_force import force_blocks, force_response, Response
 from ._roughness import Roughness, roughness
 from ._slots import (
     emptied,
     filled,
     Free,
     free_term,
+    Part,
     roomy,
     slots_of,
 )
+from ._vibration_scan import periodogram
 
 
 class _Lead(NamedTuple):
@@ -40,9 +45,12 @@ class _Lead(NamedTuple):
     family: Family | None = None
     rough: Roughness | None = None
     slot: str = ""
+    promise: Promise | None = None
 
     @property
     def label(self) -> str:
+        if self.promise is not None:
+            return self.promise.hidden.label
         return self.name or (self.family.name if self.family else "")
 
 
@@ -70,7 +78,8 @@ class FreeSearch:
         self.fits = FreeFits(rig, self.terms, policy)
         self.families = tuple(families)
         impacting = any(family.where is not Where.FLIGHT for family in families)
-        self.problem = roomy(problem, self.families[0], impacting)
+        self.driven = driven_by(problem, self.families[0].motion_unit)
+        self.problem = roomy(problem, self.families[0], impacting, self.driven)
         #: what any sensor may do is no function without a name
         self.faults = own_faults(self.problem.model, self.problem.parameters)
         self.apart = dataclasses.replace(
@@ -88,7 +97,7 @@ class FreeSearch:
             found = self._grown(swapped, False)
         if not found.functions:
             return None
-        found = self._pruned(found)
+        found = self._simplified(self._pruned(found))
         return formulated(self.fits, found, self._small(found), self.progress)
 
     def _bare(self, problem: Problem, start: Point) -> Missing:
@@ -126,6 +135,8 @@ class FreeSearch:
 
     def _shows_apart(self, lead: _Lead) -> bool:
         """Whether pieces that are tied to none show what a lead adds."""
+        if lead.promise is not None:
+            return True
         if lead.family is not None:
             place, argument = lead.family.where, lead.family.argument
             drifts = place is Where.SENSOR and argument is Variable.TIME
@@ -147,7 +158,8 @@ class FreeSearch:
 
     def _least(self) -> float:
         """Growth of twice the logarithm of the evidence that is asked for."""
-        chance = self.policy.false_alarms / (len(self.families) + len(self.terms))
+        tests = len(self.families) + len(self.terms) + len(KINDS)
+        chance = self.policy.false_alarms / tests
         least = max(float(chi2.isf(chance, 1)), math.log(self.problem.samples))
         return (math.sqrt(least) + self.policy.beyond) ** 2
 
@@ -169,11 +181,14 @@ class FreeSearch:
             for where in (Where.FLIGHT, Where.IMPACT, Where.CONTACT, Where.SENSOR)
         }
         forces = [f for f in self.families if f.where is Where.FLIGHT]
-        if slots[Where.FLIGHT]:
+        forces = forces if slots[Where.FLIGHT] else []
+        hidden = self.driven is not None and len(used) < self.policy.functions
+        hidden = hidden and not any(isinstance(f, Hidden) for f in found.functions)
+        if forces or hidden:
             response = force_response(problem, point, free)
-            slot = slots[Where.FLIGHT][0]
             for family in forces:
                 # one at a time: all of them at once would take gigabytes
+                slot = slots[Where.FLIGHT][0]
                 term = free_term(family, "new")
                 blocks = force_blocks(problem, response, [term])
                 information, score = (x / heat for x in blocks.total())
@@ -182,6 +197,8 @@ class FreeSearch:
                 zero = np.zeros(len(own))
                 rough = roughness(information, score, rows, own, family, zero, policy)
                 leads.append(_Lead(rough.gain, None, family, rough, slot))
+            if hidden:
+                leads += self._hidden_leads(problem, response, heat)
         # impacts say nothing where they tie nothing
         elsewhere = {Where.CONTACT, Where.SENSOR, *([] if apart else [Where.IMPACT])}
         for family in self.families:
@@ -218,10 +235,39 @@ class FreeSearch:
             least = max(least, self._small(found) / heat)
         return [lead for lead in leads if lead.gain > least][: self.policy.followed]
 
+    def _hidden_leads(
+        self, problem: Problem, response: Response, heat: float
+    ) -> list[_Lead]:
+        """What elements with a state of their own promise, one at most.
+
+        A resonance that does less than a force at one frequency with any phase in each
+        record is none that the motion drives.
+        """
+        assert self.driven is not None
+        self.progress("looking for forces with a state of their own", None)
+        leads = []
+        for one in promises(problem, response, self.driven, self.policy):
+            price = one.hidden.price(problem.samples)
+            leads.append(_Lead(one.gain / heat - price, promise=one))
+        top = max(leads, key=lambda lead: lead.gain)
+        assert top.promise is not None
+        if top.gain > 0 and top.promise.hidden.kind is RESONANCE:
+            scan = periodogram(problem, response, self.policy)
+            count = 2 * scan.records + 1
+            price = count * math.log(problem.samples) + 2 * math.log(scan.cells)
+            if scan.best_separate[1] / heat - price > top.gain:
+                leads.remove(top)
+        return leads
+
     def _with(self, problem: Problem, found: Missing, lead: _Lead) -> Missing | None:
         functions, names = found.functions, found.names
         point = found.fit.point
-        if lead.family is not None:
+        if lead.promise is not None:
+            hidden, direct = lead.promise.hidden, lead.promise.direct
+            functions = (*functions, hidden)
+            values = started(problem, point.values, hidden, direct)
+            point = point._replace(values=values)
+        elif lead.family is not None:
             assert lead.rough is not None
             functions = (*functions, Free(lead.family, lead.rough, lead.slot))
             values = emptied(problem, point.values, lead.slot)
@@ -257,7 +303,7 @@ class FreeSearch:
                 return self._swapped(trial)
         return found
 
-    def _rival(self, found: Missing, out: Free | str) -> str | None:
+    def _rival(self, found: Missing, out: Part | str) -> str | None:
         """The term that would do most in the place of something, if it would do.
 
         By the quadratic likelihood about the fit.
@@ -293,12 +339,12 @@ class FreeSearch:
         labels = {one.label: one for one in found.functions}
         return self.fits.fitted(*self._without(found, labels.get(label, label)))
 
-    def _without(self, found: Missing, out: Free | str) -> tuple[Subset, Point]:
+    def _without(self, found: Missing, out: Part | str) -> tuple[Subset, Point]:
         """Return the subset without a function or a term, and a start for its fit."""
         functions = tuple(f for f in found.functions if f is not out)
         names = found.names - {out} if isinstance(out, str) else found.names
         values = found.fit.point.values
-        if isinstance(out, Free):
+        if not isinstance(out, str):
             values = emptied(self.problem, values, out.slot)
         else:
             rows = [
@@ -318,4 +364,25 @@ class FreeSearch:
             heat = heat_of(found.fit)
             if less.score - found.score < max(heat * self._least(), self._small(found)):
                 found = less
+        return found
+
+    def _simplified(self, found: Missing) -> Missing:
+        """Without parts of a hidden element's force that the rig can do as well."""
+        for one in found.functions:
+            if not isinstance(one, Hidden):
+                continue
+            kept = self.fits.needed_parts(found, one)
+            if kept == one.direct:
+                continue
+            self.progress(f"simplifying {one.label}", None)
+            less = dataclasses.replace(one, direct=kept)
+            functions = tuple(less if f is one else f for f in found.functions)
+            values = np.asarray(found.fit.point.values).copy()
+            gone = set(one.direct_parts) - set(less.direct_parts)
+            values[:, [self.problem.names.index(name) for name in gone]] = 0.0
+            point = found.fit.point._replace(values=values)
+            subset = Subset(self.problem, functions, found.names)
+            trial = self.fits.fitted(subset, point)
+            if trial.score < found.score:
+                found = trial
         return found

@@ -59,8 +59,8 @@ class Response(NamedTuple):
         and then `l` for the force at the nodes, of each record.
     - `place` `(r, m)`: which of the `g` free numbers each parameter of a record is.
     - `time` `(r, k, l)`: of the nodes. `exists` `(r, k)`.
-    - `names`, `scale`, `prior`, `pull` `(g,)`: of the free numbers, and what their
-        tolerances add to information and score.
+    - `names`, `scale`, `prior`, `pull`, `owner` `(g,)`: of the free numbers, what their
+        tolerances add to information and score, and of which record they are.
     """
 
     point: Point
@@ -73,6 +73,7 @@ class Response(NamedTuple):
     scale: Float[np.ndarray, " g"]
     prior: Float[np.ndarray, " g"]
     pull: Float[np.ndarray, " g"]
+    owner: Int[np.ndarray, " g"]
 
 
 def stride_of(problem: Problem) -> int:
@@ -119,6 +120,7 @@ def force_response(problem: Problem, point: Point, free: Sequence[str]) -> Respo
         columns.scale,
         prior,
         -prior * off_nominal(problem, columns, point),
+        np.maximum(columns.record, 0),
     )
 
 
@@ -131,8 +133,7 @@ def force_blocks(problem: Problem, response: Response, terms: Sequence[Term]) ->
     """
     strengths = [p for k, term in enumerate(terms) for p in term.parameters(k)]
     scale = np.array([p.scale for p in strengths], dtype=float)
-    forces = _forces(problem.layout, problem.pieces, response.point, tuple(terms))
-    forces = np.asarray(forces)[:, :, :: stride_of(problem)] * scale
+    forces = forces_at_nodes(problem, response, terms) * scale
     width, size = forces.shape[-1], len(response.prior)
     chain = jax.vmap(chained)(_onto(response, forces))
     found = eliminate_states(jax.tree.map(jnp.asarray, chain))
@@ -159,7 +160,17 @@ def force_blocks(problem: Problem, response: Response, terms: Sequence[Term]) ->
         np.array(score),
         np.concatenate([response.prior, none]),
         np.concatenate([response.pull, none]),
+        np.concatenate([response.owner, np.zeros(width, dtype=int)]),
     )
+
+
+def forces_at_nodes(
+    problem: Problem, response: Response, terms: Sequence[Term]
+) -> Float[np.ndarray, "r k l p"]:
+    """Acceleration by a unit of each strength of some terms, at every node."""
+    terms = tuple(terms)
+    every = _forces(problem.layout, problem.pieces, response.point, terms)
+    return np.asarray(every)[:, :, :: stride_of(problem)]
 
 
 def _onto(response: Response, forces: Float[np.ndarray, "r k l p"]) -> LinearPieces:

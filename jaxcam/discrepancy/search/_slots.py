@@ -3,14 +3,26 @@
 import dataclasses
 import math
 from collections.abc import Sequence
+from typing import TypeAlias
 
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
 from ...fitting import Model, Problem
-from ..terms import Family, FREE, FreeFunction, Primitive, terms_of, Where
+from ..terms import (
+    Family,
+    FREE,
+    FreeFunction,
+    HiddenForce,
+    Primitive,
+    Term,
+    terms_of,
+    Where,
+)
 from ._extended import extended
+from ._hidden_signals import Driven
+from ._hidden_state import Hidden, with_hidden
 from ._roughness import Roughness
 
 
@@ -39,6 +51,20 @@ class Free:
         return self.family.name
 
     @property
+    def where(self) -> Where:
+        return self.family.where
+
+    @property
+    def smooth(self) -> bool:
+        """Whether it has a prior by its roughness."""
+        return self.primitive is None
+
+    def price(self, samples: int) -> float:
+        """What its numbers must gain, without what its roughness costs."""
+        count = 0 if self.primitive is None else self.primitive.count
+        return count * math.log(samples)
+
+    @property
     def coefficients(self) -> list[str]:
         """Names of the parameters that are its own."""
         sines = _SINES[self.family.where] + 1
@@ -54,18 +80,28 @@ class Free:
         return np.array([self.roughness.size, *self.primitive.scales])
 
 
-def roomy(problem: Problem, family: Family, impacting: bool) -> Problem:
-    """The problem with room for free functions, all of them zero.
+#: what may be put into a problem that has room for it
+Part: TypeAlias = Free | Hidden
+
+
+def roomy(
+    problem: Problem, family: Family, impacting: bool, driven: Driven | None
+) -> Problem:
+    """The problem with room for free functions and a hidden element, all without
+    effect.
 
     One program serves whatever is put into the slots.
 
-    **Arguments:** any family, which fills the slots to begin with.
+    **Arguments:** any family, which fills the slots to begin with; the position that
+    drives a hidden element, if it is measured.
     """
     room = (*_ROOM, *(_ROOM_OF_IMPACTS if impacting else ()), *_ROOM_OF_SENSOR)
-    empty = [
+    empty: list[Term] = [
         FREE[where].of(family, label, [0.0] * (_SINES[where] + 1))
         for where, label in room
     ]
+    if driven is not None:
+        empty.append(HiddenForce.empty(*driven.position.shape))
     wide = extended(problem, empty, problem.start)
     layout = dataclasses.replace(wide.layout, ready=_with_splines)
     return dataclasses.replace(wide, layout=layout)
@@ -100,9 +136,12 @@ def spread_of(family: Family, roughness: Roughness) -> np.ndarray:
     return roughness.size * np.sqrt(np.append(variances, float(family.jumps)))
 
 
-def filled(problem: Problem, functions: Sequence[Free], prior: bool = True) -> Problem:
+def filled(problem: Problem, functions: Sequence[Part], prior: bool = True) -> Problem:
     """The problem with some functions in their slots, `prior` by their roughness."""
     for one in functions:
+        if isinstance(one, Hidden):
+            problem = with_hidden(problem, one)
+            continue
         place = _place(problem, one.slot)
         fresh = free_term(one.family, one.slot, one.primitive)
 
@@ -138,13 +177,13 @@ def filled(problem: Problem, functions: Sequence[Free], prior: bool = True) -> P
 
 def emptied(problem: Problem, values, slot: str):
     """Values of parameters with those in a slot at zero."""
-    term = terms_of(problem.model)[_place(problem, slot)]
-    rows = [problem.names.index(one.name) for one in term.parameters(0)]
+    parameters = terms_of(problem.model)[_place(problem, slot)].parameters(0)
+    rows = [problem.names.index(p.name) for p in parameters if p.known is None]
     return jnp.asarray(values).at[:, jnp.asarray(rows)].set(0.0)
 
 
 def _place(problem: Problem, slot: str) -> int:
     for place, term in enumerate(terms_of(problem.model)):
-        if isinstance(term, FreeFunction) and term.label == slot:
+        if isinstance(term, FreeFunction | HiddenForce) and term.label == slot:
             return place
     raise ValueError(f"There is no slot {slot!r} for a free function.")

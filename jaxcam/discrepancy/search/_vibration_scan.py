@@ -61,7 +61,7 @@ def periodogram(problem: Problem, response: Response, policy: Policy) -> Periodo
 
     **Arguments:** the problem, and its `Response` about a fit.
     """
-    frequency = _frequencies(problem, policy)
+    frequency = scanned_frequencies(problem, policy)
     if not len(frequency):
         none = np.zeros(1)
         return Periodogram(none, none, none, 1)
@@ -91,7 +91,8 @@ def periodogram(problem: Problem, response: Response, policy: Policy) -> Periodo
     return Periodogram(frequency, gain, separate, len(parts), cells, float(elsewhere))
 
 
-def _frequencies(problem: Problem, policy: Policy) -> Float[np.ndarray, " k"]:
+def scanned_frequencies(problem: Problem, policy: Policy) -> Float[np.ndarray, " k"]:
+    """From a few periods in the longest record to a few steps of a flight a period."""
     length = max(part.recording.duration for part in problem.segments)
     interval = max(part.recording.interval for part in problem.segments)
     exists = np.asarray(problem.pieces.exists)

@@ -12,6 +12,19 @@ from ._families import (
     free_basis as free_basis,
 )
 from ._free_function import FREE as FREE, FreeFunction as FreeFunction
+from ._hidden_elements import (
+    HiddenElement as HiddenElement,
+    Hysteresis as Hysteresis,
+    Relaxation as Relaxation,
+    Resonator as Resonator,
+)
+from ._hidden_force import (
+    ByMotion as ByMotion,
+    DIRECT as DIRECT,
+    HiddenForce as HiddenForce,
+    SHARED as SHARED,
+    STARTS as STARTS,
+)
 from ._library import (
     DriveRipple as DriveRipple,
     library as library,
@@ -32,4 +45,5 @@ from ._term import (
 from ._value import Value as Value
 from ._visited import Visited as Visited
 from ._where import Where as Where
+from ._with_hidden import WithHidden as WithHidden
 from ._with_terms import base_drive as base_drive, WithTerms as WithTerms

@@ -10,6 +10,7 @@ import jax.numpy as jnp
 from ...recordings import References
 from ._by_place import StribeckCurve, UnevenFriction
 from ._free_function import FREE
+from ._hidden_elements import Hysteresis, Relaxation, Resonator
 from ._one_way import (
     DampingBackwards,
     DampingForwards,
@@ -27,6 +28,7 @@ from ._springs import (
 from ._term import Motion, SensorTerm, strength, Term
 from ._value import Value
 from ._where import Where
+from ._with_hidden import WithHidden
 from ._with_terms import WithTerms
 
 
@@ -355,4 +357,5 @@ def library(
 def saved_classes() -> tuple[type, ...]:
     """Classes that a saved system with terms may name, for `load_system`."""
     terms = (type(term) for term in library(extended=True))
-    return (WithTerms, DriveRipple, *terms, *FREE.values())
+    elements = (WithHidden, Resonator, Relaxation, Hysteresis)
+    return (WithTerms, DriveRipple, *terms, *FREE.values(), *elements)

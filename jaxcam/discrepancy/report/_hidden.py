@@ -1,0 +1,139 @@
+"""A hidden element as a table, a formula and a sentence."""
+
+import math
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from ...fitting import Fit
+from ..search import Hidden
+from ..terms import HiddenElement, Hysteresis, Relaxation, Resonator
+from ._words import quantity
+
+
+# A resonance is shown from a tenth of its frequency to ten times that, and the memory
+# of a relaxation for five of its times
+_DECADE, _TIMES = 10.0, 5.0
+# Steps of a branch of a hysteresis between two points of its table
+_STEPS = 20
+
+
+def hidden_table(found: Fit, hidden: Hidden, points: int):
+    """What an element does, over its one argument, with standard errors.
+
+    A resonance: the magnitude of the force for a deflection of one, by frequency (Hz).
+    A relaxation: what is left of the force so long after a deflection by one (s). A
+    hysteresis: the force so far beyond a reversal, from where it had slipped.
+
+    **Returns:** the argument, values and errors, each `(points,)`, and the element.
+    """
+    names = list(found.problem.names)
+    element = hidden.element(found.point, names)
+    along = _argument(element, points)
+    own = [n for n in hidden.coefficients if n not in hidden.free_motions]
+    labels = [estimate.label for estimate in found.estimates]
+    rows = [labels.index(name) for name in own]
+    columns = [names.index(name) for name in own]
+    values = jnp.asarray(np.asarray(found.point.values)[0])
+
+    def curve(numbers):
+        moved = values.at[jnp.asarray(columns)].set(numbers)
+        return _curve(hidden.element_at(moved, names), along)
+
+    start = values[jnp.asarray(columns)]
+    slope = np.asarray(jax.jacfwd(curve)(start))
+    covariance = found.covariance[np.ix_(rows, rows)]
+    covariance = np.where(np.isfinite(covariance), covariance, 0.0)
+    square = np.einsum("kp,pq,kq->k", slope, covariance, slope)
+    return along, np.asarray(curve(start)), np.sqrt(np.maximum(square, 0.0)), element
+
+
+def _argument(element: HiddenElement, points: int) -> np.ndarray:
+    if isinstance(element, Resonator):
+        f = float(element.frequency)
+        return np.geomspace(f / _DECADE, f * _DECADE, points)
+    if isinstance(element, Relaxation):
+        return np.linspace(0.0, _TIMES * float(element.time), points)
+    assert isinstance(element, Hysteresis)
+    return np.linspace(0.0, _TIMES * float(element.limit), points)
+
+
+def _curve(element, along):
+    if isinstance(element, Resonator):
+        return jnp.abs(jax.vmap(element.transfer)(jnp.asarray(along)))
+    if isinstance(element, Relaxation):
+        return element.by_state * jnp.exp(-jnp.asarray(along) / element.time)
+    step = along[1] / _STEPS
+
+    def advance(z, _):
+        middle = z + step / 2 * element.slope(1.0, z)
+        return z + step * element.slope(1.0, middle), z
+
+    count = _STEPS * (len(along) - 1) + 1
+    _, branch = jax.lax.scan(advance, -element.limit, None, count)
+    return element.by_state * branch[::_STEPS]
+
+
+def hidden_unit(element: HiddenElement, unit: str) -> str:
+    """Unit of the table, by that of the coordinate."""
+    return f"{unit}/s^2" if isinstance(element, Hysteresis) else "1/s^2"
+
+
+def hidden_formula(element: HiddenElement) -> str:
+    """Equations of the hidden state z, then the force."""
+    e = element
+    force = f"{_n(e.by_state)}*z"  # pyright: ignore
+    if isinstance(e, Resonator):
+        w = f"{2 * math.pi * float(e.frequency):.5g}"
+        state = f"z'' + 2*{_n(e.ratio)}*{w}*z' + {w}**2*z = position"
+        force = _sum(force, (e.by_rate, "*z'"))
+    elif isinstance(e, Relaxation):
+        state = f"z' = velocity - z/{_n(e.time)}"
+    else:
+        assert isinstance(e, Hysteresis)
+        d, n = float(e.sharing), _n(e.power)
+        state = (
+            f"z' = velocity*(1 - ({_n(d)}*sign(velocity*z) + {_n(1 - d)})"
+            f"*abs(z/{_n(e.limit)})**{n})"
+        )
+    away = f"*(position - {_n(e.middle)})"
+    force = _sum(force, (e.stiffness, away), (e.damping, "*velocity"), (e.constant, ""))
+    return f"{state}; {force}"
+
+
+def _sum(first: str, *more) -> str:
+    for value, text in more:
+        value = float(value)
+        if value != 0:
+            sign = "-" if value < 0 else "+"
+            first = f"{first} {sign} {_n(abs(value))}{text}"
+    return first
+
+
+def _n(value) -> str:
+    return f"{float(value):.4g}"
+
+
+def hidden_words(found: Fit, hidden: Hidden, element: HiddenElement, unit: str) -> str:
+    """What the element is, for an engineer."""
+    first = hidden.kind.numbers[0]
+    value = float(getattr(element, first.name))
+    error = first.error(value, found[hidden.changes[0]].stderr)
+    said = f"{value:.4g} +- {error:.1g}"
+    if isinstance(element, Resonator):
+        return (
+            f"a resonance at {said} Hz with {100 * float(element.ratio):.2g} % damping "
+            f"that is driven by the motion, impacts included, as the surge of a spring "
+            f"would be"
+        )
+    if isinstance(element, Relaxation):
+        return (
+            f"a force with a memory: it holds against a deflection and relaxes over "
+            f"{said} s, as rubber, or a spring and a dashpot in a row, would"
+        )
+    return (
+        f"a force with a memory: from each reversal it is elastic over some "
+        f"{quantity(said, unit)} and then slips (hysteresis), as a joint or a wire "
+        f"rope would"
+    )

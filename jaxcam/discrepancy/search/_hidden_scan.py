@@ -1,0 +1,283 @@
+"""What hidden elements would gain, for numbers of them on a grid.
+
+A force that is a sum of known signals enters the likelihood as a vibration does: with
+states and free parameters eliminated, for many cells of the grid at once.
+"""
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from ...fitting import Problem
+from ...fitting.engine import invert_information
+from ..policy import Policy
+from ..terms import ByMotion, DIRECT
+from ._hidden_signals import at_times, Driven, hysteresis_signals
+from ._hidden_state import Hidden, HYSTERESIS, Kind, RELAXATION, RESONANCE
+from ._local_force import forces_at_nodes, Response
+from ._vibration_scan import scanned_frequencies
+
+
+# Damping ratios of the grid; frequencies are as far apart as each of them makes a
+# resonance wide
+_RATIOS = (0.02, 0.1)
+# Ratio of neighbouring times of a relaxation
+_TIMES = 1.25
+# Limits of a hysteresis, in shares of the range of positions, and its other numbers
+_LIMITS = tuple(np.geomspace(0.03, 1.5, 12).tolist())
+_SHAPES = ((0.5, 1.0), (1.0, 1.0), (0.5, 2.0), (1.0, 2.0))
+# Forces at nodes, in numbers, that are worked out at once
+_AT_ONCE = 8_000_000
+# Parts of a diagonal that keep a matrix definite against rounding
+_STATES, _FORCES = 1e-13, 1e-9
+_TINY = 1e-300
+
+
+class Promise(NamedTuple):
+    """What an element promises: twice the log-likelihood, and where a fit may start.
+
+    `direct`: strengths of the parts of the force by the motion itself.
+    """
+
+    gain: float
+    hidden: Hidden
+    direct: Float[np.ndarray, " d"]
+
+
+def promises(
+    problem: Problem, response: Response, driven: Driven, policy: Policy
+) -> Iterator[Promise]:
+    """The best cell of each kind of element.
+
+    **Arguments:** a problem with room for one, and its `Response` about a fit.
+    """
+    chain = _Chain(problem, response, driven)
+    for kind, cells in _grids(problem, driven, policy):
+        best = None
+        width = len(kind.outputs) + kind.starts
+        count = max(1, _AT_ONCE // (response.time.size * width))
+        for first in range(0, len(cells), count):
+            some = cells[first : first + count]
+            gains, numbers = chain.gains(kind, some)
+            k = int(np.argmax(gains))
+            if best is None or gains[k] > best[0]:
+                best = gains[k], some[k], numbers[k]
+        if best is None:
+            continue
+        grown, cell, (strengths, starts, direct) = best
+        hidden = Hidden(
+            kind,
+            driven,
+            tuple(cell),
+            tuple(strengths.tolist()),
+            starts,
+            cells=len(cells),
+        )
+        yield Promise(float(grown), hidden, direct)
+
+
+def _grids(problem: Problem, driven: Driven, policy: Policy):
+    """Kinds of elements, each with the numbers that are tried."""
+    frequency = scanned_frequencies(problem, policy)
+    if len(frequency):
+        low, high = frequency[0], frequency[-1]
+        yield (
+            RESONANCE,
+            [
+                (f, ratio)
+                for ratio in _RATIOS
+                for f in np.exp(np.arange(math.log(low), math.log(high), ratio))
+            ],
+        )
+        # a relaxation is told from damping and from stiffness in the same range
+        longest = 1 / (2 * math.pi * low)
+        shortest = 1 / (2 * math.pi * high)
+        count = max(2, math.ceil(math.log(longest / shortest) / math.log(_TIMES)))
+        yield RELAXATION, [(t,) for t in np.geomspace(shortest, longest, count)]
+    yield (
+        HYSTERESIS,
+        [(x * driven.spread, *shape) for x in _LIMITS for shape in _SHAPES],
+    )
+
+
+class _Chain:
+    """The pieces of all records, ready for forces that are given at their nodes.
+
+    The parts of a force by the motion itself stand with the free parameters.
+
+    **Arguments:** the problem, its `Response` about a fit, and the position that drives
+    elements.
+    """
+
+    def __init__(self, problem: Problem, response: Response, driven: Driven):
+        self.response, self.driven = response, driven
+        by_motion = ByMotion([0.0] * DIRECT, jnp.asarray(driven.middle))
+        self.direct = forces_at_nodes(problem, response, [by_motion])
+        self.size = len(response.prior) + DIRECT
+
+    def gains(self, kind: Kind, cells: Sequence[Sequence[float]]):
+        """Gains of some cells, and strengths, starts and direct parts of each."""
+        columns = list(_columns(kind, cells, self.driven, self.response))
+        shared = len(kind.outputs)
+        information = np.zeros((self.size, self.size))
+        score = np.zeros(self.size)
+        free = len(self.response.prior)
+        information[:free, :free] = np.diag(self.response.prior)
+        score[:free] = self.response.pull
+        records = len(self.response.place)
+        starts = kind.starts
+        width = shared + records * starts
+        number = len(cells)
+        across = np.zeros((number, width, self.size))
+        own = np.zeros((number, width, width))
+        pull = np.zeros((number, width))
+        for r, place in enumerate(self.response.place):
+            sums = _summed(self.response, r, self.direct[r], columns[r], number)
+            used = np.flatnonzero(place >= 0)
+            m = len(place)
+            extra = np.arange(self.direct.shape[-1])
+            rows = np.concatenate([place[used], free + extra])
+            local = np.concatenate([used, m + extra])
+            information[np.ix_(rows, rows)] += sums.pp[np.ix_(local, local)]
+            score[rows] += sums.p[local]
+            mine = shared + r * starts + np.arange(starts)
+            columns_of = np.concatenate([np.arange(shared), mine])
+            across[:, columns_of[:, None], rows] += sums.pf[local].transpose(1, 2, 0)
+            pull[:, columns_of] += sums.f
+            own[:, columns_of[:, None], columns_of] += sums.ff
+        return self._solved(kind, information, score, across, own, pull, free)
+
+    def _solved(self, kind, information, score, across, own, pull, free):
+        inside = invert_information(information)
+        inside = np.where(np.isfinite(inside), inside, 0.0)
+        taken = across @ inside
+        left = pull - taken @ score
+        matrix = own - taken @ np.swapaxes(across, 1, 2)
+        diagonal = np.maximum(np.einsum("wii->wi", matrix), _TINY)
+        scale = 1 / np.sqrt(diagonal)
+        matrix = matrix * scale[:, :, None] * scale[:, None, :]
+        matrix = matrix + _FORCES * np.eye(matrix.shape[-1])
+        solved = np.linalg.solve(matrix, (left * scale)[..., None])[..., 0]
+        gains = np.sum(left * scale * solved, axis=-1)
+        # the parts by the motion itself gain as well
+        base = score @ inside @ score
+        few = invert_information(information[:free, :free])
+        few = np.where(np.isfinite(few), few, 0.0)
+        base = base - score[:free] @ few @ score[:free]
+        found = []
+        shared, starts = len(kind.outputs), kind.starts
+        for k, strengths in enumerate(solved * scale):
+            rest = inside @ (score - across[k].T @ strengths)
+            own_starts = strengths[shared:].reshape(-1, starts)
+            found.append((strengths[:shared], own_starts, rest[free:]))
+        return gains + base, found
+
+
+def _columns(kind: Kind, cells, driven: Driven, response: Response):
+    """For each record, forces of unit strengths at its nodes, `(k, l, cells, p)`."""
+    if kind is HYSTERESIS:
+        several = hysteresis_signals(driven, *np.array(cells).T)
+        each = [(state, beside) for state, beside in zip(*several)]
+    else:
+        each = [kind.signals(driven, cell) for cell in cells]
+    times = response.time
+    whole = np.empty((*times.shape, len(cells), len(kind.outputs) + kind.starts))
+    for c, (outputs, free) in enumerate(each):
+        signal = np.concatenate([outputs, free], axis=-1)
+        whole[..., c, :] = at_times(driven, signal, times)
+    return whole
+
+
+class _Sums:
+    """Of one record: information and score of parameters, and of forces in cells.
+
+    `pp`, `p` of the parameters; `pf` `(m, cells, p)` couples them to the forces; `f`
+    `(cells, p)` is their score and `ff` `(cells, p, p)` their information.
+    """
+
+    def __init__(self, m: int, cells: int, width: int):
+        self.shape = cells, width
+        self.pp, self.p = np.zeros((m, m)), np.zeros(m)
+        self.pf = np.zeros((m, cells, width))
+        self.f = np.zeros((cells, width))
+        self.ff = np.zeros((cells, width, width))
+
+    def add(self, direct, pushed, off, sign=1.0):
+        """Rows for the parameters and the forces, and what they are to explain."""
+        self.pp += sign * direct.T @ direct
+        self.p += sign * direct.T @ off
+        self.pf += sign * (direct.T @ pushed).reshape(-1, *self.shape)
+        self.f += sign * (off @ pushed).reshape(self.shape)
+        self.ff += sign * self.products(pushed, pushed)
+
+    def products(self, left, right):
+        """For each cell, the products of its columns."""
+        left = left.reshape(-1, *self.shape).transpose(1, 2, 0)
+        right = right.reshape(-1, *self.shape).transpose(1, 0, 2)
+        return left @ right
+
+
+def _summed(response: Response, r: int, direct, columns, cells: int) -> _Sums:
+    """The states of one record eliminated, from its first piece to its last."""
+    found: Any = jax.tree.map(lambda part: part[r], response.pieces)
+    n, m = found.later.shape[-1], response.place.shape[1]
+    d = direct.shape[-1]
+    sums = _Sums(m + d, cells, columns.shape[-1])
+    before, pushed_before = [], np.zeros((0, 0))
+    direct_before = np.zeros((0, 0))
+    for k in np.flatnonzero(response.exists[r]):
+        forces = columns[k].reshape(columns.shape[1], -1)
+        inner, slope = found.information[k], found.slope[k]
+        l = slice(n + m, None)
+        # state and parameters, parts by the motion, and the forces
+        side = inner[:, l] @ direct[k]
+        known = np.block(
+            [
+                [inner[: n + m, : n + m], side[: n + m]],
+                [side[: n + m].T, direct[k].T @ side[l]],
+            ]
+        )
+        pull = np.concatenate([slope[: n + m], direct[k].T @ slope[l]])
+        shaken = inner[:, l] @ forces
+        coupled = np.concatenate([shaken[: n + m], direct[k].T @ shaken[l]])
+        sums.pp += known[n:, n:]
+        sums.p += pull[n:]
+        sums.pf += coupled[n:].reshape(-1, *sums.shape)
+        sums.f += (slope[l] @ forces).reshape(sums.shape)
+        sums.ff += sums.products(forces, shaken[l])
+        here = [known[:n, :n], known[:n, n:], pull[:n], coupled[:n]]
+        if before:
+            later, earlier, off = found.later[k], found.earlier[k], -found.tied[k]
+            by_parameters = earlier[:, n : n + m] + found.direct[k, :, :m]
+            moved = np.concatenate(
+                [by_parameters, earlier[:, l] @ direct_before], axis=1
+            )
+            pushed = earlier[:, l] @ pushed_before
+            sums.add(moved, pushed, off)
+            rows = [moved, off, pushed]
+            here = [x + later.T @ y for x, y in zip(here, (later, *rows))]
+            first = earlier[:, :n]
+            before = [x + first.T @ y for x, y in zip(before, (first, *rows))]
+            (_, moved, off, pushed), tie = _halved(before, first.T @ later)
+            sums.add(moved, pushed, off, -1.0)
+            taken = (tie, moved, off, pushed)
+            here = [x - tie.T @ y for x, y in zip(here, taken)]
+        before, pushed_before, direct_before = here, forces, direct[k]
+    if before:
+        (_, moved, off, pushed), _ = _halved(before, np.zeros((n, 0)))
+        sums.add(moved, pushed, off, -1.0)
+    return sums
+
+
+def _halved(blocks, coupling):
+    """Blocks of one piece, and its coupling to the next, over the root of the first."""
+    scale = 1 / np.sqrt(np.maximum(np.diag(blocks[0]), _TINY))
+    scaled = blocks[0] * np.outer(scale, scale)
+    root = np.linalg.inv(np.linalg.cholesky(scaled + _STATES * np.eye(len(scale))))
+    root = root * scale
+    return [root @ part for part in blocks], root @ coupling

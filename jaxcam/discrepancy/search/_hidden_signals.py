@@ -1,0 +1,177 @@
+"""Signals of hidden elements that a measured position drives, record by record."""
+
+import dataclasses
+import math
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+from scipy.signal import lfilter, savgol_filter
+
+from ...fitting import Problem
+
+
+# Samples of the polynomials of second degree that smooth a flight: beyond them nothing
+# is late, and what is faster than they follow is far above what steps resolve
+_WINDOW = 9
+# Samples are padded to a multiple of this, so that similar records share a program
+_STRIDE = 2048
+
+
+@dataclasses.dataclass(frozen=True)
+class Driven:
+    """The measured position of each record at equal times.
+
+    `position` `(r, n)`, the last one repeated where a record is shorter than others;
+    `begin`, `interval` `(r,)`; `spread`: of all positions from their `middle`;
+    `motion_unit`: of the position.
+    """
+
+    position: Float[np.ndarray, "r n"]
+    begin: Float[np.ndarray, " r"]
+    interval: Float[np.ndarray, " r"]
+    middle: float
+    spread: float
+    motion_unit: str = ""
+
+
+def driven_by(problem: Problem, motion_unit: str = "") -> Driven | None:
+    """The position of the first coordinate as it was measured, smoothed in each flight.
+
+    `None` where no sensor shows it.
+    """
+    place = problem.model.system.coordinates[0][0]  # pyright: ignore
+    channels = [n for n, s in problem.model.sensors.items() if s.observe == place]
+    if not channels:
+        return None
+    rows = [_smooth(part, channels[0]) for part in problem.segments]
+    longest = max(len(row) for row in rows)
+    size = _STRIDE * -(-longest // _STRIDE)
+    position = np.stack([np.pad(row, (0, size - len(row)), "edge") for row in rows])
+    every = np.concatenate(rows)
+    low, high = float(every.min()), float(every.max())
+    return Driven(
+        position,
+        np.array([float(part.recording.time[0]) for part in problem.segments]),
+        np.array([part.recording.interval for part in problem.segments]),
+        (low + high) / 2,
+        (high - low) / 2,
+        motion_unit,
+    )
+
+
+def _smooth(part, channel: str) -> Float[np.ndarray, " n"]:
+    """One record at equal times; no polynomial goes on through an impact."""
+    record = part.recording
+    time, interval = record.time, record.interval
+    values = np.asarray(record[channel], dtype=float)
+    fine = np.isfinite(values)
+    count = round((time[-1] - time[0]) / interval) + 1
+    at = time[0] + interval * np.arange(count)
+    found = np.interp(at, time[fine], values[fine])
+    smooth = found.copy()
+    for flight in part.flights:
+        inside = (at > flight.start.time) & (at < flight.stop.time)
+        rows = np.flatnonzero(inside)
+        if len(rows) >= _WINDOW:
+            smooth[rows] = savgol_filter(found[rows], _WINDOW, 2)
+    return smooth
+
+
+def resonance_signals(driven: Driven, frequency: float, ratio: float):
+    """Outputs z and z' of `z'' + 2 D w z' + w^2 z = q`, and its free motions.
+
+    Exact for a position that is straight between samples; it begins at rest.
+
+    **Returns:** arrays `(r, n, 2)` both.
+    """
+    w = 2 * math.pi * frequency
+    root = math.sqrt(1 - ratio**2)
+    pole = complex(-ratio * w, w * root)
+    filtered, free = [], []
+    for position, interval in zip(driven.position, driven.interval):
+        y = _first_order(position, pole, interval)
+        # the imaginary part of y is z, of its rate z'
+        filtered.append(np.stack([y.imag, (pole * y).imag], axis=-1) / (w * root))
+        wave = np.exp(pole * interval * np.arange(len(position)))
+        free.append(np.stack([wave.real, wave.imag], axis=-1))
+    return np.array(filtered), np.array(free)
+
+
+def relaxation_signals(driven: Driven, time: float):
+    """Output of `z' = v - z / time`, and its free motion, both `(r, n, 1)`."""
+    pole = complex(-1 / time)
+    filtered, free = [], []
+    for position, interval in zip(driven.position, driven.interval):
+        y = _first_order(position, pole, interval).real
+        filtered.append((position - y / time)[:, None])
+        free.append(np.exp(pole.real * interval * np.arange(len(position)))[:, None])
+    return np.array(filtered), np.array(free)
+
+
+def _first_order(position, pole: complex, interval: float):
+    """`y' = pole y + q` from where it is at rest."""
+    x = pole * interval
+    end = np.exp(x)
+    last = (end - 1 - x) / (x * pole)
+    first = (end - 1) / pole - last
+    start = -position[0] / pole
+    found, _ = lfilter(
+        [last, first], [1.0, -end], position, zi=[start - last * position[0]]
+    )
+    return found
+
+
+# Start of a hysteresis beside its middle, for the difference that it makes
+_BESIDE = 1e-3
+
+
+def hysteresis_signals(
+    driven: Driven, limits: Any, sharings: Any, powers: Any
+) -> tuple[Float[np.ndarray, "k r n 1"], Float[np.ndarray, "k r n 1"]]:
+    """Hysteresis of Bouc and Wen for several `(k,)` numbers of it at once.
+
+    **Returns:** its state, from zero, and by how much it differs from that for a start
+    beside it, in units of that.
+    """
+    limits, sharings, powers = (
+        np.asarray(x, dtype=float)[:, None] for x in (limits, sharings, powers)
+    )
+    steps = np.diff(driven.position, axis=1)
+
+    def slope(z, sign):
+        size = np.maximum(np.abs(z) / limits, 1e-12)
+        turned = np.sign(z) * sign
+        return 1 - (sharings * turned + 1 - sharings) * size**powers
+
+    def run(start):
+        z = np.broadcast_to(start, (len(limits), len(steps))).astype(float)
+        found = np.empty((steps.shape[1] + 1, *z.shape))
+        found[0] = z
+        for k in range(steps.shape[1]):
+            step = steps[:, k]
+            sign = np.sign(step)
+            middle = z + step / 2 * slope(z, sign)
+            z = z + step * slope(middle, sign)
+            z = np.clip(z, -limits, limits)
+            found[k + 1] = z
+        return np.moveaxis(found, 0, -1)[..., None]
+
+    state = run(np.zeros((1, 1)))
+    beside = run(_BESIDE * limits)
+    return state, (beside - state) / (_BESIDE * limits[..., None, None])
+
+
+def at_times(
+    driven: Driven, signals: Float[np.ndarray, "r n s"], time
+) -> Float[np.ndarray, "r k l s"]:
+    """Signals at some times `(r, k, l)`, by straight lines."""
+    found = []
+    for signal, at, begin, interval in zip(
+        signals, time, driven.begin, driven.interval
+    ):
+        place = np.clip((at - begin) / interval, 0, len(signal) - 1.001)
+        first = place.astype(int)
+        u = (place - first)[..., None]
+        found.append((1 - u) * signal[first] + u * signal[first + 1])
+    return np.array(found)

@@ -1,0 +1,353 @@
+"""Hidden elements in a problem: which one, with which numbers, and its signals."""
+
+import dataclasses
+import math
+from collections.abc import Callable, Sequence
+from typing import Any, ClassVar
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from ...fitting import Model, Problem
+from ...fitting.engine import Point
+from ..terms import (
+    DIRECT,
+    HiddenElement,
+    HiddenForce,
+    Hysteresis,
+    Relaxation,
+    Resonator,
+    SHARED,
+    STARTS,
+    terms_of,
+    Where,
+)
+from ._hidden_signals import (
+    Driven,
+    hysteresis_signals,
+    relaxation_signals,
+    resonance_signals,
+)
+
+
+# Step of the numbers of an element, for the derivatives of its force to them
+_STEP = 1e-3
+# A free motion may be so many times as large as the usual force
+_LARGEST_START = 5.0
+
+
+@dataclasses.dataclass(frozen=True)
+class Number:
+    """A number of an element: its name, bounds, and how far one fit may move it.
+
+    It is fitted as its logarithm where `logarithm`.
+    """
+
+    name: str
+    low: float
+    high: float
+    reach: float
+    logarithm: bool = True
+
+    def moved(self, value: float, change: float) -> float:
+        new = value * math.exp(change) if self.logarithm else value + change
+        return min(max(new, self.low), self.high)
+
+    def near(self, value: float, change):
+        """The number after a small change, which can be differentiated."""
+        return value * jnp.exp(change) if self.logarithm else value + change
+
+    def change(self, old: float, new: float) -> float:
+        return math.log(new / old) if self.logarithm else new - old
+
+    def span(self, value: float, reach: float) -> tuple[float, float]:
+        """Least and largest change, within the reach and the bounds."""
+        ends = (self.moved(value, sign * reach) for sign in (-1.0, 1.0))
+        low, high = (self.change(value, end) for end in ends)
+        return low, high
+
+    def error(self, value: float, stderr: float) -> float:
+        """Standard error of the number, from that of its change."""
+        return value * stderr if self.logarithm else stderr
+
+
+@dataclasses.dataclass(frozen=True)
+class Kind:
+    """A kind of element.
+
+    - `name`: of it in sentences; `numbers`, and `outputs`: names of its strengths.
+    - `signals(driven, numbers)`: outputs and free motions of each record.
+    """
+
+    name: str
+    element: type[HiddenElement]
+    numbers: tuple[Number, ...]
+    outputs: tuple[str, ...]
+    starts: int
+    signals: Callable[[Driven, Sequence[float]], tuple[np.ndarray, np.ndarray]]
+
+    def reach(self, number: Number, values: Sequence[float]) -> float:
+        """How far one fit may move a number: a share of the width of a resonance."""
+        if self is RESONANCE and number.name == "frequency":
+            return number.reach * values[1]
+        return number.reach
+
+
+def _hysteresis(driven: Driven, numbers):
+    state, beside = hysteresis_signals(driven, *([one] for one in numbers))
+    return state[0], beside[0]
+
+
+RESONANCE = Kind(
+    "resonance",
+    Resonator,
+    (
+        Number("frequency", 0.0, math.inf, 0.5),
+        Number("ratio", 1e-3, 0.7, 0.5),
+    ),
+    ("by_state", "by_rate"),
+    2,
+    lambda driven, numbers: resonance_signals(driven, *numbers),
+)
+RELAXATION = Kind(
+    "relaxation",
+    Relaxation,
+    (Number("time", 0.0, math.inf, 0.5),),
+    ("by_state",),
+    1,
+    lambda driven, numbers: relaxation_signals(driven, *numbers),
+)
+HYSTERESIS = Kind(
+    "hysteresis",
+    Hysteresis,
+    (
+        Number("limit", 0.0, math.inf, 0.4),
+        Number("sharing", 0.5, 1.5, 0.2, logarithm=False),
+        Number("power", 0.5, 6.0, 0.4),
+    ),
+    ("by_state",),
+    1,
+    _hysteresis,
+)
+KINDS = (RESONANCE, RELAXATION, HYSTERESIS)
+
+
+@dataclasses.dataclass(frozen=True)
+class Hidden:
+    """A hidden element that is fitted, about some numbers of it.
+
+    - `numbers`, `strengths`, `starts` `(r, s)`: about which its force is linear.
+    - `direct`: which parts of the force by the motion itself are fitted.
+    - `cells`: how many numbers were tried until these were found.
+    """
+
+    kind: Kind
+    driven: Driven
+    numbers: tuple[float, ...]
+    strengths: tuple[float, ...]
+    starts: Float[np.ndarray, "r s"]
+    direct: tuple[int, ...] = tuple(range(DIRECT))
+    cells: int = 1
+    slot: str = HiddenForce.label
+
+    #: it has no roughness
+    smooth: ClassVar[bool] = False
+
+    @property
+    def label(self) -> str:
+        return f"hidden {self.kind.name}"
+
+    @property
+    def where(self) -> Where:
+        return Where.FLIGHT
+
+    @property
+    def outputs(self) -> list[str]:
+        """Names of the parameters that are strengths of its outputs."""
+        return [f"{self.slot}_shared_{k}" for k in range(len(self.kind.outputs))]
+
+    @property
+    def changes(self) -> list[str]:
+        """Names of the parameters that are changes of its numbers."""
+        first = len(self.kind.outputs)
+        return [
+            f"{self.slot}_shared_{first + k}" for k in range(len(self.kind.numbers))
+        ]
+
+    @property
+    def free_motions(self) -> list[str]:
+        return [f"{self.slot}_starts_{k}" for k in range(self.kind.starts)]
+
+    @property
+    def direct_parts(self) -> list[str]:
+        return [f"{self.slot}_direct_{k}" for k in self.direct]
+
+    @property
+    def coefficients(self) -> list[str]:
+        """Names of the parameters that are its own."""
+        return [
+            *self.outputs,
+            *self.changes,
+            *self.free_motions,
+            *self.direct_parts,
+        ]
+
+    def price(self, samples: int) -> float:
+        """What its numbers, and that some of them were looked for, must gain."""
+        shared = len(self.outputs) + len(self.changes) + len(self.direct)
+        count = shared + self.starts.size
+        return count * math.log(samples) + 2 * math.log(self.cells)
+
+    def moved_from(self, other: "Hidden") -> float:
+        """How far its numbers are from those of another one, in their reaches."""
+        return max(
+            abs(number.change(a, b)) / self.kind.reach(number, other.numbers)
+            for number, a, b in zip(self.kind.numbers, other.numbers, self.numbers)
+        )
+
+    def force(self, numbers: Sequence[float]) -> Float[np.ndarray, "r n"]:
+        """Its force for other numbers and the same strengths."""
+        outputs, free = self.kind.signals(self.driven, numbers)
+        return outputs @ np.asarray(self.strengths) + np.einsum(
+            "rns,rs->rn", free, self.starts
+        )
+
+    def element(self, point: Point, names: Sequence[str]) -> HiddenElement:
+        """What was found, for a simulation."""
+        return self.element_at(point.values[0], names)
+
+    def element_at(self, values, names: Sequence[str]) -> HiddenElement:
+        """The element with parameters `(q,)` at some values; can be differentiated."""
+
+        def at(name):
+            return values[names.index(name)]
+
+        numbers = {
+            number.name: number.near(value, at(name))
+            for number, value, name in zip(
+                self.kind.numbers, self.numbers, self.changes
+            )
+        }
+        outputs = {n: at(m) for n, m in zip(self.kind.outputs, self.outputs)}
+        direct: list[Any] = [0.0] * DIRECT
+        for k, name in zip(self.direct, self.direct_parts):
+            direct[k] = at(name)
+        constant, stiffness, damping = direct
+        return self.kind.element(
+            **numbers,
+            **outputs,
+            constant=constant,
+            stiffness=stiffness,
+            damping=damping,
+            middle=self.driven.middle,
+        )
+
+
+def _moved(hidden: Hidden, changes: Sequence[float]) -> tuple[float, ...]:
+    kind = hidden.kind
+    return tuple(
+        one.moved(value, change)
+        for one, value, change in zip(kind.numbers, hidden.numbers, changes)
+    )
+
+
+def hidden_table(hidden: Hidden) -> Float[np.ndarray, "r n s"]:
+    """Its signals: outputs, derivatives of the force to its numbers, free motions."""
+    outputs, free = hidden.kind.signals(hidden.driven, hidden.numbers)
+    table = np.zeros((*outputs.shape[:2], SHARED + STARTS))
+    width = outputs.shape[-1]
+    table[..., :width] = outputs
+    for k, number in enumerate(hidden.kind.numbers):
+        sides = []
+        for sign in (-1, 1):
+            numbers = list(hidden.numbers)
+            numbers[k] = number.moved(numbers[k], sign * _STEP)
+            sides.append((hidden.force(numbers), numbers[k]))
+        (below, low), (above, high) = sides
+        table[..., width + k] = (above - below) / number.change(low, high)
+    table[..., SHARED : SHARED + free.shape[-1]] = free
+    return table
+
+
+def with_hidden(problem: Problem, hidden: Hidden) -> Problem:
+    """The problem with the signals of an element in its place."""
+    table = hidden_table(hidden)
+    place = hidden_place(problem)
+    force = hidden.force(hidden.numbers)
+    usual = max(float(np.sqrt(np.mean(force**2))), 1e-12)
+
+    def put(model: Model) -> Model:
+        def parts(m) -> tuple[Any, ...]:
+            term: Any = terms_of(m)[place]
+            return term.table, term.begin, term.interval, term.middle
+
+        driven = hidden.driven
+        fresh = table, driven.begin, driven.interval, driven.middle
+        return eqx.tree_at(parts, model, tuple(jnp.asarray(x, float) for x in fresh))
+
+    size = np.sqrt(np.mean(table**2, axis=(0, 1)))
+    change: dict[str, dict[str, float]] = {}
+    for k, name in enumerate(hidden.outputs):
+        change[name] = {"scale": usual / max(float(size[k]), 1e-12)}
+    for number, value, name in zip(hidden.kind.numbers, hidden.numbers, hidden.changes):
+        reach = hidden.kind.reach(number, hidden.numbers)
+        low, high = number.span(value, reach)
+        change[name] = {"scale": reach, "lower": low, "upper": high}
+    for name in hidden.free_motions:
+        known = math.sqrt(3) * _LARGEST_START * usual
+        change[name] = {"scale": usual, "tolerance": known}
+    sizes = 1.0, hidden.driven.spread, 10 * hidden.driven.spread
+    for k, name in zip(hidden.direct, hidden.direct_parts):
+        change[name] = {"scale": usual / sizes[k]}
+    return dataclasses.replace(
+        problem,
+        model=put(problem.model),
+        layout=eqx.tree_at(
+            lambda part: part.model, problem.layout, put(problem.layout.model)
+        ),
+        parameters=tuple(
+            dataclasses.replace(p, **change.get(p.name, {}))  # pyright: ignore
+            for p in problem.parameters
+        ),
+    )
+
+
+def hidden_place(problem: Problem) -> int:
+    """Which of the terms of a problem is the hidden force."""
+    for place, term in enumerate(terms_of(problem.model)):
+        if isinstance(term, HiddenForce):
+            return place
+    raise ValueError("There is no room for a hidden element.")
+
+
+def started(problem: Problem, values, hidden: Hidden, direct=None) -> Array:
+    """Values of parameters with those of an element as it says they are."""
+    new = np.array(values)
+    names = problem.names
+    for name, value in zip(hidden.outputs, hidden.strengths):
+        new[:, names.index(name)] = value
+    for name in hidden.changes:
+        new[:, names.index(name)] = 0.0
+    for k, name in enumerate(hidden.free_motions):
+        new[:, names.index(name)] = hidden.starts[:, k]
+    if direct is not None:
+        for k, name in zip(hidden.direct, hidden.direct_parts):
+            new[:, names.index(name)] = direct[k]
+    return jnp.asarray(new)
+
+
+def recentred(problem: Problem, hidden: Hidden, point: Point) -> Hidden:
+    """The element about where a fit has moved it."""
+    values, names = np.asarray(point.values), problem.names
+
+    def at(name):
+        return values[:, names.index(name)]
+
+    return dataclasses.replace(
+        hidden,
+        numbers=_moved(hidden, [float(at(name)[0]) for name in hidden.changes]),
+        strengths=tuple(float(at(name)[0]) for name in hidden.outputs),
+        starts=np.stack([at(name) for name in hidden.free_motions], axis=-1),
+    )

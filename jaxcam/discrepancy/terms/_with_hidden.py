@@ -1,0 +1,83 @@
+"""A system with an element that has a state of its own."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+
+from ...hybrid import HybridSystem
+from ._hidden_elements import HiddenElement
+
+
+class WithHidden(HybridSystem):
+    """A system whose coordinate drives a hidden element, which pushes it.
+
+    **Arguments:**
+
+    - `base`: the system, a `WithTerms` or any other.
+    - `element`: a `Resonator`, `Relaxation` or `Hysteresis`.
+    - `coordinate`: which component of the base's state is the coordinate that drives
+        the element and is pushed by it, and which its velocity.
+
+    The state is that of the base and then that of the element, which impacts leave as
+    it is.
+    """
+
+    base: HybridSystem
+    element: HiddenElement
+    coordinate: tuple[int, int] = eqx.field(
+        default=(0, 1), static=True, metadata={"spare": True}
+    )
+
+    @property
+    def _size(self) -> int:
+        """How many components the element has."""
+        return len(self.element.names)
+
+    @property
+    def state_names(self) -> tuple[str, ...]:  # pyright: ignore
+        names = self.base.state_names
+        return (*names, *self.element.names) if names else ()
+
+    @property
+    def state_units(self) -> tuple[str, ...]:  # pyright: ignore
+        units = self.base.state_units
+        if not units:
+            return ()
+        return (*units, *self.element.units(units[self.coordinate[0]]))
+
+    @property
+    def period(self):
+        return self.base.period
+
+    @property
+    def breakpoints(self):
+        return self.base.breakpoints
+
+    @property
+    def speed(self):
+        """Of the drive (rad/s), where the base has one."""
+        return self.base.speed  # pyright: ignore
+
+    def prepared(self) -> "WithHidden":
+        return eqx.tree_at(lambda s: s.base, self, self.base.prepared())
+
+    def check(self) -> None:
+        self.base.check()
+        self.element.check()
+
+    def vector_field(self, t, state) -> jax.Array:
+        own, hidden = state[: -self._size], state[-self._size :]
+        rate = self.base.vector_field(t, own)
+        place, pushed = self.coordinate
+        position, velocity = own[place], own[pushed]
+        rate = rate.at[pushed].add(self.element.force(position, velocity, hidden))
+        return jnp.concatenate([rate, self.element.rate(position, velocity, hidden)])
+
+    def gap(self, t, state) -> jax.Array:
+        return self.base.gap(t, state[: -self._size])
+
+    def impact(self, t, state) -> jax.Array:
+        own, hidden = state[: -self._size], state[-self._size :]
+        after = self.base.impact(t, own)
+        kept = jnp.broadcast_to(hidden, (*after.shape[:-1], self._size))
+        return jnp.concatenate([after, kept], axis=-1)

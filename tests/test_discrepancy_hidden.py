@@ -1,0 +1,209 @@
+"""Forces with a state of their own: their signals, their scan, and as systems."""
+
+import math
+from pathlib import Path
+
+import equinox as eqx
+import hidden_state_rig as truth
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from jaxcam import simulate
+from jaxcam.discrepancy.search._hidden_signals import Driven
+from jaxcam.discrepancy.search._hidden_state import (
+    Hidden,
+    hidden_table,
+    HYSTERESIS,
+    RELAXATION,
+    RESONANCE,
+)
+from jaxcam.discrepancy.terms import (
+    HiddenForce,
+    Hysteresis,
+    Motion,
+    Relaxation,
+    Resonator,
+    saved_classes,
+    SHARED,
+    WithHidden,
+    WithTerms,
+)
+from jaxcam.fitting import read_setup
+from jaxcam.models import load_system, save_system
+
+
+_RIG = Path(__file__).parents[1] / "docs" / "rigs" / "two_stops.toml"
+_INTERVAL = 1e-3
+_TIME = _INTERVAL * np.arange(3001)
+_CORNER = 1.3
+NUMBERS = {
+    RESONANCE: (7.0, 0.04),
+    RELAXATION: (0.12,),
+    HYSTERESIS: (0.02, 0.7, 1.5),
+}
+STRENGTHS = {RESONANCE: (900.0, 4.0), RELAXATION: (-9.0,), HYSTERESIS: (-12.0,)}
+KINDS = pytest.mark.parametrize("kind", list(NUMBERS), ids=lambda kind: kind.name)
+
+
+def _position(t):
+    """A motion whose velocity jumps once, as in an impact."""
+    return 0.05 * np.sin(5.0 * t) + 0.3 * np.abs(t - _CORNER) - 0.02 * t
+
+
+def _velocity(t):
+    return 0.25 * np.cos(5.0 * t) + 0.3 * np.sign(t - _CORNER) - 0.02
+
+
+def _driven():
+    q = _position(_TIME)
+    one = np.ones(1)
+    return Driven(q[None], 0 * one, _INTERVAL * one, 0.1, float(np.ptp(q)) / 2, "m")
+
+
+def _hidden(kind, starts=None):
+    starts = np.zeros((1, kind.starts)) if starts is None else starts
+    return Hidden(kind, _driven(), NUMBERS[kind], STRENGTHS[kind], starts)
+
+
+def _element(kind):
+    numbers = (number.name for number in kind.numbers)
+    named = dict(zip(numbers, NUMBERS[kind])) | dict(zip(kind.outputs, STRENGTHS[kind]))
+    return kind.element(**named)
+
+
+@KINDS
+def test_the_signal_is_the_force_of_the_element(kind):
+    """Against scipy on the equations of the element, to 2e-4 of the largest force."""
+    element = _element(kind)
+    rate = jax.jit(lambda q, v, z: element.rate(q, v, z))
+
+    def field(t, z):
+        return np.asarray(rate(_position(t), _velocity(t), jnp.asarray(z)))
+
+    start = np.zeros(len(element.names))
+    if kind is RESONANCE:
+        # where it is at rest
+        start[0] = _position(0.0) / (2 * math.pi * NUMBERS[kind][0]) ** 2
+    states = []
+    for a, b in ((0.0, _CORNER), (_CORNER, _TIME[-1])):
+        at = _TIME[(_TIME >= a) & (_TIME <= b)]
+        flight = solve_ivp(field, (a, b), start, "RK45", at, rtol=1e-7, atol=1e-10)
+        start = flight.y[:, -1]
+        states.append(flight.y[:, :-1] if b < _TIME[-1] else flight.y)
+    states = np.concatenate(states, axis=1)
+    expected = np.asarray(jax.vmap(element.push)(jnp.asarray(states.T)))
+    found = _hidden(kind).force(NUMBERS[kind])[0]
+    assert np.max(np.abs(found - expected)) < 2e-4 * np.max(np.abs(expected))
+
+
+@KINDS
+def test_the_table_holds_the_changes_of_the_force(kind):
+    """What a change of each number makes of the force, to second order in it."""
+    starts = 1e-3 * np.ones((1, kind.starts))
+    hidden = _hidden(kind, starts)
+    table = hidden_table(hidden)[0]
+    width = len(kind.outputs)
+    here = hidden.force(hidden.numbers)[0]
+    free = table[:, SHARED : SHARED + kind.starts] @ starts[0]
+    np.testing.assert_allclose(
+        table[:, :width] @ np.array(STRENGTHS[kind]) + free, here, atol=1e-12
+    )
+    for k, number in enumerate(kind.numbers):
+        change = 0.02 * kind.reach(number, hidden.numbers)
+        numbers = list(hidden.numbers)
+        numbers[k] = number.moved(numbers[k], change)
+        moved = hidden.force(numbers)[0] - here
+        linear = change * table[:, width + k]
+        assert np.max(np.abs(moved)) > 0
+        assert np.max(np.abs(moved - linear)) < 0.05 * np.max(np.abs(moved))
+
+
+def test_the_term_reads_its_table_between_samples():
+    """A cubic in time is read exactly, of each record its own."""
+    term = HiddenForce.empty(2, 40)
+    t = 0.5 + 0.01 * np.arange(40)
+    table = np.zeros(term.table.shape)
+    table[0, :, 0], table[1, :, 0] = t**3, 2 - t**2
+    term = eqx.tree_at(
+        lambda m: (m.table, m.begin, m.interval, m.shared[0], m.record),
+        term,
+        tuple(jnp.asarray(x, float) for x in (table, [0.5, 0.5], [0.01, 0.01], 3.0, 1)),
+    )
+    for record, value in ((0, lambda t: t**3), (1, lambda t: 2 - t**2)):
+        one = eqx.tree_at(lambda m: m.record, term, jnp.asarray(float(record)))
+        for at in (0.5, 0.5037, 0.71, 0.8862):
+            motion = Motion(*(jnp.asarray(x) for x in (at, 0.1, 0.2, 0.3)))
+            assert float(one.acceleration(motion)) == pytest.approx(3 * value(at))
+
+
+def _carried(mass, frequency, damping):
+    """A mass on a spring that the cart carries, as a resonance that it drives."""
+    w, d = 2 * math.pi * frequency, damping
+    return Resonator(
+        frequency,
+        damping,
+        mass * w**4 * (1 - 4 * d**2),
+        mass * 4 * d * w**3 * (1 - 2 * d**2),
+        stiffness=-mass * w**2 * (1 - 4 * d**2),
+        damping=-2 * mass * d * w,
+    )
+
+
+def _cart(speed):
+    system = read_setup(_RIG).model.system
+    values = (
+        truth.STIFFNESS, truth.DAMPING, truth.AMPLITUDE,
+        truth.LEFT, truth.RIGHT, truth.R_LEFT, truth.R_RIGHT, speed, 0.0,
+    )  # fmt: skip
+    return eqx.tree_at(
+        lambda s: (
+            s.stiffness_over_mass, s.damping_over_mass, s.base_amplitude,
+            s.left, s.right, s.restitution_left, s.restitution_right, s.speed, s.phase,
+        ),
+        system,
+        values,
+    )  # fmt: skip
+
+
+SYSTEMS = {
+    "resonance": (truth.resonance(0.02, 9.0, 0.05), _carried(0.02, 9.0, 0.05)),
+    "relaxation": (truth.relaxation(9.0, 0.05), Relaxation(0.05, -9.0)),
+    "hysteresis": (truth.hysteresis(12.0, 0.012), Hysteresis(0.012, 0.5, 1.0, -12.0)),
+}
+
+
+@pytest.mark.parametrize("name", list(SYSTEMS))
+def test_a_system_with_a_hidden_state_moves_as_scipy_has_it(name):
+    """Through several impacts at both stops, to 2e-6 m."""
+    hidden, element = SYSTEMS[name]
+    speed = 2 * math.pi * 2.3
+    times, expected = truth.motion(hidden, speed, 1.5, 5e-3, start=[0.0] * hidden.size)
+    system = WithHidden(WithTerms(_cart(speed)), element)
+    start = [0.01, 0.3, *([0.0] * len(element.names))]
+    found = simulate(system, start, 0.0, 1.5)
+    assert found.impacts.count >= 4
+    assert set(np.asarray(found.impacts.constraint)) == {0, 1}
+    np.testing.assert_allclose(found.at(times)[:, 0], expected, atol=2e-6)
+    # an impact leaves the hidden state as it is
+    before, after = (np.asarray(x) for x in (found.impacts.before, found.impacts.after))
+    np.testing.assert_array_equal(before[:, 2:], after[:, 2:])
+
+
+def test_a_saved_system_with_a_hidden_state_is_the_same(tmp_path):
+    from jaxcam.models import ImpactOscillator
+
+    element = Relaxation(0.3, -0.5)
+    system = WithHidden(WithTerms(ImpactOscillator()), element)
+    save_system(system, tmp_path / "model.json")
+    again = load_system(tmp_path / "model.json", classes=saved_classes())
+    start = jnp.array([-1.0, 0.0, 0.1])
+    one, other = (simulate(s, start, 0.0, 3.0) for s in (system, again))
+    np.testing.assert_array_equal(one.final, other.final)
+
+
+def test_a_number_without_meaning_is_refused():
+    with pytest.raises(ValueError, match="Relaxation"):
+        Relaxation(-0.1, 1.0).check()
