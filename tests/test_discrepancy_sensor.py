@@ -51,9 +51,9 @@ def _seen(model: Model):
     place = jnp.tile(jnp.array([0.0, 0.3, 0.8]), (steps, 1))
     drive = jnp.zeros(steps), jnp.zeros(steps)
     _, nodes = fly(model, jnp.array([-1.0, 0.3]), start, step, *drive)
-    along = start + (jnp.arange(steps) + 0.5) * step, *drive
+    along = start + (jnp.arange(steps, dtype=float) + 0.5) * step, *drive
     found = samples(model, nodes, start, step, place, along)
-    time = start + step * (jnp.arange(steps)[:, None] + place)
+    time = start + step * (jnp.arange(steps, dtype=float)[:, None] + place)
     return np.asarray(found).reshape(-1, 2), np.asarray(time).ravel()
 
 

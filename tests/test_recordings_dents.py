@@ -4,6 +4,7 @@ import dataclasses
 import functools
 import math
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
@@ -59,27 +60,31 @@ def height(rig: RealRig, turned) -> np.ndarray:
     ).real
 
 
+def touched(gap) -> np.ndarray:
+    return np.abs(gap) < 1e-3 * NOISE
+
+
 @pytest.mark.parametrize(
     ("size", "place", "width"),
     [(1.5e-4, 3.6, 0.25), (-2.5e-4, 2.4, 0.15), (3e-4, 0.6, 0.4)],
     ids=["where it is released", "a hollow", "a wide one"],
 )
 def test_a_dented_cam_is_cut_right(size, place, width):
-    """What counts as contact is within two noises of the cam, nine tenths of what rests
-    beyond doubt is contact, and the cam is known to 0.6 noises where it is touched."""
+    """What counts as contact is within a noise of the cam, nine tenths of what touches
+    it is contact, and the cam is known to 0.3 noises where it is touched."""
     rig = Dented(damping=0.0, size=size, place=place, width=width)
     runs, gaps = measured(rig)
     for gap, part in zip(gaps, segment_case(runs, NOMINAL)):
         contact = np.zeros(len(gap), dtype=bool)
         for one in part.contacts:
             contact[one.first : one.last] = True
-            assert np.max(gap[part.resting(one)], initial=0.0) < 2 * NOISE
-        touched = gap == 0
-        assert np.sum(touched) > 200
-        assert np.mean(contact[touched]) > 0.9
-        turned = part.drive.angle[touched]
+            assert np.max(gap[part.resting(one)], initial=0.0) < NOISE
+        at = touched(gap)
+        assert np.sum(at) > 200
+        assert np.mean(contact[at]) > 0.9
+        turned = part.drive.angle[at]
         off = part.surface.angle(turned) - height(rig, turned)
-        assert np.max(np.abs(off)) < 0.6 * NOISE
+        assert np.sqrt(np.mean(off**2)) < 0.3 * NOISE
 
 
 def test_a_round_cam_is_not_bent():
@@ -89,14 +94,16 @@ def test_a_round_cam_is_not_bent():
 
 
 def test_firm_contact_is_contact():
-    """On average to a tenth of the noise; most of what rests is firm."""
+    """On average to a tenth of the noise; most of what touches the cam is firm."""
     runs, gaps = measured(Dented(damping=0.0))
+    counts = np.zeros(2)
     for rpm, run, gap in zip(SPEEDS, runs, gaps):
         speed = rpm * math.pi / 30
         firm = firm_contact(run, NOMINAL, speed, "follower_angle_rad", NOISE)
-        assert np.sum(firm) > 0.5 * np.sum(gap == 0)
+        counts += np.sum(firm), np.sum(touched(gap))
         assert np.max(gap[firm], initial=0.0) < NOISE
-        assert np.mean(gap[firm]) < 0.1 * NOISE
+        assert np.sum(gap[firm]) <= 0.1 * NOISE * np.sum(firm)
+    assert counts[0] > 0.5 * counts[1]
 
 
 def test_a_follower_that_flies_is_in_no_firm_contact():
@@ -114,7 +121,9 @@ def test_a_follower_that_flies_is_in_no_firm_contact():
 
 def seen(rng, places, truth):
     """What samples at some angles say of a bend and of one number beside it."""
-    rows = np.column_stack([np.ones(len(places)), np.asarray(waves(places))])
+    rows = np.column_stack(
+        [np.ones(len(places)), np.asarray(waves(jnp.asarray(places)))]
+    )
     values = truth(places) + rng.normal(size=len(places))
     return Seen(rows.T @ rows, rows.T @ values)
 
@@ -139,6 +148,6 @@ def test_a_dent_that_two_records_show_is_followed_and_a_hop_of_one_is_not():
 
 @pytest.mark.parametrize("length", [0.1, 0.4])
 def test_a_bend_has_the_variance_it_is_given(length):
-    basis = np.asarray(waves(np.linspace(0.0, 6.0, 7)))
+    basis = np.asarray(waves(jnp.linspace(0.0, 6.0, 7)))
     variance = basis**2 @ spread(length) ** 2
     np.testing.assert_allclose(variance, 1.0, rtol=1e-12)

@@ -179,13 +179,13 @@ def _columns(function, *args):
 
 def flown(model: Model, state, start, step, angle, rate, place):
     end, nodes = fly(model, state, start, step, angle, rate)
-    along = start + (jnp.arange(angle.shape[0]) + 0.5) * step, angle, rate
+    along = start + (jnp.arange(angle.shape[0], dtype=float) + 0.5) * step, angle, rate
     return end, samples(model, nodes, start, step, place, along)
 
 
 def rested(model: Model, guess, start, step, angle, rate, place):
     nodes = rest(model, guess, start, step, angle, rate)
-    along = start + jnp.arange(angle.shape[0]) * step, angle, rate
+    along = start + jnp.arange(angle.shape[0], dtype=float) * step, angle, rate
     return samples(model, nodes, start, step, place, [one[:-1] for one in along])
 
 

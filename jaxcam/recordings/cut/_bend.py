@@ -28,7 +28,7 @@ _SURE = 30.0
 def waves(turned: Float[Array, "*k"]) -> Float[Array, "*k waves"]:
     """What each number of a bend adds to the contact angle."""
     orders = jnp.arange(_HIGHEST + 1, dtype=float)
-    phases = jnp.multiply.outer(jnp.asarray(turned), orders)
+    phases = jnp.multiply.outer(turned, orders)
     return jnp.concatenate([jnp.cos(phases), jnp.sin(phases[..., 1:])], axis=-1)
 
 
