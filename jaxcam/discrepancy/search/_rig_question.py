@@ -48,7 +48,8 @@ def rig_question(
         candidates = library(references=rig.references)
     base = cam_follower_model(rig)
     sensor = base.sensors[_FOLLOWER]
-    visited = visited_by(cut, _FOLLOWER, sensor, rig.references.slip_speed)
+    own = [part.recording for part in cut]
+    visited = visited_by(own, _FOLLOWER, sensor, rig.references.slip_speed)
     terms, unlisted = by_listing(tuple(term.scaled(visited) for term in candidates))
     model = Model(WithTerms(base.system, terms), base.sensors, base_drive())
     parameters = cam_follower_parameters(rig, base=lambda s: s.base)

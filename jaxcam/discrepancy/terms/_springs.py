@@ -91,8 +91,8 @@ class StopAbove(_WithEdge):
     """Something that is touched above an edge: it pushes back and takes energy out.
 
     Of the depth `d = max(q - edge_a, 0)`, the acceleration is
-    `-d (ka + da v + la sign(v))`: stiffness, damping as of a fluid, and a loss that does
-    not depend on the speed, as of rubber or of rubbing sides.
+    `-d (ka + da v + la sign(v))`: stiffness, damping as of a fluid, and a loss that
+    does not depend on the speed, as of rubber or of rubbing sides.
     """
 
     name: ClassVar[str] = "stop_above"
@@ -110,7 +110,10 @@ class StopAbove(_WithEdge):
 
 
 class StopBelow(_WithEdge):
-    """The same below an edge: `d (kd - dd v - ld sign(v))`, `d = max(edge_b - q, 0)`."""
+    """The same below an edge, `d (kd - dd v - ld sign(v))`, `d = max(edge_b - q, 0)`.
+
+    See `StopAbove`.
+    """
 
     name: ClassVar[str] = "stop_below"
     sentence: ClassVar[str] = "an elastic stop below an edge"
