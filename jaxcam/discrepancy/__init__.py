@@ -10,4 +10,5 @@ from ._next_experiment import (
 from ._predictions import Prediction as Prediction, predictions as predictions
 from .policy import Policy as Policy
 from .report import Diagnosis as Diagnosis, Verdict as Verdict
+from .search import with_terms as with_terms
 from .terms import library as library, strength as strength, Term as Term

@@ -2,6 +2,7 @@
 
 import dataclasses
 from collections.abc import Mapping, Sequence
+from functools import partial
 
 import equinox as eqx
 import jax
@@ -10,12 +11,19 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from ..recordings import Recording, Segments
-from ._free_run import free_run, FreeRun, Prepared, prepared, simulated
-from .engine import Layout, Model, Parameter, parameter_places
+from ._free_run import free_run, FreeRun, Prepared, prepared, restarted, simulated
+from .engine import (
+    Layout,
+    Model,
+    Parameter,
+    parameter_places,
+    with_constants,
+)
 
 
-# How often initial states are found anew; change of the error at which that ends
-_ROUNDS, _SETTLED = 4, 1e-4
+# How often initial states are found anew; steps of the parameters, in their scales,
+# that end it
+_ROUNDS, _SETTLED = 4, 1e-2
 # Evaluations of a round at most
 _EVALUATIONS = 40
 
@@ -40,6 +48,7 @@ def fit_free_run(
     recordings: Sequence[Recording | Segments],
     parameters: Sequence[Parameter],
     *,
+    start: Mapping[str, float] | None = None,
     samples: int = 20,
 ) -> FreeRunFit:
     """Fit parameters to whole free runs.
@@ -51,45 +60,58 @@ def fit_free_run(
 
     **Arguments:**
 
-    - `model`: with the values to start from.
+    - `model`: with its sensors and its input.
     - `recordings`: without impacts, evenly sampled; one value of each parameter serves
         all of them.
     - `parameters`: those to fit; bounds and scales count, tolerances do not.
+    - `start`: values of some parameters to start from; by default those of the model.
     - `samples`: how many samples the initial state of a recording is found from.
 
     **Raises:** as `free_run` does; `ValueError` for a parameter that is not one number
-    of the model.
+    of the model, or a start that is none of the parameters.
     """
     model = jax.tree.map(_array, model)
-    layout = Layout(model, parameter_places(model, parameters))
-    values = np.array([float(one.where(model)) for one in parameters])
+    places = parameter_places(model, parameters)
+    runs = [r.recording if isinstance(r, Segments) else r for r in recordings]
+    layouts = [Layout(with_constants(model, run), places) for run in runs]
+    given = dict(start or {})
+    names = [one.name for one in parameters]
+    wrong = [name for name in given if name not in names]
+    if wrong:
+        raise ValueError(
+            f"There is no parameter {wrong[0]!r} to start from; the parameters are "
+            f"{', '.join(names)}."
+        )
+    values = np.array([given.get(p.name, float(p.where(model))) for p in parameters])
     scale = np.array([one.size(x) for one, x in zip(parameters, values)])
     low, high = (
         np.array([getattr(one, side) for one in parameters], dtype=float)
         for side in ("lower", "upper")
     )
     values = np.clip(values, low, high)
-    ready, error, settled = (), np.inf, False
+    settled = False
     for _ in range(_ROUNDS):
-        here = layout.at(jnp.asarray(values))
-        ready = tuple(prepared(here, run, samples) for run in recordings)
+        ready = [
+            (layout, prepared(layout.at(jnp.asarray(values)), run, samples))
+            for layout, run in zip(layouts, runs)
+        ]
         found = least_squares(
-            lambda x: _missed(layout, ready, x),
+            partial(_missed, ready),
             values,
-            lambda x: _slopes(layout, ready, x, jnp.asarray(scale)) / scale,
+            partial(_slopes, ready, scale),
             bounds=(low, high),
             x_scale=scale,
             max_nfev=_EVALUATIONS,
         )
+        moved = np.max(np.abs(found.x - values) / scale, initial=0.0)
         values = found.x
-        settled = bool(found.success and abs(error - found.cost) < _SETTLED * error)
-        if settled or found.cost >= error:
+        settled = bool(found.success and moved < _SETTLED)
+        if settled:
             break
-        error = found.cost
-    best = layout.at(jnp.asarray(values))
+    best = Layout(model, places).at(jnp.asarray(values))
     return FreeRunFit(
         best,
-        {one.name: float(x) for one, x in zip(parameters, values)},
+        dict(zip(names, values.tolist())),
         tuple(free_run(best, run, samples=samples) for run in recordings),
         settled,
     )
@@ -99,16 +121,17 @@ def _array(leaf):
     return jnp.asarray(leaf, dtype=float) if isinstance(leaf, float) else leaf
 
 
-def _missed(layout: Layout, ready: Sequence[Prepared], values):
-    """What all recordings miss, in units of the noise and of all samples."""
-    parts = [_off(layout, one, jnp.asarray(values)) for one in ready]
+def _missed(ready: Sequence[tuple[Layout, Prepared]], values):
+    """What all recordings miss, in units of the noise."""
+    parts = [_off(*one, jnp.asarray(values)) for one in ready]
     return _sound(np.concatenate(parts))
 
 
-def _slopes(layout: Layout, ready: Sequence[Prepared], values, scale):
-    """Derivatives of that to the parameters, in units of their scales."""
-    rows = [_along(layout, one, jnp.asarray(values), scale) for one in ready]
-    return _sound(np.concatenate(rows, axis=1).T)
+def _slopes(ready: Sequence[tuple[Layout, Prepared]], scale, values):
+    """Derivatives of that to the parameters."""
+    units = jnp.asarray(scale)
+    rows = [_along(*one, jnp.asarray(values), units) for one in ready]
+    return _sound(np.concatenate(rows, axis=1).T) / scale
 
 
 def _sound(numbers):
@@ -118,7 +141,8 @@ def _sound(numbers):
 
 @eqx.filter_jit
 def _off(layout: Layout, one: Prepared, values):
-    found = simulated(layout.at(values), one).channels
+    model = layout.at(values)
+    found = simulated(model, restarted(model, one)).channels
     missed = (found - one.data) / one.noise[None]
     missed = jnp.where(jnp.isfinite(one.data), missed, 0.0)
     # the samples that the state was found from do not count

@@ -26,6 +26,8 @@ from .engine import (
 
 # Steps of Newton's method on the initial state, and its relative tolerance
 _NEWTON, _STILL = 20, 1e-12
+# Part of its own information that keeps a state in place that no sample shows
+_LEAST = 1e-12
 # Steps between two samples: to begin with, and at most
 _FIRST_STEPS, _MOST_STEPS = 2, 64
 # Change of the simulated motion, in standard deviations of the noise or relative to
@@ -226,9 +228,7 @@ def _first_state(model: Model, data) -> Float[Array, " n"]:
 
 def _started(model: Model, one: Prepared) -> Prepared:
     """With the state whose motion fits the first samples best, by Gauss-Newton."""
-    few = dataclasses.replace(
-        one, level=one.level[: one.samples], data=one.data[: one.samples]
-    )
+    few = _first(one)
     state, cost = np.asarray(one.state), math.inf
     for _ in range(_NEWTON):
         missed, rows = (np.asarray(x) for x in _off(model, few, jnp.asarray(state)))
@@ -253,6 +253,29 @@ def _off(model: Model, one: Prepared, state):
         return jnp.ravel(jnp.where(jnp.isfinite(one.data), off, 0.0))
 
     return missed(state), jax.jacfwd(missed)(state)
+
+
+def restarted(model: Model, one: Prepared) -> Prepared:
+    """With the initial state that goes with another model, to first order.
+
+    Differentiable, so that a fit knows how the start moves with a parameter.
+    """
+    few = _first(one)
+    missed, rows = _off(model, few, few.state)
+    # slopes are exact enough where the state was found; only their size changes
+    scale = jnp.linalg.norm(jax.lax.stop_gradient(rows), axis=0)
+    scale = jnp.where(scale > 0, scale, 1.0)
+    rows = rows / scale[None]
+    inside = rows.T @ rows + _LEAST * jnp.eye(len(scale))
+    step = jnp.linalg.solve(inside, rows.T @ missed) / scale
+    return dataclasses.replace(one, state=one.state - step)
+
+
+def _first(one: Prepared) -> Prepared:
+    """The samples that the initial state is found from."""
+    return dataclasses.replace(
+        one, level=one.level[: one.samples], data=one.data[: one.samples]
+    )
 
 
 def _levels(model: Model, run: Recording) -> Float[Array, " k"]:

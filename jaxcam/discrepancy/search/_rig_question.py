@@ -48,11 +48,10 @@ def rig_question(
     if candidates is None:
         candidates = library(references=rig.references)
     base = cam_follower_model(rig)
-    sensors, noisier = with_seen_noise(
-        base.sensors, [run.recording for run in cut], policy
-    )
+    own = [part.recording for part in cut]
+    sensors, noisier = with_seen_noise(base.sensors, own, policy)
     slip = rig.references.slip_speed
-    visited = visited_by(cut, _FOLLOWER, sensors[_FOLLOWER], slip)
+    visited = visited_by(own, _FOLLOWER, sensors[_FOLLOWER], slip)
     terms, unlisted = by_listing(tuple(term.scaled(visited) for term in candidates))
     model = watched(Model(WithTerms(base.system, terms), sensors, base_drive()))
     parameters = cam_follower_parameters(rig, base=lambda s: s.base)

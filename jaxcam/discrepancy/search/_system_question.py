@@ -1,19 +1,17 @@
 """The question of any system, as its setup states it."""
 
 import dataclasses
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
 
 from ...fitting import Input, Model, Parameter, Problem, Sensor, Setup, Turning
 from ...hybrid import HybridSystem
 from ...recordings import Recording, References
-from ...recordings.against_model import size_of
 from ...recordings.cut import (
     fast_speed,
     measured_noise,
@@ -23,6 +21,7 @@ from ...recordings.cut import (
 from ...recordings.files import check_channels, unit_of
 from ..policy import Policy
 from ..terms import coordinates, library, Term, terms_of, watched, WithTerms
+from ._of_base import channel_of, measured_in, of_base, usual_state, within
 from ._question import (
     by_listing,
     Question,
@@ -37,19 +36,6 @@ from ._visited_by import visited_by
 # Share of the usual change of the speed in a step within which dry friction changes
 # sign: its impulse is then integrated well enough
 _RESOLVED = 0.3
-
-
-@dataclasses.dataclass(frozen=True)
-class _OfBase:
-    """A picker of a field of the system inside a `WithTerms`.
-
-    Equal for equal picks, so that diagnoses of one rig share compiled programs.
-    """
-
-    pick: Callable
-
-    def __call__(self, system):
-        return self.pick(system.base)
 
 
 def setup_question(
@@ -115,8 +101,8 @@ def system_question(
             )
     runs = [part.recording for part in recordings]
     sensors, noisier = with_seen_noise(sensors, runs, policy)
-    pairs = coordinates(system, _usual_state(system, sensors, recordings))
-    seen = _channel_of(sensors, pairs[0][0])
+    pairs = coordinates(system, usual_state(system, sensors, runs))
+    seen = channel_of(sensors, pairs[0][0])
     unit, turned = unit_of(seen), system.period is not None
     usual = References.of_speed(fast_speed(runs, seen))
     references = dataclasses.replace(usual, **(stated or {}))
@@ -125,17 +111,15 @@ def system_question(
     def listed(references: References):
         usual = library(turned, references, clocked=clocked)
         offered = usual if candidates is None else candidates
-        visited = visited_by(recordings, seen, sensors[seen], references.slip_speed)
+        visited = visited_by(runs, seen, sensors[seen], references.slip_speed)
         scaled = [term.scaled(visited) for term in offered]
-        return by_listing(_measured_in(unit, scaled))
+        return by_listing(measured_in(unit, scaled))
 
     terms, unlisted = listed(references)
-    if isinstance(drive, Input):
-        drive = Input(drive.channel, _OfBase(drive.value))
-    elif drive is not None:
-        drive = Turning(_OfBase(drive.speed), _OfBase(drive.phase))
-    model = watched(Model(WithTerms(system, terms, pairs), dict(sensors), drive))
-    inside = [_within(parameter) for parameter in parameters]
+    model = watched(
+        Model(WithTerms(system, terms, pairs), dict(sensors), of_base(drive))
+    )
+    inside = [within(parameter) for parameter in parameters]
     report("preparing the fits", None)
     problem = Problem.build(
         model, recordings, inside + term_parameters(terms, recordings, policy)
@@ -192,36 +176,3 @@ def _with_terms(problem: Problem, terms: Sequence[Term]) -> Problem:
         model=put(problem.model),
         layout=eqx.tree_at(lambda part: part.model, layout, put(layout.model)),
     )
-
-
-def _channel_of(sensors: Mapping[str, Sensor], place: int) -> str:
-    """The channel that shows a component of the state, or the first one."""
-    for name, sensor in sensors.items():
-        if isinstance(sensor.observe, int) and sensor.observe == place:
-            return name
-    return next(iter(sensors))
-
-
-def _usual_state(system, sensors, recordings) -> Float[np.ndarray, " n"]:
-    """The middle of what is measured of a state, zero for what is not."""
-    picks = {name: sensor.observe for name, sensor in sensors.items()}
-    state = np.zeros(size_of(system, picks))
-    for name, pick in picks.items():
-        if isinstance(pick, int):
-            samples = np.concatenate([part.recording[name] for part in recordings])
-            state[pick] = np.nanmedian(samples)
-    return state
-
-
-def _measured_in(unit: str, terms: Sequence[Term]) -> tuple[Term, ...]:
-    """The terms with the unit of the coordinate in their own."""
-    return tuple(dataclasses.replace(term, motion_unit=unit or "1") for term in terms)
-
-
-def _within(parameter: Parameter) -> Parameter:
-    """The same parameter of the system that a `WithTerms` holds."""
-
-    def where(model):
-        return parameter.where(Model(model.system.base, model.sensors, model.drive))
-
-    return dataclasses.replace(parameter, where=where)

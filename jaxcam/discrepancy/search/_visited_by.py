@@ -6,19 +6,18 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...fitting import Sensor
-from ...recordings import Segments
+from ...recordings import Recording
 from ...recordings.cut import fast_speed, usual_acceleration
 from ..terms import Visited
 
 
 def visited_by(
-    recordings: Sequence[Segments], channel: str, sensor: Sensor, slip: float
+    runs: Sequence[Recording], channel: str, sensor: Sensor, slip: float
 ) -> Visited:
     """Positions, speeds and accelerations of a coordinate that a channel shows.
 
     **Arguments:** `slip`, the speed within which dry friction changes sign.
     """
-    runs = [part.recording for part in recordings]
     samples = np.concatenate([run[channel] for run in runs])
     offset, gain = float(sensor.offset), float(sensor.gain)
     places = (samples[np.isfinite(samples)] - offset) / gain

@@ -14,7 +14,7 @@ _SHARES = tuple(np.geomspace(0.02, 0.6, 9).tolist())
 
 
 class StribeckCurve(ScaledTerm):
-    """Dry friction that is larger near standstill, `-fs exp(-(v / vs)^2) sign(v)`.
+    """Dry friction that is larger near standstill, `-se exp(-(v / vs)^2) sign(v)`.
 
     The speed `vs` is fitted with the strength.
     """
@@ -26,18 +26,18 @@ class StribeckCurve(ScaledTerm):
         "Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica 1994"
     )
     corner: ClassVar[bool] = True
-    fs: float = strength("[q]/s^2", 0.1, lower=0.0)
+    se: float = strength("[q]/s^2", 0.1, lower=0.0)
     vs: float = strength("[q]/s", 0.1, default=1.0, inner=True)
 
     def acceleration(self, motion: Motion):
         slow = jnp.exp(-((motion.velocity / self.vs) ** 2))
-        return -self.fs * slow * jnp.tanh(motion.velocity / self.visited.slip)
+        return -self.se * slow * jnp.tanh(motion.velocity / self.visited.slip)
 
     def starts(self):
         return tuple({"vs": share * self.visited.fast} for share in _SHARES)
 
     def _sizes(self):
-        return {"fs": self.visited.push, "vs": 0.05 * self.visited.fast}
+        return {"se": self.visited.push, "vs": 0.05 * self.visited.fast}
 
     def _ends(self):
         fast = self.visited.fast

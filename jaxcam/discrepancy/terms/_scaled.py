@@ -16,17 +16,19 @@ class ScaledTerm(Term):
     one in `_ends`.
     """
 
-    visited: Visited = eqx.field(
-        default=Visited(),
-        converter=lambda given: Visited(*given),
-        static=True,
-        kw_only=True,
-        metadata={"spare": True},
+    # plain numbers, as a saved system holds them
+    ranges: tuple[float, ...] = eqx.field(
+        default=tuple(Visited()), static=True, kw_only=True, metadata={"spare": True}
     )
     listed: ClassVar[bool] = True
 
+    @property
+    def visited(self) -> Visited:
+        """What the recordings visit."""
+        return Visited(*self.ranges)
+
     def scaled(self, visited: Visited) -> "ScaledTerm":
-        found = dataclasses.replace(self, visited=visited)
+        found = dataclasses.replace(self, ranges=tuple(visited))
         starts = found.starts()
         # somewhere in the range, until a fit says where
         inner = starts[len(starts) // 2] if starts else {}

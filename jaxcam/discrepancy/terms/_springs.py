@@ -45,7 +45,9 @@ class LinearSpring(ScaledTerm):
 
 
 class _WithEdge(ScaledTerm):
-    """A force that begins at a position."""
+    """A force that begins at a position; `viscous` strengths are times the velocity."""
+
+    viscous: ClassVar[tuple[str, ...]] = ()
 
     def starts(self):
         low, width = self.visited.low, 2 * self.visited.half
@@ -62,12 +64,8 @@ class _WithEdge(ScaledTerm):
     def _sizes(self):
         stiff, visited = self._stiff(), self.visited
         sizes = {one.name: stiff for one in self._declared()}
-        for one in self._declared():
-            if one.unit.startswith("1/(s [q])"):
-                sizes[one.name] = stiff / visited.fast
-            if one.inner:
-                sizes[one.name] = 0.05 * visited.half
-        return sizes
+        sizes |= {name: stiff / visited.fast for name in self.viscous}
+        return sizes | {self._edge: 0.05 * visited.half}
 
     def _ends(self):
         return {self._edge: (self.visited.low, self.visited.high)}
@@ -91,14 +89,15 @@ class StopAbove(_WithEdge):
     """Something that is touched above an edge: it pushes back and takes energy out.
 
     Of the depth `d = max(q - edge_a, 0)`, the acceleration is
-    `-d (ka + da v + la sign(v))`: stiffness, damping as of a fluid, and a loss that does
-    not depend on the speed, as of rubber or of rubbing sides.
+    `-d (ka + da v + la sign(v))`: stiffness, damping as of a fluid, and a loss that
+    does not depend on the speed, as of rubber or of rubbing sides.
     """
 
     name: ClassVar[str] = "stop_above"
     sentence: ClassVar[str] = "an elastic stop above an edge"
     region: ClassVar[str] = "in flight, above the edge"
     source: ClassVar[str] = "Hunt and Crossley, Journal of Applied Mechanics 1975"
+    viscous: ClassVar[tuple[str, ...]] = ("da",)
     ka: float = strength("1/s^2", 1.0, lower=0.0)
     da: float = strength("1/(s [q])", 1.0, lower=0.0)
     la: float = strength("1/s^2", 1.0, lower=0.0)
@@ -110,12 +109,16 @@ class StopAbove(_WithEdge):
 
 
 class StopBelow(_WithEdge):
-    """The same below an edge: `d (kd - dd v - ld sign(v))`, `d = max(edge_b - q, 0)`."""
+    """The same below an edge, `d (kd - dd v - ld sign(v))`, `d = max(edge_b - q, 0)`.
+
+    See `StopAbove`.
+    """
 
     name: ClassVar[str] = "stop_below"
     sentence: ClassVar[str] = "an elastic stop below an edge"
     region: ClassVar[str] = "in flight, below the edge"
     source: ClassVar[str] = "Hunt and Crossley, Journal of Applied Mechanics 1975"
+    viscous: ClassVar[tuple[str, ...]] = ("dd",)
     kd: float = strength("1/s^2", 1.0, lower=0.0)
     dd: float = strength("1/(s [q])", 1.0, lower=0.0)
     ld: float = strength("1/s^2", 1.0, lower=0.0)

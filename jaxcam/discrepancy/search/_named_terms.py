@@ -1,0 +1,57 @@
+"""A model of one's own with terms of the library in it, for a fit of one's own."""
+
+import dataclasses
+from collections.abc import Sequence
+
+from ...fitting import Input, Model, Parameter, Turning
+from ...recordings import Recording, References, Segments
+from ...recordings.cut import fast_speed
+from ...recordings.files import unit_of
+from ..terms import coordinates, library, Term, WithTerms
+from ._of_base import channel_of, measured_in, of_base, usual_state, within
+from ._visited_by import visited_by
+
+
+def with_terms(
+    model: Model,
+    parameters: Sequence[Parameter],
+    terms: Sequence[str | Term],
+    recordings: Sequence[Recording | Segments],
+) -> tuple[Model, list[Parameter]]:
+    """A model with physics added to it, for `fit` or `fit_free_run`.
+
+    **Arguments:**
+
+    - `model`, `parameters`: of the bare system.
+    - `terms`: names from `library(extended=True)`, or terms of your own, which push the
+        first coordinate. Strengths are zero to begin with.
+    - `recordings`: from which the terms take their scales: the middle and the ends of
+        the positions, the speeds within which dry friction changes sign.
+
+    **Returns:** the model with the terms in its system, and all parameters.
+
+    **Raises:** `ValueError` for a name that the library does not have.
+    """
+    runs = [r.recording if isinstance(r, Segments) else r for r in recordings]
+    sensors = model.sensors
+    pairs = coordinates(model.system, usual_state(model.system, sensors, runs))
+    seen = channel_of(sensors, pairs[0][0])
+    references = References.of_speed(fast_speed(runs, seen))
+    visited = visited_by(runs, seen, sensors[seen], references.slip_speed)
+    references = dataclasses.replace(references, spring_center=visited.middle)
+    known = {
+        term.name: term
+        for term in library(references=references, clocked=True, extended=True)
+    }
+    wrong = [one for one in terms if isinstance(one, str) and one not in known]
+    if wrong:
+        raise ValueError(
+            f"There is no term {wrong[0]!r}; the terms are {', '.join(known)}."
+        )
+    picked = [known[one] if isinstance(one, str) else one for one in terms]
+    scaled = [term.scaled(visited) for term in picked]
+    placed = measured_in(unit_of(seen), scaled)
+    drive: Turning | Input | None = of_base(model.drive)
+    more = [p for k, term in enumerate(placed) for p in term.parameters(k)]
+    system = WithTerms(model.system, placed, pairs)
+    return Model(system, sensors, drive), [*map(within, parameters), *more]

@@ -1,0 +1,69 @@
+"""A system and what picks its numbers, once it is inside a `WithTerms`."""
+
+import dataclasses
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+from jaxtyping import Float
+
+from ...fitting import Input, Model, Parameter, Sensor, Turning
+from ...recordings import Recording
+from ...recordings.against_model import size_of
+from ..terms import Term
+
+
+@dataclasses.dataclass(frozen=True)
+class OfBase:
+    """What picks a field out of the system that a `WithTerms` holds.
+
+    Equal for equal picks, so that diagnoses of one rig share compiled programs.
+    """
+
+    pick: Callable
+
+    def __call__(self, system):
+        return self.pick(system.base)
+
+
+def of_base(drive: Turning | Input | None) -> Turning | Input | None:
+    """The drive of the system that a `WithTerms` holds."""
+    if isinstance(drive, Input):
+        return Input(drive.channel, OfBase(drive.value))
+    if drive is not None:
+        return Turning(OfBase(drive.speed), OfBase(drive.phase))
+    return None
+
+
+def within(parameter: Parameter) -> Parameter:
+    """The same parameter of the system that a `WithTerms` holds."""
+
+    def where(model):
+        return parameter.where(Model(model.system.base, model.sensors, model.drive))
+
+    return dataclasses.replace(parameter, where=where)
+
+
+def channel_of(sensors: Mapping[str, Sensor], place: int) -> str:
+    """The channel that shows a component of the state, or the first one."""
+    for name, sensor in sensors.items():
+        if isinstance(sensor.observe, int) and sensor.observe == place:
+            return name
+    return next(iter(sensors))
+
+
+def usual_state(
+    system, sensors: Mapping[str, Sensor], runs: Sequence[Recording]
+) -> Float[np.ndarray, " n"]:
+    """The middle of what is measured of a state, zero for what is not."""
+    picks = {name: sensor.observe for name, sensor in sensors.items()}
+    state = np.zeros(size_of(system, picks))
+    for name, pick in picks.items():
+        if isinstance(pick, int):
+            samples = np.concatenate([run[name] for run in runs])
+            state[pick] = np.nanmedian(samples)
+    return state
+
+
+def measured_in(unit: str, terms: Sequence[Term]) -> tuple[Term, ...]:
+    """The terms with the unit of the coordinate in their own."""
+    return tuple(dataclasses.replace(term, motion_unit=unit or "1") for term in terms)
