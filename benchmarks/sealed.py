@@ -84,7 +84,7 @@ def line(case: str, truth: dict, verdict: dict) -> str:
     )
     mark = "yes" if right(truth, verdict) else "**no**"
     return (
-        f"| {case} | {', '.join(truth) or 'nothing'} | {named} | {numbers} | {mark} |"
+        f"| {case} | {', '.join(truth) or 'nothing'} | {named} | {mark} | {numbers} |"
     )
 
 
@@ -92,7 +92,7 @@ def main(arguments: argparse.Namespace) -> None:
     """Print table and score."""
     truths = read_keys(arguments.keys)
     verdicts = {v["case"]: v for v in json.loads(arguments.verdicts.read_text("utf-8"))}
-    print("| case | truth | verdict | strengths | right |\n|---|---|---|---|---|")
+    print("| case | truth | verdict | right | strengths |\n|---|---|---|---|---|")
     off = []
     for case, truth in truths.items():
         print(line(case, truth, verdicts[case]))

@@ -21,6 +21,7 @@ DOCS = ROOT / "docs"
 
 #: pages whose blocks take longer than ten seconds
 SLOW = {
+    "chatter.md",
     "continuation.md",
     "discrepancy.md",
     "filippov.md",
@@ -129,7 +130,7 @@ def _impacts(folder: Path) -> None:
 
 def _basins(folder: Path) -> None:
     """A small sweep in the folder that the page reads."""
-    _command("jaxcam basins --preset calibrated --speed 145 --turns 20 "
+    _command("jaxcam basins --preset calibrated --speed 145 --turns 24 "
              "--shape 8,8 --out ./basins")  # fmt: skip
 
 
