@@ -60,8 +60,12 @@ def test_sticking_makes_minus_infinity():
     system = ImpactOscillator(
         **parameters(omega=1.0, restitution=0.1, wall=-1.0, damping=0.1)
     )
-    found = variational.lyapunov_spectrum(system, [-1.5, 0.0], 200, transient=50)
+    shares = []
+    found = variational.lyapunov_spectrum(
+        system, [-1.5, 0.0], 200, transient=50, progress=shares.append
+    )
     assert int(found.code) == 0
+    assert shares == sorted(shares) and shares[-1] == 1.0
     assert np.all(np.isneginf(np.asarray(found.exponents)))
 
 

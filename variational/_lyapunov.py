@@ -197,7 +197,9 @@ class _Seen:
     @property
     def share(self) -> float:
         """Part of the turns that is done, over all lanes."""
-        return float(np.mean(self._filled)) / self.logs.shape[1]
+        # the first is the start of the run
+        done, most = self._filled - 1, self.logs.shape[1] - 1
+        return float(np.mean(np.minimum(done, most))) / most
 
     def take(self, kind, logs, after) -> None:
         hit = (kind == RowKind.IMPACT) | (kind == RowKind.LAST_IMPACT)

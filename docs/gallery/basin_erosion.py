@@ -14,11 +14,11 @@ grid = sweeps.Grid((-3.0, -2.5), (0.0, 2.5), (32, 32))
 walls = np.linspace(0.0, 0.4, 9)
 found = sweeps.follow_basins(system, "wall", walls, grid, turns=200)
 
-# an attractor may change its label on the way; those that are small are one band
+# an attractor is named as where it is largest; those that are small are one band
 large = found.shares.max(axis=0) > 0.03
-labels = [" / ".join(sorted(set(names[names != ""]))) for names in found.names.T]
+names = found.names[found.shares.argmax(axis=0), np.arange(len(large))]
 bands = [*found.shares.T[large], found.shares.T[~large].sum(axis=0)]
-words = [*np.array(labels)[large], "others"]
+words = [*names[large], "others"]
 
 with style():
     figure, ax = plt.subplots()

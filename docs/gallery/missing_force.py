@@ -37,10 +37,10 @@ class Swing(jaxcam.HybridSystem):
         return state * jnp.array([1.0, -0.5])
 
 
-real, sensors = Swing(stiffness=150.0, air=0.25), {"angle_rad": Sensor(0, noise=2e-3)}
+real, sensors = Swing(stiffness=150.0, air=0.25), {"angle_rad": Sensor(0, noise=1e-2)}
 rng = np.random.default_rng(1)
 recording = record(real, sensors, 6.0, rng=rng, state=[0.5, 0.0], interval=0.01)
-cut = segment(recording, "angle_rad", noise=2e-3)
+cut = segment(recording, "angle_rad", noise=1e-2)
 shape = ("first", "third", "fifth")
 known = Parameter("stiffness", lambda m: m.system.stiffness, scale=1.0)
 free = [

@@ -162,7 +162,7 @@ def _name(ax: Axes, points, value, x_scale) -> None:
         taken.append(here)
         left = ax.transAxes.inverted().transform(ax.transData.transform(place))[0] > 0.8
         ax.annotate(
-            _SHORT.get(point.kind, point.kind),
+            str(_SHORT.get(point.kind, point.kind)),
             place,
             xytext=(-5 if left else 5, 5),
             textcoords="offset points",

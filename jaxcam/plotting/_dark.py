@@ -97,4 +97,4 @@ def _recolour_ticks(axes: Axes) -> None:
             for name in ("color", "labelcolor", "grid_color")
             if name in parameters
         }
-        axis.set_tick_params(**found)
+        axis.set_tick_params("major", False, **found)

@@ -85,7 +85,8 @@ def _name(ax: Axes, curve, scale, share: float) -> None:
     along = near[-1] - near[0]
     kind = _kind(curve)
     ax.text(
-        *values[middle],
+        values[middle, 0],
+        values[middle, 1],
         kind,
         ha="center",
         va="center",
