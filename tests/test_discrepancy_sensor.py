@@ -14,6 +14,7 @@ from jaxcam.discrepancy.terms import (
     Family,
     FREE,
     library,
+    more_faults,
     own_faults,
     Variable,
     watched,
@@ -100,7 +101,10 @@ def test_gain_offset_and_lag_of_that_sensor_are_known():
         Parameter("zero", lambda m: m.sensors["speed"].offset),
         Parameter("restitution", lambda m: m.system.base.restitution),
     ]
-    assert own_faults(_model(), parameters) == ["place_gain", "late"]
+    model = _model()
+    assert own_faults(model, parameters) == ["place_gain", "late"]
+    (more,) = more_faults(model, parameters)
+    assert more.where(model) is model.sensors["place"].offset
 
 
 def test_what_a_gain_can_do_is_no_form():

@@ -9,7 +9,15 @@ import jax.numpy as jnp
 import numpy as np
 
 from ...fitting import Model, Problem
-from ..terms import Family, FREE, FreeFunction, Primitive, terms_of, Where
+from ..terms import (
+    Family,
+    FREE,
+    FreeFunction,
+    more_faults,
+    Primitive,
+    terms_of,
+    Where,
+)
 from ._extended import extended
 from ._roughness import Roughness
 
@@ -55,7 +63,8 @@ class Free:
 
 
 def roomy(problem: Problem, family: Family, impacting: bool) -> Problem:
-    """The problem with room for free functions, all of them zero.
+    """The problem with room for free functions, all of them zero, and with the faults
+    that any sensor may have.
 
     One program serves whatever is put into the slots.
 
@@ -66,7 +75,8 @@ def roomy(problem: Problem, family: Family, impacting: bool) -> Problem:
         FREE[where].of(family, label, [0.0] * (_SINES[where] + 1))
         for where, label in room
     ]
-    wide = extended(problem, empty, problem.start)
+    faults = more_faults(problem.model, problem.parameters)
+    wide = extended(problem, empty, problem.start, faults)
     layout = dataclasses.replace(wide.layout, ready=_with_splines)
     return dataclasses.replace(wide, layout=layout)
 
