@@ -25,8 +25,8 @@ def watching(model: Model) -> str:
     return next(iter(shown or model.sensors))
 
 
-# Changes of gain, offset (in the unit of the channel) and lag (s) that matter
-_FAULTS = {"gain": 1e-3, "offset": 1e-3, "lag": 1e-4}
+# What may be wrong with any sensor
+_FAULTS = ("gain", "offset", "lag")
 
 
 def more_faults(model: Model, parameters: Sequence[Parameter]) -> list[Parameter]:
@@ -38,9 +38,8 @@ def more_faults(model: Model, parameters: Sequence[Parameter]) -> list[Parameter
         Parameter(
             f"seen_{field}",
             lambda m, field=field: getattr(m.sensors[watching(m)], field),
-            scale=size,
         )
-        for field, size in _FAULTS.items()
+        for field in _FAULTS
         if not any(getattr(sensor, field) is one for one in taken)
     ]
 
