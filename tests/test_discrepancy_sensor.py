@@ -13,8 +13,9 @@ from jaxcam.discrepancy.report import formula_of
 from jaxcam.discrepancy.terms import (
     Family,
     FREE,
-    library,
+    more_faults,
     own_faults,
+    terms_of,
     Variable,
     watched,
     Where,
@@ -98,9 +99,13 @@ def test_gain_offset_and_lag_of_that_sensor_are_known():
         Parameter("place_gain", lambda m: m.sensors["place"].gain),
         Parameter("late", lambda m: m.sensors["place"].lag),
         Parameter("zero", lambda m: m.sensors["speed"].offset),
-        Parameter("restitution", lambda m: m.system.base.restitution),
+        Parameter("first", lambda m: terms_of(m)[0].numbers()[0]),
     ]
-    assert own_faults(_model(), parameters) == ["place_gain", "late"]
+    term = FREE[Where.SENSOR].of(_family(Variable.TIME), "a", np.zeros(SINES + 1))
+    model = _model(term)
+    assert own_faults(model, parameters) == ["place_gain", "late"]
+    (more,) = more_faults(model, parameters)
+    assert more.where(model) is model.sensors["place"].offset
 
 
 def test_what_a_gain_can_do_is_no_form():
@@ -137,8 +142,7 @@ def _by_time(time, turned, position):
 
 
 def _diagnosed(error):
-    setup = read_setup(RIG)
-    return diagnose(setup, records(error), library(references=setup.references))
+    return diagnose(read_setup(RIG), records(error))
 
 
 @pytest.mark.slow

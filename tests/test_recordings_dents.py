@@ -82,6 +82,7 @@ def test_a_dented_cam_is_cut_right(size, place, width):
         at = touched(gap)
         assert np.sum(at) > 200
         assert np.mean(contact[at]) > 0.9
+        assert part.drive is not None and part.surface is not None
         turned = part.drive.angle[at]
         off = part.surface.angle(turned) - height(rig, turned)
         assert np.sqrt(np.mean(off**2)) < 0.3 * NOISE
@@ -90,6 +91,7 @@ def test_a_dented_cam_is_cut_right(size, place, width):
 def test_a_round_cam_is_not_bent():
     runs, _ = measured(Dented(damping=0.0))
     surface = segment_case(runs, NOMINAL)[0].surface
+    assert surface is not None
     np.testing.assert_array_equal(surface.bend, np.zeros(WAVES))
 
 

@@ -7,7 +7,7 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
-from ...fitting import Fit, Model, Problem
+from ...fitting import Fit, Model, Parameter, Problem
 from ...fitting.engine import (
     assemble,
     eliminate_states,
@@ -23,11 +23,16 @@ from ..policy import Policy
 from ..terms import Term, watched, WithTerms
 
 
-def extended(problem: Problem, terms: Sequence[Term], at: Point) -> Problem:
+def extended(
+    problem: Problem,
+    terms: Sequence[Term],
+    at: Point,
+    parameters: Sequence[Parameter] = (),
+) -> Problem:
     """The same data with more terms in the system, all without effect so far.
 
-    **Arguments:** a problem whose system is a `WithTerms`, the terms to add, and the
-    point to start from.
+    **Arguments:** a problem whose system is a `WithTerms`, the terms to add, the point
+    to start from, and parameters that are to be added as well.
     """
     system = problem.model.system
     assert isinstance(system, WithTerms)
@@ -38,9 +43,10 @@ def extended(problem: Problem, terms: Sequence[Term], at: Point) -> Problem:
         WithTerms(system.base, (*system.terms, *terms), system.coordinates),
     )
     model = watched(model)
-    more = [p for k, t in enumerate(terms) for p in t.parameters(before + k)]
-    parameters = (*problem.parameters, *more)
-    layout = Layout(model, parameter_places(model, parameters))
+    own = [p for k, t in enumerate(terms) for p in t.parameters(before + k)]
+    more = [*own, *parameters]
+    every = (*problem.parameters, *more)
+    layout = Layout(model, parameter_places(model, every))
     fresh = np.array([float(p.where(model)) for p in more])
     fresh = np.tile(fresh, (len(problem.segments), 1))
     for column, one in enumerate(more):
@@ -53,7 +59,7 @@ def extended(problem: Problem, terms: Sequence[Term], at: Point) -> Problem:
     return dataclasses.replace(
         problem,
         model=model,
-        parameters=parameters,
+        parameters=every,
         layout=layout,
         start=at._replace(values=wider(at.values)),
     )

@@ -15,6 +15,7 @@ from ..terms import (
     FREE,
     FreeFunction,
     HiddenForce,
+    more_faults,
     Primitive,
     Term,
     terms_of,
@@ -88,7 +89,7 @@ def roomy(
     problem: Problem, family: Family, impacting: bool, driven: Driven | None
 ) -> Problem:
     """The problem with room for free functions and a hidden element, all without
-    effect.
+    effect, and with the faults that any sensor may have.
 
     One program serves whatever is put into the slots.
 
@@ -102,7 +103,8 @@ def roomy(
     ]
     if driven is not None:
         empty.append(HiddenForce.empty(*driven.position.shape))
-    wide = extended(problem, empty, problem.start)
+    faults = more_faults(problem.model, problem.parameters)
+    wide = extended(problem, empty, problem.start, faults)
     layout = dataclasses.replace(wide.layout, ready=_with_splines)
     return dataclasses.replace(wide, layout=layout)
 

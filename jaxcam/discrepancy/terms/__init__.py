@@ -32,7 +32,11 @@ from ._library import (
 )
 from ._primitives import Primitive as Primitive
 from ._scaled import ScaledTerm as ScaledTerm
-from ._sensed import own_faults as own_faults, watched as watched
+from ._sensed import (
+    more_faults as more_faults,
+    own_faults as own_faults,
+    watched as watched,
+)
 from ._shapes import Shape as Shape, shapes as shapes, Variable as Variable
 from ._term import (
     Motion as Motion,

@@ -1,7 +1,7 @@
 """What terms add to what the sensor of the first coordinate shows."""
 
 import dataclasses
-from collections.abc import Iterable
+from collections.abc import Sequence
 
 from ...fitting import Model, Parameter
 from ._term import Motion, terms_of
@@ -25,10 +25,29 @@ def watching(model: Model) -> str:
     return next(iter(shown or model.sensors))
 
 
-def own_faults(model: Model, parameters: Iterable[Parameter]) -> list[str]:
+# What may be wrong with any sensor
+_FAULTS = ("gain", "offset", "lag")
+
+
+def more_faults(model: Model, parameters: Sequence[Parameter]) -> list[Parameter]:
+    """Gain, offset and lag of that sensor as parameters, where they are none yet."""
+    known = set(own_faults(model, parameters))
+    taken = [one.where(model) for one in parameters if one.name in known]
+    sensor = model.sensors[watching(model)]
+    return [
+        Parameter(
+            f"seen_{field}",
+            lambda m, field=field: getattr(m.sensors[watching(m)], field),
+        )
+        for field in _FAULTS
+        if not any(getattr(sensor, field) is one for one in taken)
+    ]
+
+
+def own_faults(model: Model, parameters: Sequence[Parameter]) -> list[str]:
     """Names of the parameters that are gain, offset or lag of that sensor."""
     sensor = model.sensors[watching(model)]
-    fields = sensor.gain, sensor.offset, sensor.lag
+    fields = [getattr(sensor, field) for field in _FAULTS]
     return [
         one.name
         for one in parameters

@@ -166,7 +166,8 @@ def _errors(model: Model, start, step, place, along, value, slope):
         return jax.vmap(sample)(places, values, slopes)
 
     numbers = jnp.arange(place.shape[0], dtype=float)
-    return jax.vmap(one_step)(numbers, place, *along, value, slope)
+    when, angle, rate = along
+    return jax.vmap(one_step)(numbers, place, when, angle, rate, value, slope)
 
 
 class Joint(NamedTuple):

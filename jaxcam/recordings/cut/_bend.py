@@ -113,8 +113,9 @@ def _foretold(records, known, pull, sizes) -> float:
     return total
 
 
-def _total(records) -> tuple[np.ndarray, np.ndarray]:
-    return sum(one.normal for one in records), sum(one.target for one in records)
+def _total(records: list[Seen]) -> tuple[np.ndarray, np.ndarray]:
+    normal = np.sum([one.normal for one in records], axis=0)
+    return normal, np.sum([one.target for one in records], axis=0)
 
 
 def _scaled(normal, units) -> np.ndarray:

@@ -119,7 +119,8 @@ def refine_surface(surface: Surface, rig: Rig, segments: Sequence) -> Surface:
         error.append(np.full(len(place), noise))
     joined = [np.concatenate([*column, []]) for column in (turned, angle, error)]
     plain = _solve(_unbent(surface), rig, *joined, equal=count)
-    bend = _bend(plain, rig, *(column[:count] for column in joined), ends)
+    on = [column[:count] for column in joined]
+    bend = _bend(plain, rig, on[0], on[1], on[2], ends)
     if not np.any(bend):
         return plain
     return _solve(plain, rig, *joined, equal=count, bend=bend)
