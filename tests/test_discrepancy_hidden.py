@@ -15,7 +15,6 @@ from jaxcam import simulate
 from jaxcam.discrepancy.search._hidden_signals import Driven
 from jaxcam.discrepancy.search._hidden_state import (
     Hidden,
-    hidden_table,
     HYSTERESIS,
     RELAXATION,
     RESONANCE,
@@ -104,7 +103,7 @@ def test_the_table_holds_the_changes_of_the_force(kind):
     """What a change of each number makes of the force, to second order in it."""
     starts = 1e-3 * np.ones((1, kind.starts))
     hidden = _hidden(kind, starts)
-    table = hidden_table(hidden)[0]
+    table = hidden.table[0]
     width = len(kind.outputs)
     here = hidden.force(hidden.numbers)[0]
     free = table[:, SHARED : SHARED + kind.starts] @ starts[0]
