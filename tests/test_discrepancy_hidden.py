@@ -142,10 +142,10 @@ def _carried(mass, frequency, damping):
     """A mass on a spring that the cart carries, as a resonance that it drives."""
     w, d = 2 * math.pi * frequency, damping
     return Resonator(
-        frequency,
-        damping,
-        mass * w**4 * (1 - 4 * d**2),
-        mass * 4 * d * w**3 * (1 - 2 * d**2),
+        frequency=frequency,
+        ratio=damping,
+        by_state=mass * w**4 * (1 - 4 * d**2),
+        by_rate=mass * 4 * d * w**3 * (1 - 2 * d**2),
         stiffness=-mass * w**2 * (1 - 4 * d**2),
         damping=-2 * mass * d * w,
     )
@@ -175,10 +175,14 @@ SYSTEMS = {
         _carried(0.02, 9.0, 0.05),
         [4 * 0.05**2 * 0.01 / _W**2, -2 * 0.05 * 0.01 / _W],
     ),
-    "relaxation": (truth.relaxation(9.0, 0.05), Relaxation(0.05, -9.0), [0.0]),
+    "relaxation": (
+        truth.relaxation(9.0, 0.05),
+        Relaxation(time=0.05, by_state=-9.0),
+        [0.0],
+    ),
     "hysteresis": (
         truth.hysteresis(12.0, 0.012),
-        Hysteresis(0.012, 0.5, 1.0, -12.0),
+        Hysteresis(limit=0.012, sharing=0.5, power=1.0, by_state=-12.0),
         [0.0],
     ),
 }
@@ -203,7 +207,7 @@ def test_a_system_with_a_hidden_state_moves_as_scipy_has_it(name):
 def test_a_saved_system_with_a_hidden_state_is_the_same(tmp_path):
     from jaxcam.models import ImpactOscillator
 
-    element = Relaxation(0.3, -0.5)
+    element = Relaxation(time=0.3, by_state=-0.5)
     system = WithHidden(WithTerms(ImpactOscillator()), element)
     save_system(system, tmp_path / "model.json")
     again = load_system(tmp_path / "model.json", classes=saved_classes())
@@ -214,4 +218,4 @@ def test_a_saved_system_with_a_hidden_state_is_the_same(tmp_path):
 
 def test_a_number_without_meaning_is_refused():
     with pytest.raises(ValueError, match="Relaxation"):
-        Relaxation(-0.1, 1.0).check()
+        Relaxation(time=-0.1, by_state=1.0).check()
