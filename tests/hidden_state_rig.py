@@ -22,11 +22,15 @@ DRIVE_NOISE = 1e-4
 
 @dataclasses.dataclass(frozen=True)
 class Hidden:
-    """A hidden state: its rate and its force, functions of x, v and the state."""
+    """A hidden state: its rate and its force, functions of x, v and the state.
+
+    `begin(phase)` is its state at time zero, where nothing moves it.
+    """
 
     size: int
     rate: Callable
     force: Callable
+    begin: Callable | None = None
 
 
 def nothing() -> Hidden:
@@ -67,12 +71,16 @@ def shaken(amplitude: float, frequency: float) -> Hidden:
     """A force of time, as of a foundation that shakes: nothing moves it."""
     w = 2 * math.pi * frequency
     return Hidden(
-        2, lambda x, v, z: [z[1], -(w**2) * z[0]], lambda x, v, z: amplitude * z[0]
+        2,
+        lambda x, v, z: [z[1], -(w**2) * z[0]],
+        lambda x, v, z: amplitude * z[0],
+        lambda phase: [math.cos(phase), -w * math.sin(phase)],
     )
 
 
 def motion(hidden: Hidden, speed: float, duration: float, interval: float, start=()):
-    """Positions of the cart after it has settled, at equal times from zero."""
+    """Positions of the cart at equal times from zero, after it has settled or, with
+    the `start` of a hidden state, from a state of its own."""
     settle = 0.0 if len(start) else 6.0
     times = np.arange(0.0, duration, interval)
     found = np.zeros(len(times))
@@ -129,11 +137,7 @@ def records(
     for number, frequency in enumerate(frequencies, start=1):
         speed = 2 * math.pi * frequency * (1 + 0.02 * rng.standard_normal())
         phase = rng.uniform(0, 2 * math.pi)
-        start = ()
-        if hidden.force(0.0, 0.0, np.ones(max(hidden.size, 1))) != 0 and _autonomous(
-            hidden
-        ):
-            start = (math.cos(phase), 0.0)
+        start = () if hidden.begin is None else hidden.begin(phase)
         times, x = motion(hidden, speed, duration, interval, start)
         seen = x + NOISE * rng.standard_normal(len(x))
         turned = speed * times + DRIVE_NOISE * rng.standard_normal(len(x))
@@ -143,9 +147,3 @@ def records(
         }
         runs.append(Recording(f"run{number}_{frequency:.2f}Hz", times, channels))
     return runs
-
-
-def _autonomous(hidden: Hidden) -> bool:
-    """Whether the cart does not move the hidden state."""
-    z = np.array([0.3, 0.1][: hidden.size])
-    return hidden.size == 2 and hidden.rate(0.1, 0.2, z) == hidden.rate(0.0, 0.0, z)

@@ -72,7 +72,10 @@ def compare_experiments(
     problem = Problem.build(fit.problem.model, records, parameters)
     values = np.repeat(np.asarray(fit.point.values)[:1], len(problem.segments), axis=0)
     point = problem.start._replace(values=jnp.asarray(values))
-    known, more = blocks_of(fit.problem, fit.point), blocks_of(problem, point)
+    # what each record has for itself says nothing of another one
+    names = [p.name for p in parameters if p.known is None and not p.per_record]
+    known = blocks_of(fit.problem, fit.point, names=names)
+    more = blocks_of(problem, point, names=names)
     questions = _questions(found, asked)
     names = [part.recording.name for part in problem.segments]
     made = [

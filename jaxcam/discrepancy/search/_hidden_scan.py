@@ -17,7 +17,7 @@ from ...fitting import Problem
 from ...fitting.engine import invert_information
 from ..policy import Policy
 from ..terms import ByMotion, DIRECT
-from ._hidden_signals import at_times, Driven, hysteresis_signals
+from ._hidden_signals import at_times, Driven
 from ._hidden_state import Hidden, HYSTERESIS, Kind, RELAXATION, RESONANCE
 from ._local_force import forces_at_nodes, Response
 from ._vibration_scan import scanned_frequencies
@@ -180,11 +180,7 @@ class _Chain:
 
 def _columns(kind: Kind, cells, driven: Driven, response: Response):
     """For each record, forces of unit strengths at its nodes, `(k, l, cells, p)`."""
-    if kind is HYSTERESIS:
-        several = hysteresis_signals(driven, *np.array(cells).T)
-        each = [(state, beside) for state, beside in zip(*several)]
-    else:
-        each = [kind.signals(driven, cell) for cell in cells]
+    each = kind.signals(driven, cells)
     times = response.time
     whole = np.empty((*times.shape, len(cells), len(kind.outputs) + kind.starts))
     for c, (outputs, free) in enumerate(each):

@@ -1,6 +1,7 @@
 """Hidden elements in a problem: which one, with which numbers, and its signals."""
 
 import dataclasses
+import functools
 import math
 from collections.abc import Callable, Sequence
 from typing import Any, ClassVar
@@ -78,7 +79,8 @@ class Kind:
     """A kind of element.
 
     - `name`: of it in sentences; `numbers`, and `outputs`: names of its strengths.
-    - `signals(driven, numbers)`: outputs and free motions of each record.
+    - `signals(driven, cells)`: for each of some numbers, outputs `(r, n, o)` and free
+        motions `(r, n, s)`.
     """
 
     name: str
@@ -86,7 +88,9 @@ class Kind:
     numbers: tuple[Number, ...]
     outputs: tuple[str, ...]
     starts: int
-    signals: Callable[[Driven, Sequence[float]], tuple[np.ndarray, np.ndarray]]
+    signals: Callable[
+        [Driven, Sequence[Sequence[float]]], list[tuple[np.ndarray, np.ndarray]]
+    ]
 
     def reach(self, number: Number, values: Sequence[float]) -> float:
         """How far one fit may move a number: a share of the width of a resonance."""
@@ -95,9 +99,16 @@ class Kind:
         return number.reach
 
 
-def _hysteresis(driven: Driven, numbers):
-    state, beside = hysteresis_signals(driven, *([one] for one in numbers))
-    return state[0], beside[0]
+def _resonances(driven: Driven, cells):
+    return [resonance_signals(driven, *cell) for cell in cells]
+
+
+def _relaxations(driven: Driven, cells):
+    return [relaxation_signals(driven, *cell) for cell in cells]
+
+
+def _hystereses(driven: Driven, cells):
+    return list(zip(*hysteresis_signals(driven, *np.array(cells).T)))
 
 
 RESONANCE = Kind(
@@ -109,7 +120,7 @@ RESONANCE = Kind(
     ),
     ("by_state", "by_rate"),
     2,
-    lambda driven, numbers: resonance_signals(driven, *numbers),
+    _resonances,
 )
 RELAXATION = Kind(
     "relaxation",
@@ -117,7 +128,7 @@ RELAXATION = Kind(
     (Number("time", 0.0, math.inf, 0.5),),
     ("by_state",),
     1,
-    lambda driven, numbers: relaxation_signals(driven, *numbers),
+    _relaxations,
 )
 HYSTERESIS = Kind(
     "hysteresis",
@@ -129,12 +140,12 @@ HYSTERESIS = Kind(
     ),
     ("by_state",),
     1,
-    _hysteresis,
+    _hystereses,
 )
 KINDS = (RESONANCE, RELAXATION, HYSTERESIS)
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, eq=False)
 class Hidden:
     """A hidden element that is fitted, about some numbers of it.
 
@@ -209,10 +220,32 @@ class Hidden:
 
     def force(self, numbers: Sequence[float]) -> Float[np.ndarray, "r n"]:
         """Its force for other numbers and the same strengths."""
-        outputs, free = self.kind.signals(self.driven, numbers)
-        return outputs @ np.asarray(self.strengths) + np.einsum(
-            "rns,rs->rn", free, self.starts
-        )
+        return self._sum(*self.kind.signals(self.driven, [numbers])[0])
+
+    def _sum(self, outputs, free) -> Float[np.ndarray, "r n"]:
+        starts = np.einsum("rns,rs->rn", free, self.starts)
+        return outputs @ np.asarray(self.strengths) + starts
+
+    @functools.cached_property
+    def table(self) -> Float[np.ndarray, "r n s"]:
+        """Its signals: outputs, derivatives of the force to its numbers, free
+        motions."""
+        cells = [list(self.numbers)]
+        for k, number in enumerate(self.kind.numbers):
+            for sign in (-1, 1):
+                moved = list(self.numbers)
+                moved[k] = number.moved(moved[k], sign * _STEP)
+                cells.append(moved)
+        (outputs, free), *beside = self.kind.signals(self.driven, cells)
+        table = np.zeros((*outputs.shape[:2], SHARED + STARTS))
+        width = outputs.shape[-1]
+        table[..., :width] = outputs
+        for k, number in enumerate(self.kind.numbers):
+            below, above = (self._sum(*one) for one in beside[2 * k : 2 * k + 2])
+            low, high = (cell[k] for cell in cells[2 * k + 1 : 2 * k + 3])
+            table[..., width + k] = (above - below) / number.change(low, high)
+        table[..., SHARED : SHARED + free.shape[-1]] = free
+        return table
 
     def element(self, point: Point, names: Sequence[str]) -> HiddenElement:
         """What was found, for a simulation."""
@@ -253,29 +286,14 @@ def _moved(hidden: Hidden, changes: Sequence[float]) -> tuple[float, ...]:
     )
 
 
-def hidden_table(hidden: Hidden) -> Float[np.ndarray, "r n s"]:
-    """Its signals: outputs, derivatives of the force to its numbers, free motions."""
-    outputs, free = hidden.kind.signals(hidden.driven, hidden.numbers)
-    table = np.zeros((*outputs.shape[:2], SHARED + STARTS))
-    width = outputs.shape[-1]
-    table[..., :width] = outputs
-    for k, number in enumerate(hidden.kind.numbers):
-        sides = []
-        for sign in (-1, 1):
-            numbers = list(hidden.numbers)
-            numbers[k] = number.moved(numbers[k], sign * _STEP)
-            sides.append((hidden.force(numbers), numbers[k]))
-        (below, low), (above, high) = sides
-        table[..., width + k] = (above - below) / number.change(low, high)
-    table[..., SHARED : SHARED + free.shape[-1]] = free
-    return table
-
-
 def with_hidden(problem: Problem, hidden: Hidden) -> Problem:
     """The problem with the signals of an element in its place."""
-    table = hidden_table(hidden)
+    table = hidden.table
     place = hidden_place(problem)
-    force = hidden.force(hidden.numbers)
+    width = len(hidden.outputs)
+    starts = slice(SHARED, SHARED + hidden.kind.starts)
+    force = table[..., :width] @ np.asarray(hidden.strengths)
+    force = force + np.einsum("rns,rs->rn", table[..., starts], hidden.starts)
     usual = max(float(np.sqrt(np.mean(force**2))), 1e-12)
 
     def put(model: Model) -> Model:
