@@ -122,6 +122,8 @@ def ask(case: str, system, runs, **options) -> None:
 def stray(case, label, model, parameters, names, seen, unseen, scales, start=None):
     """Fit named terms to free runs of one record, and run another one freely."""
     model, parameters = with_terms(model, parameters, names, scales)
+    offered = {one.name for one in parameters}
+    start = {name: x for name, x in (start or {}).items() if name in offered}
     fitted = fit_free_run(model, [seen], parameters, start=start)
     (channel,) = fitted.runs[0].rmse
     other = free_run(fitted.model, unseen).rmse[channel]
@@ -439,13 +441,13 @@ steps = {
     "more friction at low speed": ("stribeck_curve",),
 }
 names: tuple[str, ...] = ()
-values: dict[str, float] = {}
+values = {"1/mass": 0.0105, "viscous": 2.0, "offset": -0.03, "fc": 0.2, "vs": 0.03}
 for label, more in steps.items():
     names = (*names, *more)
     fitted = stray(
         "stage", label, stage, cart, names, estimation, pulses, [estimation], values
     )
-    values = dict(fitted.values)
+    values |= fitted.values
 # -
 
 # Free runs of the second record stray because its friction is larger from the start,
