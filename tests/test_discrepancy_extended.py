@@ -9,6 +9,7 @@ from textbook_stage import Stage, staged
 
 from jaxcam.discrepancy import diagnose, library, Policy
 from jaxcam.discrepancy.search._placing import _signed_gain
+from jaxcam.discrepancy.search._question import by_listing
 from jaxcam.discrepancy.terms import Motion, saved_classes, Visited, Where, WithTerms
 from jaxcam.fitting import Input, Parameter, Sensor
 from jaxcam.models.saved import load_system, save_system
@@ -161,6 +162,14 @@ def test_the_gain_of_a_placed_term_minds_the_signs_of_its_strengths():
     )
     assert _signed_gain(rest, left, both, above, 1e-8) == pytest.approx(left[0] ** 2)
     assert _signed_gain(rest, -np.abs(left), both, above, 1e-8) == 0.0
+
+
+def test_a_place_is_looked_for_on_the_first_coordinate():
+    elsewhere = dataclasses.replace(TERMS["stop_above"], coordinate=1)
+    with pytest.raises(ValueError, match="'stop_above' has places to start from"):
+        by_listing((elsewhere,))
+    terms, unlisted = by_listing(tuple(TERMS.values()))
+    assert len(terms) == len(TERMS) and not unlisted
 
 
 def test_a_system_with_extended_terms_is_saved_and_read_again(tmp_path):
