@@ -190,18 +190,21 @@ ask(
 # -
 
 # Each swing is to foretell the other. A model is fitted to the whole of one, from its
-# first samples to where it sticks, and then runs freely through the other.
+# first samples to where it sticks, and then runs freely through the other. Dry friction
+# and drag are in the place of the viscous hinge.
 
 # +
 by_size = {"large to small": swings, "small to large": swings[::-1]}
+viscous = Pendulum(stiffness=64.0)
+rubbing, others = Pendulum(stiffness=64.0, damping=0.0), [hinge[0], hinge[2]]
 for way, (seen, unseen) in by_size.items():
-    for label, names in {
-        "textbook": (),
-        "dry friction": ("coulomb_friction",),
-        "dry friction and drag": ("coulomb_friction", "quadratic_drag"),
-    }.items():
-        swing = Model(Pendulum(stiffness=64.0), encoder)
-        stray(f"pendulum, {way}", label, swing, hinge, names, seen, unseen, [seen])
+    for label, system, own, names in (
+        ("textbook", viscous, hinge, ()),
+        ("dry friction", rubbing, others, ("coulomb_friction",)),
+        ("and drag", rubbing, others, ("coulomb_friction", "quadratic_drag")),
+    ):
+        swing = Model(system, encoder)
+        stray(f"pendulum, {way}", label, swing, own, names, seen, unseen, [seen])
 # -
 
 # ## Falling balls
@@ -526,7 +529,8 @@ ask(
 # samples.
 
 # +
-touches = {"edge_a": 0.0105, "ka": 400.0, "la": 50.0, "fc": 0.3}
+touches = {"edge_a": 0.0105, "ka": 630.0, "la": 98.0, "ra": 0.88, "fc": 0.16}
+touches |= {"edge_b": 0.0015, "kd": 2e4}
 for way, (seen, unseen) in {
     "first to second": (first, second),
     "second to first": (second, first),
@@ -534,10 +538,10 @@ for way, (seen, unseen) in {
     for label, names in {
         "textbook": (),
         "a surface": ("stop_above",),
-        "a surface and dry friction": ("stop_above", "coulomb_friction"),
+        "and dry friction": ("stop_above", "coulomb_friction"),
+        "and the end of the way": ("stop_above", "coulomb_friction", "stop_below"),
     }.items():
-        start = {k: x for k, x in touches.items() if names and (k != "fc" or names[1:])}
-        stray(f"head, {way}", label, head, spring, names, seen, unseen, [first], start)
+        stray(f"head, {way}", label, head, spring, names, seen, unseen, [run], touches)
 # -
 
 # ## All of them
