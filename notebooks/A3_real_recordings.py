@@ -441,10 +441,9 @@ steps = {
     "dry friction": ("coulomb_friction",),
     "more damping backwards": ("damping_backwards",),
     "friction uneven along the way": ("uneven_friction",),
-    "more friction at low speed": ("stribeck_curve",),
 }
 names: tuple[str, ...] = ()
-values = {"1/mass": 0.0105, "viscous": 2.0, "offset": -0.03, "fc": 0.2, "vs": 0.03}
+values = {"1/mass": 0.0105, "viscous": 2.0, "offset": -0.03, "fc": 0.2}
 for label, more in steps.items():
     names = (*names, *more)
     fitted = stray(
