@@ -124,6 +124,8 @@ def ask(case: str, system, runs, **options) -> None:
 def stray(case, label, model, parameters, names, seen, unseen, scales, start=None):
     """Fit named terms to free runs of one record, and run another one freely."""
     model, parameters = with_terms(model, parameters, names, scales)
+    offered = {one.name for one in parameters}
+    start = {name: x for name, x in (start or {}).items() if name in offered}
     fitted = fit_free_run(model, [seen], parameters, start=start)
     (channel,) = fitted.runs[0].rmse
     other = free_run(fitted.model, unseen).rmse[channel]
@@ -190,18 +192,21 @@ ask(
 # -
 
 # Each swing is to foretell the other. A model is fitted to the whole of one, from its
-# first samples to where it sticks, and then runs freely through the other.
+# first samples to where it sticks, and then runs freely through the other. Dry friction
+# and drag are in the place of the viscous hinge.
 
 # +
 by_size = {"large to small": swings, "small to large": swings[::-1]}
+viscous = Pendulum(stiffness=64.0)
+rubbing, others = Pendulum(stiffness=64.0, damping=0.0), [hinge[0], hinge[2]]
 for way, (seen, unseen) in by_size.items():
-    for label, names in {
-        "textbook": (),
-        "dry friction": ("coulomb_friction",),
-        "dry friction and drag": ("coulomb_friction", "quadratic_drag"),
-    }.items():
-        swing = Model(Pendulum(stiffness=64.0), encoder)
-        stray(f"pendulum, {way}", label, swing, hinge, names, seen, unseen, [seen])
+    for label, system, own, names in (
+        ("textbook", viscous, hinge, ()),
+        ("dry friction", rubbing, others, ("coulomb_friction",)),
+        ("and drag", rubbing, others, ("coulomb_friction", "quadratic_drag")),
+    ):
+        swing = Model(system, encoder)
+        stray(f"pendulum, {way}", label, swing, own, names, seen, unseen, [seen])
 # -
 
 # ## Falling balls
@@ -438,16 +443,15 @@ steps = {
     "dry friction": ("coulomb_friction",),
     "more damping backwards": ("damping_backwards",),
     "friction uneven along the way": ("uneven_friction",),
-    "more friction at low speed": ("stribeck_curve",),
 }
 names: tuple[str, ...] = ()
-values: dict[str, float] = {}
+values = {"1/mass": 0.0105, "viscous": 2.0, "offset": -0.03, "fc": 0.2}
 for label, more in steps.items():
     names = (*names, *more)
     fitted = stray(
         "stage", label, stage, cart, names, estimation, pulses, [estimation], values
     )
-    values = dict(fitted.values)
+    values |= fitted.values
 # -
 
 # Free runs of the second record stray because its friction is larger from the start,
@@ -526,7 +530,8 @@ ask(
 # samples.
 
 # +
-touches = {"edge_a": 0.0105, "ka": 400.0, "la": 50.0, "fc": 0.3}
+touches = {"edge_a": 0.0105, "ka": 630.0, "la": 98.0, "ra": 0.88, "fc": 0.16}
+touches |= {"edge_b": 0.0015, "kd": 2e4}
 for way, (seen, unseen) in {
     "first to second": (first, second),
     "second to first": (second, first),
@@ -534,10 +539,10 @@ for way, (seen, unseen) in {
     for label, names in {
         "textbook": (),
         "a surface": ("stop_above",),
-        "a surface and dry friction": ("stop_above", "coulomb_friction"),
+        "and dry friction": ("stop_above", "coulomb_friction"),
+        "and the end of the way": ("stop_above", "coulomb_friction", "stop_below"),
     }.items():
-        start = {k: x for k, x in touches.items() if names and (k != "fc" or names[1:])}
-        stray(f"head, {way}", label, head, spring, names, seen, unseen, [first], start)
+        stray(f"head, {way}", label, head, spring, names, seen, unseen, [run], touches)
 # -
 
 # ## All of them

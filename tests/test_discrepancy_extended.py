@@ -9,6 +9,7 @@ from textbook_stage import Stage, staged
 
 from jaxcam.discrepancy import diagnose, library, Policy
 from jaxcam.discrepancy.search._placing import _signed_gain
+from jaxcam.discrepancy.search._question import by_listing
 from jaxcam.discrepancy.terms import Motion, saved_classes, Visited, Where, WithTerms
 from jaxcam.fitting import Input, Parameter, Sensor
 from jaxcam.models.saved import load_system, save_system
@@ -59,6 +60,11 @@ def test_without_strength_nothing_changes(name):
         ("stop_above", {"ka": 10.0, "edge_a": 0.4}, 0.5, 2.0, -1.0),
         ("stop_above", {"da": 10.0, "edge_a": 0.4}, 0.5, 2.0, -2.0),
         ("stop_above", {"la": 10.0, "edge_a": 0.4}, 0.5, -2.0, 1.0),
+        # of the half range, 0.4, friction begins within 0.02
+        ("stop_above", {"ra": 2.0, "edge_a": 0.4}, 0.3, 1.0, 0.0),
+        ("stop_above", {"ra": 2.0, "edge_a": 0.4}, 0.408, 1.0, -2 * (1 - np.exp(-1))),
+        ("stop_above", {"ra": 2.0, "edge_a": 0.4}, 0.6, -1.0, 2 * (1 - np.exp(-25))),
+        ("stop_below", {"rd": 2.0, "edge_b": 0.2}, -0.2, 1.0, -2 * (1 - np.exp(-50))),
         ("stop_below", {"kd": 10.0, "edge_b": 0.0}, 0.1, 2.0, 0.0),
         ("stop_below", {"kd": 10.0, "edge_b": 0.0}, -0.1, 2.0, 1.0),
         ("stop_below", {"dd": 10.0, "edge_b": 0.0}, -0.1, -2.0, 2.0),
@@ -133,7 +139,7 @@ def test_scales_are_those_of_the_recordings():
         for name, term in TERMS.items()
         for one, other in zip(term.strengths(), term.scaled(small).strengths())
     }
-    for name in ("f0", "ff", "fb", "se", "u1", "u2", "edge_a", "knee", "vs"):
+    for name in ("f0", "ff", "fb", "se", "u1", "u2", "ra", "edge_a", "knee", "vs"):
         assert ratio[name] == pytest.approx(100.0)
     for name in ("k1", "kb", "ka", "cf", "cb", "la", "rp"):
         assert ratio[name] == pytest.approx(1.0)
@@ -161,6 +167,14 @@ def test_the_gain_of_a_placed_term_minds_the_signs_of_its_strengths():
     )
     assert _signed_gain(rest, left, both, above, 1e-8) == pytest.approx(left[0] ** 2)
     assert _signed_gain(rest, -np.abs(left), both, above, 1e-8) == 0.0
+
+
+def test_a_place_is_looked_for_on_the_first_coordinate():
+    elsewhere = dataclasses.replace(TERMS["stop_above"], coordinate=1)
+    with pytest.raises(ValueError, match="'stop_above' has places to start from"):
+        by_listing((elsewhere,))
+    terms, unlisted = by_listing(tuple(TERMS.values()))
+    assert len(terms) == len(TERMS) and not unlisted
 
 
 def test_a_system_with_extended_terms_is_saved_and_read_again(tmp_path):

@@ -12,7 +12,7 @@ from ...fitting import Parameter, Problem, Sensor
 from ...recordings import Recording, RecordingError, References
 from ...recordings.cut import least_noise, Segments
 from ..policy import Policy
-from ..terms import SensorTerm, Term
+from ..terms import SensorTerm, Term, Where
 
 
 Report = Callable[[str, float | None], None]
@@ -97,6 +97,12 @@ def by_listing(terms: tuple[Term, ...]):
             raise ValueError(
                 f"The term {term.name!r} acts nowhere; override its `acceleration`, "
                 f"`contact` or `restitution`, or make it a `SensorTerm`."
+            )
+        if term.starts() and (term.coordinate or term.acts != (Where.FLIGHT,)):
+            raise ValueError(
+                f"The term {term.name!r} has places to start from, which are looked "
+                f"for on the first coordinate in flight; let it act there and nowhere "
+                f"else, or leave `starts` out."
             )
     return (
         tuple(term for term in terms if term.listed),

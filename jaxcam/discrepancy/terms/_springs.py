@@ -11,6 +11,8 @@ from ._term import Motion, strength
 
 # Places of a knee or an edge that are tried, as shares of the positions visited
 _SHARES = tuple(np.linspace(0.02, 0.98, 33).tolist())
+# Depth within which dry friction of a stop begins, in halves of the range
+_BEGINS = 0.02
 
 
 class ConstantForce(ScaledTerm):
@@ -45,9 +47,13 @@ class LinearSpring(ScaledTerm):
 
 
 class _WithEdge(ScaledTerm):
-    """A force that begins at a position; `viscous` strengths are times the velocity."""
+    """A force that begins at a position.
+
+    Strengths that are `viscous` are times a velocity, those that are `dry` forces.
+    """
 
     viscous: ClassVar[tuple[str, ...]] = ()
+    dry: ClassVar[tuple[str, ...]] = ()
 
     def starts(self):
         low, width = self.visited.low, 2 * self.visited.half
@@ -65,6 +71,7 @@ class _WithEdge(ScaledTerm):
         stiff, visited = self._stiff(), self.visited
         sizes = {one.name: stiff for one in self._declared()}
         sizes |= {name: stiff / visited.fast for name in self.viscous}
+        sizes |= dict.fromkeys(self.dry, visited.push)
         return sizes | {self._edge: 0.05 * visited.half}
 
     def _ends(self):
@@ -89,8 +96,9 @@ class StopAbove(_WithEdge):
     """Something that is touched above an edge: it pushes back and takes energy out.
 
     Of the depth `d = max(q - edge_a, 0)`, the acceleration is
-    `-d (ka + da v + la sign(v))`: stiffness, damping as of a fluid, and a loss that
-    does not depend on the speed, as of rubber or of rubbing sides.
+    `-d (ka + da v + la sign(v)) - ra sign(v)`: stiffness, damping as of a fluid, a loss
+    that does not depend on the speed, as of rubber, and dry friction of what is moved
+    along, which begins within a hundredth of the range.
     """
 
     name: ClassVar[str] = "stop_above"
@@ -98,20 +106,23 @@ class StopAbove(_WithEdge):
     region: ClassVar[str] = "in flight, above the edge"
     source: ClassVar[str] = "Hunt and Crossley, Journal of Applied Mechanics 1975"
     viscous: ClassVar[tuple[str, ...]] = ("da",)
+    dry: ClassVar[tuple[str, ...]] = ("ra",)
     ka: float = strength("1/s^2", 1.0, lower=0.0)
     da: float = strength("1/(s [q])", 1.0, lower=0.0)
     la: float = strength("1/s^2", 1.0, lower=0.0)
+    ra: float = strength("[q]/s^2", 1.0, lower=0.0)
     edge_a: float = strength("[q]", 0.01, default=0.0, inner=True)
 
     def acceleration(self, motion: Motion):
         depth = jnp.maximum(motion.position - self.edge_a, 0.0)
-        return -depth * _reaction(self, motion, self.ka, self.da, self.la)
+        numbers = self.ka, self.da, self.la, self.ra
+        return -_reaction(self, depth, motion.velocity, *numbers)
 
 
 class StopBelow(_WithEdge):
-    """The same below an edge, `d (kd - dd v - ld sign(v))`, `d = max(edge_b - q, 0)`.
+    """The same below an edge, of the depth `d = max(edge_b - q, 0)`.
 
-    See `StopAbove`.
+    See `StopAbove`; its numbers are `kd`, `dd`, `ld` and `rd`.
     """
 
     name: ClassVar[str] = "stop_below"
@@ -119,18 +130,22 @@ class StopBelow(_WithEdge):
     region: ClassVar[str] = "in flight, below the edge"
     source: ClassVar[str] = "Hunt and Crossley, Journal of Applied Mechanics 1975"
     viscous: ClassVar[tuple[str, ...]] = ("dd",)
+    dry: ClassVar[tuple[str, ...]] = ("rd",)
     kd: float = strength("1/s^2", 1.0, lower=0.0)
     dd: float = strength("1/(s [q])", 1.0, lower=0.0)
     ld: float = strength("1/s^2", 1.0, lower=0.0)
+    rd: float = strength("[q]/s^2", 1.0, lower=0.0)
     edge_b: float = strength("[q]", 0.01, default=0.0, inner=True)
 
     def acceleration(self, motion: Motion):
         depth = jnp.maximum(self.edge_b - motion.position, 0.0)
-        mirrored = motion._replace(velocity=-motion.velocity)
-        return depth * _reaction(self, mirrored, self.kd, self.dd, self.ld)
+        numbers = self.kd, self.dd, self.ld, self.rd
+        return _reaction(self, depth, -motion.velocity, *numbers)
 
 
-def _reaction(term: ScaledTerm, motion: Motion, stiffness, damping, loss):
-    """What a unit of depth pushes with, of motion into the stop."""
-    turned = jnp.tanh(motion.velocity / term.visited.slip)
-    return stiffness + damping * motion.velocity + loss * turned
+def _reaction(term: ScaledTerm, depth, velocity, stiffness, damping, loss, friction):
+    """What a stop pushes back with, at a depth and a velocity into it."""
+    turned = jnp.tanh(velocity / term.visited.slip)
+    touching = 1 - jnp.exp(-depth / (_BEGINS * term.visited.half))
+    elastic = depth * (stiffness + damping * velocity + loss * turned)
+    return elastic + touching * friction * turned
