@@ -29,7 +29,7 @@ def compare(
     noise: dict[str, float] | None = None,
     clock: Float[np.ndarray, " k"] | None = None,
 ) -> Comparison:
-    """One recording against a model.
+    """Compare one recording with a model.
 
     Args:
         system: The model. A `CamFollower` is compared at the measured angle of its cam,
@@ -42,8 +42,22 @@ def compare(
             are measured.
         clock: Time of the model at each sample (s).
 
+    Returns:
+        A comparison.
+
     Raises:
         RecordingError: Where a channel is missing.
+
+    Examples:
+        >>> from jaxcam.models import BouncingBall
+        >>> from jaxcam.recordings import Recording, compare, segment
+        >>> ball, time = BouncingBall(), np.linspace(0.0, 1.0, 1001)
+        >>> motion = jaxcam.simulate(ball, [1.0, 0.0], 0.0, 1.0)
+        >>> height = np.random.default_rng(0).normal(motion.at(time)[:, 0], 1e-4)
+        >>> run = Recording("run", time, {"height_m": height})
+        >>> parts = segment(run, "height_m", 0.0)
+        >>> compare(ball, parts).row("flight").ratio < 2
+        True
     """
     observe = dict(observe or {segments.channel: 0})
     known = {segments.channel: segments.noise, **(noise or {})}
@@ -72,11 +86,14 @@ def compare(
 
 
 def compare_case(rig: Rig, case: Sequence[Segments]) -> Comparison:
-    """All recordings of a cam-follower against its nominal model.
+    """Compare all recordings of a cam-follower with its nominal model.
 
     Args:
         rig: The model; another set of values by `rig.replace(...)`.
         case: From `segment_case`.
+
+    Returns:
+        A comparison.
     """
     found = []
     for segments in case:

@@ -31,10 +31,15 @@ class Flight:
     """Free motion from one boundary to the next; samples `first <= i < last`."""
 
     start: Boundary
+    """The boundary at which it begins."""
     stop: Boundary
+    """The boundary at which it ends."""
     first: int
+    """First sample."""
     last: int
+    """Sample after the last one."""
     height: float
+    """Largest distance from the surface."""
 
     @property
     def duration(self) -> float:
@@ -45,16 +50,20 @@ class Flight:
 class Contact:
     """A stretch within the noise of the surface; samples `first <= i < last`.
 
-    It begins with bounces that are too low to be seen. `settled` (s) is when they have
-    died out, estimated from the last flight that was seen: from there to `stop` the
-    follower rests on the cam.
+    It begins with impacts that are too low to be observed.
     """
 
     start: Boundary
+    """The boundary at which it begins."""
     stop: Boundary
+    """The boundary at which it ends."""
     first: int
+    """First sample."""
     last: int
+    """Sample after the last one."""
     settled: float
+    """Time (s) at which the impacts have died out, estimated from the last observed
+    flight: from there to `stop` the follower is in contact with the cam."""
 
     @property
     def duration(self) -> float:
@@ -63,7 +72,7 @@ class Contact:
 
 @dataclasses.dataclass(frozen=True)
 class Impacts:
-    """Impacts between two flights that were both seen, one entry each."""
+    """Impacts between two observed flights, one entry each."""
 
     time: Float[np.ndarray, " k"]
     """Seconds."""
@@ -80,9 +89,11 @@ class Impacts:
     before: Float[np.ndarray, " k"]
     """Rate of the channel on either side, and their errors."""
     before_stderr: Float[np.ndarray, " k"]
+    """Standard error of `before`."""
     after: Float[np.ndarray, " k"]
     """Rate of the channel on either side, and their errors."""
     after_stderr: Float[np.ndarray, " k"]
+    """Standard error of `after`."""
     approach: Float[np.ndarray, " k"]
     """Speeds relative to the surface, both positive."""
     separation: Float[np.ndarray, " k"]
@@ -117,9 +128,22 @@ class Impacts:
 
 @dataclasses.dataclass(frozen=True)
 class Segments:
-    """A recording cut into its parts."""
+    """A recording cut into its parts.
+
+    Examples:
+        >>> from jaxcam.models import BouncingBall
+        >>> from jaxcam.recordings import Recording, segment
+        >>> ball, time = BouncingBall(), np.linspace(0.0, 1.0, 1001)
+        >>> motion = jaxcam.simulate(ball, [1.0, 0.0], 0.0, 1.0)
+        >>> height = np.random.default_rng(0).normal(motion.at(time)[:, 0], 1e-4)
+        >>> run = Recording("run", time, {"height_m": height})
+        >>> parts = segment(run, "height_m", 0.0)
+        >>> len(parts.flights)
+        2
+    """
 
     recording: Recording
+    """The recording that was cut."""
     channel: str
     """The channel that the parts were found in."""
     noise: float
@@ -128,8 +152,11 @@ class Segments:
     """Time of the model at each sample (s): record time, or that of a drive at constant
     speed."""
     flights: tuple[Flight, ...]
+    """The flights."""
     contacts: tuple[Contact, ...]
+    """The contacts."""
     impacts: Impacts
+    """The impacts between two observed flights."""
     gap: Float[np.ndarray, " k"] | None = None
     """Its distance from the nearest surface, `(k,)`, or `None` in free flight."""
     drive: Drive | None = None
@@ -140,7 +167,7 @@ class Segments:
     """Samples at which contact is no hidden hop, shape `(k,)`; `None`: all."""
 
     def resting(self, contact: Contact) -> Bool[np.ndarray, " k"]:
-        """Samples at which the follower rests: settled, and beyond doubt."""
+        """Return the samples at which the follower is surely in settled contact."""
         time = self.recording.time
         rows = (time >= contact.settled) & (time < contact.stop.time)
         # a release that few samples tell of may be placed after the contact
@@ -148,7 +175,7 @@ class Segments:
         return rows if self.sure is None else rows & self.sure
 
     def sentence(self) -> str:
-        """Summarise the segments in words."""
+        """Return a summary of the segments in words."""
         flown = sum(flight.last - flight.first for flight in self.flights)
         rested = sum(contact.last - contact.first for contact in self.contacts)
         total = len(self.recording)

@@ -50,17 +50,19 @@ class Surface(eqx.Module):
         return self.profile(angle) + extra
 
     def angle(self, turned) -> Float[np.ndarray, " k"]:
-        """The contact angle as a numpy array, shape `(k,)`."""
+        """Return the contact angle (rad) as a NumPy array, shape `(k,)`."""
         turned = np.asarray(turned)
         return np.asarray(_evaluate(self, padded(turned))[0])[: len(turned)]
 
     def slope(self, turned) -> Float[np.ndarray, " k"]:
-        """Its derivative to the angle that the cam has turned."""
+        """Return its derivative by the angle that the cam has turned."""
         turned = np.asarray(turned)
         return np.asarray(_evaluate(self, padded(turned))[1])[: len(turned)]
 
     def slope_stderr(self, turned) -> Float[np.ndarray, " k"]:
-        """Standard error of `slope`, large where no impact or contact was seen."""
+        """Return the standard error of `slope`, large where no impact or contact was
+        observed.
+        """
         turned = np.asarray(turned)
         rows = np.asarray(_slope_jacobian(self, vector_of(self), padded(turned)))
         rows = rows[: len(turned)]
@@ -68,7 +70,14 @@ class Surface(eqx.Module):
 
 
 def nominal_surface(rig: Rig) -> Surface:
-    """The profile as the rig file states it."""
+    """Return the profile that the rig file states.
+
+    Args:
+        rig: The rig.
+
+    Returns:
+        A [`jaxcam.recordings.cut.Surface`][].
+    """
     zero = jnp.zeros(len(_HARMONICS))
     sense = -1.0 if rig.cam_rotation == "clockwise" else 1.0
     covariance = jnp.diag(jnp.asarray(prior_sizes(rig)) ** 2)

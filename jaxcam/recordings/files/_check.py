@@ -60,6 +60,9 @@ def find_gaps(
 def check_channels(recording: Recording) -> None:
     """Check that the channels of a recording can be what their names say.
 
+    Args:
+        recording: The recording.
+
     Raises:
         RecordingError: For a dead channel or a lever angle in degrees.
     """
@@ -82,6 +85,9 @@ def check_channels(recording: Recording) -> None:
 
 def check_drive(recording: Recording) -> None:
     """Compare the cam's speed with the one in the file's name.
+
+    Args:
+        recording: The recording.
 
     Raises:
         RecordingError: That names the unit the numbers look like.
