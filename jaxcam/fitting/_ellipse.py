@@ -42,18 +42,19 @@ class Ellipse:
         return (self._roots() * np.sqrt(self.limit)).T
 
     def chi_square(self, points: Float[np.ndarray, "*k d"]) -> Float[np.ndarray, "*k"]:
-        """Squared distance of points from the centre, in standard errors."""
+        """Return the squared distance of points from the centre, in standard errors."""
         off = (np.asarray(points, dtype=float) - self.centre) @ np.linalg.pinv(
             self._roots()
         ).T
         return np.sum(off**2, axis=-1)
 
     def contains(self, points: Float[np.ndarray, "*k d"]) -> Bool[np.ndarray, "*k"]:
-        """Whether points are inside."""
+        """Return whether points lie inside."""
         return self.chi_square(points) <= self.limit
 
     def polygon(self, points: int = 181) -> Float[np.ndarray, "k 2"]:
-        """The edge of an ellipse as a closed line, shape `(points, 2)`, to be drawn.
+        """Return the edge of an ellipse as a closed line, shape `(points, 2)`, for
+        drawing.
 
         Raises:
             ValueError: For more than two parameters.

@@ -37,7 +37,7 @@ class MomentumBalance:
         return not (size > _ERRORS * self.stderr and size > _SHARE)
 
     def sentence(self) -> str:
-        """The balance in words."""
+        """Return the balance in words."""
         ratio = f"{self.ratio:.4g} +- {self.ratio_stderr:.1g}"
         if np.isnan(self.stated):
             return f"If momentum is kept, the second mass is {ratio} times the first."
@@ -51,7 +51,7 @@ class MomentumBalance:
         )
 
     def to_json(self) -> dict[str, Any]:
-        """Plain numbers, `None` for what is not known."""
+        """Return plain numbers, `None` for unknown ones."""
         fields = dataclasses.asdict(self)
         return {
             name: None if np.isnan(value) else value for name, value in fields.items()

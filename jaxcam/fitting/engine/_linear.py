@@ -37,12 +37,10 @@ class Extras(NamedTuple):
 
 
 class LinearPieces(NamedTuple):
-    """Pieces and joints of one record, before anything is added up.
+    """Pieces and joints of one record, before summation.
 
     The first `n` of `a = n + m` columns are the state at the beginning of the piece,
-    the others what else varies.
-
-    - `end`: the state at the end of each piece, by its columns.
+    the others the parameters.
     """
 
     information: Float[Array, "k a a"]
@@ -66,9 +64,13 @@ class LinearPieces(NamedTuple):
     it, and for what else varies, in units of the joint's error. `tied`: how far the
     joint is off."""
     tied: Float[Array, "k e"]
+    """Distance at each joint, in units of its error."""
     flown_cost: Float[Array, " k"]
+    """Cost of each piece in flight."""
     joint_cost: Float[Array, " k"]
+    """Cost of each joint."""
     rested_cost: Float[Array, " kc"]
+    """Cost of each piece in contact."""
 
 
 def linear_pieces(
@@ -76,9 +78,17 @@ def linear_pieces(
 ) -> LinearPieces:
     """Linearise one record about its states.
 
-    **Arguments:** `model_at(change, start, step)` is the model of a piece that begins
-    at `start` and has steps of length `step`, where `change` `(m,)` is zero at the
-    point; `width` is m.
+    Args:
+        model_at: `model_at(change, start, step)` is the model of a piece that begins at
+            `start` with steps of length `step`, where `change` `(m,)` is zero at the
+            point.
+        pieces: The pieces.
+        extras: Further arguments of the compiled programs.
+        states: States at the beginning of each piece.
+        width: Number m of parameters.
+
+    Returns:
+        A [`jaxcam.fitting.engine.LinearPieces`][].
     """
     size = states.shape[-1]
     origin = jnp.zeros(width)

@@ -21,6 +21,7 @@ class FreeFall(eqx.Module):
     """A system, and the state in which it was let go."""
 
     system: HybridSystem
+    """The system."""
     state: Float[Array, " n"] | tuple[Float[Array, ""], ...]
     """(n,), or its components one by one."""
 
@@ -37,12 +38,13 @@ def fit_free_fall(
     name: str = "stiffness",
     steps: int = 4,
 ) -> PublishedFit:
-    """Fit one parameter, and the state at the start, to a motion without contact.
+    """Fit one parameter, and the initial state, to a motion without contact.
 
-    The motion of the rig sees inertia and stiffness only through M = J/K (4.9): pick
-    one of them with `where` and hold the other.
+    The motion of the rig depends on inertia and stiffness only through M = J/K (thesis,
+    eq. 4.9): pick one of them with `where` and hold the other.
 
     Args:
+        system: The system.
         where: Picks the parameter of the system.
         times: Shape `(k,)`, increasing (s); before the first impact.
         measured: Shape `(k,)`, one component of the state.

@@ -34,6 +34,12 @@ class Published(eqx.Module):
 
     Raises:
         ValueError: For an error that is not positive.
+
+    Examples:
+        >>> from jaxcam.fitting import Published
+        >>> fall = lambda ball: jnp.sqrt(2 / ball.gravity)[None]
+        >>> Published("fall from 1 m", fall, [0.45152], [1e-5]).values.tolist()
+        [0.45152]
     """
 
     name: str = eqx.field(static=True)
@@ -63,7 +69,14 @@ class Published(eqx.Module):
 
 
 def rounding_error(decimals: int) -> float:
-    """Standard deviation of what rounding to `decimals` digits hides."""
+    """Return the standard deviation of the error of rounding to `decimals` digits.
+
+    Args:
+        decimals: Number of digits after the point.
+
+    Returns:
+        10^-decimals / sqrt(12).
+    """
     return 10.0**-decimals / 12**0.5
 
 
@@ -85,21 +98,29 @@ def fit_published(
 
     Args:
         model: A system, or any Module with one in it, at the nominal values.
-        where: The scalars of it that are free, as a tuple or list; the centres of the
-            priors.
+        where: Picks the free scalars, as a tuple or list; they centre the priors.
         published: The data.
-        names: One for each free parameter.
-        tolerances: Standard deviations of the priors, in the units of the parameters;
-            infinity for none.
-        start: Values to begin at instead of the nominal ones.
-        max_steps: Most evaluations at one scale of the errors.
+        names: Names of the free parameters.
+        tolerances: Standard deviations of the priors; infinity for none.
+        start: Initial values instead of the nominal ones.
+        max_steps: Largest number of evaluations at one scale of the errors.
 
     Returns:
         A [`jaxcam.fitting.published.PublishedFit`][].
 
     Raises:
-        ValueError: Where lengths differ, a tolerance is not positive, or a quantity
-            cannot be computed at the start.
+        ValueError: Lengths differ, a tolerance is not positive, or a quantity cannot be
+            computed at the start.
+
+    Examples:
+        >>> from jaxcam.fitting import Published, fit_published
+        >>> from jaxcam.models import BouncingBall
+        >>> ball, where = BouncingBall(), lambda ball: (ball.gravity,)
+        >>> fall = lambda ball: jnp.sqrt(2 / ball.gravity)[None]  # from 1 m (s)
+        >>> printed = [Published("fall", fall, [0.45152], [1e-5])]
+        >>> found = fit_published(ball, where, printed, names=["gravity"], tolerances=[1.0])
+        >>> round(float(found.estimates[0]), 2)
+        9.81
     """
     nominal, unravel = _picked(model, where)
     priors = np.asarray(tolerances, dtype=float)
