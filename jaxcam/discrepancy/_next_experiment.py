@@ -17,7 +17,13 @@ from .terms import Term, WithTerms
 
 @dataclasses.dataclass(frozen=True)
 class Experiment:
-    """The expected information of one more record."""
+    """The expected information of one more record.
+
+    Examples:
+        >>> from jaxcam.discrepancy import Experiment
+        >>> Experiment("155 rpm", {"damping": 0.1}, {"damping": 0.05}).factor
+        0.5
+    """
 
     name: str
     """Of the record."""
@@ -44,15 +50,18 @@ def compare_experiments(
     of the records of the diagnosis.
 
     Args:
+        found: The diagnosis of the records so far.
         records: Simulated with the system that was found (`found.system()`) by
             [`jaxcam.recordings.record`][], and cut.
-        asked: Names of parameters; by default the strengths of what was named. The
-            terms whose BIC is not much worse stay free beside them, so that the best
-            record also tells them apart. Where nothing was named, all terms, one at a
-            time.
+        asked: Names of parameters; default the strengths of the named terms. Terms
+            whose BIC is not much worse stay free, so that the best record also
+            distinguishes them. If none is named, all terms, one at a time.
+
+    Returns:
+        The experiments, best first.
 
     Raises:
-        ValueError: For a name that is no parameter.
+        ValueError: A name is no parameter.
     """
     fit = found.after
     for name in asked or ():
@@ -88,18 +97,24 @@ def next_experiments(
     seed: int = 0,
     progress: Callable[[str, float | None], None] | None = None,
 ) -> tuple[Experiment, ...]:
-    """The speed at which to run a cam-follower rig next, the best first.
+    """Recommend the speeds at which to run a cam-follower rig next, best first.
 
     Args:
-        found: What `diagnose` said of its records so far.
+        found: The diagnosis of the records so far.
+        rig: The rig.
         speeds: Of the cam (rad/s) that can be had; by default some between those of the
             records and a little beyond.
         duration: Of a record (s); by default as before.
         asked: As in [`jaxcam.discrepancy.compare_experiments`][].
+        seed: Seed of the simulated records.
+        progress: Called with a sentence and a fraction, or `None`.
+
+    Returns:
+        The experiments, best first.
 
     Raises:
-        ValueError: For a system that is no rig with a drive.
-        RecordingError: Where none of the speeds makes the follower fly.
+        ValueError: The system is no rig with a drive.
+        RecordingError: The follower does not fly at any of the speeds.
     """
     parts = found.after.problem.segments
     drives = [part.drive for part in parts if part.drive is not None]

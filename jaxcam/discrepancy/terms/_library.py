@@ -280,7 +280,7 @@ def library(
     references: References = References(),
     clocked: bool | None = None,
 ) -> tuple[Term, ...]:
-    """All terms that `diagnose` tries by default.
+    """Return all terms that `diagnose` tries by default.
 
     Args:
         turned: Whether the system has a drive, without which no cam can be out of
@@ -290,6 +290,14 @@ def library(
             stated.
         clocked: Whether anything happens at a known time, such as by a drive (the
             default) or a measured input. Otherwise a lag is another beginning of time.
+
+    Returns:
+        A tuple of [`jaxcam.discrepancy.Term`][].
+
+    Examples:
+        >>> from jaxcam.discrepancy import library
+        >>> len(library()) > len(library(turned=False))
+        True
     """
     slip = references.slip_speed
     found: list[Term] = [
@@ -315,6 +323,10 @@ def library(
 
 
 def saved_classes() -> tuple[type, ...]:
-    """Classes that a saved system with terms may name, for `load_system`."""
+    """Return the classes that a saved system with terms may name, for `load_system`.
+
+    Returns:
+        A tuple of classes.
+    """
     terms = (type(term) for term in library())
     return (WithTerms, DriveRipple, *terms, *FREE.values())

@@ -55,7 +55,8 @@ class WithTerms(HybridSystem):
     def motion(self, t, state, coordinate: int = 0, field=None) -> Motion:
         """Return the state as the terms of a coordinate see it.
 
-        **Arguments:** `field` is the rate of change of the state, if it is known.
+        Args:
+            field: Rate of change of the state, if it is known.
         """
         place, rate = self.coordinates[coordinate]
         velocity = state[rate] if field is None else field[place]
