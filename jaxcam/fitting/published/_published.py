@@ -92,13 +92,12 @@ def fit_published(
 ) -> PublishedFit:
     """Fit parameters of a model to published numbers.
 
-    Levenberg and Marquardt's method (MINPACK) on forward-mode Jacobians. Where the
-    start is far from the data, their errors are taken ten, a hundred, ... times as
-    large first: a path that bends less.
+    Levenberg and Marquardt's method (MINPACK) on forward-mode Jacobians. Far from the
+    data their errors are first taken larger, by factors of ten.
 
     Args:
         model: A system, or any Module with one in it, at the nominal values.
-        where: Picks the free scalars, as a tuple or list; they centre the priors.
+        where: Picks the free scalars, which centre the priors.
         published: The data.
         names: Names of the free parameters.
         tolerances: Standard deviations of the priors; infinity for none.
@@ -109,8 +108,7 @@ def fit_published(
         A [`jaxcam.fitting.published.PublishedFit`][].
 
     Raises:
-        ValueError: Lengths differ, a tolerance is not positive, or a quantity cannot be
-            computed at the start.
+        ValueError: Lengths differ, or a number is invalid.
 
     Examples:
         >>> from jaxcam.fitting import Published, fit_published
@@ -118,7 +116,7 @@ def fit_published(
         >>> ball, where = BouncingBall(), lambda ball: (ball.gravity,)
         >>> fall = lambda ball: jnp.sqrt(2 / ball.gravity)[None]  # from 1 m (s)
         >>> printed = [Published("fall", fall, [0.45152], [1e-5])]
-        >>> found = fit_published(ball, where, printed, names=["gravity"], tolerances=[1.0])
+        >>> found = fit_published(ball, where, printed, names=["g"], tolerances=[1.0])
         >>> round(float(found.estimates[0]), 2)
         9.81
     """
