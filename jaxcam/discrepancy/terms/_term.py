@@ -133,8 +133,8 @@ class Term(eqx.Module):
         ...     factor: float = strength("1/[q]", 0.1)
         ...     def acceleration(self, motion):
         ...         return -self.factor * motion.velocity * abs(motion.velocity)
-        >>> Drag().acts
-        ('flight',)
+        >>> [str(place) for place in Drag().acts]
+        ['flight']
     """
 
     name: ClassVar[str] = ""

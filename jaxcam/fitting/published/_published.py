@@ -96,13 +96,13 @@ def fit_published(
     data their errors are first taken larger, by factors of ten.
 
     Args:
-        model: A system, or any Module with one in it, at the nominal values.
+        model: A system, or a Module with one in it, at the nominal values.
         where: Picks the free scalars, which centre the priors.
         published: The data.
         names: Names of the free parameters.
         tolerances: Standard deviations of the priors; infinity for none.
-        start: Initial values instead of the nominal ones.
-        max_steps: Largest number of evaluations at one scale of the errors.
+        start: Initial values; default nominal.
+        max_steps: Largest number of evaluations per scale of the errors.
 
     Returns:
         A [`jaxcam.fitting.published.PublishedFit`][].
@@ -113,11 +113,10 @@ def fit_published(
     Examples:
         >>> from jaxcam.fitting import Published, fit_published
         >>> from jaxcam.models import BouncingBall
-        >>> ball, where = BouncingBall(), lambda ball: (ball.gravity,)
         >>> fall = lambda ball: jnp.sqrt(2 / ball.gravity)[None]  # from 1 m (s)
-        >>> printed = [Published("fall", fall, [0.45152], [1e-5])]
-        >>> found = fit_published(ball, where, printed, names=["g"], tolerances=[1.0])
-        >>> round(float(found.estimates[0]), 2)
+        >>> data = [Published("fall", fall, [0.45152], [1e-5])]
+        >>> free = dict(where=lambda ball: (ball.gravity,), names=["g"], tolerances=[1.0])
+        >>> round(float(fit_published(BouncingBall(), published=data, **free).estimates[0]), 2)
         9.81
     """
     nominal, unravel = _picked(model, where)
