@@ -56,7 +56,7 @@ def _options(
     ] = False,
 ) -> None:
     """
-    Motion of mechanical systems that fly, hit and stick.
+    Simulate and analyse vibro-impact systems.
 
     \b
     Examples:

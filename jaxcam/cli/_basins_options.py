@@ -39,8 +39,8 @@ class Cells:
         int,
         typer.Option(
             metavar="N",
-            help="How often motions that do not repeat yet go on, each time for twice "
-            "as many turns.",
+            help="Extensions of non-periodic runs, each twice as long as the one "
+            "before.",
         ),
     ] = 1
 

@@ -36,7 +36,7 @@ class BranchRange:
     at: Annotated[
         float | None,
         typer.Option(
-            metavar="P", help="Its value at the start; without, that of the system."
+            metavar="P", help="Its value at the start; default that of the system."
         ),
     ] = None
 
@@ -81,8 +81,8 @@ class Following:
         str | None,
         typer.Option(
             metavar="A,B",
-            help="A guess of the orbit's state at time zero, such as 0.3,0. Without: "
-            "the orbit that the motion settles on.",
+            help="A guess of the orbit's state at time zero, such as 0.3,0; default "
+            "the orbit on which the motion settles.",
         ),
     ] = None
     periods: Annotated[

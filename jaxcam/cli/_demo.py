@@ -15,7 +15,8 @@ def demo(
         typer.Option(metavar="DIR", help="A folder of recordings, one CSV a run."),
     ] = None,
     rig: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="The rig; DIR/rig.toml without.")
+        Path | None,
+        typer.Option(metavar="FILE", help="The rig file; default DIR/rig.toml."),
     ] = None,
     gaps: Annotated[
         str,
@@ -29,7 +30,7 @@ def demo(
     json_file: JsonFile = None,
     diagnose: Annotated[
         bool,
-        typer.Option(help="Say what the model lacks; takes a minute or two at first."),
+        typer.Option(help="Diagnose the model; takes a minute or two at first."),
     ] = True,
     branches: Annotated[
         bool, typer.Option(help="Follow two branches of orbits of the thesis' rig.")

@@ -17,20 +17,21 @@ def diagnose(
     rig: RigFile = None,
     system: OwnSystem = None,
     files: Files = Files(),
-    seed: Annotated[int, typer.Option(help="Of the redrawn stretches.")] = 0,
+    seed: Annotated[int, typer.Option(help="Block-bootstrap seed.")] = 0,
     predict: Annotated[
         bool,
         typer.Option(
-            help="Speeds at which the motion changes, with and without what was found."
+            help="Predict the speeds at which the motion changes, with and without the "
+            "effects."
         ),
     ] = True,
     propose: Annotated[
-        bool, typer.Option("--next", help="Which record to make next, by its speed.")
+        bool, typer.Option("--next", help="Recommend the next test speed.")
     ] = False,
     resume: Resume = False,
     json_file: Annotated[
         Path | None,
-        typer.Option("--json", metavar="FILE", help="The verdict; - prints it."),
+        typer.Option("--json", metavar="FILE", help="Write the verdict; - prints it."),
     ] = None,
     out: Annotated[
         Path | None,
@@ -95,13 +96,13 @@ def _kept_fits(out: Path | None, resume: bool) -> Path | None:
     keep = None if out is None else out / "fits"
     if resume and (keep is None or not keep.is_dir()):
         raise ValueError(
-            "--resume: there is nothing to go on with; give --out the folder of a run "
-            "that was stopped, or leave --resume out to begin anew."
+            "--resume: there is nothing to resume; give --out the folder of an "
+            "interrupted run, or leave --resume out to start anew."
         )
     if keep is not None and not resume and any(keep.glob("*.npz")):
         raise ValueError(
-            f"{keep} holds the fits of a run that was stopped; add --resume to go on "
-            f"with it, or give another folder to --out."
+            f"{keep} holds the fits of an interrupted run; add --resume to continue "
+            "it, or give another folder to --out."
         )
     return keep
 

@@ -27,7 +27,7 @@ class Sweep:
     ] = "speed"
     low: Lowest = None
     high: Highest = None
-    points: Annotated[int, typer.Option(metavar="N", help="How many values.")] = 200
+    points: Annotated[int, typer.Option(metavar="N", help="Number of values.")] = 200
     turns: Annotated[
         int, typer.Option(metavar="N", help="Forcing periods at each value.")
     ] = 300
@@ -38,16 +38,16 @@ class Sweep:
         str,
         typer.Option(
             metavar="NAME",
-            help="up, down or both ways with the state carried on, or each value from "
-            "the same start.",
+            help="up, down or both with the state carried from value to value, or each "
+            "value from the same start.",
         ),
     ] = "both"
     dwell: Annotated[
         str | None,
         typer.Option(
             metavar="A,B",
-            help="Seconds to wait and to store at each value, as a rig is driven, in "
-            "place of --turns and --keep.",
+            help="Seconds to wait and to record at each value, instead of --turns and "
+            "--keep.",
         ),
     ] = None
     section: Annotated[
@@ -92,23 +92,30 @@ class Starts:
 
     state: Annotated[
         str | None,
-        typer.Option(metavar="A,B", help="Start; without, in contact at rest."),
+        typer.Option(metavar="A,B", help="Initial state; default in contact at rest."),
     ] = None
     starts: Annotated[
         int | None,
         typer.Option(
-            metavar="N", help="Or N random starts of each value, between --low, --high."
+            metavar="N",
+            help="Or N random initial states per value, between --low and --high.",
         ),
     ] = None
     corner: Annotated[
         str | None,
-        typer.Option("--low", metavar="A,B", help="Lowest state of random starts."),
+        typer.Option(
+            "--low", metavar="A,B", help="Lower corner of the random initial states."
+        ),
     ] = None
     opposite: Annotated[
         str | None,
-        typer.Option("--high", metavar="A,B", help="Highest state of random starts."),
+        typer.Option(
+            "--high", metavar="A,B", help="Upper corner of the random initial states."
+        ),
     ] = None
-    seed: Annotated[int, typer.Option(metavar="N", help="Of random starts.")] = 0
+    seed: Annotated[
+        int, typer.Option(metavar="N", help="Seed of the random initial states.")
+    ] = 0
 
     def check(self, sweep: Sweep) -> None:
         """

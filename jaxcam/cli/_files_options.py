@@ -25,11 +25,15 @@ class Files:
     ] = None
     rate: Annotated[
         float | None,
-        typer.Option(metavar="HZ", help="Samples a second, of files without a time."),
+        typer.Option(
+            metavar="HZ", help="Sampling rate of files without a time column (Hz)."
+        ),
     ] = None
     split: Annotated[
         str | None,
-        typer.Option(metavar="COLUMN", help="It numbers the runs in one file."),
+        typer.Option(
+            metavar="COLUMN", help="Column that numbers the runs in one file."
+        ),
     ] = None
 
     def check(self) -> None:

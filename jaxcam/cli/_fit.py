@@ -19,7 +19,8 @@ def fit(
     bootstrap: Annotated[
         int,
         typer.Option(
-            metavar="N", help="Weight the flights at random N times for another error."
+            metavar="N",
+            help="Bootstrap the errors by N random weightings of the flights.",
         ),
     ] = 0,
     json_file: Annotated[
@@ -58,8 +59,8 @@ def fit(
     if rig is None and system is None and is_table(case, files):
         if out is not None or bootstrap:
             raise ValueError(
-                f"{case} is a table of impacts, of which there are no figures and no "
-                f"redrawn flights; leave out --out and --bootstrap."
+                f"{case} is a table of impacts, which has no figures and no "
+                "bootstrap; leave out --out and --bootstrap."
             )
         fit_impacts(case, files, json_file)
         return

@@ -89,7 +89,7 @@ def fitted(
         model, parameters = nominal.model, nominal.parameters
         if not parameters:
             raise ValueError(
-                "Nothing is to be fitted; give at least one entry of [parameters] in "
+                "There is nothing to fit; give at least one entry of [parameters] in "
                 "the rig file a `tolerance`."
             )
         segments = nominal.segments(runs)

@@ -18,7 +18,8 @@ _FILE, _CLASS = "cart", "Cart"
 
 def new_rig(
     name: Annotated[
-        Path, typer.Argument(metavar="NAME", help="Of the files NAME.py and NAME.toml.")
+        Path,
+        typer.Argument(metavar="NAME", help="Name of the files NAME.py and NAME.toml."),
     ],
 ) -> None:
     """

@@ -62,7 +62,7 @@ JsonFile: TypeAlias = Annotated[
     typer.Option("--json", metavar="FILE", help="Write the result; - to print it."),
 ]
 Resume: TypeAlias = Annotated[
-    bool, typer.Option("--resume", help="Go on with what a stopped run left in DIR.")
+    bool, typer.Option("--resume", help="Resume the interrupted run in DIR.")
 ]
 Case: TypeAlias = Annotated[
     Path,
@@ -73,14 +73,15 @@ Case: TypeAlias = Annotated[
     ),
 ]
 RigFile: TypeAlias = Annotated[
-    Path | None, typer.Option(metavar="FILE", help="The rig; CASE/rig.toml without.")
+    Path | None,
+    typer.Option(metavar="FILE", help="The rig file; default CASE/rig.toml."),
 ]
 OwnSystem: TypeAlias = Annotated[
     str | None,
     typer.Option(
         "--system",
         metavar="FILE.py:CLASS",
-        help="A system of your own; without, that of the rig file.",
+        help="A system of your own; default that of the rig file.",
     ),
 ]
 Gaps: TypeAlias = Annotated[

@@ -21,7 +21,7 @@ def reproduce(
         str | None,
         typer.Argument(
             metavar="[TARGET]",
-            help="Such as table-5.2 or figure-4.5; all of them without, or with all.",
+            help="Such as table-5.2 or figure-4.5; all, or no name, for all of them.",
         ),
     ] = None,
     preset: Annotated[
@@ -31,18 +31,18 @@ def reproduce(
         str,
         typer.Option(
             metavar="NAME",
-            help="full for diagrams and basins as fine as published ones; or default.",
+            help="full for diagrams and basins at published resolution, or default.",
         ),
     ] = _SIZES[0],
     list_: Annotated[
-        bool, typer.Option("--list", help="Say what there is, and compute nothing.")
+        bool, typer.Option("--list", help="List the targets, and compute nothing.")
     ] = False,
     json_file: JsonFile = None,
     out: Annotated[
         Path | None,
         typer.Option(
             metavar="DIR",
-            help="Write numbers and figures there; of all targets, a page as well.",
+            help="Write numbers and figures there; for all targets also a page.",
         ),
     ] = None,
     resume: Resume = False,

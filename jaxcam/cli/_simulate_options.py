@@ -17,8 +17,9 @@ class RunOptions:
         str | None,
         typer.Option(
             metavar="A,B",
-            help="Start, such as 0.3,0, or the word release for the release point of "
-            "a sticking orbit. Without: release; 1,0 for the ball; 0,0.1,-2 for the "
+            help="Initial state, such as 0.3,0, or the word release for the release "
+            "point of a sticking orbit. Default: release; 1,0 for the ball; "
+            "0,0.1,-2 for the "
             "triple integrator.",
         ),
     ] = None
@@ -32,7 +33,7 @@ class RunOptions:
         float | None,
         typer.Option(
             metavar="N",
-            help="Or its length in periods of the forcing (turns of the cam): 10.",
+            help="Or its length in forcing periods (turns of the cam); default 10.",
         ),
     ] = None
     tolerance: Annotated[
@@ -45,7 +46,7 @@ class RunOptions:
         str | None,
         typer.Option(
             metavar="NAME",
-            help="loop, or diffeqsolve: one call a flight, also for implicit solvers.",
+            help="loop, or diffeqsolve: one call per flight, also implicit solvers.",
         ),
     ] = None
 

@@ -20,7 +20,8 @@ class Source:
     rig: Annotated[
         Path | None,
         typer.Option(
-            metavar="FILE", help="Its nominal values: a rig file, as of jaxcam new-rig."
+            metavar="FILE",
+            help="Its nominal values: a rig file, as written by jaxcam new-rig.",
         ),
     ] = None
 

@@ -84,7 +84,7 @@ def event_causes(
         if len(term.strengths()) != 1:
             raise ValueError(
                 f"The term {term.name!r} has {len(term.strengths())} strengths; only "
-                f"terms of one strength can be told apart by so few numbers."
+                f"terms of one strength can be distinguished by so few numbers."
             )
     goal = _Goal(np.asarray(observed), np.asarray(errors), where, tolerance, policy)
     paths, here = [], None

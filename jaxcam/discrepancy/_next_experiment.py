@@ -158,7 +158,8 @@ def next_experiments(
     flying = [part for part in segment_case(made, rig) if part.flights]
     if not flying:
         raise RecordingError(
-            "The follower would rest on the cam at all of these speeds; give `speeds` "
+            "The follower would stay in contact with the cam at all of these speeds; "
+            "give `speeds` "
             "at which it flies."
         )
     return compare_experiments(found, flying, asked)

@@ -85,8 +85,8 @@ def read_setup(
     for name in measured:
         if name in fitted and name != _phase_of(drive):
             raise RigError(
-                f"{file}: `{name}` in [parameters] has a tolerance, but a channel says "
-                f"what it is; remove the tolerance."
+                f"{file}: `{name}` in [parameters] has a tolerance, but a channel "
+                "gives its value; remove the tolerance."
             )
     made = stated_system(
         file,
@@ -134,7 +134,7 @@ def _class(file: Path, tables, system) -> type[HybridSystem]:
     named = tables.get("system")
     if not isinstance(named, str) or not named.strip():
         raise RigError(
-            f"{file}: it does not say which system it is the rig of; begin it with "
+            f"{file}: it does not name a system; begin it with "
             f'system = "FILE.py:CLASS".'
         )
     return system_class(named, file.parent)

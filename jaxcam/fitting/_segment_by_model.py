@@ -158,6 +158,7 @@ def _refuse_unseen(model: Model, picks, recording, slopes) -> None:
             name = f"`{names[place]}`" if names else f"component {place} of the state"
             raise RecordingError(
                 f"{recording.name}: gap {number + 1} depends on {name}, which no "
-                f"channel sees; give a sensor whose `observe` is {place}, without a "
+                f"channel measures; give a sensor whose `observe` is {place}, without "
+                "a "
                 f"bandwidth."
             )

@@ -73,7 +73,8 @@ def sweep_diagram(
     if phase:
         if "phase" not in diagram.dataset:
             raise ValueError(
-                "samples a turn apart all have one phase; draw a diagram of impacts"
+                "samples one period apart all have the same phase; draw a diagram of "
+                "impacts"
             )
         y = diagram.dataset["phase"].values
         y_label = ("phase", "turns") if y_label is None else y_label

@@ -50,7 +50,7 @@ def cobweb(
             x = float(np.asarray(function(np.array([x])))[0])
     points = np.array([*points[skip:], x])
     if not np.all(np.isfinite(points)):
-        raise ValueError("the motion leaves every bound; give another start")
+        raise ValueError("the orbit diverges; give another start")
     low, high = points.min(), points.max()
     if edge is not None:
         low, high = min(low, edge), max(high, edge)

@@ -58,7 +58,7 @@ def free_columns(problem: Problem, free: Iterable[str] | None) -> Columns:
     for name in wanted:
         if problem.parameter(name).known is not None:
             raise ValueError(
-                f"The parameter {name!r} is known of each record; leave it out of the "
+                f"The parameter {name!r} is known for each record; leave it out of the "
                 f"`constants` of the recordings to fit it."
             )
     records = len(problem.segments)

@@ -28,7 +28,7 @@ def find_gaps(
     if gaps not in ("refuse", "split"):
         raise RecordingError(f'gaps is "refuse", "split" or "mend", not {gaps!r}.')
     if len(time) < 2:
-        raise RecordingError(f"{name}: one sample is no recording; remove this run.")
+        raise RecordingError(f"{name}: one sample is not a recording; remove this run.")
     steps = np.diff(time)
     back = np.flatnonzero(steps <= 0)
     if len(back):
@@ -41,7 +41,8 @@ def find_gaps(
     usual = float(np.median(steps))
     if usual < _SHORTEST:
         raise RecordingError(
-            f"{name}: samples are {usual:.3g} s apart, which no sensor can do; check "
+            f"{name}: samples are {usual:.3g} s apart, which is too fast for a "
+            "sensor; check "
             f"the unit of the time."
         )
     found = np.flatnonzero(steps > 1.5 * usual)

@@ -154,7 +154,7 @@ def read_case(
             files without a line of names; or a channel for each column whose name is
             another, `{"Angle": "angle_deg", "Y1": ("height_m", -8e-4)}`, the second
             with a factor. Rows in which one of those is empty are left out.
-        rate: Samples a second, of files without a time.
+        rate: Sampling rate of files without a time column (Hz).
 
     Returns:
         A case.
