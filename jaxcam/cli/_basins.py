@@ -34,7 +34,7 @@ def basins(
     resume: Resume = False,
 ) -> None:
     """
-    Find the attractors, and which initial states end on each.
+    Compute basins of attraction: the attractor of each initial state.
 
     \b
     Examples:

@@ -37,7 +37,7 @@ def demo(
     ] = True,
 ) -> None:
     """
-    Follow orbits of a rig; compare recordings with its simulation; say what it lacks.
+    Follow orbits of a rig, compare recordings with simulation, diagnose the model.
 
     Without --case, a small recording that ships with the package. The report is
     DIR/index.html, with the figures in it, and DIR/result.json; what the model lacks is

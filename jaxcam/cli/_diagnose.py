@@ -41,9 +41,9 @@ def diagnose(
     ] = None,
 ) -> None:
     """
-    Say what physics the model of a rig leaves out.
+    Diagnose the physics that the model of a rig leaves out.
 
-    Of a cam-follower, or of any system in a Python file; see jaxcam new-rig.
+    For a cam-follower, or any system in a Python file; see jaxcam new-rig.
 
     \b
     Examples:

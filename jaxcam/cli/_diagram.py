@@ -35,7 +35,7 @@ def diagram(
     resume: Resume = False,
 ) -> None:
     """
-    Draw where motions settle over a parameter; list what they are.
+    Draw a bifurcation diagram; list the motions found.
 
     \b
     Examples:

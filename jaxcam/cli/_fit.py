@@ -36,10 +36,10 @@ def fit(
     ] = None,
 ) -> None:
     """
-    Fit the parameters of a rig to recordings of it.
+    Fit the parameters of a rig to its recordings.
 
-    Of a cam-follower, or of any system in a Python file; see jaxcam new-rig. A file
-    with one impact a row, before_m_s and after_m_s, gives a law of restitution.
+    For a cam-follower, or any system in a Python file; see jaxcam new-rig. A file
+    with one impact per row, before_m_s and after_m_s, gives a law of restitution.
 
     \b
     Examples:

@@ -23,7 +23,7 @@ def new_rig(
     ],
 ) -> None:
     """
-    Write an example of a rig of your own: a system in Python, and what is known of it.
+    Write a template for a rig of your own: a system in Python and a rig file.
 
     \b
     Examples:

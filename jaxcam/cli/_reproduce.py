@@ -48,7 +48,7 @@ def reproduce(
     resume: Resume = False,
 ) -> None:
     """
-    Compute what the thesis prints; show both and the difference.
+    Reproduce tables and figures of the thesis; show printed and computed values.
 
     \b
     Examples:

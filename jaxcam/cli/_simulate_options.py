@@ -19,8 +19,7 @@ class RunOptions:
             metavar="A,B",
             help="Initial state, such as 0.3,0, or the word release for the release "
             "point of a sticking orbit. Default: release; 1,0 for the ball; "
-            "0,0.1,-2 for the "
-            "triple integrator.",
+            "0,0.1,-2 for the triple integrator.",
         ),
     ] = None
     t0: Annotated[float, typer.Option(metavar="S", help="Start of the motion (s).")] = (
