@@ -39,8 +39,8 @@ def demo(
     """
     Follow orbits of a rig, compare recordings with simulation, diagnose the model.
 
-    Without --case, a small recording that ships with the package. The report is
-    DIR/index.html, with the figures in it, and DIR/result.json; what the model lacks is
+    By default it uses the recordings that ship with the package. The report is
+    DIR/index.html, with the figures in it, and DIR/result.json; the diagnosis is
     in DIR/diagnosis.
 
     \b

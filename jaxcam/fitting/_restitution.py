@@ -135,7 +135,8 @@ def fit_restitution(
         >>> from jaxcam.models import ConstantRestitution
         >>> from jaxcam.recordings import read_case, read_rig, segment_case
         >>> parts = segment_case(read_case(DEMO_RIG), read_rig(DEMO_RIG / "rig.toml"))
-        >>> 0 < fit_restitution(parts, ConstantRestitution(0.5), ["r"]).values[0] < 1
+        >>> found = fit_restitution(parts, ConstantRestitution(0.5), ["r"])
+        >>> bool(0 < found.values[0] < 1)
         True
     """
     impacts = [part.impacts for part in segments]

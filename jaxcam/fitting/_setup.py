@@ -20,7 +20,7 @@ class Setup:
     Examples:
         >>> from jaxcam.data import DEMO_RIG
         >>> from jaxcam.fitting import read_setup
-        >>> setup = read_setup(DEMO_RIG.parent / "new_rig" / "rig.toml")
+        >>> setup = read_setup(DEMO_RIG.parent / "new_rig" / "cart.toml")
         >>> len(setup.parameters) > 0
         True
     """
