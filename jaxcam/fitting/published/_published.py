@@ -92,8 +92,7 @@ def fit_published(
 ) -> PublishedFit:
     """Fit parameters of a model to published numbers.
 
-    Levenberg and Marquardt's method (MINPACK) on forward-mode Jacobians. Far from the
-    data their errors are first taken larger, by factors of ten.
+    Levenberg-Marquardt (MINPACK); far from the data, errors are first taken larger.
 
     Args:
         model: A system, or a Module with one in it, at the nominal values.
@@ -111,12 +110,12 @@ def fit_published(
         ValueError: Lengths differ, or a number is invalid.
 
     Examples:
-        >>> from jaxcam.fitting import Published, fit_published
-        >>> from jaxcam.models import BouncingBall
+        >>> from jaxcam import fitting, models
+        >>> ball, free = models.BouncingBall(), lambda ball: (ball.gravity,)
         >>> fall = lambda ball: jnp.sqrt(2 / ball.gravity)[None]  # from 1 m (s)
-        >>> data = [Published("fall", fall, [0.45152], [1e-5])]
-        >>> free = dict(where=lambda ball: (ball.gravity,), names=["g"], tolerances=[1.0])
-        >>> round(float(fit_published(BouncingBall(), published=data, **free).estimates[0]), 2)
+        >>> data = [fitting.Published("fall", fall, [0.45152], [1e-5])]
+        >>> fit = fitting.fit_published(ball, free, data, names=["g"], tolerances=[1.0])
+        >>> round(float(fit.estimates[0]), 2)
         9.81
     """
     nominal, unravel = _picked(model, where)
