@@ -17,7 +17,7 @@ from ._rests import rest_table, Rests, rests, simulate_run
 
 @dataclasses.dataclass(frozen=True)
 class DemoResult:
-    """Recordings beside the simulation of their rig, and what that lacks."""
+    """Recordings compared with the simulation of their rig, and what that lacks."""
 
     case: str
     segments: Sequence[Segments]

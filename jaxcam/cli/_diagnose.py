@@ -91,7 +91,7 @@ def _kept_fits(out: Path | None, resume: bool) -> Path | None:
     """The folder of fits that a run which is stopped leaves.
 
     Raises:
-        ValueError: Where there is nothing to go on with, or something in the way.
+        ValueError: Where there is nothing to continue with, or something in the way.
     """
     keep = None if out is None else out / "fits"
     if resume and (keep is None or not keep.is_dir()):

@@ -77,7 +77,7 @@ class Result:
 def fitted(
     runs: Iterable[Recording], nominal: Rig | fitting.Setup, bootstrap: int, report
 ) -> Result:
-    """Cut the runs, fit, and say what the recordings can tell apart.
+    """Cut the runs, fit, and say what the recordings can distinguish.
 
     **Arguments:** `bootstrap`: how often flights are weighted at random; 0 is never.
 

@@ -1,4 +1,4 @@
-"""`jaxcam reproduce`: tables and figures of the thesis, printed beside computed."""
+"""`jaxcam reproduce`: tables and figures of the thesis, printed next to computed."""
 
 import time
 from pathlib import Path

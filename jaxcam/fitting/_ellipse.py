@@ -104,7 +104,7 @@ def ellipse_of(
 
 
 def most_correlated(labels: Sequence[str], correlation) -> str:
-    """The pair of parameters that are told apart worst, in a sentence."""
+    """The pair of parameters that are most correlated, in a sentence."""
     if len(labels) < 2:
         return "Fewer than two parameters were fitted, so none are correlated."
     size = np.abs(np.where(np.isfinite(correlation), correlation, 0.0))

@@ -1,4 +1,4 @@
-"""A recording and simulations of it, a few turns of the cam, and what is left over."""
+"""A recording and simulations of it, a few turns of the cam, and what remains."""
 
 from collections.abc import Mapping, Sequence
 from typing import TypeAlias

@@ -1,4 +1,4 @@
-"""Floquet multipliers in the complex plane, beside the unit circle."""
+"""Floquet multipliers in the complex plane, with the unit circle."""
 
 from collections.abc import Sequence
 

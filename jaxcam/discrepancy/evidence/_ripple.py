@@ -132,7 +132,7 @@ def _held_out(wave, variance) -> float:
 
 
 def _inclusion(wave, variance, asked: float, repetitions: int) -> float:
-    """Part of the redrawn sets of records in which the ripple is worth it."""
+    """Part of the bootstrap samples of records in which the ripple is worth it."""
     rng = np.random.default_rng(0)
     drawn = rng.integers(0, len(wave), (repetitions, len(wave)))
     weight = 1 / variance[drawn]

@@ -2,7 +2,7 @@
 
 A simulation from one initial state would soon be somewhere else: impacts magnify
 every error. Here each flight is started where the recording says it started, so that
-what is left over is what the model lacks in that mode: in flight, on the surface, or
+what remains is what the model lacks in that mode: in flight, on the surface, or
 in the impacts.
 """
 
