@@ -48,7 +48,7 @@ class ImpactTable:
     time: Float[np.ndarray, " k"] | None = None
     """Times (s), or `None`."""
     notes: tuple[str, ...] = ()
-    """What was left out of the file, in words."""
+    """Rows that were left out of the file, in words."""
 
     def __len__(self) -> int:
         return len(self.approach)

@@ -107,13 +107,13 @@ def record(
     """Simulate a system and record it through sensors.
 
     Args:
-        system: A driven one may be a `Wandering`.
+        system: The system; a driven one may be a `Wandering`.
         sensors: A `jaxcam.fitting.Sensor` for each channel.
         duration: Length of the record (s).
-        rng: The source of the noise.
-        state: To start from `(n,)`; `None` for the release point.
+        rng: Random number generator of the noise.
+        state: Initial state, `(n,)`; `None` for the release point.
         settle: Time to wait before (s).
-        interval: Between samples (s).
+        interval: Time between samples (s).
         drive: Noise and resolution (rad) of an encoder on the drive of a `Wandering`,
             recorded as `cam_angle_rad`.
         name: Name of the recording.

@@ -35,18 +35,17 @@ def compare(
         system: The model. A `CamFollower` is compared at the measured angle of its cam,
             whatever its own speed.
         segments: The recording, cut into its parts.
-        observe: What the channels are of the state: `{"height_m": 0}` is the first
+        observe: The channels as functions of the state: `{"height_m": 0}` is the first
             component; a function of the state gives anything else. By default the
             channel that was cut is the first component.
-        noise: Standard deviations of the channels, where they are known; otherwise they
-            are measured.
+        noise: Standard deviations of the channels; default measured.
         clock: Time of the model at each sample (s).
 
     Returns:
         A comparison.
 
     Raises:
-        RecordingError: Where a channel is missing.
+        RecordingError: A channel is missing.
 
     Examples:
         >>> from jaxcam.models import BouncingBall
@@ -89,8 +88,8 @@ def compare_case(rig: Rig, case: Sequence[Segments]) -> Comparison:
     """Compare all recordings of a cam-follower with its nominal model.
 
     Args:
-        rig: The model; another set of values by `rig.replace(...)`.
-        case: From `segment_case`.
+        rig: The model; change values by `rig.replace(...)`.
+        case: Segments from `segment_case`.
 
     Returns:
         A comparison.

@@ -31,7 +31,7 @@ class Residuals:
     stderr: Float[np.ndarray, " k"]
     """Standard errors from the noise alone."""
     piece: Int[np.ndarray, " k"]
-    """Which flight, contact or impact each one belongs to."""
+    """Index of the flight, contact or impact of each value."""
     fitted: int = 0
     """Number of parameters that were fitted to them."""
 

@@ -32,14 +32,14 @@ def segment_case(
         recordings: A `Case`, or any recordings of the same rig.
         rig: Its nominal geometry, tolerances and sensors.
         channel: The channel of the follower.
-        surface: The profile, where it is known; otherwise it is estimated from the
-            impacts and contacts of all recordings.
+        surface: The cam's surface, if known; default estimated from the impacts and
+            contacts of all recordings.
 
     Returns:
         The segments of each recording.
 
     Raises:
-        RecordingError: Where a channel is missing or the cam cannot be read.
+        RecordingError: A channel is missing, or the angle of the cam cannot be used.
 
     Examples:
         >>> from jaxcam.data import DEMO_RIG
@@ -82,26 +82,25 @@ def segment(
     Args:
         recording: The recording.
         channel: The channel of the motion.
-        contact: What the channel would be in contact at each sample, shape `(k,)` or
-            one number; the motion is above it. `None` without `upper`: the whole record
-            is one flight.
-        contact_rate: Its rate of change; by default from differences of `contact`.
+        contact: Value of the channel in contact at each sample, shape `(k,)` or one
+            number; the motion is above it. `None` without `upper`: the whole record is
+            one flight.
+        contact_rate: Its rate of change; default from differences of `contact`.
         upper: The same for a second surface that the motion is below, as the far one of
             two stops.
         upper_rate: Its rate of change.
-        tolerance: How far (in the units of the channel) each surface may be from where
-            it is stated, by default nothing. Within it, it is put where the impacts
-            are.
-        noise: Standard deviation of a sample; by default it is measured.
-        restitution: Expected, for the bounces that are too low to be seen.
+        tolerance: Largest error of the stated position of each surface, in the units of
+            the channel; within it, the surface is placed where the impacts are.
+        noise: Standard deviation of a sample; default measured from the record.
+        restitution: Expected coefficient, for impacts too low to be observed.
 
     Returns:
         The parts. Every impact in `impacts` has a positive speed of approach to the
             surface that it is on.
 
     Raises:
-        ValueError: Where the surfaces have not one number for each sample, or where the
-            upper one is not above the other.
+        ValueError: A surface has not one number per sample, or the upper one is not
+            above the other.
 
     Examples:
         >>> from jaxcam.models import BouncingBall

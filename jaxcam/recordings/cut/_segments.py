@@ -85,7 +85,7 @@ class Impacts:
     """The measured channel at the impact, and the error of its distance from the
     surface."""
     turned: Float[np.ndarray, " k"]
-    """What the cam has turned (rad), or not a number without a drive."""
+    """Angle that the cam has turned (rad), NaN without a drive."""
     before: Float[np.ndarray, " k"]
     """Rate of the channel on either side, and their errors."""
     before_stderr: Float[np.ndarray, " k"]
@@ -103,7 +103,7 @@ class Impacts:
     flight: Int[np.ndarray, " k"]
     """Index of the flight that ends here; the next one begins here."""
     side: Int[np.ndarray, " k"]
-    """Which surface was hit, 0 the one below the motion, 1 the one above."""
+    """Surface that was hit: 0 the one below the motion, 1 the one above."""
 
     @property
     def count(self) -> int:
@@ -160,9 +160,9 @@ class Segments:
     gap: Float[np.ndarray, " k"] | None = None
     """Its distance from the nearest surface, `(k,)`, or `None` in free flight."""
     drive: Drive | None = None
-    """What the gap was computed with, for a cam-follower."""
+    """Measured drive of a cam-follower, from which the gap was computed."""
     surface: Surface | None = None
-    """What the gap was computed with, for a cam-follower."""
+    """Surface of a cam-follower's cam, from which the gap was computed."""
     sure: Bool[np.ndarray, " k"] | None = None
     """Samples at which contact is no hidden hop, shape `(k,)`; `None`: all."""
 

@@ -32,13 +32,13 @@ class Surface(eqx.Module):
     profile: EccentricCircle
     """The eccentric circle that fits best."""
     phase: Float[Array, ""]
-    """How far ahead of its measured angle the cam seems to be (rad)."""
+    """Phase of the cam ahead of its measured angle (rad)."""
     cosines: Float[Array, " harmonics"]
     """Amplitudes of harmonics 2 and 3 on top of it (rad)."""
     sines: Float[Array, " harmonics"]
     """Amplitudes of harmonics 2 and 3 on top of it (rad)."""
     covariance: Float[Array, " p p"]
-    """Of radius, eccentricity, centre, phase and amplitudes together."""
+    """Covariance of radius, eccentricity, centre, phase and amplitudes."""
     sense: float = eqx.field(static=True)
     """-1 for a clockwise cam; the angle given is counted as it turns."""
 

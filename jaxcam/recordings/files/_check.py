@@ -65,7 +65,7 @@ def check_channels(recording: Recording) -> None:
         recording: The recording.
 
     Raises:
-        RecordingError: For a dead channel or a lever angle in degrees.
+        RecordingError: A channel is constant, or a lever angle is in degrees.
     """
     for name, samples in recording.channels.items():
         # A force or a reference may well be constant; the motion itself may not.
@@ -91,7 +91,8 @@ def check_drive(recording: Recording) -> None:
         recording: The recording.
 
     Raises:
-        RecordingError: That names the unit the numbers look like.
+        RecordingError: The speed is another one; the message names the unit that the
+            numbers suggest.
     """
     angle = recording.channels.get("cam_angle_rad")
     nominal = recording.nominal_speed

@@ -42,9 +42,9 @@ def read_recordings(
     is one with its unit in brackets (`Time (ms)` -> `time_s`). One column is the time.
 
     Args:
-        file: The file. `..._150.7rpm.csv` in its name is the nominal speed.
-        channels: Columns that must be there (SI names).
-        split: A column that numbers the runs in a file that holds several.
+        file: The file; `..._150.7rpm.csv` in its name is the nominal speed.
+        channels: Required columns (SI names).
+        split: Column that numbers the runs in a file that holds several.
         gaps: `"refuse"` a record with samples missing, `"split"` it in pieces, or
             `"mend"` it: bridge short gaps, split at long ones and undo slips of an
             encoder (see `mend`); what was done is in `meta["notes"]`.
@@ -53,13 +53,14 @@ def read_recordings(
             another, `{"Angle": "angle_deg", "Y1": ("height_m", -8e-4)}`, the second
             with a factor. Only columns that are named or needed are read then, and rows
             in which one of them is empty are left out.
-        rate: Samples a second, of a file without a time.
+        rate: Sampling rate of a file without a time column (Hz).
 
     Returns:
         A tuple of `Recording`, one for each run and piece.
 
     Raises:
-        RecordingError: One sentence that says what to do.
+        RecordingError: The file cannot be used; the message is one sentence that says
+            what to do.
     """
     file = Path(file)
     chosen = read_columns(
@@ -145,11 +146,10 @@ def read_case(
 
     Args:
         folder: The folder.
-        channels: Columns that must be there (SI names); `()` for something other than a
-            cam-follower rig.
-        split: A column that numbers the runs in a file that holds several.
-        gaps: `"refuse"` a record with samples missing, `"split"` it in pieces, or
-            `"mend"` it (see `mend`).
+        channels: Required columns (SI names); `()` for anything but a cam-follower rig.
+        split: Column that numbers the runs in a file that holds several.
+        gaps: Treatment of a record with missing samples: `"refuse"` it, `"split"` it in
+            pieces, or `"mend"` it (see `mend`).
         columns: Names of the columns in their order, `"-"` for one that is not read, of
             files without a line of names; or a channel for each column whose name is
             another, `{"Angle": "angle_deg", "Y1": ("height_m", -8e-4)}`, the second

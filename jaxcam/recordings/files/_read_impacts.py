@@ -29,7 +29,7 @@ def is_impact_table(file: str | Path, columns: Columns | None = None) -> bool:
 
 
 def read_impacts(file: str | Path, *, columns: Columns | None = None) -> ImpactTable:
-    r"""Impacts from a file with one impact a row.
+    r"""Read impacts from a file with one impact per row.
 
     Columns, each with its unit at the end (`_m_s`, `_mm_s`, `_rad_s`, ...): `before`
     and `after`, the speeds of one body along the normal of something fixed; or
