@@ -61,15 +61,15 @@ def fit(
 
     Args:
         problem: The problem.
-        free: Names of the parameters to fit; by default all of them. The others stay at
-            the values of `start`.
-        start: Another fit, or values of some parameters; by default the nominal ones.
+        free: Names of the parameters to fit; default all. The others stay at the values
+            of `start`.
+        start: Another fit, or values of some parameters; default the nominal ones.
         weights: Weight of each piece of the data.
-        prior: Whether the tolerances count as knowledge; bounds always hold.
+        prior: Whether the tolerances count as prior knowledge; bounds always hold.
         iterations: Largest number of iterations.
-        stop: Called after each iteration with the cost at the start and after every one
-            so far; where it says so, the fit ends, not converged. Long flights are
-            first fitted with loose joints, to the end; the costs are those that follow.
+        stop: Called after each iteration with the costs so far, from the start on; if
+            it returns True, the fit ends, not converged. Long flights are first fitted
+            with loose joints, to the end; the costs are those that follow.
         progress: Called with the number of the iteration and the cost.
 
     Returns:
@@ -78,7 +78,7 @@ def fit(
             why not.
 
     Raises:
-        ValueError: For a name that is not a parameter.
+        ValueError: A name is not a parameter.
 
     Examples:
         >>> from jaxcam import fitting, recordings

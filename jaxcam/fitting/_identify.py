@@ -35,20 +35,19 @@ class Identifiability:
     """
 
     names: tuple[str, ...]
-    """Parameters, as in the columns of `directions` `(g, g)`: one combination a row,
-    each parameter in units of its scale (its tolerance)."""
+    """Names of the parameters."""
     directions: Float[np.ndarray, "g g"]
     """Combinations, one per row, each parameter in units of its scale, shape `(g, g)`.
     """
     stderr: Float[np.ndarray, " g"]
     """Error of each combination from the data alone, in the same units."""
     values: Float[np.ndarray, " g"]
-    """Of each parameter, where it was looked and what its unit is."""
+    """Value of each parameter at which it was evaluated."""
     scales: Float[np.ndarray, " g"]
-    """Of each parameter, where it was looked and what its unit is."""
+    """Scale of each parameter."""
     alone: Float[np.ndarray, " g"]
-    """Error of each parameter from the data alone if all others were known, and
-    `together` if none is, in units of the scale."""
+    """Error of each parameter from the data alone if all others are known, in units of
+    the scale."""
     together: Float[np.ndarray, " g"]
     """Error of each parameter from the data alone if no other is known, in units of the
     scale."""

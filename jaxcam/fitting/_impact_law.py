@@ -50,19 +50,19 @@ class ImpactLaw:
     best: str
     """Name of the law that the impacts support."""
     delta_bic: dict[str, float]
-    """Of each law, less that of the constant one; below zero is better. The power law
-    that the impacts turn away from is the constant with one number more."""
+    """BIC of each law less that of the constant one; below zero is better. A power law
+    that the impacts do not support is the constant with one number more."""
     p_value: float
-    """Chance of what the power law gains where restitution is constant."""
+    """Probability of the power law's gain where restitution is constant."""
     scatter: float
     """Standard deviation of an impact, in `scatter_unit`."""
     scatter_unit: str
     """Unit of the scatter: that of the speed, `"1"` for the restitution, or `"stated"`
     for its standard errors."""
     set_aside: tuple[int, ...]
-    """Rows (from 1) that are too far off to belong to the others."""
+    """Rows (from 1) that are outliers."""
     momentum: MomentumBalance | None
-    """Of two bodies, how well their momentum is kept; or `None`."""
+    """Momentum balance of two bodies, or `None`."""
 
     @property
     def law(self) -> RestitutionFit:

@@ -18,11 +18,10 @@ class MomentumBalance:
     """Momentum of two bodies in their impacts."""
 
     change: float
-    """Of the momentum of both, as a share of what they exchange; not a number where the
+    """Change of the total momentum, relative to the momentum exchanged; NaN where the
     masses are unknown."""
     stderr: float
-    """Of the momentum of both, as a share of what they exchange; not a number where the
-    masses are unknown."""
+    """Standard error of `change`."""
     ratio: float
     """Mass of the second body over that of the first, such that momentum is kept."""
     ratio_stderr: float

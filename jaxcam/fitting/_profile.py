@@ -66,10 +66,10 @@ def profile(
     Args:
         found: The fit, in which `name` was free.
         name: Name of the parameter.
-        reach: How far to go, in standard errors on both sides.
+        reach: Range, in standard errors on both sides.
         points: Number of values, the optimum included.
-        values: Where to hold it instead, in any order; a value is inside the 95 %
-            interval if its cost is below 3.84.
+        values: Values at which to hold it instead, in any order; a value is inside the
+            95 % interval if its cost is below 3.84.
         weights: As for `found`.
         prior: As for `found`.
 

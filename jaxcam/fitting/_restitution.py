@@ -76,7 +76,7 @@ def restitution_laws(segments: Sequence[Segments]) -> dict[str, RestitutionFit]:
             whose parameters the impacts do not determine.
 
     Raises:
-        RecordingError: Where there are too few impacts.
+        RecordingError: There are too few impacts.
 
     Examples:
         >>> from jaxcam.data import DEMO_RIG
@@ -119,15 +119,15 @@ def fit_restitution(
     (optimistix); an outlier counts by its size.
 
     Args:
-        segments: From `segment_case` or `segment`.
-        law: Called as `law(speed, approach_speed)`; where to start.
-        names: Its fields to fit; the others stay.
+        segments: Segments from `segment_case` or `segment`.
+        law: Initial law, called as `law(speed, approach_speed)`.
+        names: Fields of the law to fit; the others stay.
 
     Returns:
         A [`jaxcam.fitting.RestitutionFit`][].
 
     Raises:
-        RecordingError: Where there are fewer impacts than parameters.
+        RecordingError: There are fewer impacts than parameters.
 
     Examples:
         >>> from jaxcam.data import DEMO_RIG

@@ -28,18 +28,18 @@ class Setup:
     model: Model
     """The system at its nominal values, with its sensors and its drive."""
     parameters: tuple[Parameter, ...] = ()
-    """What is fitted, each within its tolerance."""
+    """Parameters to fit, each within its tolerance."""
     drive_channel: str | None = None
-    """Of the encoder of a turning drive (rad), or `None`."""
+    """Channel of the encoder of a turning drive (rad), or `None`."""
     references: Mapping[str, float] = dataclasses.field(default_factory=dict)
     """Constants of the forms of missing physics that are stated, by the names of fields
     of `jaxcam.recordings.References`, in the units of the motion; the others follow its
     speeds."""
     records: Mapping[str, Mapping[str, float]] = dataclasses.field(default_factory=dict)
-    """What is known of some records alone, by patterns of their names:
-    `{"run3*": {"mass": 0.31}}`; of several that fit, the last one counts."""
+    """Known constants of single records, by patterns of their names:
+    `{"run3*": {"mass": 0.31}}`; of several that match, the last one counts."""
     files: FileLayout = FileLayout()
-    """How the columns of recordings are called, and their rate."""
+    """Names of the columns of recordings, and their sampling rate."""
 
     @property
     def channels(self) -> tuple[str, ...]:

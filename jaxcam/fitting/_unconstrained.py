@@ -21,9 +21,9 @@ class Unconstrained:
     """A combination of parameters that can change without changing the data."""
 
     names: tuple[str, ...]
-    """Of parameters, `name@record` where each record has its own."""
+    """Names of the parameters, `name@record` where each record has its own."""
     shares: Float[np.ndarray, " k"]
-    """How far each moves, in its own unit, the largest of them by its scale."""
+    """Change of each parameter, in its own unit, the largest of them by its scale."""
 
     def sentence(self) -> str:
         """Return the combination, and the remedy, in words."""

@@ -50,7 +50,7 @@ def free_columns(problem: Problem, free: Iterable[str] | None) -> Columns:
         The [`jaxcam.fitting.engine.Columns`][].
 
     Raises:
-        ValueError: For an unknown name, or one whose values are known.
+        ValueError: A name is unknown, or its values are known constants.
     """
     if free is None:
         free = [one.name for one in problem.parameters if one.known is None]

@@ -44,13 +44,13 @@ class LinearPieces(NamedTuple):
     """
 
     information: Float[Array, "k a a"]
-    """Of the samples of each piece in flight."""
+    """Information of the samples of each piece in flight, shape `(k, a, a)`."""
     slope: Float[Array, "k a"]
-    """Of the samples of each piece in flight."""
+    """Slope of the cost of these samples, shape `(k, a)`."""
     pp: Float[Array, "m m"]
-    """Of all samples in contact, by what else varies."""
+    """Information of all samples in contact, by the parameters, shape `(m, m)`."""
     p: Float[Array, " m"]
-    """Of all samples in contact, by what else varies."""
+    """Slope of the cost of these samples, shape `(m,)`."""
     later: Float[Array, "k e n"]
     """Rows of each joint for the state after it, for the columns of the piece before
     it, and for what else varies, in units of the joint's error. `tied`: how far the

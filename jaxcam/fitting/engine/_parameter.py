@@ -21,15 +21,15 @@ class Parameter:
     """
 
     name: str
-    """For tables, and to free it."""
+    """Name of the parameter, for tables and to free it."""
     where: Callable[[Model], Array]
     """Picks it out of a `Model`: `lambda m: m.system.stiffness`."""
     tolerance: float = math.inf
-    """How far it may be from `nominal`, as a maker states it: plus or minus so much,
-    anything in between equally likely. The fit uses a Gaussian of the same standard
-    deviation, `tolerance / sqrt(3)`. Infinite: nothing is known."""
+    """Largest deviation from `nominal`, as a maker states it: any value within it is
+    equally likely. The fit uses a Gaussian of the same standard deviation,
+    `tolerance / sqrt(3)`. Infinite without prior knowledge."""
     nominal: float | None = None
-    """By default, the value that the model has."""
+    """Nominal value; default the model's own."""
     scale: float | None = None
     """Size of a change that matters; by default the tolerance, or else a hundredth of
     the value. It does not influence the result."""

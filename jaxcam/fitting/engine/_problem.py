@@ -102,19 +102,19 @@ class Problem:
     """
 
     model: Model
-    """At its nominal parameters."""
+    """The model at its nominal parameters."""
     parameters: tuple[Parameter, ...]
-    """What may be fitted."""
+    """Parameters that may be fitted."""
     segments: tuple[Segments, ...]
     """The recordings, cut into their parts."""
     pieces: Pieces
-    """What the recordings were cut into."""
+    """Pieces of the recordings, as arrays."""
     spans: tuple[tuple[list[Span], list[Span]], ...]
-    """What the recordings were cut into."""
+    """Spans of the flights and contacts of each recording."""
     layout: Layout
     """The location of the parameters in the model."""
     start: Point
-    """The nominal parameters and the states that the data suggest."""
+    """Nominal parameters, and the states that the data suggest."""
     extras: Extras
     """Further arguments of the compiled programs."""
 

@@ -43,7 +43,7 @@ class Published(eqx.Module):
     """
 
     name: str = eqx.field(static=True)
-    """What they are, for the report."""
+    """Name of the numbers, for the report."""
     compute: Callable[[Any], Float[Array, " k"]]
     """Takes the model and returns `(k,)`; differentiable, as
     [`variational.impact_orbit`][] and [`variational.fold_of_orbit`][] are."""
