@@ -33,19 +33,17 @@ def diagnose(
 
     Args:
         system: A `Rig` from `jaxcam.recordings.read_rig` or a `Setup` from
-            `jaxcam.fitting.read_setup`, which know their sensors and tolerances; or any
-            system with one coordinate, with what follows.
-        recordings: At least two of a rig; of a bare system, what
-            `jaxcam.recordings.segment` makes of them.
+            `jaxcam.fitting.read_setup`, which state sensors and tolerances; or any
+            system with one coordinate, together with `sensors`, `parameters` and
+            `drive`.
+        recordings: At least two recordings of a rig; for a bare system, segments from
+            `jaxcam.recordings.segment`.
         candidates: Terms that may be named; default `library()`, with the constants of
             the rig. Those that are not `listed` only help to describe an unknown
             effect.
-        sensors: As for `jaxcam.fitting.Model` and `Problem`, of a bare system; the
-            drive is an input that was measured.
-        parameters: As for `jaxcam.fitting.Model` and `Problem`, of a bare system; the
-            drive is an input that was measured.
-        drive: As for `jaxcam.fitting.Model` and `Problem`, of a bare system; the drive
-            is an input that was measured.
+        sensors: For a bare system, as for `jaxcam.fitting.Model`.
+        parameters: For a bare system, as for `jaxcam.fitting.Problem`.
+        drive: For a bare system, its measured drive or input.
         case: Name of the case.
         seed: Seed of the block bootstrap.
         progress: Called with a sentence and a fraction, or `None`.

@@ -27,18 +27,18 @@ class EventCause:
     """One explanation of the observed event speeds."""
 
     name: str
-    """Of the term, or `"none"`; `strength` with its `unit`."""
+    """Name of the term, or `"none"`."""
     strength: float
     """Strength of the term."""
     unit: str
     """Unit of the strength."""
     beside: float
-    """The parameter of the rig that was fitted with it."""
+    """Value of the rig's parameter that was fitted together with it."""
     speeds: Float[np.ndarray, "4"]
     """Shape `(4,)`, rad/s, valve float, fold and flip of P(1,1), interruption of
     chattering; NaN where there is none."""
     misfit: float
-    """Sum of the squares of what is left of them, and of the pull on the parameter, in
+    """Sum of the squares of the speeds' residuals, and of the pull on the parameter, in
     the errors of each."""
 
 
@@ -63,11 +63,11 @@ def event_causes(
         observed: Valve float, fold and flip of P(1,1) and interruption of chattering
             (rad/s), NaN where one was not observed.
         errors: Standard error of each.
-        terms: Candidates, of one strength each.
+        terms: Candidate terms, each of one strength.
         where: Picks a parameter of the rig that is fitted together with each term, such
             as `lambda rig: rig.restitution.intercept`.
         tolerance: Tolerance of this parameter.
-        policy: How far strengths are searched.
+        policy: Settings that limit the search of strengths.
 
     Returns:
         Explanations, best first; one of them is no term at all.

@@ -26,13 +26,13 @@ class Experiment:
     """
 
     name: str
-    """Of the record."""
+    """Name of the record."""
     now: Mapping[str, float]
-    """Standard errors of the parameters asked for, without and with it."""
+    """Standard errors of the parameters in question without the record."""
     then: Mapping[str, float]
-    """Standard errors of the parameters asked for, without and with it."""
+    """Standard errors of these parameters with the record."""
     speed: float | None = None
-    """Of the cam (rad/s), where there is one."""
+    """Speed of the cam (rad/s), where there is one."""
 
     @property
     def factor(self) -> float:
@@ -51,7 +51,7 @@ def compare_experiments(
 
     Args:
         found: The diagnosis of the records so far.
-        records: Simulated with the system that was found (`found.system()`) by
+        records: Records simulated with the diagnosed system (`found.system()`) by
             [`jaxcam.recordings.record`][], and cut.
         asked: Names of parameters; default the strengths of the named terms. Terms
             whose BIC is not much worse stay free, so that the best record also
@@ -102,9 +102,9 @@ def next_experiments(
     Args:
         found: The diagnosis of the records so far.
         rig: The rig.
-        speeds: Of the cam (rad/s) that can be had; by default some between those of the
-            records and a little beyond.
-        duration: Of a record (s); by default as before.
+        speeds: Available speeds of the cam (rad/s); default some between those of the
+            records and slightly beyond.
+        duration: Length of a record (s); default as before.
         asked: As in [`jaxcam.discrepancy.compare_experiments`][].
         seed: Seed of the simulated records.
         progress: Called with a sentence and a fraction, or `None`.

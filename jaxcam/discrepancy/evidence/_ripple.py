@@ -35,9 +35,9 @@ class Ripple:
     psi_stderr: float
     """Standard error of `psi`."""
     gain: float
-    """Growth of twice the log-likelihood, over what leakage explains."""
+    """Gain of twice the log-likelihood, beyond the leakage of slow wander."""
     p_value: float
-    """Of no ripple. `count`: samples. `per_record`: eps of each record."""
+    """Probability of such a gain without ripple."""
     count: int
     """Number of samples."""
     dispersion: float

@@ -283,13 +283,12 @@ def library(
     """Return all terms that `diagnose` tries by default.
 
     Args:
-        turned: Whether the system has a drive, without which no cam can be out of
-            round.
+        turned: Whether the system has a drive; without one there are no profile errors.
         references: Constants of the forms, which belong to a rig (`rig.references`):
-            where a nonlinear spring is symmetric, at which speed a restitution is
+            the centre of a nonlinear spring, the speed at which a restitution is
             stated.
-        clocked: Whether anything happens at a known time, such as by a drive (the
-            default) or a measured input. Otherwise a lag is another beginning of time.
+        clocked: Whether any event has a known time, as with a drive (the default) or a
+            measured input. Otherwise a lag is only a shift of the time origin.
 
     Returns:
         A tuple of [`jaxcam.discrepancy.Term`][].

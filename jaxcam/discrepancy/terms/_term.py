@@ -66,13 +66,13 @@ def strength(
     """Declare a field of a term that is fitted.
 
     Args:
-        unit: For tables; `[q]` in it stands for the unit of the coordinate.
+        unit: Unit for tables; `[q]` in it stands for the unit of the coordinate.
         size: A change that matters; it does not influence the result.
         lower: Lower bound, as for signs that physics demands.
         upper: Upper bound.
         default: Value of a new term.
-        inner: A frequency (Hz), without effect while the strengths are zero; it is
-            fitted from the value that a scan of the frequencies finds.
+        inner: Whether it is a frequency (Hz), without effect while the strengths are
+            zero; it is fitted from the value found by a scan of the frequencies.
 
     Returns:
         A field.

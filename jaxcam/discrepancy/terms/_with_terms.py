@@ -20,7 +20,7 @@ class WithTerms(HybridSystem):
     base: HybridSystem
     """The system."""
     terms: tuple[Term, ...] = ()
-    """What is added, each a `Term`. Without effect while strengths are zero."""
+    """Terms added to it; without effect while strengths are zero."""
     coordinates: tuple[tuple[int, int], ...] = eqx.field(
         default=((0, 1),), static=True, metadata={"spare": True}
     )
