@@ -27,7 +27,7 @@ class Curve(NamedTuple):
     gap: Float[np.ndarray, "k constraints"]
     """Gaps, shape `(k, constraints)`."""
     contact: Bool[np.ndarray, " k"]
-    """(k,) whether the row belongs to a contact."""
+    """Whether the row belongs to a contact, shape `(k,)`."""
     impact_time: Float[np.ndarray, " impacts"]
     """Times of impacts (s), shape `(impacts,)`."""
     before: Float[np.ndarray, "impacts n"]
@@ -35,7 +35,7 @@ class Curve(NamedTuple):
     after: Float[np.ndarray, "impacts n"]
     """States after the impacts, shape `(impacts, n)`."""
     contacts: Float[np.ndarray, "contacts 2"]
-    """(contacts, 2) start and end (s)."""
+    """Start and end of each contact (s), shape `(contacts, 2)`."""
 
 
 class Hits(NamedTuple):
