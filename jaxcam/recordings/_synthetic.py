@@ -27,8 +27,8 @@ class Wandering(HybridSystem):
     Examples:
         >>> from jaxcam.models import preset
         >>> from jaxcam.recordings import Wandering
-        >>> float(Wandering(preset("calibrated")).angle(0.0)) == 0.0
-        True
+        >>> Wandering(preset("calibrated")).state_names
+        ('follower angle', 'follower velocity')
     """
 
     base: HybridSystem
