@@ -66,7 +66,7 @@ def citation(*names: str) -> str:
         asked = name.strip().lower()
         if asked not in _TOPICS and asked not in entries:
             raise ValueError(
-                f"{name!r} is no topic of the bibliography; ask for one of "
+                f"{name!r} is not a topic of the bibliography; choose one of "
                 f"{', '.join(_TOPICS)}."
             )
         keys |= dict.fromkeys(_TOPICS.get(asked, (asked,)))

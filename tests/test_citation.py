@@ -63,5 +63,5 @@ def test_an_entry_comes_once_in_any_writing():
 
 
 def test_an_unknown_name_is_refused_with_the_known_ones():
-    with pytest.raises(ValueError, match="'magic' is no topic.*chatter.*saltation"):
+    with pytest.raises(ValueError, match="'magic' is not a topic.*chatter.*saltation"):
         jaxcam.citation("chatter", "magic")

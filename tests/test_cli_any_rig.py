@@ -178,7 +178,7 @@ def test_a_driven_system_is_simulated_by_turns(rig):
         ("basins --rig cart.toml --turns 30", "needs the corners of the grid"),
         (
             "basins --rig cart.toml --low=-0.04,0 --high 0,1 --cluster local",
-            "other processes do not know Cart",
+            "worker processes cannot load Cart",
         ),
         ("fit case --rig cart.toml", "case: there is no such folder"),
         ("fit . --rig cart.toml", "there is no recording"),
@@ -188,7 +188,7 @@ def test_a_driven_system_is_simulated_by_turns(rig):
         ("diagnose runs --rig cart.toml", "the column `position_m` is missing"),
         ("diagnose one --rig cart.toml --next", "--next proposes speeds of a drive"),
         ("diagnose one --rig cart.toml", "There is 1 recording; give at least two"),
-        ("fit one --rig known.toml", "Nothing is to be fitted"),
+        ("fit one --rig known.toml", "There is nothing to fit"),
         ("demo --case one --rig cart.toml", "is that of a cam-follower"),
     ],
 )
@@ -228,7 +228,7 @@ def test_from_recordings_to_a_fitted_system(rig):
     assert again["parameters"]["stiffness"] == pytest.approx(41.5, rel=1e-3)
     assert again["system"] == "Cart"
     shutil.move(rig / "cart.py", rig / "moved.py")
-    assert "which is not there; put it back" in refusal(*line)
+    assert "which does not exist; restore it" in refusal(*line)
 
 
 def test_a_system_that_cannot_be_saved_is_fitted_all_the_same(rig):

@@ -122,7 +122,7 @@ def test_saved_systems_are_checked(tmp_path):
 
     inner = good["system"]
     cases = [
-        (changed(format="other"), "no saved system"),
+        (changed(format="other"), "not a saved system"),
         (changed(version=99), "version 99"),
         (changed(system={**inner, "class": "Popen"}), "'Popen', which is not known"),
         (changed(system={**inner, "fields": {"gravity": 1.0}}), "lacks"),

@@ -109,7 +109,7 @@ def test_a_fit_knows_what_each_record_was(tmp_path):
     for name, (mass, speed) in KNOWN.items():
         system = found.model(name).system
         assert (float(system.mass), float(system.speed)) == (mass, speed)
-    with pytest.raises(ValueError, match="known of each record"):
+    with pytest.raises(ValueError, match="known for each record"):
         fit(problem, free=["mass"])
     with pytest.raises(ValueError, match="share every number"):
         train(problem, lambda model: model.system.stiffness)

@@ -92,7 +92,8 @@ def covariant_vectors(
     """
     if system.period is None:
         raise ValueError(
-            "this system has no forcing period; covariant vectors are taken once a turn"
+            "this system has no forcing period; covariant vectors are computed once "
+            "per period"
         )
     if turns < 1 or transient < 1:
         raise ValueError(

@@ -56,7 +56,7 @@ def saltation_matrix(
     parts = saltation_parts(system, t, state_before, constraint)
     if not isinstance(parts.speed, Tracer) and not float(parts.speed) < 0:
         raise ValueError(
-            f"the normal velocity is {float(parts.speed):g}, which is no impact; "
+            f"the normal velocity is {float(parts.speed):g}, so there is no impact; "
             "give the state just before it, and for a graze use "
             "saltation_parts: the matrix is regular + singular / speed"
         )

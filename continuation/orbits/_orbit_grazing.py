@@ -37,7 +37,7 @@ def orbit_grazing(problem: Any, point: Any) -> Start | None:
 
     `problem` is one of `ImpactingOrbits`, and so is that of the start.
 
-    The branch goes on with the new sequence of impacts in the direction in which the
+    The branch continues with the new sequence of impacts in the direction in which the
     gap that was zero opens, or the new impact gains speed.
     """
     u = jnp.asarray(point.state)
@@ -78,7 +78,7 @@ def _direction(
 ) -> np.ndarray | None:
     """The direction of the branch in which a monitor grows.
 
-    By the program that the branch goes on with; only the sign of the slope is wanted,
+    By the program that the branch continues with; only the sign of the slope is wanted,
     for which differences do.
     """
     z = np.append(u, point.parameter)

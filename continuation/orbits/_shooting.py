@@ -59,8 +59,8 @@ class ImpactingOrbits(AbstractProblem):
     def __check_init__(self):
         if self.periods == 0 and not self.constraints:
             raise ValueError(
-                "an orbit without forcing and without impacts has no section to be "
-                "found on; follow it as a smooth boundary value problem"
+                "an orbit without forcing and without impacts has no Poincare "
+                "section; follow it as a smooth boundary value problem"
             )
 
     @staticmethod

@@ -121,8 +121,8 @@ def _refuse_interrupted(path: Path) -> None:
             continue
         if points and points[-1].kind != "end":
             raise ValueError(
-                f"{file} holds a branch that was interrupted; add --resume to go on "
-                f"with it, or give another folder to --out."
+                f"{file} holds an interrupted branch; add --resume to continue it, or "
+                "give another folder to --out."
             )
 
 

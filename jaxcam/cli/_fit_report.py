@@ -39,7 +39,7 @@ def parameter_table(problem: Problem, found: Fit, again: Bootstrap | None) -> Ta
 
 
 def correlation_table(found: Fit) -> Table:
-    """The strongest correlations, which say what cannot be told apart."""
+    """The strongest correlations, which say what cannot be distinguished."""
     table = Table(title="Strongest correlations")
     for heading in ("one", "other"):
         table.add_column(heading, no_wrap=True)

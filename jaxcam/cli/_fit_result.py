@@ -77,7 +77,7 @@ class Result:
 def fitted(
     runs: Iterable[Recording], nominal: Rig | fitting.Setup, bootstrap: int, report
 ) -> Result:
-    """Cut the runs, fit, and say what the recordings can tell apart.
+    """Cut the runs, fit, and say what the recordings can distinguish.
 
     **Arguments:** `bootstrap`: how often flights are weighted at random; 0 is never.
 
@@ -89,7 +89,7 @@ def fitted(
         model, parameters = nominal.model, nominal.parameters
         if not parameters:
             raise ValueError(
-                "Nothing is to be fitted; give at least one entry of [parameters] in "
+                "There is nothing to fit; give at least one entry of [parameters] in "
                 "the rig file a `tolerance`."
             )
         segments = nominal.segments(runs)

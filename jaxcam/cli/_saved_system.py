@@ -46,8 +46,8 @@ def load_saved(file: Path) -> HybridSystem:
         python = Path(split_name(source)[0])
         if not python.is_file():
             raise ValueError(
-                f"{file}: its system is in {python}, which is not there; put it back, "
-                f"or correct `{_SOURCE}`."
+                f"{file}: its system is in {python}, which does not exist; restore "
+                f"it, or correct `{_SOURCE}`."
             )
         classes = (*classes, *classes_beside(system_class(source)))
     return load_system(file, classes=classes)

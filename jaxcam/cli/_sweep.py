@@ -43,8 +43,9 @@ class Execution:
         base = system.base if isinstance(system, WithTerms) else system
         if self.cluster is not None and system_source(type(base)) is not None:
             raise ValueError(
-                f"--cluster: other processes do not know {type(base).__name__}, which "
-                f"is in a file of your own; leave it out to run in threads here."
+                f"--cluster: worker processes cannot load {type(base).__name__}, "
+                "which is in a file of your own; leave --cluster out to run in local "
+                "threads."
             )
 
     @contextmanager

@@ -248,7 +248,7 @@ DEMO_SPEEDS_RPM = (136.5, 146.0, 158.0)
 
 
 def main() -> None:
-    """Write the runs of the demonstration rig beside its rig.toml."""
+    """Write the runs of the demonstration rig next to its rig.toml."""
     folder = Path(__file__).parent / "demo_rig"
     rng = np.random.default_rng(20081)
     for number, rpm in enumerate(DEMO_SPEEDS_RPM, start=1):

@@ -38,31 +38,34 @@ def diagnose(
 ) -> Diagnosis:
     """Diagnose the physics that a model leaves out, from recordings.
 
+    A diagnosis takes minutes; the notebooks show one.
+
     Args:
         system: A `Rig` from `jaxcam.recordings.read_rig` or a `Setup` from
-            `jaxcam.fitting.read_setup`, which know their sensors and tolerances; or any
-            system with one coordinate, with what follows.
-        recordings: At least two of a rig; of a bare system, what
-            `jaxcam.recordings.segment` makes of them.
-        candidates: Terms that may be named; by default `library()`, with the constants
-            of the rig. Those that are not `listed` only help to describe what is
-            unknown.
-        sensors: As for `jaxcam.fitting.Model` and `Problem`, of a bare system; the
-            drive is an input that was measured.
-        parameters: As for `jaxcam.fitting.Model` and `Problem`, of a bare system; the
-            drive is an input that was measured.
-        drive: As for `jaxcam.fitting.Model` and `Problem`, of a bare system; the drive
-            is an input that was measured.
-        seed: Of the redrawn blocks.
+            `jaxcam.fitting.read_setup`, which state sensors and tolerances; or any
+            system with one coordinate, together with `sensors`, `parameters` and
+            `drive`.
+        recordings: At least two recordings of a rig; for a bare system, segments from
+            `jaxcam.recordings.segment`.
+        candidates: Terms that may be named; default `library()`, with the constants of
+            the rig. Those that are not `listed` only help to describe an unknown
+            effect.
+        sensors: For a bare system, as for `jaxcam.fitting.Model`.
+        parameters: For a bare system, as for `jaxcam.fitting.Problem`.
+        drive: For a bare system, its measured drive or input.
+        case: Name of the case.
+        seed: Seed of the block bootstrap.
         progress: Called with a sentence and a fraction, or `None`.
-        keep: A folder in which fits are kept until the diagnosis is done; one that was
-            interrupted goes on from there.
-        policy: What decides a verdict, and how long a search may take.
+        keep: Folder in which fits are kept until the diagnosis is done; an interrupted
+            one continues from there.
+        policy: Settings that decide a verdict, and limit the time of a search.
+
+    Returns:
+        A [`jaxcam.discrepancy.Diagnosis`][].
 
     Raises:
-        RecordingError: For recordings from which nothing can be told, with one sentence
-            that says why.
-        ValueError: For a term that acts nowhere.
+        RecordingError: The recordings do not suffice; the message says why.
+        ValueError: A term acts nowhere.
     """
     report = progress or (lambda sentence, fraction: None)
 

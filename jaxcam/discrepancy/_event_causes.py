@@ -24,19 +24,21 @@ from .terms import Term, WithTerms
 
 @dataclasses.dataclass(frozen=True)
 class EventCause:
-    """One explanation of the speeds at which a motion changes."""
+    """One explanation of the observed event speeds."""
 
     name: str
-    """Of the term, or `"none"`; `strength` with its `unit`."""
+    """Name of the term, or `"none"`."""
     strength: float
+    """Strength of the term."""
     unit: str
+    """Unit of the strength."""
     beside: float
-    """The parameter of the rig that was fitted with it."""
+    """Value of the rig's parameter that was fitted together with it."""
     speeds: Float[np.ndarray, "4"]
     """Shape `(4,)`, rad/s, valve float, fold and flip of P(1,1), interruption of
     chattering; NaN where there is none."""
     misfit: float
-    """Sum of the squares of what is left of them, and of the pull on the parameter, in
+    """Sum of the squares of the speeds' residuals, and of the pull on the parameter, in
     the errors of each."""
 
 
@@ -51,31 +53,29 @@ def event_causes(
     policy: Policy = Policy(),
     progress: Callable[[float], None] | None = None,
 ) -> tuple[EventCause, ...]:
-    """Rank terms by how near they bring a rig to the speeds that were observed.
+    """Rank terms by how near they bring a rig to the observed event speeds.
 
-    Each term is tried alone. A few numbers cannot decide between terms of which each
-    has a strength of its own: terms within a few units of misfit of the first are its
-    equals.
+    Each term is tried alone. A few numbers cannot decide between terms that each
+    have a strength of their own: terms within a few units of misfit of the first are
+    equally good.
 
     Args:
+        rig: The rig.
         observed: Valve float, fold and flip of P(1,1) and interruption of chattering
-            (rad/s), NaN where one was not seen, and how well each is known.
-        errors: Valve float, fold and flip of P(1,1) and interruption of chattering
-            (rad/s), NaN where one was not seen, and how well each is known.
-        terms: Candidates, of one strength each.
-        where: A parameter of the rig that is fitted beside each term, and how far it
-            may be off; `lambda rig: rig.restitution.intercept`, say.
-        tolerance: A parameter of the rig that is fitted beside each term, and how far
-            it may be off; `lambda rig: rig.restitution.intercept`, say.
-        policy: How far strengths are searched.
-        progress: Called with the part of the terms that is done.
+            (rad/s), NaN where one was not observed.
+        errors: Standard error of each.
+        terms: Candidate terms, each of one strength.
+        where: Picks a parameter of the rig that is fitted together with each term, such
+            as `lambda rig: rig.restitution.intercept`.
+        tolerance: Tolerance of this parameter.
+        policy: Settings that limit the search of strengths.
+        progress: Called with the fraction of the terms that is done.
 
     Returns:
-        Explanations, the best first; one of them is no term at all.
+        Explanations, best first; one of them is no term at all.
 
     Raises:
-        ValueError: For a term with several strengths, or if `observed` are not four
-            speeds.
+        ValueError: A term has several strengths, or `observed` is not four speeds.
     """
     if np.shape(observed) != (4,) or np.shape(errors) != (4,):
         raise ValueError(
@@ -86,7 +86,7 @@ def event_causes(
         if len(term.strengths()) != 1:
             raise ValueError(
                 f"The term {term.name!r} has {len(term.strengths())} strengths; only "
-                f"terms of one strength can be told apart by so few numbers."
+                f"terms of one strength can be distinguished by so few numbers."
             )
     goal = _Goal(np.asarray(observed), np.asarray(errors), where, tolerance, policy)
     paths, here = [], None

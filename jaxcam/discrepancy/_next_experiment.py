@@ -26,16 +26,22 @@ from .terms import Term, WithTerms
 
 @dataclasses.dataclass(frozen=True)
 class Experiment:
-    """The expected information of one more record."""
+    """The expected information of one more record.
+
+    Examples:
+        >>> from jaxcam.discrepancy import Experiment
+        >>> Experiment("155 rpm", {"damping": 0.1}, {"damping": 0.05}).factor
+        0.5
+    """
 
     name: str
-    """Of the record."""
+    """Name of the record."""
     now: Mapping[str, float]
-    """Standard errors of the parameters asked for, without and with it."""
+    """Standard errors of the parameters in question without the record."""
     then: Mapping[str, float]
-    """Standard errors of the parameters asked for, without and with it."""
+    """Standard errors of these parameters with the record."""
     speed: float | None = None
-    """Of the cam (rad/s), where there is one."""
+    """Speed of the cam (rad/s), where there is one."""
 
     @property
     def factor(self) -> float:
@@ -53,12 +59,15 @@ def compare_experiments(
     of the records of the diagnosis.
 
     Args:
-        records: Simulated with the system that was found (`found.system()`) by
+        found: The diagnosis of the records so far.
+        records: Records simulated with the diagnosed system (`found.system()`) by
             [`jaxcam.recordings.record`][], and cut.
-        asked: Names of parameters; by default the strengths of what was named. The
-            terms whose BIC is not much worse stay free beside them, so that the best
-            record also tells them apart. Where nothing was named, all terms, one at a
-            time.
+        asked: Names of parameters; default the strengths of the named terms. Terms
+            whose BIC is not much worse stay free, so that the best record also
+            distinguishes them. If none is named, all terms, one at a time.
+
+    Returns:
+        The experiments, best first.
 
     Raises:
         ValueError: For a name that is no parameter, or where a force with a state of
@@ -118,10 +127,10 @@ def next_experiments(
     seed: int = 0,
     progress: Callable[[str, float | None], None] | None = None,
 ) -> tuple[Experiment, ...]:
-    """The speed at which to run a driven rig next, the best first.
+    """Recommend the speeds at which to run a driven rig next, best first.
 
     Args:
-        found: What `diagnose` said of its records so far.
+        found: The diagnosis of the records so far.
         rig: As given to `diagnose`.
         speeds: Of the drive (rad/s) that can be had; by default some between those of
             the records and a little beyond.

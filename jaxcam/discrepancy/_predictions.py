@@ -23,15 +23,25 @@ _DEFINITE = 1e-12
 
 @dataclasses.dataclass(frozen=True)
 class Prediction:
-    """A speed of the cam (rad/s) at which the motion changes.
+    """A predicted speed of the cam (rad/s) at which the motion changes.
 
     `before` and `after`: of the textbook model refitted, and with what it lacked, with
     the standard errors that those of the fits make; NaN where there is no such speed.
+
+    Examples:
+        >>> from jaxcam.discrepancy import Prediction
+        >>> from jaxcam.discrepancy.terms import Value
+        >>> Prediction("fold", Value(14.2, 0.1), Value(14.5, 0.2)).after.value
+        14.5
     """
 
     name: str
+    """The change, such as "fold"."""
     before: Value
+    """Prediction of the refitted textbook model, with its standard error; NaN where
+    there is no such speed."""
     after: Value
+    """Prediction with the missing effects."""
 
 
 def predictions(
@@ -40,18 +50,21 @@ def predictions(
     *,
     progress: Callable[[float], None] | None = None,
 ) -> tuple[Prediction, ...]:
-    """Speeds at which the motion of a cam-follower rig changes, by both its models.
+    """Predict the speeds at which the motion of a cam-follower rig changes, by both
+    models.
 
     Valve float, the fold and the flip of P(1,1), and the interruption of complete
-    chattering. Their errors come from rigs drawn from the errors of the fits. The terms
-    that were named are part of the second model, but for those that have a frequency
+    chattering. Their errors come from rigs drawn from the errors of the fits. The named
+    terms are part of the second model, except those that have a frequency
     of their own: their motion is not periodic with the cam.
 
-    **Arguments:** a diagnosis, the `seed` of the rigs that are drawn, and `progress`,
-    called with the part of them that is done.
+    Args:
+        found: The diagnosis.
+        seed: Seed of the rigs that are drawn.
+        progress: Called with the fraction of them that is done.
 
     Returns:
-        Nothing for a system that is no cam-follower.
+        The predictions; none for a system that is no cam-follower.
     """
     if not isinstance(found.after.model(0).system.base, CamFollower):  # pyright: ignore
         return ()

@@ -50,16 +50,21 @@ class Setting(NamedTuple):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Policy:
-    """Settings that decide a verdict, the time of a search, and the content of a
+    """Settings that decide a verdict, limit a search, and choose the content of a
     report.
 
-    Give another one to `diagnose(..., policy=Policy(false_alarms=0.05))`. Numbers
+    Pass another one to `diagnose(..., policy=Policy(false_alarms=0.05))`. Numbers
     without a unit are ratios or counts; a cost is minus twice the log-likelihood, a
     cost per sample is one where only noise is left. [Discrepancy](../discrepancy.md)
-    has the table of all fields.
+    has the table of all fields, and `settings` gives each with its meaning.
 
     Raises:
-        ValueError: For a number out of its range.
+        ValueError: A number is out of its range.
+
+    Examples:
+        >>> from jaxcam.discrepancy import Policy
+        >>> Policy(false_alarms=0.05).false_alarms
+        0.05
     """
 
     # what decides a verdict
@@ -293,14 +298,14 @@ class Policy:
 
     @property
     def small(self) -> float:
-        """Share of what was explained that may be left over, `form_error**2`.
+        """Share of the explained cost that may remain, `form_error**2`.
 
         The likelihood is quadratic in the error of a force.
         """
         return self.form_error**2
 
     def settings(self) -> Iterator[Setting]:
-        """Every number with its group and meaning, in order."""
+        """Yield every setting with its group and meaning, in order."""
         for field in dataclasses.fields(self):
             about = field.metadata
             value = getattr(self, field.name)

@@ -19,8 +19,7 @@ class Switches(eqx.Module):
     state: Float[Array, "k n"]
     """State there, shape `(k, n)`."""
     before: Int[Array, " k"]
-    """[`Mode`][jaxcam.filippov.modes.Mode] before the event, 1 above, 0 sliding, -1
-    below; shape `(k,)`."""
+    """Mode before the event, 1 above, 0 sliding, -1 below; shape `(k,)`."""
     after: Int[Array, " k"]
     """Mode after the event, shape `(k,)`."""
 

@@ -1,4 +1,4 @@
-"""Parameters from recordings and from published numbers, with their uncertainty."""
+"""Estimate parameters from recordings and from published numbers."""
 
 from ._bootstrap import Bootstrap as Bootstrap, bootstrap as bootstrap
 from ._cam_follower import (

@@ -13,14 +13,22 @@ from .engine import Weights
 
 @dataclasses.dataclass(frozen=True)
 class Bootstrap:
-    """Estimates from reweighted data, shape `(repetitions, g)`, in the fit's order.
+    """Estimates from reweighted data, in the fit's order.
 
-    Unlike the Fisher information they count what is left over in the data as it is: a
-    model that lacks something scatters more than the noise explains.
+    Unlike the Fisher information they account for the actual residuals: a
+    model with a discrepancy scatters more than the noise explains.
+    The example continues that of [`jaxcam.fitting.fit`][].
+
+    Examples:
+        >>> from jaxcam.fitting import bootstrap
+        >>> bootstrap(found, 3).stderr.shape
+        (1,)
     """
 
     found: Fit
+    """The fit."""
     estimates: Float[np.ndarray, "b g"]
+    """Estimates, shape `(repetitions, g)`."""
 
     @property
     def stderr(self) -> Float[np.ndarray, " g"]:
@@ -28,7 +36,7 @@ class Bootstrap:
         return np.std(self.estimates, axis=0, ddof=1)
 
     def interval(self, name: str, level: float = 0.95) -> tuple[float, float]:
-        """Interval between the outer percentiles of a parameter."""
+        """Return the interval between the outer percentiles of a parameter."""
         names = [one.name for one in self.found.estimates]
         column = self.estimates[:, names.index(self.found[name].name)]
         low, high = np.quantile(column, [(1 - level) / 2, (1 + level) / 2])
@@ -44,16 +52,31 @@ def bootstrap(
     iterations: int = 8,
     progress: Callable[[int, int], None] | None = None,
 ) -> Bootstrap:
-    """Fit again with random weights on flights and contacts (Rubin, 1981).
+    """Fit again with random weights on flights and contacts (block bootstrap; Rubin,
+    1981).
 
-    A block is one flight, all its pieces together, or one contact: what is left over in
-    one part of a motion tends to be alike throughout. Weights are exponential with mean
+    A block is one flight, all its pieces together, or one contact, since residuals
+    tend to be alike throughout one part of a motion. Weights are exponential with mean
     one; drawing blocks with replacement has the same mean and variance, but leaves
-    out blocks altogether, and with them the impacts at both their ends. Each repetition
+    out some blocks, and with them the impacts at both their ends. Each repetition
     starts at the optimum and needs few iterations.
+    The example continues that of [`jaxcam.fitting.fit`][].
 
-    **Arguments:** number of repetitions, and of iterations at most in each; `prior` as
-    it was for `found`.
+    Args:
+        found: The fit.
+        repetitions: Number of repetitions.
+        seed: Seed of the random weights.
+        prior: As for `found`.
+        iterations: Largest number of iterations of each repetition.
+        progress: Called with the number of repetitions done, and of all.
+
+    Returns:
+        A [`jaxcam.fitting.Bootstrap`][].
+
+    Examples:
+        >>> from jaxcam.fitting import bootstrap
+        >>> bootstrap(found, 3).estimates.shape
+        (3, 1)
     """
     problem, rng = found.problem, np.random.default_rng(seed)
     blocks = []

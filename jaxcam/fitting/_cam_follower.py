@@ -10,12 +10,24 @@ from .engine import cam_follower_drive, Model, Parameter, Sensor
 def cam_follower_model(
     rig: Rig, channels: Sequence[str] = ("follower_angle_rad",)
 ) -> Model:
-    """The nominal rig with its sensors; the drive follows the cam's encoder.
+    """Return the nominal rig with its sensors; the drive follows the cam's encoder.
 
-    **Arguments:** channels to fit: `follower_angle_rad`, `gyro_rad_s`.
+    Args:
+        rig: The rig.
+        channels: Channels to fit: `follower_angle_rad`, `gyro_rad_s`.
+
+    Returns:
+        A [`jaxcam.fitting.Model`][].
 
     Raises:
-        ValueError: For another channel, or a gyro that the rig does not have.
+        ValueError: A channel is unknown, or the rig has no gyro.
+
+    Examples:
+        >>> from jaxcam.data import DEMO_RIG
+        >>> from jaxcam.fitting import cam_follower_model
+        >>> from jaxcam.recordings import read_rig
+        >>> list(cam_follower_model(read_rig(DEMO_RIG / "rig.toml")).sensors)
+        ['follower_angle_rad']
     """
     known = rig_sensors(rig)
     for channel in channels:
@@ -28,7 +40,21 @@ def cam_follower_model(
 
 
 def rig_sensors(rig: Rig) -> dict[str, Sensor]:
-    """Sensors of the follower, by channel, as the rig file states them."""
+    """Return the sensors of the follower, by channel, as the rig file states them.
+
+    Args:
+        rig: The rig.
+
+    Returns:
+        Sensors by channel.
+
+    Examples:
+        >>> from jaxcam.data import DEMO_RIG
+        >>> from jaxcam.fitting import rig_sensors
+        >>> from jaxcam.recordings import read_rig
+        >>> "follower_angle_rad" in rig_sensors(read_rig(DEMO_RIG / "rig.toml"))
+        True
+    """
     sensors = rig.sensors
     found = {
         "follower_angle_rad": Sensor(
@@ -49,13 +75,25 @@ def rig_sensors(rig: Rig) -> dict[str, Sensor]:
 
 
 def cam_follower_parameters(rig: Rig, base=lambda system: system) -> list[Parameter]:
-    """Return the identifiable parameters of the rig: K (as K/J), the spring, the cam,
-    r.
+    """Return the identifiable parameters of the rig: K (as K/J), spring, cam,
+    restitution.
 
     The inertia is held, since only K/J acts; so is the follower's half height in the
     profile, since only its sum with the cam's radius does.
 
-    **Arguments:** `base` picks the `CamFollower` out of a system that wraps it.
+    Args:
+        rig: The rig.
+        base: Picks the `CamFollower` out of a system that wraps it.
+
+    Returns:
+        A list of [`jaxcam.fitting.Parameter`][].
+
+    Examples:
+        >>> from jaxcam.data import DEMO_RIG
+        >>> from jaxcam.fitting import cam_follower_parameters
+        >>> from jaxcam.recordings import read_rig
+        >>> cam_follower_parameters(read_rig(DEMO_RIG / "rig.toml"))[0].name
+        'stiffness'
     """
     half = rig.follower_half_height.tolerance
     table = (

@@ -18,7 +18,13 @@ _ON_BOUND = 1e-9
 
 
 class Doubt(enum.Enum):
-    """Reasons why a fit does not count as converged."""
+    """Reasons why a fit does not count as converged.
+
+    Examples:
+        >>> from jaxcam.fitting import Doubt
+        >>> len(Doubt) > 1
+        True
+    """
 
     NO_OPTIMUM = "the iteration ended before an optimum"
     NOT_FINITE = "a parameter, a state, a cost or an error is not a finite number"
@@ -28,10 +34,12 @@ class Doubt(enum.Enum):
 
 
 class Reason(NamedTuple):
-    """One doubt, and what it is about in a sentence."""
+    """One doubt, and a sentence about it."""
 
     doubt: Doubt
+    """The doubt."""
     sentence: str
+    """The sentence."""
 
 
 def not_finite(problem: Problem, point: Point, cost: float, costs: Costs) -> str:

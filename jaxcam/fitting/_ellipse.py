@@ -42,18 +42,19 @@ class Ellipse:
         return (self._roots() * np.sqrt(self.limit)).T
 
     def chi_square(self, points: Float[np.ndarray, "*k d"]) -> Float[np.ndarray, "*k"]:
-        """Squared distance of points from the centre, in standard errors."""
+        """Return the squared distance of points from the centre, in standard errors."""
         off = (np.asarray(points, dtype=float) - self.centre) @ np.linalg.pinv(
             self._roots()
         ).T
         return np.sum(off**2, axis=-1)
 
     def contains(self, points: Float[np.ndarray, "*k d"]) -> Bool[np.ndarray, "*k"]:
-        """Whether points are inside."""
+        """Return whether points lie inside."""
         return self.chi_square(points) <= self.limit
 
     def polygon(self, points: int = 181) -> Float[np.ndarray, "k 2"]:
-        """The edge of an ellipse as a closed line, shape `(points, 2)`, to be drawn.
+        """Return the edge of an ellipse as a closed line, shape `(points, 2)`, for
+        drawing.
 
         Raises:
             ValueError: For more than two parameters.
@@ -96,14 +97,14 @@ def ellipse_of(
     part = np.asarray(covariance)[np.ix_(rows, rows)]
     if not np.all(np.isfinite(part) & (np.diag(part) > 0)[:, None]):
         raise ValueError(
-            f"One of {', '.join(names)} has no finite error; hold what the data cannot "
-            f"see."
+            f"One of {', '.join(names)} has no finite error; hold the parameters that "
+            "the data do not determine."
         )
     return Ellipse(tuple(names), np.asarray(centre, dtype=float)[rows], part, level)
 
 
 def most_correlated(labels: Sequence[str], correlation) -> str:
-    """The pair of parameters that are told apart worst, in a sentence."""
+    """The pair of parameters that are most correlated, in a sentence."""
     if len(labels) < 2:
         return "Fewer than two parameters were fitted, so none are correlated."
     size = np.abs(np.where(np.isfinite(correlation), correlation, 0.0))

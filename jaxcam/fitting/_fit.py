@@ -60,14 +60,16 @@ def fit(
     fits best is returned.
 
     Args:
-        free: Names of the parameters to fit; by default all of them. The others stay at
-            the values of `start`.
-        start: Another fit, or values of some parameters; by default the nominal ones.
-        weights: How much each piece of the data counts.
-        prior: Whether the tolerances count as knowledge; bounds always hold.
-        stop: Called after each iteration with the cost at the start and after every one
-            so far; where it says so, the fit ends, not converged. Long flights are
-            first fitted with loose joints, to the end; the costs are those that follow.
+        problem: The problem.
+        free: Names of the parameters to fit; default all. The others stay at the values
+            of `start`.
+        start: Another fit, or values of some parameters; default the nominal ones.
+        weights: Weight of each piece of the data.
+        prior: Whether the tolerances count as prior knowledge; bounds always hold.
+        iterations: Largest number of iterations.
+        stop: Called after each iteration with the costs so far, from the start on; if
+            it returns True, the fit ends, not converged. Long flights are first fitted
+            with loose joints, to the end; the costs are those that follow.
         progress: Called with the number of the iteration and the cost.
 
     Returns:
@@ -76,7 +78,21 @@ def fit(
             why not.
 
     Raises:
-        ValueError: For a name that is not a parameter.
+        ValueError: A name is not a parameter.
+
+    Examples:
+        >>> from jaxcam import fitting, recordings
+        >>> from jaxcam.models import BouncingBall
+        >>> ball, rng = BouncingBall(), np.random.default_rng(0)
+        >>> sensors = {"height_m": fitting.Sensor(0, noise=1e-3)}
+        >>> run = recordings.record(ball, sensors, 1.0, rng=rng, state=[1.0, 0.0])
+        >>> parts = recordings.segment(run, "height_m", 0.0)
+        >>> gravity = fitting.Parameter("gravity", lambda m: m.system.gravity, 1.0)
+        >>> model = fitting.Model(ball, sensors)
+        >>> problem = fitting.Problem.build(model, [parts], [gravity])
+        >>> found = fitting.fit(problem)
+        >>> abs(found.estimates[0].value - 9.81) < 4 * found.estimates[0].stderr
+        True
     """
     columns = free_columns(problem, free)
     point = start_point(problem, start)
@@ -215,10 +231,24 @@ def _descend(
 
 
 def held_out_cost(problem: Problem, found: Fit, weights: Weights) -> float:
-    """Cost of data under a fit that need not have seen them.
+    """Return the cost of held-out data under a fit.
 
     The parameters stay as they are; the states of the pieces are fitted to the data, as
-    nobody can predict them. Joints between pieces that count are included.
+    they cannot be predicted. Joints between pieces that count are included.
+    The example continues that of [`jaxcam.fitting.fit`][].
+
+    Args:
+        problem: The problem.
+        found: The fit.
+        weights: Weight of each piece of the data.
+
+    Returns:
+        Minus twice the log-likelihood.
+
+    Examples:
+        >>> from jaxcam.fitting import held_out_cost
+        >>> held_out_cost(problem, found, problem.everything()) > 0
+        True
     """
     other = fit(problem, free=(), start=found, weights=weights, prior=False)
     return other.cost

@@ -35,10 +35,15 @@ class Estimate:
     """
 
     name: str
+    """Name of the parameter."""
     value: float
+    """Estimate."""
     stderr: float
+    """Standard error."""
     unit: str = ""
+    """Unit."""
     record: str | None = None
+    """Name of the record, where each has its own value."""
 
     @property
     def label(self) -> str:
@@ -53,7 +58,14 @@ class Estimate:
 
 @dataclasses.dataclass(frozen=True, repr=False)
 class Fit:
-    """The result of a fit."""
+    """The result of a fit.
+
+    The example continues that of [`jaxcam.fitting.fit`][].
+
+    Examples:
+        >>> found.converged, found.free
+        (True, ('gravity',))
+    """
 
     problem: Problem
     """Parameters and states at the optimum."""
@@ -69,6 +81,7 @@ class Fit:
     """Minus twice the log-likelihood (less a constant) with the prior; `costs`: of each
     piece, without it."""
     costs: Costs
+    """Cost of each piece, without the prior."""
     optimal: bool
     """Whether the iteration met its tolerance at an optimum, after how many steps, and
     how it ended in words."""
@@ -79,9 +92,9 @@ class Fit:
     """Whether the iteration met its tolerance at an optimum, after how many steps, and
     how it ended in words."""
     weights: Weights | None = None
-    """How much each piece of the data counted; `None`: all alike."""
+    """Weight of each piece of the data; `None` where all count alike."""
     unconstrained: tuple[Unconstrained, ...] = ()
-    """Combinations of parameters that the data say nothing of."""
+    """Combinations of parameters that the data do not constrain."""
 
     def __repr__(self) -> str:
         return self._table().text()
@@ -160,33 +173,40 @@ class Fit:
         return self.covariance / np.outer(size, size)
 
     def ellipse(self, names: Sequence[str], level: float = 0.95) -> Ellipse:
-        """Joint confidence region of two or more parameters, the others left free.
+        """Return the joint confidence region of two or more parameters, the others left
+        free.
 
-        **Arguments:** names as in `estimates`, with `@record` where each record has its
-        own; the probability that the region holds the truth.
+        Args:
+            names: Names as in `estimates`, with `@record` where each record has its
+                own.
+            level: Probability that the region holds the truth.
+
+        Returns:
+            An `Ellipse`.
 
         Raises:
-            KeyError: For a name that was not fitted.
-            ValueError: For a level outside 0 and 1, fewer than two names, or an error
-                that is not finite.
+            KeyError: A name was not fitted.
+            ValueError: The level lies outside 0 and 1, there are fewer than two names,
+                or an error is not finite.
         """
         labels = [one.label for one in self.estimates]
         values = [one.value for one in self.estimates]
         return ellipse_of(names, labels, values, self.covariance, level)
 
     def most_correlated(self) -> str:
-        """The pair of parameters that is told apart worst, in a sentence."""
+        """Return a sentence about the most correlated pair of parameters."""
         return most_correlated([e.label for e in self.estimates], self.correlation)
 
     def model(self, record: int | str = 0) -> Model:
-        """The model with the parameters that were found; of one record where some
-        parameters differ from record to record."""
+        """Return the model with the fitted parameters, of one record where they
+        differ.
+        """
         names = self.problem.records
         row = names.index(record) if isinstance(record, str) else record
         return self.problem.layout.at(self.point.values[row])
 
     def to_json(self) -> dict[str, Any]:
-        """Plain numbers and strings."""
+        """Return plain numbers and strings."""
         return {
             "parameters": [dataclasses.asdict(one) for one in self.estimates],
             "correlation": self.correlation.tolist(),

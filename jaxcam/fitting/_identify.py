@@ -24,30 +24,43 @@ _MEMBER = 0.15
 
 @dataclasses.dataclass(frozen=True)
 class Identifiability:
-    """The combinations of parameters that the data determine, best first."""
+    """The combinations of parameters that the data determine, best first.
+
+    The example continues that of [`jaxcam.fitting.fit`][].
+
+    Examples:
+        >>> from jaxcam.fitting import identify
+        >>> identify(problem).seen
+        1
+    """
 
     names: tuple[str, ...]
-    """Parameters, as in the columns of `directions` `(g, g)`: one combination a row,
-    each parameter in units of its scale (its tolerance)."""
+    """Names of the parameters."""
     directions: Float[np.ndarray, "g g"]
+    """Combinations, one per row, each parameter in units of its scale, shape `(g, g)`.
+    """
     stderr: Float[np.ndarray, " g"]
     """Error of each combination from the data alone, in the same units."""
     values: Float[np.ndarray, " g"]
-    """Of each parameter, where it was looked and what its unit is."""
+    """Value of each parameter at which it was evaluated."""
     scales: Float[np.ndarray, " g"]
-    """Of each parameter, where it was looked and what its unit is."""
+    """Scale of each parameter."""
     alone: Float[np.ndarray, " g"]
-    """Error of each parameter from the data alone if all others were known, and
-    `together` if none is, in units of the scale."""
+    """Error of each parameter from the data alone if all others are known, in units of
+    the scale."""
     together: Float[np.ndarray, " g"]
+    """Error of each parameter from the data alone if no other is known, in units of the
+    scale."""
 
     @property
     def seen(self) -> int:
-        """Number of combinations that the data narrow below half their tolerance."""
+        """Number of combinations that the data determine to better than half their
+        tolerance.
+        """
         return int(np.sum(self.stderr < _SEEN))
 
     def sentences(self) -> list[str]:
-        """The report, one fact a sentence."""
+        """Return the report, one fact per sentence."""
         total = len(self.names)
         if not total:
             return ["Nothing is to be fitted."]
@@ -119,12 +132,27 @@ def identify(
 ) -> Identifiability:
     """Analyse which parameters the recordings can determine, without fitting them.
 
-    The Fisher information at the nominal parameters, the states of all pieces
-    eliminated: its large eigenvalues belong to what the data see, its small ones to
-    what only the tolerances say.
+    The Fisher information at the nominal parameters, with the states of all pieces
+    eliminated: its large eigenvalues belong to combinations that the data determine,
+    its small ones to those that only the tolerances constrain. The example continues
+    that of [`jaxcam.fitting.fit`][].
 
-    **Arguments:** `at` is where to look, by default the nominal parameters with the
-    states fitted.
+    Args:
+        problem: The problem.
+        names: Names of the parameters; default all.
+        at: The fit at which to evaluate; default the nominal parameters with the states
+            fitted.
+
+    Returns:
+        An [`jaxcam.fitting.Identifiability`][].
+
+    Raises:
+        ValueError: A name is unknown.
+
+    Examples:
+        >>> from jaxcam.fitting import identify
+        >>> identify(problem).names
+        ('gravity',)
     """
     columns = free_columns(problem, names)
     at = at or fit(problem, free=())

@@ -31,26 +31,38 @@ _NOTHING = 1e-4
 
 @dataclasses.dataclass(frozen=True)
 class ImpactLaw:
-    """The restitution law of a table of impacts."""
+    """The restitution law of a table of impacts.
+
+    Examples:
+        >>> from jaxcam.fitting import impact_law
+        >>> from jaxcam.recordings import ImpactTable
+        >>> speed = np.array([1.0, 1.5, 2.0, 2.5, 3.0])
+        >>> scatter = np.array([1e-3, -1e-3, 2e-3, -2e-3, 1e-3])
+        >>> found = impact_law(ImpactTable("drops", speed, 0.8 * speed + scatter))
+        >>> found.set_aside
+        ()
+    """
 
     table: ImpactTable
+    """The table of impacts."""
     laws: dict[str, RestitutionFit]
     """`"constant"`, and the power law as `"falling"` or `"rising"`."""
     best: str
-    """The name of the one that the impacts support."""
+    """Name of the law that the impacts support."""
     delta_bic: dict[str, float]
-    """Of each law, less that of the constant one; below zero is better. The power law
-    that the impacts turn away from is the constant with one number more."""
+    """BIC of each law less that of the constant one; below zero is better. A power law
+    that the impacts do not support is the constant with one number more."""
     p_value: float
-    """Chance of what the power law gains where restitution is constant."""
+    """Probability of the power law's gain where restitution is constant."""
     scatter: float
-    """Standard deviation of an impact, in `scatter_unit`: that of the speed, or, with
-    `"1"`, of the restitution; with `"stated"`, in its standard errors."""
+    """Standard deviation of an impact, in `scatter_unit`."""
     scatter_unit: str
+    """Unit of the scatter: that of the speed, `"1"` for the restitution, or `"stated"`
+    for its standard errors."""
     set_aside: tuple[int, ...]
-    """Rows (from 1) that are too far off to belong to the others."""
+    """Rows (from 1) that are outliers."""
     momentum: MomentumBalance | None
-    """Of two bodies, how well their momentum is kept; or `None`."""
+    """Momentum balance of two bodies, or `None`."""
 
     @property
     def law(self) -> RestitutionFit:
@@ -58,7 +70,7 @@ class ImpactLaw:
         return self.laws[self.best]
 
     def sentences(self) -> list[str]:
-        """The law, how sure it is, and what is to be known of the table."""
+        """Return the law, its certainty, and remarks on the table."""
         return [self._headline(), *self._caveats()]
 
     def _headline(self) -> str:
@@ -125,7 +137,7 @@ class ImpactLaw:
         return found
 
     def to_json(self) -> dict[str, Any]:
-        """Plain numbers and strings."""
+        """Return plain numbers and strings."""
         return {
             "table": self.table.name,
             "impacts": len(self.table),
@@ -146,16 +158,31 @@ class ImpactLaw:
 
 
 def impact_law(table: ImpactTable) -> ImpactLaw:
-    """The law of restitution that a table of impacts supports.
+    """Return the restitution law that a table of impacts supports.
 
     A constant restitution and a power of the speed, r = r0 (1 + v / v_ref)^-b with the
-    median speed as v_ref, are fitted by least squares. What an impact scatters by is
-    estimated: alike in its speed or alike in its restitution, whichever is likelier;
-    where the table states errors, in proportion to these. The power law is named where
-    an F test finds that a constant one would gain as much in one table of a hundred.
+    median speed as v_ref, are fitted by least squares. The scatter of an impact is
+    estimated: constant in its speed or constant in its restitution, whichever is
+    likelier; where the table states errors, in proportion to these. The power law is
+    named where, by an F test, a constant law would gain as much in one table of a
+    hundred.
+
+    Args:
+        table: The impacts.
+
+    Returns:
+        An [`jaxcam.fitting.ImpactLaw`][].
 
     Raises:
-        RecordingError: For fewer than four impacts.
+        RecordingError: There are fewer than four impacts.
+
+    Examples:
+        >>> from jaxcam.fitting import impact_law
+        >>> from jaxcam.recordings import ImpactTable
+        >>> speed = np.array([1.0, 1.5, 2.0, 2.5, 3.0])
+        >>> scatter = np.array([1e-3, -1e-3, 2e-3, -2e-3, 1e-3])
+        >>> impact_law(ImpactTable("drops", speed, 0.8 * speed + scatter)).best
+        'constant'
     """
     if len(table) < _LEAST:
         raise RecordingError(

@@ -18,11 +18,10 @@ class MomentumBalance:
     """Momentum of two bodies in their impacts."""
 
     change: float
-    """Of the momentum of both, as a share of what they exchange; not a number where the
+    """Change of the total momentum, relative to the momentum exchanged; NaN where the
     masses are unknown."""
     stderr: float
-    """Of the momentum of both, as a share of what they exchange; not a number where the
-    masses are unknown."""
+    """Standard error of `change`."""
     ratio: float
     """Mass of the second body over that of the first, such that momentum is kept."""
     ratio_stderr: float
@@ -37,7 +36,7 @@ class MomentumBalance:
         return not (size > _ERRORS * self.stderr and size > _SHARE)
 
     def sentence(self) -> str:
-        """The balance in words."""
+        """Return the balance in words."""
         ratio = f"{self.ratio:.4g} +- {self.ratio_stderr:.1g}"
         if np.isnan(self.stated):
             return f"If momentum is kept, the second mass is {ratio} times the first."
@@ -51,7 +50,7 @@ class MomentumBalance:
         )
 
     def to_json(self) -> dict[str, Any]:
-        """Plain numbers, `None` for what is not known."""
+        """Return plain numbers, `None` for unknown ones."""
         fields = dataclasses.asdict(self)
         return {
             name: None if np.isnan(value) else value for name, value in fields.items()

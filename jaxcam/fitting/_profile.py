@@ -13,17 +13,20 @@ from .engine import Weights
 
 @dataclasses.dataclass(frozen=True)
 class Profile:
-    """Of one parameter: `values`, and `cost` above the optimum at each of them.
+    """The profile likelihood of one parameter.
 
-    The cost is minus twice the log-likelihood, so the 95 % interval is where it is
-    below 3.84; `interval` is interpolated, infinite on a side where no value was tried
-    that is bad enough.
+    The 95 % interval is where the cost is below 3.84; `interval` is interpolated,
+    infinite on a side where no value with such a cost was tried.
     """
 
     name: str
+    """Name of the parameter."""
     values: Float[np.ndarray, " k"]
+    """Values at which it was held, shape `(k,)`."""
     cost: Float[np.ndarray, " k"]
+    """Minus twice the log-likelihood above the optimum, shape `(k,)`."""
     fits: tuple[Fit, ...]
+    """The fits at these values."""
 
     @property
     def interval(self) -> tuple[float, float]:
@@ -56,21 +59,33 @@ def profile(
     prior: bool = True,
     progress: Callable[[int, int], None] | None = None,
 ) -> Profile:
-    """Fit all other parameters again with one of them held at several values.
+    """Compute a profile likelihood: fit all other parameters with one held at several
+    values.
+
+    The example continues that of [`jaxcam.fitting.fit`][].
 
     Args:
         found: The fit, in which `name` was free.
-        reach: How far to go, in standard errors on both sides.
+        name: Name of the parameter.
+        reach: Range, in standard errors on both sides.
         points: Number of values, the optimum included.
-        values: Where to hold it instead, in any order; a value is inside the 95 %
-            interval if its cost is below 3.84.
-        weights: As they were for `found`.
-        prior: As they were for `found`.
+        values: Values at which to hold it instead, in any order; a value is inside the
+            95 % interval if its cost is below 3.84.
+        weights: As for `found`.
+        prior: As for `found`.
         progress: Called with the number of values done and of all.
 
+    Returns:
+        A `Profile`.
+
     Raises:
-        KeyError: For a parameter that was not fitted.
-        ValueError: For one that differs from record to record.
+        KeyError: The parameter was not fitted.
+        ValueError: It differs from record to record.
+
+    Examples:
+        >>> from jaxcam.fitting import profile
+        >>> profile(found, "gravity", points=3).cost.shape
+        (3,)
     """
     _require_shared(found, name)
     estimate = found[name]
@@ -115,17 +130,31 @@ def excess_cost(
     weights: Weights | None = None,
     prior: bool = True,
 ) -> float:
-    """Cost above the optimum with several parameters held and all others fitted.
+    """Return the cost above the optimum with several parameters held and all others
+    fitted.
 
-    The joint confidence region of d parameters, bent as the model is: values are inside
-    where this is below the quantile of a chi-square with d degrees of freedom,
-    `found.ellipse(names).limit`.
+    It defines the joint confidence region of d parameters of a nonlinear model: values
+    are inside where it is below the quantile of a chi-square with d degrees of freedom,
+    `found.ellipse(names).limit`. The example continues that of
+    [`jaxcam.fitting.fit`][].
 
-    **Arguments:** the fit, in which all of these were free; `weights` and `prior` as
-    they were for it.
+    Args:
+        found: The fit, in which all of these were free.
+        values: Values by name.
+        weights: As for `found`.
+        prior: As for `found`.
+
+    Returns:
+        The cost.
 
     Raises:
-        ValueError: as in [`jaxcam.fitting.profile`][].
+        KeyError: A parameter was not fitted.
+        ValueError: A parameter differs from record to record.
+
+    Examples:
+        >>> from jaxcam.fitting import excess_cost
+        >>> excess_cost(found, {"gravity": found.estimates[0].value}) < 1e-3
+        True
     """
     problem, cost = found.problem, 0.0
     point = found.point

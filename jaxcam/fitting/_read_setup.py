@@ -52,16 +52,29 @@ class _Stated(NamedTuple):
 def read_setup(
     path: str | Path, system: str | type[HybridSystem] | None = None
 ) -> Setup:
-    """The rig of a system of one's own, as a TOML file describes it.
+    """Read a rig file (TOML) of a system of your own.
 
-    `system` in the file, such as `"two_stops.py:TwoStops"`, names a Python file beside
-    it and a class, and the Python file is run: read rigs only from those you trust.
+    `system` in the file, such as `"two_stops.py:TwoStops"`, names a Python file next to
+    it and a class, and the Python file is run: read only rigs that you trust.
 
-    **Arguments:** the file; and another system than that of the file: a class, or
-    `FILE.py:CLASS` as seen from the working directory.
+    Args:
+        path: The file.
+        system: Another system than that of the file: a class, or `FILE.py:CLASS`
+            relative to the working directory.
+
+    Returns:
+        A [`jaxcam.fitting.Setup`][].
 
     Raises:
-        RigError: One sentence that names the file, the key and the fix.
+        RigError: The file cannot be used; the message names the file, the key and the
+            fix.
+
+    Examples:
+        >>> from jaxcam.data import DEMO_RIG
+        >>> from jaxcam.fitting import read_setup
+        >>> setup = read_setup(DEMO_RIG.parent / "new_rig" / "cart.toml")
+        >>> len(setup.channels) > 0
+        True
     """
     file = Path(path)
     tables = read_tables(file)
@@ -73,8 +86,8 @@ def read_setup(
     for name in measured:
         if name in fitted and name != _phase_of(drive):
             raise RigError(
-                f"{file}: `{name}` in [parameters] has a tolerance, but a channel says "
-                f"what it is; remove the tolerance."
+                f"{file}: `{name}` in [parameters] has a tolerance, but a channel "
+                "gives its value; remove the tolerance."
             )
     made = stated_system(
         file,
@@ -94,10 +107,22 @@ def read_setup(
 
 
 def is_setup(path: str | Path) -> bool:
-    """Whether a rig file is one for `read_setup`, and not that of a cam-follower.
+    """Return whether a rig file is one for `read_setup`, not that of a cam-follower.
+
+    Args:
+        path: The file.
+
+    Returns:
+        A flag.
 
     Raises:
-        RigError: For a file that is no TOML.
+        RigError: The file is not TOML.
+
+    Examples:
+        >>> from jaxcam.data import DEMO_RIG
+        >>> from jaxcam.fitting import is_setup
+        >>> is_setup(DEMO_RIG / "rig.toml")
+        False
     """
     return not {"system", "parameters", "channels"}.isdisjoint(read_tables(Path(path)))
 
@@ -110,7 +135,7 @@ def _class(file: Path, tables, system) -> type[HybridSystem]:
     named = tables.get("system")
     if not isinstance(named, str) or not named.strip():
         raise RigError(
-            f"{file}: it does not say which system it is the rig of; begin it with "
+            f"{file}: it does not name a system; begin it with "
             f'system = "FILE.py:CLASS".'
         )
     return system_class(named, file.parent)

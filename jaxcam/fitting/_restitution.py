@@ -24,7 +24,17 @@ _STEPS = 200
 
 @dataclasses.dataclass(frozen=True)
 class RestitutionFit:
-    """A law of restitution fitted to measured impacts."""
+    """A law of restitution fitted to measured impacts.
+
+    Examples:
+        >>> from jaxcam.fitting import impact_law
+        >>> from jaxcam.recordings import ImpactTable
+        >>> speed = np.array([1.0, 1.5, 2.0, 2.5, 3.0])
+        >>> scatter = np.array([1e-3, -1e-3, 2e-3, -2e-3, 1e-3])
+        >>> law = impact_law(ImpactTable("drops", speed, 0.8 * speed + scatter))
+        >>> round(float(law.laws["constant"].values[0]), 2)
+        0.8
+    """
 
     law: eqx.Module
     """The fitted law, a Module for `CamFollower(restitution=...)`."""
@@ -42,7 +52,7 @@ class RestitutionFit:
     their ratio is one where the law says all there is."""
 
     def sentence(self) -> str:
-        """The law in words."""
+        """Return the law in words."""
         parts = ", ".join(
             f"{n} = {v:.5g} +- {e:.1g}"
             for n, v, e in zip(self.names, self.values, self.stderr)
@@ -55,7 +65,10 @@ class RestitutionFit:
 
 
 def restitution_laws(segments: Sequence[Segments]) -> dict[str, RestitutionFit]:
-    """Three laws fitted to the impacts of some recordings.
+    """Fit three restitution laws to the impacts of some recordings.
+
+    Args:
+        segments: The recordings, cut into their parts.
 
     Returns:
         `"constant"`, `"speed"` (linear in the speed of the drive, Figure 4.15 of the
@@ -63,7 +76,15 @@ def restitution_laws(segments: Sequence[Segments]) -> dict[str, RestitutionFit]:
             whose parameters the impacts do not determine.
 
     Raises:
-        RecordingError: Where there are too few impacts.
+        RecordingError: There are too few impacts.
+
+    Examples:
+        >>> from jaxcam.data import DEMO_RIG
+        >>> from jaxcam.fitting import restitution_laws
+        >>> from jaxcam.recordings import read_case, read_rig, segment_case
+        >>> parts = segment_case(read_case(DEMO_RIG), read_rig(DEMO_RIG / "rig.toml"))
+        >>> "constant" in restitution_laws(parts)
+        True
     """
     approach = np.concatenate([part.impacts.approach for part in segments])
     usual = float(np.median(approach[approach > 0])) if np.any(approach > 0) else 1.0
@@ -91,19 +112,32 @@ def restitution_laws(segments: Sequence[Segments]) -> dict[str, RestitutionFit]:
 def fit_restitution(
     segments: Sequence[Segments], law: eqx.Module, names: Sequence[str]
 ) -> RestitutionFit:
-    """Fit parameters of a law to the speeds before and after every impact.
+    """Fit parameters of a restitution law to the speeds before and after every impact.
 
     The misfit of an impact is its separation speed less r times its approach speed,
     over the error that both speeds and that of the surface give it. Levenberg-Marquardt
     (optimistix); an outlier counts by its size.
 
     Args:
-        segments: From `segment_case` or `segment`.
-        law: Called as `law(speed, approach_speed)`; where to start.
-        names: Its fields to fit; the others stay.
+        segments: Segments from `segment_case` or `segment`.
+        law: Initial law, called as `law(speed, approach_speed)`.
+        names: Fields of the law to fit; the others stay.
+
+    Returns:
+        A [`jaxcam.fitting.RestitutionFit`][].
 
     Raises:
-        RecordingError: Where there are fewer impacts than parameters.
+        RecordingError: There are fewer impacts than parameters.
+
+    Examples:
+        >>> from jaxcam.data import DEMO_RIG
+        >>> from jaxcam.fitting import fit_restitution
+        >>> from jaxcam.models import ConstantRestitution
+        >>> from jaxcam.recordings import read_case, read_rig, segment_case
+        >>> parts = segment_case(read_case(DEMO_RIG), read_rig(DEMO_RIG / "rig.toml"))
+        >>> found = fit_restitution(parts, ConstantRestitution(0.5), ["r"])
+        >>> bool(0 < found.values[0] < 1)
+        True
     """
     impacts = [part.impacts for part in segments]
     speed = np.concatenate(
@@ -207,16 +241,26 @@ def _normal(law, names, values, data):
 def first_bounce(
     system: HybridSystem, segments: Segments, drive: Turning
 ) -> Float[np.ndarray, " turns"]:
-    """Restitution from the height of the first bounce, the thesis' procedure (4.6.1).
+    """Compute the restitution from the height of the first rebound (thesis, section
+    4.6.1).
 
-    After each release the first impact ends the high flight of that turn. The system
+    After each release the first impact ends the high flight of that period. The system
     is started on the surface at that impact with a separation speed such that the next
     flight rises as high above the cam as the recorded one; the coefficient is this
-    speed over the recorded approach speed. For comparison: unlike a fit of whole
-    trajectories it uses one number a turn, and that one is the largest of noisy ones.
+    speed over the recorded approach speed. Unlike a fit of whole
+    trajectories it uses one number per period, the largest of several noisy ones.
+
+    Args:
+        system: The system.
+        segments: A recording, cut into its parts.
+        drive: The measured drive.
 
     Returns:
-        One coefficient for each turn that has such a pair of flights.
+        One coefficient for each period that has such a pair of flights, shape
+            `(turns,)`.
+
+    Raises:
+        RecordingError: The recording has no measured drive.
     """
     impacts, flights = segments.impacts, segments.flights
     if segments.drive is None:

@@ -61,8 +61,11 @@ class Trained(NamedTuple):
     """The result of `train`: the trained part, and the cost before and after."""
 
     values: Any
+    """The trained field, or tuple of fields."""
     before: float
+    """Cost before."""
     after: float
+    """Cost after."""
 
 
 def train(
@@ -78,13 +81,17 @@ def train(
     are fitted first, so that the gradient is that of the best cost.
 
     Args:
+        problem: The problem.
         where: Picks a field, or a tuple of fields, out of the model:
             `lambda m: m.system.network`.
-        steps: Of L-BFGS, at most.
+        steps: Largest number of L-BFGS steps.
         progress: Called after each evaluation with its number and its cost.
 
+    Returns:
+        A `Trained`.
+
     Raises:
-        ValueError: For a problem with a number that each record has its own of.
+        ValueError: A number of the problem differs from record to record.
     """
     own = [p.name for p in problem.parameters if p.per_record or p.known is not None]
     if own:

@@ -25,29 +25,38 @@ from .engine import (
 class Linearised:
     """The likelihood about a fit as a quadratic function of all parameters.
 
-    In units of each parameter's scale, states eliminated; `information` of the data
-    alone, `prior` that of what was known beforehand (a diagonal), `score` of both.
+    In units of each parameter's scale, with states eliminated.
     """
 
     problem: Problem
+    """The problem."""
     names: tuple[str, ...]
+    """Names of the parameters."""
     columns: Columns
+    """The free numbers."""
     information: Float[np.ndarray, "g g"]
+    """Information of the data alone, shape `(g, g)`."""
     score: Float[np.ndarray, " g"]
+    """Score of data and prior, shape `(g,)`."""
     prior: Float[np.ndarray, " g"]
+    """Diagonal of the prior's information, shape `(g,)`."""
 
     def gain(self, names: Iterable[str], beside: Iterable[str] = ()) -> float:
-        """By how much twice the log-likelihood would grow if `names` were freed.
+        """Return the gain of twice the log-likelihood if `names` were freed.
 
-        **Arguments:** `beside` are parameters that are free in any case, and take up
-        what they can.
+        Args:
+            names: Names of the parameters to free.
+            beside: Parameters that are free in any case, and absorb part of the gain.
+
+        Returns:
+            The gain.
         """
         names, beside = tuple(names), tuple(beside)
         with_, without = self._best((*names, *beside)), self._best(beside)
         return with_ - without
 
     def step(self, names: Iterable[str]) -> dict[str, tuple[float, float]]:
-        """Change of each of the freed parameters, and its standard error.
+        """Return the change of each freed parameter, and its standard error.
 
         Exact where the likelihood is quadratic. Parameters that differ from record to
         record are named `name@record`.
@@ -83,9 +92,23 @@ class Linearised:
 def linearise(
     problem: Problem, found: Fit, *, weights: Weights | None = None, prior: bool = True
 ) -> Linearised:
-    """Score and information of all parameters about a fit.
+    """Return score and information of all parameters about a fit.
 
-    **Arguments:** as for `fit`.
+    The example continues that of [`jaxcam.fitting.fit`][].
+
+    Args:
+        problem: The problem.
+        found: The fit.
+        weights: As for [`jaxcam.fitting.fit`][].
+        prior: As for [`jaxcam.fitting.fit`][].
+
+    Returns:
+        A `Linearised`.
+
+    Examples:
+        >>> from jaxcam.fitting import linearise
+        >>> linearise(problem, found).names
+        ('gravity',)
     """
     columns = free_columns(problem, None)
     blocks, _ = assemble(

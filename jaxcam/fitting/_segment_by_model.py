@@ -27,22 +27,36 @@ def segment_by_model(
     drive_channel: str | None = None,
     restitution: float = 0.5,
 ) -> tuple[Segments, ...]:
-    """Cut recordings at every gap of a model's system, as its channels show them.
+    """Cut recordings at every gap of a model's system, as measured by its channels.
 
-    A gap is computed from the measured components of the state, and put to zero where
-    the velocity of the gap jumps, as far as the tolerances of the parameters allow.
+    A gap is computed from the measured components of the state, and set to zero where
+    its velocity jumps, as far as the tolerances of the parameters allow.
     Without a gap the whole record is one flight.
 
     Args:
-        model: Its system and sensors. Components of the state are seen by sensors whose
+        model: The model. Components of the state are measured by sensors whose
             `observe` is a number and that have no bandwidth.
-        parameters: Whose tolerances say how far a gap may be off.
+        recordings: The recordings.
+        parameters: Parameters whose tolerances limit the error of a gap.
         drive_channel: The encoder of a drive (rad), of a model with a `Turning` drive.
-        restitution: Expected, for the bounces that are too low to be seen.
+        restitution: Expected coefficient, for impacts too low to be observed.
+
+    Returns:
+        The segments of each recording.
 
     Raises:
-        RecordingError: For a missing channel, or a gap that depends on a state that no
-            channel sees.
+        RecordingError: A channel is missing, or a gap depends on a state that no
+            channel measures.
+
+    Examples:
+        >>> from jaxcam import fitting, recordings
+        >>> from jaxcam.models import BouncingBall
+        >>> ball, rng = BouncingBall(), np.random.default_rng(0)
+        >>> sensors = {"height_m": fitting.Sensor(0, noise=1e-3)}
+        >>> run = recordings.record(ball, sensors, 1.0, rng=rng, state=[1.0, 0.0])
+        >>> parts = fitting.segment_by_model(fitting.Model(ball, sensors), [run])
+        >>> parts[0].impacts.count
+        1
     """
     picks = {
         sensor.observe: name
@@ -144,6 +158,7 @@ def _refuse_unseen(model: Model, picks, recording, slopes) -> None:
             name = f"`{names[place]}`" if names else f"component {place} of the state"
             raise RecordingError(
                 f"{recording.name}: gap {number + 1} depends on {name}, which no "
-                f"channel sees; give a sensor whose `observe` is {place}, without a "
+                f"channel measures; give a sensor whose `observe` is {place}, without "
+                "a "
                 f"bandwidth."
             )

@@ -15,23 +15,31 @@ from .engine import Input, Model, Parameter, Problem
 
 @dataclasses.dataclass(frozen=True)
 class Setup:
-    """A rig file of a system of one's own; `read_setup` reads it."""
+    """A rig file of a system of one's own; `read_setup` reads it.
+
+    Examples:
+        >>> from jaxcam.data import DEMO_RIG
+        >>> from jaxcam.fitting import read_setup
+        >>> setup = read_setup(DEMO_RIG.parent / "new_rig" / "cart.toml")
+        >>> len(setup.parameters) > 0
+        True
+    """
 
     model: Model
     """The system at its nominal values, with its sensors and its drive."""
     parameters: tuple[Parameter, ...] = ()
-    """What is fitted, each within its tolerance."""
+    """Parameters to fit, each within its tolerance."""
     drive_channel: str | None = None
-    """Of the encoder of a turning drive (rad), or `None`."""
+    """Channel of the encoder of a turning drive (rad), or `None`."""
     references: Mapping[str, float] = dataclasses.field(default_factory=dict)
     """Constants of the forms of missing physics that are stated, by the names of fields
     of `jaxcam.recordings.References`, in the units of the motion; the others follow its
     speeds."""
     records: Mapping[str, Mapping[str, float]] = dataclasses.field(default_factory=dict)
-    """What is known of some records alone, by patterns of their names:
-    `{"run3*": {"mass": 0.31}}`; of several that fit, the last one counts."""
+    """Known constants of single records, by patterns of their names:
+    `{"run3*": {"mass": 0.31}}`; of several that match, the last one counts."""
     files: FileLayout = FileLayout()
-    """How the columns of recordings are called, and their rate."""
+    """Names of the columns of recordings, and their sampling rate."""
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -49,11 +57,14 @@ class Setup:
         split: str | None = None,
         gaps: Literal["refuse", "split", "mend"] = "refuse",
     ) -> Case:
-        """The recordings in a folder, as `jaxcam.recordings.read_case` does it, with
-        the names of columns and the constants that the rig states.
+        """Return the recordings in a folder, with the columns and constants of the rig.
+
+        As `jaxcam.recordings.read_case`, with the names of columns and the constants
+        that the rig states.
 
         Raises:
-            RecordingError: Also for constants of a record that is not there.
+            RecordingError: As for `read_case`; or constants belong to a record that
+                does not exist.
         """
         case = read_case(
             folder,
@@ -66,10 +77,10 @@ class Setup:
         return self.known_of(case)
 
     def known_of(self, case: Case) -> Case:
-        """The case with what the rig knows of each record.
+        """Return the case with the constants that the rig states for each record.
 
         Raises:
-            RecordingError: For constants of a record that is not there.
+            RecordingError: Constants belong to a record that does not exist.
         """
         for pattern in self.records:
             if not any(_fits(run.name, pattern) for run in case):
@@ -92,11 +103,11 @@ class Setup:
     def segments(
         self, recordings: Iterable[Recording | Segments]
     ) -> tuple[Segments, ...]:
-        """Recordings cut at the gaps of the system; those that are all cut stay.
+        """Return recordings cut at the gaps of the system; those already cut stay.
 
         Raises:
-            RecordingError: For a channel that is missing, or a gap that no channel
-                shows.
+            RecordingError: A channel is missing, or a gap is not measured by any
+                channel.
         """
         runs = tuple(
             dataclasses.replace(run, recording=self._with_known(run.recording))
@@ -113,10 +124,10 @@ class Setup:
         )
 
     def problem(self, recordings: Iterable[Recording | Segments]) -> Problem:
-        """Recordings, cut already or not, ready to be fitted.
+        """Return the fitting problem of recordings, cut already or not.
 
         Raises:
-            ValueError: as `segments` and `Problem.build` do.
+            ValueError: As for `segments` and `Problem.build`.
         """
         return Problem.build(self.model, self.segments(recordings), self.parameters)
 

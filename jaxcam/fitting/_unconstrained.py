@@ -18,15 +18,15 @@ _MEMBER = 0.1
 
 @dataclasses.dataclass(frozen=True)
 class Unconstrained:
-    """Parameters that can change together and the data stay the same."""
+    """A combination of parameters that can change without changing the data."""
 
     names: tuple[str, ...]
-    """Of parameters, `name@record` where each record has its own."""
+    """Names of the parameters, `name@record` where each record has its own."""
     shares: Float[np.ndarray, " k"]
-    """How far each moves, in its own unit, the largest of them by its scale."""
+    """Change of each parameter, in its own unit, the largest of them by its scale."""
 
     def sentence(self) -> str:
-        """The combination, and what to do, in words."""
+        """Return the combination, and the remedy, in words."""
         if len(self.names) == 1:
             return (
                 f"The data say nothing of {self.names[0]}; hold it or give a tolerance."

@@ -110,7 +110,7 @@ def border_collision(
     if abs(float(moved.left(zero) - moved.right(zero))) > 1e-9:
         raise ValueError(
             "The map jumps at its border, where Feigin's classification does not "
-            "apply; look at its attractors on both sides instead."
+            "apply; compute its attractors on both sides instead."
         )
     left, right = (jax.grad(rule)(zero) for rule in (moved.left, moved.right))
     found = classify_border_collision(float(left), float(right))

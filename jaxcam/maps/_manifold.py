@@ -68,7 +68,8 @@ def saddle_at(system: Callable, guess: VectorLike) -> Saddle:
     if np.any(np.imag(values) != 0) or not np.abs(values[0]) < 1 < np.abs(values[1]):
         raise ValueError(
             f"The fixed point at {np.asarray(point).tolist()} has multipliers "
-            f"{values[0]:.4g} and {values[1]:.4g}, so it is no saddle; look elsewhere."
+            f"{values[0]:.4g} and {values[1]:.4g}, so it is not a saddle; give "
+            "another guess."
         )
     return Saddle(point, np.real(values), np.real(vectors))
 

@@ -100,7 +100,7 @@ def load_system(file: str | Path, *, classes: Iterable[type] = ()) -> HybridSyst
         found = json.loads(file.read_text("utf-8"))
     except (ValueError, RecursionError):
         raise ValueError(
-            f"{file}: this is no JSON; give a file that `jaxcam fit` or `save_system` "
+            f"{file}: this is not JSON; give a file that `jaxcam fit` or `save_system` "
             f"wrote."
         ) from None
     try:
@@ -141,7 +141,7 @@ def system_from_json(found: Any, *, classes: Iterable[type] = ()) -> HybridSyste
     """
     if not isinstance(found, dict) or found.get("format") != _FORMAT:
         raise ValueError(
-            f'this is no saved system: it lacks "format": "{_FORMAT}"; give a file '
+            f'this is not a saved system: it lacks "format": "{_FORMAT}"; give a file '
             f"that `jaxcam fit` or `save_system` wrote."
         )
     if found.get("version") != _VERSION:
@@ -152,7 +152,9 @@ def system_from_json(found: Any, *, classes: Iterable[type] = ()) -> HybridSyste
     known = {cls.__name__: cls for cls in (*_KNOWN, *classes)}
     system = _decode(found.get("system"), known, "system")
     if not isinstance(system, HybridSystem):
-        raise ValueError(f"{type(system).__name__} is no system; save a system.")
+        raise ValueError(
+            f"{type(system).__name__} is not a HybridSystem; save a HybridSystem."
+        )
     try:
         with np.errstate(all="ignore"):
             system.check()
@@ -192,7 +194,9 @@ def _decode(found: Any, known: dict[str, type], place: str) -> Any:
         try:
             return jnp.asarray(np.asarray(found, dtype=float))
         except (*_MISFITS, ValueError):
-            raise ValueError(f"`{place}` is no list of numbers; correct it.") from None
+            raise ValueError(
+                f"`{place}` is not a list of numbers; correct it."
+            ) from None
     if isinstance(found, bool) or found is None or isinstance(found, str):
         return found
     if isinstance(found, int | float):

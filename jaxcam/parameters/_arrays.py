@@ -11,7 +11,7 @@ _Tree = TypeVar("_Tree")
 
 
 def as_arrays(tree: _Tree) -> _Tree:
-    """The same tree with every Python or NumPy float as a float64 array.
+    """Return the same tree with every Python or NumPy float as a float64 array.
 
     A field declared as `stiffness: float = 3.0` is then a parameter like any other.
     Arrays, traced values, integers and flags stay as they are.

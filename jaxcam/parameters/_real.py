@@ -5,7 +5,7 @@ import jax.numpy as jnp
 
 
 def real_array(values, name: str = "state") -> jax.Array:
-    """An array of 64-bit floats.
+    """Return an array of 64-bit floats.
 
     Args:
         values: Numbers.

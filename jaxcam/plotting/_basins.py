@@ -38,21 +38,28 @@ def basin_picture(
     axes: tuple[int, int] = (0, 1),
     orbits: bool = True,
 ) -> Figure:
-    """Draw which state ends on which attractor, a colour an attractor.
+    """Draw basins of attraction, one colour per attractor.
 
     Args:
-        basins: From [`jaxcam.sweeps.basins`][]; other components than those of `axes`
-            must have one value.
-        ax: Axes; a new figure without.
-        axes: The components along x and y.
-        orbits: Whether the points of the attractors are marked.
+        basins: Basins from [`jaxcam.sweeps.basins`][]; components other than those of
+            `axes` must have one value.
+        ax: Axes to draw on; default a new figure.
+        axes: Components along x and y.
+        orbits: Whether to mark the points of the attractors.
 
     Returns:
         The figure.
 
     Raises:
-        ValueError: Where a component that is not drawn has several values, or one that
-            is drawn has one.
+        ValueError: A component that is not drawn has several values, or one that is
+            drawn has one.
+
+    Examples:
+        >>> from jaxcam import sweeps
+        >>> from jaxcam.plotting import basin_picture
+        >>> f = lambda x, p: jnp.stack([1.5 * x[0] - 0.5 * x[0] ** 3, x[1] / 2])
+        >>> grid = sweeps.Grid([-1.0, -1.0], [1.0, 1.0], [10, 10])
+        >>> figure = basin_picture(sweeps.basins(sweeps.Map(f), grid))
     """
     ax = one_axes(ax)
     grid = basins.grid

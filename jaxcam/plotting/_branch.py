@@ -59,19 +59,26 @@ def branch_diagram(
     """Draw branches: stable parts solid, unstable ones dashed, special points marked.
 
     Args:
-        branches: From `continuation.branch`, one or several.
-        ax: Axes; a new figure without.
-        value: What is drawn against the parameter, a number or several from each point;
-            without, the first component of the state once a forcing period, where the
-            points have it, or else of their solution.
-        x_label: Name and unit of both axes; the parameter's name without.
-        y_label: Name and unit of both axes; the parameter's name without.
-        x_scale: By which parameters are multiplied (30/pi for a speed in rpm).
+        branches: One or several branches from `continuation.branch`.
+        ax: Axes to draw on; default a new figure.
+        value: Returns from each point the number, or several, drawn against the
+            parameter; default the first component of the state once per forcing period,
+            where the points have it, else of their solution.
+        x_label: Name and unit of the x-axis; default the parameter's name.
+        y_label: Name and unit of the y-axis.
+        x_scale: Factor of the parameters (30/pi for a speed in rpm).
         letters: Whether words name the special points besides the legend; one that
             would cover another is left out.
 
     Returns:
         The figure.
+
+    Examples:
+        >>> import continuation
+        >>> from jaxcam.plotting import branch_diagram
+        >>> problem = continuation.Equilibrium(lambda u, p: p["a"] - u**2, {"a": 1.0})
+        >>> found = continuation.branch(problem, [1.0], "a", (-1, 2), direction=-1)
+        >>> figure = branch_diagram(found)
     """
     ax = one_axes(ax)
     several: list[Any] = (

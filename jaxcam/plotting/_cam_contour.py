@@ -11,12 +11,20 @@ from ._style import CAM, IMPACT, styled
 
 @styled
 def cam_contour(contour: CamContour, ax: Axes | None = None) -> Figure:
-    """Draw a cam in its own frame, the axis it turns about, and where it is undercut.
+    """Draw a cam in its own frame, its axis, and where it is undercut.
 
-    **Arguments:** the contour over a whole turn, and where to draw.
+    Args:
+        contour: The contour over a whole turn.
+        ax: Axes to draw on; default a new figure.
 
     Returns:
         The figure.
+
+    Examples:
+        >>> from jaxcam.models import EccentricCircle, flat_oscillating_contour
+        >>> from jaxcam.plotting import cam_contour
+        >>> angles = jnp.linspace(0, 2 * jnp.pi, 50)
+        >>> drawn = cam_contour(flat_oscillating_contour(EccentricCircle(), angles))
     """
     ax = one_axes(ax)
     x, y = np.asarray(contour.x), np.asarray(contour.y)

@@ -13,16 +13,21 @@ from ._style import FLIGHT, IMPACT, RECORDED, SECTION, styled
 
 @styled
 def lambda_cobweb(r: float, ax: Axes | None = None, *, start=None) -> Figure:
-    """Draw f(lambda) with its fixed point. (Figure 6.5)
+    """Draw f(lambda) with its fixed point (thesis, Figure 6.5).
 
     Args:
         r: Coefficient of restitution.
-        ax: Where to draw; a new figure without.
-        start: First values of lambda to draw cobwebs from; without, one either side of
-            the fixed point, where chattering completes and where it is interrupted.
+        ax: Axes to draw on; default a new figure.
+        start: First values of lambda from which cobwebs are drawn; default one either
+            side of the fixed point, where chattering completes and where it is
+            interrupted.
 
     Returns:
         The figure.
+
+    Examples:
+        >>> from jaxcam.plotting import lambda_cobweb
+        >>> drawn = lambda_cobweb(0.5)
     """
     ax = one_axes(ax)
     law = scaling_law(r)
@@ -66,17 +71,22 @@ def _cobweb(lam, r, most=40):
 def beta_lobes(
     r: float, ax: Axes | None = None, *, measured=None, lobes: int = 4
 ) -> Figure:
-    """Draw beta over lambda - lambda_bar, with its corners. (Figures 6.14, 6.15)
+    """Draw beta over lambda - lambda_bar, with its corners (thesis, Figures 6.14 and
+    6.15).
 
     Args:
         r: Coefficient of restitution.
-        ax: Where to draw; a new figure without.
+        ax: Axes to draw on; default a new figure.
         measured: Deviations of lambda and the beta found by simulation, drawn under the
             theory.
-        lobes: How many of them, from the largest.
+        lobes: Number of lobes, from the largest.
 
     Returns:
         The figure.
+
+    Examples:
+        >>> from jaxcam.plotting import beta_lobes
+        >>> drawn = beta_lobes(0.5)
     """
     ax = one_axes(ax)
     bar = float(scaling_law(r).lambda_bar)
@@ -103,13 +113,21 @@ def beta_lobes(
 
 @styled
 def lobe_scaling(distance, height, kappa: float, ax: Axes | None = None) -> Figure:
-    """Draw heights of lobes over their distance from the interruption. (6.53)
+    """Draw the heights of lobes over their distance from the interruption (thesis,
+    eq. 6.53).
 
-    **Arguments:** `distance` and `height`, each `(k,)`, positive; `kappa`, the exponent
-    of the theory; `ax`, a new figure without.
+    Args:
+        distance: Distances, positive, shape `(k,)`.
+        height: Heights, positive, shape `(k,)`.
+        kappa: Exponent of the theory.
+        ax: Axes to draw on; default a new figure.
 
     Returns:
         The figure.
+
+    Examples:
+        >>> from jaxcam.plotting import lobe_scaling
+        >>> drawn = lobe_scaling(np.array([0.1, 0.01]), np.array([0.02, 0.001]), 1.3)
     """
     ax = one_axes(ax)
     distance, height = np.asarray(distance), np.asarray(height)

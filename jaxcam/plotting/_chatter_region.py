@@ -30,21 +30,28 @@ def chattering_picture(
     period: float,
     most: float | None = None,
 ) -> Figure:
-    """Draw the chattering region D and the grazing manifold. (Figures 6.2 and 6.4)
+    """Draw the chattering region D and the grazing manifold (thesis, Figures 6.2 and
+    6.4).
 
     Args:
-        frame: Of [`variational.chatter_frame`][], [`variational.chattering_region`][]
-            and [`variational.grazing_manifold`][].
-        region: Of [`variational.chatter_frame`][], [`variational.chattering_region`][]
-            and [`variational.grazing_manifold`][].
-        manifold: Of [`variational.chatter_frame`][],
-            [`variational.chattering_region`][] and [`variational.grazing_manifold`][].
-        ax: Where to draw; a new figure without.
-        period: Of the forcing (s).
-        most: Largest speed drawn; that of the region without.
+        frame: From [`variational.chatter_frame`][].
+        region: From [`variational.chattering_region`][].
+        manifold: From [`variational.grazing_manifold`][].
+        ax: Axes to draw on; default a new figure.
+        period: Forcing period (s).
+        most: Largest speed drawn; default that of the region.
 
     Returns:
         The figure: rebound speed over time from release, modulo the period.
+
+    Examples:
+        >>> import variational
+        >>> from jaxcam.models import ImpactOscillator
+        >>> from jaxcam.plotting import chattering_picture
+        >>> system = ImpactOscillator(omega=0.5, restitution=0.5)
+        >>> frame = variational.chatter_frame(system)
+        >>> region = variational.chattering_region(system, points=8, impacts=2)
+        >>> drawn = chattering_picture(frame, region, period=float(system.period))
     """
     ax = one_axes(ax)
     release = float(frame.release)

@@ -1,4 +1,4 @@
-"""A recording and simulations of it, a few turns of the cam, and what is left over."""
+"""A recording and simulations of it, a few turns of the cam, and what remains."""
 
 from collections.abc import Mapping, Sequence
 from typing import TypeAlias
@@ -35,28 +35,35 @@ def compare_recording(
 ) -> Figure:
     """Draw a recorded channel with its simulations, and the residuals below.
 
-    With a channel `cam_angle_rad` the horizontal axis counts turns of the cam, without
-    one it is time.
+    With a channel `cam_angle_rad` the horizontal axis counts turns of the cam,
+    otherwise it is time.
 
     Args:
-        recording: The run.
+        recording: The recording.
         simulated: The channel as simulated at the samples of the recording, shape
             `(k,)`, NaN where it was not; or a comparison that the recording is in; or
             several of these by name.
-        axes: Two of them; a new figure without.
+        axes: Two axes; default a new figure.
         channel: The channel to compare.
-        contact: What the channel would be in contact with the cam, shape `(k,)`; drawn
-            as the surface below the motion.
+        contact: Value of the channel in contact with the cam, shape `(k,)`; drawn as
+            the surface below the motion.
         noise: Standard deviation of a sample of the channel, in its unit; drawn as a
             band of twice that on either side.
-        turns: How many turns of the cam to draw; without a cam, all is drawn.
-        start: Where to begin (s), at the first sample without.
+        turns: Number of turns of the cam to draw; without a cam, all is drawn.
+        start: Start time (s); default the first sample.
 
     Returns:
         The figure.
 
     Raises:
-        ValueError: Where a simulation has another length than the recording.
+        ValueError: A simulation has another length than the recording.
+
+    Examples:
+        >>> from jaxcam.plotting import compare_recording
+        >>> from jaxcam.recordings import Recording
+        >>> time = np.linspace(0, 1, 50)
+        >>> run = Recording("run", time, {"angle_rad": np.sin(time)})
+        >>> figure = compare_recording(run, np.sin(time) + 0.01, channel="angle_rad")
     """
     runs = dict(simulated) if isinstance(simulated, Mapping) else {"": simulated}
     runs = {name: _samples(recording, run, channel) for name, run in runs.items()}

@@ -44,25 +44,32 @@ def sweep_diagram(
     y_label: tuple[str, str] | None = None,
     x_scale: float = 1.0,
 ) -> Figure:
-    """Draw what motions settled on over the parameter, darker where they are often.
+    """Draw a bifurcation diagram over the parameter, darker where motions are often.
 
     Dots are drawn as an image, so that millions of them stay a small file.
 
     Args:
         diagram: From [`jaxcam.sweeps.diagram`][].
-        ax: Axes; a new figure without.
-        component: Of the state.
-        phase: Draws the phase (turns) of each sample instead, for sections that are not
-            taken once a turn.
-        x_label: Name and unit of both axes.
-        y_label: Name and unit of both axes.
-        x_scale: By which parameters are multiplied (30/pi for a speed in rpm).
+        ax: Axes to draw on; default a new figure.
+        component: Component of the state to draw.
+        phase: Draw the phase (in periods) of each sample instead, for sections that are
+            not sampled once per period.
+        x_label: Name and unit of the x-axis.
+        y_label: Name and unit of the y-axis.
+        x_scale: Factor of the parameters (30/pi for a speed in rpm).
 
     Returns:
         The figure.
 
     Raises:
-        ValueError: For the phase of samples that all have the same.
+        ValueError: All samples have the same phase.
+
+    Examples:
+        >>> from jaxcam import sweeps
+        >>> from jaxcam.plotting import sweep_diagram
+        >>> logistic = sweeps.Map(lambda x, p: p["mu"] * x * (1 - x), {"mu": 3.2})
+        >>> found = sweeps.diagram(logistic, "mu", [2.8, 3.2], [0.3], keep=16)
+        >>> figure = sweep_diagram(found)
     """
     ax = one_axes(ax)
     states, values = diagram.states, x_scale * diagram.values
@@ -70,7 +77,8 @@ def sweep_diagram(
     if phase:
         if "phase" not in diagram.dataset:
             raise ValueError(
-                "samples a turn apart all have one phase; draw a diagram of impacts"
+                "samples one period apart all have the same phase; draw a diagram of "
+                "impacts"
             )
         y = diagram.dataset["phase"].values
         y_label = ("phase", "turns") if y_label is None else y_label
@@ -144,19 +152,27 @@ def sweep_chart(
     x_scale: float = 1.0,
     y_scale: float = 1.0,
 ) -> Figure:
-    """Draw the labels of a chart, a colour a label.
+    """Draw the labels of a chart, one colour per label.
 
     Args:
         chart: From [`jaxcam.sweeps.chart`][].
-        ax: Axes; a new figure without.
-        start: Which of several starts.
-        x_label: Name and unit of the first and the second parameter.
-        y_label: Name and unit of the first and the second parameter.
-        x_scale: By which parameters are multiplied.
-        y_scale: By which parameters are multiplied.
+        ax: Axes to draw on; default a new figure.
+        start: Index of the start, if there are several.
+        x_label: Name and unit of the first parameter.
+        y_label: Name and unit of the second parameter.
+        x_scale: Factor of the first parameter.
+        y_scale: Factor of the second parameter.
 
     Returns:
         The figure.
+
+    Examples:
+        >>> from jaxcam import sweeps
+        >>> from jaxcam.plotting import sweep_chart
+        >>> f = lambda x, p: p["a"] + p["b"] * x - x**2
+        >>> quadratic = sweeps.Map(f, {"a": 0.0, "b": 0.5})
+        >>> found = sweeps.chart(quadratic, ("a", "b"), [0.0, 0.1], [0.4, 0.5], [0.1])
+        >>> figure = sweep_chart(found)
     """
     ax = one_axes(ax)
     labels = chart.labels[..., start].astype(str)

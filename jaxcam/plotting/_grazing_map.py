@@ -21,21 +21,27 @@ def cobweb(
     edge: float | None = None,
     name: str = "x",
 ) -> Figure:
-    """Draw a map, the line on which nothing changes, and the cobweb of one motion.
+    """Draw a map, the diagonal, and the cobweb of one orbit.
 
     Args:
-        function: The map of a vector of points, such as
+        function: The map, of a vector of points, such as
             `lambda x: variational.nordmark_map(x, mu, lam)`.
-        start: Where the motion starts; `turns` steps are drawn after `skip` others.
-        ax: Where to draw; a new figure without.
+        start: First point of the orbit.
+        turns: Number of iterations drawn.
+        ax: Axes to draw on; default a new figure.
+        skip: Number of iterations before that.
         edge: Where impacts begin, marked by a dashed line.
-        name: Of the variable, in TeX.
+        name: Name of the variable, in TeX.
 
     Returns:
         The figure.
 
     Raises:
-        ValueError: For a motion that does not stay finite.
+        ValueError: The orbit does not stay finite.
+
+    Examples:
+        >>> from jaxcam.plotting import cobweb
+        >>> figure = cobweb(lambda x: 3.2 * x * (1 - x), 0.3)
     """
     x, points = float(start), []
     with np.errstate(over="ignore", invalid="ignore"):
@@ -44,7 +50,7 @@ def cobweb(
             x = float(np.asarray(function(np.array([x])))[0])
     points = np.array([*points[skip:], x])
     if not np.all(np.isfinite(points)):
-        raise ValueError("the motion leaves every bound; give another start")
+        raise ValueError("the orbit diverges; give another start")
     low, high = points.min(), points.max()
     if edge is not None:
         low, high = min(low, edge), max(high, edge)

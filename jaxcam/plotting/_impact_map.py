@@ -27,24 +27,30 @@ def impact_return_map(
     period: float | None = None,
     between: tuple[float, float] | None = None,
 ) -> Figure:
-    """Draw impact k+1 against impact k, with the line on which they are equal.
+    """Draw impact k+1 against impact k, with the diagonal.
 
-    The first panel shows when the impacts happen, the second their speed of approach
-    (the normal speed just before). Points on the line are impacts that repeat.
+    The first panel shows the impact times, the second the approach speeds
+    (the normal speed just before). Points on the diagonal are impacts that repeat.
 
     Args:
-        trajectory: What `jaxcam.simulate` returned.
-        axes: Two of them; a new figure without.
+        trajectory: A trajectory of `jaxcam.simulate`.
+        axes: Two axes; default a new figure.
         against: "phase" for the phase of the forcing (rad, from 0 to 2 pi), "time" for
             the time itself (s), which is also drawn where there is no period.
-        period: Of the forcing (s); the system's own without.
-        between: The span of time to draw (s), for example without a transient.
+        period: Forcing period (s); default the system's own.
+        between: Time span to draw (s), for example without a transient.
 
     Returns:
         The figure.
 
     Raises:
-        ValueError: For another `against` or a wrong number of axes.
+        ValueError: `against` is unknown, or the number of axes is wrong.
+
+    Examples:
+        >>> from jaxcam.models import BouncingBall
+        >>> from jaxcam.plotting import impact_return_map
+        >>> trajectory = jaxcam.simulate(BouncingBall(), [1.0, 0.0], 0.0, 2.0)
+        >>> figure = impact_return_map(trajectory, against="time")
     """
     if against not in ("phase", "time"):
         raise ValueError(f'against is {against!r}; choose "phase" or "time".')

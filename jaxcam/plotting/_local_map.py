@@ -20,17 +20,24 @@ def local_map(
     shift: float = 0.0,
     turns: int = 60,
 ) -> Figure:
-    """Draw the fitted map over the measured one, with a cobweb. (Figures 5.25, 5.26)
+    """Draw the fitted map over the measured one, with a cobweb (thesis, Figures 5.25,
+    5.26).
 
     Args:
-        local: What [`variational.fit_local_map`][] returned.
+        local: From [`variational.fit_local_map`][].
         lobes: The measurement, drawn as dots and only without a shift.
-        ax: Where to draw; a new figure without.
-        shift: How far the map is moved to the left, as a parameter moves it.
-        turns: Steps of the cobweb, the first half of which is not drawn.
+        ax: Axes to draw on; default a new figure.
+        shift: Distance by which the map is moved to the left, as by a parameter.
+        turns: Number of iterations of the cobweb, the first half of which is not drawn.
 
     Returns:
         The figure.
+
+    Examples:
+        >>> from jaxcam.plotting import local_map
+        >>> from variational.chatter import LocalMap
+        >>> numbers = (-1.0, -1.0, 1.0, 1.0, [0.0, 1.0], 0.5, 1.0, 0.0)
+        >>> drawn = local_map(LocalMap(*map(jnp.asarray, numbers)))
     """
     ax = one_axes(ax)
     x_0, x_inf = float(local.x_0), float(local.x_inf)

@@ -10,17 +10,26 @@ from ._style import BAND, styled
 
 @styled
 def lyapunov_convergence(spectrum, ax: Axes | None = None) -> Figure:
-    """Draw the exponents over the first turns, with their standard errors.
+    """Draw the exponents over the first periods, with their standard errors.
 
     Args:
-        spectrum: Of one motion, from `variational.lyapunov_spectrum`.
-        ax: Where to draw; a new figure without.
+        spectrum: Spectrum of one motion from `variational.lyapunov_spectrum`.
+        ax: Axes to draw on; default a new figure.
 
     Returns:
         The figure.
 
     Raises:
-        ValueError: For the spectra of many motions.
+        ValueError: The spectra are those of many motions.
+
+    Examples:
+        >>> from jaxcam.models import ImpactOscillator
+        >>> from jaxcam.plotting import lyapunov_convergence
+        >>> from variational import lyapunov_spectrum
+        >>> system = ImpactOscillator(omega=3.5, wall=-0.2, damping=0.02)
+        >>> start = jnp.array([-0.9, 0.0])
+        >>> found = lyapunov_spectrum(system, start, turns=50, transient=20)
+        >>> figure = lyapunov_convergence(found)
     """
     running = np.asarray(spectrum.running)
     if running.ndim != 2:

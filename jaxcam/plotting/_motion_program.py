@@ -15,19 +15,26 @@ _POINTS = 200
 
 @styled
 def motion_program(program: MotionProgram, axes=None, *, unit: str = "rad") -> Figure:
-    """Draw lift, velocity, acceleration and jerk, for each radian of the cam.
+    """Draw lift, velocity, acceleration and jerk, per radian of the cam.
 
-    Where a derivative jumps the curve is broken: the values on both sides are marked by
+    Where a derivative jumps the curve is broken: the values on both sides are joined by
     a dashed line. A jump of the derivative before it, which is a pulse of unbounded
     height, is not drawn.
 
     Args:
-        program: What to draw.
-        axes: Four of them; a new figure without.
-        unit: Of the lift, "rad" or "m".
+        program: The motion program.
+        axes: Four axes; default a new figure.
+        unit: Unit of the lift, "rad" or "m".
 
     Returns:
         The figure.
+
+    Examples:
+        >>> from jaxcam.models import MotionProgram, Segment
+        >>> from jaxcam.plotting import motion_program
+        >>> rises = (0.01, -0.01)
+        >>> program = MotionProgram([Segment("cycloidal", np.pi, r) for r in rises])
+        >>> drawn = motion_program(program, unit="m")
     """
     figure, axes = several_axes(axes, (4, 1), sharex=True, figsize=(6.4, 8.4))
     axes = axes[:, 0]

@@ -1,4 +1,4 @@
-"""Floquet multipliers in the complex plane, beside the unit circle."""
+"""Floquet multipliers in the complex plane, with the unit circle."""
 
 from collections.abc import Sequence
 
@@ -17,13 +17,18 @@ def multipliers(
     """Draw multipliers of one orbit, or of many, and the unit circle.
 
     Args:
-        values: Complex, shape `(n,)`, or `(orbits, n)` for the orbits of a branch.
-        ax: Where to draw; a new figure without.
-        reach: Half the width of the picture; without, so that all fit in. Multipliers
+        values: Multipliers, complex, shape `(n,)`, or `(orbits, n)` for the orbits of a
+            branch.
+        ax: Axes to draw on; default a new figure.
+        reach: Half the width of the picture; default such that all fit in. Multipliers
             beyond it are marked at the edge.
 
     Returns:
         The figure.
+
+    Examples:
+        >>> from jaxcam.plotting import multipliers
+        >>> figure = multipliers(np.array([0.5 + 0.5j, 0.5 - 0.5j]))
     """
     values = np.atleast_2d(np.asarray(values, dtype=complex)).ravel()
     values = values[np.isfinite(values)]

@@ -22,23 +22,29 @@ def phase_portrait(
     between: tuple[float, float] | None = None,
     samples: int = 1500,
 ) -> Figure:
-    """Draw a trajectory in the plane of two components of the state.
+    """Draw a trajectory in the plane of two state components.
 
     Flights and contacts are lines of different colour, jumps at impacts are thin and
-    dashed, and the stroboscopic points, one a period, are dots.
+    dashed, and the stroboscopic points, one per period, are dots.
 
     Args:
-        trajectory: What `jaxcam.simulate` returned.
-        ax: Where to draw; a new figure without.
-        components: Which component goes to the right and which goes up.
-        period: Time between stroboscopic points (s); the period of the forcing without,
-            and no points for a system that has none.
+        trajectory: A trajectory of `jaxcam.simulate`.
+        ax: Axes to draw on; default a new figure.
+        components: Components along x and y.
+        period: Time between stroboscopic points (s); default the forcing period, and no
+            points for a system without one.
         phase: Time from t0 to one of these points (s).
-        between: The span of time to draw (s), the whole trajectory without.
-        samples: Points of a curve, besides those that short flights need.
+        between: Time span to draw (s); default the whole trajectory.
+        samples: Number of points of a curve, besides those that short flights need.
 
     Returns:
         The figure.
+
+    Examples:
+        >>> from jaxcam.models import BouncingBall
+        >>> from jaxcam.plotting import phase_portrait
+        >>> trajectory = jaxcam.simulate(BouncingBall(), [1.0, 0.0], 0.0, 1.0)
+        >>> drawn = phase_portrait(trajectory)
     """
     drawn = trajectory_curve(trajectory, between, samples)
     ax = one_axes(ax)

@@ -34,22 +34,32 @@ def residual_by_mode(
     """Draw recording minus model, one row for each mode and channel.
 
     On the left the residuals, with a grey band of twice the noise on either side; on
-    the right how many there are of each size (bars), and how many there would be if
-    there were noise alone (black line). Impacts carry their standard errors.
+    the right their histogram (bars), and that of the noise
+    alone (black line). Impacts carry their standard errors.
 
     Args:
-        comparison: What `jaxcam.recordings.compare` or `compare_case` returned.
-        axes: Two for each mode and channel, row by row; a new figure without.
-        record: Name of the only recording to draw; all of them without, each in its own
-            colour.
+        comparison: From `jaxcam.recordings.compare` or `compare_case`.
+        axes: Two axes for each mode and channel, row by row; default a new figure.
+        record: Name of the only recording to draw; default all, each in its own colour.
         against: "time" (s), or "phase" for the angle of the cam within its turn (rad).
 
     Returns:
         The figure.
 
     Raises:
-        ValueError: Where there is nothing to draw, no cam to take the phase of, or for
-            another `against`.
+        ValueError: There is nothing to draw, no cam to take the phase of, or `against`
+            is unknown.
+
+    Examples:
+        >>> from jaxcam.models import BouncingBall
+        >>> from jaxcam.plotting import residual_by_mode
+        >>> from jaxcam.recordings import Recording, compare, segment
+        >>> ball, time = BouncingBall(), np.linspace(0.0, 1.0, 1001)
+        >>> motion = jaxcam.simulate(ball, [1.0, 0.0], 0.0, 1.0)
+        >>> height = np.random.default_rng(0).normal(motion.at(time)[:, 0], 1e-4)
+        >>> run = Recording("run", time, {"height_m": height})
+        >>> parts = segment(run, "height_m", 0.0)
+        >>> figure = residual_by_mode(compare(ball, parts))
     """
     if against not in ("time", "phase"):
         raise ValueError(f'against is {against!r}; choose "time" or "phase".')

@@ -30,24 +30,33 @@ def special_curves(
 ) -> Figure:
     """Draw curves of special points in the plane of two parameters.
 
-    Each kind of point has the colour that it has on a branch. Points of codimension two
+    Each kind of point has the same colour as on a branch. Points of codimension two
     on the curves, and crossings with other curves found there, are marked and named.
 
     Args:
-        curves: From `continuation.curve`, one or several, all in the same parameters.
-        ax: Axes; a new figure without.
-        x_label: Name and unit of the first and the second parameter; the parameters'
-            names without.
-        y_label: Name and unit of the first and the second parameter; the parameters'
-            names without.
-        x_scale: By which they are multiplied (30/pi for a speed in rpm).
-        y_scale: By which they are multiplied (30/pi for a speed in rpm).
+        curves: One or several curves from `continuation.curve`, all in the same
+            parameters.
+        ax: Axes to draw on; default a new figure.
+        x_label: Name and unit of the first parameter; default its name.
+        y_label: Name and unit of the second parameter; default its name.
+        x_scale: Factor of the first parameter (30/pi for a speed in rpm).
+        y_scale: Factor of the second parameter.
 
     Returns:
         The figure.
 
     Raises:
-        ValueError: For branches in one parameter.
+        ValueError: A branch is in one parameter only.
+
+    Examples:
+        >>> import continuation
+        >>> from jaxcam.plotting import special_curves
+        >>> field = lambda u, p: p["a"] + p["b"] * u + u**3
+        >>> problem = continuation.Equilibrium(field, {"a": 2.0, "b": -1.0})
+        >>> found = continuation.branch(problem, [-1.52], "a", (-2, 2.5), direction=-1)
+        >>> where = lambda p: p["a"], lambda p: p["b"]
+        >>> curve = continuation.curve(found.special[0], where, ((-2, 2.5), (-2, 1)))
+        >>> figure = special_curves(curve)
     """
     ax = one_axes(ax)
     several: list[Branch] = (

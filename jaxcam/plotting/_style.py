@@ -34,7 +34,16 @@ def gap_colour(number: int) -> str:
 
 
 def style():
-    """Context manager: figures made inside it follow the project's style."""
+    """Return a context in which figures follow the project's style.
+
+    Returns:
+        A context manager.
+
+    Examples:
+        >>> from jaxcam.plotting import multipliers, style
+        >>> with style():
+        ...     figure = multipliers(np.array([0.5]))
+    """
     return plt.style.context(_STYLE_FILE)
 
 
@@ -52,7 +61,19 @@ def styled(function: Callable[_P, _R]) -> Callable[_P, _R]:
 def save_figure(figure: Figure, path: str | Path) -> Path:
     """Write a figure to a file, in the style's resolution, and close it.
 
-    The folder is made where it is missing; the ending of the name sets the format.
+    The folder is created if it does not exist; the suffix of the name sets the format.
+
+    Args:
+        figure: The figure.
+        path: The file to write.
+
+    Returns:
+        The path.
+
+    Examples:
+        >>> from jaxcam.plotting import multipliers, save_figure
+        >>> save_figure(multipliers(np.array([0.5])), "circle.png").name
+        'circle.png'
     """
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)

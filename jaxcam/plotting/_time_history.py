@@ -28,18 +28,24 @@ def time_history(
     Impacts are dots on the curves and thin dashed jumps; contacts are shaded.
 
     Args:
-        trajectory: What `jaxcam.simulate` returned.
-        axes: One for each component and one more for the gap; a new figure without.
-        components: The components to draw, all of them without.
-        between: The span of time to draw (s), the whole trajectory without.
-        samples: Points of a curve, besides those that short flights need.
+        trajectory: A trajectory of `jaxcam.simulate`.
+        axes: One for each component and one for the gap; default a new figure.
+        components: Components to draw; default all.
+        between: Time span to draw (s); default the whole trajectory.
+        samples: Number of points of a curve, besides those that short flights need.
 
     Returns:
         The figure.
 
     Raises:
-        ValueError: For a wrong number of axes, or a span that the trajectory does not
-            cover.
+        ValueError: The number of axes is wrong, or the trajectory does not cover the
+            span.
+
+    Examples:
+        >>> from jaxcam.models import BouncingBall
+        >>> from jaxcam.plotting import time_history
+        >>> trajectory = jaxcam.simulate(BouncingBall(), [1.0, 0.0], 0.0, 1.0)
+        >>> figure = time_history(trajectory)
     """
     drawn = trajectory_curve(trajectory, between, samples)
     system = trajectory.system

@@ -21,15 +21,21 @@ class Curve(NamedTuple):
     """
 
     time: Float[np.ndarray, " k"]
+    """Times (s), shape `(k,)`."""
     state: Float[np.ndarray, "k n"]
+    """States, shape `(k, n)`."""
     gap: Float[np.ndarray, "k constraints"]
+    """Gaps, shape `(k, constraints)`."""
     contact: Bool[np.ndarray, " k"]
-    """(k,) whether the row belongs to a contact."""
+    """Whether the row belongs to a contact, shape `(k,)`."""
     impact_time: Float[np.ndarray, " impacts"]
+    """Times of impacts (s), shape `(impacts,)`."""
     before: Float[np.ndarray, "impacts n"]
+    """States before the impacts, shape `(impacts, n)`."""
     after: Float[np.ndarray, "impacts n"]
+    """States after the impacts, shape `(impacts, n)`."""
     contacts: Float[np.ndarray, "contacts 2"]
-    """(contacts, 2) start and end (s)."""
+    """Start and end of each contact (s), shape `(contacts, 2)`."""
 
 
 class Hits(NamedTuple):
@@ -97,7 +103,17 @@ def trajectory_curve(
     between: tuple[float, float] | None = None,
     samples: int = 1500,
 ) -> Curve:
-    """The part of a trajectory within `between` (s), with about `samples` points."""
+    """Return the part of a trajectory within `between` (s), with about `samples`
+    points.
+
+    Args:
+        trajectory: A trajectory of `jaxcam.simulate`.
+        between: Time span (s); default the whole trajectory.
+        samples: Number of points.
+
+    Returns:
+        A [`jaxcam.plotting.curves.Curve`][].
+    """
     start, stop = window(trajectory, between)
     found = hits(trajectory, start, stop)
     spans = contact_spans(trajectory, start, stop)

@@ -5,7 +5,15 @@ from ..tables import scaled as scaled
 
 
 def labelled(name: str, unit: str) -> str:
-    """`name (unit)`; a dimensionless quantity has the unit -."""
+    """Return `name (unit)`; a dimensionless quantity has the unit -.
+
+    Args:
+        name: Name of the quantity.
+        unit: Its unit.
+
+    Returns:
+        The label.
+    """
     return f"{name} ({_dash(unit)})"
 
 

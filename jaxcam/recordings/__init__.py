@@ -1,4 +1,6 @@
-"""Recordings: reading, sensors, segmentation, and comparison with a model."""
+"""Read and check recordings, cut them into flights and contacts, compare with a
+model.
+"""
 
 from ._errors import RecordingError as RecordingError, RigError as RigError
 from ._impact_table import ImpactTable as ImpactTable

@@ -2,8 +2,26 @@
 
 
 class RecordingError(ValueError):
-    """A file that cannot be used as a recording; one sentence says what to do."""
+    """A file cannot be used as a recording; one sentence says what to do.
+
+    Examples:
+        >>> from jaxcam.recordings import RecordingError, read_recording
+        >>> try:
+        ...     read_recording("absent.csv")
+        ... except RecordingError as error:
+        ...     print(error)
+        absent.csv: there is no such file; check the path.
+    """
 
 
 class RigError(ValueError):
-    """A rig file that cannot be used; one sentence says what to do."""
+    """A rig file cannot be used; one sentence says what to do.
+
+    Examples:
+        >>> from jaxcam.recordings import RigError, read_rig
+        >>> try:
+        ...     read_rig("absent.toml")
+        ... except RigError as error:
+        ...     print("absent.toml" in str(error))
+        True
+    """

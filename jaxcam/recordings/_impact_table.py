@@ -8,36 +8,47 @@ from jaxtyping import Float
 
 @dataclasses.dataclass(frozen=True)
 class Bodies:
-    """Two bodies that hit each other: velocities along the normal, masses if known."""
+    """Velocities of two colliding bodies along the normal, and their masses if
+    known.
+    """
 
     before: Float[np.ndarray, "k 2"]
-    """Velocities, shape `(k, 2)`."""
+    """Velocities before the impacts, shape `(k, 2)`."""
     after: Float[np.ndarray, "k 2"]
-    """Velocities, shape `(k, 2)`."""
+    """Velocities after the impacts, shape `(k, 2)`."""
     mass: Float[np.ndarray, "k 2"] | None = None
-    """Of both (kg), shape `(k, 2)`, or `None`."""
+    """Masses of both (kg), shape `(k, 2)`, or `None`."""
 
 
 @dataclasses.dataclass(frozen=True)
 class ImpactTable:
-    """Measured impacts, shape `(k,)` each."""
+    """Measured impacts.
+
+    Examples:
+        >>> from jaxcam.recordings import ImpactTable
+        >>> table = ImpactTable("drops", np.array([1.0, 2.0]), np.array([0.8, 1.5]))
+        >>> (table.separation / table.approach).tolist()
+        [0.8, 0.75]
+    """
 
     name: str
+    """Name of the table."""
     approach: Float[np.ndarray, " k"]
-    """Relative speeds along the normal, in `unit`."""
+    """Relative approach speeds along the normal, in `unit`, shape `(k,)`."""
     separation: Float[np.ndarray, " k"]
-    """Relative speeds along the normal, in `unit`."""
+    """Relative separation speeds along the normal, in `unit`, shape `(k,)`."""
     unit: str = "m/s"
+    """Unit of the speeds."""
     approach_stderr: Float[np.ndarray, " k"] | None = None
-    """Their standard errors, or `None`."""
+    """Standard errors of the approach speeds, or `None`."""
     separation_stderr: Float[np.ndarray, " k"] | None = None
-    """Their standard errors, or `None`."""
+    """Standard errors of the separation speeds, or `None`."""
     bodies: Bodies | None = None
-    """Of two bodies, what both did; `None` where one hits something fixed."""
+    """Velocities of both bodies; `None` where one hits something fixed."""
     time: Float[np.ndarray, " k"] | None = None
-    """Seconds, or `None`."""
+    """Times (s), or `None`."""
     notes: tuple[str, ...] = ()
-    """What was left out of the file, in words."""
+    """Rows that were left out of the file, in words."""
 
     def __len__(self) -> int:
         return len(self.approach)

@@ -13,22 +13,29 @@ from ._errors import RecordingError
 
 @dataclasses.dataclass(frozen=True)
 class Recording:
-    """One run of one rig, in SI units."""
+    """One run of one rig, in SI units.
+
+    Examples:
+        >>> from jaxcam.recordings import Recording
+        >>> run = Recording("run", np.linspace(0, 1, 11), {"height_m": np.zeros(11)})
+        >>> run.duration, round(run.interval, 3)
+        (1.0, 0.1)
+    """
 
     name: str
-    """The name of the run, for tables and messages."""
+    """Name of the run, for tables and messages."""
     time: Float[np.ndarray, " k"]
     """Seconds, shape `(k,)`, strictly increasing."""
     channels: Mapping[str, Float[np.ndarray, " k"]]
-    """What was measured, each of shape `(k,)`. The end of a name is the unit:
+    """Measured quantities, each of shape `(k,)`. The end of a name is the unit:
     `follower_angle_rad`, `gyro_rad_s`, `height_m`."""
     nominal_speed: float | None = None
-    """Speed of the drive as the file name states it (rad/s), or `None`."""
+    """Speed of the drive according to the file name (rad/s), or `None`."""
     meta: Mapping[str, Any] = dataclasses.field(default_factory=dict)
-    """Anything else that is known (the file, the piece of it, ...)."""
+    """Any other information (the file, the piece of it, ...)."""
     constants: Mapping[str, float] = dataclasses.field(default_factory=dict)
-    """What is known of this run alone, by names of fields of the system that it is a
-    run of: `{"mass": 0.31}`. A fit takes them as they are."""
+    """Known constants of this run alone, by names of fields of the system:
+    `{"mass": 0.31}`. A fit uses them unchanged."""
 
     def __getitem__(self, channel: str) -> Float[np.ndarray, " k"]:
         """The samples of one channel, shape `(k,)`.
@@ -48,7 +55,7 @@ class Recording:
 
     @property
     def interval(self) -> float:
-        """Time between samples (s), the median of it."""
+        """Median time between samples (s)."""
         return float(np.median(np.diff(self.time)))
 
     @property
@@ -57,10 +64,10 @@ class Recording:
         return float(self.time[-1] - self.time[0])
 
     def between(self, start: float, stop: float) -> "Recording":
-        """The part with `start <= time < stop`, under the same name.
+        """Return the part with `start <= time < stop`, under the same name.
 
         Raises:
-            RecordingError: Where fewer than two samples are left.
+            RecordingError: Fewer than two samples are left.
         """
         keep = (self.time >= start) & (self.time < stop)
         if keep.sum() < 2:
@@ -78,8 +85,11 @@ class Case:
     """Several runs of the same rig, usually one folder of files."""
 
     name: str
+    """Name of the case."""
     recordings: tuple[Recording, ...]
+    """The recordings."""
     folder: Path | None = None
+    """Folder from which they were read."""
 
     def __iter__(self) -> Iterator[Recording]:
         return iter(self.recordings)

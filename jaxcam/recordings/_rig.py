@@ -18,10 +18,12 @@ _FAST = 2.0
 
 @dataclasses.dataclass(frozen=True)
 class Quantity:
-    """A nominal value and how far a real one may differ from it, in SI units."""
+    """A nominal value and its tolerance, in SI units."""
 
     value: float
+    """Nominal value."""
     tolerance: float = 0.0
+    """Largest deviation of the real value."""
 
     @property
     def array(self) -> jax.Array:
@@ -34,8 +36,11 @@ class Gyro:
     """A rate sensor: first-order bandwidth (Hz), range and noise (rad/s)."""
 
     bandwidth_hz: float
+    """Bandwidth (Hz)."""
     range_rad_s: float
+    """Largest rate (rad/s)."""
     noise_rad_s: float
+    """Standard deviation of the noise (rad/s)."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -43,11 +48,17 @@ class Sensors:
     """Sample rate (Hz), counts a turn and noise (rad) of the two encoders."""
 
     sample_rate: float
+    """Sampling rate (Hz)."""
     cam_counts_per_turn: int
+    """Counts of the cam's encoder per turn."""
     follower_counts_per_turn: int
+    """Counts of the follower's encoder per turn."""
     cam_noise: float
+    """Standard deviation of the cam's angle (rad)."""
     follower_noise: float
+    """Standard deviation of the follower's angle (rad)."""
     gyro: Gyro | None = None
+    """The rate sensor, if there is one."""
 
     @property
     def follower_floor(self) -> float:
@@ -62,10 +73,15 @@ class Sensors:
 
 @dataclasses.dataclass(frozen=True)
 class References:
-    """Constants in the forms of the physics that a rig's model may lack.
+    """Constants in the forms of physics that a rig's model may lack.
 
     They fix what a strength means and are not fitted; by default, those of the thesis'
     cam-follower.
+
+    Examples:
+        >>> from jaxcam.recordings import References
+        >>> References().stribeck_speed
+        0.1
     """
 
     spring_center: float = 0.27
@@ -80,12 +96,13 @@ class References:
     """Speed (rad/s) within which dry friction changes sign, far below the speeds of the
     motion; `free_slip_speed` in friction that varies with position."""
     free_slip_speed: float = 0.01
+    """Slip speed (rad/s) of friction that varies with position."""
 
     @classmethod
     def of_speed(cls, fast: float) -> "References":
-        """Constants of a motion whose fast speeds are about `fast`, about its zero.
+        """Return the constants for a motion whose fast speeds are about `fast`.
 
-        Each speed stands to those of the motion as it does in the thesis' rig.
+        Each speed relates to those of the motion as it does in the thesis' rig.
         """
         share, usual = fast / _FAST, cls()
         return cls(
@@ -97,7 +114,9 @@ class References:
         )
 
     def sharper(self, share: float) -> "References":
-        """The same with dry friction that changes sign within a share of the speed."""
+        """Return the same with dry friction that changes sign within a share of the
+        speed.
+        """
         return dataclasses.replace(
             self,
             slip_speed=share * self.slip_speed,
@@ -110,28 +129,47 @@ class Rig:
     """The content of `rig.toml`, typed and checked; `system` turns it into a model.
 
     Lengths are m, the inertia kg m^2, the stiffness N/m. Only the ratio of stiffness
-    and inertia can be seen in a recording.
+    and inertia can be identified from a recording.
+
+    Examples:
+        >>> from jaxcam.data import DEMO_RIG
+        >>> from jaxcam.recordings import read_rig
+        >>> float(read_rig(DEMO_RIG / "rig.toml").system(15.0).speed)
+        15.0
     """
 
     cam_radius: Quantity
+    """Radius of the cam (m)."""
     cam_eccentricity: Quantity
+    """Eccentricity of the cam (m)."""
     cam_center_x: Quantity
+    """x-coordinate of the cam's axis from the hinge (m)."""
     cam_center_y: Quantity
+    """y-coordinate of the cam's axis from the hinge (m)."""
     follower_half_height: Quantity
+    """Distance of the follower's face from the hinge (m)."""
     cam_rotation: str
+    """"clockwise" or "counterclockwise"."""
     inertia: Quantity
+    """Moment of inertia of the follower (kg m^2)."""
     spring_stiffness: Quantity
+    """Stiffness of the spring (N/m)."""
     spring_hook_x: Quantity
+    """x-coordinate of the spring's suspension point (m)."""
     spring_elongation: Quantity
+    """Elongation in the spring's torque (m)."""
     restitution: Quantity
+    """Coefficient of restitution."""
     sensors: Sensors
+    """Sensors of the rig."""
     references: References = References()
+    """Constants of the forms of missing physics."""
 
     def replace(self, **values: float) -> "Rig":
-        """The rig with other nominal values; tolerances stay.
+        """Return the rig with other nominal values; tolerances stay.
 
         Raises:
-            RigError: For a name that is not a quantity of the rig.
+            RigError: A name is not a quantity of the rig.
         """
         changes = {}
         for name, value in values.items():
@@ -142,7 +180,7 @@ class Rig:
         return dataclasses.replace(self, **changes)
 
     def profile(self) -> EccentricCircle:
-        """The nominal cam."""
+        """Return the nominal cam."""
         return EccentricCircle(
             radius=self.cam_radius.array,
             eccentricity=self.cam_eccentricity.array,
@@ -158,7 +196,7 @@ class Rig:
         *,
         restitution: eqx.Module | None = None,
     ) -> CamFollower:
-        """The nominal rig as a `CamFollower` with its cam at `speed` (rad/s).
+        """Return the nominal rig as a `CamFollower` with its cam at `speed` (rad/s).
 
         Args:
             speed: Speed of the cam (rad/s).

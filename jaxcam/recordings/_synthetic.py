@@ -23,6 +23,12 @@ class Wandering(HybridSystem):
 
     The drive turns at `speed (1 + depth w)` with w = 0.7 cos(2 pi 0.31 t) + 0.3 cos(2
     pi 0.87 t): two slow tones that have no simple ratio.
+
+    Examples:
+        >>> from jaxcam.models import preset
+        >>> from jaxcam.recordings import Wandering
+        >>> Wandering(preset("calibrated")).state_names
+        ('follower angle', 'follower velocity')
     """
 
     base: HybridSystem
@@ -32,11 +38,11 @@ class Wandering(HybridSystem):
     speed: Callable[[Any], Array] = eqx.field(
         default=lambda system: system.speed, static=True
     )
-    """Pick both out of `base`."""
+    """Picks the speed out of `base`."""
     phase: Callable[[Any], Array] = eqx.field(
         default=lambda system: system.phase, static=True
     )
-    """Pick both out of `base`."""
+    """Picks the phase out of `base`."""
 
     @property
     def state_names(self) -> tuple[str, ...]:  # pyright: ignore
@@ -61,7 +67,7 @@ class Wandering(HybridSystem):
         self.base.check()
 
     def angle(self, t) -> Array:
-        """Angle that the drive has turned (rad) at `t` (s), elementwise."""
+        """Return the angle that the drive has turned (rad) at `t` (s), elementwise."""
         wander = 0.0
         for share, frequency in _TONES:
             w = 2 * jnp.pi * frequency
@@ -69,7 +75,7 @@ class Wandering(HybridSystem):
         return self.phase(self.base) + self.speed(self.base) * (t + self.depth * wander)
 
     def at(self, t) -> HybridSystem:
-        """The base as it is near time `t`: turning at the drive's speed of then."""
+        """Return the base near time `t`, turning at the drive's speed of that time."""
         angle, rate = jax.jvp(self.angle, (t,), (jnp.ones_like(t),))
         here = rate, angle - rate * t
         return eqx.tree_at(lambda s: (self.speed(s), self.phase(s)), self.base, here)
@@ -103,22 +109,34 @@ def record(
     drive_channel: str = "cam_angle_rad",
     name: str = "synthetic",
 ) -> Recording:
-    """Simulate a system and read it through sensors.
+    """Simulate a system and record it through sensors.
 
     Args:
-        system: A driven one may be a `Wandering`.
+        system: The system; a driven one may be a `Wandering`.
         sensors: A `jaxcam.fitting.Sensor` for each channel.
-        duration: How long (s) to record, and to wait before.
-        settle: How long (s) to record, and to wait before.
-        rng: The source of the noise.
-        state: To start from `(n,)`; `None` for the release point.
-        interval: Between samples (s).
+        duration: Length of the record (s).
+        rng: Random number generator of the noise.
+        state: Initial state, `(n,)`; `None` for the release point.
+        settle: Time to wait before (s).
+        interval: Time between samples (s).
         drive: Noise and resolution (rad) of an encoder on the drive of a `Wandering`,
             recorded as `drive_channel`.
         drive_channel: Name of that channel.
+        name: Name of the recording.
+
+    Returns:
+        A [`jaxcam.recordings.Recording`][].
 
     Raises:
-        RecordingError: Where the simulation did not come to its end.
+        RecordingError: The simulation did not reach its end.
+
+    Examples:
+        >>> from jaxcam.fitting import Sensor
+        >>> from jaxcam.models import BouncingBall
+        >>> from jaxcam.recordings import record
+        >>> rng, sensors = np.random.default_rng(0), {"height_m": Sensor(0, noise=1e-3)}
+        >>> record(BouncingBall(), sensors, 0.5, rng=rng, state=[1.0, 0.0]).name
+        'synthetic'
     """
     trajectory = simulate(system, state, 0.0, settle + duration, max_steps=1 << 17)
     if not bool(trajectory.successful):

@@ -78,7 +78,7 @@ def basins(
     check_turns(turns, keep, period_tolerance, reruns)
     if not section.regular:
         raise ValueError(
-            f"basins need a section that is taken once a turn; a "
+            f"basins need a section that is sampled once per period; a "
             f"{type(section).__name__} is not, so pass the system itself"
         )
     if not 0 < same < 1:

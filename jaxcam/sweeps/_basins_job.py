@@ -13,7 +13,7 @@ from .sections import AbstractSection
 
 
 _FINE = 1 / 64
-"""Extent of the cells by which motions that do not repeat are told apart."""
+"""Extent of the cells by which motions that do not repeat are distinguished."""
 
 
 class BasinsJob(AbstractJob):

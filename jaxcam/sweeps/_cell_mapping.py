@@ -50,7 +50,8 @@ def cell_mapping(system, grid: Grid, *, turns: int = 1) -> CellMapping:
     section = as_section(system)
     if not section.regular or turns < 1:
         raise ValueError(
-            "cell mapping needs a section that is taken once a turn, and 1 turn or more"
+            "cell mapping needs a section that is sampled once per period, and 1 "
+            "period or more"
         )
     states = grid.states()
     samples = section.sample(states, turns, 1)

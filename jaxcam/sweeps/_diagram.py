@@ -93,7 +93,8 @@ def diagram(
     if dwell is not None:
         if direction == "each":
             raise ValueError(
-                "dwell is for states that are carried on; choose the direction up, "
+                "dwell needs states that are carried from value to value; choose the "
+                "direction up, "
                 "down or both"
             )
         many, kept = dwell_turns(section, picked, values, dwell)
@@ -115,8 +116,5 @@ def diagram(
     )
     made = Diagram(store.dataset())
     if np.all(made.dataset["code"].values == BEHIND):
-        raise ValueError(
-            "no motion can start: every state is behind the constraint; choose states "
-            "in front of it"
-        )
+        raise ValueError("all states violate gap >= 0; choose states in front of it")
     return made

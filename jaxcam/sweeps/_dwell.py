@@ -28,9 +28,7 @@ def dwell_turns(
         ValueError: Where there is not one whole turn to store.
     """
     if not section.regular:
-        raise ValueError(
-            "dwell counts turns; look at the motion once a turn, not at impacts"
-        )
+        raise ValueError("dwell needs samples once per period, not at impacts")
     wait, store = (float(seconds) for seconds in dwell)
     if not (0 <= wait < math.inf and 0 < store < math.inf):
         raise ValueError(
@@ -41,7 +39,8 @@ def dwell_turns(
     stored = np.floor(store / length + _SLACK).astype(int)
     if np.min(stored) < 1:
         raise ValueError(
-            f"dwell stores {store:g} s, and a turn takes up to {np.max(length):.3g} s; "
+            f"dwell stores {store:g} s, and a period takes up to {np.max(length):.3g} "
+            "s; "
             "store longer"
         )
     return waited + stored, stored

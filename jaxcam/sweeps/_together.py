@@ -40,8 +40,8 @@ def together(job: BasinsJob, store: Store, known: Basins | None) -> xarray.Datas
     impacts, turns = np.concatenate(impacts), np.concatenate(turns)
     if np.all(turns == OUTSIDE):
         raise ValueError(
-            "no motion can start: every state of the grid is behind the constraint; "
-            "choose low and high in front of it"
+            "all states of the grid violate gap >= 0; choose low and high in front of "
+            "it"
         )
 
     def cells():

@@ -1,4 +1,4 @@
-"""Drawings of motions that have settled: time series beside phase portraits."""
+"""Drawings of motions that have settled: time series next to phase portraits."""
 
 from collections.abc import Sequence
 
@@ -45,7 +45,7 @@ def draw_gap(ax, run: Trajectory) -> None:
 
 
 def draw_portrait(ax, run: Trajectory, motion: SettledMotion) -> None:
-    """Velocity over angle, with the samples once a turn."""
+    """Velocity over angle, with the samples once per period."""
     drawn = trajectory_curve(run, None, 3000)
     ax.plot(drawn.state[:, 0], drawn.state[:, 1], color=FLIGHT, lw=0.9)
     for before, after in zip(drawn.before, drawn.after, strict=True):

@@ -1,4 +1,4 @@
-"""Figures that show motions: what they are, and time series beside portraits."""
+"""Figures that show motions: what they are, and time series next to portraits."""
 
 import dataclasses
 from collections.abc import Callable, Sequence

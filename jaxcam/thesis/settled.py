@@ -1,4 +1,4 @@
-"""Motions of the rig that have settled, and what they are beside what is printed."""
+"""Motions of the rig that have settled, and what they are next to what is printed."""
 
 from collections.abc import Sequence
 from typing import NamedTuple

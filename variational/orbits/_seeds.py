@@ -85,7 +85,7 @@ def seed(
     if int(motion.impacts.count):
         return _of_impacts(system, motion.impacts, length, periods, dimension)
     if periods == 0:
-        raise ValueError("an orbit without forcing must hit something to be followed")
+        raise ValueError("an orbit without forcing must have an impact to be continued")
     # the state at a whole number of periods
     whole = -np.floor(-(t0 / length - 1e-12)) * length
     if isinstance(motion, Trajectory):

@@ -8,7 +8,7 @@ each. With phi the free flight and H, R gap and law of the constraint that is hi
 
 closed by t_{m+1} = t_1 + n T, x_{m+1} = x_1. Nothing in these equations divides by an
 impact speed, so they are as regular at grazing as elsewhere; they go on behind it, to
-motions through the constraint, which `seen` tells apart.
+motions through the constraint, which `seen` distinguishes.
 """
 
 from typing import NamedTuple

@@ -19,14 +19,14 @@ class TurnDerivative(eqx.Module):
     """Derivatives of the state at the end of one period."""
 
     state: Float[Array, "n n"]
-    """By the state at the start, shape `(n, n)`: the monodromy matrix of a periodic
-    orbit."""
+    """Derivative by the state at the start, shape `(n, n)`: the monodromy matrix of a
+    periodic orbit."""
     period: Float[Array, " n"]
-    """By the period, that is, by the time at which it ends, shape `(n,)`."""
+    """Derivative by the period, that is, by the time at which it ends, shape `(n,)`."""
     phase: Float[Array, " n"]
-    """By the time of the start, at the same length, shape `(n,)`."""
+    """Derivative by the time of the start, at the same length, shape `(n,)`."""
     parameters: Float[Array, "n q"]
-    """By the parameters picked, at the same times, shape `(n, q)`."""
+    """Derivative by the parameters picked, at the same times, shape `(n, q)`."""
     determinant: Float[Array, ""]
     """Determinant of `state`; zero where the motion sticks."""
     condition: Float[Array, ""]

@@ -73,9 +73,9 @@ class Choice:
 
 
 def choose(question: Question, trials: Trials, seed: int) -> Choice:
-    """Search, drop what hangs on a few blocks, and look at what is left over.
+    """Search, drop what hangs on a few blocks, and look at what remains.
 
-    A term in doubt is named where nothing is left over with it and much is without it,
+    A term in doubt is named where nothing remains with it and much is without it,
     if it improves the prediction of held-out records.
     """
     found = Search(trials).run()
@@ -163,7 +163,7 @@ def _without_a_name(
     """Functions that explain what the named terms leave over, by their evidence.
 
     What is left after a named term but is small beside what that explains is none, and
-    what the redrawn sets can do without is not needed.
+    what the bootstrap samples can do without is not needed.
     """
     policy, bare = trials.policy, trials.known[frozenset()].fit.cost
     small = policy.small * (bare - best.fit.cost)

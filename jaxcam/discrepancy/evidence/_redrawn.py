@@ -18,10 +18,10 @@ def sure(
     """The part of a subset that does not hang on a few stretches of the records.
 
     A term whose strength might be zero is dropped first, then the one that fewest of
-    the redrawn sets need.
+    the bootstrap samples need.
 
     **Returns:** the fit, what `redrawn` says of it, and the terms that were dropped
-    with the part of the redrawn sets that would have kept them.
+    with the part of the bootstrap samples that would have kept them.
     """
     doubtful: list[tuple[str, float]] = []
     while True:
@@ -50,8 +50,8 @@ def _size(trials: Trials, best: Trial, name: str, deviation) -> float:
 class Needs(NamedTuple):
     """The parts of a model that are needed, by the bootstrap samples and by all data.
 
-    - `inclusion`: share of the redrawn sets that would keep a part.
-    - `deviation`: of each free parameter, over the redrawn sets.
+    - `inclusion`: share of the bootstrap samples that would keep a part.
+    - `deviation`: of each free parameter, over the bootstrap samples.
     - `lost`: what all data lose without a part, less its price.
     """
 
@@ -65,7 +65,7 @@ def redrawn(
 ) -> tuple[dict[str, float], dict[str, float]]:
     """Draw stretches of the records again, a second or so each.
 
-    **Returns:** of each term, in which part of the redrawn sets it would be kept,
+    **Returns:** of each term, in which part of the bootstrap samples it would be kept,
     because a fit without it is worse by BIC; and the standard deviation of each
     parameter.
     """

@@ -24,26 +24,36 @@ _TINY = 1e-300
 
 @dataclasses.dataclass(frozen=True)
 class Ripple:
-    """Ripple of the speed once a turn: `eps` and `psi` (rad) with their errors."""
+    """Speed ripple of the drive once per turn."""
 
     eps: float
+    """Relative amplitude."""
     eps_stderr: float
+    """Standard error of `eps`."""
     psi: float
+    """Phase (rad)."""
     psi_stderr: float
+    """Standard error of `psi`."""
     gain: float
-    """Growth of twice the log-likelihood, over what leakage explains."""
+    """Gain of twice the log-likelihood, beyond the leakage of slow wander."""
     p_value: float
-    """Of no ripple. `count`: samples. `per_record`: eps of each record."""
+    """Probability of such a gain without ripple."""
     count: int
+    """Number of samples."""
     dispersion: float
+    """Scatter of the samples about the ripple, relative to the noise."""
     per_record: dict[str, tuple[float, float]]
+    """Amplitude and its standard error, by record."""
     heldout_gain: float
+    """Gain of the log-likelihood on held-out records."""
     inclusion: float
+    """Share of the bootstrap samples in which it is significant."""
 
     def significant(self, tests: int, policy: Policy) -> bool:
-        """Whether it is more than chance, in one of so many tests, and the BIC ask.
+        """Return whether it exceeds chance, in one of `tests` tests, and the BIC's
+        threshold.
 
-        And, as of any term that is named, in most of the redrawn sets of records.
+        As for any named term, it must also do so in most of the bootstrap samples.
         """
         chance = chi2.isf(policy.false_alarms / tests, 2)
         asked = max(2 * math.log(self.count), chance)
@@ -62,8 +72,14 @@ def ripple_of(
 ) -> Ripple:
     """Fit one ripple to the drives of all records.
 
-    **Arguments:** recordings, the standard deviation of the channel's noise (rad), its
-    name, and the policy.
+    Args:
+        recordings: The recordings.
+        noise: Standard deviation of the channel's noise (rad).
+        channel: The channel of the drive.
+        policy: The settings.
+
+    Returns:
+        A [`jaxcam.discrepancy.evidence.Ripple`][].
     """
     orders = (1.0, *policy.drive_orders)
     amplitudes, errors, samples = [], [], 0
@@ -116,7 +132,7 @@ def _held_out(wave, variance) -> float:
 
 
 def _inclusion(wave, variance, asked: float, repetitions: int) -> float:
-    """Part of the redrawn sets of records in which the ripple is worth it."""
+    """Part of the bootstrap samples of records in which the ripple is worth it."""
     rng = np.random.default_rng(0)
     drawn = rng.integers(0, len(wave), (repetitions, len(wave)))
     weight = 1 / variance[drawn]

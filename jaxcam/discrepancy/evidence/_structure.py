@@ -44,18 +44,24 @@ class Form(enum.StrEnum):
 
 @dataclasses.dataclass(frozen=True)
 class Structure:
-    """One way in which what is left over might not be noise."""
+    """A structure by which the residuals may differ from noise."""
 
     name: str
+    """Name of the structure."""
     sentence: str
+    """The structure in words."""
     where: str
+    """Place at which it acts."""
     region: str
+    """Part of the motion, in words."""
     gain: float
-    """Growth of twice the log-likelihood; `threshold`: what chance and the number of
-    parameters would demand."""
+    """Gain of twice the log-likelihood."""
     threshold: float
+    """Gain that chance and the number of parameters demand."""
     count: int
+    """Number of parameters."""
     unit: str = ""
+    """Unit of `value`."""
     variable: str = ""
     """The shape, where there is one; `quantity` is what its value is."""
     grid: Float[np.ndarray, " k"] = dataclasses.field(
@@ -78,6 +84,7 @@ class Structure:
     """An unlisted term, a free function, a vibration, or residuals that are correlated
     in time."""
     quantity: str = ""
+    """The quantity whose value is given."""
 
     @property
     def significant(self) -> bool:

@@ -31,10 +31,11 @@ class Caveat:
     """One reservation about a verdict."""
 
     reason: Reason
-    """A `Reason`. `terms`: names of those it is about, if any."""
+    """A `Reason`."""
     sentence: str
-    """In words, also by `str`."""
+    """The reservation in words, also by `str`."""
     terms: tuple[str, ...] = ()
+    """Names of the terms concerned, if any."""
 
     def __str__(self) -> str:
         return self.sentence

@@ -18,7 +18,13 @@ from ._words import number
 
 
 class Verdict(enum.StrEnum):
-    """The verdict of a diagnosis; equal to its name as a string."""
+    """The verdict of a diagnosis; equal to its name as a string.
+
+    Examples:
+        >>> from jaxcam.discrepancy import Verdict
+        >>> Verdict("none") == "none"
+        True
+    """
 
     EFFECT = "effect"
     NONE = "none"
@@ -26,40 +32,47 @@ class Verdict(enum.StrEnum):
 
 
 class Alternative(NamedTuple):
-    """Another subset of terms, and how much worse its BIC is.
+    """Another subset of terms, and its BIC less the least one.
 
     `name` puts the names of its `terms` together, or is `"none"`; `reason` says why it
     was not named.
     """
 
     name: str
+    """The names of its `terms` joined, or `"none"`."""
     delta_bic: float
+    """BIC less that of the chosen subset."""
     terms: tuple[str, ...]
+    """Names of its terms."""
     reason: str = ""
+    """Why it is not the verdict."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Effect:
-    """One thing that the model lacks."""
+    """One effect that the model lacks."""
 
     name: str
+    """Name of the effect."""
     sentence: str
+    """The effect in words."""
     parameters: dict[str, Value]
-    """Its numbers. `where`: `"flight"`, `"impact"`, `"contact"`, `"drive"` or
-    `"sensor"`; `region` in words; `records` in which it can be seen."""
+    """Its strengths."""
     where: str
+    """`"flight"`, `"impact"`, `"contact"`, `"drive"` or `"sensor"`."""
     region: str
+    """Part of the motion, in words."""
     records: tuple[str, ...]
+    """Records in which it is significant."""
     delta_bic: float
-    """Of the model with it, less that of the model without it."""
+    """BIC with it less that without it."""
     heldout_gain_nats: float
-    """Log-likelihood gained on data that no parameter has seen."""
+    """Gain of the log-likelihood on held-out data."""
     inclusion: float | None
-    """Part of the redrawn data sets in which it would be named; `None` where that was
-    not asked, of what is unknown and has no function."""
+    """Share of the bootstrap samples in which it would be named; `None` for an unknown
+    effect without a function."""
     term: bool = True
-    """Whether it is one that has a name; otherwise it is the unknown."""
-    share: float | None = None
+    """Whether it is a named term; otherwise it is unknown."""
     """Part of the misfit that it explains; of what is unknown, the part that nothing
     explains. `None` for the drive, which is judged by its own channel."""
 
@@ -85,53 +98,57 @@ class Effect:
 
 @dataclasses.dataclass(frozen=True, repr=False)
 class Diagnosis:
-    """The answer to: what physics did the model leave out?"""
+    """The result of [`jaxcam.discrepancy.diagnose`][]: which physics the model left
+    out.
+    """
 
     case: str
+    """Name of the case."""
     verdict: Verdict
     """A `Verdict`: `"effect"`, `"none"` or `"unknown"`."""
     effects: tuple[Effect, ...]
-    """What is missing."""
+    """The missing effects."""
     alternatives: tuple[Alternative, ...]
-    """Other subsets, each an `Alternative`, the best first."""
+    """Other subsets of terms, best first."""
     heldout_before: float
-    """Rms of the residuals (`unit`) on stretches that no parameter has seen, one flight
-    ahead."""
+    """Rms of the held-out residuals of the textbook model (`unit`), one flight ahead.
+    """
     heldout_after: float
-    """Rms of the residuals (`unit`) on stretches that no parameter has seen, one flight
-    ahead."""
+    """Rms of the held-out residuals with the effects (`unit`)."""
     noise_floor: float
-    """Rms of the residuals (`unit`) on stretches that no parameter has seen, one flight
-    ahead."""
+    """Rms of the noise (`unit`)."""
     unit: str
+    """Unit of the residuals."""
     rig: dict[str, Value]
-    """Fitted parameters with what is missing in the model."""
+    """Fitted parameters of the model with the effects."""
     summary: str
+    """The result in words."""
     before: Fit
-    """The fits of the textbook model and of the one chosen."""
+    """Fit of the textbook model."""
     after: Fit
-    """The fits of the textbook model and of the one chosen."""
+    """Fit of the chosen model."""
     left_before: tuple[Structure, ...]
-    """Shapes that the residuals were asked for."""
+    """Structures sought in the residuals of the textbook model."""
     left_after: tuple[Structure, ...]
-    """Shapes that the residuals were asked for."""
+    """Structures sought in the residuals of the chosen model."""
     unseen: tuple[list[Residuals], list[Residuals]]
-    """Residuals of both on stretches not seen."""
+    """Held-out residuals of both models."""
     ripple: Ripple | None
-    """Of the drive. `pulls`: how far each parameter went without the effects, held
-    within the tolerances, and with them, in tolerances. `limits`: least strength of
-    each term that would have been named. `hides`: the parameter that would take up most
-    of each term."""
+    """Speed ripple of the drive."""
     pulls: dict[str, tuple[float, float]]
+    """Deviation of each parameter from nominal without the effects and with them, in
+    tolerances."""
     limits: dict[str, Value]
+    """Detection limits: least strength of each term that would have been named."""
     hides: dict[str, str]
+    """The parameter that would absorb most of each term."""
     caveats: tuple[Caveat, ...]
-    """Each a `Caveat`, a reason with its sentence."""
+    """Reservations, each a reason with its sentence."""
     policy: Policy = Policy()
-    """By which it was decided."""
+    """The settings of the diagnosis."""
     missing: tuple[MissingFunction, ...] = ()
-    """What has no name, as functions that were fitted with the rig; `after` is the
-    model with them."""
+    """Effects without a name, as functions fitted with the rig; `after` is the model
+    with them."""
     misfit: dict[str, float] = dataclasses.field(default_factory=dict)
     """Shares of what the textbook model leaves unexplained that are in `"flight"`, at
     an `"impact"` and in `"contact"`; empty where it is noise."""
@@ -167,11 +184,11 @@ class Diagnosis:
         return tuple(effect.name for effect in self.effects)
 
     def model(self, record: int | str = 0) -> Model:
-        """The model with what was missing, for use in every other command."""
+        """Return the model with the missing effects, for use in every other command."""
         return self.after.model(record)
 
     def system(self, record: int | str = 0) -> HybridSystem:
-        """The system with the terms that were named and no others.
+        """Return the system with the named terms and no others.
 
         A drive turns at the speed of that record. Faults of sensors are not part of it.
         A force with a state of its own is a part of it with that state: the system is
@@ -211,7 +228,7 @@ class Diagnosis:
         return self.after.problem.records
 
     def to_json(self) -> dict[str, Any]:
-        """The verdict as plain numbers and strings."""
+        """Return the verdict as plain numbers and strings."""
         return {
             "case": self.case,
             "verdict": self.verdict,

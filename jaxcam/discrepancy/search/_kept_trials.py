@@ -1,4 +1,4 @@
-"""Fits of a diagnosis on disk, from which one that was interrupted goes on."""
+"""Fits of a diagnosis on disk, from which one that was interrupted continues."""
 
 import hashlib
 import os

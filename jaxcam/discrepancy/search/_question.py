@@ -86,7 +86,7 @@ def refuse_one(runs: Sequence[Recording | Segments]) -> None:
     if len(runs) < 2:
         raise RecordingError(
             f"There is {len(runs)} recording; give at least two of the same rig at "
-            f"different speeds, so that one can test what the other says."
+            f"different speeds, so that one can be predicted from the other."
         )
 
 

@@ -30,7 +30,7 @@ class Periodogram:
     """Growth of twice the log-likelihood at each `frequency` (Hz), shape `(k,)`.
 
     `gain` with one phase for all records, `separate` with a phase for each record.
-    `records` is their number, `cells` that of frequencies that can be told apart (of
+    `records` is their number, `cells` that of frequencies that can be distinguished (of
     which each has a few neighbours on the grid);
     `elsewhere` is what the highest separate peak gains without the record that it gains
     most in.

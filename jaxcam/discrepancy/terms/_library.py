@@ -314,20 +314,27 @@ def library(
     clocked: bool | None = None,
     extended: bool = False,
 ) -> tuple[Term, ...]:
-    """All terms that `diagnose` tries by default.
+    """Return all terms that `diagnose` tries by default.
 
     Args:
-        turned: Whether the system has a drive, without which no cam can be out of
-            round.
+        turned: Whether the system has a drive; without one there are no profile errors.
         references: Constants of the forms, which belong to a rig (`rig.references`):
-            where a nonlinear spring is symmetric, at which speed a restitution is
+            the centre of a nonlinear spring, the speed at which a restitution is
             stated.
-        clocked: Whether anything happens at a known time, such as by a drive (the
-            default) or a measured input. Otherwise a lag is another beginning of time.
+        clocked: Whether any event has a known time, as with a drive (the default) or a
+            measured input. Otherwise a lag is only a shift of the time origin.
         extended: Whether to add terms that most rigs have as parameters already, or
             that take longer to look for: forces by position with an edge, friction that
             differs by direction, speed or place, a restitution as a power. Their
             constants come from the recordings.
+
+    Returns:
+        A tuple of [`jaxcam.discrepancy.Term`][].
+
+    Examples:
+        >>> from jaxcam.discrepancy import library
+        >>> len(library()) > len(library(turned=False))
+        True
     """
     slip = references.slip_speed
     found: list[Term] = [
@@ -355,7 +362,11 @@ def library(
 
 
 def saved_classes() -> tuple[type, ...]:
-    """Classes that a saved system with terms may name, for `load_system`."""
+    """Return the classes that a saved system with terms may name, for `load_system`.
+
+    Returns:
+        A tuple of classes.
+    """
     terms = (type(term) for term in library(extended=True))
     elements = (WithHidden, Resonator, Relaxation, Hysteresis)
     return (WithTerms, DriveRipple, *terms, *FREE.values(), *elements)

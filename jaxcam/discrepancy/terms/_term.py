@@ -24,8 +24,7 @@ _METHODS = {
 
 
 class Motion(NamedTuple):
-    """The motion as a term sees it: time (s), position, velocity, drive and whole
-    state.
+    """The motion as a term sees it.
 
     `position` and `velocity` are those of the term's `coordinate`. `phase` is the angle
     that the drive has turned (rad), or time itself without a drive; `rate` the drive's
@@ -34,12 +33,19 @@ class Motion(NamedTuple):
     """
 
     t: Any
+    """Time (s)."""
     position: Any
+    """Position of the term's coordinate."""
     velocity: Any
+    """Velocity of the term's coordinate."""
     phase: Any
+    """Angle that the drive has turned (rad), or time without a drive."""
     rate: Any = 1.0
+    """Speed of the drive (rad/s), or one."""
     state: Any = None
+    """Whole state `(n,)`; zero where a term acts on a surface."""
     pushed: Any = 0.0
+    """Acceleration of the position without any terms."""
 
 
 MOTION = "[q]"
@@ -59,16 +65,30 @@ def strength(
     default: float = 0.0,
     inner: bool = False,
 ):
-    """A field of a term that is fitted.
+    """Declare a field of a term that is fitted.
 
     Args:
-        unit: For tables; `[q]` in it stands for the unit of the coordinate.
+        unit: Unit for tables; `[q]` in it stands for the unit of the coordinate.
         size: A change that matters; it does not influence the result.
-        lower: Signs that physics demands.
-        upper: Signs that physics demands.
-        inner: A number without effect while the strengths are zero, such as an edge. It
-            is fitted from the best of the term's `starts`, or, without any, is a
-            frequency (Hz) that a scan finds.
+        lower: Lower bound, as for signs that physics demands.
+        upper: Upper bound.
+        default: Value of a new term.
+        inner: Whether it has no effect while the strengths are zero, as an edge or a
+            frequency. It is fitted from the best of the term's `starts`, or, without
+            any, is a frequency (Hz) that a scan finds.
+
+    Returns:
+        A field.
+
+    Examples:
+        >>> from jaxcam.discrepancy import Term, strength
+        >>> class Damping(Term):
+        ...     name, sentence = "damping", "viscous damping"
+        ...     rate: float = strength("1/s", 0.1, lower=0.0)
+        ...     def acceleration(self, motion):
+        ...         return -self.rate * motion.velocity
+        >>> Damping().strengths()[0].unit
+        '1/s'
     """
     metadata = {
         "strength": Strength("", unit, size, lower, upper, inner),
@@ -82,51 +102,71 @@ def strength(
 
 @dataclasses.dataclass(frozen=True)
 class Strength:
-    """One number of a term that is fitted, as `strength` declares it."""
+    """One fitted number of a term, as `strength` declares it."""
 
     name: str
+    """Name of the field."""
     unit: str
+    """Unit."""
     size: float
+    """A change that matters."""
     lower: float = -math.inf
+    """Lower bound."""
     upper: float = math.inf
+    """Upper bound."""
     inner: bool = False
+    """Whether it is a frequency, without effect while the strengths are zero."""
 
 
 class Term(eqx.Module):
-    """Something a model may lack. Subclass it, and declare its numbers by `strength`.
+    """A physical effect that a model may lack. Subclass it, and declare strengths by
+    `strength`.
 
     With all strengths zero a term changes nothing. It acts in flight, on the surface,
     in impacts or on the sensor of the first coordinate where a subclass overrides
     `acceleration`, `contact`, `restitution` or `sensed`; `acts` follows from these
     methods.
 
-    Class variables: `name`, `sentence` (what it is, in words that go on after "the
-    model lacks"), `where` (a [`Where`][jaxcam.discrepancy.terms.Where] or its name; by
-    default the first of `acts`), `region` (of the motion, in words), `source`
-    (literature), `listed` (false for one that describes a shape but is not a verdict by
-    itself), `corner` (whether its force jumps, as dry friction does, and is smoothed).
-
-    Fields, given by name: `coordinate`, the number of the coordinate (0 for the first)
-    that is pushed and whose position and velocity are seen; `constraint`, that of the
-    gap whose surface or restitution is another; `motion_unit`, that of the coordinate.
-
     Raises:
-        TypeError: For a subclass whose own `acts` is not what it overrides.
+        TypeError: A subclass declares another `acts` than it overrides.
+
+    Examples:
+        >>> from jaxcam.discrepancy import Term, strength
+        >>> class Drag(Term):
+        ...     name, sentence = "drag", "drag that grows with the square of the speed"
+        ...     factor: float = strength("1/[q]", 0.1)
+        ...     def acceleration(self, motion):
+        ...         return -self.factor * motion.velocity * abs(motion.velocity)
+        >>> [str(place) for place in Drag().acts]
+        ['flight']
     """
 
     name: ClassVar[str] = ""
+    """Name of the term."""
     sentence: ClassVar[str] = ""
+    """The effect in words that continue "the model lacks"."""
     where: ClassVar[str] = Where.FLIGHT
+    """A [`Where`][jaxcam.discrepancy.terms.Where] or its name; default the first of
+    `acts`."""
     region: ClassVar[str] = "everywhere"
+    """Part of the motion, in words."""
     source: ClassVar[str] = ""
+    """Literature."""
     listed: ClassVar[bool] = True
+    """False for a term that describes a shape but is not a verdict by itself."""
     corner: ClassVar[bool] = False
+    """Whether its force jumps, as dry friction does, and is smoothed."""
     acts: ClassVar[tuple[str, ...]] = ()
+    """Places at which it acts."""
     coordinate: int = eqx.field(default=0, static=True, kw_only=True, metadata=_SPARE)
+    """Index of the coordinate that is pushed and whose position and velocity the term
+    uses."""
     constraint: int = eqx.field(default=0, static=True, kw_only=True, metadata=_SPARE)
+    """Index of the gap whose surface or restitution is changed."""
     motion_unit: str = eqx.field(
         default="rad", static=True, kw_only=True, metadata=_SPARE
     )
+    """Unit of the coordinate."""
 
     def __init_subclass__(cls, **options):
         super().__init_subclass__(**options)
@@ -156,7 +196,7 @@ class Term(eqx.Module):
         return 0.0
 
     def restitution(self, approach, motion: Motion):
-        """Factor on the restitution coefficient at an approach speed."""
+        """Return the factor on the restitution coefficient at an approach speed."""
         del approach, motion
         return 1.0
 
@@ -178,11 +218,11 @@ class Term(eqx.Module):
         return ()
 
     def prepared(self) -> "Term":
-        """The term with whatever it needs at every step worked out once."""
+        """Return the term with everything precomputed that it needs at every step."""
         return self
 
     def strengths(self) -> tuple[Strength, ...]:
-        """The numbers that are fitted, in the order of the fields."""
+        """Return the fitted numbers, in the order of the fields."""
         found = []
         for field in dataclasses.fields(self):
             one = field.metadata.get("strength")
@@ -192,11 +232,11 @@ class Term(eqx.Module):
         return tuple(found)
 
     def numbers(self) -> tuple[Any, ...]:
-        """Values of the strengths, in the same order."""
+        """Return the values of the strengths, in the same order."""
         return tuple(getattr(self, one.name) for one in self.strengths())
 
     def written(self, unit: str) -> str:
-        """A unit with that of the coordinate in it."""
+        """Return a unit with that of the coordinate inserted."""
         return unit.replace(MOTION, self.motion_unit)
 
     def reported(self, values: Mapping[str, Value]) -> dict[str, Value]:
@@ -204,7 +244,9 @@ class Term(eqx.Module):
         return dict(values)
 
     def parameters(self, place: int) -> list[Parameter]:
-        """Parameters of a fit, of the term at some place of a `WithTerms`."""
+        """Return the parameters of a fit, for the term at some place of a
+        `WithTerms`.
+        """
         return [
             Parameter(
                 one.name,
@@ -219,9 +261,10 @@ class Term(eqx.Module):
 
 
 class SensorTerm(Term):
-    """A fault of the sensor of the motion: it acts on a field of that sensor."""
+    """A fault of the motion's sensor: it acts on a field of that sensor."""
 
     where: ClassVar[str] = Where.SENSOR
+    """The sensor."""
     fields: ClassVar[tuple[str, ...]] = ()
     """Fields of `jaxcam.fitting.Sensor`, one for each strength."""
 

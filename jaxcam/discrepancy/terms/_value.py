@@ -8,5 +8,8 @@ class Value:
     """A number with its standard error and unit."""
 
     value: float
+    """The number."""
     stderr: float
+    """Standard error."""
     unit: str = ""
+    """Unit."""

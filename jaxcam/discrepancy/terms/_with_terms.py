@@ -20,7 +20,7 @@ class WithTerms(HybridSystem):
     base: HybridSystem
     """The system."""
     terms: tuple[Term, ...] = ()
-    """What is added, each a `Term`. Without effect while strengths are zero."""
+    """Terms added to it; without effect while strengths are zero."""
     coordinates: tuple[tuple[int, int], ...] = eqx.field(
         default=((0, 1),), static=True, metadata={"spare": True}
     )
@@ -59,7 +59,8 @@ class WithTerms(HybridSystem):
     def motion(self, t, state, coordinate: int = 0, field=None) -> Motion:
         """Return the state as the terms of a coordinate see it.
 
-        **Arguments:** `field` is the rate of change of the state, if it is known.
+        Args:
+            field: Rate of change of the state, if it is known.
         """
         place, rate = self.coordinates[coordinate]
         velocity = state[rate] if field is None else field[place]

@@ -16,17 +16,22 @@ from ._sharpness import shared_width
 
 @dataclasses.dataclass(frozen=True)
 class Columns:
-    """The free numbers: which parameter each is, and of which record (-1: of all).
+    """The free numbers of a fit.
 
     `local` `(r, m)`: which parameter each column of a record's equations is;
     `place` `(r, m)`: where it is among the free numbers, -1 where it fills up.
     """
 
     parameter: Int[np.ndarray, " g"]
+    """Index of the parameter of each free number, shape `(g,)`."""
     record: Int[np.ndarray, " g"]
+    """Index of its record, -1 for all, shape `(g,)`."""
     local: Int[np.ndarray, "r m"]
+    """Index of the parameter of each column of a record's equations, shape `(r, m)`."""
     place: Int[np.ndarray, "r m"]
+    """Index of the column among the free numbers, -1 for padding, shape `(r, m)`."""
     scale: Float[np.ndarray, " g"]
+    """Scale of each free number, shape `(g,)`."""
 
     @property
     def scales(self) -> Float[np.ndarray, "r m"]:
@@ -35,11 +40,17 @@ class Columns:
 
 
 def free_columns(problem: Problem, free: Iterable[str] | None) -> Columns:
-    """Return which numbers of a problem are free, by the names of parameters (`None`:
-    all).
+    """Return the free numbers of a problem, by the names of parameters.
+
+    Args:
+        problem: The problem.
+        free: Names of the parameters; `None` for all.
+
+    Returns:
+        The [`jaxcam.fitting.engine.Columns`][].
 
     Raises:
-        ValueError: For an unknown name, or one whose values are known.
+        ValueError: A name is unknown, or its values are known constants.
     """
     if free is None:
         free = [one.name for one in problem.parameters if one.known is None]
@@ -47,7 +58,7 @@ def free_columns(problem: Problem, free: Iterable[str] | None) -> Columns:
     for name in wanted:
         if problem.parameter(name).known is not None:
             raise ValueError(
-                f"The parameter {name!r} is known of each record; leave it out of the "
+                f"The parameter {name!r} is known for each record; leave it out of the "
                 f"`constants` of the recordings to fit it."
             )
     records = len(problem.segments)
@@ -101,14 +112,20 @@ def gathered(columns: Columns, found):
 def invert_information(
     information: Float[np.ndarray, "g g"],
 ) -> Float[np.ndarray, "g g"]:
-    """Inverse of a positive semidefinite information matrix, shape `(g, g)`.
+    """Return the inverse of a positive semidefinite information matrix.
 
     It is scaled to a unit diagonal and inverted by its eigenvalues, none of which is
-    less than rounding makes it. What cannot be seen (a zero on the diagonal) gets an
+    less than rounding makes it. An undetermined number (a zero on the diagonal) gets an
     infinite variance.
 
+    Args:
+        information: The matrix, shape `(g, g)`.
+
+    Returns:
+        Shape `(g, g)`.
+
     Raises:
-        ValueError: Where it is not finite, as that of a model with NaN.
+        ValueError: It is not finite, as that of a model with NaN.
     """
     if not np.all(np.isfinite(information)):
         raise ValueError(
@@ -131,7 +148,16 @@ def invert_information(
 
 
 def off_nominal(problem: Problem, columns: Columns, point: Point):
-    """Distance of each free number from its nominal value, in scales, shape `(g,)`."""
+    """Return the distance of each free number from its nominal value, in scales.
+
+    Args:
+        problem: The problem.
+        columns: The free numbers.
+        point: The values.
+
+    Returns:
+        Shape `(g,)`.
+    """
     values = np.asarray(point.values)
     now = values[np.maximum(columns.record, 0), columns.parameter]
     nominal = np.array([_nominal(problem, p) for p in columns.parameter])
@@ -146,9 +172,17 @@ def _nominal(problem: Problem, place: int | np.integer) -> float:
 
 
 def prior_information(problem: Problem, columns: Columns, prior: bool):
-    """Information of the tolerances, `(scale / stderr)^2`, shape `(g,)`.
+    """Return the information of the tolerances, `(scale / stderr)^2`.
 
-    Zero with `prior=False`, and for a parameter of which nothing is known beforehand.
+    Zero with `prior=False`, and for a parameter without prior knowledge.
+
+    Args:
+        problem: The problem.
+        columns: The free numbers.
+        prior: Whether the tolerances count.
+
+    Returns:
+        Shape `(g,)`.
     """
     stderr = np.array([problem.parameters[p].prior_stderr for p in columns.parameter])
     return (columns.scale / stderr) ** 2 if prior else np.zeros(len(columns.scale))

@@ -21,29 +21,46 @@ LEAST = 1e-13
 
 
 class Reduced(NamedTuple):
-    """Information and score of the parameters, states eliminated, and how to go back.
+    """Normal equations of the parameters with the states eliminated.
 
     For each record: `information` `(m, m)`, `score` `(m,)`; `gain` `(k, n, m + 1 + n)`
     gives each state from the parameters, a constant, and the state after it.
     """
 
     information: Float[Array, "r m m"]
+    """Information of the parameters of each record, shape `(r, m, m)`."""
     score: Float[Array, "r m"]
+    """Score of the parameters of each record, shape `(r, m)`."""
     gain: Float[Array, "r k n c"]
+    """Gives each state from the parameters, a constant, and the state after it, shape
+    `(r, k, n, m + 1 + n)`."""
 
 
 @eqx.filter_jit
 def eliminate_states(blocks: Blocks, least: float | Array = LEAST) -> Reduced:
     """Eliminate the states of every record by a block-tridiagonal Schur complement.
 
-    **Arguments:** `least` is the part of its own information that holds a state.
+    Args:
+        blocks: The normal equations.
+        least: Share of its own information that holds a state.
+
+    Returns:
+        A [`jaxcam.fitting.engine.Reduced`][].
     """
     return jax.vmap(lambda one: _eliminate(one, least))(blocks)
 
 
 @eqx.filter_jit
 def state_steps(reduced: Reduced, change: Float[Array, "r m"]) -> Float[Array, "r k n"]:
-    """Steps of the states that go with one of the parameters, in their scales."""
+    """Return the steps of the states that belong to a step of the parameters.
+
+    Args:
+        reduced: The reduced equations.
+        change: Step of the parameters, shape `(r, m)`.
+
+    Returns:
+        Shape `(r, k, n)`, in the scales of the states.
+    """
 
     def record(gain, change):
         size = gain.shape[-2]

@@ -60,7 +60,8 @@ def _place(system: HybridSystem, recording: Recording, name: str) -> str:
         value = math.nan
     if not math.isfinite(value):
         raise RecordingError(
-            f"{recording.name}: its constant `{name}` is no finite number; correct it."
+            f"{recording.name}: its constant `{name}` is not a finite number; correct "
+            "it."
         )
     every = parameter_names(system)
     inside = [one for one in every if one == name or one.endswith(f".{name}")]
@@ -68,7 +69,7 @@ def _place(system: HybridSystem, recording: Recording, name: str) -> str:
         near = difflib.get_close_matches(name, every, n=1)
         hint = f"is `{near[0]}` meant?" if near else f"it has {', '.join(every)}."
         raise RecordingError(
-            f"{recording.name}: its constant `{name}` is no number of the system; "
+            f"{recording.name}: its constant `{name}` is not a number of the system; "
             f"{hint}"
         )
     return min(inside, key=lambda one: one.count("."))

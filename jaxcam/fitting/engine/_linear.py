@@ -37,22 +37,20 @@ class Extras(NamedTuple):
 
 
 class LinearPieces(NamedTuple):
-    """Pieces and joints of one record, before anything is added up.
+    """Pieces and joints of one record, before summation.
 
     The first `n` of `a = n + m` columns are the state at the beginning of the piece,
-    the others what else varies.
-
-    - `end`: the state at the end of each piece, by its columns.
+    the others the parameters.
     """
 
     information: Float[Array, "k a a"]
-    """Of the samples of each piece in flight."""
+    """Information of the samples of each piece in flight, shape `(k, a, a)`."""
     slope: Float[Array, "k a"]
-    """Of the samples of each piece in flight."""
+    """Slope of the cost of these samples, shape `(k, a)`."""
     pp: Float[Array, "m m"]
-    """Of all samples in contact, by what else varies."""
+    """Information of all samples in contact, by the parameters, shape `(m, m)`."""
     p: Float[Array, " m"]
-    """Of all samples in contact, by what else varies."""
+    """Slope of the cost of these samples, shape `(m,)`."""
     later: Float[Array, "k e n"]
     """Rows of each joint for the state after it, for the columns of the piece before
     it, and for what else varies, in units of the joint's error. `tied`: how far the
@@ -66,9 +64,13 @@ class LinearPieces(NamedTuple):
     it, and for what else varies, in units of the joint's error. `tied`: how far the
     joint is off."""
     tied: Float[Array, "k e"]
+    """Distance at each joint, in units of its error."""
     flown_cost: Float[Array, " k"]
+    """Cost of each piece in flight."""
     joint_cost: Float[Array, " k"]
+    """Cost of each joint."""
     rested_cost: Float[Array, " kc"]
+    """Cost of each piece in contact."""
 
 
 def linear_pieces(
@@ -76,9 +78,17 @@ def linear_pieces(
 ) -> LinearPieces:
     """Linearise one record about its states.
 
-    **Arguments:** `model_at(change, start, step)` is the model of a piece that begins
-    at `start` and has steps of length `step`, where `change` `(m,)` is zero at the
-    point; `width` is m.
+    Args:
+        model_at: `model_at(change, start, step)` is the model of a piece that begins at
+            `start` with steps of length `step`, where `change` `(m,)` is zero at the
+            point.
+        pieces: The pieces.
+        extras: Further arguments of the compiled programs.
+        states: States at the beginning of each piece.
+        width: Number m of parameters.
+
+    Returns:
+        A [`jaxcam.fitting.engine.LinearPieces`][].
     """
     size = states.shape[-1]
     origin = jnp.zeros(width)

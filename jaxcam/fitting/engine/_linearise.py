@@ -27,12 +27,12 @@ from ._pieces import Pieces
 
 
 class Point(NamedTuple):
-    """The varying numbers: values `(r, q)` of the parameters of each record, in their
-    units, and the state `(r, k, n)` at the beginning of each piece.
-    """
+    """Values of the parameters, and states at the beginning of each piece."""
 
     values: Float[Array, "r q"]
+    """Values of the parameters of each record, in their units, shape `(r, q)`."""
     states: Float[Array, "r k n"]
+    """State at the beginning of each piece, shape `(r, k, n)`."""
 
 
 def _as_it_is(model: Model) -> Model:
@@ -40,18 +40,20 @@ def _as_it_is(model: Model) -> Model:
 
 
 class Layout(eqx.Module):
-    """The location of the parameters in a model: its leaves, and which of them are
-    fitted.
+    """The location of the parameters in a model: its leaves, and the fitted ones.
 
     `ready` works out what a model needs at every step, once for all of them.
     """
 
     model: Model
+    """The model."""
     places: tuple[int, ...] = eqx.field(static=True)
+    """Index of each parameter among the leaves."""
     ready: Callable[[Model], Model] = eqx.field(static=True, default=_as_it_is)
+    """Prepares a model for many evaluations."""
 
     def at(self, values: Float[Array, " q"]) -> Model:
-        """The model with the parameters at some values."""
+        """Return the model with the parameters at some values."""
         leaves, tree = jax.tree.flatten(self.model)
         for column, place in enumerate(self.places):
             leaves[place] = values[column]
@@ -59,7 +61,7 @@ class Layout(eqx.Module):
 
     @eqx.filter_jit
     def about(self, values: Float[Array, " q"]) -> "Expansion":
-        """The model near some values."""
+        """Return the model near some values."""
         origin = self.at(values)
         given = jax.tree.leaves(self.model)
         leaves, tree = jax.tree.flatten(origin)
@@ -119,19 +121,28 @@ class Blocks(NamedTuple):
     """
 
     ss: Float[Array, "k n n"]
+    """Information of each piece's state, shape `(k, n, n)`."""
     sp: Float[Array, "k n m"]
+    """Information of state and parameters, shape `(k, n, m)`."""
     s: Float[Array, "k n"]
+    """Score of each piece's state, shape `(k, n)`."""
     before: Float[Array, "k n n"]
+    """Coupling of a piece's state to that of the piece before, shape `(k, n, n)`."""
     pp: Float[Array, "m m"]
+    """Information of the parameters, over all pieces and joints, shape `(m, m)`."""
     p: Float[Array, " m"]
+    """Score of the parameters, shape `(m,)`."""
 
 
 class Costs(NamedTuple):
-    """Minus twice the log-likelihood of each piece, by what it is made of."""
+    """Minus twice the log-likelihood of each piece, by its parts."""
 
     flown: Float[Array, "r k"]
+    """Cost of each piece in flight, shape `(r, k)`."""
     joints: Float[Array, "r k"]
+    """Cost of each joint, shape `(r, k)`."""
     rested: Float[Array, "r kc"]
+    """Cost of each piece in contact, shape `(r, kc)`."""
 
 
 def assemble(
@@ -142,10 +153,18 @@ def assemble(
     columns: Int[Array, "r m"],
     scales: Float[Array, "r m"],
 ) -> tuple[Blocks, Costs]:
-    """Linearise about a point; records are shared out to the cores.
+    """Linearise about a point; records are distributed over the cores.
 
-    **Arguments:** `columns` of the parameters that are free in each record and the
-    `scales` that the normal equations are in; a scale of zero fills up the width.
+    Args:
+        layout: The location of the parameters.
+        pieces: The pieces of all records.
+        extras: Further arguments of the compiled programs.
+        point: The point.
+        columns: Parameters that are free in each record, shape `(r, m)`.
+        scales: Scales of the normal equations, shape `(r, m)`; zero for padding.
+
+    Returns:
+        Normal equations and costs.
     """
 
     def record(row):
@@ -210,7 +229,14 @@ def cost_of(layout: Layout, pieces: Pieces, extras: Extras, point: Point) -> Cos
 
 
 def chained(found: LinearPieces) -> Blocks:
-    """Normal equations of one record: its pieces and their joints added up."""
+    """Return the normal equations of one record: its pieces and joints summed.
+
+    Args:
+        found: The linear pieces.
+
+    Returns:
+        The [`jaxcam.fitting.engine.Blocks`][].
+    """
     size = found.later.shape[-1]
     information, later = found.information, found.later
     earlier, params = (
@@ -239,7 +265,15 @@ def chained(found: LinearPieces) -> Blocks:
 
 
 def total_cost(costs: Costs, extras) -> float:
-    """Cost of all pieces by their weights; a joint counts as the less of its two."""
+    """Return the weighted cost of all pieces; a joint has the lesser weight of its two.
+
+    Args:
+        costs: The costs.
+        extras: Further arguments of the compiled programs, with the weights.
+
+    Returns:
+        The cost.
+    """
     before = jnp.concatenate([extras.weight[:, :1], extras.weight[:, :-1]], axis=1)
     shared = jnp.minimum(extras.weight, before)
     parts = (

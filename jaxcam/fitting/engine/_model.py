@@ -20,37 +20,40 @@ def _number(default: float):
 class Sensor(eqx.Module):
     """A sensor: the map from the state x(t) to one channel of a recording.
 
-    The sensor sees `offset + gain * observe(x(t - lag))`, through a first-order filter
-    where it has a bandwidth, with white noise, rounded to its resolution and cut off
-    at its limit. The likelihood is that of such samples: a rounded one says in which
-    interval it was, a saturated one only that it was beyond the limit.
+    The sensor measures `offset + gain * observe(x(t - lag))`, through a first-order
+    filter if it has a bandwidth, with white noise, rounded to its resolution and
+    saturated at its limit. The likelihood is that of such samples: a rounded one is
+    known to an interval, a saturated one only to lie beyond the limit. Gain, offset and
+    lag can be fitted like parameters of the system.
 
-    Args:
-        observe: A component of the state, or a function of the state.
-        noise: Standard deviation of the noise, in the units of the channel.
-        resolution: Smallest step of the channel; zero for a continuous one.
-        limit: Largest magnitude that it can show.
-        bandwidth_hz: Of a first-order filter (Hz); infinite for none.
-        gain: A parameter that can be fitted like those of the system.
-        offset: Another one, in the units of the channel.
-        lag: Another one (s); it must be short compared with the time in which the
-            motion changes.
-        tails: Degrees of freedom of a Student distribution for noise with outliers;
-            infinite for a Gaussian one.
-        error: What else the sensor shows in a fit, `error(system, t, value, slope)` of
-            the value and its rate of change; nothing by default.
+    Examples:
+        >>> from jaxcam.fitting import Sensor
+        >>> round(float(Sensor(0, noise=3e-3, resolution=1e-3).floor), 6)
+        0.003014
     """
 
     observe: int | Callable[[Array], Array] = eqx.field(static=True)
+    """A component of the state, or a function of the state."""
     noise: Float[Array, ""] = eqx.field(converter=_array)
+    """Standard deviation of the noise, in the units of the channel."""
     resolution: float = eqx.field(default=0.0, static=True)
+    """Smallest step of the channel; zero for a continuous one."""
     limit: float = eqx.field(default=float("inf"), static=True)
+    """Largest magnitude that it can show."""
     bandwidth_hz: float = eqx.field(default=float("inf"), static=True)
+    """Bandwidth of a first-order filter (Hz); infinite for none."""
     tails: float = eqx.field(default=float("inf"), static=True)
+    """Degrees of freedom of a Student distribution for noise with outliers; infinite
+    for a Gaussian one."""
     gain: Float[Array, ""] = _number(1.0)
+    """Gain."""
     offset: Float[Array, ""] = _number(0.0)
+    """Offset, in the units of the channel."""
     lag: Float[Array, ""] = _number(0.0)
+    """Lag (s), short compared with the time in which the motion changes."""
     error: Callable | None = eqx.field(default=None, static=True)
+    """What else the sensor shows in a fit, `error(system, t, value, slope)` of the value
+    and its rate of change; nothing by default."""
 
     def __check_init__(self):
         if not self.noise > 0:
@@ -77,22 +80,29 @@ class Sensor(eqx.Module):
 
 
 class Turning(eqx.Module):
-    """A drive that was measured: where a system keeps its speed and its phase.
+    """A measured drive: the fields in which a system keeps its speed and its phase.
 
     While a recording is predicted, the speed follows the measured one and the phase is
     such that the drive is where it was measured. `phase` of the fitted system is then
     an offset between its angle and the encoder's.
 
-    **Arguments:** functions that pick both out of the system, such as
-    `lambda s: s.speed` and, where the system is a field of another,
-    `lambda s: s.base.speed`.
+    Examples:
+        >>> from jaxcam.fitting import Turning
+        >>> from jaxcam.models import preset
+        >>> drive = Turning(lambda s: s.speed, lambda s: s.phase)
+        >>> float(drive.speed(preset("calibrated"))) > 0
+        True
     """
 
     speed: Callable[[HybridSystem], Array] = eqx.field(static=True)
+    """Picks the speed out of the system, such as `lambda s: s.speed`."""
     phase: Callable[[HybridSystem], Array] = eqx.field(static=True)
+    """Picks the phase out of the system, such as `lambda s: s.phase`."""
 
     def at(self, system, t, angle, rate):
-        """The system with its drive at `angle` and turning at `rate` at time `t`."""
+        """Return the system with its drive at `angle` and turning at `rate` at time
+        `t`.
+        """
         phase = self.phase(system) + angle - rate * t
         return eqx.tree_at(
             lambda s: (self.speed(s), self.phase(s)), system, (rate, phase)
@@ -100,43 +110,60 @@ class Turning(eqx.Module):
 
 
 class Input(eqx.Module):
-    """An input that was measured, as a force or a voltage: where a system keeps it.
+    """A measured input, as a force or a voltage, and the field in which a system keeps
+    it.
 
-    While a recording is predicted, the system has the value that its own recording had,
+    While a recording is predicted, the system has the value of its own recording,
     each sample held until the next one, as digital controllers do; over a step of the
     integration, its mean.
+
+    Examples:
+        >>> from jaxcam.fitting import Input
+        >>> Input("force_N", lambda s: s.force).channel
+        'force_N'
     """
 
     channel: str = eqx.field(static=True)
-    """Of the recordings."""
+    """Channel of the recordings."""
     value: Callable[[HybridSystem], Array] = eqx.field(static=True)
     """Picks the field out of the system, such as `lambda s: s.force`."""
 
     def at(self, system, t, level, rate):
-        """The system with its input at `level`."""
+        """Return the system with its input at `level`."""
         del t, rate
         return eqx.tree_at(self.value, system, level)
 
 
 class Model(eqx.Module):
-    """A system and the sensors that see it; what parameters are picked from."""
+    """A system and its sensors, from which parameters are picked.
+
+    Examples:
+        >>> from jaxcam.fitting import Model, Sensor
+        >>> from jaxcam.models import BouncingBall
+        >>> list(Model(BouncingBall(), {"height_m": Sensor(0, noise=1e-3)}).sensors)
+        ['height_m']
+    """
 
     system: HybridSystem
     """Any `HybridSystem`."""
     sensors: Mapping[str, Sensor]
-    """A `Sensor` for each channel that is fitted."""
+    """A `Sensor` for each fitted channel."""
     drive: Turning | Input | None = None
-    """For a system that is turned by a measured drive, or that has a measured input."""
+    """The measured drive or input of the system, if there is one."""
 
     def driven(self, t, angle, rate) -> HybridSystem:
-        """The system as it is near time `t`."""
+        """Return the system near time `t`."""
         if self.drive is None:
             return self.system
         return self.drive.at(self.system, t, angle, rate)
 
 
 def cam_follower_drive() -> Turning:
-    """The drive of a `CamFollower`."""
+    """Return the drive of a `CamFollower`.
+
+    Returns:
+        A [`jaxcam.fitting.Turning`][].
+    """
     return _CAM_DRIVE
 
 

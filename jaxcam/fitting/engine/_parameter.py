@@ -11,25 +11,32 @@ from ._model import Model
 
 @dataclasses.dataclass(frozen=True)
 class Parameter:
-    """One number of a model that may be fitted."""
+    """One number of a model that may be fitted, and its prior knowledge.
+
+    Examples:
+        >>> from jaxcam.fitting import Parameter
+        >>> mass = Parameter("mass", lambda m: m.system.mass, tolerance=0.01, unit="kg")
+        >>> round(mass.prior_stderr, 5)
+        0.00577
+    """
 
     name: str
-    """For tables, and to free it."""
+    """Name of the parameter, for tables and to free it."""
     where: Callable[[Model], Array]
     """Picks it out of a `Model`: `lambda m: m.system.stiffness`."""
     tolerance: float = math.inf
-    """How far it may be from `nominal`, as a maker states it: plus or minus so much,
-    anything in between equally likely. The fit uses a Gaussian of the same standard
-    deviation, `tolerance / sqrt(3)`. Infinite: nothing is known."""
+    """Largest deviation from `nominal`, as a maker states it: any value within it is
+    equally likely. The fit uses a Gaussian of the same standard deviation,
+    `tolerance / sqrt(3)`. Infinite without prior knowledge."""
     nominal: float | None = None
-    """By default, the value that the model has."""
+    """Nominal value; default the model's own."""
     scale: float | None = None
     """Size of a change that matters; by default the tolerance, or else a hundredth of
     the value. It does not influence the result."""
     lower: float = -math.inf
-    """Bounds that hold whatever the data say."""
+    """Lower bound."""
     upper: float = math.inf
-    """Bounds that hold whatever the data say."""
+    """Upper bound."""
     per_record: bool = False
     """Whether every record has a value of its own."""
     unit: str = ""
@@ -56,7 +63,7 @@ class Parameter:
         return self.tolerance / math.sqrt(3.0)
 
     def size(self, value: float) -> float:
-        """A change that matters, positive."""
+        """Return a change that matters, positive."""
         if self.scale is not None:
             return self.scale
         if math.isfinite(self.tolerance):

@@ -53,7 +53,18 @@ def fly(model: Model, state, start, step, angle, rate):
 
 
 def runge_kutta(model: Model, system, t, x, h):
-    """One classical step of length `h`: the state after it, and the first slope."""
+    """Take one classical Runge-Kutta step of length `h`.
+
+    Args:
+        model: The model.
+        system: The system.
+        t: Time (s).
+        x: State, shape `(n,)`.
+        h: Step length (s).
+
+    Returns:
+        The state after it, and the first slope.
+    """
 
     def field(t, x):
         return augmented_field(model, system, t, x)

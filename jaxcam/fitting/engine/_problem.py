@@ -76,43 +76,62 @@ class Weights(eqx.Module):
     """Weights of the data of each piece: `(r, k)` in flight, `(r, kc)` in contact."""
 
     flown: Float[np.ndarray, "r k"]
+    """Weight of each piece in flight, shape `(r, k)`."""
     rested: Float[np.ndarray, "r kc"]
+    """Weight of each piece in contact, shape `(r, kc)`."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Problem:
-    """Recordings, a model, and the parameters of it that may be fitted.
+    """Recordings, a model, and its parameters that may be fitted.
 
     Built by `Problem.build`.
 
-    - `records`: names of the recordings.
+    Examples:
+        >>> from jaxcam import fitting, recordings
+        >>> from jaxcam.models import BouncingBall
+        >>> ball, rng = BouncingBall(), np.random.default_rng(0)
+        >>> sensors = {"height_m": fitting.Sensor(0, noise=1e-3)}
+        >>> run = recordings.record(ball, sensors, 1.0, rng=rng, state=[1.0, 0.0])
+        >>> parts = recordings.segment(run, "height_m", 0.0)
+        >>> gravity = fitting.Parameter("gravity", lambda m: m.system.gravity, 1.0)
+        >>> model = fitting.Model(ball, sensors)
+        >>> problem = fitting.Problem.build(model, [parts], [gravity])
+        >>> problem.names
+        ('gravity',)
     """
 
     model: Model
-    """At its nominal parameters."""
+    """The model at its nominal parameters."""
     parameters: tuple[Parameter, ...]
-    """What may be fitted."""
+    """Parameters that may be fitted."""
     segments: tuple[Segments, ...]
+    """The recordings, cut into their parts."""
     pieces: Pieces
-    """What the recordings were cut into."""
+    """Pieces of the recordings, as arrays."""
     spans: tuple[tuple[list[Span], list[Span]], ...]
-    """What the recordings were cut into."""
+    """Spans of the flights and contacts of each recording."""
     layout: Layout
+    """The location of the parameters in the model."""
     start: Point
-    """The nominal parameters and the states that the data suggest."""
+    """Nominal parameters, and the states that the data suggest."""
     extras: Extras
+    """Further arguments of the compiled programs."""
 
     @staticmethod
     def build(
         model: Model, segments: Sequence[Segments], parameters: Sequence[Parameter]
     ) -> "Problem":
-        """Cut the recordings into pieces and find a state to start each of them from.
+        """Cut the recordings into pieces and find a start state for each of them.
 
         Args:
             model: A system with its sensors, at nominal parameters.
             segments: Recordings from `jaxcam.recordings.segment_case` or `segment`;
                 what is in their `constants` becomes a parameter that no fit changes.
             parameters: Those that may be fitted, free or not.
+
+        Returns:
+            A `Problem`.
 
         Raises:
             RecordingError: For a missing channel, a record without flight, or a
@@ -198,7 +217,7 @@ class Problem:
         return longest_flight(self.spans)
 
     def parameter(self, name: str) -> Parameter:
-        """
+        """Return the parameter of this name.
 
         Raises:
             ValueError: That lists the names there are.
@@ -212,12 +231,12 @@ class Problem:
         )
 
     def everything(self) -> Weights:
-        """All data count once."""
+        """Return weights by which all data count once."""
         exists, rests = self.pieces.exists, self.pieces.rest_exists
         return Weights(np.asarray(exists, float), np.asarray(rests, float))
 
     def only(self, records: Iterable[str]) -> Weights:
-        """Only some records count. **Raises:** `ValueError` for an unknown name."""
+        """Return weights by which only some records count."""
         wanted = set(records)
         if not wanted <= set(self.records):
             raise ValueError(
@@ -229,7 +248,9 @@ class Problem:
         return Weights(every.flown * keep[:, None], every.rested * keep[:, None])
 
     def between(self, start: float, stop: float) -> Weights:
-        """Only pieces that begin in some span of time (s of each record) count."""
+        """Return weights by which only pieces that begin in a time span (s of each
+        record) count.
+        """
 
         def inside(samples):
             begin = np.asarray(samples.start)

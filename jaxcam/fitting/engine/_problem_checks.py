@@ -50,11 +50,18 @@ def refuse_repeated(parameters) -> None:
 
 
 def parameter_places(model: Model, parameters) -> tuple[int, ...]:
-    """Index of each parameter among the leaves of a model, for a `Layout`.
+    """Return the index of each parameter among the leaves of a model, for a `Layout`.
+
+    Args:
+        model: The model.
+        parameters: The parameters.
+
+    Returns:
+        One index per parameter.
 
     Raises:
-        ValueError: For a parameter that is not one number of the model, or the same one
-            as another.
+        ValueError: A parameter is not one number of the model, or the same one as
+            another.
     """
     leaves, tree = jax.tree.flatten(model)
     numbered = jax.tree.unflatten(tree, list(range(len(leaves))))

@@ -13,6 +13,7 @@ class Field:
     """
 
     name: str
+    """Dotted name of the field."""
 
     def __call__(self, owner: Any) -> Any:
         for part in self.name.split("."):

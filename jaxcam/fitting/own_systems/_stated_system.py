@@ -30,17 +30,22 @@ def stated_system(
     fitted: Collection[str] = (),
     measured: Mapping[str, float] = {},
 ) -> HybridSystem:
-    """The system with some of its fields as a file states them.
+    """Return a system with some of its fields as a file states them.
 
     Args:
-        values: By the names of fields, dotted for those of a part of the system, which
-            must have a default then.
-        fitted: Names among these that have to be numbers.
-        measured: Fields that follow a channel, and what they hold without a default and
+        file: The file, for messages.
+        values: Values by the names of fields, dotted for those of a part of the system,
+            which must then have a default.
+        fitted: Names of the fields that have to be numbers.
+        measured: Fields that follow a channel, and their value without a default and
             without a value in the file.
 
+    Returns:
+        The system.
+
     Raises:
-        RigError: One sentence that names the file, the field and the fix.
+        RigError: The system cannot be made; the message names the file, the field and
+            the fix.
     """
     known = inspect.signature(cls).parameters
     for name in (*values, *measured):

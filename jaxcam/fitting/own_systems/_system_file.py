@@ -22,12 +22,17 @@ _loaded: dict[Path, tuple[bytes, ModuleType]] = {}
 
 
 def system_class(named: str, folder: str | Path = ".") -> type[HybridSystem]:
-    """The class of a system in a Python file, which is run.
+    """Return the class of a system in a Python file, which is run.
 
-    **Arguments:** `named` is `FILE.py:CLASS`, the file seen from `folder`.
+    Args:
+        named: `FILE.py:CLASS`, the file relative to `folder`.
+        folder: The folder.
+
+    Returns:
+        The class.
 
     Raises:
-        RigError: One sentence that names the file and the fix.
+        RigError: The class cannot be loaded; the message names the file and the fix.
     """
     path, name = split_name(named)
     file = Path(folder) / path
@@ -54,7 +59,14 @@ def system_class(named: str, folder: str | Path = ".") -> type[HybridSystem]:
 
 
 def system_source(cls: type[HybridSystem]) -> str | None:
-    """`FILE.py:CLASS` of a class from such a file, or `None` for any other."""
+    """Return `FILE.py:CLASS` of a class from such a file, or `None` for any other.
+
+    Args:
+        cls: The class.
+
+    Returns:
+        Text, or `None`.
+    """
     for file, (_, module) in _loaded.items():
         if getattr(module, cls.__name__, None) is cls:
             return f"{file}:{cls.__name__}"

@@ -18,11 +18,12 @@ from ._published_fit import PublishedFit
 
 
 class FreeFall(eqx.Module):
-    """A system, and the state in which it was let go."""
+    """A system, and the state from which it was released."""
 
     system: HybridSystem
+    """The system."""
     state: Float[Array, " n"] | tuple[Float[Array, ""], ...]
-    """(n,), or its components one by one."""
+    """State at the start, shape `(n,)`, or its components one by one."""
 
 
 def fit_free_fall(
@@ -37,27 +38,28 @@ def fit_free_fall(
     name: str = "stiffness",
     steps: int = 4,
 ) -> PublishedFit:
-    """Fit one parameter, and the state at the start, to a motion without contact.
+    """Fit one parameter, and the initial state, to a motion without contact.
 
-    The motion of the rig sees inertia and stiffness only through M = J/K (4.9): pick
-    one of them with `where` and hold the other.
+    The motion of the rig depends on inertia and stiffness only through M = J/K (thesis,
+    eq. 4.9): pick one of them with `where` and hold the other.
 
     Args:
+        system: The system.
         where: Picks the parameter of the system.
-        times: Shape `(k,)`, increasing (s); before the first impact.
-        measured: Shape `(k,)`, one component of the state.
+        times: Times (s), increasing, before the first impact, shape `(k,)`.
+        measured: One component of the state at these times, shape `(k,)`.
         error: Standard error of a sample, in the unit of the component.
         state: Guess of the state at `times[0]`, shape `(n,)`.
-        observe: Which component is measured.
-        name: Of the parameter, for the report.
-        steps: Runge-Kutta steps of order 8 between two samples.
+        observe: Index of the measured component.
+        name: Name of the parameter, for the report.
+        steps: Number of Runge-Kutta steps of order 8 between two samples.
 
     Returns:
         A [`jaxcam.fitting.published.PublishedFit`][] whose `model` has the fields
             `system` and `state`.
 
     Raises:
-        ValueError: For times that do not increase.
+        ValueError: Times do not increase.
     """
     times, measured = np.asarray(times, dtype=float), np.asarray(measured, dtype=float)
     state = np.asarray(state, dtype=float)

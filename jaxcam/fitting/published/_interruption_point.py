@@ -19,21 +19,33 @@ def interruption_of_chattering(
     *,
     periods: int = 1,
 ) -> Float[Array, ""]:
-    """The parameter at which complete chattering ends at the release point.
+    """Return the parameter value at which complete chattering ends at the release
+    point.
 
-    [`variational.chatter_interruption`][] for use in a fit: differentiable forward in
-    all other parameters, and NaN instead of an error when a step of the fit takes the
+    [`variational.chatter_interruption`][] for use in a fit: forward-differentiable in
+    all other parameters, and NaN instead of an error when a step of the fit moves the
     interruption out of the bracket.
 
-    **Arguments:** a system with two states, one constraint and a period; `where` picks
-    the parameter; two values of it, wide around the published one, with chattering
-    complete at one of them only; `periods` from release to the release after sticking.
+    Args:
+        system: A system with two states, one constraint and a period.
+        where: Picks the parameter.
+        bracket: Two values of it, wide around the published one, with complete
+            chattering at one of them only.
+        periods: Number of forcing periods from release to the release after sticking.
 
     Returns:
         The parameter, in its own unit; NaN where the bracket holds no interruption.
 
     Raises:
-        ValueError: For a system without a period.
+        ValueError: The system has no period.
+
+    Examples:
+        >>> from jaxcam.fitting import interruption_of_chattering
+        >>> from jaxcam.models import ImpactOscillator
+        >>> system = ImpactOscillator(omega=1.0, restitution=0.5)
+        >>> value = interruption_of_chattering(system, lambda s: s.omega, (0.4, 0.8))
+        >>> round(float(value), 4)
+        0.6072
     """
     system = as_arrays(system)
     found = interruption_in(system, where, *bracket, periods)

@@ -34,10 +34,16 @@ class Published(eqx.Module):
 
     Raises:
         ValueError: For an error that is not positive.
+
+    Examples:
+        >>> from jaxcam.fitting import Published
+        >>> fall = lambda ball: jnp.sqrt(2 / ball.gravity)[None]
+        >>> Published("fall from 1 m", fall, [0.45152], [1e-5]).values.tolist()
+        [0.45152]
     """
 
     name: str = eqx.field(static=True)
-    """What they are, for the report."""
+    """Name of the numbers, for the report."""
     compute: Callable[[Any], Float[Array, " k"]]
     """Takes the model and returns `(k,)`; differentiable, as
     [`variational.impact_orbit`][] and [`variational.fold_of_orbit`][] are."""
@@ -63,7 +69,14 @@ class Published(eqx.Module):
 
 
 def rounding_error(decimals: int) -> float:
-    """Standard deviation of what rounding to `decimals` digits hides."""
+    """Return the standard deviation of the error of rounding to `decimals` digits.
+
+    Args:
+        decimals: Number of digits after the point.
+
+    Returns:
+        10^-decimals / sqrt(12).
+    """
     return 10.0**-decimals / 12**0.5
 
 
@@ -79,27 +92,31 @@ def fit_published(
 ) -> PublishedFit:
     """Fit parameters of a model to published numbers.
 
-    Levenberg and Marquardt's method (MINPACK) on forward-mode Jacobians. Where the
-    start is far from the data, their errors are taken ten, a hundred, ... times as
-    large first: a path that bends less.
+    Levenberg-Marquardt (MINPACK); far from the data, errors are first taken larger.
 
     Args:
-        model: A system, or any Module with one in it, at the nominal values.
-        where: The scalars of it that are free, as a tuple or list; the centres of the
-            priors.
+        model: A system, or a Module with one in it, at the nominal values.
+        where: Picks the free scalars, which centre the priors.
         published: The data.
-        names: One for each free parameter.
-        tolerances: Standard deviations of the priors, in the units of the parameters;
-            infinity for none.
-        start: Values to begin at instead of the nominal ones.
-        max_steps: Most evaluations at one scale of the errors.
+        names: Names of the free parameters.
+        tolerances: Standard deviations of the priors; infinity for none.
+        start: Initial values; default nominal.
+        max_steps: Largest number of evaluations per scale of the errors.
 
     Returns:
         A [`jaxcam.fitting.published.PublishedFit`][].
 
     Raises:
-        ValueError: Where lengths differ, a tolerance is not positive, or a quantity
-            cannot be computed at the start.
+        ValueError: Lengths differ, or a number is invalid.
+
+    Examples:
+        >>> from jaxcam import fitting, models
+        >>> ball, free = models.BouncingBall(), lambda ball: (ball.gravity,)
+        >>> fall = lambda ball: jnp.sqrt(2 / ball.gravity)[None]  # from 1 m (s)
+        >>> data = [fitting.Published("fall", fall, [0.45152], [1e-5])]
+        >>> fit = fitting.fit_published(ball, free, data, names=["g"], tolerances=[1.0])
+        >>> round(float(fit.estimates[0]), 2)
+        9.81
     """
     nominal, unravel = _picked(model, where)
     priors = np.asarray(tolerances, dtype=float)

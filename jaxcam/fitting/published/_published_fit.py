@@ -24,12 +24,17 @@ class PublishedFit:
     """
 
     model: Any
-    """With the estimates in it."""
+    """The model with the estimates in it."""
     names: tuple[str, ...]
+    """Names of the parameters."""
     nominal: Float[np.ndarray, " p"]
+    """Nominal values, shape `(p,)`."""
     tolerances: Float[np.ndarray, " p"]
+    """Tolerances, shape `(p,)`."""
     estimates: Float[np.ndarray, " p"]
+    """Estimates, priors included, shape `(p,)`."""
     covariance: Float[np.ndarray, "p p"]
+    """Covariance of the estimates, shape `(p, p)`."""
     shares: Float[np.ndarray, " p"]
     """`(p,)` and `(p, p)`; how much of what is known of each combination of parameters
     comes from the data and not from the priors (1 all, 0 nothing), ascending, and the
@@ -39,7 +44,9 @@ class PublishedFit:
     comes from the data and not from the priors (1 all, 0 nothing), ascending, and the
     combinations, one a row, in units of the tolerances."""
     published: tuple[Any, ...]
+    """The published numbers."""
     predicted: Float[np.ndarray, " n"]
+    """The computed numbers, shape `(n,)`."""
     steps: int
     """Iterations, and whether the last stage met its tolerance."""
     converged: bool
@@ -59,7 +66,9 @@ class PublishedFit:
         steps,
         converged,
     ) -> "PublishedFit":
-        """From the Jacobian of the data in standard errors by the parameters."""
+        """Return the result from the Jacobian of the data in standard errors by the
+        parameters.
+        """
         finite: Bool[np.ndarray, " p"] = np.isfinite(tolerances)
         units = np.where(finite, tolerances, np.where(nominal == 0, 1, np.abs(nominal)))
         scaled = jacobian * units
@@ -96,15 +105,16 @@ class PublishedFit:
         return self.covariance / np.outer(errors, errors)
 
     def ellipse(self, names: Sequence[str], level: float = 0.95) -> Ellipse:
-        """Joint confidence region of two or more parameters, the others left free.
+        """Return the joint confidence region of two or more parameters, the others left
+        free.
 
         Raises:
-            ValueError: as in [`jaxcam.fitting.Fit`][].
+            ValueError: As for [`jaxcam.fitting.Fit`][].
         """
         return ellipse_of(names, self.names, self.estimates, self.covariance, level)
 
     def most_correlated(self) -> str:
-        """The pair of parameters that is told apart worst, in a sentence."""
+        """Return a sentence about the most correlated pair of parameters."""
         return most_correlated(self.names, self.correlation)
 
     @property
@@ -112,7 +122,9 @@ class PublishedFit:
         return float(np.sum(self._misses() ** 2))
 
     def parameters(self) -> "pd.DataFrame":
-        """Nominal value, tolerance, estimate and standard error of each parameter."""
+        """Return nominal value, tolerance, estimate and standard error of each
+        parameter.
+        """
         import pandas as pd
 
         return pd.DataFrame(
@@ -126,7 +138,9 @@ class PublishedFit:
         )
 
     def numbers(self) -> "pd.DataFrame":
-        """Published and computed numbers; the last column is in standard errors."""
+        """Return published and computed numbers; the last column is in standard
+        errors.
+        """
         import pandas as pd
 
         return pd.DataFrame(
@@ -143,7 +157,8 @@ class PublishedFit:
         )
 
     def weak(self, share: float = 0.5) -> list[str]:
-        """Combinations of parameters that rest on the priors more than on the data.
+        """Return the combinations of parameters that rest on the priors more than on
+        the data.
 
         One sentence each, the weakest first; `share` is the part of the information
         that must come from the data.

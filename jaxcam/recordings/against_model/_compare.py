@@ -2,7 +2,7 @@
 
 A simulation from one initial state would soon be somewhere else: impacts magnify
 every error. Here each flight is started where the recording says it started, so that
-what is left over is what the model lacks in that mode: in flight, on the surface, or
+what remains is what the model lacks in that mode: in flight, on the surface, or
 in the impacts.
 """
 
@@ -29,21 +29,34 @@ def compare(
     noise: dict[str, float] | None = None,
     clock: Float[np.ndarray, " k"] | None = None,
 ) -> Comparison:
-    """One recording against a model.
+    """Compare one recording with a model.
 
     Args:
         system: The model. A `CamFollower` is compared at the measured angle of its cam,
             whatever its own speed.
         segments: The recording, cut into its parts.
-        observe: What the channels are of the state: `{"height_m": 0}` is the first
+        observe: The channels as functions of the state: `{"height_m": 0}` is the first
             component; a function of the state gives anything else. By default the
             channel that was cut is the first component.
-        noise: Standard deviations of the channels, where they are known; otherwise they
-            are measured.
+        noise: Standard deviations of the channels; default measured.
         clock: Time of the model at each sample (s).
 
+    Returns:
+        A comparison.
+
     Raises:
-        RecordingError: Where a channel is missing.
+        RecordingError: A channel is missing.
+
+    Examples:
+        >>> from jaxcam.models import BouncingBall
+        >>> from jaxcam.recordings import Recording, compare, segment
+        >>> ball, time = BouncingBall(), np.linspace(0.0, 1.0, 1001)
+        >>> motion = jaxcam.simulate(ball, [1.0, 0.0], 0.0, 1.0)
+        >>> height = np.random.default_rng(0).normal(motion.at(time)[:, 0], 1e-4)
+        >>> run = Recording("run", time, {"height_m": height})
+        >>> parts = segment(run, "height_m", 0.0)
+        >>> compare(ball, parts).row("flight").ratio < 2
+        True
     """
     observe = dict(observe or {segments.channel: 0})
     known = {segments.channel: segments.noise, **(noise or {})}
@@ -72,11 +85,14 @@ def compare(
 
 
 def compare_case(rig: Rig, case: Sequence[Segments]) -> Comparison:
-    """All recordings of a cam-follower against its nominal model.
+    """Compare all recordings of a cam-follower with its nominal model.
 
     Args:
-        rig: The model; another set of values by `rig.replace(...)`.
-        case: From `segment_case`.
+        rig: The model; change values by `rig.replace(...)`.
+        case: Segments from `segment_case`.
+
+    Returns:
+        A comparison.
     """
     found = []
     for segments in case:

@@ -15,18 +15,23 @@ class Residuals:
     """Recording minus model in one mode of one recording."""
 
     record: str
+    """Name of the recording."""
     mode: str
     """`"flight"`, `"contact"`, `"impact place"` or `"impact speed"`."""
     channel: str
+    """The channel."""
     unit: str
+    """Unit of the differences."""
     time: Float[np.ndarray, " k"]
     """Seconds of the record; `turned`: angle of the cam (rad), or nothing."""
     turned: Float[np.ndarray, " k"]
+    """Angle of the cam (rad), or empty."""
     value: Float[np.ndarray, " k"]
     """The differences, in `unit`; `stderr`: what the noise alone would give."""
     stderr: Float[np.ndarray, " k"]
+    """Standard errors from the noise alone."""
     piece: Int[np.ndarray, " k"]
-    """Which flight, contact or impact each one belongs to."""
+    """Index of the flight, contact or impact of each value."""
     fitted: int = 0
     """Number of parameters that were fitted to them."""
 
@@ -36,11 +41,15 @@ class Row:
     """One mode of a comparison."""
 
     mode: str
+    """The mode."""
     channel: str
+    """The channel."""
     unit: str
+    """Unit of the residuals."""
     count: int
-    """Flights, contacts or impacts; `samples`: numbers compared."""
+    """Number of flights, contacts or impacts."""
     samples: int
+    """Number of values compared."""
     rms: float
     """In `unit`; `ratio`: what is left, in units of the noise: one where the model says
     all that the sensors can see."""
@@ -48,6 +57,8 @@ class Row:
     """In `unit`; `ratio`: what is left, in units of the noise: one where the model says
     all that the sensors can see."""
     ratio: float
+    """Residual in units of the noise: one where the model explains all that the sensors
+    resolve."""
     worst_record: str
     """The middle of the 10 ms in which the mean difference is the most significant;
     `worst_score`: how many standard errors it is there. The phase is the angle of the
@@ -61,18 +72,20 @@ class Row:
     `worst_score`: how many standard errors it is there. The phase is the angle of the
     cam within its turn (rad)."""
     worst_score: float
+    """Significance of the difference there, in standard errors."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Comparison:
-    """Recordings against a model, flight by flight.
+    """A comparison of recordings with a model, flight by flight.
 
-    `residuals` has one entry for each recording, mode and channel; everything else is
-    computed from it.
+    Everything is computed from `residuals`.
     """
 
     residuals: tuple[Residuals, ...]
+    """One entry for each recording, mode and channel."""
     notes: tuple[str, ...] = ()
+    """Remarks, one sentence each."""
 
     @property
     def rows(self) -> tuple[Row, ...]:
@@ -85,10 +98,10 @@ class Comparison:
         return tuple(_row(parts) for _, parts in ordered)
 
     def row(self, mode: str, channel: str | None = None) -> Row:
-        """The row of a mode.
+        """Return the row of a mode.
 
         Raises:
-            KeyError: That names the modes there are.
+            KeyError: There is no such mode; the message names the modes.
         """
         for row in self.rows:
             if row.mode == mode and channel in (None, row.channel):
@@ -97,7 +110,7 @@ class Comparison:
         raise KeyError(f"there is no {mode!r} in this comparison; there is {there}")
 
     def table(self) -> Table:
-        """Residuals by mode, as a table for the terminal."""
+        """Return the residuals by mode, as a table for the terminal."""
         table = Table(title="Recording minus model, by mode")
         several = len({row.channel for row in self.rows}) > 1
         for heading in ("mode", "unit"):
@@ -118,20 +131,33 @@ class Comparison:
         return table
 
     def sentence(self) -> str:
-        """Summarise the comparison in words."""
+        """Return a summary in words."""
         words = [_words(row) for row in self.rows]
         if not words:
             return "Nothing could be compared: " + " ".join(self.notes)
         return " ".join([". ".join(words) + ".", *self.notes])
 
     def to_json(self) -> dict[str, Any]:
-        """Plain numbers, strings and lists; numbers that are missing are `None`."""
+        """Return plain numbers, strings and lists; missing numbers are `None`."""
         rows = [_plain(dataclasses.asdict(row)) for row in self.rows]
         return {"rows": rows, "sentence": self.sentence(), "notes": list(self.notes)}
 
 
 def merge(comparisons: Sequence[Comparison]) -> Comparison:
-    """Several recordings in one comparison."""
+    """Merge the comparisons of several recordings.
+
+    Args:
+        comparisons: The comparisons.
+
+    Returns:
+        One comparison.
+
+    Examples:
+        >>> from jaxcam.recordings import merge
+        >>> from jaxcam.recordings.against_model import Comparison
+        >>> merge([Comparison(()), Comparison(())]).rows
+        ()
+    """
     residuals = [part for one in comparisons for part in one.residuals]
     notes = [note for one in comparisons for note in one.notes]
     return Comparison(tuple(residuals), tuple(notes))

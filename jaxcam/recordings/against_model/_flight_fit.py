@@ -237,6 +237,6 @@ def size_of(system: HybridSystem, observe: Observe) -> int:
         if shape == (size,):
             return size
     raise RecordingError(
-        f"The number of states of {type(system).__name__} cannot be told; declare its "
+        f"The number of states of {type(system).__name__} is unknown; declare its "
         f"`state_names`."
     )

@@ -123,7 +123,7 @@ def sure_contact(
 def before_release(
     angle: Float[np.ndarray, " k"], first: int, releases: Int[np.ndarray, " releases"]
 ) -> Bool[np.ndarray, " k"]:
-    """Samples of a contact that the record cuts off at which it surely goes on.
+    """Samples of a contact that the record cuts off at which it surely continues.
 
     Those before the phase at which the follower was released elsewhere in the record: a
     release just before the end is not seen.

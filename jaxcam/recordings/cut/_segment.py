@@ -31,11 +31,22 @@ def segment_case(
     Args:
         recordings: A `Case`, or any recordings of the same rig.
         rig: Its nominal geometry, tolerances and sensors.
-        surface: The profile, where it is known; otherwise it is estimated from the
-            impacts and contacts of all recordings.
+        channel: The channel of the follower.
+        surface: The cam's surface, if known; default estimated from the impacts and
+            contacts of all recordings.
+
+    Returns:
+        The segments of each recording.
 
     Raises:
-        RecordingError: Where a channel is missing or the cam cannot be read.
+        RecordingError: A channel is missing, or the angle of the cam cannot be used.
+
+    Examples:
+        >>> from jaxcam.data import DEMO_RIG
+        >>> from jaxcam.recordings import read_case, read_rig, segment_case
+        >>> parts = segment_case(read_case(DEMO_RIG), read_rig(DEMO_RIG / "rig.toml"))
+        >>> parts[0].impacts.count > 0
+        True
     """
     recordings = tuple(recordings)
     drives = [read_drive(recording) for recording in recordings]
@@ -66,32 +77,41 @@ def segment(
     noise: float | None = None,
     restitution: float = 0.5,
 ) -> Segments:
-    """Cut a recording of any system with one constraint, or two that face each other.
+    """Cut a recording of a system with one constraint, or two that face each other.
 
     Args:
-        recording: The motion.
-        channel: The motion.
-        contact: What the channel would be in contact at each sample, shape `(k,)` or
-            one number; the motion is above it. `None` without `upper`: the whole record
-            is one flight.
-        contact_rate: Its rate of change; by default from differences of `contact`.
-        upper: The same of a second surface that the motion is below, as the far one of
+        recording: The recording.
+        channel: The channel of the motion.
+        contact: Value of the channel in contact at each sample, shape `(k,)` or one
+            number; the motion is above it. `None` without `upper`: the whole record is
+            one flight.
+        contact_rate: Its rate of change; default from differences of `contact`.
+        upper: The same for a second surface that the motion is below, as the far one of
             two stops.
-        upper_rate: The same of a second surface that the motion is below, as the far
-            one of two stops.
-        tolerance: How far (in the units of the channel) each surface may be from where
-            it is stated, by default nothing. Within it, it is put where the impacts
-            are.
-        noise: Standard deviation of a sample; by default it is measured.
-        restitution: Expected, for the bounces that are too low to be seen.
+        upper_rate: Its rate of change.
+        tolerance: Largest error of the stated position of each surface, in the units of
+            the channel; within it, the surface is placed where the impacts are.
+        noise: Standard deviation of a sample; default measured from the record.
+        restitution: Expected coefficient, for impacts too low to be observed.
 
     Returns:
         The parts. Every impact in `impacts` has a positive speed of approach to the
             surface that it is on.
 
     Raises:
-        ValueError: Where the surfaces have not one number for each sample, or where the
-            upper one is not above the other.
+        ValueError: A surface has not one number per sample, or the upper one is not
+            above the other.
+
+    Examples:
+        >>> from jaxcam.models import BouncingBall
+        >>> from jaxcam.recordings import Recording, segment
+        >>> ball, time = BouncingBall(), np.linspace(0.0, 1.0, 1001)
+        >>> motion = jaxcam.simulate(ball, [1.0, 0.0], 0.0, 1.0)
+        >>> height = np.random.default_rng(0).normal(motion.at(time)[:, 0], 1e-4)
+        >>> run = Recording("run", time, {"height_m": height})
+        >>> parts = segment(run, "height_m", 0.0)
+        >>> parts.impacts.count
+        1
     """
     samples = recording[channel]
     noise = noise or measured_noise(samples)

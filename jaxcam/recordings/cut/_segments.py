@@ -31,10 +31,15 @@ class Flight:
     """Free motion from one boundary to the next; samples `first <= i < last`."""
 
     start: Boundary
+    """The boundary at which it begins."""
     stop: Boundary
+    """The boundary at which it ends."""
     first: int
+    """First sample."""
     last: int
+    """Sample after the last one."""
     height: float
+    """Largest distance from the surface."""
 
     @property
     def duration(self) -> float:
@@ -45,16 +50,20 @@ class Flight:
 class Contact:
     """A stretch within the noise of the surface; samples `first <= i < last`.
 
-    It begins with bounces that are too low to be seen. `settled` (s) is when they have
-    died out, estimated from the last flight that was seen: from there to `stop` the
-    follower rests on the cam.
+    It begins with impacts that are too low to be observed.
     """
 
     start: Boundary
+    """The boundary at which it begins."""
     stop: Boundary
+    """The boundary at which it ends."""
     first: int
+    """First sample."""
     last: int
+    """Sample after the last one."""
     settled: float
+    """Time (s) at which the impacts have died out, estimated from the last observed
+    flight: from there to `stop` the follower is in contact with the cam."""
 
     @property
     def duration(self) -> float:
@@ -63,7 +72,7 @@ class Contact:
 
 @dataclasses.dataclass(frozen=True)
 class Impacts:
-    """Impacts between two flights that were both seen, one entry each."""
+    """Impacts between two observed flights, one entry each."""
 
     time: Float[np.ndarray, " k"]
     """Seconds."""
@@ -76,13 +85,15 @@ class Impacts:
     """The measured channel at the impact, and the error of its distance from the
     surface."""
     turned: Float[np.ndarray, " k"]
-    """What the cam has turned (rad), or not a number without a drive."""
+    """Angle that the cam has turned (rad), NaN without a drive."""
     before: Float[np.ndarray, " k"]
     """Rate of the channel on either side, and their errors."""
     before_stderr: Float[np.ndarray, " k"]
+    """Standard error of `before`."""
     after: Float[np.ndarray, " k"]
     """Rate of the channel on either side, and their errors."""
     after_stderr: Float[np.ndarray, " k"]
+    """Standard error of `after`."""
     approach: Float[np.ndarray, " k"]
     """Speeds relative to the surface, both positive."""
     separation: Float[np.ndarray, " k"]
@@ -92,7 +103,7 @@ class Impacts:
     flight: Int[np.ndarray, " k"]
     """Index of the flight that ends here; the next one begins here."""
     side: Int[np.ndarray, " k"]
-    """Which surface was hit, 0 the one below the motion, 1 the one above."""
+    """Surface that was hit: 0 the one below the motion, 1 the one above."""
 
     @property
     def count(self) -> int:
@@ -117,9 +128,22 @@ class Impacts:
 
 @dataclasses.dataclass(frozen=True)
 class Segments:
-    """A recording cut into its parts."""
+    """A recording cut into its parts.
+
+    Examples:
+        >>> from jaxcam.models import BouncingBall
+        >>> from jaxcam.recordings import Recording, segment
+        >>> ball, time = BouncingBall(), np.linspace(0.0, 1.0, 1001)
+        >>> motion = jaxcam.simulate(ball, [1.0, 0.0], 0.0, 1.0)
+        >>> height = np.random.default_rng(0).normal(motion.at(time)[:, 0], 1e-4)
+        >>> run = Recording("run", time, {"height_m": height})
+        >>> parts = segment(run, "height_m", 0.0)
+        >>> len(parts.flights)
+        2
+    """
 
     recording: Recording
+    """The recording that was cut."""
     channel: str
     """The channel that the parts were found in."""
     noise: float
@@ -128,19 +152,22 @@ class Segments:
     """Time of the model at each sample (s): record time, or that of a drive at constant
     speed."""
     flights: tuple[Flight, ...]
+    """The flights."""
     contacts: tuple[Contact, ...]
+    """The contacts."""
     impacts: Impacts
+    """The impacts between two observed flights."""
     gap: Float[np.ndarray, " k"] | None = None
     """Its distance from the nearest surface, `(k,)`, or `None` in free flight."""
     drive: Drive | None = None
-    """What the gap was computed with, for a cam-follower."""
+    """Measured drive of a cam-follower, from which the gap was computed."""
     surface: Surface | None = None
-    """What the gap was computed with, for a cam-follower."""
+    """Surface of a cam-follower's cam, from which the gap was computed."""
     sure: Bool[np.ndarray, " k"] | None = None
     """Samples at which contact is no hidden hop, shape `(k,)`; `None`: all."""
 
     def resting(self, contact: Contact) -> Bool[np.ndarray, " k"]:
-        """Samples at which the follower rests: settled, and beyond doubt."""
+        """Return the samples at which the follower is surely in settled contact."""
         time = self.recording.time
         rows = (time >= contact.settled) & (time < contact.stop.time)
         # a release that few samples tell of may be placed after the contact
@@ -148,7 +175,7 @@ class Segments:
         return rows if self.sure is None else rows & self.sure
 
     def sentence(self) -> str:
-        """Summarise the segments in words."""
+        """Return a summary of the segments in words."""
         flown = sum(flight.last - flight.first for flight in self.flights)
         rested = sum(contact.last - contact.first for contact in self.contacts)
         total = len(self.recording)

@@ -35,7 +35,7 @@ class Surface(eqx.Module):
     profile: EccentricCircle
     """The eccentric circle that fits best."""
     phase: Float[Array, ""]
-    """How far ahead of its measured angle the cam seems to be (rad)."""
+    """Phase of the cam ahead of its measured angle (rad)."""
     cosines: Float[Array, " harmonics"]
     """Amplitudes of harmonics 2 and 3 on top of it (rad)."""
     sines: Float[Array, " harmonics"]
@@ -43,7 +43,7 @@ class Surface(eqx.Module):
     bend: Float[Array, " waves"]
     """Amplitudes of what the harmonics cannot follow, as a dent; zero without one."""
     covariance: Float[Array, " p p"]
-    """Of radius, eccentricity, centre, phase and amplitudes together."""
+    """Covariance of radius, eccentricity, centre, phase and amplitudes."""
     sense: float = eqx.field(static=True)
     """-1 for a clockwise cam; the angle given is counted as it turns."""
 
@@ -55,17 +55,19 @@ class Surface(eqx.Module):
         return self.profile(angle) + extra + waves(turned) @ self.bend
 
     def angle(self, turned) -> Float[np.ndarray, " k"]:
-        """The contact angle as a numpy array, shape `(k,)`."""
+        """Return the contact angle (rad) as a NumPy array, shape `(k,)`."""
         turned = np.asarray(turned)
         return np.asarray(_evaluate(self, padded(turned))[0])[: len(turned)]
 
     def slope(self, turned) -> Float[np.ndarray, " k"]:
-        """Its derivative to the angle that the cam has turned."""
+        """Return its derivative by the angle that the cam has turned."""
         turned = np.asarray(turned)
         return np.asarray(_evaluate(self, padded(turned))[1])[: len(turned)]
 
     def slope_stderr(self, turned) -> Float[np.ndarray, " k"]:
-        """Standard error of `slope`, large where no impact or contact was seen."""
+        """Return the standard error of `slope`, large where no impact or contact was
+        observed.
+        """
         turned = np.asarray(turned)
         rows = np.asarray(_slope_jacobian(self, vector_of(self), padded(turned)))
         rows = rows[: len(turned)]
@@ -73,7 +75,14 @@ class Surface(eqx.Module):
 
 
 def nominal_surface(rig: Rig) -> Surface:
-    """The profile as the rig file states it."""
+    """Return the profile that the rig file states.
+
+    Args:
+        rig: The rig.
+
+    Returns:
+        A [`jaxcam.recordings.cut.Surface`][].
+    """
     zero = jnp.zeros(len(_HARMONICS))
     sense = -1.0 if rig.cam_rotation == "clockwise" else 1.0
     bend = np.zeros(WAVES)

@@ -55,6 +55,15 @@ def fit_surface(
     those points then shows the contacts, which correct it further. Each parameter
     stays near its nominal value by its tolerance. What results is good enough to cut
     the recordings; `refine_surface` makes it as good as they allow.
+
+    Args:
+        recordings: The recordings.
+        rig: The rig.
+        drives: Measured motion of the drive in each recording.
+        channel: The channel of the follower.
+
+    Returns:
+        A [`jaxcam.recordings.cut.Surface`][].
     """
     drives = drives or [read_drive(recording) for recording in recordings]
     noise = rig.sensors.follower_floor
@@ -76,12 +85,20 @@ def fit_surface(
 
 
 def refine_surface(surface: Surface, rig: Rig, segments: Sequence) -> Surface:
-    """Fit the profile again, to what `Segments` found to be impacts and contacts.
+    """Fit the profile again, to the impacts and contacts in `Segments`.
 
-    Contacts count from where the bounces that cannot be seen have died out: before,
+    Contacts count from where the unobserved impacts have died out: before,
     the follower is above the cam on average. It is near it, though, which counts for
-    one rough point, and it is never behind: where a cam is seen there alone, it would
-    else be anywhere. A dent is followed where records agree on it.
+    one rough point, and it is never below: otherwise a part of the cam that is observed
+    there alone would be undetermined. A dent is followed where records agree on it.
+
+    Args:
+        surface: The surface so far.
+        rig: The rig.
+        segments: The segments of each recording.
+
+    Returns:
+        A [`jaxcam.recordings.cut.Surface`][].
     """
     turned, angle, error, above = [], [], [], []
     ends = []

@@ -28,7 +28,7 @@ def find_gaps(
     if gaps not in ("refuse", "split"):
         raise RecordingError(f'gaps is "refuse", "split" or "mend", not {gaps!r}.')
     if len(time) < 2:
-        raise RecordingError(f"{name}: one sample is no recording; remove this run.")
+        raise RecordingError(f"{name}: one sample is not a recording; remove this run.")
     steps = np.diff(time)
     back = np.flatnonzero(steps <= 0)
     if len(back):
@@ -41,7 +41,8 @@ def find_gaps(
     usual = float(np.median(steps))
     if usual < _SHORTEST:
         raise RecordingError(
-            f"{name}: samples are {usual:.3g} s apart, which no sensor can do; check "
+            f"{name}: samples are {usual:.3g} s apart, which is too fast for a "
+            "sensor; check "
             f"the unit of the time."
         )
     found = np.flatnonzero(steps > 1.5 * usual)
@@ -60,8 +61,11 @@ def find_gaps(
 def check_channels(recording: Recording) -> None:
     """Check that the channels of a recording can be what their names say.
 
+    Args:
+        recording: The recording.
+
     Raises:
-        RecordingError: For a dead channel or a lever angle in degrees.
+        RecordingError: A channel is constant, or a lever angle is in degrees.
     """
     for name, samples in recording.channels.items():
         # A force or a reference may well be constant; the motion itself may not.
@@ -83,8 +87,12 @@ def check_channels(recording: Recording) -> None:
 def check_drive(recording: Recording) -> None:
     """Compare the cam's speed with the one in the file's name.
 
+    Args:
+        recording: The recording.
+
     Raises:
-        RecordingError: That names the unit the numbers look like.
+        RecordingError: The speed is another one; the message names the unit that the
+            numbers suggest.
     """
     angle = recording.channels.get("cam_angle_rad")
     nominal = recording.nominal_speed

@@ -15,27 +15,43 @@ _BRIDGE = 4
 
 @dataclasses.dataclass(frozen=True)
 class Mended:
-    """Pieces of a recording without faults, and what was done, in words.
+    """Pieces of a recording without faults, and the repairs, in words.
 
     Samples that were filled in are marked in `meta["filled"]` of each piece: they keep
     the time even, and no fit uses them.
     """
 
     recordings: tuple[Recording, ...]
+    """The pieces."""
     notes: tuple[str, ...]
+    """The repairs, one sentence each."""
 
 
 def mend(recording: Recording, *, bridge: int = _BRIDGE) -> Mended:
-    """Undo what a clock, an encoder or a saturated gyro does to a recording.
+    """Repair faults of the clock, an encoder or a saturated gyro in a recording.
 
-    - Dropped samples: up to `bridge` in a row are filled in (and marked); at a longer
-        gap the recording is split, since nobody knows what happened in it.
-    - An encoder (`..._rad`) that slips by whole turns is put back.
+    - Dropped samples: up to `bridge` in a row are interpolated (and marked); at a
+      longer gap the recording is split.
+    - An encoder (`..._rad`) that slips by whole turns is corrected.
     - Saturated samples of a rate (`..._rad_s`) are counted; a fit whose `Sensor` has
-        that limit takes them for what they are.
+      that limit treats them as saturated.
+
+    Args:
+        recording: The recording.
+        bridge: Largest number of missing samples in a row that are interpolated.
+
+    Returns:
+        A [`jaxcam.recordings.files.Mended`][].
 
     Raises:
-        RecordingError: Where time does not increase, or nothing is left.
+        RecordingError: Time does not increase, or nothing is left.
+
+    Examples:
+        >>> from jaxcam.recordings import Recording, mend
+        >>> time = np.delete(np.linspace(0, 1, 101), 50)
+        >>> mended = mend(Recording("run", time, {"angle_rad": time}))
+        >>> len(mended.recordings[0].time)
+        101
     """
     notes: list[str] = []
     channels = dict(recording.channels)

@@ -35,16 +35,16 @@ def read_recordings(
     columns: Columns | None = None,
     rate: float | None = None,
 ) -> tuple[Recording, ...]:
-    """Every recording in one file: text (plain or gz), .mat, .xlsx or .parquet.
+    """Read every recording in one file: text (plain or gz), .mat, .xlsx or .parquet.
 
     The end of a column's name is its unit; `_deg`, `_rpm`, `_ms`, `_mm` and the like
     are converted and the column is renamed (`cam_angle_deg` -> `cam_angle_rad`), and so
     is one with its unit in brackets (`Time (ms)` -> `time_s`). One column is the time.
 
     Args:
-        file: The file. `..._150.7rpm.csv` in its name is the nominal speed.
-        channels: Columns that must be there (SI names).
-        split: A column that numbers the runs in a file that holds several.
+        file: The file; `..._150.7rpm.csv` in its name is the nominal speed.
+        channels: Required columns (SI names).
+        split: Column that numbers the runs in a file that holds several.
         gaps: `"refuse"` a record with samples missing, `"split"` it in pieces, or
             `"mend"` it: bridge short gaps, split at long ones and undo slips of an
             encoder (see `mend`); what was done is in `meta["notes"]`.
@@ -53,13 +53,14 @@ def read_recordings(
             another, `{"Angle": "angle_deg", "Y1": ("height_m", -8e-4)}`, the second
             with a factor. Only columns that are named or needed are read then, and rows
             in which one of them is empty are left out.
-        rate: Samples a second, of a file without a time.
+        rate: Sampling rate of a file without a time column (Hz).
 
     Returns:
         A tuple of `Recording`, one for each run and piece.
 
     Raises:
-        RecordingError: One sentence that says what to do.
+        RecordingError: The file cannot be used; the message is one sentence that says
+            what to do.
     """
     file = Path(file)
     chosen = read_columns(
@@ -102,12 +103,28 @@ def read_recording(
     columns: Columns | None = None,
     rate: float | None = None,
 ) -> Recording:
-    """The one recording in a file.
+    r"""Read the one recording in a file.
 
-    **Arguments:** as for `read_case`.
+    Args:
+        file: The file.
+        channels: As for `read_case`.
+        columns: As for `read_case`.
+        rate: As for `read_case`.
+
+    Returns:
+        A [`jaxcam.recordings.Recording`][].
 
     Raises:
-        RecordingError: One sentence that says what to do.
+        RecordingError: The file cannot be used; the message is one sentence that says
+            what to do.
+
+    Examples:
+        >>> from pathlib import Path
+        >>> from jaxcam.recordings import read_recording
+        >>> _ = Path("run.csv").write_text("time_s,angle_deg\n0.0,0\n0.1,90\n0.2,180\n")
+        >>> run = read_recording("run.csv", channels=())
+        >>> run.channels["angle_rad"].round(3).tolist()
+        [0.0, 1.571, 3.142]
     """
     (recording,) = read_recordings(file, channels=channels, columns=columns, rate=rate)
     return recording
@@ -122,25 +139,35 @@ def read_case(
     columns: Columns | None = None,
     rate: float | None = None,
 ) -> Case:
-    """All recordings in a folder, in the order of their names.
+    """Read all recordings in a folder, in the order of their names.
 
     Files are text (CSV of any kind, `.tsv`, `.lvm`, each plain or gz), `.mat`, `.xlsx`
     or `.parquet`; where there are none of these, `.txt`, `.dat` and `.xls` are read.
 
     Args:
-        channels: Columns that must be there (SI names); `()` for something other than a
-            cam-follower rig.
-        split: A column that numbers the runs in a file that holds several.
-        gaps: `"refuse"` a record with samples missing, `"split"` it in pieces, or
-            `"mend"` it (see `mend`).
+        folder: The folder.
+        channels: Required columns (SI names); `()` for anything but a cam-follower rig.
+        split: Column that numbers the runs in a file that holds several.
+        gaps: Treatment of a record with missing samples: `"refuse"` it, `"split"` it in
+            pieces, or `"mend"` it (see `mend`).
         columns: Names of the columns in their order, `"-"` for one that is not read, of
             files without a line of names; or a channel for each column whose name is
             another, `{"Angle": "angle_deg", "Y1": ("height_m", -8e-4)}`, the second
             with a factor. Rows in which one of those is empty are left out.
-        rate: Samples a second, of files without a time.
+        rate: Sampling rate of files without a time column (Hz).
+
+    Returns:
+        A case.
 
     Raises:
-        RecordingError: One sentence that says what to do.
+        RecordingError: A file cannot be used; the message is one sentence that says
+            what to do.
+
+    Examples:
+        >>> from jaxcam.data import DEMO_RIG
+        >>> from jaxcam.recordings import read_case
+        >>> len(read_case(DEMO_RIG).recordings) > 1
+        True
     """
     folder = Path(folder)
     if not folder.exists():

@@ -29,7 +29,7 @@ def is_impact_table(file: str | Path, columns: Columns | None = None) -> bool:
 
 
 def read_impacts(file: str | Path, *, columns: Columns | None = None) -> ImpactTable:
-    """Impacts from a file with one impact a row.
+    r"""Read impacts from a file with one impact per row.
 
     Columns, each with its unit at the end (`_m_s`, `_mm_s`, `_rad_s`, ...): `before`
     and `after`, the speeds of one body along the normal of something fixed; or
@@ -37,10 +37,23 @@ def read_impacts(file: str | Path, *, columns: Columns | None = None) -> ImpactT
     `mass1_kg` and `mass2_kg` where they are known. `before_stderr` and `after_stderr`
     are standard errors, `time_s` is the time; others are ignored.
 
-    **Arguments:** the file, and the names of its columns as for `read_case`.
+    Args:
+        file: The file.
+        columns: Names of its columns, as for `read_case`.
+
+    Returns:
+        An [`jaxcam.recordings.ImpactTable`][].
 
     Raises:
-        RecordingError: One sentence that names the row and the fix.
+        RecordingError: The file cannot be used; the message names the row and the fix.
+
+    Examples:
+        >>> from pathlib import Path
+        >>> from jaxcam.recordings import read_impacts
+        >>> text = "before_m_s,after_m_s\n-1.0,0.8\n-2.0,1.5\n"
+        >>> _ = Path("drops.csv").write_text(text)
+        >>> read_impacts("drops.csv").approach.tolist()
+        [1.0, 2.0]
     """
     file = Path(file)
     every = column_names(file, columns)

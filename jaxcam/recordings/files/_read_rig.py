@@ -11,13 +11,25 @@ from ._toml import known_keys, read_tables, Section
 
 
 def read_rig(file: str | Path) -> Rig:
-    """The rig described in a TOML file.
+    """Read the rig described in a TOML file.
 
     A quantity is `{value = 0.045, tolerance = 0.002, unit = "m"}` or a bare number;
     `unit` may be left out, and is refused where it is not the SI unit.
 
+    Args:
+        file: The file.
+
+    Returns:
+        A [`jaxcam.recordings.Rig`][].
+
     Raises:
-        RigError: One sentence that names the file and the key.
+        RigError: The file cannot be used; the message names the file and the key.
+
+    Examples:
+        >>> from jaxcam.data import DEMO_RIG
+        >>> from jaxcam.recordings import read_rig
+        >>> read_rig(DEMO_RIG / "rig.toml").inertia.value > 0
+        True
     """
     file = Path(file)
     tables = read_tables(file)

@@ -86,7 +86,7 @@ class Section:
         return value
 
     def done(self) -> None:
-        """**Raises:** `RigError` for a key that nobody asked for."""
+        """**Raises:** `RigError` for an unknown key."""
         known_keys(self.file, self.name, self.table, self.read)
 
     def word(self, key: str) -> str:

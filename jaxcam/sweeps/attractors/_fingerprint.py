@@ -1,4 +1,4 @@
-"""By what attractors are told apart."""
+"""Fingerprints by which attractors are distinguished."""
 
 import numpy as np
 from scipy.sparse import coo_array

@@ -54,7 +54,7 @@ def cluster(address: str, workers: int | None = None) -> Iterator[Executor]:
             client = Client(address if made is None else made, timeout="10s")
         except (OSError, TimeoutError):
             raise ValueError(
-                f"nobody answers at {address}; start a scheduler there, or choose "
+                f"cannot connect to {address}; start a scheduler there, or choose "
                 '"local"'
             ) from None
         try:

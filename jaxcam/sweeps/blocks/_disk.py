@@ -116,8 +116,8 @@ class OnDisk:
             raise ValueError(f"{self.path} holds something else; choose another folder")
         if not resume:
             raise ValueError(
-                f"{self.path} holds a sweep already; pass resume=True to go on with "
-                "it, or choose another folder"
+                f"{self.path} holds a sweep already; pass resume=True to continue it, "
+                "or choose another folder"
             )
         wanted = plain(self.layout.identity)
         if identity != wanted:
@@ -128,7 +128,7 @@ class OnDisk:
             ]
             raise ValueError(
                 f"{self.path} holds another sweep (other {', '.join(differing)}); "
-                "choose another folder, or ask for the same sweep to go on with it"
+                "choose another folder, or request the same sweep to continue it"
             )
         self._check_description()
 

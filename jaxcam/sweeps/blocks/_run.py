@@ -49,7 +49,7 @@ class AbstractJob(abc.ABC):
     """
 
     layout: StoreLayout
-    """What the sweep stores."""
+    """Arrays that the sweep stores."""
     chained: bool = False
     """Whether a block needs the result of the previous one."""
 

@@ -1,4 +1,4 @@
-"""At which points of many motions they are looked at."""
+"""Sample many motions on a section."""
 
 from ._impact_section import ImpactSection as ImpactSection
 from ._map import Map as Map

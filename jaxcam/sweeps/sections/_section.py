@@ -1,4 +1,4 @@
-"""Sections: at which points of a motion it is looked at."""
+"""Sections: the points at which a motion is sampled."""
 
 import abc
 from collections.abc import Callable

@@ -82,7 +82,7 @@ def smooth_branch(system: CamFollower, points: int = 16) -> SmoothBranch:
 def _around_the_fold(system: CamFollower, orbit, rpm: float):
     """Speed (rpm), angle and multipliers of orbits from `rpm` through the fold.
 
-    Around it the sum of the multipliers goes on, where the speed turns back.
+    Around it the sum of the multipliers continues, where the speed turns back.
     """
     point = SpecialPoint(jnp.asarray(rpm_to_rad_s(rpm)), orbit)
     matrix = np.asarray(compiled_monodromy(at_rpm(system, rpm), orbit))

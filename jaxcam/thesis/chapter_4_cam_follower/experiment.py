@@ -27,7 +27,7 @@ def experiment(system: CamFollower, size: str) -> tuple[sweeps.Diagram, sweeps.D
     """Both runs: up from contact, and down from where the first has ended.
 
     The cam turns at each speed for a minute, and then for the ten seconds that are
-    stored, once a turn; then the speed is another one and the motion goes on.
+    stored, once per period; then the speed is another one and the motion continues.
     """
     step = _STEP[size]
     forward = sweeps.diagram(

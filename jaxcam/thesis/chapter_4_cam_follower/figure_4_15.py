@@ -1,4 +1,4 @@
-"""Figure 4.15: restitution by speed, beside what Table 5.2 implies.
+"""Figure 4.15: restitution by speed, next to what Table 5.2 implies.
 
 The line itself is not printed; the product of the two multipliers of an orbit with
 one impact is r^2.

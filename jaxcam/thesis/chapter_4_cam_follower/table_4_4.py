@@ -1,4 +1,4 @@
-"""Table 4.4: the parameters as printed, beside those of a rig.
+"""Table 4.4: the parameters as printed, next to those of a rig.
 
 Raises:
     ValueError: For a cam that is not an eccentric circle.

@@ -40,7 +40,7 @@ class Picture(NamedTuple):
 
 
 def basins_target(title: str, picture: Picture, note: str = "") -> Target:
-    """A figure of basins: the attractors beside the printed ones, and their states."""
+    """A figure of basins: the attractors next to the printed ones, and their states."""
 
     @remembered
     def basins_of(system: CamFollower, size: str) -> sweeps.Basins:

@@ -28,7 +28,7 @@ _SHIFTS = 600
 
 
 class Iterated(NamedTuple):
-    """Figure 5.28: the fitted map beside the motion, both from the sticking state."""
+    """Figure 5.28: the fitted map next to the motion, both from the sticking state."""
 
     speeds: np.ndarray
     """(k,) rpm; (k, kept) rad."""

@@ -1,6 +1,6 @@
 """Table 5.1, the simulated column: speeds of the main events.
 
-The two printed rows of the route to chaos and of chaos are not told apart here.
+The two printed rows of the route to chaos and of chaos are not distinguished here.
 """
 
 import numpy as np

@@ -2,7 +2,7 @@
 
 Near the fold the branch is steep in the speed. There the speed is computed at which
 the multipliers have the printed sum; elsewhere the multipliers at the printed
-speed. Fold and first flip follow, beside the values of section 5.2.1.
+speed. Fold and first flip follow, next to the values of section 5.2.1.
 """
 
 import numpy as np

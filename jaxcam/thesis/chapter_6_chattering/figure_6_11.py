@@ -1,4 +1,4 @@
-"""Figure 6.11: impacts predicted by the lambda-map beside the simulated ones."""
+"""Figure 6.11: impacts predicted by the lambda-map next to the simulated ones."""
 
 import matplotlib.pyplot as plt
 import numpy as np

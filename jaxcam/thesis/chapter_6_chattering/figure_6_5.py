@@ -1,4 +1,4 @@
-"""Figure 6.5: fixed points of f, slopes there; scales beside Table 5.3's."""
+"""Figure 6.5: fixed points of f, slopes there; scales next to Table 5.3's."""
 
 import jax
 import jax.numpy as jnp
