@@ -98,7 +98,7 @@ def fit_free_run(
         found = least_squares(
             partial(_missed, ready),
             values,
-            partial(_slopes, ready, scale),
+            partial(_slopes, ready, scale),  # pyright: ignore
             bounds=(low, high),
             x_scale=scale,
             max_nfev=_EVALUATIONS,

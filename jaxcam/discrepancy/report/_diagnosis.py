@@ -73,6 +73,7 @@ class Effect:
     effect without a function."""
     term: bool = True
     """Whether it is a named term; otherwise it is unknown."""
+    share: float | None = None
     """Part of the misfit that it explains; of what is unknown, the part that nothing
     explains. `None` for the drive, which is judged by its own channel."""
 

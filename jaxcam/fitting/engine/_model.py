@@ -52,8 +52,8 @@ class Sensor(eqx.Module):
     lag: Float[Array, ""] = _number(0.0)
     """Lag (s), short compared with the time in which the motion changes."""
     error: Callable | None = eqx.field(default=None, static=True)
-    """What else the sensor shows in a fit, `error(system, t, value, slope)` of the value
-    and its rate of change; nothing by default."""
+    """What else the sensor shows in a fit, `error(system, t, value, slope)` of the
+    value and its rate of change; nothing by default."""
 
     def __check_init__(self):
         if not self.noise > 0:
