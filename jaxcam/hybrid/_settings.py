@@ -1,5 +1,7 @@
 """How accurately a trajectory is made."""
 
+from typing import Literal
+
 import diffrax
 import equinox as eqx
 import numpy as np
@@ -38,6 +40,9 @@ class Settings(eqx.Module):
       that make it fast. Slower by an order of magnitude, equal to the tolerance, and
       without reverse mode: a check on these passes, and a way on where one fails.
     - `solver`: any explicit Runge-Kutta solver of diffrax with an error estimate.
+    - `backend`: what compiles runs that are not traced: "llvm", or "xla", which all
+      traced runs and derivatives go through; "auto" takes LLVM where it has all that
+      the system needs. Results differ by rounding.
     """
 
     tolerance: FloatScalar = 1e-10
@@ -49,9 +54,19 @@ class Settings(eqx.Module):
     absolute: FloatScalar | Float[ArrayLike, " n"] | None = None
     max_step: FloatScalar | None = None
     plain: bool = eqx.field(default=False, static=True)
+    backend: Literal["auto", "llvm", "xla"] = eqx.field(default="auto", static=True)
+
+    @property
+    def compiles(self) -> bool:
+        """Whether a run that is not traced is to be compiled by LLVM."""
+        return self.backend != "xla" and not self.plain
 
     def check(self) -> None:
         """Raise `ValueError` for a setting outside its range."""
+        if self.backend not in ("auto", "llvm", "xla"):
+            raise ValueError(
+                f'backend is {self.backend!r}; choose "auto", "llvm" or "xla"'
+            )
         if not 0 < float(self.tolerance) < 1:
             raise ValueError(
                 f"tolerance is {float(self.tolerance):g}; give a number between 1e-14 "
