@@ -79,7 +79,7 @@ def laid_out(tree, lanes: int | None = None) -> tuple[np.ndarray, Layout]:
 class Key(NamedTuple):
     """What an attempt is compiled for; hashable."""
 
-    #: leaves of system and plan that are no arrays, with their types, and where they are
+    #: what is no array in system and plan, with its types, and where it is
     static: tuple
     structure: Any
     #: arrays of system and plan that differ between batch elements, and that do not
