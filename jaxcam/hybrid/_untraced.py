@@ -1,11 +1,13 @@
 """A run that is not traced: chunk by chunk, by LLVM or by XLA, as far as it goes."""
 
 from collections.abc import Callable
+from typing import Any
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array, Int
 
 from .backend import attempts_of, key_of, Lacking, laid_out, say_lacking
 from .codes import RUNNING
@@ -27,7 +29,7 @@ _CHUNK = 2048
 
 def run_untraced(
     system, settings, t0, state, t1, budget: int, progress: Callable | None
-) -> tuple[Log, np.ndarray, int]:
+) -> tuple[Log, Any, Int[Array, ""]]:
     """Log, contacts at the start, and result code of a run of at most `budget` rows.
 
     A run that goes on after that has the code of `RUNNING`.
@@ -89,7 +91,7 @@ def _by_llvm(system, settings, t0, state, t1, budget, progress):
         _said(progress, numbers[0, place.t], t0, t1)
     _said(progress, t1, t0, t1)
     log = log_of(np.concatenate(tables), len(place.x), len(place.contact))
-    return log, contact, np.int32(numbers[0, place.status])
+    return log, contact, jnp.asarray(numbers[0, place.status], jnp.int32)
 
 
 @eqx.filter_jit
@@ -118,4 +120,4 @@ def _by_xla(system, settings, t0, state, t1, budget, progress):
         used += size
     _said(progress, t1, t0, t1)
     whole = jax.tree.map(lambda *parts: np.concatenate(parts), *logs)
-    return whole, contact, np.int32(carried.status)
+    return whole, contact, jnp.asarray(carried.status, jnp.int32)

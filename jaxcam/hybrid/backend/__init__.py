@@ -15,4 +15,5 @@ from ._attempts import (
     say_lacking as say_lacking,
 )
 from ._machine import user_cache as user_cache, vector_width as vector_width
+from ._mapped import Mapped as Mapped
 from ._writer import Lacking as Lacking

@@ -25,6 +25,8 @@ MOVES = frozenset(
     gather pad rev reshape scatter slice split squeeze stack transpose
     """.split()
 )
+# numbers that a scatter may add
+_BITS = 62
 # elements of a table that are compared one by one with an index that is not known
 _MOST = 512
 
@@ -39,6 +41,9 @@ def moved(equation, inputs) -> list[np.ndarray]:
 
     Operands that are indices must be known.
     """
+    simple = _plainly_moved(equation, inputs)
+    if simple is not None:
+        return [simple]
     numbers = _indices_of(equation.primitive.name, len(inputs))
     flat, sent = [], []
     for i, elements in enumerate(inputs):
@@ -68,6 +73,29 @@ def moved(equation, inputs) -> list[np.ndarray]:
     return found
 
 
+@no_type_check
+def _plainly_moved(equation, inputs):
+    """The most frequent moves by numpy alone; else `None`."""
+    name, params, first = equation.primitive.name, equation.params, inputs[0]
+    if name in ("reshape", "squeeze", "expand_dims", "copy"):
+        return first.reshape(equation.outvars[0].aval.shape)
+    if name == "slice":
+        strides = params["strides"] or (1,) * first.ndim
+        cuts = zip(params["start_indices"], params["limit_indices"], strides)
+        return first[tuple(slice(*c) for c in cuts)]
+    if name == "concatenate":
+        return np.concatenate(inputs, axis=params["dimension"])
+    if name == "transpose":
+        return first.transpose(params["permutation"])
+    if name == "broadcast_in_dim":
+        shape, kept = params["shape"], params["broadcast_dimensions"]
+        sizes = [1] * len(shape)
+        for axis, dimension in enumerate(kept):
+            sizes[dimension] = first.shape[axis]
+        return np.broadcast_to(first.reshape(sizes), shape)
+    return None
+
+
 def _fill(equation):
     """What a gather gives where it reaches beyond the array."""
     dtype, value = equation.outvars[0].aval.dtype, equation.params.get("fill_value")
@@ -79,11 +107,34 @@ def _fill(equation):
 
 def _indices_of(name: str, count: int) -> tuple[int, ...]:
     """Which operands are indices."""
-    if name in ("gather", "scatter"):
+    if name in ("gather", "scatter", "scatter-add"):
         return (1,)
     if name == "dynamic_slice":
         return tuple(range(1, count))
     return tuple(range(2, count)) if name == "dynamic_update_slice" else ()
+
+
+@no_type_check
+def added(add: Callable, equation, inputs) -> np.ndarray:
+    """A scatter that adds, by indices that are known: a bit for each addend says where.
+
+    **Raises:** `Lacking` where there are too many.
+    """
+    onto, where, given = inputs
+    if given.size > _BITS:
+        raise Lacking(f"scatter-add of {given.size} numbers")
+    bits = 2 ** np.arange(given.size, dtype=np.int64).reshape(given.shape)
+    nothing = jnp.zeros(onto.shape, jnp.int64)
+    with jax.ensure_compile_time_eval():
+        params = equation.primitive.get_bind_params(dict(equation.params))
+        sent = nothing, jnp.asarray(join_known(where)), jnp.asarray(bits)
+        found = np.asarray(equation.primitive.bind(*sent, **params))
+    out = onto.copy()
+    for index in np.ndindex(*out.shape):
+        for k in range(given.size):
+            if int(found[index]) >> k & 1:
+                out[index] = add(out[index], given.ravel()[k])
+    return out
 
 
 def has_known_indices(equation, inputs) -> bool:

@@ -43,6 +43,8 @@ def elementwise(w: Writer, name: str, params, dtype, x):
         return b.not_(x[0])
     if name in ("max", "min"):
         return _extreme(w, name, dtype, *x)
+    if name in ("lt_to", "le_to"):
+        return _ordered(w, "<" if name == "lt_to" else "<=", dtype, x)
     if name == "convert_element_type":
         return converted(w, x[0], dtype, params["new_dtype"])
     if name == "integer_pow":
@@ -121,6 +123,23 @@ def _comparison(w: Writer, sign: str, dtype, x):
     if sign == "!=":
         return w.builder.fcmp_unordered(sign, *x)
     return w.builder.fcmp_ordered(sign, *x)
+
+
+@no_type_check
+def _ordered(w: Writer, sign: str, dtype, x):
+    """Comparison in an order of all floats, in which NaN has a place of its own."""
+    if not is_float(dtype):
+        return _comparison(w, sign, dtype, x)
+    b, size = w.builder, kind_of(dtype)
+    bits = 64 if size == DOUBLE else 32
+    whole = ir.IntType(bits)
+    placed = []
+    for value in x:
+        number = b.bitcast(value, w.with_kind(value, whole))
+        negative = b.ashr(number, w.like(number, bits - 1))
+        most = w.like(number, 2 ** (bits - 1) - 1)
+        placed.append(b.xor(number, b.and_(negative, most)))
+    return b.icmp_signed(sign, *placed)
 
 
 @no_type_check
@@ -256,7 +275,7 @@ ELEMENTWISE: frozenset[str] = (
     frozenset(
         """
     abs add add_any and ceil clamp convert_element_type div eq exp exp2 floor ge gt
-    integer_pow is_finite le log logistic lt max min mul ne neg not or rem round rsqrt
+    integer_pow is_finite le le_to log logistic lt lt_to max min mul ne neg not or rem round rsqrt
     select_n shift_left shift_right_arithmetic shift_right_logical sign sqrt square sub
     xor
     """.split()

@@ -182,6 +182,7 @@ def _write_remainder(writer: Writer, name: str, kind):
     # a product and a difference without rounding: up to 2^53 steps the rest is a float
     rest = w.call("llvm.fma", [builder.fneg(ratio), step, size])
     rest = a.choose(a.less(rest, 0.0), builder.fadd(rest, step), rest)
+    rest = a.choose(a.less(size, step), size, rest)
     fine = w.both(a.less(ratio, 2.0**52), a.less(size, float("inf")))
     made = w.call("llvm.copysign", [rest, x])
     odd = w.any(builder.not_(fine))
