@@ -25,8 +25,8 @@ MOVES = frozenset(
     gather pad rev reshape scatter slice split squeeze stack transpose
     """.split()
 )
-# numbers that a scatter may add
-_BITS = 62
+# numbers that a scatter may add: a float holds as many bits
+_BITS = 52
 # elements of a table that are compared one by one with an index that is not known
 _MOST = 512
 
@@ -121,10 +121,11 @@ def added(add: Callable, equation, inputs) -> np.ndarray:
     **Raises:** `Lacking` where there are too many.
     """
     onto, where, given = inputs
-    if given.size > _BITS:
-        raise Lacking(f"scatter-add of {given.size} numbers")
-    bits = 2 ** np.arange(given.size, dtype=np.int64).reshape(given.shape)
-    nothing = jnp.zeros(onto.shape, jnp.int64)
+    dtype = equation.outvars[0].aval.dtype
+    if given.size > _BITS or dtype != np.float64:
+        raise Lacking(f"scatter-add of {given.size} numbers of type {dtype}")
+    bits = 2.0 ** np.arange(given.size).reshape(given.shape)
+    nothing = jnp.zeros(onto.shape)
     with jax.ensure_compile_time_eval():
         params = equation.primitive.get_bind_params(dict(equation.params))
         sent = nothing, jnp.asarray(join_known(where)), jnp.asarray(bits)

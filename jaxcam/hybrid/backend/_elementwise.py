@@ -275,7 +275,8 @@ ELEMENTWISE: frozenset[str] = (
     frozenset(
         """
     abs add add_any and ceil clamp convert_element_type div eq exp exp2 floor ge gt
-    integer_pow is_finite le le_to log logistic lt lt_to max min mul ne neg not or rem round rsqrt
+    integer_pow is_finite le le_to log logistic lt lt_to max min mul ne neg not or rem
+    round rsqrt
     select_n shift_left shift_right_arithmetic shift_right_logical sign sqrt square sub
     xor
     """.split()
