@@ -9,7 +9,16 @@ from typing import no_type_check
 import llvmlite.ir as ir
 import numpy as np
 
-from ._special import Arithmetic, exp, exp2, LIBRARY, library, log, remainder
+from ._special import (
+    Arithmetic,
+    exp,
+    exp2,
+    LIBRARY,
+    library,
+    log,
+    quotient,
+    remainder,
+)
 from ._writer import DOUBLE, FAST, is_float, kind_of, Lacking, Writer
 
 
@@ -56,7 +65,7 @@ def elementwise(w: Writer, name: str, params, dtype, x):
     if not real:
         return _of_integers(w, name, dtype, x)
     if name == "div":
-        return b.fdiv(*x)
+        return quotient(w, *x) if str(dtype) == "float64" else b.fdiv(*x)
     if name == "neg":
         return b.fneg(x[0])
     if name == "abs":
@@ -186,7 +195,9 @@ def _power(w: Writer, x, exponent: int, dtype):
         size >>= 1
         if size:
             x = elementwise(w, "mul", {}, dtype, [x, x])
-    return w.builder.fdiv(w.like(made, one), made) if exponent < 0 else made
+    if exponent < 0:
+        return elementwise(w, "div", {}, dtype, [w.like(made, one), made])
+    return made
 
 
 @no_type_check

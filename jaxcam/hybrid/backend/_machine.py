@@ -3,9 +3,11 @@
 import ctypes
 import functools
 import hashlib
+import itertools
 import os
 import sys
 import tempfile
+import threading
 from pathlib import Path
 from typing import Any
 
@@ -21,10 +23,9 @@ _LEVEL = 2
 class Compiled:
     """A function of the machine; it keeps its code alive."""
 
-    def __init__(self, engine, name: str, result, arguments):
-        self._engine = engine
-        address = engine.get_function_address(name)
-        self._function = ctypes.CFUNCTYPE(result, *arguments)(address)
+    def __init__(self, tracker, name: str, result, arguments):
+        self._tracker = tracker
+        self._function = ctypes.CFUNCTYPE(result, *arguments)(tracker[name])
 
     def __call__(self, *arguments):
         return self._function(*arguments)
@@ -50,10 +51,31 @@ def vector_width() -> int:
     return 4 if features.get("avx") else 2
 
 
+@functools.cache
+def has_rough_inverse() -> bool:
+    """Whether eight inverses of 14 bits take one instruction, which AVX-512 has."""
+    return bool(llvm.get_host_cpu_features().get("avx512f"))
+
+
 def _machine():
+    # small: constants are operands, found by their distance from the code
     return _target().create_target_machine(
-        cpu=llvm.get_host_cpu_name(), features=_features(), opt=_LEVEL
+        cpu=llvm.get_host_cpu_name(),
+        features=_features(),
+        opt=_LEVEL,
+        reloc="pic",
+        codemodel="small",
     )
+
+
+@functools.cache
+def _linker():
+    """What loads code; JITLink keeps a function and its constants together."""
+    return llvm.create_lljit_compiler(_machine(), use_jit_link=True)
+
+
+_NUMBERS = itertools.count()
+_LOCK = threading.Lock()
 
 
 def compiled(text: str, name: str, result, arguments) -> Compiled:
@@ -64,10 +86,11 @@ def compiled(text: str, name: str, result, arguments) -> Compiled:
     if code is None:
         code = _code_of(text)
         _store(key, code)
-    engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _machine())
-    engine.add_object_file(llvm.ObjectFileRef.from_data(code))
-    engine.finalize_object()
-    return Compiled(engine, name, result, arguments)
+    library = llvm.JITLibraryBuilder().add_object_img(code).add_current_process()
+    library.export_symbol(name)
+    with _LOCK:
+        tracker = library.link(_linker(), f"{name}.{next(_NUMBERS)}")
+    return Compiled(tracker, name, result, arguments)
 
 
 def _code_of(text: str) -> bytes:
