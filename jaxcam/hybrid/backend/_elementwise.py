@@ -16,7 +16,6 @@ from ._special import (
     LIBRARY,
     library,
     log,
-    quotient,
     remainder,
 )
 from ._writer import DOUBLE, FAST, is_float, kind_of, Lacking, Writer
@@ -65,7 +64,7 @@ def elementwise(w: Writer, name: str, params, dtype, x):
     if not real:
         return _of_integers(w, name, dtype, x)
     if name == "div":
-        return quotient(w, *x) if str(dtype) == "float64" else b.fdiv(*x)
+        return b.fdiv(*x)
     if name == "neg":
         return b.fneg(x[0])
     if name == "abs":
@@ -195,9 +194,7 @@ def _power(w: Writer, x, exponent: int, dtype):
         size >>= 1
         if size:
             x = elementwise(w, "mul", {}, dtype, [x, x])
-    if exponent < 0:
-        return elementwise(w, "div", {}, dtype, [w.like(made, one), made])
-    return made
+    return w.builder.fdiv(w.like(made, one), made) if exponent < 0 else made
 
 
 @no_type_check

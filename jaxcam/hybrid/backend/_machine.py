@@ -51,12 +51,6 @@ def vector_width() -> int:
     return 4 if features.get("avx") else 2
 
 
-@functools.cache
-def has_rough_inverse() -> bool:
-    """Whether eight inverses of 14 bits take one instruction, which AVX-512 has."""
-    return bool(llvm.get_host_cpu_features().get("avx512f"))
-
-
 def _machine():
     # small: constants are operands, found by their distance from the code
     return _target().create_target_machine(

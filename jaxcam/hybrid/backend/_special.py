@@ -7,7 +7,6 @@ error is that of the library, mostly below 1 ulp as well.
 
 import llvmlite.ir as ir
 
-from ._machine import has_rough_inverse
 from ._writer import DOUBLE, FAST, INT64, Writer
 
 
@@ -62,7 +61,7 @@ class Arithmetic:
         return self.b.fmul(*self._two(a, b), flags=FAST)
 
     def div(self, a, b):
-        return quotient(self.w, *self._two(a, b))
+        return self.b.fdiv(*self._two(a, b))
 
     def horner(self, coefficients, z):
         total = self.w.like(z, coefficients[-1])
@@ -88,40 +87,6 @@ class Arithmetic:
 
     def from_bits(self, a):
         return self.b.bitcast(a, self.w.with_kind(a, DOUBLE))
-
-
-def quotient(writer: Writer, x, y):
-    """x / y of 64-bit floats; below 1 ulp where a rough inverse is refined.
-
-    A division of vectors takes as long as a dozen other operations. What is no number,
-    infinite or zero comes from the rough inverse, which is exact there.
-    """
-    vector = isinstance(x.type, ir.VectorType) and x.type.count == 8
-    constant = isinstance(x, ir.Constant) and isinstance(y, ir.Constant)
-    if not vector or constant or not has_rough_inverse():
-        return writer.builder.fdiv(x, y)
-    b = writer.builder
-    byte = ir.IntType(8)
-    kind = ir.FunctionType(x.type, [x.type, x.type, byte])
-    function = writer.declare("llvm.x86.avx512.rcp14.pd.512", kind)
-    nothing = writer.like(y, 0.0)
-    rough = b.call(function, [y, nothing, ir.Constant(byte, -1)])
-
-    def fused(a, c, d):
-        return writer.call("llvm.fma", [a, c, d])
-
-    minus, inverse = b.fneg(y), rough
-    for _ in range(2):
-        wrong = fused(minus, inverse, writer.like(y, 1.0))
-        inverse = fused(inverse, wrong, inverse)
-    ratio = b.fmul(x, inverse)
-    rest = fused(minus, ratio, x)
-    refined = fused(rest, inverse, ratio)
-    # NaN, infinite or zero
-    classes = ir.Constant(ir.IntType(32), 0x267)
-    flags = writer.with_kind(ratio, ir.IntType(1))
-    odd = writer.call("llvm.is.fpclass", [ratio, classes], flags, [ratio.type])
-    return b.select(odd, b.fmul(x, rough), refined)
 
 
 def exp(writer: Writer, x):
