@@ -30,6 +30,7 @@ from jaxcam.models import (
 
 
 _TOLERANCE = 1e-10
+_LLVM = Settings(tolerance=1e-9, chatter_depth=1.0, backend="llvm")
 _VALVE = ValveTrain(
     profile=FourierProfile(0.005, [-0.005], [0.0]),
     speed=300.0,
@@ -208,15 +209,16 @@ class Coupled(HybridSystem):
 
 def test_what_is_lacking_runs_by_xla_and_is_said_once(caplog):
     _attempts._SAID.clear()
+    state, either = [0.5, 0.0, 0.0, 0.0], Settings(backend="auto")
     with caplog.at_level(logging.WARNING, logger="jaxcam"):
         for _ in range(2):
-            run = jaxcam.simulate(Coupled(), [0.5, 0.0, 0.0, 0.0], 0.0, 0.5)
+            run = jaxcam.simulate(Coupled(), state, 0.0, 0.5, settings=either)
             assert run.successful and int(run.impacts.count) > 0
     said = [r.getMessage() for r in caplog.records]
     assert len(said) == 1 and "XLA" in said[0]
     with pytest.raises(ValueError, match="backend"):
         only = Settings(backend="llvm")
-        jaxcam.simulate(Coupled(), [0.5, 0.0, 0.0, 0.0], 0.0, 0.5, settings=only)
+        jaxcam.simulate(Coupled(), state, 0.0, 0.5, settings=only)
 
 
 @pytest.mark.parametrize("name", ["oscillator", "ball", "cam"])
@@ -255,9 +257,9 @@ def test_batches(name):
 def test_a_budget_ends_a_batch_element_and_no_other():
     system = ImpactOscillator(omega=2.8, restitution=0.8)
     starts = np.random.default_rng(2).uniform(-1, -0.1, (11, 2))
-    full = stroboscope(system, starts, 8)
+    full = stroboscope(system, starts, 8, settings=_LLVM)
     most = int(np.median(full.steps))
-    cut = stroboscope(system, starts, 8, max_steps=most)
+    cut = stroboscope(system, starts, 8, max_steps=most, settings=_LLVM)
     over = full.steps > most
     assert np.any(over) and not np.all(over)
     np.testing.assert_array_equal(cut.code, np.where(over, 1, 0))
@@ -270,12 +272,12 @@ def test_company_changes_no_result():
     """Alone, in another order, in threads: bit by bit."""
     system = ImpactOscillator(omega=2.8, restitution=0.8)
     starts = np.random.default_rng(3).uniform(-1, -0.1, (19, 2))
-    full = stroboscope(system, starts, 10)
-    back = stroboscope(system, starts[::-1], 10)
+    full = stroboscope(system, starts, 10, settings=_LLVM)
+    back = stroboscope(system, starts[::-1], 10, settings=_LLVM)
     np.testing.assert_array_equal(full.states, back.states[::-1])
-    threads = stroboscope(system, starts, 10, workers=3, block=4)
+    threads = stroboscope(system, starts, 10, workers=3, block=4, settings=_LLVM)
     np.testing.assert_array_equal(full.states, threads.states)
-    alone = stroboscope(system, starts[:1], 10)
+    alone = stroboscope(system, starts[:1], 10, settings=_LLVM)
     np.testing.assert_array_equal(full.states[:1], alone.states)
 
 
@@ -283,9 +285,9 @@ def test_a_long_run_goes_on_where_a_call_ends(monkeypatch):
     """Calls of few rounds, with what is at work kept in between."""
     system = ImpactOscillator(omega=2.8, restitution=0.8)
     starts = np.random.default_rng(4).uniform(-1, -0.1, (13, 2))
-    full = stroboscope(system, starts, 10)
+    full = stroboscope(system, starts, 10, settings=_LLVM)
     monkeypatch.setattr(_attempts, "_PATIENCE", 7)
-    short = stroboscope(system, starts, 10)
+    short = stroboscope(system, starts, 10, settings=_LLVM)
     np.testing.assert_array_equal(full.states, short.states)
     np.testing.assert_array_equal(full.steps, short.steps)
 
@@ -293,10 +295,14 @@ def test_a_long_run_goes_on_where_a_call_ends(monkeypatch):
 def test_a_budget_of_rows_and_progress():
     """A run by chunks is the run as a whole; it says how far it is."""
     system, seen = ImpactOscillator(omega=2.8, restitution=0.8), []
-    run = jaxcam.simulate(system, [-0.5, 0.0], 0.0, 900.0, progress=seen.append)
+    run = jaxcam.simulate(
+        system, [-0.5, 0.0], 0.0, 900.0, settings=_LLVM, progress=seen.append
+    )
     assert run.successful and seen[-1] == 1.0 and len(seen) > 2
     assert seen == sorted(seen)
-    short = jaxcam.simulate(system, [-0.5, 0.0], 0.0, 900.0, max_steps=3000)
+    short = jaxcam.simulate(
+        system, [-0.5, 0.0], 0.0, 900.0, settings=_LLVM, max_steps=3000
+    )
     assert int(short.code) == 1
     count = int(short.impacts.count)
     np.testing.assert_array_equal(short.impacts.time, run.impacts.time[:count])

@@ -82,7 +82,7 @@ def _by_llvm(system, settings, t0, state, t1, budget, progress):
     tables, used = [], 0
     while True:
         size = min(_CHUNK, budget - used)
-        table = np.zeros((1, size, loop.program.row))
+        table = np.zeros((1, size, loop.sizes.row))
         loop.run(shared, own, numbers, table, first=used, limit=used + size)
         tables.append(table[0])
         used += size

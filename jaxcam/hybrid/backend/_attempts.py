@@ -137,13 +137,25 @@ def traced(key: Key) -> Program:
     )
 
 
+class Sizes(NamedTuple):
+    """How many numbers there are in a state, of its own and in a row of the log."""
+
+    state: int
+    own: int
+    row: int
+    #: which number of the state counts the attempts
+    steps: int
+
+
 class Attempts:
     """The compiled loop of attempts for one key."""
 
     def __init__(self, key: Key):
-        self.program = traced(key)
+        program = traced(key)
+        # the program itself takes megabytes
+        self.sizes = Sizes(len(program.dtypes), program.own, program.row, program.steps)
         self.width = key.width
-        text = str(module_of(self.program, key.width))
+        text = str(module_of(program, key.width))
         self.function: Compiled = compiled(text, ENTRY, ctypes.c_int64, _ARGUMENTS)
 
     def run(
@@ -156,18 +168,20 @@ class Attempts:
         first: float = 0.0,
         limit: float,
         between: Callable[[], None] | None = None,
-    ) -> None:
+    ) -> int:
         """Run batch elements to their ends, or to `limit` attempts each.
 
         **Arguments:** numbers of system and plan, `(k,)` and `(lanes, k)`; those of the
         states, `(lanes, k)`, which are changed in place; the log, `(lanes, places,
         k)`, whose place `first` comes first; and what is called between two calls.
+
+        **Returns:** the number of attempts in each slot.
         """
-        program, width = self.program, self.width
-        count, columns = len(lanes), len(program.dtypes) + program.own
+        count, width = len(lanes), self.width
+        columns = self.sizes.state + self.sizes.own
         slots = np.zeros((columns, width))
         work = np.full(width, -1, dtype=np.int64)
-        order, cursor = np.arange(count), np.zeros(1, dtype=np.int64)
+        order, cursor = np.arange(count), np.zeros(2, dtype=np.int64)
         arrays = shared, own, lanes, slots, work, order, cursor, table
         assert all(a.flags.c_contiguous for a in arrays)
         pointers = [a.ctypes.data for a in arrays]
@@ -175,6 +189,7 @@ class Attempts:
         while self.function(*pointers, *numbers):
             if between is not None:
                 between()
+        return int(cursor[1])
 
 
 _KNOWN: dict[Key, Attempts | str] = {}

@@ -51,6 +51,7 @@ class _Arguments(NamedTuple):
     slots: Any
     work: Any
     order: Any
+    # the place in the order that comes next; rounds so far
     cursor: Any
     log: Any
     queued: Any
@@ -126,9 +127,13 @@ class _Kernel:
         b.cbranch(patient, refill, done)
 
         b.position_at_end(done)
-        rest = b.phi(INT64)
+        rest, rounds = b.phi(INT64), b.phi(INT64)
+        rounds.add_incoming(count, filled)
+        rounds.add_incoming(after, ended)
         rest.add_incoming(self._int(0), filled)
         rest.add_incoming(self._int(1), ended)
+        so_far = self._load(self.a.cursor, self._int(1))
+        self._store(b.add(so_far, rounds), self.a.cursor, self._int(1))
         b.ret(rest)
 
     def _int(self, k: int):
