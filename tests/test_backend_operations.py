@@ -239,7 +239,12 @@ _ARRAYS = {
     ],
     "pieces": lambda x: [*jnp.concatenate([x[::-1], x[1:3]]), *jnp.roll(x, 2)],
     "padded": lambda x: [*jnp.pad(x, 2, constant_values=3.0)],
-    "set": lambda x: [*x.at[2].set(7.0), *x.at[1].add(x[0])],
+    "set": lambda x: [*x.at[2].set(7.0), *x.at[1].add(x[0]), *x.at[0].multiply(x[3])],
+    "several": lambda x: [
+        *x.at[jnp.array([1, 3, 1])].add(x[:3]),
+        *x.at[jnp.array([0, 5])].max(x[2:4]),
+        *x.at[1:3].min(0.1),
+    ],
     "looked up": lambda x: [x[_index(x)], x.reshape(2, 3)[1, _index(x) % 3]],
     "beyond": lambda x: [x[_index(x) + 4], x.at[_index(x) * 3].get(mode="clip")],
     "slice": lambda x: [*lax.dynamic_slice(x, (_index(x),), (2,))],

@@ -40,9 +40,10 @@ class Settings(eqx.Module):
       that make it fast. Slower by an order of magnitude, equal to the tolerance, and
       without reverse mode: a check on these passes, and a way on where one fails.
     - `solver`: any explicit Runge-Kutta solver of diffrax with an error estimate.
-    - `backend`: what compiles runs that are not traced: "llvm", or "xla", which all
-      traced runs and derivatives go through; "auto" takes LLVM where it has all that
-      the system needs. Results differ by rounding.
+    - `backend`: what compiles runs that are not traced: "xla" by default, which all
+      traced runs and derivatives go through; "llvm", which is faster and refuses a
+      system that needs an operation it has not; or "auto", LLVM where it can and XLA
+      where it cannot. Results differ by rounding.
     """
 
     tolerance: FloatScalar = 1e-10
@@ -54,7 +55,7 @@ class Settings(eqx.Module):
     absolute: FloatScalar | Float[ArrayLike, " n"] | None = None
     max_step: FloatScalar | None = None
     plain: bool = eqx.field(default=False, static=True)
-    backend: Literal["auto", "llvm", "xla"] = eqx.field(default="auto", static=True)
+    backend: Literal["auto", "llvm", "xla"] = eqx.field(default="xla", static=True)
 
     @property
     def compiles(self) -> bool:

@@ -25,7 +25,7 @@ MOVES = frozenset(
     gather pad rev reshape scatter slice split squeeze stack transpose
     """.split()
 )
-# numbers that a scatter may add: a float holds as many bits
+# numbers that a scatter may combine: a float holds as many bits
 _BITS = 52
 # elements of a table that are compared one by one with an index that is not known
 _MOST = 512
@@ -107,34 +107,48 @@ def _fill(equation):
 
 def _indices_of(name: str, count: int) -> tuple[int, ...]:
     """Which operands are indices."""
-    if name in ("gather", "scatter", "scatter-add"):
+    if name == "gather" or name.startswith("scatter"):
         return (1,)
     if name == "dynamic_slice":
         return tuple(range(1, count))
     return tuple(range(2, count)) if name == "dynamic_update_slice" else ()
 
 
-@no_type_check
-def added(add: Callable, equation, inputs) -> np.ndarray:
-    """A scatter that adds, by indices that are known: a bit for each addend says where.
+#: scatters that combine what is there with what comes, and by what
+SCATTERS = {
+    "scatter-add": "add",
+    "scatter-sub": "sub",
+    "scatter-mul": "mul",
+    "scatter-min": "min",
+    "scatter-max": "max",
+}
 
-    **Raises:** `Lacking` where there are too many.
+
+@no_type_check
+def scattered(operation: Callable, equation, inputs) -> np.ndarray:
+    """A scatter that combines, by indices that are known.
+
+    **Raises:** `Lacking` where more numbers come than a float has bits.
     """
     onto, where, given = inputs
-    dtype = equation.outvars[0].aval.dtype
-    if given.size > _BITS or dtype != np.float64:
-        raise Lacking(f"scatter-add of {given.size} numbers of type {dtype}")
+    if given.size > _BITS:
+        raise Lacking(f"{equation.primitive.name} of {given.size} numbers")
+    # a bit for each number that comes says where it goes
     bits = 2.0 ** np.arange(given.size).reshape(given.shape)
-    nothing = jnp.zeros(onto.shape)
+    params = equation.params
     with jax.ensure_compile_time_eval():
-        params = equation.primitive.get_bind_params(dict(equation.params))
-        sent = nothing, jnp.asarray(join_known(where)), jnp.asarray(bits)
-        found = np.asarray(equation.primitive.bind(*sent, **params))
-    out = onto.copy()
+        found = jax.lax.scatter_add(
+            jnp.zeros(onto.shape),
+            jnp.asarray(join_known(where)),
+            jnp.asarray(bits),
+            params["dimension_numbers"],
+            mode=params["mode"],
+        )
+    found, out = np.asarray(found), onto.copy()
     for index in np.ndindex(*out.shape):
         for k in range(given.size):
             if int(found[index]) >> k & 1:
-                out[index] = add(out[index], given.ravel()[k])
+                out[index] = operation(out[index], given.ravel()[k])
     return out
 
 

@@ -7,7 +7,6 @@ from jax.extend.core import ClosedJaxpr, Literal
 
 from ..lowering import computed, has_program, join_known, opened
 from ._arrays import (
-    added,
     extreme_place,
     has_known_indices,
     known,
@@ -17,6 +16,8 @@ from ._arrays import (
     product,
     reduced,
     running,
+    scattered,
+    SCATTERS,
     value_of,
 )
 from ._control import branches, scan, while_loop
@@ -113,8 +114,8 @@ class Emitter:
         if name in ("argmax", "argmin"):
             kinds = dtypes[0], output.dtype
             return extreme_place(self.w, name, inputs[0], params["axes"], *kinds)
-        if name == "scatter-add" and has_known_indices(equation, inputs):
-            return added(pair("add"), equation, inputs)
+        if name in SCATTERS and has_known_indices(equation, inputs):
+            return scattered(pair(SCATTERS[name]), equation, inputs)
         if name in ("gather", "dynamic_slice", "dynamic_update_slice"):
             return looked_up(self.w, equation, inputs, dtypes)[0]
         raise Lacking(name)

@@ -7,7 +7,7 @@ slot in loops of their own.
 """
 
 import contextlib
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, no_type_check
 
 import llvmlite.ir as ir
 import numpy as np
@@ -61,15 +61,15 @@ class _Arguments(NamedTuple):
     patience: Any
 
 
-_KINDS = _Arguments(
-    *(_POINTER,) * 4, *(_COUNTS,) * 3, _POINTER, INT64, INT64, DOUBLE, DOUBLE, INT64
+_KINDS = (
+    [_POINTER] * 4 + [_COUNTS] * 3 + [_POINTER, INT64, INT64, DOUBLE, DOUBLE, INT64]
 )
 
 
 def module_of(program: Program, width: int) -> ir.Module:
     """A module with the function `ENTRY`, for vectors of `width` batch elements."""
     module = ir.Module("attempts")
-    function = ir.Function(module, ir.FunctionType(INT64, list(_KINDS)), ENTRY)
+    function = ir.Function(module, ir.FunctionType(INT64, _KINDS), ENTRY)
     for argument in function.args:
         if isinstance(argument.type, ir.PointerType):
             argument.add_attribute("noalias")
@@ -78,6 +78,7 @@ def module_of(program: Program, width: int) -> ir.Module:
     return module
 
 
+@no_type_check
 class _Kernel:
     def __init__(self, program: Program, writer: Writer, arguments: _Arguments):
         self.p, self.w, self.b, self.a = program, writer, writer.builder, arguments

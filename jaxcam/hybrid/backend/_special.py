@@ -5,6 +5,8 @@ below 1 ulp. A function of the C library is called once for each batch element; 
 error is that of the library, mostly below 1 ulp as well.
 """
 
+from typing import Any
+
 import llvmlite.ir as ir
 
 from ._writer import DOUBLE, FAST, INT64, Writer
@@ -42,7 +44,8 @@ class Arithmetic:
     """Short names for arithmetic on values of one shape and numbers of Python."""
 
     def __init__(self, writer: Writer):
-        self.w, self.b = writer, writer.builder
+        self.w = writer
+        self.b: Any = writer.builder
 
     def _two(self, a, b):
         if not isinstance(a, ir.Value):
