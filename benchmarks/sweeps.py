@@ -30,7 +30,7 @@ import typer
 
 from benchmarks import _workloads
 from jaxcam.hybrid import stroboscope
-from jaxcam.hybrid.backend import Attempts
+from jaxcam.hybrid.batch import _refilled_lanes
 from jaxcam.models import CamFollower, rpm_to_rad_s
 from jaxcam.sweeps import basins, diagram, Grid
 
@@ -104,19 +104,24 @@ def kept(repeats: int, side: int) -> None:
 
 def idle_slots(call) -> float:
     """Part of the attempts that the compiled loop made without a lane in the slot."""
-    slots, steps, run = [], [], Attempts.run
+    slots, steps, compiled = [], [], _refilled_lanes.compiled_chunk
 
-    def counted(self, shared, own, lanes, table, **options):
-        rounds = run(self, shared, own, lanes, table, **options)
-        slots.append(rounds * self.width)
-        steps.append(lanes[:, self.sizes.steps].sum())
-        return rounds
+    def counted(start, *others):
+        chunk, place = compiled(start, *others), start.slots.rows.steps
 
-    Attempts.run = counted
+        def looking(own, shared, numbers):
+            made, log = chunk(own, shared, numbers)
+            slots.append(log[0].size)
+            steps.append(np.sum(np.asarray(made)[place] - np.asarray(numbers)[place]))
+            return made, log
+
+        return looking
+
+    _refilled_lanes.compiled_chunk = counted
     try:
         call()
     finally:
-        Attempts.run = run
+        _refilled_lanes.compiled_chunk = compiled
     return float(1 - np.sum(steps) / np.sum(slots))
 
 
