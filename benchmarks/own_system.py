@@ -20,7 +20,7 @@ from benchmarks import _numba_own
 from jaxcam.hybrid import Settings, stroboscope
 
 
-SETTINGS = Settings(tolerance=1e-9, chatter_depth=1.0)
+SETTINGS = Settings(tolerance=1e-9, chatter_depth=1.0, backend="llvm")
 
 
 class Pendulum(jaxcam.HybridSystem):

@@ -27,17 +27,18 @@ from jaxcam.hybrid import Settings, stroboscope
 from jaxcam.models import CamFollower
 
 
-FAST = Settings(tolerance=1e-9, chatter_depth=1.0)
+FAST = Settings(tolerance=1e-9, chatter_depth=1.0, backend="llvm")
+BY_XLA = Settings(tolerance=1e-9, chatter_depth=1.0, backend="xla")
 
 
-def ours(workload, block: int):
+def ours(workload, block: int, settings=FAST):
     """The same workload in one batch call."""
     system = CamFollower(speed=workload.speed[0])
     sweep = {}
     if np.ptp(workload.speed) > 0:
         sweep = {"where": lambda s: s.speed, "values": workload.speed}
     return lambda: stroboscope(
-        system, workload.start, workload.turns, settings=FAST, block=block, **sweep
+        system, workload.start, workload.turns, settings=settings, block=block, **sweep
     )
 
 
@@ -55,6 +56,7 @@ def batches(repeats: int, side: int) -> None:
             ),
             "numba best": lambda w=workload: _numba_best.simulate(w),
             "jaxcam": run,
+            "jaxcam by XLA": ours(workload, block, BY_XLA),
         }
         samples, impacts, _ = calls["numba best"]()
         made = run()
@@ -83,15 +85,16 @@ def single(repeats: int) -> None:
     t1 = workload.turns * float(system.period)
     start = jnp.asarray(workload.start[0])
 
-    def ours():
-        jaxcam.simulate(system, start, 0.0, t1, settings=FAST)
+    def ours(settings=FAST):
+        jaxcam.simulate(system, start, 0.0, t1, settings=settings)
 
-    ours()
+    ours(), ours(BY_XLA)
     calls = {
         "numba best, steps": lambda: _numba_best.simulate(
             workload, reach=_numba_best.STEPS_ONLY
         ),
         "jaxcam.simulate": ours,
+        "by XLA": lambda: ours(BY_XLA),
     }
     calls["numba best, steps"]()
     rows = _timing.compare(

@@ -106,8 +106,8 @@ def idle_slots(call) -> float:
     """Part of the attempts that the compiled loop made without a lane in the slot."""
     slots, steps, compiled = [], [], _refilled_lanes.compiled_chunk
 
-    def counted(start, rows, row):
-        chunk, place = compiled(start, rows, row), start.slots.rows.steps
+    def counted(start, *others):
+        chunk, place = compiled(start, *others), start.slots.rows.steps
 
         def looking(own, shared, numbers):
             made, log = chunk(own, shared, numbers)

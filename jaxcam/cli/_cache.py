@@ -1,9 +1,7 @@
 """Compiled programs are kept on disk, so that a second run starts at once."""
 
 import os
-import sys
 import warnings
-from pathlib import Path
 
 
 def keep_compiled_programs() -> None:
@@ -14,9 +12,11 @@ def keep_compiled_programs() -> None:
     """
     import jax
 
+    from ..hybrid.backend import user_cache
+
     if not os.environ.get("JAX_COMPILATION_CACHE_DIR"):
         try:
-            folder = _user_cache() / "jaxcam" / "compiled"
+            folder = user_cache() / "jaxcam" / "compiled"
             folder.mkdir(parents=True, exist_ok=True)
         except (OSError, RuntimeError):
             return
@@ -26,11 +26,3 @@ def keep_compiled_programs() -> None:
     jax.config.update("jax_persistent_cache_min_entry_size_bytes", -1)
     # an entry that cannot be read or written is compiled again, and nothing is lost
     warnings.filterwarnings("ignore", "Error (reading|writing) persistent compilation")
-
-
-def _user_cache() -> Path:
-    if sys.platform == "win32" and os.environ.get("LOCALAPPDATA"):
-        return Path(os.environ["LOCALAPPDATA"])
-    if sys.platform == "darwin":
-        return Path("~/Library/Caches").expanduser()
-    return Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser()

@@ -1,5 +1,7 @@
 """Accuracy settings of a run."""
 
+from typing import Literal
+
 import diffrax
 import equinox as eqx
 import numpy as np
@@ -55,12 +57,27 @@ class Settings(eqx.Module):
     ten times slower, equal within the tolerance, and without reverse mode: a check of
     these passes, and a fallback if one fails."""
 
+    backend: Literal["auto", "llvm", "xla"] = eqx.field(default="xla", static=True)
+    """Compiler of runs that are not traced: `"xla"`, through which all traced runs and
+    derivatives go; `"llvm"`, which is faster and refuses a system that needs an operation
+    it lacks; or `"auto"`, LLVM where it can and XLA where it cannot. Results differ by
+    rounding."""
+
+    @property
+    def compiles(self) -> bool:
+        """Whether a run that is not traced is to be compiled by LLVM."""
+        return self.backend != "xla" and not self.plain
+
     def check(self) -> None:
         """Raise `ValueError` if a setting is outside its range.
 
         Raises:
             ValueError: A setting is outside its range.
         """
+        if self.backend not in ("auto", "llvm", "xla"):
+            raise ValueError(
+                f'backend is {self.backend!r}; choose "auto", "llvm" or "xla"'
+            )
         if not 0 < float(self.tolerance) < 1:
             raise ValueError(
                 f"tolerance is {float(self.tolerance):g}; give a number between 1e-14 "

@@ -14,18 +14,15 @@ from ..parameters import as_arrays, FloatScalar, real_array, VectorLike
 from ._settings import Settings
 from ._system import HybridSystem
 from ._types import RealScalar
+from ._untraced import prepare, run_untraced
 from .checks import check_start, is_traced
 from .codes import RUNNING
-from .loop import first_state, Functions, Log, LoopState, Plan, run, run_reversible
+from .loop import Log, LoopState, run, run_reversible
 from .lowering import whole
 from .record import assemble, Contacts, Impacts, Parts, Steps, Trajectory
 from .runge_kutta import tableau_of
 from .segments import simulate_segments
 from .surface import release_point
-
-
-# rows of a chunk: for progress, interruption and growing logs
-_CHUNK = 2048
 
 
 def simulate(
@@ -122,7 +119,7 @@ def simulate(
             return Trajectory(system, settings, t0, t1, *parts, code)
     else:
         budget = 1_000_000 if max_steps is None else max_steps
-        log, contact, code = _chunks(
+        log, contact, code = run_untraced(
             system, settings, t_start, state, t1, budget, progress
         )
         parts = _assemble(system, t_start, state, contact, log)
@@ -181,15 +178,6 @@ def _release_point(system, t0):
     return jnp.where(nowhere, jnp.nan, point.state), point.time, nowhere
 
 
-def _prepare(system, settings, t0, state, t1, differentiable):
-    system = system.prepared()
-    functions = Functions(system, state.shape[0], settings.plain)
-    plan = Plan.of(system, settings, t0, t1, differentiable=differentiable)
-    x = tuple(state[i] for i in range(state.shape[0]))
-    carried = first_state(functions, t0, x, t1, plan.longest_step, plan.repeat)
-    return functions, plan, carried
-
-
 def _forward(
     system, settings, t0, state, t1, rows: int
 ) -> tuple[Parts, Int[Array, ""]]:
@@ -203,26 +191,12 @@ def _reversible(system, settings, t0, state, t1, rows: int):
 
 
 def _of_rows(runner, system, settings, t0, state, t1, rows):
-    functions, plan, carried = _prepare(system, settings, t0, state, t1, True)
+    functions, plan, carried = prepare(system, settings, t0, state, t1, True)
     contact = jnp.stack(carried.contact)
     # a start that is refused leads nowhere
     state = jnp.where(carried.status == RUNNING, state, jnp.nan)
     carried, log = runner(functions, plan, carried, rows)
     return assemble(system, t0, state, contact, log, (rows, rows)), _code(carried)
-
-
-@eqx.filter_jit
-def _begin(system, settings, t0, state, t1, rows):
-    functions, plan, carried = _prepare(system, settings, t0, state, t1, False)
-    contact = jnp.stack(carried.contact)
-    carried, log = run(functions, plan, carried, rows, "one")
-    return carried, log, contact
-
-
-@eqx.filter_jit
-def _go_on(system, settings, t0, state, t1, carried: LoopState, rows):
-    functions, plan, _ = _prepare(system, settings, t0, state, t1, False)
-    return run(functions, plan, carried, rows, "one")
 
 
 def _assemble(system, t0, state, contact, log: Log) -> Parts:
@@ -233,25 +207,6 @@ def _assemble(system, t0, state, contact, log: Log) -> Parts:
     # contacts that hold at the start belong to no row
     sizes = rows, width * (rows + 1)
     return assemble(system, t0, state, contact, log, sizes, np)
-
-
-def _chunks(system, settings, t0, state, t1, budget, progress):
-    """Run chunk by chunk, as far as the budget goes."""
-    size = min(_CHUNK, budget)
-    carried, log, contact = _begin(system, settings, t0, state, t1, size)
-    logs, used = [log], size
-    start = float(t0)
-    span = max(float(t1) - start, 1e-300)
-    while float(carried.status) == RUNNING and used < budget:
-        if progress is not None:
-            progress((float(carried.t) - start) / span)
-        carried, log = _go_on(system, settings, t0, state, t1, carried, size)
-        logs.append(log)
-        used += size
-    if progress is not None:
-        progress(1.0)
-    whole = jax.tree.map(lambda *parts: np.concatenate(parts), *logs)
-    return whole, contact, _code(carried)
 
 
 @jax.jit

@@ -131,7 +131,7 @@ def stroboscope(
         seen = TurnSamples(len(some.states), turns, skip, states.shape[1])
         chunking = Chunking(width, rows, max_steps)
         ends = run_refilled(
-            some, Horizon(start, length, turns), settings, chunking, seen
+            some, Horizon(start, length, turns), settings, chunking, seen.table
         )
         return seen.states, *ends, *seen.counts()
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from .._system import HybridSystem
 from ..loop import attempts, first_state, Functions, LoopState, Plan, run_many
-from ..lowering import one_kernel, pack, Packed, without_library
+from ..lowering import one_kernel, Packed, without_library
 
 
 # starts that are computed at once, over lanes that run at once
@@ -35,6 +35,11 @@ class LaneLayout(NamedTuple):
             for number, dtype in zip(numbers, self.dtypes, strict=True)
         ]
         return jax.tree.unflatten(jax.tree.structure(self.rows), leaves)
+
+    def example(self) -> LoopState:
+        """Shapes of the scalars of a lane."""
+        kinds = [jax.ShapeDtypeStruct((), dtype) for dtype in self.dtypes]
+        return jax.tree.unflatten(jax.tree.structure(self.rows), kinds)
 
 
 def packed(lane: LoopState):
@@ -83,9 +88,9 @@ class LaneStart(NamedTuple):
 
     slots: LaneLayout
     numbers: np.ndarray
-    own: Packed
+    own: Any
     """Parts of system and plan that differ from lane to lane, and that do not."""
-    shared: Packed
+    shared: Any
     static: Any
 
 
@@ -107,22 +112,23 @@ def start_lanes(lanes: Lanes, horizon: Horizon, settings, width: int) -> LaneSta
     numbers = np.concatenate([numbers for _, numbers, _, _ in pieces], axis=1)
     each = [own for _, _, own, _ in pieces]
     own = jax.tree.map(lambda *parts: np.concatenate(parts)[:count], *each)
-    return LaneStart(slots, numbers[:, :count], pack(own, count), pack(shared), static)
+    return LaneStart(slots, numbers[:, :count], own, shared, static)
 
 
-def compiled_chunk(start: LaneStart, rows: int, row: Callable):
+def compiled_chunk(
+    start: LaneStart, own: Packed, shared: Packed, rows: int, row: Callable
+):
     """The compiled loop: own and shared parts, each as numbers and what is apart, and
     the numbers of the lanes, to numbers and log.
 
-    It makes `rows` attempts in each slot, in whole blocks. `row` makes numbers of what
-    an attempt did and the lane after it, as in `run_raw`; of each the log has one
-    array, `(rows, slots)`.
+    It makes `rows` attempts in each slot, in whole blocks. `row` is that of a `Table`;
+    of each of its numbers the log has one array, `(rows, slots)`, places first.
     """
     leaves, structure = jax.tree.flatten(start.static)
     # 1, 1.0 and True are equal, and different programs
     key = tuple((type(leaf), leaf) for leaf in leaves)
     flat, lane = jax.tree.flatten(start.slots.rows)
-    packings = start.own.packing, start.shared.packing
+    packings = own.packing, shared.packing
     layout = lane, tuple(flat), start.slots.dtypes
     return _chunk(key, structure, packings, layout, rows, row)
 
@@ -135,10 +141,15 @@ def _chunk(
     lane, flat, dtypes = layout
     slots = LaneLayout(jax.tree.unflatten(lane, flat), dtypes)
 
+    def numbers_of(record, lane):
+        place, values = row(record, lane)
+        return [jnp.asarray(v) for v in (place, *values)]
+
     def one(own, shared, lane):
         parts = [p.unpacked(*q) for p, q in zip(packings, (own, shared), strict=True)]
         system, plan = eqx.combine(*parts, static)
-        return attempts(Functions(system, len(lane.x), plan.plain), plan, lane, row)
+        functions = Functions(system, len(lane.x), plan.plain)
+        return attempts(functions, plan, lane, numbers_of)
 
     mapped = jax.vmap(one, in_axes=((1, 0), None, 0), out_axes=(0, -1))
 
@@ -148,7 +159,7 @@ def _chunk(
         )
 
         def loop(numbers):
-            lanes, log = run_many(some, slots.unpacked(numbers), rows, row)
+            lanes, log = run_many(some, slots.unpacked(numbers), rows, numbers_of)
             return packed(lanes), log
 
         _, plan = static

@@ -5,8 +5,18 @@ from typing import NamedTuple
 import jax.numpy as jnp
 import numpy as np
 
+from ..backend import (
+    attempts_of,
+    key_of,
+    Lacking,
+    laid_out,
+    say_lacking,
+    vector_width,
+)
 from ..codes import FINISHED, RUNNING
-from ._layout import compiled_chunk, Horizon, Lanes, start_lanes
+from ..lowering import pack
+from ._layout import compiled_chunk, Horizon, Lanes, LaneStart, start_lanes
+from ._table import Table
 
 
 class Chunking(NamedTuple):
@@ -20,19 +30,53 @@ class Chunking(NamedTuple):
     """Attempts of one lane, at most."""
 
 
-def run_refilled(lanes: Lanes, horizon: Horizon, settings, chunking: Chunking, seen):
+def run_refilled(
+    lanes: Lanes, horizon: Horizon, settings, chunking: Chunking, table: Table
+):
     """Run some lanes; one that ends makes room for the next.
 
-    Lanes do not know of each other, so their order and company change no result.
-    `seen` takes the log as it comes: of each number in `seen.row` one array, an attempt
-    after the other.
+    Lanes do not know of each other, so their order and company change no result. The
+    log of all goes into the `table`.
 
     Returns:
         Impacts, attempts and result codes, each `(lanes,)`.
     """
-    count, (width, rows, max_steps) = len(lanes.states), chunking
-    start = start_lanes(lanes, horizon, settings, width)
-    chunk, place = compiled_chunk(start, rows, seen.row), start.slots.rows
+    start = start_lanes(lanes, horizon, settings, chunking.width)
+    if settings.compiles:
+        try:
+            return _by_llvm(start, chunking.max_steps, table)
+        except Lacking as lacking:
+            say_lacking(lacking, settings.backend == "llvm")
+    return _by_xla(start, chunking, table)
+
+
+def _by_llvm(start: LaneStart, max_steps: int, table: Table):
+    """The loop as code of this machine; it looks after its slots itself."""
+    count = start.numbers.shape[1]
+    shared, shared_layout = laid_out(start.shared)
+    own, own_layout = laid_out(start.own, count)
+    numbers = np.ascontiguousarray(start.numbers.T)
+    key = key_of(
+        start.static,
+        own_layout,
+        shared_layout,
+        start.slots.example(),
+        table.row,
+        vector_width(),
+    )
+    loop = attempts_of(key)
+    loop.run(shared, own, numbers, table.numbers, first=table.first, limit=max_steps)
+    place = start.slots.rows
+    columns = [place.impacts, place.steps, place.status]
+    return tuple(numbers[:, columns].astype(int).T)
+
+
+def _by_xla(start: LaneStart, chunking: Chunking, table: Table):
+    """Chunks of attempts in all slots, which are looked after in between."""
+    count, (width, rows, max_steps) = start.numbers.shape[1], chunking
+    packed_own, packed_shared = pack(start.own, count), pack(start.shared)
+    chunk = compiled_chunk(start, packed_own, packed_shared, rows, table.row)
+    place = start.slots.rows
     ends = np.zeros((count, 3), dtype=int)
     # spread evenly, to learn what the others will cost; slots without a lane of their
     # own show the last one, and do not run
@@ -40,12 +84,12 @@ def run_refilled(lanes: Lanes, horizon: Horizon, settings, chunking: Chunking, s
     work, used = np.full(width, count - 1), np.zeros(width)
     work[: len(first)], running = first, np.arange(width) < count
     waiting, sorted_yet = np.setdiff1d(np.arange(count), first), False
-    shared = jnp.asarray(start.shared.numbers), start.shared.apart
-    numbers, mine = start.numbers[:, work], start.own.some(work)
+    shared = jnp.asarray(packed_shared.numbers), packed_shared.apart
+    numbers, mine = start.numbers[:, work], packed_own.some(work)
     numbers[place.status, ~running] = FINISHED
     while np.any(running):
         numbers, log = chunk(mine, shared, numbers)
-        seen.take(work, [np.asarray(part) for part in log])
+        table.take(work, log)
         used += rows
         status = np.asarray(numbers)[place.status]
         over = running & ((status != RUNNING) | (used >= max_steps))
@@ -63,7 +107,7 @@ def run_refilled(lanes: Lanes, horizon: Horizon, settings, chunking: Chunking, s
         fresh, waiting = waiting[: len(free)], waiting[len(free) :]
         work[free], used[free], running[free] = fresh, 0, True
         numbers[:, free] = start.numbers[:, fresh]
-        mine = start.own.some(work)
+        mine = packed_own.some(work)
     return ends[:, 1], ends[:, 2], ends[:, 0]
 
 

@@ -12,6 +12,8 @@ from ._loop_state import first_state as first_state, LoopState as LoopState
 from ._run import (
     attempts as attempts,
     Log as Log,
+    log_of as log_of,
+    numbers_of_row as numbers_of_row,
     rows_of_kind as rows_of_kind,
     run as run,
     run_many as run_many,

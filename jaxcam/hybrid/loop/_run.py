@@ -49,7 +49,7 @@ def run(
     row of the log is written for all of them at once.
     """
     carried, log = run_raw(functions, plan, carried, rows, _row, company)
-    return carried, _unpack(log, functions)
+    return carried, log_of(log, functions.n, functions.m)
 
 
 def run_raw(
@@ -171,7 +171,8 @@ def run_reversible(
         return jax.lax.scan(one, carried, None, length=block)
 
     carried, log = jax.lax.scan(many, carried, None, length=blocks)
-    return carried, _unpack(log.reshape(blocks * block, -1), functions)
+    log = log.reshape(blocks * block, -1)
+    return carried, log_of(log, functions.n, functions.m)
 
 
 def _empty_record(n: int, m: int) -> Record:
@@ -181,13 +182,18 @@ def _empty_record(n: int, m: int) -> Record:
 
 
 def _row(record: Record, _: LoopState) -> list:
+    return numbers_of_row(record)
+
+
+def numbers_of_row(record: Record) -> list:
+    """The numbers of a row of the log."""
     flags = [jnp.asarray(c, dtype=jnp.float64) for c in record.contact]
     head = [record.kind, record.constraint, record.t]
     return [jnp.asarray(v) for v in head] + [*record.before, *record.after, *flags]
 
 
-def _unpack(log, functions: Functions) -> Log:
-    n, m = functions.n, functions.m
+def log_of(log, n: int, m: int) -> Log:
+    """The log of rows of numbers, of `n` components and `m` constraints."""
     return Log(
         kind=log[:, 0],
         constraint=log[:, 1],

@@ -3,7 +3,12 @@
 The one exception is `whole`, which gives a loop the transformations that it lacks.
 """
 
-from ._jaxprs import saving_jvp as saving_jvp
+from ._jaxprs import opened as opened, saving_jvp as saving_jvp
+from ._known import (
+    computed as computed,
+    is_known as is_known,
+    join_known as join_known,
+)
 from ._materialise import (
     depend_on as depend_on,
     with_kept as with_kept,
@@ -12,4 +17,4 @@ from ._materialise import (
 from ._one_kernel import one_kernel as one_kernel
 from ._packing import pack as pack, Packed as Packed
 from ._scalarise import joined as joined, scalarise as scalarise, split as split
-from ._whole import while_loop as while_loop, whole as whole
+from ._whole import has_program as has_program, while_loop as while_loop, whole as whole

@@ -86,6 +86,13 @@ def while_loop(goes_on: Callable, body: Callable, start):
     return whole(lambda start: jax.lax.while_loop(goes_on, body, start))(start)
 
 
+def has_program(equation) -> ClosedJaxpr | None:
+    """The program inside an operation that `whole` has made; else `None`."""
+    if equation.primitive is not whole_p:
+        return None
+    return equation.params["program"].jaxpr
+
+
 def _open(closed: ClosedJaxpr):
     """The jaxpr with what it captures of outer transformations as its first inputs."""
     jaxpr = closed.jaxpr

@@ -1,11 +1,13 @@
 """The impact section: every time that something is hit."""
 
+from typing import NamedTuple
+
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
 from ...hybrid import HybridSystem, Settings
-from ...hybrid.batch import Chunking, Horizon, Lanes, run_refilled
+from ...hybrid.batch import Chunking, Horizon, Lanes, run_refilled, Table
 from ...hybrid.codes import RowKind
 from ...parameters import as_arrays
 from ._hybrid_lanes import chunk_rows, run_lanes
@@ -57,12 +59,13 @@ class ImpactSection(AbstractSystemSection):
         t0 = jnp.asarray(self.t0, dtype=jnp.float64)
 
         def run(states, values, width):
-            seen = _Impacts(len(states), keep, n)
+            table = Table(_Row(keep), len(states), keep + 1, 2 + n)
             chunking = Chunking(width, chunk_rows(width), self.max_steps)
             lanes = Lanes(system, where, values, states)
             when = Horizon(t0, period, turns)
-            _, _, code = run_refilled(lanes, when, settings, chunking, seen)
-            return *seen.found(), code
+            run = run_refilled(lanes, when, settings, chunking, table)
+            impacts, _, code = run
+            return *_found(table.numbers, impacts, keep), code
 
         lanes = (self.system, self.t0, states, where, values, self.lanes)
         tails = ((keep, n), (keep,), (keep,), (n,))
@@ -78,36 +81,24 @@ class ImpactSection(AbstractSystemSection):
         )
 
 
-class _Impacts:
-    """The last impacts of each lane, in a ring, and its state at the last stop."""
+class _Row(NamedTuple):
+    """The last `keep` impacts in a ring, and after them the state at the last stop."""
 
-    def __init__(self, lanes: int, keep: int, n: int):
-        self._ring = np.full((lanes, keep, 2 + n), np.nan)
-        self._number = np.zeros(lanes, dtype=int)
-        self._final = np.full((lanes, n), np.nan)
+    keep: int
 
-    @staticmethod
-    def row(record, _):
-        return [jnp.asarray(v) for v in (record.kind, record.t, *record.after)]
+    def __call__(self, record, lane):
+        kind = record.kind
+        hit = (kind == float(RowKind.IMPACT)) | (kind == float(RowKind.LAST_IMPACT))
+        earlier = lane.impacts - 1.0
+        ring = earlier - self.keep * jnp.floor(earlier * (1 / self.keep) + 1e-9)
+        last = jnp.where(kind == float(RowKind.STOP), float(self.keep), -1.0)
+        return jnp.where(hit, ring, last), [kind, record.t, *record.after]
 
-    def take(self, work, log) -> None:
-        kind = log[0].astype(np.int8)
-        hit = (kind == RowKind.IMPACT) | (kind == RowKind.LAST_IMPACT)
-        rank = self._number[work] + np.cumsum(hit, axis=0) - 1
-        # attempt by attempt, so that the latest is what stays in a place
-        at = np.nonzero(hit)
-        place = work[at[1]], rank[at] % self._ring.shape[1]
-        self._ring[place] = np.stack([part[at] for part in log], axis=1)
-        # slots that do not run show a lane of another slot
-        np.add.at(self._number, work, hit.sum(axis=0))
-        at = np.nonzero(kind == RowKind.STOP)
-        self._final[work[at[1]]] = np.stack([part[at] for part in log[2:]], axis=1)
 
-    def found(self):
-        keep = self._ring.shape[1]
-        number = self._number
-        # the newest impact goes last; a ring that is not full starts with NaN
-        order = (number[:, None] + np.arange(keep)) % keep
-        rows = np.take_along_axis(self._ring, order[..., None], axis=1)
-        rests = (rows[..., 0] == float(RowKind.LAST_IMPACT)).astype(float)
-        return rows[..., 2:], rows[..., 1], rests, self._final
+def _found(numbers, impacts, keep):
+    """States, times and whether a chatter was completed there; the last state."""
+    # the newest impact goes last; a ring that is not full starts with NaN
+    order = (impacts[:, None] + np.arange(keep)) % keep
+    rows = np.take_along_axis(numbers, order[..., None], axis=1)
+    rests = (rows[..., 0] == float(RowKind.LAST_IMPACT)).astype(float)
+    return rows[..., 2:], rows[..., 1], rests, numbers[:, keep, 2:]

@@ -1,0 +1,123 @@
+"""A run that is not traced: chunk by chunk, by LLVM or by XLA, as far as it goes."""
+
+from collections.abc import Callable
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Int
+
+from .backend import attempts_of, key_of, Lacking, laid_out, say_lacking
+from .codes import RUNNING
+from .loop import (
+    first_state,
+    Functions,
+    Log,
+    log_of,
+    LoopState,
+    numbers_of_row,
+    Plan,
+    run,
+)
+
+
+# rows of a chunk: for progress, interruption and growing logs
+_CHUNK = 2048
+
+
+def run_untraced(
+    system, settings, t0, state, t1, budget: int, progress: Callable | None
+) -> tuple[Log, Any, Int[Array, ""]]:
+    """Log, contacts at the start, and result code of a run of at most `budget` rows.
+
+    A run that goes on after that has the code of `RUNNING`.
+    """
+    case = system, settings, t0, state, t1
+    if settings.compiles:
+        try:
+            return _by_llvm(*case, budget, progress)
+        except Lacking as lacking:
+            say_lacking(lacking, settings.backend == "llvm")
+    return _by_xla(*case, budget, progress)
+
+
+def prepare(system, settings, t0, state, t1, differentiable):
+    """Functions, plan and first state of a run."""
+    system = system.prepared()
+    functions = Functions(system, state.shape[0], settings.plain)
+    plan = Plan.of(system, settings, t0, t1, differentiable=differentiable)
+    x = tuple(state[i] for i in range(state.shape[0]))
+    carried = first_state(functions, t0, x, t1, plan.longest_step, plan.repeat)
+    return functions, plan, carried
+
+
+def _said(progress, t, t0, t1) -> None:
+    if progress is not None:
+        progress((float(t) - float(t0)) / max(float(t1) - float(t0), 1e-300))
+
+
+@eqx.filter_jit
+def _start(system, settings, t0, state, t1):
+    _, plan, carried = prepare(system, settings, t0, state, t1, False)
+    return (system.prepared(), plan), jax.tree.map(jnp.asarray, carried)
+
+
+def _row(record, lane: LoopState):
+    """All attempts in a row."""
+    return lane.steps - 1.0, numbers_of_row(record)
+
+
+def _by_llvm(system, settings, t0, state, t1, budget, progress):
+    parts, carried = _start(system, settings, t0, state, t1)
+    arrays, static = eqx.partition(parts, eqx.is_array)
+    shared, layout = laid_out(arrays)
+    _, nothing = laid_out(jax.tree.map(lambda _: None, arrays))
+    numbers, lane = laid_out(carried)
+    loop = attempts_of(key_of(static, nothing, layout, carried, _row, 1))
+    place = jax.tree.unflatten(lane.structure, range(len(numbers)))
+    contact = np.array([numbers[k] > 0.5 for k in place.contact])
+    numbers, own = numbers[None], np.zeros((1, 0))
+    tables, used = [], 0
+    while True:
+        size = min(_CHUNK, budget - used)
+        table = np.zeros((1, size, loop.sizes.row))
+        loop.run(shared, own, numbers, table, first=used, limit=used + size)
+        tables.append(table[0])
+        used += size
+        if numbers[0, place.status] != RUNNING or used >= budget:
+            break
+        _said(progress, numbers[0, place.t], t0, t1)
+    _said(progress, t1, t0, t1)
+    log = log_of(np.concatenate(tables), len(place.x), len(place.contact))
+    return log, contact, jnp.asarray(numbers[0, place.status], jnp.int32)
+
+
+@eqx.filter_jit
+def _begin(system, settings, t0, state, t1, rows):
+    functions, plan, carried = prepare(system, settings, t0, state, t1, False)
+    contact = jnp.stack(carried.contact)
+    carried, log = run(functions, plan, carried, rows, "one")
+    return carried, log, contact
+
+
+@eqx.filter_jit
+def _go_on(system, settings, t0, state, t1, carried: LoopState, rows):
+    functions, plan, _ = prepare(system, settings, t0, state, t1, False)
+    return run(functions, plan, carried, rows, "one")
+
+
+def _by_xla(system, settings, t0, state, t1, budget, progress):
+    case = system, settings, t0, state, t1
+    size = min(_CHUNK, budget)
+    carried, log, contact = _begin(*case, size)
+    logs, used = [log], size
+    while float(carried.status) == RUNNING and used < budget:
+        _said(progress, carried.t, t0, t1)
+        carried, log = _go_on(*case, carried, size)
+        logs.append(log)
+        used += size
+    _said(progress, t1, t0, t1)
+    whole = jax.tree.map(lambda *parts: np.concatenate(parts), *logs)
+    return whole, contact, jnp.asarray(carried.status, jnp.int32)

@@ -1,0 +1,311 @@
+"""Operations on small arrays of numbers: which element goes where, sums and products.
+
+An array is a numpy array of elements, each a number that is known while tracing (of
+numpy) or a value of LLVM.
+"""
+
+import functools
+import itertools
+from collections.abc import Callable
+from typing import no_type_check
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from ..lowering import is_known, join_known
+from ._elementwise import elementwise
+from ._writer import Lacking, Writer
+
+
+#: operations that only move elements, by indices that are known
+MOVES = frozenset(
+    """
+    broadcast_in_dim concatenate copy dynamic_slice dynamic_update_slice expand_dims
+    gather pad rev reshape scatter slice split squeeze stack transpose
+    """.split()
+)
+# numbers that a scatter may combine: a float holds as many bits
+_BITS = 52
+# elements of a table that are compared one by one with an index that is not known
+_MOST = 512
+
+
+def known(elements: np.ndarray) -> bool:
+    return all(is_known(e) for e in elements.ravel())
+
+
+@no_type_check
+def moved(equation, inputs) -> list[np.ndarray]:
+    """What goes where, by sending the indices of all elements the same way.
+
+    Operands that are indices must be known.
+    """
+    simple = _plainly_moved(equation, inputs)
+    if simple is not None:
+        return [simple]
+    numbers = _indices_of(equation.primitive.name, len(inputs))
+    flat, sent = [], []
+    for i, elements in enumerate(inputs):
+        if i in numbers:
+            sent.append(jnp.asarray(join_known(elements)))
+            continue
+        # zero stays free: it is what a fill is
+        first = sum(map(len, flat)) + 1
+        places = np.arange(first, first + elements.size, dtype=np.int64)
+        flat.append(elements.ravel())
+        sent.append(jnp.asarray(places.reshape(elements.shape)))
+    params = dict(equation.params)
+    if "fill_value" in params:
+        params["fill_value"] = 0
+    with jax.ensure_compile_time_eval():
+        params = equation.primitive.get_bind_params(params)
+        made = equation.primitive.bind(*sent, **params)
+    made = made if equation.primitive.multiple_results else [made]
+    outside = np.empty(1, dtype=object)
+    outside[0] = _fill(equation)
+    table = np.concatenate([outside, *flat])
+    found = []
+    for places in map(np.asarray, made):
+        out = np.empty(places.shape, dtype=object)
+        out.ravel()[:] = table[places.ravel()]
+        found.append(out)
+    return found
+
+
+@no_type_check
+def _plainly_moved(equation, inputs):
+    """The most frequent moves by numpy alone; else `None`."""
+    name, params, first = equation.primitive.name, equation.params, inputs[0]
+    if name in ("reshape", "squeeze", "expand_dims", "copy"):
+        return first.reshape(equation.outvars[0].aval.shape)
+    if name == "slice":
+        strides = params["strides"] or (1,) * first.ndim
+        cuts = zip(params["start_indices"], params["limit_indices"], strides)
+        return first[tuple(slice(*c) for c in cuts)]
+    if name == "concatenate":
+        return np.concatenate(inputs, axis=params["dimension"])
+    if name == "transpose":
+        return first.transpose(params["permutation"])
+    if name == "broadcast_in_dim":
+        shape, kept = params["shape"], params["broadcast_dimensions"]
+        sizes = [1] * len(shape)
+        for axis, dimension in enumerate(kept):
+            sizes[dimension] = first.shape[axis]
+        return np.broadcast_to(first.reshape(sizes), shape)
+    return None
+
+
+def _fill(equation):
+    """What a gather gives where it reaches beyond the array."""
+    dtype, value = equation.outvars[0].aval.dtype, equation.params.get("fill_value")
+    if value is None:
+        inexact = np.issubdtype(dtype, np.inexact)
+        value = np.nan if inexact else np.iinfo(dtype).min if dtype != bool else True
+    return np.dtype(dtype).type(value)
+
+
+def _indices_of(name: str, count: int) -> tuple[int, ...]:
+    """Which operands are indices."""
+    if name == "gather" or name.startswith("scatter"):
+        return (1,)
+    if name == "dynamic_slice":
+        return tuple(range(1, count))
+    return tuple(range(2, count)) if name == "dynamic_update_slice" else ()
+
+
+#: scatters that combine what is there with what comes, and by what
+SCATTERS = {
+    "scatter-add": "add",
+    "scatter-sub": "sub",
+    "scatter-mul": "mul",
+    "scatter-min": "min",
+    "scatter-max": "max",
+}
+
+
+@no_type_check
+def scattered(operation: Callable, equation, inputs) -> np.ndarray:
+    """A scatter that combines, by indices that are known.
+
+    **Raises:** `Lacking` where more numbers come than a float has bits.
+    """
+    onto, where, given = inputs
+    if given.size > _BITS:
+        raise Lacking(f"{equation.primitive.name} of {given.size} numbers")
+    # a bit for each number that comes says where it goes
+    bits = 2.0 ** np.arange(given.size).reshape(given.shape)
+    params = equation.params
+    with jax.ensure_compile_time_eval():
+        found = jax.lax.scatter_add(
+            jnp.zeros(onto.shape),
+            jnp.asarray(join_known(where)),
+            jnp.asarray(bits),
+            params["dimension_numbers"],
+            mode=params["mode"],
+        )
+    found, out = np.asarray(found), onto.copy()
+    for index in np.ndindex(*out.shape):
+        for k in range(given.size):
+            if int(found[index]) >> k & 1:
+                out[index] = operation(out[index], given.ravel()[k])
+    return out
+
+
+def has_known_indices(equation, inputs) -> bool:
+    places = _indices_of(equation.primitive.name, len(inputs))
+    return all(known(inputs[i]) for i in places)
+
+
+@no_type_check
+def looked_up(w: Writer, equation, inputs, dtypes) -> list[np.ndarray]:
+    """A move by indices that are not known: by comparison with all there may be."""
+    name = equation.primitive.name
+    if name in ("dynamic_slice", "dynamic_update_slice"):
+        return _sliced(w, equation, inputs, dtypes)
+    if name != "gather" or inputs[1].ndim != 1:
+        raise Lacking(name)
+    numbers = equation.params["dimension_numbers"]
+    if numbers.operand_batching_dims or numbers.start_indices_batching_dims:
+        raise Lacking("gather of a batch")
+    shape, sizes = inputs[0].shape, equation.params["slice_sizes"]
+    room = [shape[d] - sizes[d] + 1 for d in numbers.start_index_map]
+    # beyond the array it fills, or takes the nearest
+    mode = str(equation.params["mode"]).upper()
+    clips = "FILL" not in mode
+    return _by_comparison(w, equation, inputs, (1,), room, clips, dtypes)
+
+
+@no_type_check
+def _sliced(w: Writer, equation, inputs, dtypes):
+    first = 1 if equation.primitive.name == "dynamic_slice" else 2
+    small = equation.outvars[0].aval.shape if first == 1 else inputs[1].shape
+    room = [a - b + 1 for a, b in zip(inputs[0].shape, small, strict=True)]
+    places = tuple(range(first, len(inputs)))
+    return _by_comparison(w, equation, inputs, places, room, True, dtypes)
+
+
+@no_type_check
+def _by_comparison(w: Writer, equation, inputs, places, room, clips, dtypes):
+    given = np.concatenate([inputs[i].ravel() for i in places])
+    dtype = dtypes[places[0]]
+    if np.prod(room) > _MOST:
+        raise Lacking(f"{equation.primitive.name} from {np.prod(room)} places")
+
+    def result_at(candidate):
+        sent, left = list(inputs), list(candidate)
+        for i in places:
+            number = inputs[i].size
+            index = np.empty(number, dtype=object)
+            index[:] = [dtype.type(c) for c in left[:number]]
+            sent[i], left = index.reshape(inputs[i].shape), left[number:]
+        return moved(equation, sent)[0]
+
+    def here(candidate):
+        flag = None
+        for element, size, at in zip(given, room, candidate, strict=True):
+            element = value_of(w, element, dtype)
+            sign = "==" if not clips else "<=" if at == 0 else ">="
+            if clips and 0 < at < size - 1:
+                sign = "=="
+            if size == 1 and clips:
+                continue
+            one = w.builder.icmp_signed(sign, element, w.like(element, at))
+            flag = w.both(flag, one)
+        return flag
+
+    outputs = equation.outvars[0].aval
+    candidates = list(itertools.product(*map(range, room)))
+    made = result_at(candidates[0])
+    if not clips:
+        first = np.empty(made.shape, dtype=object)
+        first.ravel()[:] = [_fill(equation)] * made.size
+        made, candidates = first, [None, *candidates]
+    for candidate in candidates[1:]:
+        flag, there = here(candidate), result_at(candidate)
+        both = zip(made.ravel(), there.ravel(), strict=True)
+        picked = np.empty(made.shape, dtype=object)
+        picked.ravel()[:] = [
+            old
+            if flag is None or old is new
+            else w.choose(
+                flag,
+                value_of(w, new, outputs.dtype),
+                value_of(w, old, outputs.dtype),
+            )
+            for old, new in both
+        ]
+        made = picked
+    return [made]
+
+
+def value_of(w: Writer, element, dtype):
+    """An element as a value."""
+    return w.number(element, dtype) if is_known(element) else element
+
+
+def reduced(operation: Callable, elements: np.ndarray, axes) -> np.ndarray:
+    """All elements along some axes as one."""
+    moved_axes = np.moveaxis(elements, axes, range(len(axes)))
+    shape = moved_axes.shape[len(axes) :]
+    columns = moved_axes.reshape((-1, *shape))
+    out = np.empty(shape, dtype=object)
+    for index in np.ndindex(*shape):
+        total = columns[(0, *index)]
+        for k in range(1, columns.shape[0]):
+            total = operation(total, columns[(k, *index)])
+        out[index] = total
+    return out
+
+
+def running(operation: Callable, elements: np.ndarray, axis: int, reverse: bool):
+    """Along an axis each element with all before it, or all after it."""
+    out = np.moveaxis(elements.copy(), axis, 0)
+    out = out[::-1] if reverse else out
+    for k in range(1, out.shape[0]):
+        for index in np.ndindex(*out.shape[1:]):
+            place = (k, *index)
+            out[place] = operation(out[(k - 1, *index)], out[place])
+    return np.moveaxis(out[::-1] if reverse else out, 0, axis)
+
+
+def product(add: Callable, multiply: Callable, a, b, numbers) -> np.ndarray:
+    """A product of matrices, or of batches of them."""
+    (left, right), (batch_left, batch_right) = numbers
+    rest_a = [d for d in range(a.ndim) if d not in (*left, *batch_left)]
+    rest_b = [d for d in range(b.ndim) if d not in (*right, *batch_right)]
+    a = a.transpose([*batch_left, *rest_a, *left])
+    b = b.transpose([*batch_right, *rest_b, *right])
+    n, k = len(batch_left), len(left)
+    out = np.empty((*a.shape[: a.ndim - k], *b.shape[n : b.ndim - k]), dtype=object)
+    for index in np.ndindex(*out.shape):
+        batch, i = index[:n], index[n : n + len(rest_a)]
+        j = index[n + len(rest_a) :]
+        pairs = zip(np.ravel(a[(*batch, *i)]), np.ravel(b[(*batch, *j)]), strict=True)
+        out[index] = functools.reduce(add, [multiply(x, y) for x, y in pairs])
+    return out
+
+
+@no_type_check
+def extreme_place(w: Writer, name: str, elements, axes, dtype, index_dtype):
+    """Where along an axis the largest or smallest element is; NaN before all."""
+    (axis,) = axes
+    columns = np.moveaxis(elements, axis, 0)
+    sign = "gt" if name == "argmax" else "lt"
+    out = np.empty(columns.shape[1:], dtype=object)
+    for index in np.ndindex(*out.shape):
+        best = value_of(w, columns[(0, *index)], dtype)
+        place = w.number(0, index_dtype)
+        for k in range(1, columns.shape[0]):
+            one = value_of(w, columns[(k, *index)], dtype)
+            better = elementwise(w, sign, {}, dtype, [one, best])
+            if np.issubdtype(dtype, np.floating):
+                # the first NaN counts
+                odd = elementwise(w, "ne", {}, dtype, [one, one])
+                fine = elementwise(w, "eq", {}, dtype, [best, best])
+                better = elementwise(w, "or", {}, np.dtype(bool), [better, odd])
+                better = elementwise(w, "and", {}, np.dtype(bool), [better, fine])
+            best = w.choose(better, one, best)
+            place = w.choose(better, w.number(k, index_dtype), place)
+        out[index] = place
+    return out

@@ -1,0 +1,229 @@
+"""Attempts of the event loop compiled for this machine, and how they are run."""
+
+import ctypes
+import logging
+import threading
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax.interpreters import partial_eval
+
+from ..loop import Functions, iteration, LoopState
+from ._kernel import ENTRY, module_of, Program
+from ._machine import Compiled, compiled
+from ._writer import Lacking
+
+
+# rounds of a call, after which Python may be interrupted or show progress
+_PATIENCE = 200_000
+_POINTERS = (ctypes.c_void_p,) * 8
+_ARGUMENTS = (
+    *_POINTERS,
+    ctypes.c_int64,
+    ctypes.c_int64,
+    ctypes.c_double,
+    ctypes.c_double,
+    ctypes.c_int64,
+)
+_LOG = logging.getLogger("jaxcam")
+_SAID: set[str] = set()
+
+
+class Layout(NamedTuple):
+    """Where arrays of a pytree are among numbers; hashable."""
+
+    structure: Any
+    shapes: tuple
+    dtypes: tuple
+
+    @property
+    def size(self) -> int:
+        return sum(int(np.prod(shape)) for shape in self.shapes)
+
+    def tree(self, numbers):
+        """The pytree of these numbers, `(size,)`."""
+        leaves, first = [], 0
+        for shape, dtype in zip(self.shapes, self.dtypes, strict=True):
+            last = first + int(np.prod(shape))
+            leaves.append(numbers[first:last].reshape(shape).astype(dtype))
+            first = last
+        return jax.tree.unflatten(self.structure, leaves)
+
+
+def laid_out(tree, lanes: int | None = None) -> tuple[np.ndarray, Layout]:
+    """The arrays of a pytree as 64-bit floats: `(size,)`, or `(lanes, size)`.
+
+    **Raises:** `Lacking` where a number is not one.
+    """
+    leaves, structure = jax.tree.flatten(tree)
+    rows, shapes, dtypes = [], [], []
+    number, head = (1, 0) if lanes is None else (lanes, 1)
+    for leaf in map(np.asarray, leaves):
+        if leaf.dtype.kind not in "fiub":
+            raise Lacking(f"numbers of type {leaf.dtype}")
+        floats = leaf.astype(np.float64)
+        if leaf.dtype.kind in "iu" and np.any(np.abs(floats) > 2.0**53):
+            raise Lacking("integers above 2^53")
+        rows.append(floats.reshape(number, -1))
+        shapes.append(leaf.shape[head:])
+        dtypes.append(leaf.dtype)
+    numbers = np.concatenate([np.zeros((number, 0)), *rows], axis=1)
+    layout = Layout(structure, tuple(shapes), tuple(dtypes))
+    return np.ascontiguousarray(numbers[0] if lanes is None else numbers), layout
+
+
+class Key(NamedTuple):
+    """What an attempt is compiled for; hashable."""
+
+    #: what is no array in system and plan, with its types, and where it is
+    static: tuple
+    structure: Any
+    #: arrays of system and plan that differ between batch elements, and that do not
+    own: Layout
+    shared: Layout
+    #: pytree of the scalars of the state, and their types
+    lane: Any
+    dtypes: tuple
+    #: what is made of a record and the state after it: a place in the log, and a row
+    row: Callable
+    width: int
+
+
+def key_of(static, own: Layout, shared: Layout, lane: LoopState, row, width) -> Key:
+    """The key of an attempt of such a lane."""
+    leaves, structure = jax.tree.flatten(static)
+    scalars, lane_structure = jax.tree.flatten(lane)
+    # 1, 1.0 and True are equal, and different programs
+    kinds = tuple((type(leaf), leaf) for leaf in leaves)
+    dtypes = tuple(np.dtype(s.dtype) for s in scalars)
+    return Key(kinds, structure, own, shared, lane_structure, dtypes, row, width)
+
+
+def traced(key: Key) -> Program:
+    """One attempt as a program."""
+    static = jax.tree.unflatten(key.structure, [leaf for _, leaf in key.static])
+
+    def attempt(own, shared, *scalars):
+        parts = key.own.tree(own), key.shared.tree(shared)
+        system, plan = eqx.combine(*parts, static)
+        lane = jax.tree.unflatten(key.lane, scalars)
+        functions = Functions(system, len(lane.x), plan.plain)
+        after, record = iteration(functions, plan, lane)
+        place, values = key.row(record, after)
+        return [jnp.asarray(v) for v in (*jax.tree.leaves(after), place, *values)]
+
+    def shape(number):
+        return jax.ShapeDtypeStruct((number,), jnp.float64)
+
+    scalars = [jax.ShapeDtypeStruct((), dtype) for dtype in key.dtypes]
+    sizes = key.own.size, key.shared.size
+    closed = jax.make_jaxpr(attempt)(*map(shape, sizes), *scalars)
+    wanted = [True] * len(closed.jaxpr.outvars)
+    pruned, _ = partial_eval.dce_jaxpr(closed.jaxpr, wanted, instantiate=True)
+    places = jax.tree.unflatten(key.lane, range(len(scalars)))
+    return Program(
+        pruned,
+        closed.consts,
+        key.dtypes,
+        places.status,
+        places.steps,
+        key.shared.size,
+        key.own.size,
+        len(closed.jaxpr.outvars) - len(scalars) - 1,
+    )
+
+
+class Sizes(NamedTuple):
+    """How many numbers there are in a state, of its own and in a row of the log."""
+
+    state: int
+    own: int
+    row: int
+    #: which number of the state counts the attempts
+    steps: int
+
+
+class Attempts:
+    """The compiled loop of attempts for one key."""
+
+    def __init__(self, key: Key):
+        program = traced(key)
+        # the program itself takes megabytes
+        self.sizes = Sizes(len(program.dtypes), program.own, program.row, program.steps)
+        self.width = key.width
+        text = str(module_of(program, key.width))
+        self.function: Compiled = compiled(text, ENTRY, ctypes.c_int64, _ARGUMENTS)
+
+    def run(
+        self,
+        shared: np.ndarray,
+        own: np.ndarray,
+        lanes: np.ndarray,
+        table: np.ndarray,
+        *,
+        first: float = 0.0,
+        limit: float,
+        between: Callable[[], None] | None = None,
+    ) -> int:
+        """Run batch elements to their ends, or to `limit` attempts each.
+
+        **Arguments:** numbers of system and plan, `(k,)` and `(lanes, k)`; those of the
+        states, `(lanes, k)`, which are changed in place; the log, `(lanes, places,
+        k)`, whose place `first` comes first; and what is called between two calls.
+
+        **Returns:** the number of attempts in each slot.
+        """
+        count, width = len(lanes), self.width
+        columns = self.sizes.state + self.sizes.own
+        slots = np.zeros((columns, width))
+        work = np.full(width, -1, dtype=np.int64)
+        order, cursor = np.arange(count), np.zeros(2, dtype=np.int64)
+        arrays = shared, own, lanes, slots, work, order, cursor, table
+        assert all(a.flags.c_contiguous for a in arrays)
+        pointers = [a.ctypes.data for a in arrays]
+        numbers = count, table.shape[1], float(first), float(limit), _PATIENCE
+        while self.function(*pointers, *numbers):
+            if between is not None:
+                between()
+        return int(cursor[1])
+
+
+_KNOWN: dict[Key, Attempts | str] = {}
+_LOCK = threading.Lock()
+
+
+def attempts_of(key: Key) -> Attempts:
+    """The loop for a key, compiled once.
+
+    **Raises:** `Lacking` where the program needs what the back end has not.
+    """
+    with _LOCK:
+        if key not in _KNOWN:
+            try:
+                _KNOWN[key] = Attempts(key)
+            except Lacking as lacking:
+                _KNOWN[key] = str(lacking)
+        found = _KNOWN[key]
+    if isinstance(found, str):
+        raise Lacking(found)
+    return found
+
+
+def say_lacking(lacking: Lacking, demanded: bool) -> None:
+    """Say once that a system runs by XLA; or raise where it must not.
+
+    **Raises:** `ValueError`.
+    """
+    text = (
+        f"the LLVM back end cannot compile this system: it has no {lacking}. "
+        'Settings(backend="auto") runs it by XLA, which is slower'
+    )
+    if demanded:
+        raise ValueError(text) from lacking
+    if str(lacking) not in _SAID:
+        _SAID.add(str(lacking))
+        _LOG.warning("the system runs by XLA: the LLVM back end has no %s", lacking)

@@ -1,0 +1,319 @@
+"""The loop around an attempt: a vector of batch elements, refilled one by one.
+
+The numbers of the batch elements at work stand in slots, a row for each number and a
+column for each slot. Each round loads them, writes one attempt and stores what it
+made; whatever is rare (a row of the log, the end of a batch element) is done slot by
+slot in loops of their own.
+"""
+
+import contextlib
+from typing import Any, NamedTuple, no_type_check
+
+import llvmlite.ir as ir
+import numpy as np
+
+from ..codes import RUNNING
+from ._elementwise import converted
+from ._emit import Emitter
+from ._writer import DOUBLE, INT64, Writer
+
+
+#: name of the function in each module
+ENTRY = "run"
+_POINTER = DOUBLE.as_pointer()
+_COUNTS = INT64.as_pointer()
+_FLOAT = np.dtype(np.float64)
+
+
+class Program(NamedTuple):
+    """One attempt: a jaxpr of shared numbers, own numbers and those of the state.
+
+    The first two are arrays, the rest scalars. Results are the scalars of the state
+    after it, the place of a row of the log (negative for none), and that row.
+    """
+
+    jaxpr: Any
+    consts: list
+    #: types of the scalars of the state, and which of them are status and attempts
+    dtypes: tuple
+    status: int
+    steps: int
+    shared: int
+    own: int
+    #: numbers in a row of the log
+    row: int
+
+
+class _Arguments(NamedTuple):
+    shared: Any
+    own: Any
+    lanes: Any
+    slots: Any
+    work: Any
+    order: Any
+    # the place in the order that comes next; rounds so far
+    cursor: Any
+    log: Any
+    queued: Any
+    places: Any
+    first: Any
+    limit: Any
+    patience: Any
+
+
+_KINDS = (
+    [_POINTER] * 4 + [_COUNTS] * 3 + [_POINTER, INT64, INT64, DOUBLE, DOUBLE, INT64]
+)
+
+
+def module_of(program: Program, width: int) -> ir.Module:
+    """A module with the function `ENTRY`, for vectors of `width` batch elements."""
+    module = ir.Module("attempts")
+    function = ir.Function(module, ir.FunctionType(INT64, _KINDS), ENTRY)
+    for argument in function.args:
+        if isinstance(argument.type, ir.PointerType):
+            argument.add_attribute("noalias")
+    builder = ir.IRBuilder(function.append_basic_block("entry"))
+    _Kernel(program, Writer(module, builder, width), _Arguments(*function.args)).write()
+    return module
+
+
+@no_type_check
+class _Kernel:
+    def __init__(self, program: Program, writer: Writer, arguments: _Arguments):
+        self.p, self.w, self.b, self.a = program, writer, writer.builder, arguments
+        self.states = len(program.dtypes)
+        self.shared: list = []
+
+    def write(self) -> None:
+        b = self.b
+        blocks = ("refill", "attempt", "log", "over", "ended", "done")
+        refill, attempt, log, over, ended, done = map(b.append_basic_block, blocks)
+        row = self.w.memory(self.w.vector(DOUBLE), max(1, self.p.row))
+        self.shared = [
+            self._load(self.a.shared, self._int(k)) for k in range(self.p.shared)
+        ]
+        start = b.block
+        b.branch(refill)
+
+        b.position_at_end(refill)
+        count = b.phi(INT64)
+        count.add_incoming(self._int(0), start)
+        live = self._refill()
+        filled = b.block
+        nothing = b.icmp_unsigned("==", live, ir.Constant(live.type, 0))
+        b.cbranch(nothing, done, attempt)
+
+        b.position_at_end(attempt)
+        round_count = b.phi(INT64)
+        round_count.add_incoming(count, filled)
+        place = self._attempt(row)
+        after = b.add(round_count, self._int(1))
+        b.cbranch(self._any(self._logged(place)), log, over)
+
+        b.position_at_end(log)
+        self._log(row, place)
+        b.branch(over)
+
+        b.position_at_end(over)
+        running = self._bits(self._runs())
+        ends = b.and_(live, b.not_(running))
+        some = b.icmp_unsigned("!=", ends, ir.Constant(ends.type, 0))
+        patient = b.icmp_signed("<", after, self.a.patience)
+        b.cbranch(b.or_(some, b.not_(patient)), ended, attempt)
+        round_count.add_incoming(after, over)
+
+        b.position_at_end(ended)
+        count.add_incoming(after, ended)
+        b.cbranch(patient, refill, done)
+
+        b.position_at_end(done)
+        rest, rounds = b.phi(INT64), b.phi(INT64)
+        rounds.add_incoming(count, filled)
+        rounds.add_incoming(after, ended)
+        rest.add_incoming(self._int(0), filled)
+        rest.add_incoming(self._int(1), ended)
+        so_far = self._load(self.a.cursor, self._int(1))
+        self._store(b.add(so_far, rounds), self.a.cursor, self._int(1))
+        b.ret(rest)
+
+    def _int(self, k: int):
+        return ir.Constant(INT64, k)
+
+    def _load(self, pointer, place):
+        return self.b.load(self.b.gep(pointer, [place]))
+
+    def _store(self, value, pointer, place) -> None:
+        self.b.store(value, self.b.gep(pointer, [place]))
+
+    @contextlib.contextmanager
+    def _each(self, count):
+        """A loop over 0, 1, ... below `count`, which is above zero."""
+        b = self.b
+        before, head = b.block, b.append_basic_block("each")
+        b.branch(head)
+        b.position_at_end(head)
+        k = b.phi(INT64)
+        k.add_incoming(self._int(0), before)
+        yield k
+        more = b.add(k, self._int(1))
+        after = b.append_basic_block("next")
+        k.add_incoming(more, b.block)
+        b.cbranch(b.icmp_signed("<", more, count), head, after)
+        b.position_at_end(after)
+
+    def _column(self, row):
+        """The vector of a row of the slots."""
+        place = self.b.gep(self.a.slots, [self._int(row * self.w.width)])
+        return self.b.bitcast(place, self.w.vector(DOUBLE).as_pointer())
+
+    def _slot(self, row, k):
+        """The place of one number of one slot."""
+        return self.b.add(self.b.mul(row, self._int(self.w.width)), k)
+
+    def _bits(self, flags):
+        """Flags as one number, a bit each."""
+        if not isinstance(flags.type, ir.VectorType):
+            return flags
+        return self.b.bitcast(flags, ir.IntType(self.w.width))
+
+    def _any(self, bits):
+        return self.b.icmp_unsigned("!=", bits, ir.Constant(bits.type, 0))
+
+    def _copy(self, numbers: int, source, place, target, to) -> None:
+        """A loop that copies numbers; `place` and `to` say where, of the count."""
+        if not numbers:
+            return
+        with self._each(self._int(numbers)) as i:
+            self._store(self._load(source, place(i)), target, to(i))
+
+    def _refill(self):
+        """Put ended batch elements back and waiting ones in; who is there, by bits."""
+        b, a = self.b, self.a
+        with self._each(self._int(self.w.width)) as k:
+            lane = self._load(a.work, k)
+            busy = b.icmp_signed(">=", lane, self._int(0))
+            status = self._load(a.slots, self._slot(self._int(self.p.status), k))
+            steps = self._load(a.slots, self._slot(self._int(self.p.steps), k))
+            runs = self._going(status, steps)
+            with b.if_then(b.and_(busy, b.not_(runs))):
+                base = b.mul(lane, self._int(self.states))
+                self._copy(
+                    self.states,
+                    a.slots,
+                    lambda i: self._slot(i, k),
+                    a.lanes,
+                    lambda i: b.add(base, i),
+                )
+                self._store(self._int(-1), a.work, k)
+            free = b.icmp_signed("<", self._load(a.work, k), self._int(0))
+            at = self._load(a.cursor, self._int(0))
+            waits = b.icmp_signed("<", at, a.queued)
+            with b.if_then(b.and_(free, waits)):
+                fresh = self._load(a.order, at)
+                self._store(b.add(at, self._int(1)), a.cursor, self._int(0))
+                self._store(fresh, a.work, k)
+                states = b.mul(fresh, self._int(self.states))
+                self._copy(
+                    self.states,
+                    a.lanes,
+                    lambda i: b.add(states, i),
+                    a.slots,
+                    lambda i: self._slot(i, k),
+                )
+                owned = b.mul(fresh, self._int(self.p.own))
+                self._copy(
+                    self.p.own,
+                    a.own,
+                    lambda i: b.add(owned, i),
+                    a.slots,
+                    lambda i: self._slot(b.add(i, self._int(self.states)), k),
+                )
+        work = b.bitcast(a.work, self.w.vector(INT64).as_pointer())
+        lanes = b.load(work, align=8)
+        return self._bits(b.icmp_signed(">=", lanes, self.w.like(lanes, 0)))
+
+    def _going(self, status, steps):
+        """Whether batch elements of this status and so many attempts go on."""
+        running = self.b.fcmp_ordered("==", status, self.w.like(status, RUNNING))
+        limit = self.a.limit
+        if isinstance(status.type, ir.VectorType):
+            limit = self.w.spread(limit)
+        return self.b.and_(running, self.b.fcmp_ordered("<", steps, limit))
+
+    def _runs(self):
+        status, steps = (
+            self.b.load(self._column(row), align=8)
+            for row in (self.p.status, self.p.steps)
+        )
+        return self._going(status, steps)
+
+    def _attempt(self, row):
+        """One attempt in all slots; the place of its row of the log in each."""
+        b, p = self.b, self.p
+        columns = [b.load(self._column(k), align=8) for k in range(self.states + p.own)]
+        leaves = [
+            _element(converted(self.w, value, _FLOAT, dtype))
+            for value, dtype in zip(columns, p.dtypes)
+        ]
+        own = columns[self.states :]
+        numbers = [_elements(part) for part in (own, self.shared)]
+        made = Emitter(self.w).program(p.jaxpr, p.consts, [*numbers, *leaves])
+        dtypes = [v.aval.dtype for v in p.jaxpr.outvars]
+        kept = [
+            self._number(element[()], dtype)
+            for element, dtype in zip(made, dtypes, strict=True)
+        ]
+        for k, value in enumerate(kept[: self.states]):
+            b.store(value, self._column(k), align=8)
+        for k, value in enumerate(kept[self.states + 1 :]):
+            b.store(value, b.gep(row, [self._int(k)]))
+        return kept[self.states]
+
+    def _number(self, element, dtype):
+        """An element of a result as a vector of floats."""
+        if not isinstance(element, ir.Value):
+            return self.w.spread(self.w.number(float(element), _FLOAT))
+        return self.w.spread(converted(self.w, element, dtype, _FLOAT))
+
+    def _logged(self, place):
+        here = self.b.fcmp_ordered(">=", place, self.w.like(place, 0.0))
+        return self._bits(here)
+
+    def _log(self, row, place) -> None:
+        """Copy rows of the log to where they belong."""
+        b, a, p = self.b, self.a, self.p
+        places = self.w.memory(self.w.vector(DOUBLE), 1)
+        b.store(place, places)
+        numbers = b.bitcast(places, _POINTER)
+        rows = b.bitcast(row, _POINTER)
+        with self._each(self._int(self.w.width)) as k:
+            at = b.fsub(self._load(numbers, k), a.first)
+            lane = self._load(a.work, k)
+            last = b.sitofp(a.places, DOUBLE)
+            fits = b.and_(
+                b.fcmp_ordered(">=", at, ir.Constant(DOUBLE, 0.0)),
+                b.fcmp_ordered("<", at, last),
+            )
+            with b.if_then(b.and_(fits, b.icmp_signed(">=", lane, self._int(0)))):
+                index = b.add(b.mul(lane, a.places), b.fptosi(at, INT64))
+                base = b.mul(index, self._int(p.row))
+                self._copy(
+                    p.row,
+                    rows,
+                    lambda i: self._slot(i, k),
+                    a.log,
+                    lambda i: b.add(base, i),
+                )
+
+
+def _element(value) -> np.ndarray:
+    out = np.empty((), dtype=object)
+    out[()] = value
+    return out
+
+
+def _elements(values) -> np.ndarray:
+    out = np.empty(len(values), dtype=object)
+    out[:] = values
+    return out

@@ -1,0 +1,140 @@
+"""Instructions for one batch element, or for as many as a vector holds.
+
+A number that is the same for all batch elements stays a scalar, so that the compiler
+takes what is made of such numbers alone out of the loop.
+"""
+
+from typing import Any
+
+import llvmlite.ir as ir
+import numpy as np
+
+
+# rounding of a product that is added to something may be left out, as XLA does
+FAST = ("contract",)
+
+DOUBLE = ir.DoubleType()
+BIT, BYTE = ir.IntType(1), ir.IntType(8)
+INT32, INT64 = ir.IntType(32), ir.IntType(64)
+_KINDS = {
+    "float64": DOUBLE,
+    "float32": ir.FloatType(),
+    "bool": BIT,
+    **{f"{s}int{n}": ir.IntType(n) for n in (8, 16, 32, 64) for s in ("", "u")},
+}
+
+
+class Lacking(Exception):
+    """A program needs an operation that this back end has not; its name."""
+
+
+def kind_of(dtype) -> Any:
+    """The type of a scalar in LLVM."""
+    if str(dtype) not in _KINDS:
+        raise Lacking(f"numbers of type {dtype}")
+    return _KINDS[str(dtype)]
+
+
+def is_float(dtype) -> bool:
+    return np.issubdtype(dtype, np.floating)
+
+
+class Writer:
+    """Writes into one function; `width` batch elements fit into a vector."""
+
+    def __init__(self, module: ir.Module, builder: ir.IRBuilder, width: int):
+        self.module, self.builder, self.width = module, builder, width
+        # in branches and loops: for which batch elements the result counts
+        self.mask: Any = None
+
+    def vector(self, kind):
+        """The type of a number that differs from batch element to batch element."""
+        return kind if self.width == 1 else ir.VectorType(kind, self.width)
+
+    def number(self, value, dtype):
+        """A number that is known, as a constant."""
+        kind = kind_of(dtype)
+        if isinstance(kind, ir.IntType):
+            bits = int(value) & (2**kind.width - 1)
+            return ir.Constant(kind, bits)
+        return ir.Constant(kind, float(np.dtype(dtype).type(value)))
+
+    def spread(self, value):
+        """A number as a vector."""
+        kind = value.type
+        if self.width == 1 or isinstance(kind, ir.VectorType):
+            return value
+        if isinstance(value, ir.Constant):
+            return ir.Constant(self.vector(kind), [value] * self.width)
+        empty = ir.Constant(self.vector(kind), ir.Undefined)
+        one = self.builder.insert_element(empty, value, ir.Constant(INT32, 0))
+        order = ir.Constant(ir.VectorType(INT32, self.width), [0] * self.width)
+        return self.builder.shuffle_vector(one, empty, order)
+
+    def alike(self, values) -> list:
+        """All of them as vectors, if one of them is."""
+        if any(isinstance(v.type, ir.VectorType) for v in values):
+            return [self.spread(v) for v in values]
+        return list(values)
+
+    def like(self, value, number):
+        """A number of Python as a constant of the type of a value."""
+        kind = value.type
+        if isinstance(kind, ir.VectorType):
+            return ir.Constant(kind, [ir.Constant(kind.element, number)] * kind.count)
+        return ir.Constant(kind, number)
+
+    def with_kind(self, value, kind):
+        """The type of so many numbers of a kind as the value has."""
+        if isinstance(value.type, ir.VectorType):
+            return ir.VectorType(kind, value.type.count)
+        return kind
+
+    def call(self, name: str, arguments, result=None, suffixes=None):
+        """Call of an intrinsic function of LLVM, named by the type of its operand."""
+        result = arguments[0].type if result is None else result
+        full = name + "".join(
+            "." + _suffix(kind) for kind in (suffixes or [arguments[0].type])
+        )
+        kinds = [a.type for a in arguments]
+        function = self.declare(full, ir.FunctionType(result, kinds))
+        return self.builder.call(function, arguments)
+
+    def declare(self, name: str, kind: ir.FunctionType):
+        known = self.module.globals.get(name)
+        return ir.Function(self.module, kind, name) if known is None else known
+
+    def any(self, flags):
+        """Whether a flag is set for some batch element; a scalar."""
+        if not isinstance(flags.type, ir.VectorType):
+            return flags
+        bits = ir.IntType(flags.type.count)
+        set_bits = self.builder.bitcast(flags, bits)
+        return self.builder.icmp_unsigned("!=", set_bits, ir.Constant(bits, 0))
+
+    def both(self, a, b):
+        """Where both flags are set; `None` stands for all."""
+        if a is None or b is None:
+            return b if a is None else a
+        return self.builder.and_(*self.alike([a, b]))
+
+    def choose(self, flag, when_true, when_false):
+        """Selection; the flag may be one for all."""
+        if isinstance(flag.type, ir.VectorType):
+            when_true, when_false = self.spread(when_true), self.spread(when_false)
+        else:
+            when_true, when_false = self.alike([when_true, when_false])
+        return self.builder.select(flag, when_true, when_false)
+
+    def memory(self, kind, count: int):
+        """Room for `count` numbers on the stack."""
+        with self.builder.goto_entry_block():
+            return self.builder.alloca(kind, ir.Constant(INT64, count))
+
+
+def _suffix(kind) -> str:
+    if isinstance(kind, ir.VectorType):
+        return f"v{kind.count}{_suffix(kind.element)}"
+    if isinstance(kind, ir.IntType):
+        return f"i{kind.width}"
+    return "f64" if isinstance(kind, ir.DoubleType) else "f32"
