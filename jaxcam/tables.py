@@ -20,7 +20,7 @@ class ShortTable(NamedTuple):
     sentence: str
     headings: tuple[str, ...]
     rows: Sequence[tuple[str, ...]]
-    #: headings of the columns that are words
+    # headings of the columns that are words
     words: tuple[str, ...] = ()
 
     def text(self) -> str:

@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 
 
-#: every so many samples one is kept, which leaves 100 a second
+# every so many samples one is kept, which leaves 100 a second
 EVERY = 10
-#: what the encoder's smallest step is (rad): 40000 counts a turn
+# what the encoder's smallest step is (rad): 40000 counts a turn
 COUNT = 2 * np.pi / 40000
 
 

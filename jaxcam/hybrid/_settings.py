@@ -59,9 +59,9 @@ class Settings(eqx.Module):
 
     backend: Literal["auto", "llvm", "xla"] = eqx.field(default="xla", static=True)
     """Compiler of runs that are not traced: `"xla"`, through which all traced runs and
-    derivatives go; `"llvm"`, which is faster and refuses a system that needs an operation
-    it lacks; or `"auto"`, LLVM where it can and XLA where it cannot. Results differ by
-    rounding."""
+    derivatives go; `"llvm"`, which is faster and refuses a system that needs an
+    operation it lacks; or `"auto"`, LLVM where it can and XLA where it cannot. Results
+    differ by rounding."""
 
     @property
     def compiles(self) -> bool:

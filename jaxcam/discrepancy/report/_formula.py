@@ -57,7 +57,7 @@ _THINGS = {
     "surface": "a surface",
     "sensor": "an error of the sensor",
 }
-#: what an engineer knows an error of a sensor by
+# what an engineer knows an error of a sensor by
 _FAULTS = {
     Variable.POSITION: "as of a scale with uneven graduation or an encoder off centre",
     Variable.PHASE: "as of something picked up in step with the drive",

@@ -80,7 +80,7 @@ class FreeSearch:
         impacting = any(family.where is not Where.FLIGHT for family in families)
         self.driven = driven_by(problem, self.families[0].motion_unit)
         self.problem = roomy(problem, self.families[0], impacting, self.driven)
-        #: what any sensor may do is no function without a name
+        # what any sensor may do is no function without a name
         self.faults = own_faults(self.problem.model, self.problem.parameters)
         self.apart = dataclasses.replace(
             self.problem, extras=separated(self.problem.extras)

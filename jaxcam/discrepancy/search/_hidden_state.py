@@ -163,7 +163,7 @@ class Hidden:
     cells: int = 1
     slot: str = HiddenForce.label
 
-    #: it has no roughness
+    # it has no roughness
     smooth: ClassVar[bool] = False
 
     @property

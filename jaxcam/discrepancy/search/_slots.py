@@ -81,7 +81,7 @@ class Free:
         return np.array([self.roughness.size, *self.primitive.scales])
 
 
-#: what may be put into a problem that has room for it
+# what may be put into a problem that has room for it
 Part: TypeAlias = Free | Hidden
 
 

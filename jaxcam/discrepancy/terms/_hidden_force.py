@@ -16,12 +16,12 @@ from ...fitting import Parameter
 from ._term import Motion, Term, terms_of
 
 
-#: signals that all records share strengths of: outputs of the element, then the
-#: derivatives of its force to its numbers
+# signals that all records share strengths of: outputs of the element, then the
+# derivatives of its force to its numbers
 SHARED = 5
-#: signals of the free motion of the element, with strengths of their own in each record
+# signals of the free motion of the element, with strengths of their own in each record
 STARTS = 2
-#: parts of the force by the motion itself: constant, by deflection, by velocity
+# parts of the force by the motion itself: constant, by deflection, by velocity
 DIRECT = 3
 
 

@@ -18,7 +18,7 @@ from ._elementwise import elementwise
 from ._writer import Lacking, Writer
 
 
-#: operations that only move elements, by indices that are known
+# operations that only move elements, by indices that are known
 MOVES = frozenset(
     """
     broadcast_in_dim concatenate copy dynamic_slice dynamic_update_slice expand_dims
@@ -114,7 +114,7 @@ def _indices_of(name: str, count: int) -> tuple[int, ...]:
     return tuple(range(2, count)) if name == "dynamic_update_slice" else ()
 
 
-#: scatters that combine what is there with what comes, and by what
+# scatters that combine what is there with what comes, and by what
 SCATTERS = {
     "scatter-add": "add",
     "scatter-sub": "sub",

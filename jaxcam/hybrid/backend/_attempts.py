@@ -79,16 +79,16 @@ def laid_out(tree, lanes: int | None = None) -> tuple[np.ndarray, Layout]:
 class Key(NamedTuple):
     """What an attempt is compiled for; hashable."""
 
-    #: what is no array in system and plan, with its types, and where it is
+    # what is no array in system and plan, with its types, and where it is
     static: tuple
     structure: Any
-    #: arrays of system and plan that differ between batch elements, and that do not
+    # arrays of system and plan that differ between batch elements, and that do not
     own: Layout
     shared: Layout
-    #: pytree of the scalars of the state, and their types
+    # pytree of the scalars of the state, and their types
     lane: Any
     dtypes: tuple
-    #: what is made of a record and the state after it: a place in the log, and a row
+    # what is made of a record and the state after it: a place in the log, and a row
     row: Callable
     width: int
 
@@ -143,7 +143,7 @@ class Sizes(NamedTuple):
     state: int
     own: int
     row: int
-    #: which number of the state counts the attempts
+    # which number of the state counts the attempts
     steps: int
 
 

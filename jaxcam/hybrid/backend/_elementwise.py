@@ -266,7 +266,7 @@ def converted(w: Writer, x, old, new):
     return b.sext(x, kind) if from_signed else b.zext(x, kind)
 
 
-#: of each reduction the operation between two elements
+# of each reduction the operation between two elements
 REDUCED = {
     "reduce_sum": "add",
     "reduce_prod": "mul",
@@ -276,9 +276,9 @@ REDUCED = {
     "reduce_or": "or",
     "reduce_xor": "xor",
 }
-#: and of each running one
+# and of each running one
 RUNNING = {"cumsum": "add", "cumprod": "mul", "cummax": "max", "cummin": "min"}
-#: operations on each element alone
+# operations on each element alone
 ELEMENTWISE: frozenset[str] = (
     frozenset(
         """

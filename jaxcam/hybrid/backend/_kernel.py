@@ -18,7 +18,7 @@ from ._emit import Emitter
 from ._writer import DOUBLE, INT64, Writer
 
 
-#: name of the function in each module
+# name of the function in each module
 ENTRY = "run"
 _POINTER = DOUBLE.as_pointer()
 _COUNTS = INT64.as_pointer()
@@ -34,13 +34,13 @@ class Program(NamedTuple):
 
     jaxpr: Any
     consts: list
-    #: types of the scalars of the state, and which of them are status and attempts
+    # types of the scalars of the state, and which of them are status and attempts
     dtypes: tuple
     status: int
     steps: int
     shared: int
     own: int
-    #: numbers in a row of the log
+    # numbers in a row of the log
     row: int
 
 
@@ -99,7 +99,7 @@ class _Kernel:
         b.position_at_end(refill)
         count = b.phi(INT64)
         count.add_incoming(self._int(0), start)
-        live = self._refill()
+        live: Any = self._refill()
         filled = b.block
         nothing = b.icmp_unsigned("==", live, ir.Constant(live.type, 0))
         b.cbranch(nothing, done, attempt)
@@ -117,7 +117,7 @@ class _Kernel:
 
         b.position_at_end(over)
         running = self._bits(self._runs())
-        ends = b.and_(live, b.not_(running))
+        ends: Any = b.and_(live, b.not_(running))
         some = b.icmp_unsigned("!=", ends, ir.Constant(ends.type, 0))
         patient = b.icmp_signed("<", after, self.a.patience)
         b.cbranch(b.or_(some, b.not_(patient)), ended, attempt)

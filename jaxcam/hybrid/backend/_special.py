@@ -31,7 +31,7 @@ _LOG = (
     1.531383769920937332e-01,
     1.479819860511658591e-01,
 )
-#: operations that are functions of the C library
+# operations that are functions of the C library
 LIBRARY = frozenset(
     """
     acos acosh asin asinh atan atan2 atanh cbrt cos cosh erf erfc expm1 lgamma log1p

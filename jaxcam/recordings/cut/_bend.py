@@ -15,7 +15,7 @@ from jaxtyping import Array, Float
 
 # The highest harmonic of a bend: of a dent over a tenth of a radian it has 98 %
 _HIGHEST = 32
-#: how many numbers a bend has
+# how many numbers a bend has
 WAVES = 2 * _HIGHEST + 1
 # Lengths of correlation (rad) and sizes (in units of the noise) that are tried
 _LENGTHS = (0.1, 0.2, 0.4)

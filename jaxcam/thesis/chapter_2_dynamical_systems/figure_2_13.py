@@ -21,7 +21,7 @@ from ..target import Rows, Target
 
 _BALL = BouncingBall(jnp.asarray(9.81), jnp.asarray(0.7))
 _LAUNCH = 1.0
-#: numbers of steps over which an error is averaged, over that in the middle
+# numbers of steps over which an error is averaged, over that in the middle
 _NEIGHBOURS = (0.92, 0.96, 1.0, 1.04, 1.08)
 
 
