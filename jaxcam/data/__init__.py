@@ -3,8 +3,8 @@
 from pathlib import Path
 
 
-#: a case folder of three runs and its rig file, made by `make_demo.py`
 DEMO_RIG = Path(__file__).parent / "demo_rig"
+"""A case folder of three runs and its rig file, made by `make_demo.py`."""
 
-#: a system in Python and its rig file, to be copied and changed (`jaxcam new-rig`)
 NEW_RIG = Path(__file__).parent / "new_rig"
+"""A system in Python and its rig file, to be copied and changed (`jaxcam new-rig`)."""

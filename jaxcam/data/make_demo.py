@@ -108,7 +108,7 @@ class _Follower:
         self.t, (self.x, self.v, _) = 0.0, cam.surface(0.0)
         self.x += 0.01
         self.resting, self.landed = False, 0.0
-        #: of a step; the next bounce must not end inside its own first one
+        # of a step; the next bounce must not end inside its own first one
         self.longest = interval
         self.impacts: list[tuple[float, float]] = []
         self.contacts: list[tuple[float, float]] = []
@@ -240,8 +240,8 @@ def recording_text(truth: Truth, rng, *, sensors: Sequence[float]) -> str:
     return "\n".join(["time_s,cam_angle_rad,follower_angle_rad", *rows, ""])
 
 
-#: noise (rad) and counts a turn of the two encoders of the demonstration rig
 DEMO_SENSORS = (9e-5, 16384, 7e-5, 36000)
+"""Noise (rad) and counts a turn of the two encoders of the demonstration rig."""
 DEMO_SPEEDS_RPM = (136.5, 146.0, 158.0)
 
 

@@ -49,7 +49,7 @@ class Trials:
     ):
         self.problem, self.rig, self.terms = problem, tuple(rig), tuple(terms)
         self.policy, self.progress = policy, progress
-        #: the best fit of each subset
+        # the best fit of each subset
         self.known: dict[frozenset[str], Trial] = {}
         self._kept = kept
         self._scans: dict[frozenset[str], Periodogram] = {}
