@@ -132,7 +132,7 @@ def test_saved_systems_are_checked(tmp_path):
         with pytest.raises(ValueError, match=message):
             models.load_system(file)
     file.write_text("{")
-    with pytest.raises(ValueError, match="no JSON"):
+    with pytest.raises(ValueError, match="not JSON"):
         models.load_system(file)
 
 

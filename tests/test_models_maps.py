@@ -312,7 +312,7 @@ def test_manifold_in_closed_form(s):
 
 
 def test_what_is_no_saddle_is_refused():
-    with pytest.raises(ValueError, match="no saddle"):
+    with pytest.raises(ValueError, match="not a saddle"):
         saddle_at(Parabolic(0.5, 0.4), [0.0, 0.0])
     with pytest.raises(ValueError, match="stretches"):
         grow_manifold(Parabolic(2.0, 0.4), [0.0, 0.0], [0.0, 1.0], length=1.0)

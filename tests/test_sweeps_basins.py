@@ -152,7 +152,7 @@ def test_attractors_are_matched_along_a_parameter(tmp_path):
 
 
 def test_nobody_can_start():
-    with pytest.raises(ValueError, match="behind the constraint"):
+    with pytest.raises(ValueError, match="violate gap >= 0"):
         basins(SECTION, Grid((0.5, 0), (1, 1), (2, 2)), 20, keep=4)
 
 

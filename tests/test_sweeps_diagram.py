@@ -126,7 +126,7 @@ def test_random_starts_show_what_one_start_hides():
         ({"values": [[2.6, 2.7]]}, "give a vector"),
         ({"values": [np.nan]}, "not finite"),
         ({"states": np.zeros((3, 2, 2))}, "for 2 points"),
-        ({"states": (0.5, 0.0)}, "behind the constraint"),
+        ({"states": (0.5, 0.0)}, "violate gap >= 0"),
         ({"system": 3}, "cannot be swept"),
         ({"period_tolerance": 0.0}, "period_tolerance is 0"),
         ({"block": 0}, "block is 0"),
@@ -136,7 +136,7 @@ def test_random_starts_show_what_one_start_hides():
         ({"dwell": (-1, 10), "direction": "up"}, "seconds to wait and to store"),
         (
             {"system": ImpactSection(OSCILLATOR), "dwell": (6, 9), "direction": "up"},
-            "once a turn",
+            "once per period",
         ),
     ],
 )

@@ -242,8 +242,8 @@ def recording_text(truth: Truth, rng, *, sensors: Sequence[float]) -> str:
     return "\n".join(["time_s,cam_angle_rad,follower_angle_rad", *rows, ""])
 
 
-# noise (rad) and counts a turn of the two encoders of the demonstration rig
 DEMO_SENSORS = (9e-5, 16384, 7e-5, 36000)
+"""Noise (rad) and counts a turn of the two encoders of the demonstration rig."""
 DEMO_SPEEDS_RPM = (136.5, 146.0, 158.0)
 
 

@@ -70,9 +70,9 @@ def read_setup(
             fix.
 
     Examples:
-        >>> from jaxcam.data import DEMO_RIG
+        >>> from jaxcam.data import NEW_RIG
         >>> from jaxcam.fitting import read_setup
-        >>> setup = read_setup(DEMO_RIG.parent / "new_rig" / "cart.toml")
+        >>> setup = read_setup(NEW_RIG / "cart.toml")
         >>> len(setup.channels) > 0
         True
     """

@@ -18,9 +18,9 @@ class Setup:
     """A rig file of a system of one's own; `read_setup` reads it.
 
     Examples:
-        >>> from jaxcam.data import DEMO_RIG
+        >>> from jaxcam.data import NEW_RIG
         >>> from jaxcam.fitting import read_setup
-        >>> setup = read_setup(DEMO_RIG.parent / "new_rig" / "cart.toml")
+        >>> setup = read_setup(NEW_RIG / "cart.toml")
         >>> len(setup.parameters) > 0
         True
     """

@@ -116,5 +116,7 @@ def diagram(
     )
     made = Diagram(store.dataset())
     if np.all(made.dataset["code"].values == BEHIND):
-        raise ValueError("all states violate gap >= 0; choose states in front of it")
+        raise ValueError(
+            "all states violate gap >= 0; choose states in front of the constraint"
+        )
     return made

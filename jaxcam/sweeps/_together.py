@@ -41,7 +41,7 @@ def together(job: BasinsJob, store: Store, known: Basins | None) -> xarray.Datas
     if np.all(turns == OUTSIDE):
         raise ValueError(
             "all states of the grid violate gap >= 0; choose low and high in front of "
-            "it"
+            "the constraint"
         )
 
     def cells():

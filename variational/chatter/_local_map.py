@@ -139,15 +139,6 @@ def find_lobes(
 
     Raises:
         ValueError: Fewer than two lobes are found.
-
-    Examples:
-        >>> from jaxcam.models import ImpactOscillator
-        >>> from variational import composed_map, find_lobes
-        >>> system = ImpactOscillator(omega=0.6071945, restitution=0.5)
-        >>> state = composed_map(system, "omega", 24, phase=0.3).state
-        >>> lobes = find_lobes(system, state, np.linspace(-0.1, 0.1), phase=0.3, most=2)
-        >>> len(lobes.corners)
-        3
     """
     check_chatter_system(system)
     system = as_arrays(system)
@@ -273,15 +264,6 @@ def fit_local_map(lobes: Lobes) -> LocalMap:
 
     Returns:
         A [`variational.chatter.LocalMap`][].
-
-    Examples:
-        >>> from jaxcam.models import ImpactOscillator
-        >>> from variational import composed_map, find_lobes, fit_local_map
-        >>> system = ImpactOscillator(omega=0.6071945, restitution=0.5)
-        >>> state = composed_map(system, "omega", 24, phase=0.3).state
-        >>> lobes = find_lobes(system, state, np.linspace(-0.1, 0.1), phase=0.3, most=2)
-        >>> fit_local_map(lobes).coefficients.ndim
-        1
     """
     width, height = np.abs(np.diff(lobes.corners)), np.abs(np.diff(lobes.values))
     k = np.arange(len(width))
