@@ -1,9 +1,14 @@
 """Results print as short tables, as text and as HTML."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from continuation import Branch, Point
+from jaxcam.discrepancy import Diagnosis
+from jaxcam.discrepancy.report import Effect
+from jaxcam.discrepancy.terms import Value
 from jaxcam.fitting._fit_result import Fit
 from jaxcam.tables import ShortTable
 
@@ -63,7 +68,18 @@ def test_a_branch_prints_its_ends_and_special_points():
     assert str(points[-1]) == "Point 62: end at 7, unstable, speed is at its bound 7"
 
 
-@pytest.mark.parametrize("kind", [Fit, Branch, Point])
+def test_a_diagnosis_prints_its_effects():
+    drag = Effect(
+        "air_drag", "air", {"c": Value(0.12, 0.01, "1/m")}, "flight", "fast", ("a",),
+        -250.0, 120.0, 1.0,
+    )  # fmt: skip
+    fields = SimpleNamespace(case="swing", summary="Air drags.", effects=(drag,))
+    text = Diagnosis._table(fields).text()  # pyright: ignore
+    assert text.splitlines()[0] == "swing: Air drags."
+    assert "air drag  c = 0.12 +- 0.01 1/m  flight" in text and "-250" in text
+
+
+@pytest.mark.parametrize("kind", [Fit, Branch, Point, Diagnosis])
 def test_no_result_prints_its_arrays(kind):
     """The representation that a dataclass writes would show every array."""
     assert "dataclasses" not in kind.__repr__.__module__
