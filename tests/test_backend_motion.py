@@ -2,6 +2,7 @@
 
 import logging
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -219,6 +220,19 @@ def test_what_is_lacking_runs_by_xla_and_is_said_once(caplog):
     with pytest.raises(ValueError, match="backend"):
         only = Settings(backend="llvm")
         jaxcam.simulate(Coupled(), state, 0.0, 0.5, settings=only)
+
+
+class WithKey(ImpactOscillator):
+    """A system that holds a random key, whose type LLVM has not."""
+
+    key: jax.Array = eqx.field(default_factory=lambda: jax.random.key(0))
+
+
+def test_a_random_key_is_left_to_xla():
+    system = WithKey(omega=2.8, restitution=0.8)
+    either = Settings(backend="auto")
+    run = jaxcam.simulate(system, [-0.5, 0.0], 0.0, 5.0, settings=either)
+    assert run.successful and int(run.impacts.count) > 0
 
 
 @pytest.mark.parametrize("name", ["oscillator", "ball", "cam"])

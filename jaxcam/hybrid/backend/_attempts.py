@@ -15,7 +15,7 @@ from jax.interpreters import partial_eval
 from ..loop import Functions, iteration, LoopState
 from ._kernel import ENTRY, module_of, Program
 from ._machine import Compiled, compiled
-from ._writer import Lacking
+from ._writer import kind_of, Lacking
 
 
 # rounds of a call, after which Python may be interrupted or show progress
@@ -62,9 +62,10 @@ def laid_out(tree, lanes: int | None = None) -> tuple[np.ndarray, Layout]:
     leaves, structure = jax.tree.flatten(tree)
     rows, shapes, dtypes = [], [], []
     number, head = (1, 0) if lanes is None else (lanes, 1)
-    for leaf in map(np.asarray, leaves):
-        if leaf.dtype.kind not in "fiub":
-            raise Lacking(f"numbers of type {leaf.dtype}")
+    for array in leaves:
+        # a random key is an array, too
+        kind_of(array.dtype)
+        leaf = np.asarray(array)
         floats = leaf.astype(np.float64)
         if leaf.dtype.kind in "iu" and np.any(np.abs(floats) > 2.0**53):
             raise Lacking("integers above 2^53")
