@@ -1,4 +1,4 @@
-"""Which hidden elements promise enough to be fitted, and fits without needless parts."""
+"""Which hidden elements promise enough to be fitted; fits without needless parts."""
 
 import dataclasses
 import math
