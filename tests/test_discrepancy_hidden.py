@@ -12,6 +12,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from jaxcam import simulate
+from jaxcam.discrepancy.report._hidden import hidden_formula
 from jaxcam.discrepancy.search._hidden_signals import Driven
 from jaxcam.discrepancy.search._hidden_state import (
     Hidden,
@@ -219,3 +220,23 @@ def test_a_saved_system_with_a_hidden_state_is_the_same(tmp_path):
 def test_a_number_without_meaning_is_refused():
     with pytest.raises(ValueError, match="Relaxation"):
         Relaxation(time=-0.1, by_state=1.0).check()
+
+
+def test_formulas_say_what_the_elements_are():
+    relaxation = Relaxation(time=0.05, by_state=-9.0, stiffness=2.0, middle=0.01)
+    assert hidden_formula(relaxation) == (
+        "z' = velocity - z/0.05; -9*z + 2*(position - 0.01)"
+    )
+    resonator = Resonator(frequency=14.0, ratio=0.02, by_state=12.3, by_rate=-0.4)
+    assert hidden_formula(resonator) == (
+        "z'' + 2*0.02*87.965*z' + 87.965**2*z = position; 12.3*z - 0.4*z'"
+    )
+    hysteresis = Hysteresis(limit=0.012, sharing=0.5, power=1.0, by_state=-12.0)
+    state, force = hidden_formula(hysteresis).split("; ")
+    assert force == "-12*z"
+    # the equation of the state, as it is written
+    for velocity, z in ((0.3, 0.004), (-0.3, 0.004), (0.3, -0.011)):
+        names = {"velocity": velocity, "z": z, "sign": np.sign, "abs": abs}
+        written = eval(state.removeprefix("z' = "), names)
+        rate = hysteresis.rate(0.0, jnp.asarray(velocity), jnp.asarray([z]))
+        assert written == pytest.approx(float(rate[0]))

@@ -20,10 +20,11 @@ from ._blocks import blocks_of, values_of
 from ._formulas import formulated
 from ._free_fits import FreeFits, heat_of, heated, Missing, Subset, unscaled
 from ._gains import added_gain, gain
-from ._hidden_scan import Promise, promises
+from ._hidden_leads import simplified, worthwhile
+from ._hidden_scan import Promise
 from ._hidden_signals import driven_by
-from ._hidden_state import Hidden, KINDS, RESONANCE, started
-from ._local_force import force_blocks, force_response, Response
+from ._hidden_state import Hidden, KINDS, started
+from ._local_force import force_blocks, force_response
 from ._roughness import Roughness, roughness
 from ._slots import (
     emptied,
@@ -34,7 +35,6 @@ from ._slots import (
     roomy,
     slots_of,
 )
-from ._vibration_scan import periodogram
 
 
 class _Lead(NamedTuple):
@@ -97,7 +97,8 @@ class FreeSearch:
             found = self._grown(swapped, False)
         if not found.functions:
             return None
-        found = self._simplified(self._pruned(found))
+        found = self._pruned(found)
+        found = simplified(self.fits, self.problem, found, self.progress)
         return formulated(self.fits, found, self._small(found), self.progress)
 
     def _bare(self, problem: Problem, start: Point) -> Missing:
@@ -197,8 +198,10 @@ class FreeSearch:
                 zero = np.zeros(len(own))
                 rough = roughness(information, score, rows, own, family, zero, policy)
                 leads.append(_Lead(rough.gain, None, family, rough, slot))
-            if hidden:
-                leads += self._hidden_leads(problem, response, heat)
+            if hidden and self.driven is not None:
+                self.progress("looking for forces with a state of their own", None)
+                elements = worthwhile(problem, response, self.driven, policy, heat)
+                leads += [_Lead(gain, promise=one) for gain, one in elements]
         # impacts say nothing where they tie nothing
         elsewhere = {Where.CONTACT, Where.SENSOR, *([] if apart else [Where.IMPACT])}
         for family in self.families:
@@ -234,30 +237,6 @@ class FreeSearch:
         if not apart and found.functions:
             least = max(least, self._small(found) / heat)
         return [lead for lead in leads if lead.gain > least][: self.policy.followed]
-
-    def _hidden_leads(
-        self, problem: Problem, response: Response, heat: float
-    ) -> list[_Lead]:
-        """What elements with a state of their own promise, one at most.
-
-        A resonance that does less than a force at one frequency with any phase in each
-        record is none that the motion drives.
-        """
-        assert self.driven is not None
-        self.progress("looking for forces with a state of their own", None)
-        leads = []
-        for one in promises(problem, response, self.driven, self.policy):
-            price = one.hidden.price(problem.samples)
-            leads.append(_Lead(one.gain / heat - price, promise=one))
-        top = max(leads, key=lambda lead: lead.gain)
-        assert top.promise is not None
-        if top.gain > 0 and top.promise.hidden.kind is RESONANCE:
-            scan = periodogram(problem, response, self.policy)
-            count = 2 * scan.records + 1
-            price = count * math.log(problem.samples) + 2 * math.log(scan.cells)
-            if scan.best_separate[1] / heat - price > top.gain:
-                leads.remove(top)
-        return leads
 
     def _with(self, problem: Problem, found: Missing, lead: _Lead) -> Missing | None:
         functions, names = found.functions, found.names
@@ -364,25 +343,4 @@ class FreeSearch:
             heat = heat_of(found.fit)
             if less.score - found.score < max(heat * self._least(), self._small(found)):
                 found = less
-        return found
-
-    def _simplified(self, found: Missing) -> Missing:
-        """Without parts of a hidden element's force that the rig can do as well."""
-        for one in found.functions:
-            if not isinstance(one, Hidden):
-                continue
-            kept = self.fits.needed_parts(found, one)
-            if kept == one.direct:
-                continue
-            self.progress(f"simplifying {one.label}", None)
-            less = dataclasses.replace(one, direct=kept)
-            functions = tuple(less if f is one else f for f in found.functions)
-            values = np.asarray(found.fit.point.values).copy()
-            gone = set(one.direct_parts) - set(less.direct_parts)
-            values[:, [self.problem.names.index(name) for name in gone]] = 0.0
-            point = found.fit.point._replace(values=values)
-            subset = Subset(self.problem, functions, found.names)
-            trial = self.fits.fitted(subset, point)
-            if trial.score < found.score:
-                found = trial
         return found

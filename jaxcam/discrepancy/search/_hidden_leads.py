@@ -1,0 +1,57 @@
+"""Which hidden elements promise enough to be fitted; fits without needless parts."""
+
+import dataclasses
+import math
+
+import numpy as np
+
+from ...fitting import Problem
+from ..policy import Policy
+from ._free_fits import FreeFits, Missing, Subset
+from ._hidden_scan import Promise, promises
+from ._hidden_signals import Driven
+from ._hidden_state import Hidden, RESONANCE
+from ._local_force import Response
+from ._vibration_scan import periodogram
+
+
+def worthwhile(
+    problem: Problem, response: Response, driven: Driven, policy: Policy, heat: float
+) -> list[tuple[float, Promise]]:
+    """What elements with a state of their own gain, less the price of their numbers.
+
+    A resonance that does less than a force at one frequency with any phase in each
+    record is none that the motion drives.
+    """
+    found = []
+    for one in promises(problem, response, driven, policy):
+        found.append((one.gain / heat - one.hidden.price(problem.samples), one))
+    top = max(found, key=lambda each: each[0])
+    if top[0] > 0 and top[1].hidden.kind is RESONANCE:
+        scan = periodogram(problem, response, policy)
+        count = 2 * scan.records + 1
+        price = count * math.log(problem.samples) + 2 * math.log(scan.cells)
+        if scan.best_separate[1] / heat - price > top[0]:
+            found.remove(top)
+    return found
+
+
+def simplified(fits: FreeFits, problem: Problem, found: Missing, progress) -> Missing:
+    """Without parts of a hidden element's force that the rig can do as well."""
+    for one in found.functions:
+        if not isinstance(one, Hidden):
+            continue
+        kept = fits.needed_parts(found, one)
+        if kept == one.direct:
+            continue
+        progress(f"simplifying {one.label}", None)
+        less = dataclasses.replace(one, direct=kept)
+        functions = tuple(less if f is one else f for f in found.functions)
+        values = np.asarray(found.fit.point.values).copy()
+        gone = set(one.direct_parts) - set(less.direct_parts)
+        values[:, [problem.names.index(name) for name in gone]] = 0.0
+        point = found.fit.point._replace(values=values)
+        trial = fits.fitted(Subset(problem, functions, found.names), point)
+        if trial.score < found.score:
+            found = trial
+    return found
