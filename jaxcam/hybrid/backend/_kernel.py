@@ -187,7 +187,7 @@ class _Kernel:
         with self._each(self._int(numbers)) as i:
             self._store(self._load(source, place(i)), target, to(i))
 
-    def _refill(self):
+    def _refill(self) -> Any:
         """Put ended batch elements back and waiting ones in; who is there, by bits."""
         b, a = self.b, self.a
         with self._each(self._int(self.w.width)) as k:
