@@ -196,7 +196,7 @@ def _run(name: str, names: dict) -> dict:
     )
     shown = io.StringIO()
     done = doctest.DocTestRunner(verbose=False).run(
-        test, shown.write, clear_globs=False
+        test, out=shown.write, clear_globs=False
     )
     assert done.attempted and not done.failed, shown.getvalue()
     return test.globs

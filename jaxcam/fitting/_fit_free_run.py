@@ -30,17 +30,16 @@ _EVALUATIONS = 40
 
 @dataclasses.dataclass(frozen=True)
 class FreeRunFit:
-    """The parameters with which free runs miss recordings least.
-
-    - `model`: with these parameters; `values` of them, by name.
-    - `runs`: the free run of each recording.
-    - `converged`: whether the search ended at an optimum near its start.
-    """
+    """Parameters that minimise the error of free runs."""
 
     model: Model
+    """The model with these parameters."""
     values: Mapping[str, float]
+    """Their values, by name."""
     runs: tuple[FreeRun, ...]
+    """The free run of each recording."""
     converged: bool
+    """Whether the search ended at an optimum near its start."""
 
 
 def fit_free_run(
@@ -58,17 +57,32 @@ def fit_free_run(
     samples strays in the end; what the model lacks adds up, and parameters are bent to
     make up for it, so no errors are given. Channels count in units of their noise.
 
-    **Arguments:**
+    Args:
+        model: A system with its sensors and its input.
+        recordings: Recordings without impacts, evenly sampled; one value of each
+            parameter serves all of them.
+        parameters: Parameters to fit; bounds and scales count, tolerances do not.
+        start: Values of some parameters to start from; default those of the model.
+        samples: Number of samples that the initial state of a recording is found from.
 
-    - `model`: with its sensors and its input.
-    - `recordings`: without impacts, evenly sampled; one value of each parameter serves
-        all of them.
-    - `parameters`: those to fit; bounds and scales count, tolerances do not.
-    - `start`: values of some parameters to start from; by default those of the model.
-    - `samples`: how many samples the initial state of a recording is found from.
+    Returns:
+        A `FreeRunFit`.
 
-    **Raises:** as `free_run` does; `ValueError` for a parameter that is not one number
-    of the model, or a start that is none of the parameters.
+    Raises:
+        RecordingError: As by `free_run`.
+        ValueError: A parameter is not one number of the model, or a start is none of
+            the parameters; also as by `free_run`.
+
+    Examples:
+        >>> from jaxcam.fitting import fit_free_run, Model, Parameter, Sensor
+        >>> from jaxcam.models import BouncingBall
+        >>> from jaxcam.recordings import Recording
+        >>> time = 1e-3 * np.arange(200)
+        >>> fallen = Recording("drop", time, {"height_m": 1.0 - 4.905 * time**2})
+        >>> model = Model(BouncingBall(gravity=9.0), {"height_m": Sensor(0, noise=1e-4)})
+        >>> gravity = Parameter("gravity", lambda m: m.system.gravity)
+        >>> round(fit_free_run(model, [fallen], [gravity]).values["gravity"], 4)
+        9.81
     """
     model = jax.tree.map(_array, model)
     places = parameter_places(model, parameters)

@@ -39,19 +39,21 @@ _UNEVEN = 0.01
 
 @dataclasses.dataclass(frozen=True)
 class FreeRun:
-    """A recording and what a model makes of its inputs alone.
-
-    - `time` (s), `measured` and `simulated` channels, each `(k,)`.
-    - `samples`: how many samples the initial `state` was found from; they do not count.
-    - `rmse`: of each channel, in its unit.
-    """
+    """A recording and the motion that a model predicts from its inputs alone."""
 
     record: str
+    """Name of the recording."""
     time: Float[np.ndarray, " k"]
+    """Times of the samples (s)."""
     measured: Mapping[str, Float[np.ndarray, " k"]]
+    """Samples of each channel."""
     simulated: Mapping[str, Float[np.ndarray, " k"]]
+    """Predicted samples of each channel."""
     state: Float[np.ndarray, " n"]
+    """Initial state."""
     samples: int
+    """Number of samples that the initial state was found from; they do not count in the
+    error."""
 
     @property
     def rmse(self) -> dict[str, float]:
@@ -62,7 +64,7 @@ class FreeRun:
         }
 
     def residual(self, channel: str) -> Float[np.ndarray, " k"]:
-        """Measured less simulated samples."""
+        """Return measured less simulated samples."""
         return self.measured[channel] - self.simulated[channel]
 
 
@@ -76,15 +78,28 @@ def free_run(
     errors add up over the whole recording. This is how benchmarks of identification
     judge a model; a fit judges it piece by piece.
 
-    **Arguments:**
+    Args:
+        model: A system with its sensors and its input, such as `found.model()`.
+        recording: An evenly sampled recording; its `constants` are those of the system.
+        samples: Number of samples that the initial state is found from.
 
-    - `model`: a system with its sensors and its input, such as `found.model()`.
-    - `recording`: evenly sampled; its `constants` are those of the system.
-    - `samples`: how many samples the initial state is found from.
+    Returns:
+        A `FreeRun`.
 
-    **Raises:** `RecordingError` for a recording that is too short, unevenly sampled or
-    lacks a channel; `ValueError` for a model with a turning drive, and for a motion
-    that meets a constraint or does not stay finite.
+    Raises:
+        RecordingError: The recording is too short, unevenly sampled or lacks a channel.
+        ValueError: The drive of the model turns, or the motion meets a constraint or
+            does not stay finite.
+
+    Examples:
+        >>> from jaxcam.fitting import free_run, Model, Sensor
+        >>> from jaxcam.models import BouncingBall
+        >>> from jaxcam.recordings import Recording
+        >>> time = 1e-3 * np.arange(200)
+        >>> fallen = Recording("drop", time, {"height_m": 1.0 - 4.905 * time**2})
+        >>> model = Model(BouncingBall(), {"height_m": Sensor(0, noise=1e-4)})
+        >>> free_run(model, fallen).rmse["height_m"] < 1e-9
+        True
     """
     one = prepared(model, recording, samples)
     run = recording.recording if isinstance(recording, Segments) else recording

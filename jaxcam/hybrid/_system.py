@@ -114,7 +114,7 @@ class HybridSystem(eqx.Module):
         return None
 
     def constraint_name(self, number: int) -> str:
-        """Name of a constraint, or `constraint 1` where the system names none."""
+        """Return the name of a constraint, by default `constraint 1` and so on."""
         names = self.constraint_names
         return names[number] if number < len(names) else f"constraint {number}"
 

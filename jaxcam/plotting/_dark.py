@@ -34,7 +34,15 @@ def on_dark(figure: Figure) -> Figure:
 
     The figure is changed in place, whatever drew it; save the light version first.
 
-    **Returns:** the figure.
+    Args:
+        figure: The figure.
+
+    Returns:
+        The same figure.
+
+    Examples:
+        >>> from jaxcam.plotting import lambda_cobweb, on_dark
+        >>> drawn = on_dark(lambda_cobweb(0.5))
     """
     # ticks are made when a figure is drawn
     figure.canvas.draw()

@@ -18,19 +18,34 @@ def with_terms(
     terms: Sequence[str | Term],
     recordings: Sequence[Recording | Segments],
 ) -> tuple[Model, list[Parameter]]:
-    """A model with physics added to it, for `fit` or `fit_free_run`.
+    """Add physics to a model, for `fit` or `fit_free_run`.
 
-    **Arguments:**
+    Args:
+        model: The model of the bare system.
+        parameters: Its parameters.
+        terms: Names from `library(extended=True)`, or terms of your own, which push the
+            first coordinate. Strengths are zero to begin with.
+        recordings: Recordings from which the terms take their scales: the middle and
+            the ends of the positions, the speeds within which dry friction changes
+            sign.
 
-    - `model`, `parameters`: of the bare system.
-    - `terms`: names from `library(extended=True)`, or terms of your own, which push the
-        first coordinate. Strengths are zero to begin with.
-    - `recordings`: from which the terms take their scales: the middle and the ends of
-        the positions, the speeds within which dry friction changes sign.
+    Returns:
+        The model with the terms in its system, and all parameters.
 
-    **Returns:** the model with the terms in its system, and all parameters.
+    Raises:
+        ValueError: The library has no term of this name.
 
-    **Raises:** `ValueError` for a name that the library does not have.
+    Examples:
+        >>> from jaxcam.discrepancy import with_terms
+        >>> from jaxcam.fitting import Model, Sensor
+        >>> from jaxcam.models import BouncingBall
+        >>> from jaxcam.recordings import Recording
+        >>> time = 1e-3 * np.arange(200)
+        >>> fallen = Recording("drop", time, {"height_m": 1.0 - 4.905 * time**2})
+        >>> model = Model(BouncingBall(), {"height_m": Sensor(0, noise=1e-4)})
+        >>> _, found = with_terms(model, [], ["quadratic_drag"], [fallen])
+        >>> [one.name for one in found]
+        ['c2']
     """
     runs = [r.recording if isinstance(r, Segments) else r for r in recordings]
     sensors = model.sensors

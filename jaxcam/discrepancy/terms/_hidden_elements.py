@@ -31,22 +31,31 @@ class HiddenElement(eqx.Module):
     """
 
     names: ClassVar[tuple[str, ...]]
+    """Names of the components of the hidden state."""
 
     constant: eqx.AbstractVar[FloatScalar]
+    """Constant part of the acceleration."""
     stiffness: eqx.AbstractVar[FloatScalar]
+    """Acceleration per unit of deflection (1/s^2)."""
     damping: eqx.AbstractVar[FloatScalar]
+    """Acceleration per unit of velocity (1/s)."""
     middle: eqx.AbstractVar[FloatScalar]
+    """Position from which the deflection is measured."""
 
     @abc.abstractmethod
     def units(self, unit: str) -> tuple[str, ...]:
-        """Units of the hidden state, by that of the coordinate."""
+        """Return the units of the hidden state, given that of the coordinate."""
 
     @abc.abstractmethod
     def scales(self) -> tuple[FloatScalar, ...]:
-        """Numbers that must be positive."""
+        """Return the numbers that must be positive."""
 
     def check(self) -> None:
-        """**Raises:** `ValueError` for a number that has no meaning."""
+        """Check the numbers of the element.
+
+        Raises:
+            ValueError: A frequency, time, limit or power is not positive.
+        """
         if not all(float(one) > 0 for one in self.scales()):
             raise ValueError(
                 f"{type(self).__name__}: its frequency, time, limit or power must be "
@@ -55,14 +64,14 @@ class HiddenElement(eqx.Module):
 
     @abc.abstractmethod
     def rate(self, position, velocity, hidden: Float[Array, " h"]) -> Array:
-        """Rate of change of the hidden state."""
+        """Return the rate of change of the hidden state."""
 
     @abc.abstractmethod
     def push(self, hidden: Float[Array, " h"]) -> Array:
-        """Acceleration by the hidden state alone."""
+        """Return the acceleration by the hidden state alone."""
 
     def force(self, position, velocity, hidden: Float[Array, " h"]) -> Array:
-        """Acceleration of the coordinate."""
+        """Return the acceleration of the coordinate."""
         direct = self.stiffness * (position - self.middle) + self.damping * velocity
         return self.push(hidden) + direct + self.constant
 
@@ -75,15 +84,24 @@ class Resonator(HiddenElement):
     """
 
     names: ClassVar[tuple[str, ...]] = ("hidden", "hidden_rate")
+    """Names of the components of the hidden state."""
 
     frequency: FloatScalar = _field(1.0)
+    """Natural frequency (Hz)."""
     ratio: FloatScalar = _field(0.1)
+    """Damping ratio D."""
     by_state: FloatScalar = _field()
+    """Acceleration per unit of the hidden state."""
     by_rate: FloatScalar = _field()
+    """Acceleration per unit of its rate of change."""
     constant: FloatScalar = _field()
+    """Constant part of the acceleration."""
     stiffness: FloatScalar = _field()
+    """Acceleration per unit of deflection (1/s^2)."""
     damping: FloatScalar = _field()
+    """Acceleration per unit of velocity (1/s)."""
     middle: FloatScalar = _field()
+    """Position from which the deflection is measured."""
 
     def units(self, unit):
         return f"{unit} s^2", f"{unit} s"
@@ -101,7 +119,7 @@ class Resonator(HiddenElement):
         return self.by_state * hidden[0] + self.by_rate * hidden[1]
 
     def transfer(self, frequency):
-        """Force over deflection at some frequencies (Hz), complex."""
+        """Return force over deflection at some frequencies (Hz), complex."""
         s = 2j * jnp.pi * frequency
         w = 2 * jnp.pi * self.frequency
         below = s**2 + 2 * self.ratio * w * s + w**2
@@ -113,13 +131,20 @@ class Relaxation(HiddenElement):
     """A spring and a dashpot in a row (Maxwell): `z' = v - z / time`, force `k z`."""
 
     names: ClassVar[tuple[str, ...]] = ("hidden",)
+    """Names of the components of the hidden state."""
 
     time: FloatScalar = _field(1.0)
+    """Relaxation time (s)."""
     by_state: FloatScalar = _field()
+    """Acceleration per unit of the hidden state."""
     constant: FloatScalar = _field()
+    """Constant part of the acceleration."""
     stiffness: FloatScalar = _field()
+    """Acceleration per unit of deflection (1/s^2)."""
     damping: FloatScalar = _field()
+    """Acceleration per unit of velocity (1/s)."""
     middle: FloatScalar = _field()
+    """Position from which the deflection is measured."""
 
     def units(self, unit):
         return (unit,)
@@ -142,15 +167,24 @@ class Hysteresis(HiddenElement):
     """
 
     names: ClassVar[tuple[str, ...]] = ("hidden",)
+    """Names of the components of the hidden state."""
 
     limit: FloatScalar = _field(1.0)
+    """Largest hidden state, in the unit of the coordinate."""
     sharing: FloatScalar = _field(0.5)
+    """Share d of the loading term; the rest is that of unloading."""
     power: FloatScalar = _field(1.0)
+    """Sharpness n of the transition."""
     by_state: FloatScalar = _field()
+    """Acceleration per unit of the hidden state."""
     constant: FloatScalar = _field()
+    """Constant part of the acceleration."""
     stiffness: FloatScalar = _field()
+    """Acceleration per unit of deflection (1/s^2)."""
     damping: FloatScalar = _field()
+    """Acceleration per unit of velocity (1/s)."""
     middle: FloatScalar = _field()
+    """Position from which the deflection is measured."""
 
     def units(self, unit):
         return (unit,)
@@ -163,7 +197,7 @@ class Hysteresis(HiddenElement):
         return velocity * self.slope(velocity, hidden)
 
     def slope(self, direction, hidden):
-        """`dz / dq` for a motion in some direction."""
+        """Return `dz / dq` for a motion in some direction."""
         size = jnp.maximum(jnp.abs(hidden) / self.limit, 1e-12)
         turned = jnp.sign(direction * hidden)
         return 1 - (self.sharing * turned + 1 - self.sharing) * size**self.power

@@ -201,19 +201,19 @@ class Term(eqx.Module):
         return 1.0
 
     def sensed(self, motion: Motion):
-        """What the sensor of the first coordinate shows besides, in its unit."""
+        """Return what the sensor of the first coordinate shows in addition, in its unit."""
         del motion
         return 0.0
 
     def scaled(self, visited: Visited) -> "Term":
-        """The term with the constants of its form as recordings suggest them."""
+        """Return the term with the constants of its form that recordings suggest."""
         del visited
         return self
 
     def starts(self) -> tuple[Mapping[str, float], ...]:
-        """Values of its inner numbers from which a fit may start.
+        """Return values of its inner numbers from which a fit may start.
 
-        Of a frequency there are none here; a scan finds it.
+        None for a frequency, which a scan finds.
         """
         return ()
 

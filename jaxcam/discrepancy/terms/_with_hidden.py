@@ -11,22 +11,19 @@ from ._hidden_elements import HiddenElement
 class WithHidden(HybridSystem):
     """A system whose coordinate drives a hidden element, which pushes it.
 
-    **Arguments:**
-
-    - `base`: the system, a `WithTerms` or any other.
-    - `element`: a `Resonator`, `Relaxation` or `Hysteresis`.
-    - `coordinate`: which component of the base's state is the coordinate that drives
-        the element and is pushed by it, and which its velocity.
-
     The state is that of the base and then that of the element, which impacts leave as
     it is.
     """
 
     base: HybridSystem
+    """The system, a `WithTerms` or any other."""
     element: HiddenElement
+    """A `Resonator`, `Relaxation` or `Hysteresis`."""
     coordinate: tuple[int, int] = eqx.field(
         default=(0, 1), static=True, metadata={"spare": True}
     )
+    """Components of the base's state that are the coordinate, which drives the element
+    and is pushed by it, and its velocity."""
 
     @property
     def _size(self) -> int:
