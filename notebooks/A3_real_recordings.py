@@ -13,8 +13,8 @@
 # asked what it lacks. Nothing is set differently from one to the next: every model
 # states its parameters, its sensor and how noisy that is, and the library is the same.
 #
-# The recordings are public. Only the pendulum is in the package, with every tenth sample
-# (`jaxcam.data.PENDULUM`):
+# The recordings are public. Of them only the pendulum is in the package, every tenth
+# sample of it (`jaxcam.data.PENDULUM`):
 #
 # - `pendulum`: github.com/dynamicslab/MultiArm-Pendulum (MIT), arXiv:2205.06231;
 # - `ball_drop`: github.com/briandesilva/discovery-of-physics-from-data (MIT);
