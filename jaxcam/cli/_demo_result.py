@@ -130,8 +130,9 @@ def _next_steps(found) -> list[tuple[str, str]]:
             "cart.toml, which says what is known and measured.",
         ),
         (
-            "jaxcam diagram --system cart.py:Cart --parameter NAME --from A --to B",
-            "A bifurcation diagram of it, once it has a forcing period.",
+            "jaxcam simulate --rig cart.toml --state 0,0.8 --t1 3 --out ./cart-run",
+            "Its motion. For a driven system, jaxcam diagram and jaxcam continue go on "
+            "from there.",
         ),
         (
             "jaxcam diagnose CASE --rig cart.toml --out ./report",
