@@ -64,7 +64,7 @@ _PART = """
 ![{caption}](gallery/{name}-light.png#only-light){{ width=640 loading=lazy }}
 ![{caption}](gallery/{name}-dark.png#only-dark){{ width=640 loading=lazy }}
 
-```python title="docs/gallery/{name}.py"
+``` {{ .python title="docs/gallery/{name}.py" }}
 --8<-- "docs/gallery/{name}.py"
 ```
 """
