@@ -38,6 +38,9 @@ WITHOUT_EXAMPLE = {
     # needs a system near the interruption of its chattering, found in a minute
     "variational.find_lobes",
     "variational.fit_local_map",
+    # returned by functions that have one
+    "jaxcam.fitting.FreeRun",
+    "jaxcam.fitting.FreeRunFit",
     # starts processes
     "jaxcam.sweeps.cluster",
 }

@@ -68,10 +68,9 @@ def lyapunov_spectrum(
 ) -> LyapunovSpectrum:
     """Compute all Lyapunov exponents, impacts included, by repeated orthogonalisation.
 
-    The steps of a run are differentiated one by one, saltation matrices are inserted at
-    its events, and the product is applied to a frame that is orthonormalised again and
-    again (Benettin et al., Meccanica 15, 1980; for impacts Mueller, Chaos, Solitons and
-    Fractals 5, 1995).
+    Steps are differentiated one by one, with saltation matrices at events, and their
+    product is applied to a frame that is orthonormalised again and again (Benettin et
+    al., Meccanica 15, 1980; for impacts Mueller, Chaos, Solitons and Fractals 5, 1995).
 
     Args:
         system: The system.
@@ -88,8 +87,7 @@ def lyapunov_spectrum(
         progress: Called with the part of the turns that is done.
 
     Returns:
-        A `LyapunovSpectrum`. An exponent is minus infinity where the motion sticks,
-            because contact forgets the past.
+        A `LyapunovSpectrum`; minus infinity where the motion sticks.
 
     Raises:
         ValueError: Shapes do not fit, or there is no period.
@@ -98,8 +96,7 @@ def lyapunov_spectrum(
         >>> from jaxcam.models import ImpactOscillator
         >>> from variational import lyapunov_spectrum
         >>> system = ImpactOscillator(omega=3.5, wall=-0.2, damping=0.02)
-        >>> start = jnp.array([-0.9, 0.0])
-        >>> found = lyapunov_spectrum(system, start, turns=50, transient=20)
+        >>> found = lyapunov_spectrum(system, [-0.9, 0.0], turns=50, transient=20)
         >>> found.exponents.shape
         (2,)
     """

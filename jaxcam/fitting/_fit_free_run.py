@@ -79,7 +79,8 @@ def fit_free_run(
         >>> from jaxcam.recordings import Recording
         >>> time = 1e-3 * np.arange(200)
         >>> fallen = Recording("drop", time, {"height_m": 1.0 - 4.905 * time**2})
-        >>> model = Model(BouncingBall(gravity=9.0), {"height_m": Sensor(0, noise=1e-4)})
+        >>> sensors = {"height_m": Sensor(0, noise=1e-4)}
+        >>> model = Model(BouncingBall(gravity=9.0), sensors)
         >>> gravity = Parameter("gravity", lambda m: m.system.gravity)
         >>> round(fit_free_run(model, [fallen], [gravity]).values["gravity"], 4)
         9.81

@@ -20,10 +20,11 @@ from ._blocks import blocks_of, values_of
 from ._formulas import formulated
 from ._free_fits import FreeFits, heat_of, heated, Missing, Subset, unscaled
 from ._gains import added_gain, gain
+from ._hidden_kinds import KINDS
 from ._hidden_leads import simplified, worthwhile
 from ._hidden_scan import Promise
 from ._hidden_signals import driven_by
-from ._hidden_state import Hidden, KINDS, started
+from ._hidden_state import Hidden, started
 from ._local_force import force_blocks, force_response
 from ._roughness import Roughness, roughness
 from ._slots import (

@@ -8,9 +8,10 @@ import numpy as np
 from ...fitting import Problem
 from ..policy import Policy
 from ._free_fits import FreeFits, Missing, Subset
+from ._hidden_kinds import RESONANCE
 from ._hidden_scan import Promise, promises
 from ._hidden_signals import Driven
-from ._hidden_state import Hidden, RESONANCE
+from ._hidden_state import Hidden
 from ._local_force import Response
 from ._vibration_scan import periodogram
 

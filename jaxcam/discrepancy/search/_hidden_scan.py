@@ -17,8 +17,9 @@ from ...fitting import Problem
 from ...fitting.engine import invert_information
 from ..policy import Policy
 from ..terms import ByMotion, DIRECT
+from ._hidden_kinds import HYSTERESIS, Kind, RELAXATION, RESONANCE
 from ._hidden_signals import at_times, Driven
-from ._hidden_state import Hidden, HYSTERESIS, Kind, RELAXATION, RESONANCE
+from ._hidden_state import Hidden
 from ._local_force import forces_at_nodes, Response
 from ._vibration_scan import scanned_frequencies
 

@@ -18,6 +18,7 @@ from ._one_way import (
     FrictionForwards,
 )
 from ._power_law import RestitutionPower
+from ._sensor_terms import SensorGain, SensorLag, SensorOffset
 from ._springs import (
     BilinearSpring,
     ConstantForce,
@@ -25,7 +26,7 @@ from ._springs import (
     StopAbove,
     StopBelow,
 )
-from ._term import Motion, SensorTerm, strength, Term
+from ._term import Motion, strength, Term
 from ._value import Value
 from ._where import Where
 from ._with_hidden import WithHidden
@@ -146,17 +147,6 @@ class CamProfileError(Term):
         return self.run * jnp.cos(2 * motion.phase + self.lead)
 
 
-class SensorLag(SensorTerm):
-    """A channel of the motion that is late."""
-
-    name: ClassVar[str] = "sensor_lag"
-    sentence: ClassVar[str] = "a lag of the sensor"
-    region: ClassVar[str] = "in the measured motion, in proportion to the velocity"
-    source: ClassVar[str] = "Ljung, System Identification, 1999, section 4.2"
-    fields: ClassVar[tuple[str, ...]] = ("lag",)
-    lag: float = strength("s", 1e-4, lower=0.0)
-
-
 class ExternalVibration(Term):
     """A foundation that shakes, `ext sin(2 pi fe t + phase)`.
 
@@ -266,30 +256,6 @@ class SpeedDependentBounce(Term):
     def restitution(self, approach, motion: Motion):
         del approach
         return 1 + self.br * motion.rate
-
-
-class SensorGain(SensorTerm):
-    """A sensor that shows too much or too little, in proportion."""
-
-    name: ClassVar[str] = "sensor_gain"
-    sentence: ClassVar[str] = "a wrong gain of the sensor"
-    region: ClassVar[str] = "in the measured motion, in proportion to it"
-    source: ClassVar[str] = "Doebelin, Measurement Systems, chapter 3"
-    listed: ClassVar[bool] = False
-    fields: ClassVar[tuple[str, ...]] = ("gain",)
-    gain: float = strength("-", 1e-3)
-
-
-class SensorOffset(SensorTerm):
-    """A sensor whose zero is off."""
-
-    name: ClassVar[str] = "sensor_offset"
-    sentence: ClassVar[str] = "a wrong zero of the sensor"
-    region: ClassVar[str] = "in the measured motion, everywhere"
-    source: ClassVar[str] = "Doebelin, Measurement Systems, chapter 3"
-    listed: ClassVar[bool] = False
-    fields: ClassVar[tuple[str, ...]] = ("offset",)
-    offset: float = strength("[q]", 1e-3)
 
 
 _EXTENDED = (

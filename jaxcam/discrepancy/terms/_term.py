@@ -201,7 +201,7 @@ class Term(eqx.Module):
         return 1.0
 
     def sensed(self, motion: Motion):
-        """Return what the sensor of the first coordinate shows in addition, in its unit."""
+        """Return what the sensor of the first coordinate adds, in its unit."""
         del motion
         return 0.0
 

@@ -1,0 +1,122 @@
+"""Kinds of hidden elements, with the numbers that are fitted and their signals."""
+
+import dataclasses
+import math
+from collections.abc import Callable, Sequence
+
+import jax.numpy as jnp
+import numpy as np
+
+from ..terms import HiddenElement, Hysteresis, Relaxation, Resonator
+from ._hidden_signals import (
+    Driven,
+    hysteresis_signals,
+    relaxation_signals,
+    resonance_signals,
+)
+
+
+@dataclasses.dataclass(frozen=True)
+class Number:
+    """A number of an element: its name, bounds, and how far one fit may move it.
+
+    It is fitted as its logarithm where `logarithm`.
+    """
+
+    name: str
+    low: float
+    high: float
+    reach: float
+    logarithm: bool = True
+
+    def moved(self, value: float, change: float) -> float:
+        new = value * math.exp(change) if self.logarithm else value + change
+        return min(max(new, self.low), self.high)
+
+    def near(self, value: float, change):
+        """The number after a small change, which can be differentiated."""
+        return value * jnp.exp(change) if self.logarithm else value + change
+
+    def change(self, old: float, new: float) -> float:
+        return math.log(new / old) if self.logarithm else new - old
+
+    def span(self, value: float, reach: float) -> tuple[float, float]:
+        """Least and largest change, within the reach and the bounds."""
+        ends = (self.moved(value, sign * reach) for sign in (-1.0, 1.0))
+        low, high = (self.change(value, end) for end in ends)
+        return low, high
+
+    def error(self, value: float, stderr: float) -> float:
+        """Standard error of the number, from that of its change."""
+        return value * stderr if self.logarithm else stderr
+
+
+@dataclasses.dataclass(frozen=True)
+class Kind:
+    """A kind of element.
+
+    - `name`: of it in sentences; `numbers`, and `outputs`: names of its strengths.
+    - `signals(driven, cells)`: for each of some numbers, outputs `(r, n, o)` and free
+        motions `(r, n, s)`.
+    """
+
+    name: str
+    element: type[HiddenElement]
+    numbers: tuple[Number, ...]
+    outputs: tuple[str, ...]
+    starts: int
+    signals: Callable[
+        [Driven, Sequence[Sequence[float]]], list[tuple[np.ndarray, np.ndarray]]
+    ]
+
+    def reach(self, number: Number, values: Sequence[float]) -> float:
+        """How far one fit may move a number: a share of the width of a resonance."""
+        if self is RESONANCE and number.name == "frequency":
+            return number.reach * values[1]
+        return number.reach
+
+
+def _resonances(driven: Driven, cells):
+    return [resonance_signals(driven, *cell) for cell in cells]
+
+
+def _relaxations(driven: Driven, cells):
+    return [relaxation_signals(driven, *cell) for cell in cells]
+
+
+def _hystereses(driven: Driven, cells):
+    return list(zip(*hysteresis_signals(driven, *np.array(cells).T)))
+
+
+RESONANCE = Kind(
+    "resonance",
+    Resonator,
+    (
+        Number("frequency", 0.0, math.inf, 0.5),
+        Number("ratio", 1e-3, 0.7, 0.5),
+    ),
+    ("by_state", "by_rate"),
+    2,
+    _resonances,
+)
+RELAXATION = Kind(
+    "relaxation",
+    Relaxation,
+    (Number("time", 0.0, math.inf, 0.5),),
+    ("by_state",),
+    1,
+    _relaxations,
+)
+HYSTERESIS = Kind(
+    "hysteresis",
+    Hysteresis,
+    (
+        Number("limit", 0.0, math.inf, 0.4),
+        Number("sharing", 0.5, 1.5, 0.2, logarithm=False),
+        Number("power", 0.5, 6.0, 0.4),
+    ),
+    ("by_state",),
+    1,
+    _hystereses,
+)
+KINDS = (RESONANCE, RELAXATION, HYSTERESIS)

@@ -1,0 +1,40 @@
+"""Faults of the sensor of the motion that have a name."""
+
+from typing import ClassVar
+
+from ._term import SensorTerm, strength
+
+
+class SensorLag(SensorTerm):
+    """A channel of the motion that is late."""
+
+    name: ClassVar[str] = "sensor_lag"
+    sentence: ClassVar[str] = "a lag of the sensor"
+    region: ClassVar[str] = "in the measured motion, in proportion to the velocity"
+    source: ClassVar[str] = "Ljung, System Identification, 1999, section 4.2"
+    fields: ClassVar[tuple[str, ...]] = ("lag",)
+    lag: float = strength("s", 1e-4, lower=0.0)
+
+
+class SensorGain(SensorTerm):
+    """A sensor that shows too much or too little, in proportion."""
+
+    name: ClassVar[str] = "sensor_gain"
+    sentence: ClassVar[str] = "a wrong gain of the sensor"
+    region: ClassVar[str] = "in the measured motion, in proportion to it"
+    source: ClassVar[str] = "Doebelin, Measurement Systems, chapter 3"
+    listed: ClassVar[bool] = False
+    fields: ClassVar[tuple[str, ...]] = ("gain",)
+    gain: float = strength("-", 1e-3)
+
+
+class SensorOffset(SensorTerm):
+    """A sensor whose zero is off."""
+
+    name: ClassVar[str] = "sensor_offset"
+    sentence: ClassVar[str] = "a wrong zero of the sensor"
+    region: ClassVar[str] = "in the measured motion, everywhere"
+    source: ClassVar[str] = "Doebelin, Measurement Systems, chapter 3"
+    listed: ClassVar[bool] = False
+    fields: ClassVar[tuple[str, ...]] = ("offset",)
+    offset: float = strength("[q]", 1e-3)
