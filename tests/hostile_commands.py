@@ -30,7 +30,7 @@ class Reached(BaseException):
 
 #: what is computed first by each command, behind all of its checks
 FIRST_WORK = (
-    "jaxcam.hybrid._simulate._begin",
+    "jaxcam.hybrid._untraced._begin",
     "jaxcam.hybrid._simulate.simulate_segments",
     "jaxcam.sweeps.blocks._run._drive",
     "jaxcam.sweeps.cluster",

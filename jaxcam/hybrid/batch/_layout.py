@@ -122,7 +122,8 @@ def compiled_chunk(
     the numbers of the lanes, to numbers and log.
 
     It makes `rows` attempts in each slot, in whole blocks. `row` is that of a `Table`;
-    of each of its numbers the log has one array, `(rows, slots)`, places first.
+    of each of its numbers the log has one array, `(rows, slots)`, first the places plus
+    one, which are zero where nothing was done.
     """
     leaves, structure = jax.tree.flatten(start.static)
     # 1, 1.0 and True are equal, and different programs
@@ -143,7 +144,8 @@ def _chunk(
 
     def numbers_of(record, lane):
         place, values = row(record, lane)
-        return [jnp.asarray(v) for v in (place, *values)]
+        # rows of a chunk that ends early are zero: no place
+        return [jnp.asarray(v) for v in (place + 1.0, *values)]
 
     def one(own, shared, lane):
         parts = [p.unpacked(*q) for p, q in zip(packings, (own, shared), strict=True)]

@@ -21,11 +21,14 @@ class Table:
         self.numbers = np.full((lanes, places, width), np.nan)
 
     def take(self, work, log) -> None:
-        """Put what some attempts made, `(attempts, slots)` each, where it belongs."""
+        """Put what some attempts made, `(attempts, slots)` each, where it belongs.
+
+        Of the places, which come first, the log has one more: zero is none.
+        """
         lanes, places, width = self.numbers.shape
         place, *values = [np.asarray(part).ravel() for part in log]
-        at = np.flatnonzero(place >= 0)
-        lane, place = work[at % len(work)], place[at].astype(int) - self.first
+        at = np.flatnonzero(place > 0)
+        lane, place = work[at % len(work)], place[at].astype(int) - 1 - self.first
         # rounding may set the end of the run apart from its last stop
         real = (place >= 0) & (place < places)
         at = at[real]
