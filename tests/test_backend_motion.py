@@ -322,7 +322,7 @@ def test_a_budget_of_rows_and_progress():
     np.testing.assert_array_equal(short.impacts.time, run.impacts.time[:count])
 
 
-def test_settings_name_the_back_end():
+def test_settings_name_the_back_end(unchecked_types):
     with pytest.raises(ValueError, match="backend"):
         stroboscope(
             ImpactOscillator(omega=2.8), [-0.5, 0.0], 2, settings=Settings(backend="c")

@@ -13,13 +13,9 @@ from scipy.integrate import solve_ivp
 
 from jaxcam import simulate
 from jaxcam.discrepancy.report._hidden import hidden_formula
+from jaxcam.discrepancy.search._hidden_kinds import HYSTERESIS, RELAXATION, RESONANCE
 from jaxcam.discrepancy.search._hidden_signals import Driven
-from jaxcam.discrepancy.search._hidden_state import (
-    Hidden,
-    HYSTERESIS,
-    RELAXATION,
-    RESONANCE,
-)
+from jaxcam.discrepancy.search._hidden_state import Hidden
 from jaxcam.discrepancy.terms import (
     HiddenForce,
     Hysteresis,

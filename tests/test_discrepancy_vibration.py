@@ -16,12 +16,8 @@ from jaxcam.discrepancy.search import (
 )
 from jaxcam.discrepancy.search._hidden_scan import _Chain
 from jaxcam.discrepancy.search._hidden_signals import driven_by
-from jaxcam.discrepancy.search._hidden_state import (
-    Hidden,
-    RELAXATION,
-    RESONANCE,
-    with_hidden,
-)
+from jaxcam.discrepancy.search._hidden_kinds import RELAXATION, RESONANCE
+from jaxcam.discrepancy.search._hidden_state import Hidden, with_hidden
 from jaxcam.discrepancy.search._local_force import force_response
 from jaxcam.discrepancy.search._vibration_scan import periodogram
 from jaxcam.discrepancy.terms import HiddenForce, WithTerms

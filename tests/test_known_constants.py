@@ -184,8 +184,8 @@ def test_what_a_recording_says_wrongly(tmp_path):
     setup = dataclasses.replace(setup_of(tmp_path), records={})
     for constants, said in (
         ({"mas": 1.0}, "is `mass` meant?"),
-        ({"mass": np.nan}, "no finite number"),
-        ({"mass": "heavy"}, "no finite number"),
+        ({"mass": np.nan}, "not a finite number"),
+        ({"mass": "heavy"}, "not a finite number"),
     ):
         run = dataclasses.replace(recorded()[0], constants=constants)
         with pytest.raises(RecordingError, match=said):

@@ -52,5 +52,5 @@ def test_the_cobweb_lies_on_the_map():
     np.testing.assert_allclose(y[1::2], expected, atol=1e-12)
     np.testing.assert_allclose(x[2::2], y[2::2], atol=1e-12)
     plt.close(figure)
-    with pytest.raises(ValueError, match="bound"):
+    with pytest.raises(ValueError, match="diverges"):
         plotting.cobweb(lambda x: 1e200 * x, 1.0, 10)

@@ -76,7 +76,7 @@ def lyapunov_spectrum(
         system: The system.
         state: Initial state, shape `(n,)`, or `(lanes, n)` for many motions at once.
         turns: Number of periods that are averaged, after the transient.
-        t0: s.
+        t0: Start (s).
         transient: Number of periods before the average.
         turn: Length of a period (s); default the forcing's own.
         where: Picks the parameter that differs between motions.
@@ -95,7 +95,7 @@ def lyapunov_spectrum(
     Examples:
         >>> from jaxcam.models import ImpactOscillator
         >>> from variational import lyapunov_spectrum
-        >>> system = ImpactOscillator(omega=3.5, wall=-0.2, damping=0.02)
+        >>> system = ImpactOscillator(3.5, wall=-0.2, damping=0.02)
         >>> found = lyapunov_spectrum(system, [-0.9, 0.0], turns=50, transient=20)
         >>> found.exponents.shape
         (2,)
@@ -126,8 +126,7 @@ def lyapunov_spectrum(
     single = state.ndim == 1 and values is None
     batched, shared, states = _lanes(system, state, where, values)
     length = None if turn is None else jnp.asarray(float(turn))
-    begin = jnp.asarray(float(t0))
-    end = jnp.asarray(float(transient + turns))
+    begin, end = (jnp.asarray(float(x)) for x in (t0, transient + turns))
     returned = _restitutions(batched, shared, begin, states)
     check_restitution(system, returned[0] if single else returned)
 
