@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from jaxcam import simulate
-from jaxcam.discrepancy import diagnose
+from jaxcam.discrepancy import diagnose, Policy
 from jaxcam.discrepancy.terms import WithHidden
 from jaxcam.fitting import read_setup
 
@@ -20,7 +20,7 @@ _RIG = Path(__file__).parents[1] / "docs" / "rigs" / "two_stops.toml"
 
 def _diagnosed(hidden, seed):
     runs = truth.records(hidden, seed, duration=4.0)
-    return diagnose(read_setup(_RIG), runs, case="cart")
+    return diagnose(read_setup(_RIG), runs, case="cart", policy=Policy(elements=1))
 
 
 def _gone(found):

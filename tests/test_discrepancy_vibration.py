@@ -14,9 +14,9 @@ from jaxcam.discrepancy.search import (
     force_blocks,
     newton_step,
 )
+from jaxcam.discrepancy.search._hidden_kinds import RELAXATION, RESONANCE
 from jaxcam.discrepancy.search._hidden_scan import _Chain
 from jaxcam.discrepancy.search._hidden_signals import driven_by
-from jaxcam.discrepancy.search._hidden_kinds import RELAXATION, RESONANCE
 from jaxcam.discrepancy.search._hidden_state import Hidden, with_hidden
 from jaxcam.discrepancy.search._local_force import force_response
 from jaxcam.discrepancy.search._vibration_scan import periodogram
@@ -167,6 +167,10 @@ def test_forces_at_nodes_say_what_terms_in_the_system_say(build):
         )
 
 
+# the reason why elements are not looked for by default (`Policy.elements`)
+@pytest.mark.xfail(
+    strict=True, reason="promises are 3 and 7 % too large, strengths a third off: open"
+)
 @pytest.mark.parametrize(
     ("kind", "numbers"), [(RELAXATION, (0.05,)), (RESONANCE, (6.1, 0.08))]
 )

@@ -186,6 +186,11 @@ class Policy:
     functions: int = _bounds(
         2, "free functions at most, where what is missing has no name; 0 for none"
     )
+    elements: int = _bounds(
+        0,
+        "elements with a state of their own (resonance, relaxation, hysteresis) that "
+        "are tried there, one at most; 0 for none",
+    )
     function_lengths: tuple[float, ...] = _bounds(
         (0.05, 0.1, 0.2, 0.4, 0.8, 1.6),
         "lengths of correlation tried for a free function: shares of the range of its "
@@ -282,7 +287,7 @@ class Policy:
                     f"Policy: `{name}` is {value!r}; give a number between 0 and 1."
                 )
         for setting in self.settings():
-            if setting.name == "functions":
+            if setting.name in ("functions", "elements"):
                 continue
             low = min(setting.value) if _several(setting.value) else setting.value
             if not low > 0 or not math.isfinite(low):

@@ -79,7 +79,8 @@ class FreeSearch:
         self.fits = FreeFits(rig, self.terms, policy)
         self.families = tuple(families)
         impacting = any(family.where is not Where.FLIGHT for family in families)
-        self.driven = driven_by(problem, self.families[0].motion_unit)
+        unit = self.families[0].motion_unit
+        self.driven = driven_by(problem, unit) if policy.elements else None
         self.problem = roomy(problem, self.families[0], impacting, self.driven)
         # what any sensor may do is no function without a name
         self.faults = own_faults(self.problem.model, self.problem.parameters)
