@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.integrate import solve_ivp
 
+from benchmarks._hidden_physics import Hidden
 from jaxcam.recordings import Recording
 
 
@@ -29,6 +30,7 @@ class Maker(NamedTuple):
     - `gaps(p, x)`, and `impacts`, one law `(p, x)` for each of them.
     - `start`: of the state; `speeds` (rad/s): least and largest, of a driven rig.
     - `channels`: name of each and the component of the state it shows.
+    - `restitution`: the parameter of the first gap's law.
     """
 
     field: Callable
@@ -37,6 +39,7 @@ class Maker(NamedTuple):
     start: tuple[float, ...]
     channels: dict[str, int]
     speeds: tuple[float, float] | None = None
+    restitution: str = ""
 
 
 class Accumulates(Exception):
@@ -90,6 +93,7 @@ MAKERS = {
         (0.01, 0.3),
         {"position_m": 0},
         (8.0, 17.0),
+        "restitution_left",
     ),
     "pendulum_wall": Maker(
         _pendulum,
@@ -98,6 +102,7 @@ MAKERS = {
         (0.2, 0.5),
         {"angle_rad": 0},
         (6.5, 18.0),
+        "restitution",
     ),
     "two_masses": Maker(
         _two_masses,
@@ -106,9 +111,22 @@ MAKERS = {
         (0.004, 0.0, 0.012, 0.1),
         {"position1_m": 0, "position2_m": 2},
         (40.0, 62.0),
+        "restitution_wall",
     ),
     "stage": Maker(_stage, lambda p, x: (), (), (0.0, 0.0), {"position_m": 0}),
 }
+
+
+class Motion(NamedTuple):
+    """What a record was made of: `states` `(n, d)` and the drive's `angle` `(n,)` at
+    `time` `(n,)`, the `hertz` of the drive, and a row `(time, approach speed, angle)`
+    for each impact on the first constraint."""
+
+    time: np.ndarray
+    states: np.ndarray
+    angle: np.ndarray
+    hertz: float
+    struck: np.ndarray
 
 
 def record_case(
@@ -118,18 +136,33 @@ def record_case(
 
     **Raises:** `Accumulates` for a rig that comes to rest on a constraint.
     """
+    return [
+        run for run, _ in made_case(name, setup, truth, rng, None, duration, records)
+    ]
+
+
+def made_case(
+    name: str, setup, truth, rng, hidden: Hidden | None, duration=6.0, records=4
+) -> list[tuple[Recording, Motion]]:
+    """Recordings with an effect hidden in them, and the motions that they show."""
     maker, found = MAKERS[name], []
     for k in range(records):
         if maker.speeds is None:
-            found.append(_with_input(maker, setup, truth, rng, duration, k))
-            continue
-        low, high = np.linspace(*maker.speeds, records + 1)[k : k + 2]
-        speed = float(rng.uniform(low, high))
-        found.append(_driven(maker, setup, truth, rng, duration, speed, k))
+            motion, channels = _with_input(maker, setup, truth, rng, duration, hidden)
+            called = f"run{k + 1}"
+        else:
+            low, high = np.linspace(*maker.speeds, records + 1)[k : k + 2]
+            speed = float(rng.uniform(low, high))
+            motion, channels = _driven(
+                maker, setup, truth, rng, duration, speed, hidden
+            )
+            called = f"run{k + 1}_{speed / (2 * math.pi):.3f}Hz"
+        channels |= _measured(maker, setup, motion, rng, hidden)
+        found.append((Recording(called, motion.time, channels), motion))
     return found
 
 
-def _driven(maker, setup, truth, rng, duration, speed, number) -> Recording:
+def _driven(maker, setup, truth, rng, duration, speed, hidden):
     shift = rng.uniform(0, 2 * math.pi, 3)
 
     def drive(t):
@@ -141,22 +174,19 @@ def _driven(maker, setup, truth, rng, duration, speed, number) -> Recording:
             rate += speed * 2e-4 * share * math.cos(v * t + lead)
         return angle, rate
 
-    def field(t, x):
-        return maker.field(truth, x, *drive(t), 0.0)
-
     time = INTERVAL * np.arange(round(duration / INTERVAL))
-    states = _flown(maker, truth, field, np.array(maker.start), SETTLE, time)
+    flight = _Flight(maker, truth, drive, hidden, SETTLE)
+    states, struck = flight.flown(np.array(maker.start), SETTLE, time)
     angle = np.array([drive(SETTLE + t)[0] for t in time])
-    angle -= 2 * math.pi * math.floor(angle[0] / (2 * math.pi))
-    noisy = angle + _DRIVE_NOISE * rng.standard_normal(len(time))
+    turns = 2 * math.pi * math.floor(angle[0] / (2 * math.pi))
+    noisy = angle - turns + _DRIVE_NOISE * rng.standard_normal(len(time))
     channels = {setup.drive_channel: np.round(noisy / _COUNT) * _COUNT}
-    channels |= _measured(maker, setup, states, rng)
     hertz = speed / (2 * math.pi)
-    return Recording(f"run{number + 1}_{hertz:.3f}Hz", time, channels)
+    return Motion(time, states, angle, hertz, struck), channels
 
 
-def _with_input(maker, setup, truth, rng, duration, number) -> Recording:
-    """A smooth random voltage, held between samples; exact from sample to sample."""
+def _with_input(maker, setup, truth, rng, duration, hidden):
+    """A smooth random voltage, held between samples."""
     time = INTERVAL * np.arange(round(duration / INTERVAL))
     voltage = np.zeros(len(time))
     for hertz in rng.uniform(0.2, 3.0, 4):
@@ -164,67 +194,131 @@ def _with_input(maker, setup, truth, rng, duration, number) -> Recording:
             2 * math.pi * hertz * time + rng.uniform(0, 2 * math.pi)
         )
     voltage = np.round(np.clip(voltage, -1.5, 1.5), 3)
-    c, gain = truth["damping"], truth["gain"]
-    decay = math.exp(-c * INTERVAL)
-    states = np.zeros((len(time), 2))
-    for k in range(len(time) - 1):
-        x, v = states[k]
-        level = gain * voltage[k] / c
-        states[k + 1] = (
-            x + level * INTERVAL + (v - level) * (1 - decay) / c,
-            level + (v - level) * decay,
-        )
+    flight = _Flight(maker, truth, lambda t: (0.0, 1.0), hidden, 0.0)
+    states = flight.held(np.array(maker.start), voltage)
     channels = {setup.model.drive.channel: voltage}
-    channels |= _measured(maker, setup, states, rng)
-    return Recording(f"run{number + 1}", time, channels)
+    none = np.zeros(len(time))
+    return Motion(time, states, none, 1.0, np.zeros((0, 3))), channels
 
 
-def _measured(maker, setup, states, rng) -> dict[str, np.ndarray]:
+def _measured(maker, setup, motion, rng, hidden) -> dict[str, np.ndarray]:
     found = {}
-    for name, place in maker.channels.items():
+    for number, (name, place) in enumerate(maker.channels.items()):
         sensor = setup.model.sensors[name]
-        noisy = states[:, place] + float(sensor.noise) * rng.standard_normal(
-            len(states)
-        )
+        shown = np.array(motion.states[:, place])
+        if hidden is not None and hidden.effect.kind == "sensor" and not number:
+            x, v = motion.states[:, 0], motion.states[:, 1]
+            shown += hidden.at(x, v, motion.angle, motion.time)
+        noisy = shown + float(sensor.noise) * rng.standard_normal(len(shown))
         step = sensor.resolution
         found[name] = np.round(noisy / step) * step if step else noisy
     return found
 
 
-def _flown(maker, truth, field, state, settle, time) -> np.ndarray:
-    """States at `settle + time`, from impact to impact."""
+class _Flight:
+    """A rig with what is hidden in it, on the way from impact to impact.
 
-    def event(k):
+    `begin` is when the record begins. The states of an effect come after the rig's own.
+    """
+
+    def __init__(self, maker, truth, drive, hidden, begin):
+        self.maker, self.truth, self.drive = maker, truth, drive
+        self.hidden, self.begin = hidden, begin
+        self.own = len(maker.start)
+
+    def acts(self, kind: str) -> bool:
+        return self.hidden is not None and self.hidden.effect.kind == kind
+
+    def field(self, t, x, u=0.0):
+        angle, rate = self.drive(t)
+        found = list(self.maker.field(self.truth, x[: self.own], angle, rate, u))
+        if self.hidden is None:
+            return found
+        own = x[self.own :]
+        if self.acts("force") or self.acts("resonance"):
+            more = own[0] if len(own) else 0.0
+            found[1] += self.hidden.at(x[0], x[1], angle, t - self.begin, more)
+        return [*found, *self.hidden.rates(own, x[0], x[1])]
+
+    def surface(self, t):
+        """By how much the first surface has come out."""
+        if not self.acts("surface"):
+            return 0.0
+        return float(self.hidden.at(0.0, 0.0, self.drive(t)[0], t - self.begin))
+
+    def gap(self, k):
         def gap(t, x):
-            return maker.gaps(truth, x)[k]
+            found = self.maker.gaps(self.truth, x[: self.own])[k]
+            return found - self.surface(t) if k == 0 else found
 
         gap.terminal, gap.direction = True, -1
         return gap
 
-    events = [event(k) for k in range(len(maker.impacts))]
-    wanted = settle + time
-    found = np.zeros((len(time), len(state)))
-    t, end, last = 0.0, wanted[-1], -1.0
-    while t < end:
-        part = solve_ivp(
-            field,
-            (t, end),
-            state,
-            "DOP853",
-            events=events,
-            dense_output=True,
-            rtol=1e-10,
-            atol=1e-13,
-            max_step=0.02,
-        )
-        inside = (wanted >= t) & (wanted <= part.t[-1])
-        if inside.any():
-            found[inside] = part.sol(wanted[inside]).T
-        t, state = float(part.t[-1]), part.y[:, -1]
-        if part.status != 1:
-            break
-        struck = next(k for k, times in enumerate(part.t_events) if len(times))
-        if t - last < _CHATTER:
-            raise Accumulates
-        state, last = maker.impacts[struck](truth, state), t
-    return found
+    def after(self, k, t, x):
+        """The state after an impact on a constraint."""
+        truth, small = self.truth, 1e-4
+        rate = (self.surface(t + small) - self.surface(t - small)) / (2 * small)
+        moved = np.array(x[: self.own])
+        if k == 0:
+            moved[1] -= rate
+        if k == 0 and self.acts("restitution"):
+            angle = self.drive(t)[0]
+            speed = abs(x[1]) / self.hidden.scales.velocity
+            more = self.hidden.at(x[0], x[1], angle, t - self.begin, speed)
+            name = self.maker.restitution
+            truth = truth | {name: truth[name] * math.exp(more)}
+        after = self.maker.impacts[k](truth, moved)
+        if k == 0:
+            after[1] += rate
+        return np.concatenate([after, x[self.own :]])
+
+    def flown(self, state, settle, time):
+        """States of the rig at `settle + time`, and impacts on the first constraint."""
+        if self.hidden is not None:
+            state = np.concatenate([state, np.zeros(self.hidden.effect.states)])
+        events = [self.gap(k) for k in range(len(self.maker.impacts))]
+        wanted, struck = settle + time, []
+        found = np.zeros((len(time), len(state)))
+        t, end, last = 0.0, wanted[-1], -1.0
+        while t < end:
+            part = solve_ivp(
+                self.field,
+                (t, end),
+                state,
+                "DOP853",
+                events=events,
+                dense_output=True,
+                rtol=1e-10,
+                atol=1e-13,
+                max_step=0.02,
+            )
+            inside = (wanted >= t) & (wanted <= part.t[-1])
+            if inside.any():
+                found[inside] = part.sol(wanted[inside]).T
+            t, state = float(part.t[-1]), part.y[:, -1]
+            if part.status != 1:
+                break
+            k = next(k for k, times in enumerate(part.t_events) if len(times))
+            if t - last < _CHATTER:
+                raise Accumulates
+            if k == 0 and t >= settle:
+                struck.append((t - settle, abs(state[1]), self.drive(t)[0]))
+            state, last = self.after(k, t, state), t
+        return found[:, : self.own], np.array(struck).reshape(-1, 3)
+
+    def held(self, state, inputs):
+        """States at every sample, with an input that is held between them."""
+        if self.hidden is not None:
+            state = np.concatenate([state, np.zeros(self.hidden.effect.states)])
+        found, parts = [state], 4
+        h = INTERVAL / parts
+        for k, u in enumerate(inputs[:-1]):
+            for j in range(parts):
+                t = k * INTERVAL + j * h
+                a = np.array(self.field(t, state, u))
+                b = np.array(self.field(t + h / 2, state + h / 2 * a, u))
+                c = np.array(self.field(t + h / 2, state + h / 2 * b, u))
+                d = np.array(self.field(t + h, state + h * c, u))
+                state = state + h / 6 * (a + 2 * b + 2 * c + d)
+            found.append(state)
+        return np.array(found)[:, : self.own]

@@ -1,0 +1,221 @@
+"""Physics without a name, to be hidden in the rigs of `_own_rig_makers.py`.
+
+Each effect is stated in shares of what the rig does without it: `u` is the first
+coordinate, from -1 to 1 over its range, `w` its velocity in units of its largest one,
+`phi` the drive's angle, `t` the share of the record that has passed, and `s` the
+approach speed in units of the largest one.
+"""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+
+class Effect(NamedTuple):
+    """Something that a textbook model leaves out.
+
+    - `kind` and `arguments`, as a verdict states them.
+    - `value(u, w, phi, t, s)`: for a force, in units of the rig's own acceleration; for
+      a restitution, the logarithm of its factor; for a surface or a sensor, in units of
+      the sensor's noise.
+    - `size`: least and largest factor on `value`.
+    - `memory`: rates of change of the effect's own `states`, `(own, u, rate, hertz)`
+      with `rate` that of `u` and the `hertz` of the drive. Such an effect's `value` has
+      the first of them in the place of `s`.
+    """
+
+    kind: str
+    arguments: tuple[str, ...]
+    value: Callable
+    size: tuple[float, float]
+    memory: Callable | None = None
+    states: int = 0
+
+
+def _within(x, low, high):
+    return 1.0 * ((x > low) & (x < high))
+
+
+def _spring_and_damper(own, u, rate, hertz):
+    """A damper in series with a spring: the force on it, relaxing."""
+    return (rate - own[0] * 1.5 * hertz,)
+
+
+def _hysteresis(own, u, rate, hertz):
+    """Bouc and Wen's law; yields within a quarter of the range."""
+    z = own[0]
+    return (4 * rate - 2 * (abs(rate) * z * abs(z) + rate * z * z),)
+
+
+def _resonance(own, u, rate, hertz):
+    """A lightly damped oscillator of 3.7 times that rate, driven by the deflection."""
+    w = 2 * np.pi * 3.7 * hertz
+    return (own[1], w * w * (u - own[0]) - 0.08 * w * own[1])
+
+
+def _force(arguments, value, low, high, **more) -> Effect:
+    return Effect("force", arguments, value, (low, high), **more)
+
+
+_AT_PLACE, _AT_SPEED, _ON_THE_WAY = (
+    ("position",),
+    ("velocity",),
+    ("position", "velocity"),
+)
+
+EFFECTS = {
+    # forces by position
+    "stop": _force(
+        _AT_PLACE, lambda u, w, phi, t, s: -np.maximum(u - 0.6, 0), 0.2, 0.6
+    ),
+    "hardening_side": _force(
+        _AT_PLACE, lambda u, w, phi, t, s: np.maximum(-u - 0.2, 0) ** 2, 0.15, 0.4
+    ),
+    "magnet": _force(
+        _AT_PLACE,
+        lambda u, w, phi, t, s: np.exp(-(((u - 0.3) / 0.2) ** 2)),
+        0.03,
+        0.1,
+    ),
+    "detents": _force(
+        _AT_PLACE, lambda u, w, phi, t, s: np.sin(2 * np.pi * 1.8 * u), 0.03, 0.1
+    ),
+    # by velocity
+    "fast_drag": _force(
+        _AT_SPEED,
+        lambda u, w, phi, t, s: -np.sign(w) * np.maximum(np.abs(w) - 0.4, 0),
+        0.08,
+        0.25,
+    ),
+    "stick_slip": _force(
+        _AT_SPEED,
+        lambda u, w, phi, t, s: -np.sign(w) * np.exp(-((w / 0.15) ** 2)),
+        0.02,
+        0.06,
+    ),
+    # by both
+    "zone_friction": _force(
+        _ON_THE_WAY,
+        lambda u, w, phi, t, s: -np.sign(w) * _within(u, -0.1, 0.5),
+        0.01,
+        0.03,
+    ),
+    "rough_end": _force(
+        _ON_THE_WAY,
+        lambda u, w, phi, t, s: -w * np.maximum(u, 0) ** 2,
+        0.05,
+        0.2,
+    ),
+    # by the drive
+    "pulse": _force(
+        ("phase",), lambda u, w, phi, t, s: 1.0 * (np.cos(phi - 2.0) > 0.6), 0.02, 0.06
+    ),
+    "parametric": _force(
+        ("phase", "position"),
+        lambda u, w, phi, t, s: u * np.cos(2 * phi - 1.0),
+        0.03,
+        0.1,
+    ),
+    # by time
+    "ramp": _force(("time",), lambda u, w, phi, t, s: t, 0.02, 0.06),
+    "jolt": _force(("time",), lambda u, w, phi, t, s: 1.0 * (t > 0.55), 0.02, 0.06),
+    "warming": _force(("time", "velocity"), lambda u, w, phi, t, s: w * t, 0.02, 0.06),
+    # with a memory
+    "relaxing": _force(
+        ("memory",),
+        lambda u, w, phi, t, own: -own,
+        0.1,
+        0.3,
+        memory=_spring_and_damper,
+        states=1,
+    ),
+    "hysteresis": _force(
+        ("memory",),
+        lambda u, w, phi, t, own: -own,
+        0.02,
+        0.06,
+        memory=_hysteresis,
+        states=1,
+    ),
+    "surge": Effect(
+        "resonance",
+        ("frequency",),
+        lambda u, w, phi, t, own: own,
+        (0.02, 0.06),
+        _resonance,
+        2,
+    ),
+    # at impacts
+    "soft_above": Effect(
+        "restitution",
+        ("speed",),
+        lambda u, w, phi, t, s: -1.0 * (s > 0.55),
+        (0.05, 0.15),
+    ),
+    "wear": Effect(
+        "restitution", ("time",), lambda u, w, phi, t, s: -(t**2), (0.05, 0.15)
+    ),
+    "soft_side": Effect(
+        "restitution",
+        ("phase",),
+        lambda u, w, phi, t, s: -np.cos(phi - 1.0),
+        (0.04, 0.12),
+    ),
+    # of the surface
+    "thermal": Effect(
+        "surface", ("time",), lambda u, w, phi, t, s: 1 - np.exp(-3 * t), (8.0, 25.0)
+    ),
+    # of the sensor
+    "off_centre": Effect(
+        "sensor",
+        ("position",),
+        lambda u, w, phi, t, s: np.sin(2 * np.pi * 0.8 * u + 0.4),
+        (3.0, 10.0),
+    ),
+    "drift": Effect(
+        "sensor", ("time",), lambda u, w, phi, t, s: np.sin(2.2 * t), (6.0, 20.0)
+    ),
+    "pickup": Effect(
+        "sensor", ("phase",), lambda u, w, phi, t, s: np.cos(phi - 1.0), (2.0, 8.0)
+    ),
+}
+
+
+class Scales(NamedTuple):
+    """The motion of a rig without an effect, which effects are stated in."""
+
+    middle: float
+    reach: float
+    velocity: float
+    acceleration: float
+    noise: float
+    lasts: float
+    hertz: float
+
+
+class Hidden(NamedTuple):
+    """An effect of some size in a rig, in the rig's own units."""
+
+    effect: Effect
+    size: float
+    scales: Scales
+
+    def at(self, x, v, phi, t, s=0.0):
+        """The value that a verdict should state, apart from what the rig may do."""
+        scales, effect = self.scales, self.effect
+        unit = {"force": scales.acceleration, "resonance": scales.acceleration}
+        unit |= {"surface": scales.noise, "sensor": scales.noise}
+        share = np.clip(t / scales.lasts, 0.0, 1.0)
+        u = (x - scales.middle) / scales.reach
+        w = v / scales.velocity
+        value = effect.value(u, w, phi, share, s)
+        return self.size * unit.get(effect.kind, 1.0) * value
+
+    def rates(self, own, x, v):
+        """Rates of change of the effect's own states."""
+        scales = self.scales
+        if self.effect.memory is None:
+            return ()
+        u, rate = (x - scales.middle) / scales.reach, v / scales.reach
+        return self.effect.memory(own, u, rate, scales.hertz)

@@ -1,0 +1,155 @@
+"""Effects without a name in rigs of a user's own: are they modelled?
+
+Rigs of `docs/rigs` are drawn at random within their tolerances, with one effect of
+`_hidden_physics.py` in each, simulated by code that shares nothing with ours, recorded
+through noisy sensors, and diagnosed. A verdict is right if it states kind and arguments
+of what was hidden, if nine tenths of the squared error on unseen data above the noise
+are gone, and if the function is off by less than four tenths of its rms where the rig
+was, apart from what parameters of the rig can do.
+
+    python -m benchmarks.unnamed two_stops
+    python -m benchmarks.unnamed pendulum_wall --effects stop magnet --first 5
+"""
+
+import argparse
+import math
+import time
+
+import numpy as np
+from scipy.interpolate import RegularGridInterpolator
+
+from benchmarks._hidden_physics import EFFECTS, Hidden, Scales
+from benchmarks._own_rig_makers import Accumulates, made_case, MAKERS, Motion
+from benchmarks.own_rigs import drawn, RIGS
+from jaxcam.discrepancy import diagnose, Diagnosis
+from jaxcam.fitting import read_setup
+
+
+_DURATION = 6.0
+_AT_IMPACTS = ("restitution", "surface")  # kinds that are of a constraint
+
+
+def scales_of(setup, motions: list[Motion]) -> Scales:
+    """The motion of a rig without an effect."""
+    states = np.concatenate([one.states for one in motions])
+    x, v = states[:, 0], states[:, 1]
+    middle, reach = (x.max() + x.min()) / 2, (x.max() - x.min()) / 2
+    steps = np.concatenate([np.gradient(m.states[:, 1], m.time) for m in motions])
+    sensor = next(iter(setup.model.sensors.values()))
+    return Scales(
+        float(middle),
+        float(reach),
+        float(np.quantile(np.abs(v), 0.995)),
+        1.5 * float(np.median(np.abs(steps))),
+        float(sensor.noise),
+        _DURATION,
+        float(np.mean([one.hertz for one in motions])),
+    )
+
+
+def hidden_case(name: str, setup, effect: str, seed: int):
+    """An effect of random size in a rig drawn at random, and its recordings."""
+    rng = np.random.default_rng([seed, *effect.encode()])
+    while True:
+        truth = drawn(setup, rng)
+        try:
+            bare = made_case(name, setup, truth, rng, None, _DURATION)
+            scales = scales_of(setup, [motion for _, motion in bare])
+            one = EFFECTS[effect]
+            hidden = Hidden(one, float(rng.uniform(*one.size)), scales)
+            made = made_case(name, setup, truth, rng, hidden, _DURATION)
+        except Accumulates:
+            continue
+        return hidden, [run for run, _ in made], [motion for _, motion in made]
+
+
+def function_off(found, hidden: Hidden, motions: list[Motion]) -> float:
+    """RMS error of a function by the rms of what was hidden, where the rig was."""
+    if hidden.effect.kind in _AT_IMPACTS:
+        rows = np.concatenate([one.struck for one in motions])
+        time, speed, angle = rows.T
+        none = np.zeros(len(time))
+        places = {"time": time, "phase": angle, "speed": speed}
+        true = hidden.at(none, none, angle, time, speed / hidden.scales.velocity)
+        known = [np.ones(len(time))]
+    else:
+        states = np.concatenate([one.states[::7] for one in motions])
+        time = np.concatenate([one.time[::7] for one in motions])
+        angle = np.concatenate([one.angle[::7] for one in motions])
+        x, v = states[:, 0], states[:, 1]
+        places = {"time": time, "phase": angle, "position": x, "velocity": v}
+        true = hidden.at(x, v, angle, time)
+        known = [np.ones(len(time)), x, v]
+    places["phase"] = np.mod(places["phase"], 2 * np.pi)
+    table = RegularGridInterpolator(
+        found.grid, found.value, bounds_error=False, fill_value=None
+    )
+    value = table(np.stack([places[name] for name in found.arguments], axis=1))
+    if hidden.effect.kind == "restitution":
+        value = np.log(value)
+    basis, _ = np.linalg.qr(np.stack(known, axis=1))
+    true, value = (one - basis @ (basis.T @ one) for one in (true, value))
+    return float(np.sqrt(np.mean((value - true) ** 2) / np.mean(true**2)))
+
+
+def judged(found: Diagnosis, hidden: Hidden, motions) -> tuple[bool, str]:
+    """Whether a verdict is right, and why."""
+    effect = hidden.effect
+    named = [one.name for one in found.effects]
+    alike = [
+        one
+        for one in found.missing
+        if one.kind == effect.kind and set(one.arguments) == set(effect.arguments)
+    ]
+    floor = found.noise_floor**2
+    before, after = found.heldout_before**2 - floor, found.heldout_after**2 - floor
+    left = max(after, 0.0) / max(before, 1e-300)
+    stated = " and ".join(
+        f"{one.kind} by {', '.join(one.arguments)}" for one in found.missing
+    )
+    said = [found.verdict, *named, stated]
+    off = math.nan
+    if alike and effect.memory is None:
+        off = function_off(alike[0], hidden, motions)
+    sound = len(alike) == len(found.missing) == 1 and left < 0.1
+    right = sound and (effect.memory is not None or off < 0.4)
+    above = math.sqrt(max(before, 0.0) / floor)
+    return right, (
+        f"{' '.join(one for one in said if one)}; {left:.3f} left of {above:.1f} "
+        f"noises, function off by {off:.2f}"
+    )
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("rig", choices=sorted(MAKERS))
+    parser.add_argument("--effects", nargs="*", choices=sorted(EFFECTS))
+    parser.add_argument("--first", type=int, default=0, help="seed of the first case")
+    parser.add_argument("--cases", type=int, default=1, help="of each effect")
+    args = parser.parse_args()
+    setup = read_setup(RIGS / f"{args.rig}.toml")
+    maker, count, right = MAKERS[args.rig], 0, 0
+    for name, effect in EFFECTS.items():
+        if args.effects and name not in args.effects:
+            continue
+        if "phase" in effect.arguments and maker.speeds is None:
+            continue
+        if effect.kind in _AT_IMPACTS and not maker.impacts:
+            continue
+        for seed in range(args.first, args.first + args.cases):
+            hidden, runs, motions = hidden_case(args.rig, setup, name, seed)
+            begun, spent = time.time(), time.process_time()
+            found = diagnose(setup, runs, case=f"{args.rig} {name} {seed}")
+            good, why = judged(found, hidden, motions)
+            count, right = count + 1, right + good
+            print(
+                f"{name} {seed}: {'right' if good else 'WRONG'}: {why} "
+                f"[{time.time() - begun:.0f} s, {time.process_time() - spent:.0f} s of "
+                f"CPU]\n    {found.summary}",
+                flush=True,
+            )
+    print(f"{args.rig}: {right} of {count} right")
+
+
+if __name__ == "__main__":
+    main()
