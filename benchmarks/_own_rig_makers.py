@@ -142,16 +142,27 @@ def record_case(
 
 
 def made_case(
-    name: str, setup, truth, rng, hidden: Hidden | None, duration=6.0, records=4
+    name: str,
+    setup,
+    truth: dict[str, float],
+    rng,
+    hidden: Hidden | None,
+    duration: float = 6.0,
+    records: int = 4,
+    speeds: tuple[float, float] | None = None,
 ) -> list[tuple[Recording, Motion]]:
-    """Recordings with an effect hidden in them, and the motions that they show."""
+    """Recordings with an effect hidden in them, and the motions that they show.
+
+    `speeds`: least and largest, in the place of the rig's own.
+    """
     maker, found = MAKERS[name], []
     for k in range(records):
         if maker.speeds is None:
             motion, channels = _with_input(maker, setup, truth, rng, duration, hidden)
             called = f"run{k + 1}"
         else:
-            low, high = np.linspace(*maker.speeds, records + 1)[k : k + 2]
+            ends = speeds or maker.speeds
+            low, high = np.linspace(*ends, records + 1)[k : k + 2]
             speed = float(rng.uniform(low, high))
             motion, channels = _driven(
                 maker, setup, truth, rng, duration, speed, hidden

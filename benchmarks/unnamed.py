@@ -48,7 +48,10 @@ def scales_of(setup, motions: list[Motion]) -> Scales:
 
 
 def hidden_case(name: str, setup, effect: str, seed: int):
-    """An effect of random size in a rig drawn at random, and its recordings."""
+    """An effect of random size in a rig drawn at random, and its recordings.
+
+    **Returns:** the effect, recordings, the motions they show, and the rig.
+    """
     rng = np.random.default_rng([seed, *effect.encode()])
     while True:
         truth = drawn(setup, rng)
@@ -60,7 +63,8 @@ def hidden_case(name: str, setup, effect: str, seed: int):
             made = made_case(name, setup, truth, rng, hidden, _DURATION)
         except Accumulates:
             continue
-        return hidden, [run for run, _ in made], [motion for _, motion in made]
+        runs, motions = map(list, zip(*made))
+        return hidden, runs, motions, truth
 
 
 def function_off(found, hidden: Hidden, motions: list[Motion]) -> float:
@@ -82,7 +86,10 @@ def function_off(found, hidden: Hidden, motions: list[Motion]) -> float:
         known = [np.ones(len(time)), x, v]
     places["phase"] = np.mod(places["phase"], 2 * np.pi)
     table = RegularGridInterpolator(
-        found.grid, found.value, bounds_error=False, fill_value=None
+        found.grid,
+        found.value,
+        bounds_error=False,
+        fill_value=None,  # pyright: ignore
     )
     value = table(np.stack([places[name] for name in found.arguments], axis=1))
     if hidden.effect.kind == "restitution":
@@ -137,7 +144,7 @@ def main() -> None:
         if effect.kind in _AT_IMPACTS and not maker.impacts:
             continue
         for seed in range(args.first, args.first + args.cases):
-            hidden, runs, motions = hidden_case(args.rig, setup, name, seed)
+            hidden, runs, motions, _ = hidden_case(args.rig, setup, name, seed)
             begun, spent = time.time(), time.process_time()
             found = diagnose(setup, runs, case=f"{args.rig} {name} {seed}")
             good, why = judged(found, hidden, motions)

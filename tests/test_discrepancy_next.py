@@ -3,10 +3,14 @@
 import numpy as np
 import pytest
 
+from benchmarks._own_rig_makers import made_case
+from benchmarks.own_rigs import RIGS
+from benchmarks.unnamed import hidden_case
 from jaxcam.data import DEMO_RIG
 from jaxcam.data.make_demo import DEMO_SENSORS, measure, RealRig, simulate_rig
 from jaxcam.discrepancy import diagnose, next_experiments
-from jaxcam.fitting import fit, Problem
+from jaxcam.discrepancy.report import slopes_of_function
+from jaxcam.fitting import fit, Problem, read_setup
 from jaxcam.recordings import read_case, read_rig, Recording, segment_case
 
 
@@ -42,3 +46,48 @@ def test_the_proposed_record_says_what_was_predicted():
     assert again.converged
     assert again["c1"].stderr == pytest.approx(best.then["c1"], rel=0.15)
     assert abs(again["c1"].value - 0.3) < 4 * again["c1"].stderr
+
+
+@pytest.mark.slow
+def test_the_band_of_a_function_shrinks_as_predicted():
+    """Rms of the band with the best record made after all, within 25 %.
+
+    The rig and what is hidden in it are simulated by scipy.
+    """
+    setup = read_setup(RIGS / "two_stops.toml")
+    hidden, runs, _, truth = hidden_case("two_stops", setup, "stop", 0)
+    found = diagnose(setup, runs)
+    (one,) = found.missing
+    assert (one.kind, one.arguments) == ("force", ("position",))
+    proposed = next_experiments(found, setup)
+    factors = [each.factor for each in proposed]
+    assert factors == sorted(factors) and factors[-1] < 1
+    best = proposed[0]
+    assert list(best.now) == ["force by position"]
+    old = found.after.problem
+    assert best.now["force by position"] == pytest.approx(
+        np.sqrt(np.mean(_band(found.after, one) ** 2)), rel=0.05
+    )
+    (made, _), *_ = made_case(
+        "two_stops",
+        setup,
+        truth,
+        np.random.default_rng(5),
+        hidden,
+        records=1,
+        speeds=(best.speed, best.speed),
+    )
+    problem = Problem.build(old.model, setup.segments((*runs, made)), old.parameters)
+    again = fit(problem, free=found.after.free, start=None, iterations=60)
+    assert again.converged
+    assert np.sqrt(np.mean(_band(again, one) ** 2)) == pytest.approx(
+        best.then["force by position"], rel=0.25
+    )
+
+
+def _band(found, one):
+    """Standard errors of a function along its argument."""
+    slopes = slopes_of_function(found, one)
+    rows = [[e.name for e in found.estimates].index(name) for name in one.numbers]
+    covariance = found.covariance[np.ix_(rows, rows)]
+    return np.sqrt(np.einsum("kp,pq,kq->k", slopes, covariance, slopes))

@@ -2,11 +2,13 @@
 
 import dataclasses
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import NamedTuple
 
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 
 from ..fitting import Parameter, Problem, Setup, Turning
 from ..recordings import (
@@ -19,9 +21,9 @@ from ..recordings import (
     Wandering,
 )
 from ..recordings.cut import measured_noise
-from .report import Diagnosis
+from .report import Diagnosis, slopes_of_function
 from .search import Blocks, blocks_of, newton_step
-from .terms import Term, WithTerms
+from .terms import FreeFunction, Term, WithTerms
 
 
 @dataclasses.dataclass(frozen=True)
@@ -37,9 +39,10 @@ class Experiment:
     name: str
     """Name of the record."""
     now: Mapping[str, float]
-    """Standard errors of the parameters in question without the record."""
+    """Standard errors of the parameters in question without the record; of a function,
+    the rms of its band."""
     then: Mapping[str, float]
-    """Standard errors of these parameters with the record."""
+    """The same with the record."""
     speed: float | None = None
     """Speed of the cam (rad/s), where there is one."""
 
@@ -62,9 +65,10 @@ def compare_experiments(
         found: The diagnosis of the records so far.
         records: Records simulated with the diagnosed system (`found.system()`) by
             [`jaxcam.recordings.record`][], and cut.
-        asked: Names of parameters; default the strengths of the named terms. Terms
-            whose BIC is not much worse stay free, so that the best record also
-            distinguishes them. If none is named, all terms, one at a time.
+        asked: Names of parameters; default the strengths of the named terms, and the
+            bands of functions without a name. Terms whose BIC is not much worse stay
+            free, so that the best record also distinguishes them. If nothing is
+            missing, all terms, one at a time.
 
     Returns:
         The experiments, best first.
@@ -90,10 +94,10 @@ def compare_experiments(
     made = [
         Experiment(
             name,
-            {one: _stderr(known, None, rows, one) for one, rows in questions.items()},
+            {name: _stderr(known, None, one) for name, one in questions.items()},
             {
-                one: _stderr(known, more.information[k], rows, one)
-                for one, rows in questions.items()
+                name: _stderr(known, more.information[k], one)
+                for name, one in questions.items()
             },
             problem.segments[k].recording.nominal_speed,
         )
@@ -166,7 +170,13 @@ def next_experiments(
     report = progress or (lambda sentence, fraction: None)
     rng = np.random.default_rng(seed)
     whole: WithTerms = model.system  # pyright: ignore
-    terms = tuple(t for t in _terms(found) if t.name in found.names and t.acts)
+    slots = {one.slot for one in found.missing}
+    terms = tuple(
+        t
+        for t in _terms(found)
+        if (t.label in slots if isinstance(t, FreeFunction) else t.name in found.names)
+        and t.acts
+    )
     system = WithTerms(whole.base, terms, whole.coordinates)
     channel, encoder = _encoder(rig, parts)
     states = np.asarray(found.after.point.states)[:, 0]
@@ -228,8 +238,21 @@ def _terms(found: Diagnosis) -> tuple[Term, ...]:
     return found.model(0).system.terms  # pyright: ignore
 
 
-def _questions(found: Diagnosis, asked) -> dict[str, list[str]]:
-    """Parameters that are asked for, and all that are free beside each."""
+class _Question(NamedTuple):
+    """What is asked for: `slopes` `(k, p)` of k values to parameters `own`, of all
+    that are `free`."""
+
+    free: list[str]
+    own: list[str]
+    slopes: Float[np.ndarray, "k p"]
+
+
+def _of_parameter(free: Iterable[str], name: str) -> _Question:
+    return _Question(sorted({*free, name}), [name], np.ones((1, 1)))
+
+
+def _questions(found: Diagnosis, asked) -> dict[str, _Question]:
+    """What is asked for, by parameters and functions."""
     own = {
         term.name: [one.name for one in term.strengths() if not one.inner]
         for term in _terms(found)
@@ -248,19 +271,28 @@ def _questions(found: Diagnosis, asked) -> dict[str, list[str]]:
     }
     beside = [one for name in {*named, *rivals} for one in own[name]]
     if asked is not None:
-        return {one: sorted({*rig, *beside, one}) for one in asked}
-    if named:
+        return {one: _of_parameter([*rig, *beside], one) for one in asked}
+    if named or found.missing:
         wanted = [one for name in named for one in own[name]]
-        return {one: sorted({*rig, *beside, one}) for one in wanted}
-    return {one: sorted({*rig, one}) for names in own.values() for one in names}
+        questions = {one: _of_parameter([*rig, *beside], one) for one in wanted}
+        for one in found.missing:
+            free = sorted({*rig, *beside, *one.numbers})
+            slopes = slopes_of_function(found.after, one)
+            about = f"{one.kind} by {' and '.join(one.arguments)}"
+            questions[about] = _Question(free, list(one.numbers), slopes)
+        return questions
+    return {one: _of_parameter(rig, one) for names in own.values() for one in names}
 
 
-def _stderr(known: Blocks, more, names: Sequence[str], one: str) -> float:
-    """Standard error of one parameter where some are free."""
+def _stderr(known: Blocks, more, question: _Question) -> float:
+    """Standard error of what is asked for where some parameters are free."""
     information, score = known.total()
     if more is not None:
         information = information + more
-    rows = known.rows(names)
+    rows = known.rows(question.free)
     _, covariance = newton_step(information, score, rows)
-    place = int(np.flatnonzero([known.names[k] == one for k in rows])[0])
-    return float(np.sqrt(covariance[place, place]) * known.scale[rows[place]])
+    names = [known.names[k] for k in rows]
+    own = [names.index(one) for one in question.own]
+    slopes = question.slopes * known.scale[rows[own]]
+    squares = np.einsum("kp,pq,kq->k", slopes, covariance[np.ix_(own, own)], slopes)
+    return float(np.sqrt(np.mean(squares)))

@@ -5,6 +5,7 @@ from ._held_out import HeldOut as HeldOut, rms_of as rms_of
 from ._limits import Limit as Limit, limits as limits
 from ._redrawn import Needs as Needs
 from ._ripple import Ripple as Ripple, ripple_of as ripple_of
+from ._rivals import Rival as Rival
 from ._shares import (
     misfit_by_part as misfit_by_part,
     Shares as Shares,

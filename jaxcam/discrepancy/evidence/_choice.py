@@ -18,6 +18,7 @@ from ._beyond_tolerance import acting_alike, Beyond, beyond_tolerance
 from ._held_out import held_out, HeldOut
 from ._masked import unmasked
 from ._redrawn import Needs, needs, redrawn, sure
+from ._rivals import Rival, rivals
 from ._structure import Structure, structures
 from ._visited_states import visited_states
 
@@ -47,7 +48,8 @@ class Choice:
         the corner of another one leaves as much.
     - `beyond`: parameters of the rig that are outside their tolerances.
     - `missing`: functions without a name that explain more than terms that have one;
-        `needs`: how much they are needed, by their labels.
+        `needs`: how much they are needed, by their labels; `rivals`: other functions
+        that were fitted in their place.
     - `left_before`, `left_after`: structures in the residuals of `before` and `best`.
     """
 
@@ -65,6 +67,7 @@ class Choice:
     beyond: list[Outside] = dataclasses.field(default_factory=list)
     missing: Missing | None = None
     needs: Needs | None = None
+    rivals: tuple[Rival, ...] = ()
 
     @property
     def unexplained(self) -> list[Structure]:
@@ -100,10 +103,12 @@ def choose(question: Question, trials: Trials, seed: int) -> Choice:
                 inclusion, deviation = redrawn(trials, best, seed)
     beyond, best = _instead(trials, best, deviation)
     inclusion |= {one.term: one.parameter.chance for one in beyond if one.term}
-    missing, needed_parts = None, None
+    missing, needed_parts, others = None, None, ()
     left = [one for one in left_after if one.significant]
     if left and trials.policy.functions:
-        missing, needed_parts = _without_a_name(question, trials, best, left, seed)
+        missing, needed_parts, others = _without_a_name(
+            question, trials, best, left, seed
+        )
     after = best.fit if missing is None else missing.fit
     if after is not before.fit:
         # the textbook model has its parameters where the rig file allows them
@@ -129,6 +134,7 @@ def choose(question: Question, trials: Trials, seed: int) -> Choice:
         beyond,
         missing,
         needed_parts,
+        others,
     )
 
 
@@ -159,7 +165,7 @@ def _bounded(trials: Trials, less: Fit, best: Fit) -> Fit:
 
 def _without_a_name(
     question: Question, trials: Trials, best: Trial, left: list[Structure], seed: int
-) -> tuple[Missing, Needs] | tuple[None, None]:
+) -> tuple[Missing | None, Needs | None, tuple[Rival, ...]]:
     """Functions that explain what the named terms leave over, by their evidence.
 
     What is left after a named term but is small beside what that explains is none, and
@@ -168,7 +174,7 @@ def _without_a_name(
     policy, bare = trials.policy, trials.known[frozenset()].fit.cost
     small = policy.small * (bare - best.fit.cost)
     if best.names and max(one.gain for one in left) < small:
-        return None, None
+        return None, None, ()
     problem = question.problem
     positions, velocities, approach, duration = visited_states(problem).ranges(policy)
     search = FreeSearch(
@@ -198,11 +204,11 @@ def _without_a_name(
         )
         least = min(needed.inclusion, key=lambda one: needed.inclusion[one])
         if needed.inclusion[least] >= policy.sure:
-            return found, needed
+            return found, needed, rivals(found, search.tried, policy, seed)
         if len(parts) < 2:
             break
         found = search.without(found, least)
-    return None, None
+    return None, None, ()
 
 
 def _left(question: Question, trials: Trials, trial: Trial) -> list[Structure]:

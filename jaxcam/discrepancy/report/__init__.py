@@ -8,6 +8,9 @@ from ._diagnosis import (
     Verdict as Verdict,
 )
 from ._formula import formula_of as formula_of
-from ._missing import MissingFunction as MissingFunction
+from ._missing import (
+    MissingFunction as MissingFunction,
+    slopes_of_function as slopes_of_function,
+)
 from ._words import listed as listed, number as number
 from ._write import diagnosis_of as diagnosis_of

@@ -1,11 +1,13 @@
 """Other explanations, the best first, each with the reason why it was not named."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
-from ..evidence import Choice
-from ..search import added_gain, Trial, Trials
+from ..evidence import Choice, Rival
+from ..policy import Policy
+from ..search import added_gain, Missing, Trial, Trials
 from ._diagnosis import Alternative
+from ._missing import named_function
 
 
 def fitted_alternatives(trials: Trials, choice: Choice) -> list[Trial]:
@@ -42,6 +44,47 @@ def alternatives_of(trials: Trials, choice: Choice) -> tuple[Alternative, ...]:
     # a single term is never left out for the many subsets that contain it
     singles = [one for one in found[most:] if len(one.terms) == 1]
     return (*found[:most], *singles)
+
+
+def alternatives_to_functions(
+    trials: Trials, missing: Missing, rivals: Sequence[Rival]
+) -> tuple[Alternative, ...]:
+    """Other functions and forms of them, then what named terms alone explain."""
+    policy = trials.policy
+    found = [
+        Alternative(
+            rival_name(rival),
+            rival.worse,
+            tuple(sorted(rival.missing.names)),
+            _why_not(rival, policy),
+        )
+        for rival in rivals
+    ]
+    named = sorted(trials.known.values(), key=lambda trial: trial.bic)
+    found += [
+        Alternative(
+            _name(trial),
+            trial.bic - missing.score,
+            _terms(trial),
+            "named terms alone explain less than the function",
+        )
+        for trial in named[: policy.alternatives]
+    ]
+    return tuple(sorted(found, key=lambda one: one.delta_bic))
+
+
+def rival_name(rival: Rival) -> str:
+    """The functions and terms of a rival."""
+    one = rival.missing
+    functions = [named_function(one.fit, part) for part in one.functions]
+    return " + ".join([*functions, *sorted(one.names)]) or "none"
+
+
+def _why_not(rival: Rival, policy: Policy) -> str:
+    found = rival.missing.fit
+    if found.cost > policy.near * found.problem.samples:
+        return "its fit did not come near the data"
+    return f"would be chosen in {rival.share:.0%} of the redrawn sets of stretches"
 
 
 def _additions(trials: Trials, choice: Choice) -> Iterator[Alternative]:

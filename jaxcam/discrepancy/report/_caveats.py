@@ -4,7 +4,7 @@ import dataclasses
 import enum
 from collections.abc import Iterator
 
-from ..evidence import Choice, HeldOut, Outside, rms_of
+from ..evidence import Choice, HeldOut, Outside, Rival, rms_of
 from ..search import Question, Trial, Trials
 from ._words import listed, number, quantity
 
@@ -126,6 +126,17 @@ def functions_fall_short(left: float) -> Caveat:
         Reason.FAR_FROM_DATA,
         f"With these functions the fit still misses by {left:.2g} times the noise: "
         f"they are a part of what is missing, and their form is rough.",
+    )
+
+
+def functions_tie(name: str, rival: Rival) -> Caveat:
+    """That another function, or another form, explains about as much."""
+    return Caveat(
+        Reason.TIE,
+        f"These records do not tell it from {name}, which would be chosen in "
+        f"{rival.share:.0%} of the redrawn sets of stretches. Record motions that "
+        f"visit more of the states between which the two differ.",
+        tuple(sorted(rival.missing.names)),
     )
 
 

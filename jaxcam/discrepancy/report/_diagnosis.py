@@ -32,10 +32,10 @@ class Verdict(enum.StrEnum):
 
 
 class Alternative(NamedTuple):
-    """Another subset of terms, and its BIC less the least one.
+    """Another subset of terms, or other functions, and its BIC less the least one.
 
-    `name` puts the names of its `terms` together, or is `"none"`; `reason` says why it
-    was not named.
+    `name` puts the names of its `terms` together, or is `"none"`, or states functions
+    by a formula or by their arguments; `reason` says why it was not named.
     """
 
     name: str

@@ -12,7 +12,16 @@ from jaxtyping import Float
 
 from ...fitting import Fit
 from ..search import Free, free_term, Hidden, Missing
-from ..terms import Factor, Family, HiddenElement, Resonator, Variable, Where
+from ..terms import (
+    Factor,
+    Family,
+    FreeFunction,
+    HiddenElement,
+    Resonator,
+    terms_of,
+    Variable,
+    Where,
+)
 from ._formula import formula_of
 from ._hidden import hidden_formula, hidden_table, hidden_unit, hidden_words
 
@@ -50,6 +59,7 @@ class MissingFunction:
     - `words`: what it is, for an engineer. `records` in which it was looked for.
     - `formula`: of what the value is, where a form with a few numbers explains as much.
     - `element`: of a resonance or a force with a memory, what a simulation needs.
+    - `numbers`: names of the fitted parameters that any other function is made of.
     """
 
     kind: str
@@ -62,6 +72,12 @@ class MissingFunction:
     records: tuple[str, ...]
     formula: str | None = None
     element: HiddenElement | None = None
+    numbers: tuple[str, ...] = ()
+
+    @property
+    def slot(self) -> str:
+        """The label of its parameters in the fit; empty for a force with a memory."""
+        return self.numbers[0].rpartition("_")[0] if self.numbers else ""
 
     def to_json(self) -> dict[str, Any]:
         table = {name: at.tolist() for name, at in zip(self.arguments, self.grid)}
@@ -150,7 +166,40 @@ def _one(found: Fit, one: Free, velocities, positions, points: int) -> MissingFu
         words,
         found.problem.records,
         formula,
+        numbers=tuple(one.coefficients),
     )
+
+
+def named_function(found: Fit, one: Free | Hidden) -> str:
+    """A function that was fitted, by its formula or by what it depends on."""
+    if isinstance(one, Hidden):
+        return one.label
+    kind = _KINDS[one.family.where]
+    if one.primitive is None:
+        return f"{kind} by {' and '.join(one.family.arguments)}"
+    numbers = np.array([found[name].value for name in one.coefficients])
+    return f"{kind} {formula_of(one.family, one.primitive, numbers, kind)[0]}"
+
+
+def slopes_of_function(
+    found: Fit, one: MissingFunction, points: int = 100
+) -> Float[np.ndarray, "points p"]:
+    """Derivatives of a function's values, without its factor, to its numbers."""
+    (term,) = (
+        term
+        for term in terms_of(found.model())
+        if isinstance(term, FreeFunction) and term.label == one.slot
+    )
+    along = jnp.linspace(term.low, term.high, points)
+    direction = jnp.tanh(along / term.slip) * term.jumping
+    count = len(one.numbers)
+
+    def values(numbers):
+        every = (*numbers, *term.coefficients[count:])
+        fresh = eqx.tree_at(lambda f: f.coefficients, term, every).prepared()
+        return jax.vmap(fresh.at)(along, direction)
+
+    return np.asarray(jax.jacfwd(values)(jnp.stack(term.coefficients[:count])))
 
 
 def _curve(one: Free, along, numbers):

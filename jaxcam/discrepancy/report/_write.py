@@ -5,7 +5,6 @@ from collections.abc import Iterator, Mapping
 from ...fitting import Fit
 from ..evidence import (
     Choice,
-    HeldOut,
     limits,
     misfit_by_part,
     Needs,
@@ -18,16 +17,22 @@ from ..evidence import (
 from ..policy import Policy
 from ..search import Missing, Question, Trials
 from ..terms import Value
-from ._alternatives import alternatives_of, fitted_alternatives
+from ._alternatives import (
+    alternatives_of,
+    alternatives_to_functions,
+    fitted_alternatives,
+    rival_name,
+)
 from ._caveats import (
     above_noise,
     Caveat,
     caveats_of,
     functions_fall_short,
+    functions_tie,
     noisier_than_stated,
     small_remainder,
 )
-from ._diagnosis import Alternative, Diagnosis, Verdict
+from ._diagnosis import Diagnosis, Verdict
 from ._effects import (
     drive_effect,
     missing_effects,
@@ -131,21 +136,12 @@ def _of_functions(
     if ripple is not None and ripple.significant(len(trials.terms) + 1, policy):
         effects.append(drive_effect(ripple, policy))
     floor = float(next(iter(question.problem.model.sensors.values())).floor)
-    others = sorted(trials.known.values(), key=lambda trial: trial.bic)
     within = bare.fit
     return Diagnosis(
         case,
         Verdict.UNKNOWN,
         tuple(effects),
-        tuple(
-            Alternative(
-                "+".join(sorted(trial.names)) or "none",
-                trial.bic - missing.score,
-                tuple(sorted(trial.names)),
-                "named terms alone explain less than the function",
-            )
-            for trial in others[: policy.alternatives]
-        ),
+        alternatives_to_functions(trials, missing, choice.rivals),
         held.before * floor,
         held.after * floor,
         floor,
@@ -163,16 +159,20 @@ def _of_functions(
         _pulls(question, within, found),
         {},
         {},
-        (*noisier_than_stated(question), *_doubts_of(missing, held, policy)),
+        (*noisier_than_stated(question), *_doubts_of(choice, missing, policy)),
         policy,
         functions,
         misfit_by_part(bare.fit, policy),
     )
 
 
-def _doubts_of(missing: Missing, held: HeldOut, policy: Policy) -> Iterator[Caveat]:
-    """That what was found does not explain everything, or not what it has not seen."""
-    left = rms_of(missing.fit)
+def _doubts_of(choice: Choice, missing: Missing, policy: Policy) -> Iterator[Caveat]:
+    """That what was found does not explain everything, or not what it has not seen, or
+    that something else explains as much."""
+    left, held = rms_of(missing.fit), choice.held
+    for rival in choice.rivals:
+        if rival.share > 1 - policy.sure:
+            yield functions_tie(rival_name(rival), rival)
     if left > policy.as_noise:
         yield functions_fall_short(left)
     elif held.after > policy.as_noise:

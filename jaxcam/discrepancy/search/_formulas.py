@@ -22,12 +22,17 @@ from ._slots import emptied, Free, free_term
 _GRID = 400
 
 
-def formulated(fits: FreeFits, found: Missing, small: float, progress) -> Missing:
+def formulated(
+    fits: FreeFits, found: Missing, small: float, progress
+) -> tuple[Missing, list[Missing]]:
     """The functions of a fit as forms, where these explain as much.
 
     **Arguments:** `small`, by how much less evidence a form may have: an edge that the
     steps of a flight cross costs them a little of their accuracy.
+
+    **Returns:** the fit, and all fits with forms.
     """
+    tried: list[Missing] = []
     for one in found.functions:
         if isinstance(one, Hidden) or not one.smooth:
             continue
@@ -38,10 +43,11 @@ def formulated(fits: FreeFits, found: Missing, small: float, progress) -> Missin
             progress(f"fitting a formula: {primitive.name}", None)
             trials.append(_fitted(fits, found, one, primitive, numbers))
         sound = [trial for trial in trials if math.isfinite(trial.score)]
+        tried += sound
         best = min(sound, key=lambda trial: trial.score, default=found)
         if best.score < found.score + small:
             found = best
-    return found
+    return found, tried
 
 
 def _enough(fits: FreeFits, found: Missing, trial: Missing) -> bool:

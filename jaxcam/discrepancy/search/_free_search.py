@@ -78,6 +78,8 @@ class FreeSearch:
         self.terms = [t for t in terms if not any(s.inner for s in t.strengths())]
         self.fits = FreeFits(rig, self.terms, policy)
         self.families = tuple(families)
+        # whole records fitted with other functions, or other forms of them
+        self.tried: list[Missing] = []
         impacting = any(family.where is not Where.FLIGHT for family in families)
         unit = self.families[0].motion_unit
         self.driven = driven_by(problem, unit) if policy.elements else None
@@ -101,7 +103,11 @@ class FreeSearch:
             return None
         found = self._pruned(found)
         found = simplified(self.fits, self.problem, found, self.progress)
-        return formulated(self.fits, found, self._small(found), self.progress)
+        small = self._small(found)
+        self.tried.append(found)
+        found, forms = formulated(self.fits, found, small, self.progress)
+        self.tried += forms
+        return found
 
     def _bare(self, problem: Problem, start: Point) -> Missing:
         return self.fits.fitted(
@@ -263,7 +269,10 @@ class FreeSearch:
             if problem is self.apart:
                 return first if math.isfinite(first.score) else None
         trial = self.fits.fitted(Subset(problem, functions, names), point)
-        return trial if math.isfinite(trial.score) else None
+        if not math.isfinite(trial.score):
+            return None
+        self.tried.append(trial)
+        return trial
 
     def _swapped(self, found: Missing) -> Missing:
         """Terms in the place of what was found first, where they explain more.
