@@ -87,7 +87,10 @@ def formula_of(
         text = f"{text}*{factor}"
     elif kind == "restitution":
         text = f"exp({text})"
-    words = f"{thing} that {_WORDS[primitive.name].format(**values)}: {text}"
+    says = _WORDS[primitive.name].format(**values)
+    if kind == "restitution" and numbers[0] < 0:
+        says = says.replace("grows", "falls")
+    words = f"{thing} that {says}: {text}"
     return text, words + _mechanism(family, primitive, numbers, values)
 
 

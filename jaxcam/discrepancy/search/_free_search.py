@@ -7,7 +7,6 @@ other flight can spoil, and then in whole records.
 import dataclasses
 import math
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
 
 import numpy as np
 from scipy.stats import chi2
@@ -15,44 +14,23 @@ from scipy.stats import chi2
 from ...fitting import Problem
 from ...fitting.engine import Point, separated
 from ..policy import Policy
-from ..terms import Family, own_faults, Term, Variable, Where
+from ..terms import Family, own_faults, Term, Where
 from ._blocks import blocks_of, values_of
 from ._formulas import formulated
-from ._free_fits import FreeFits, heat_of, heated, Missing, Subset, unscaled
+from ._free_fits import FreeFits, heat_of, Missing, Subset
 from ._gains import added_gain, gain
 from ._hidden_kinds import KINDS
-from ._hidden_leads import simplified, worthwhile
-from ._hidden_scan import Promise
+from ._hidden_leads import simplified
 from ._hidden_signals import driven_by
-from ._hidden_state import Hidden, started
-from ._local_force import force_blocks, force_response
-from ._roughness import Roughness, roughness
+from ._hidden_state import started
+from ._leads import Lead, Leads, shows_apart
 from ._slots import (
     emptied,
     filled,
     Free,
-    free_term,
     Part,
     roomy,
-    slots_of,
 )
-
-
-class _Lead(NamedTuple):
-    """One more function or term, and how much it promises."""
-
-    gain: float
-    name: str | None = None
-    family: Family | None = None
-    rough: Roughness | None = None
-    slot: str = ""
-    promise: Promise | None = None
-
-    @property
-    def label(self) -> str:
-        if self.promise is not None:
-            return self.promise.hidden.label
-        return self.name or (self.family.name if self.family else "")
 
 
 class FreeSearch:
@@ -85,7 +63,10 @@ class FreeSearch:
         self.driven = driven_by(problem, unit) if policy.elements else None
         self.problem = roomy(problem, self.families[0], impacting, self.driven)
         # what any sensor may do is no function without a name
-        self.faults = own_faults(self.problem.model, self.problem.parameters)
+        faults = own_faults(self.problem.model, self.problem.parameters)
+        self.leads = Leads(
+            self.fits, self.families, self.driven, faults, policy, progress
+        )
         self.apart = dataclasses.replace(
             self.problem, extras=separated(self.problem.extras)
         )
@@ -142,21 +123,19 @@ class FreeSearch:
             found = best
         return found
 
-    def _shows_apart(self, lead: _Lead) -> bool:
+    def _shows_apart(self, lead: Lead) -> bool:
         """Whether pieces that are tied to none show what a lead adds."""
         if lead.promise is not None:
             return True
         if lead.family is not None:
-            place, argument = lead.family.where, lead.family.argument
-            drifts = place is Where.SENSOR and argument is Variable.TIME
-            return place is not Where.IMPACT and not drifts
+            return shows_apart(lead.family)
         acts = self._term(lead.name).acts
         return Where.FLIGHT in acts or Where.CONTACT in acts
 
     def _term(self, name: str | None) -> Term:
         return next(term for term in self.terms if term.name == name)
 
-    def _done(self, best: Missing, lead: _Lead, first: _Lead) -> bool:
+    def _done(self, best: Missing, lead: Lead, first: Lead) -> bool:
         """Whether what explains the data leaves a lead without a chance."""
         close = lead.gain > self.policy.rivalling * first.gain
         return heat_of(best.fit) < self.policy.as_noise and not close
@@ -172,81 +151,17 @@ class FreeSearch:
         least = max(float(chi2.isf(chance, 1)), math.log(self.problem.samples))
         return (math.sqrt(least) + self.policy.beyond) ** 2
 
-    def _leads(self, problem: Problem, found: Missing, apart: bool) -> list[_Lead]:
-        """Return the most promising candidate, by a quadratic likelihood about a
-        fit.
-        """
-        self.progress("looking for functions of what is left over", None)
-        policy = self.policy
-        heat = heat_of(found.fit)
-        problem = heated(filled(problem, found.functions), heat)
-        point, free = found.fit.point, self.fits.free(found)
-        leads = []
-        used = {one.slot for one in found.functions}
-        slots = {
-            where: [s for s in slots_of(problem, where) if s not in used]
-            if len(used) < self.policy.functions
-            else []
-            for where in (Where.FLIGHT, Where.IMPACT, Where.CONTACT, Where.SENSOR)
-        }
-        forces = [f for f in self.families if f.where is Where.FLIGHT]
-        forces = forces if slots[Where.FLIGHT] else []
-        hidden = self.driven is not None and len(used) < self.policy.functions
-        hidden = hidden and not any(isinstance(f, Hidden) for f in found.functions)
-        if forces or hidden:
-            response = force_response(problem, point, free)
-            for family in forces:
-                # one at a time: all of them at once would take gigabytes
-                slot = slots[Where.FLIGHT][0]
-                term = free_term(family, "new")
-                blocks = force_blocks(problem, response, [term])
-                information, score = (x / heat for x in blocks.total())
-                rows = blocks.rows(response.free)
-                own = blocks.rows([p.name for p in term.parameters(0)])
-                zero = np.zeros(len(own))
-                rough = roughness(information, score, rows, own, family, zero, policy)
-                leads.append(_Lead(rough.gain, None, family, rough, slot))
-            if hidden and self.driven is not None:
-                self.progress("looking for forces with a state of their own", None)
-                elements = worthwhile(problem, response, self.driven, policy, heat)
-                leads += [_Lead(gain, promise=one) for gain, one in elements]
-        # impacts say nothing where they tie nothing
-        elsewhere = {Where.CONTACT, Where.SENSOR, *([] if apart else [Where.IMPACT])}
-        for family in self.families:
-            if family.where not in elsewhere or not slots[family.where]:
-                continue
-            slot = slots[family.where][0]
-            one = Free(family, Roughness(), slot)
-            put, names = filled(problem, [one], prior=False), one.coefficients
-            beside = free
-            if family.where is Where.SENSOR:
-                beside = list(dict.fromkeys([*free, *self.faults]))
-            blocks = blocks_of(put, point, names=[*beside, *names])
-            information, score = unscaled(blocks, names, heat)
-            rows, own = blocks.rows(beside), blocks.rows(names)
-            zero = np.zeros(len(own))
-            rough = roughness(information, score, rows, own, family, zero, policy)
-            leads.append(_Lead(rough.gain, None, family, rough, slot))
-        terms = [t for t in self.terms if t.name not in found.names]
-        if terms:
-            strengths = [one.name for t in terms for one in t.strengths()]
-            blocks = blocks_of(problem, point, names=[*free, *strengths])
-            information, score = blocks.total()
-            rows = blocks.rows(free)
-            for term in terms:
-                own = blocks.rows([one.name for one in term.strengths()])
-                grown = added_gain(information, score, rows, own, self.policy.alike)
-                price = len(own) * math.log(problem.samples)
-                leads.append(_Lead(grown / heat - price, term.name))
+    def _leads(self, problem: Problem, found: Missing, apart: bool) -> list[Lead]:
+        """The candidates that promise enough to be fitted, the best first."""
+        leads = self.leads.ranked(problem, found, apart)
         if not leads:
             return []
-        leads.sort(key=lambda lead: -lead.gain)
         least = max(self._least(), self.policy.promising * leads[0].gain)
         if not apart and found.functions:
-            least = max(least, self._small(found) / heat)
+            least = max(least, self._small(found) / heat_of(found.fit))
         return [lead for lead in leads if lead.gain > least][: self.policy.followed]
 
-    def _with(self, problem: Problem, found: Missing, lead: _Lead) -> Missing | None:
+    def _with(self, problem: Problem, found: Missing, lead: Lead) -> Missing | None:
         functions, names = found.functions, found.names
         point = found.fit.point
         if lead.promise is not None:

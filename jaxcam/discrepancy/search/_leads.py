@@ -1,0 +1,165 @@
+"""What promises most beside a fit: functions, terms, and forces with a state."""
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ...fitting import Problem
+from ..policy import Policy
+from ..terms import Family, Variable, Where
+from ._blocks import blocks_of
+from ._free_fits import FreeFits, heat_of, heated, Missing, unscaled
+from ._gains import added_gain
+from ._hidden_leads import worthwhile
+from ._hidden_scan import Promise
+from ._hidden_signals import Driven
+from ._hidden_state import Hidden
+from ._local_force import force_blocks, force_response, Response
+from ._roughness import Roughness, roughness
+from ._slots import filled, Free, free_term, slots_of
+
+
+class Lead(NamedTuple):
+    """One more function or term, and how much it promises."""
+
+    gain: float
+    name: str | None = None
+    family: Family | None = None
+    rough: Roughness | None = None
+    slot: str = ""
+    promise: Promise | None = None
+
+    @property
+    def label(self) -> str:
+        if self.promise is not None:
+            return self.promise.hidden.label
+        return self.name or (self.family.name if self.family else "")
+
+
+class Leads:
+    """Ranks what may be added to a fit, by a quadratic likelihood about it.
+
+    **Arguments:** how subsets are fitted, families of functions, what drives a force
+    with a state of its own (if such are looked for), names of the faults that any
+    sensor may have, the policy, and `progress(sentence, fraction)`.
+    """
+
+    def __init__(
+        self,
+        fits: FreeFits,
+        families: Sequence[Family],
+        driven: Driven | None,
+        faults: Sequence[str],
+        policy: Policy,
+        progress: Callable[[str, float | None], None],
+    ):
+        self.fits, self.families, self.driven = fits, tuple(families), driven
+        self.faults, self.policy, self.progress = tuple(faults), policy, progress
+
+    def ranked(self, problem: Problem, found: Missing, apart: bool) -> list[Lead]:
+        """All candidates, the most promising first; `apart` without what impacts
+        say."""
+        self.progress("looking for functions of what is left over", None)
+        problem = heated(filled(problem, found.functions), heat_of(found.fit))
+        leads = [
+            *self._in_flight(problem, found),
+            *self._elsewhere(problem, found, apart),
+            *self._terms(problem, found),
+        ]
+        return sorted(leads, key=lambda lead: -lead.gain)
+
+    def _slot(self, problem: Problem, found: Missing, where: Where) -> str | None:
+        """Where one more function has room."""
+        used = {one.slot for one in found.functions}
+        if len(used) >= self.policy.functions:
+            return None
+        return next((s for s in slots_of(problem, where) if s not in used), None)
+
+    def _in_flight(self, problem: Problem, found: Missing) -> Iterator[Lead]:
+        slot = self._slot(problem, found, Where.FLIGHT)
+        forces = [one for one in self.families if one.where is Where.FLIGHT]
+        forces = forces if slot is not None else []
+        hidden = self.driven is not None and self._has_room(found)
+        if not forces and not hidden:
+            return
+        response = force_response(problem, found.fit.point, self.fits.free(found))
+        for family in forces:
+            # one at a time: all of them at once would take gigabytes
+            yield self._force(problem, found, family, response, slot or "")
+        if hidden and self.driven is not None:
+            self.progress("looking for forces with a state of their own", None)
+            heat = heat_of(found.fit)
+            for grown, one in worthwhile(
+                problem, response, self.driven, self.policy, heat
+            ):
+                yield Lead(grown, promise=one)
+
+    def _has_room(self, found: Missing) -> bool:
+        """For one force with a state of its own."""
+        slots = {one.slot for one in found.functions}
+        one = any(isinstance(f, Hidden) for f in found.functions)
+        return len(slots) < self.policy.functions and not one
+
+    def _force(
+        self,
+        problem: Problem,
+        found: Missing,
+        family: Family,
+        response: Response,
+        slot: str,
+    ) -> Lead:
+        heat = heat_of(found.fit)
+        term = free_term(family, "new")
+        blocks = force_blocks(problem, response, [term])
+        information, score = (x / heat for x in blocks.total())
+        rows = blocks.rows(response.free)
+        own = blocks.rows([p.name for p in term.parameters(0)])
+        zero = np.zeros(len(own))
+        rough = roughness(information, score, rows, own, family, zero, self.policy)
+        return Lead(rough.gain, None, family, rough, slot)
+
+    def _elsewhere(
+        self, problem: Problem, found: Missing, apart: bool
+    ) -> Iterator[Lead]:
+        """Functions of the surface, of sensors and of impacts."""
+        free, heat = self.fits.free(found), heat_of(found.fit)
+        # impacts say nothing where they tie nothing
+        places = {Where.CONTACT, Where.SENSOR, *([] if apart else [Where.IMPACT])}
+        for family in self.families:
+            slot = self._slot(problem, found, family.where)
+            if family.where not in places or slot is None:
+                continue
+            one = Free(family, Roughness(), slot)
+            put, names = filled(problem, [one], prior=False), one.coefficients
+            beside = free
+            if family.where is Where.SENSOR:
+                beside = list(dict.fromkeys([*free, *self.faults]))
+            blocks = blocks_of(put, found.fit.point, names=[*beside, *names])
+            information, score = unscaled(blocks, names, heat)
+            rows, own = blocks.rows(beside), blocks.rows(names)
+            zero = np.zeros(len(own))
+            rough = roughness(information, score, rows, own, family, zero, self.policy)
+            yield Lead(rough.gain, None, family, rough, slot)
+
+    def _terms(self, problem: Problem, found: Missing) -> Iterator[Lead]:
+        terms = [t for t in self.fits.terms if t.name not in found.names]
+        if not terms:
+            return
+        free, heat = self.fits.free(found), heat_of(found.fit)
+        strengths = [one.name for t in terms for one in t.strengths()]
+        blocks = blocks_of(problem, found.fit.point, names=[*free, *strengths])
+        information, score = blocks.total()
+        rows = blocks.rows(free)
+        for term in terms:
+            own = blocks.rows([one.name for one in term.strengths()])
+            grown = added_gain(information, score, rows, own, self.policy.alike)
+            price = len(own) * math.log(problem.samples)
+            yield Lead(grown / heat - price, term.name)
+
+
+def shows_apart(family: Family) -> bool:
+    """Whether pieces that are tied to none show a function."""
+    drifts = family.where is Where.SENSOR and family.argument is Variable.TIME
+    return family.where is not Where.IMPACT and not drifts
