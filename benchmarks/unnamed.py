@@ -21,7 +21,7 @@ from scipy.interpolate import RegularGridInterpolator
 from benchmarks._hidden_physics import EFFECTS, Hidden, Scales
 from benchmarks._own_rig_makers import Accumulates, made_case, MAKERS, Motion
 from benchmarks.own_rigs import drawn, RIGS
-from jaxcam.discrepancy import diagnose, Diagnosis
+from jaxcam.discrepancy import diagnose, Diagnosis, Policy
 from jaxcam.fitting import read_setup
 
 
@@ -133,12 +133,13 @@ def main() -> None:
     parser.add_argument("--effects", nargs="*", choices=sorted(EFFECTS))
     parser.add_argument("--first", type=int, default=0, help="seed of the first case")
     parser.add_argument("--cases", type=int, default=1, help="of each effect")
+    parser.add_argument("--elements", type=int, default=Policy().elements)
     args = parser.parse_args()
+    policy = Policy(elements=args.elements)
     setup = read_setup(RIGS / f"{args.rig}.toml")
     maker, count, right = MAKERS[args.rig], 0, 0
-    for name, effect in EFFECTS.items():
-        if args.effects and name not in args.effects:
-            continue
+    for name in args.effects or EFFECTS:
+        effect = EFFECTS[name]
         if "phase" in effect.arguments and maker.speeds is None:
             continue
         if effect.kind in _AT_IMPACTS and not maker.impacts:
@@ -146,7 +147,9 @@ def main() -> None:
         for seed in range(args.first, args.first + args.cases):
             hidden, runs, motions, _ = hidden_case(args.rig, setup, name, seed)
             begun, spent = time.time(), time.process_time()
-            found = diagnose(setup, runs, case=f"{args.rig} {name} {seed}")
+            found = diagnose(
+                setup, runs, case=f"{args.rig} {name} {seed}", policy=policy
+            )
             good, why = judged(found, hidden, motions)
             count, right = count + 1, right + good
             print(
