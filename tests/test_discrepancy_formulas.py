@@ -21,6 +21,7 @@ NUMBERS = {
     "square": (2.0,),
     "cube": (-2.0,),
     "exponential": (0.5, 3.0),
+    "power": (0.6, 2.2),
     "wave": (0.7, 2.3, 0.4),
     "forward": (0.6,),
     "falling": (0.6, 0.2),
@@ -32,14 +33,19 @@ NUMBERS = {
     "bump in turn": (0.6, 3.7, 0.25),
 }
 
+ARGUMENTS = (Variable.POSITION, Variable.VELOCITY, Variable.PHASE, Variable.TIME)
+
 
 def _family(argument, factor=Factor.ONE, where=Where.FLIGHT):
-    low, high = (0.0, 2 * math.pi) if argument is Variable.PHASE else (LOW, HIGH)
+    low, high = {
+        Variable.PHASE: (0.0, 2 * math.pi),
+        Variable.TIME: (0.0, HIGH),
+    }.get(argument, (LOW, HIGH))
     return Family(where, argument, low, high, factor, middle=0.3, slip=SLIP)
 
 
 def _forms():
-    for argument in (Variable.POSITION, Variable.VELOCITY, Variable.PHASE):
+    for argument in ARGUMENTS:
         family = _family(argument)
         for primitive in family.primitives:
             yield pytest.param(family, primitive, id=f"{argument} {primitive.name}")
@@ -70,10 +76,23 @@ def test_the_formula_is_the_function_that_was_fitted(family, primitive):
 
 
 def test_every_form_has_as_many_numbers_as_it_says():
-    for argument in (Variable.POSITION, Variable.VELOCITY, Variable.PHASE):
+    for argument in ARGUMENTS:
         for primitive in _family(argument).primitives:
             assert primitive.count == len(NUMBERS[primitive.name])
             assert len(primitive.scales) == primitive.count - 1
+
+
+def test_a_form_is_refused_where_its_place_is_outside_the_data():
+    bump = next(p for p in _family(Variable.TIME).primitives if p.name == "bump")
+    assert bump.within((0.3, 0.8, 2.0)) and not bump.within((0.3, 1.4, 2.0))
+
+
+def test_what_falls_from_the_beginning_is_said_to_fall():
+    family = _family(Variable.TIME, where=Where.IMPACT)
+    power = next(one for one in family.primitives if one.name == "power")
+    text, words = formula_of(family, power, np.array([-0.1, 2.0]), "restitution")
+    assert text == f"exp(-0.1*(time/{HIGH:.4g})**2)"
+    assert words.startswith("a restitution that falls as the time to the power 2")
 
 
 def test_an_elastic_stop_is_said_to_be_one():

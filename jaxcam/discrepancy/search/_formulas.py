@@ -38,16 +38,26 @@ def formulated(
             continue
         trials = []
         for primitive, numbers in _promising(fits, found, one):
-            if any(_enough(fits, found, trial) for trial in trials):
+            if any(
+                _sound(trial, one) and _enough(fits, found, trial) for trial in trials
+            ):
                 break
             progress(f"fitting a formula: {primitive.name}", None)
             trials.append(_fitted(fits, found, one, primitive, numbers))
-        sound = [trial for trial in trials if math.isfinite(trial.score)]
+        sound = [trial for trial in trials if _sound(trial, one)]
         tried += sound
         best = min(sound, key=lambda trial: trial.score, default=found)
         if best.score < found.score + small:
             found = best
     return found, tried
+
+
+def _sound(trial: Missing, one: Free) -> bool:
+    """Whether a fit with a form came to an end, with its places among the data."""
+    (form,) = (f for f in trial.functions if f.slot == one.slot)
+    assert isinstance(form, Free) and form.primitive is not None
+    numbers = [trial.fit[name].value for name in form.coefficients]
+    return math.isfinite(trial.score) and form.primitive.within(numbers)
 
 
 def _enough(fits: FreeFits, found: Missing, trial: Missing) -> bool:

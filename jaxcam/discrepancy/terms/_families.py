@@ -8,7 +8,14 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ._primitives import OF_PHASE, OF_SPEED, ON_A_LINE, Primitive, STRAIGHT
+from ._primitives import (
+    FROM_ZERO,
+    OF_PHASE,
+    OF_SPEED,
+    ON_A_LINE,
+    Primitive,
+    STRAIGHT,
+)
 from ._shapes import Variable
 from ._where import Where
 
@@ -87,6 +94,8 @@ class Family:
         if self.where is Where.SENSOR and self.argument is not Variable.TIME:
             # a gain or a lag is no form without a name
             return tuple(one for one in ON_A_LINE if one is not STRAIGHT)
+        if self.argument in (Variable.TIME, Variable.APPROACH):
+            return (*ON_A_LINE, *FROM_ZERO)
         return (*ON_A_LINE, *OF_SPEED) if self.jumps else ON_A_LINE
 
     def waves(self, count: int) -> tuple[Array, Array]:

@@ -13,6 +13,8 @@ import numpy as np
 
 
 _EDGE = 0.01
+# A share of the range, in the place of zero, of which a power has derivatives
+_LEAST = 1e-6
 
 
 class Place(NamedTuple):
@@ -34,6 +36,7 @@ class Primitive(NamedTuple):
     - `scales`: for each number but the first, a change that matters.
     - `jump`: of the form where the velocity changes sign, in halves of its size.
     - `odd`: whether the form is multiplied with the direction of the motion.
+    - `places`: which numbers are places, as shares of the range.
     """
 
     name: str
@@ -42,6 +45,11 @@ class Primitive(NamedTuple):
     scales: tuple[float, ...] = ()
     jump: float = 0.0
     odd: bool = False
+    places: tuple[int, ...] = ()
+
+    def within(self, numbers) -> bool:
+        """Whether the places are where the argument has been."""
+        return all(0.0 <= float(numbers[k]) <= 1.0 for k in self.places)
 
     @property
     def count(self) -> int:
@@ -71,23 +79,35 @@ _EVERY = _shares(0.0, 2 * np.pi, 73)[:-1]
 
 STRAIGHT = Primitive("straight", lambda at, p: p[0] * at.u)
 ABOVE = Primitive(
-    "above", lambda at, p: p[0] * jnp.maximum(at.u - p[1], 0.0), (_INSIDE,), (0.05,)
+    "above",
+    lambda at, p: p[0] * jnp.maximum(at.u - p[1], 0.0),
+    (_INSIDE,),
+    (0.05,),
+    places=(1,),
 )
 BELOW = Primitive(
-    "below", lambda at, p: p[0] * jnp.maximum(p[1] - at.u, 0.0), (_INSIDE,), (0.05,)
+    "below",
+    lambda at, p: p[0] * jnp.maximum(p[1] - at.u, 0.0),
+    (_INSIDE,),
+    (0.05,),
+    places=(1,),
 )
-STEP = Primitive("step", lambda at, p: p[0] * _step(at.u - p[1]), (_INSIDE,), (0.05,))
+STEP = Primitive(
+    "step", lambda at, p: p[0] * _step(at.u - p[1]), (_INSIDE,), (0.05,), places=(1,)
+)
 WINDOW = Primitive(
     "window",
     lambda at, p: p[0] * (_step(at.u - p[1]) - _step(at.u - p[2])),
     (_INSIDE, _INSIDE),
     (0.05, 0.05),
+    places=(1, 2),
 )
 BUMP = Primitive(
     "bump",
     lambda at, p: p[0] * jnp.exp(-(((at.u - p[1]) / p[2]) ** 2)),
     (_INSIDE, (0.03, 0.05, 0.08, 0.12, 0.2, 0.3)),
     (0.05, 0.03),
+    places=(1,),
 )
 SQUARE = Primitive("square", lambda at, p: p[0] * (at.u - 0.5) ** 2)
 CUBE = Primitive("cube", lambda at, p: p[0] * (at.u - 0.5) ** 3)
@@ -96,6 +116,12 @@ EXPONENTIAL = Primitive(
     lambda at, p: p[0] * jnp.exp(p[1] * (at.u - 0.5)),
     ((-16.0, -8.0, -4.0, -2.0, 2.0, 4.0, 8.0, 16.0),),
     (1.0,),
+)
+POWER = Primitive(
+    "power",
+    lambda at, p: p[0] * jnp.maximum(at.u, _LEAST) ** p[1],
+    ((0.5, 1.5, 2.0, 3.0),),
+    (0.2,),
 )
 WAVE = Primitive(
     "wave",
@@ -148,8 +174,9 @@ ON_A_LINE = (
     EXPONENTIAL,
     WAVE,
 )
+FROM_ZERO = (POWER,)
 OF_SPEED = (FORWARD, FALLING)
 OF_PHASE = (*HARMONICS, HALF_TURN, ARC, BUMP_IN_TURN)
 
-PRIMITIVES = (*ON_A_LINE, *OF_SPEED, *OF_PHASE)
+PRIMITIVES = (*ON_A_LINE, *OF_SPEED, *OF_PHASE, *FROM_ZERO)
 """All forms, in the order of their numbers in a compiled program."""
