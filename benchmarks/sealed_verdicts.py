@@ -14,8 +14,6 @@ import time
 import traceback
 from pathlib import Path
 
-import jax
-
 from benchmarks.own_rigs import RIGS
 from jaxcam.discrepancy import diagnose
 from jaxcam.fitting import read_setup
@@ -57,8 +55,6 @@ def main() -> None:
             traceback.print_exc()
             verdict = {"case": case.name, "verdict": "failed", "summary": str(error)}
         file.write_text(json.dumps(verdict, default=float))
-        # every compiled program takes some of the mappings that a process may have
-        jax.clear_caches()
         print(f"{case.name}: {verdict['verdict']}: {verdict['summary']}", flush=True)
     files = [args.keep / f"{case.name}.json" for case in cases]
     if all(file.is_file() for file in files):

@@ -15,7 +15,6 @@ import argparse
 import math
 import time
 
-import jax
 import numpy as np
 from scipy.interpolate import RegularGridInterpolator
 
@@ -159,8 +158,6 @@ def main() -> None:
                 f"CPU]\n    {found.summary}",
                 flush=True,
             )
-            # every compiled program takes some of the mappings that a process may have
-            jax.clear_caches()
     print(f"{args.rig}: {right} of {count} right")
 
 

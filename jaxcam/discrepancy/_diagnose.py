@@ -6,6 +6,7 @@ from pathlib import Path
 from ..fitting import Input, Parameter, Sensor, Setup, Turning
 from ..hybrid import HybridSystem
 from ..recordings import Recording, Rig, Segments
+from ._mappings import make_room
 from ._set_aside import odd_record, set_aside
 from .evidence import choose, ripple_of
 from .policy import Policy
@@ -68,6 +69,7 @@ def diagnose(
         ValueError: A term acts nowhere.
     """
     report = progress or (lambda sentence, fraction: None)
+    make_room()
 
     def asked(runs: Sequence[Recording | Segments], folder: Path | None) -> Diagnosis:
         question = _question(
