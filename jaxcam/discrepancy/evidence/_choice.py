@@ -15,7 +15,7 @@ from ..search import (
 )
 from ..terms import families
 from ._beyond_tolerance import acting_alike, Beyond, beyond_tolerance
-from ._held_out import held_out, HeldOut, rms_of
+from ._held_out import held_out, HeldOut
 from ._masked import unmasked
 from ._redrawn import Needs, needs, redrawn, sure
 from ._rivals import Rival, rivals
@@ -175,36 +175,9 @@ def _without_a_name(
     small = policy.small * (bare - best.fit.cost)
     if best.names and max(one.gain for one in left) < small:
         return None, None, ()
-    search = _searching(question, trials, bare, False)
-    found = search.run()
-    if policy.elements and (found is None or rms_of(found.fit) > policy.as_noise):
-        # functions of what is measured do not explain it
-        deeper = _searching(question, trials, bare, True)
-        other = deeper.run()
-        if other is not None and (found is None or other.score < found.score):
-            search, found = deeper, other
-    while found is not None and found.functions and found.score < best.bic:
-        parts, prices = search.fits.parts(found), search.fits.prices(found)
-        fitted = found.fit
-        needed = needs(
-            fitted.problem, fitted, parts, prices, policy, seed, names=fitted.free
-        )
-        least = min(needed.inclusion, key=lambda one: needed.inclusion[one])
-        if needed.inclusion[least] >= policy.sure:
-            return found, needed, rivals(found, search.tried, policy, seed)
-        if len(parts) < 2:
-            break
-        found = search.without(found, least)
-    return None, None, ()
-
-
-def _searching(
-    question: Question, trials: Trials, bare: float, elements: bool
-) -> FreeSearch:
-    """The search for functions, with or without forces with a state of their own."""
-    problem, policy = question.problem, trials.policy
+    problem = question.problem
     positions, velocities, approach, duration = visited_states(problem).ranges(policy)
-    return FreeSearch(
+    search = FreeSearch(
         problem,
         question.rig,
         question.terms,
@@ -221,8 +194,21 @@ def _searching(
         policy,
         trials.progress,
         bare,
-        elements,
     )
+    found = search.run()
+    while found is not None and found.functions and found.score < best.bic:
+        parts, prices = search.fits.parts(found), search.fits.prices(found)
+        fitted = found.fit
+        needed = needs(
+            fitted.problem, fitted, parts, prices, policy, seed, names=fitted.free
+        )
+        least = min(needed.inclusion, key=lambda one: needed.inclusion[one])
+        if needed.inclusion[least] >= policy.sure:
+            return found, needed, rivals(found, search.tried, policy, seed)
+        if len(parts) < 2:
+            break
+        found = search.without(found, least)
+    return None, None, ()
 
 
 def _left(question: Question, trials: Trials, trial: Trial) -> list[Structure]:

@@ -37,9 +37,8 @@ class FreeSearch:
     """Adds functions and terms one by one, as long as the evidence grows.
 
     **Arguments:** the problem, names of the rig's own parameters, terms that may be
-    named, families of functions, the policy, `progress(sentence, fraction)`, the cost
-    of the model without any of them, and whether forces with a state of their own are
-    looked for as well.
+    named, families of functions, the policy, `progress(sentence, fraction)`, and the
+    cost of the model without any of them.
     """
 
     def __init__(
@@ -51,7 +50,6 @@ class FreeSearch:
         policy: Policy,
         progress: Callable[[str, float | None], None],
         cost: float,
-        elements: bool = False,
     ):
         self.cost = cost
         self.policy, self.progress = policy, progress
@@ -62,7 +60,7 @@ class FreeSearch:
         self.tried: list[Missing] = []
         impacting = any(family.where is not Where.FLIGHT for family in families)
         unit = self.families[0].motion_unit
-        self.driven = driven_by(problem, unit) if elements else None
+        self.driven = driven_by(problem, unit) if policy.elements else None
         self.problem = roomy(problem, self.families[0], impacting, self.driven)
         # what any sensor may do is no function without a name
         faults = own_faults(self.problem.model, self.problem.parameters)
