@@ -114,8 +114,12 @@ def _outlook(found, nominal, predict: bool, propose: bool, seed: int, report):
 
     outlook = Outlook()
     if predict and found.verdict != discrepancy.Verdict.UNKNOWN:
-        report("predicting with and without", None)
-        outlook = Outlook(discrepancy.predictions(found))
+        words = "predicting with and without the missing physics"
+        report(words, None)
+        predicted = discrepancy.predictions(
+            found, progress=lambda share: report(words, share)
+        )
+        outlook = Outlook(predicted)
     if propose and any(one.element is not None for one in found.missing):
         report("proposing no record, as a force with a memory was found", None)
     elif propose:

@@ -5,12 +5,13 @@ import json
 import math
 import os
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
 from ..models import CamFollower
 from ..thesis import reproduce, TARGETS
+from ..thesis.progress import reporting
 from ._output import to_text
 from ._source_mark import source_mark
 
@@ -63,18 +64,21 @@ def make(
     settings: Origin,
     out: Path | None,
     keep_going: bool,
+    progress: Callable[[str, float | None], None] | None = None,
 ) -> TargetRecord:
     """Compute a target, and draw it where there is a folder for that.
 
-    **Arguments:** `keep_going`: an exception becomes part of the record.
+    **Arguments:** `keep_going`: an exception becomes part of the record; `progress`:
+    as of `reproduce`, also while it is drawn.
     """
     begin, rows, drawn = time.perf_counter(), [], False
     try:
-        table = reproduce(name, system, settings.size)
+        table = reproduce(name, system, settings.size, progress=progress)
         rows = table.to_dict(orient="records")
         if out is not None:
             table.to_csv(out / f"{name}.csv", index=False)
-            drawn = _draw(name, system, settings.size, out)
+            with reporting(progress):
+                drawn = _draw(name, system, settings.size, out)
         error = None
     except Exception as problem:
         if not keep_going:

@@ -17,6 +17,8 @@ from ._section_turn import section_turn
 
 # states that are followed together
 _ROW = 32
+# most rows that narrow a bracket: it ends at two neighbouring numbers before
+_PASSES = 12
 
 
 class Lobes(eqx.Module):
@@ -118,6 +120,7 @@ def find_lobes(
     direction=None,
     samples: int = 64,
     most: int = 8,
+    progress: Callable[[float], None] | None = None,
 ) -> Lobes:
     """Measure the stroboscopic map around the interruption and find its lobes.
 
@@ -133,6 +136,7 @@ def find_lobes(
             `component` alone. A map to iterate needs `ComposedMap.vector`.
         samples: Number of points measured in each lobe.
         most: Largest number of lobes.
+        progress: Called with the fraction done, of as many lobes as asked for.
 
     Returns:
         The [`variational.chatter.Lobes`][].
@@ -152,21 +156,28 @@ def find_lobes(
             f"{component}. Give another component or direction."
         )
     along = along / along[component]
+    scan = base + np.asarray(deviations, dtype=float)
+    done = 0
+    # of the scan, the brackets, the points of the lobes, and three single ones
+    total = _rows(len(scan)) + (most + 2) * _PASSES + _rows(most * samples) + 3
 
     def turn(x):
         # in rows of one length, so that one compiled program serves all
-        rows = -(-len(x) // _ROW)
+        nonlocal done
+        rows = _rows(len(x))
         padded = np.concatenate([x, np.full(rows * _ROW - len(x), x[-1])])
-        parts = [
-            _turns(system, state, along, jnp.asarray(row), phase, component)
-            for row in padded.reshape(rows, _ROW)
-        ]
+        parts = []
+        for row in padded.reshape(rows, _ROW):
+            row = jnp.asarray(row)
+            parts.append(_turns(system, state, along, row, phase, component))
+            done += 1
+            if progress is not None:
+                progress(done / total)
         return tuple(
             np.concatenate([np.asarray(v) for v in column])[: len(x)]
             for column in zip(*parts, strict=True)
         )
 
-    scan = base + np.asarray(deviations, dtype=float)
     scanned, _, impacts, stuck = turn(scan)
     if np.all(stuck) or not np.any(stuck):
         raise ValueError(
@@ -186,9 +197,12 @@ def find_lobes(
     share = np.linspace(0.0, 1.0, samples) ** 2
     points = corners[:-1, None] + share * np.diff(corners)[:, None]
     images, slopes, _, _ = turn(points.ravel())
+    values = turn(corners)[0]
+    if progress is not None:
+        progress(1.0)
     return Lobes(
         corners=corners,
-        values=turn(corners)[0],
+        values=values,
         points=points,
         images=images.reshape(points.shape),
         slopes=slopes.reshape(points.shape),
@@ -198,6 +212,10 @@ def find_lobes(
         scanned=scanned,
         impacts=impacts,
     )
+
+
+def _rows(states: int) -> int:
+    return -(-states // _ROW)
 
 
 def _corners(turn, accumulation, farthest, most: int) -> np.ndarray:
@@ -241,7 +259,7 @@ def _bisect(turn: Callable, near: float, far: float, is_near: Callable):
 
     A row of points at once: each pass narrows the bracket 33-fold.
     """
-    for _ in range(12):
+    for _ in range(_PASSES):
         row = np.linspace(near, far, _ROW + 2)
         _, _, impacts, stuck = turn(row[1:-1])
         yes = np.concatenate([[True], is_near(impacts, stuck), [False]])

@@ -89,6 +89,7 @@ def fit_published(
     tolerances: VectorLike,
     start: VectorLike | None = None,
     max_steps: int = 512,
+    progress: Callable[[int, float], None] | None = None,
 ) -> PublishedFit:
     """Fit parameters of a model to published numbers.
 
@@ -102,6 +103,8 @@ def fit_published(
         tolerances: Standard deviations of the priors; infinity for none.
         start: Initial values; default nominal.
         max_steps: Largest number of evaluations per scale of the errors.
+        progress: Called after each evaluation with its number and its cost, the sum
+            that is minimised.
 
     Returns:
         A [`jaxcam.fitting.published.PublishedFit`][].
@@ -145,9 +148,16 @@ def fit_published(
         jacobian, value = jax.jacfwd(twice, has_aux=True)(unknowns)
         return value, jacobian
 
+    costs: list[float] = []
+
     @functools.lru_cache(maxsize=1)
     def cached(content):
-        return jax.device_get(program(jnp.frombuffer(content), model))
+        unknowns = jnp.frombuffer(content)
+        value, slope = jax.device_get(program(unknowns, model))
+        if progress is not None:
+            costs.append(_cost((value - values) / errors, weights * unknowns))
+            progress(len(costs), costs[-1])
+        return value, slope
 
     def describe(unknowns):
         # value and slope are asked for one after the other, at the same place
@@ -233,6 +243,10 @@ def _least_squares(describe, values, errors, weights, unknowns, max_steps):
         gtol=_XTOL,
         max_nfev=max_steps,
     )
+
+
+def _cost(misses, pulls) -> float:
+    return float(np.sum(np.square(misses)) + np.sum(np.square(np.asarray(pulls))))
 
 
 def _split(published, vector):

@@ -12,6 +12,7 @@ from variational.chatter import Lobes
 
 from ...models import CamFollower
 from ..interruption import beside_interruption, sticking_state
+from ..progress import of_share
 from ..remember import remembered
 from ..speeds import at_rpm
 from ..target import Rows, Target
@@ -41,7 +42,8 @@ def lobes_of(system: CamFollower, most: int = 6) -> Lobes:
     for doubled in range(_DOUBLED + 1):
         deviations = 2**doubled * np.linspace(-span / 4, span, 320)
         try:
-            return find_lobes(system, state, deviations, most=most)
+            share = of_share("measuring lobes")
+            return find_lobes(system, state, deviations, most=most, progress=share)
         except ValueError:
             if doubled == _DOUBLED:
                 raise
