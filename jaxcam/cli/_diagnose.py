@@ -47,6 +47,7 @@ def diagnose(
     \b
     Examples:
       jaxcam diagnose demo --out ./jaxcam-diagnosis
+      jaxcam diagnose pendulum --out ./pendulum-diagnosis
       jaxcam diagnose demo --json -
       jaxcam diagnose demo --next --out ./jaxcam-next
       jaxcam diagnose ./case --system two_stops.py:TwoStops --rig two_stops.toml
