@@ -35,7 +35,7 @@ class Batch:
     count: np.ndarray
     """Number of points of each branch, shape `(lanes,)`."""
     reasons: tuple[str, ...]
-    """Why each branch ends, one sentence per branch."""
+    """Reason for the end of each branch, one sentence per branch."""
     name: str
     """Name of the parameter."""
     _passed: Corrected

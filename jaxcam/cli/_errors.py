@@ -65,7 +65,7 @@ def fail(message: str) -> None:
 
 
 def _shortened(word: str) -> str:
-    """Paths have a few hundred letters at most, and nobody reads more."""
+    """Paths have a few hundred letters at most; a longer message is not read."""
     return word if len(word) <= 300 else f"{word[:40]}...{word[-20:]}"
 
 

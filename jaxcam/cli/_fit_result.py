@@ -79,7 +79,7 @@ def fitted(
 ) -> Result:
     """Cut the runs, fit, and say what the recordings can distinguish.
 
-    **Arguments:** `bootstrap`: how often flights are weighted at random; 0 is never.
+    **Arguments:** `bootstrap`: number of random weightings of the flights; 0 is none.
 
     Raises:
         ValueError: For a rig of which nothing is to be fitted.

@@ -1,4 +1,4 @@
-"""`jaxcam reproduce`: tables and figures of the thesis, printed beside computed."""
+"""`jaxcam reproduce`: printed values of the thesis next to computed ones."""
 
 import time
 from pathlib import Path
@@ -11,7 +11,7 @@ from ._options import JsonFile, Resume
 
 
 _PRESETS = ("calibrated", "table-4.4")
-"""The rigs, and which of them is meant where nothing is said."""
+"""The rigs; the first is the default."""
 _SIZES = ("default", "full")
 _ALL = "all"
 

@@ -28,7 +28,7 @@ class Origin:
     preset: str
     size: str
     code: str
-    """Of the code that computed it; see `source_mark`."""
+    """Mark of the code that computed it; see `source_mark`."""
 
     @staticmethod
     def of(preset: str, size: str) -> "Origin":

@@ -240,7 +240,7 @@ def _terms(found: Diagnosis) -> tuple[Term, ...]:
 
 
 def _questions(found: Diagnosis, asked) -> dict[str, list[str]]:
-    """Parameters that are asked for, and all that are free beside each."""
+    """Parameters that are asked for, and all that are free together with each."""
     own = {
         term.name: [one.name for one in term.strengths() if not one.inner]
         for term in _terms(found)
@@ -252,7 +252,7 @@ def _questions(found: Diagnosis, asked) -> dict[str, list[str]]:
         part
         for other in found.alternatives
         if other.delta_bic < found.policy.rival
-        # one more term in addition to those named is no rival of them
+        # one more term in addition to those named is no alternative to them
         and not (named and set(named) <= set(other.terms))
         for part in other.terms
         if part in own

@@ -15,7 +15,7 @@ from ..recordings.cut import Drive, padded, read_drive, segment_gaps, Segments
 from .engine import Layout, Model, Parameter, parameter_places, with_constants
 
 
-# Samples at which it is looked up what a gap depends on
+# Samples at which the dependence of a gap on the state is evaluated
 _LOOKS = 64
 
 

@@ -142,6 +142,6 @@ class Setup:
 
 
 def _fits(name: str, pattern: str) -> bool:
-    """Whether a record is meant, also a piece of it: `run3_piece2` by `run3`."""
+    """Return whether a record is meant, also a piece of it: `run3_piece2` by `run3`."""
     whole = re.sub(r"_piece\d+$", "", name)
     return any(fnmatch.fnmatchcase(one, pattern) for one in (name, whole))

@@ -30,7 +30,7 @@ _MARKS = {
     "beginning of impacts": ("v", "#56B4E9"),
 }
 _OTHER = ("X", SECTION)
-# words beside the marks, where the kind has a long name
+# words next to the marks, where the kind has a long name
 _SHORT = {
     "Neimark-Sacker": "NS",
     "interruption of chattering": "interruption",
@@ -158,7 +158,7 @@ def _mark(ax: Axes, branch, value, x_scale) -> None:
 
 
 def _name(ax: Axes, points, value, x_scale) -> None:
-    """A word beside each mark, where there is room for it."""
+    """A word next to each mark, where there is room for it."""
     taken: list[np.ndarray] = []
     for point in points:
         y = float(np.ravel(np.asarray(value(point), dtype=float))[0])

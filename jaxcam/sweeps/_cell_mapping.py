@@ -1,4 +1,4 @@
-"""Simple cell mapping: basins from one turn of each cell. (Hsu, Section 5.3.1)"""
+"""Simple cell mapping: basins from one period of each cell. (Hsu, Section 5.3.1)"""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -87,7 +87,7 @@ def follow_cells(image, shape) -> CellMapping:
     for _ in range(doublings):
         smallest = np.minimum(smallest, smallest[far])
         far = far[far]
-    # after so many turns all are on a cycle; its smallest cell is its name
+    # after so many applications all are on a cycle; its smallest cell is its name
     cyclic = np.zeros(count + 1, dtype=bool)
     cyclic[far] = True
     name = smallest[far]
@@ -101,7 +101,7 @@ def follow_cells(image, shape) -> CellMapping:
 
 
 def _steps(pointer, cyclic):
-    """Turns until a cycle is reached, by doubling."""
+    """Applications of the map until a cycle is reached, by doubling."""
     steps = np.where(cyclic, 0, 1)
     far = np.where(cyclic, np.arange(len(pointer)), pointer)
     while True:

@@ -1,4 +1,4 @@
-"""How far the long computations of a target are.
+"""Progress of the long computations of a target.
 
 Targets are functions of a rig, whose results are remembered by their arguments.
 Therefore the callback is not an argument of each, but of the context that runs them.
@@ -39,7 +39,7 @@ def reporting(progress: Report | None) -> Iterator[None]:
 
 
 def report(sentence: str, fraction: float | None = None) -> None:
-    """Tell the caller of the target what is being computed, and how far it is."""
+    """Tell the caller of the target its present computation, and the fraction done."""
     _REPORT.get()(sentence, fraction)
 
 

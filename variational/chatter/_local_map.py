@@ -184,7 +184,7 @@ def find_lobes(
             "The deviations stay on one side of the interruption: chattering is "
             "complete for all of them or for none. Take a wider range of both signs."
         )
-    # outwards from the last turn that sticks
+    # outwards from the last period that sticks
     edge = np.flatnonzero(np.diff(stuck.astype(int)))[0]
     inner, outer = (edge, edge + 1) if stuck[edge] else (edge + 1, edge)
     bottom, top = _bisect(turn, float(scan[inner]), float(scan[outer]), lambda n, s: s)

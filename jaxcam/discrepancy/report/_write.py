@@ -98,7 +98,7 @@ def diagnosis_of(
 
 
 def _shares_of(trials: Trials, choice: Choice) -> Shares:
-    """What each named term explains of the misfit, and what nothing explains."""
+    """Shares of the misfit that each named term explains, and the unexplained share."""
     best, before = choice.best, choice.before
     instead = {one.term: one.lost for one in choice.beyond if one.term}
     lost = {
@@ -171,7 +171,7 @@ def _of_functions(
 
 
 def _doubts_of(missing: Missing, held: HeldOut, policy: Policy) -> Iterator[Caveat]:
-    """That what was found does not explain everything, or not what it has not seen."""
+    """Caveats: the terms do not explain all the data, or not the held-out data."""
     left = rms_of(missing.fit)
     if left > policy.as_noise:
         yield functions_fall_short(left)

@@ -37,7 +37,7 @@ class Picture(NamedTuple):
     """Corners of the states."""
     high: tuple[float, float] = _BOX[1]
     reruns: int = _RERUNS
-    """How often motions that do not repeat yet go on, for twice as many turns."""
+    """Number of extensions of non-periodic motions, each of doubled length."""
 
 
 def basins_target(title: str, picture: Picture, note: str = "") -> Target:

@@ -24,7 +24,7 @@ _SAID = {
     (-1, "P(1,1)", "to"): 152.0,
     (-1, "P(4,4)", "from"): 157.5,
 }
-"""What the text says of it: sections 5.2.1 and 5.2.2."""
+"""Values from the text, sections 5.2.1 and 5.2.2."""
 
 
 @remembered

@@ -22,7 +22,7 @@ _MAP_SPEED = 152.6
 """Speed at which Figure 5.25 is drawn (rpm), and its range of perturbations."""
 _PERCENT = 1.0
 _DOUBLED = 4
-"""How often that is doubled for a rig whose lobes are elsewhere."""
+"""Number of doublings of it for a rig whose lobes are elsewhere."""
 Q, M, DELTA_PI, DELTA_X = -0.62, -0.535, 2.243e-4, 1.022e-3
 CUBIC = (1695.91, -15119.51, 44927.06, -44486.71)
 ROOT, X_0, P_0, ALPHA, X_INF = 0.12089, 0.33964, 0.33667, 0.33715, 0.33717
