@@ -165,12 +165,11 @@ def _settled(system, base, number: int, free: bool, t0):
     for n in range(1, _LOOKED // 2 + 1) if free else (number,):
         if np.all(np.abs(states[n:] - states[:-n]) <= _SAME * size):
             return states[-1], n
-    sought = (
-        f"{number} forcing periods" if not free else f"up to {_LOOKED // 2} of them"
-    )
+    sought = f"up to {_LOOKED // 2}" if free else f"{number}"
     raise ValueError(
-        f"the motion has not settled on an orbit of {sought} after {_TURNS} turns (it "
-        "is chaotic, or slow, or another one); give a guess of the state"
+        f"after {_TURNS} forcing periods the motion has not settled on an orbit of "
+        f"{sought} of them: it is chaotic, settles slowly, or has another period. Give "
+        "a guess of the state, or other values of the parameters"
     )
 
 

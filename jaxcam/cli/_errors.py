@@ -21,6 +21,7 @@ _OPTIONS = (
     ("or pass state=None to start", "or give --state release to start"),
     ("state=None needs", "--state release needs"),
     ("pass the state to start from", "give the state to start from with --state"),
+    ("pass the states to start from", "give a state to start from, as in --state 0,0"),
     ('engine="diffeqsolve"', "--engine diffeqsolve"),
     ("pass one (diffrax.Dopri8(), diffrax.Tsit5())", "choose --solver dopri8"),
     ('gaps="split"', "--gaps split"),

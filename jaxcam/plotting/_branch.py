@@ -45,6 +45,11 @@ def mark_of(kind: str) -> tuple[str, str]:
     return _MARKS.get(kind, _OTHER)
 
 
+def word_of(kind: str) -> str:
+    """Name of a kind of special point in figures."""
+    return str(_SHORT.get(kind, kind))
+
+
 @styled
 def branch_diagram(
     branches: "Branch | Iterable[Branch]",
@@ -169,7 +174,7 @@ def _name(ax: Axes, points, value, x_scale) -> None:
         taken.append(here)
         left = ax.transAxes.inverted().transform(ax.transData.transform(place))[0] > 0.8
         ax.annotate(
-            str(_SHORT.get(point.kind, point.kind)),
+            word_of(point.kind),
             place,
             xytext=(-5 if left else 5, 5),
             textcoords="offset points",

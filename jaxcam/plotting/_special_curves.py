@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 
 from ._axes import figure_of, one_axes
-from ._branch import mark_of
+from ._branch import mark_of, word_of
 from ._style import styled
 from .labels import labelled
 
@@ -96,7 +96,7 @@ def _name(ax: Axes, curve, scale, share: float) -> None:
     ax.text(
         values[middle, 0],
         values[middle, 1],
-        kind,
+        word_of(kind),
         ha="center",
         va="center",
         # an angle in the data, which the axes turn as they are scaled
