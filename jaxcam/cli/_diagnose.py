@@ -138,7 +138,7 @@ def _print(output, found, notes, outlook) -> None:
     for sentence in (*notes, found.summary, *caveats):
         output.print(sentence)
     output.print(
-        f"On flights not seen: {found.heldout_before:.3e} {found.unit} before, "
+        f"On held-out flights: {found.heldout_before:.3e} {found.unit} before, "
         f"{found.heldout_after:.3e} after, noise {found.noise_floor:.3e}."
     )
     for table in outlook.tables():
