@@ -11,7 +11,6 @@ from typing import Any
 
 from ..models import CamFollower
 from ..thesis import reproduce, TARGETS
-from ..thesis.progress import reporting
 from ._output import to_text
 from ._source_mark import source_mark
 
@@ -77,8 +76,7 @@ def make(
         rows = table.to_dict(orient="records")
         if out is not None:
             table.to_csv(out / f"{name}.csv", index=False)
-            with reporting(progress):
-                drawn = _draw(name, system, settings.size, out)
+            drawn = _draw(name, system, settings.size, out, progress)
         error = None
     except Exception as problem:
         if not keep_going:
@@ -88,12 +86,12 @@ def make(
     return TargetRecord(name, settings, seconds, rows, error, drawn)
 
 
-def _draw(name: str, system, size: str, out: Path) -> bool:
+def _draw(name: str, system, size: str, out: Path, progress) -> bool:
     """The figure of a target, where it has one."""
     from ..plotting import save_figure, style
 
     with style():
-        figure = TARGETS[name].figure(system, size)
+        figure = TARGETS[name].figure(system, size, progress=progress)
         if figure is not None:
             save_figure(figure, out / f"{name}.png")
     return figure is not None

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..models import CamFollower
-from .progress import reporting
 from .target import SIZES, Target
 
 
@@ -81,5 +80,4 @@ def reproduce(
     if name not in TARGETS:
         known = ", ".join(TARGETS)
         raise ValueError(f"There is no {name!r} to reproduce; choose one of {known}.")
-    with reporting(progress):
-        return TARGETS[name].table(system, size)
+    return TARGETS[name].table(system, size, progress=progress)

@@ -8,6 +8,7 @@ nominal values with tolerances are the prior:
 """
 
 import functools
+import itertools
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -148,21 +149,11 @@ def fit_published(
         jacobian, value = jax.jacfwd(twice, has_aux=True)(unknowns)
         return value, jacobian
 
-    costs: list[float] = []
+    def cost(unknowns, value):
+        misses = np.append((value - values) / errors, weights * unknowns)
+        return float(np.sum(misses**2))
 
-    @functools.lru_cache(maxsize=1)
-    def cached(content):
-        unknowns = jnp.frombuffer(content)
-        value, slope = jax.device_get(program(unknowns, model))
-        if progress is not None:
-            costs.append(_cost((value - values) / errors, weights * unknowns))
-            progress(len(costs), costs[-1])
-        return value, slope
-
-    def describe(unknowns):
-        # value and slope are asked for one after the other, at the same place
-        return cached(np.asarray(unknowns, dtype=float).tobytes())
-
+    describe = _described(lambda at: program(at, model), cost, progress)
     unknowns = np.zeros(nominal.shape[0])
     if start is not None:
         unknowns = (np.asarray(start, dtype=float) - np.asarray(nominal)) / scales
@@ -245,8 +236,20 @@ def _least_squares(describe, values, errors, weights, unknowns, max_steps):
     )
 
 
-def _cost(misses, pulls) -> float:
-    return float(np.sum(np.square(misses)) + np.sum(np.square(np.asarray(pulls))))
+def _described(program, cost, progress):
+    """Quantities and their slopes; the last evaluation is kept."""
+    counted = itertools.count(1)
+
+    @functools.lru_cache(maxsize=1)
+    def cached(content):
+        unknowns = np.frombuffer(content)
+        value, slope = jax.device_get(program(jnp.asarray(unknowns)))
+        if progress is not None:
+            progress(next(counted), cost(unknowns, value))
+        return value, slope
+
+    # value and slope are asked for one after the other, at the same place
+    return lambda unknowns: cached(np.asarray(unknowns, dtype=float).tobytes())
 
 
 def _split(published, vector):
