@@ -35,7 +35,7 @@ class Batch:
     count: np.ndarray
     """Number of points of each branch, shape `(lanes,)`."""
     reasons: tuple[str, ...]
-    """Why each branch ends, one sentence per branch."""
+    """Reason for the end of each branch, one sentence per branch."""
     name: str
     """Name of the parameter."""
     _passed: Corrected
@@ -116,6 +116,7 @@ def follow_batch(
     settings: BranchSettings | None = None,
     direction: ArrayLike = 1,
     points: int = 100,
+    progress: Callable[[float], None] | None = None,
 ) -> Batch:
     """Follow many branches in one compiled program, each with its own steps.
 
@@ -135,6 +136,8 @@ def follow_batch(
         settings: As of [`continuation.follow`][].
         direction: 1 or -1, or `(lanes,)` of them.
         points: Largest number of points on each branch.
+        progress: Called with the fraction of points done; a branch that ends earlier
+            counts as done.
 
     Returns:
         A `Batch`; a branch that fails says so in its reason.
@@ -175,7 +178,7 @@ def follow_batch(
     signs = np.broadcast_to(np.asarray(direction, float), (lanes,))
     lane = follow_lanes(
         problem, algorithm, given, axes, leaf, z, signs, np.asarray(low),
-        np.asarray(high), as_traced(settings), points,
+        np.asarray(high), as_traced(settings), points, progress,
     )  # fmt: skip
     lane = jax.tree.map(np.asarray, lane)
     passed = lane.passed

@@ -15,6 +15,8 @@ from .step_control import way_between
 
 
 _RUNNING, _BOUND, _SHORT, _FULL, _NO_START = range(5)
+# attempted steps of a call that reports progress, and of one that does not
+_ROUNDS, _WHOLE = 16, np.iinfo(np.int64).max
 REASONS = (
     "running",
     "the parameter is at its bound",
@@ -75,20 +77,36 @@ class Axes(eqx.Module):
         return jax.tree.unflatten(structure, chosen)
 
 
-@eqx.filter_jit
 def follow_lanes(
-    problem, algorithm, given, axes, leaf, z, signs, low, high, s, points,
+    problem, algorithm, given, axes, leaf, z, signs, low, high, s, points, progress,
 ):  # fmt: skip
-    """All branches to their ends.
+    """Follow all branches to their ends.
 
     **Arguments:** the problem, and an algorithm that predicts from one point;
     parameters `given` to the problem, which differ between lanes by `axes`, and the
     `leaf` that is followed; for each lane a point `z` and the sign of its direction;
-    bounds; settings from `as_traced`; and how many `points` at most.
+    bounds; settings from `as_traced`; the largest number of `points`; and `progress`,
+    or None, which is called with the fraction done.
 
     Returns:
         The last `Lane` of each branch.
     """
+    lanes = _begin(problem, given, axes, leaf, z, signs, low, high, s, points)
+    rounds = np.asarray(_WHOLE if progress is None else _ROUNDS)
+    while np.any(lanes.status == _RUNNING):
+        lanes = _advance(
+            problem, algorithm, given, axes, leaf, lanes, low, high, s, points, rounds
+        )
+        if progress is not None:
+            # a branch that has ended is done, with as many points as it has
+            done = np.where(lanes.status == _RUNNING, lanes.count / points, 1.0)
+            progress(float(np.mean(done)))
+    return lanes
+
+
+@eqx.filter_jit
+def _begin(problem, given, axes, leaf, z, signs, low, high, s, points):
+    """The first point of each branch."""
     width = high - low
 
     def begin(parameters, z, sign):
@@ -111,6 +129,16 @@ def follow_lanes(
             status=jnp.where(good, _RUNNING, _NO_START),
             passed=buffer,
         )
+
+    return jax.vmap(begin, in_axes=(axes.tree, 0, 0))(given, z, signs)
+
+
+@eqx.filter_jit
+def _advance(
+    problem, algorithm, given, axes, leaf, lanes, low, high, s, points, rounds,
+):  # fmt: skip
+    """Up to `rounds` attempted steps of each branch that is not at its end."""
+    width = high - low
 
     def advance(parameters, lane: Lane) -> Lane:
         current = set_parameters(problem, parameters)
@@ -167,9 +195,12 @@ def follow_lanes(
             passed=passed,
         )
 
-    lanes = jax.vmap(begin, in_axes=(axes.tree, 0, 0))(given, z, signs)
-    return jax.lax.while_loop(
-        lambda lanes: jnp.any(lanes.status == _RUNNING),
-        lambda lanes: jax.vmap(advance, in_axes=(axes.tree, 0))(given, lanes),
-        lanes,
-    )
+    def going(carry):
+        lanes, done = carry
+        return jnp.any(lanes.status == _RUNNING) & (done < rounds)
+
+    def together(carry):
+        lanes, done = carry
+        return jax.vmap(advance, in_axes=(axes.tree, 0))(given, lanes), done + 1
+
+    return jax.lax.while_loop(going, together, (lanes, jnp.zeros_like(rounds)))[0]

@@ -1,4 +1,4 @@
-"""Whether a branch has come back to where it has been."""
+"""Detect a branch that returns to its own start."""
 
 from typing import Any, NamedTuple
 
@@ -54,7 +54,7 @@ class Past:
     def near(
         self, current: Solution, following: Solution
     ) -> list[tuple[float, Passed]]:
-        """Points beside the step, and which share of it lies before each."""
+        """Points next to the step, and the share of it that lies before each."""
         representation = current.problem.representation
         known = self.families.get(representation.family, [])
         known = [p for p in known if p.z.shape == current.at.z.shape]

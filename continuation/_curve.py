@@ -59,7 +59,7 @@ def extended(
     ]
     if len(same) > 1:
         # several monitors may share a kind: the one that is zero here, and the last
-        # where others vanish with it, such as the gap beside an impact without speed
+        # where others vanish with it, such as the gap next to an impact without speed
         at = evaluate(problem, context, z, np.ones_like(z))
         sizes = {k: abs(float(at.monitors[k])) for k in same}
         most = max(min(sizes.values()), _ZERO * (1.0 + float(np.max(np.abs(z)))))

@@ -55,7 +55,7 @@ class Point:
     converged: bool
     """False for a special point that could only be bracketed."""
     reason: str = ""
-    """Why the branch ends here, or a remark on a special point."""
+    """Reason for the end of the branch, or a remark on a special point."""
     coefficient: float | None = None
     """Normal-form coefficient, where there is one."""
     criticality: str = ""
@@ -84,7 +84,7 @@ class Point:
 
     @property
     def special(self) -> bool:
-        """Whether this is a special point."""
+        """Return whether this is a special point."""
         return self.kind not in ORDINARY
 
     @property

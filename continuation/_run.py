@@ -20,7 +20,7 @@ from .special import ahead, BRANCH_POINT, Located
 from .step_control import Refusal
 
 
-# failures in one place before an end is looked for just ahead
+# failures in one place before an end is searched for just ahead
 _HALVINGS = 2
 # an orbit is one of half the period where its halves differ by less, in lengths of
 # steps: what is left of the square root in which they grow apart
@@ -223,7 +223,7 @@ class Run:
     # Special points
 
     def _doubt(self, current: Solution, passed: list[tuple[str, Located]]) -> bool:
-        """Whether the branch would end at a point that was not found."""
+        """Return whether the branch would end at a point that was not found."""
         return any(
             self._ends(current, name) and not located.converged
             for name, located in passed
@@ -247,8 +247,10 @@ class Run:
         return None
 
     def _joins(self, current: Solution, point: Point) -> bool:
-        """Whether orbits of half the period take over, which are a branch of their own
-        and not run through twice here."""
+        """Return whether orbits of half the period take over.
+
+        They are a branch of their own, which is not followed twice.
+        """
         if point.kind != BRANCH_POINT:
             return False
         problem, parameters = current.problem, getattr(point.problem, "parameters")

@@ -1,4 +1,4 @@
-"""Numbers that decide how a branch is walked, not what it is."""
+"""Settings of path following, which do not change the branch itself."""
 
 import dataclasses
 
@@ -41,7 +41,7 @@ class BranchSettings(eqx.Module):
     special: bool = True
     """Whether to locate and report special points."""
     localise: str = "auto"
-    """How special points are located. `"newton"` solves the extended system, which
+    """Method of locating special points. `"newton"` solves the extended system, which
     takes second derivatives of the residual; `"bracket"` takes none and encloses the
     point between points of the branch; `"auto"` is `"bracket"` where `problem.costly`
     is set, otherwise `"newton"`."""
@@ -73,8 +73,8 @@ class BranchSettings(eqx.Module):
 
 
 _NOT_OF_A_BATCH = ("max_points", "special", "localise")
-"""What a batch does not use: it is told its number of points, and special points are
-located when a lane is looked at."""
+"""Settings that a batch ignores: it has its own number of points; special points are
+located when one of its branches is requested."""
 
 
 def as_traced(settings: BranchSettings) -> BranchSettings:

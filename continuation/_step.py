@@ -21,11 +21,11 @@ class StepAttempt(NamedTuple):
     at: Corrected | None
     """None where it is not taken."""
     bound: str = ""
-    """Which bound it ends on, as a sentence; empty if none."""
+    """The bound on which the step ends, as a sentence; empty if none."""
     following: float = 0.0
     """Length of the step that follows."""
     refusal: Refusal | None = None
-    """Why it is not taken."""
+    """Reason for not taking the step."""
 
 
 def attempt_step(

@@ -15,7 +15,7 @@ from .representation import AbstractRepresentation, Unique
 
 
 StabilityKind = Literal["equilibrium", "map", "none"]
-"""What the eigenvalues of `linearisation` mean."""
+"""Meaning of the eigenvalues of `linearisation`."""
 
 
 class Monitor(eqx.Module):

@@ -33,7 +33,7 @@ _TOPICS: dict[str, tuple[str, ...]] = {
     "time-stepping": ("moreau1988", "cottle1992", "camlibel2002"),
     "uncertainty exponent": ("mcdonald1985",),
 }
-"""What can be asked for, and the keys of `references.bib` it stands for."""
+"""Topics that can be cited, and their keys in `references.bib`."""
 
 
 def citation(*names: str) -> str:

@@ -1,4 +1,4 @@
-"""How results are shown: short tables, and units that suit the size of a number."""
+"""Short tables of results, and units that suit the size of a number."""
 
 from collections.abc import Sequence
 from html import escape

@@ -20,7 +20,7 @@ from jaxcam.cli._cache import keep_compiled_programs
 from jaxcam.cli._output import to_text
 from jaxcam.cli._parameters import assign_parameters, parameters
 from jaxcam.cli._source import make_system
-from jaxcam.data import DEMO_RIG
+from jaxcam.data import DEMO_RIG, PENDULUM
 
 
 BALL = "simulate bouncing-ball --set restitution=0.5 --state 2,0 --t1 3".split()
@@ -78,7 +78,8 @@ def test_the_shipped_recordings_have_a_name(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     for command in ("fit", "diagnose"):
         made = get_command(app).commands[command]  # pyright: ignore
-        assert made.make_context(command, ["demo"]).params["case"] == DEMO_RIG
+        for word, folder in (("demo", DEMO_RIG), ("pendulum", PENDULUM)):
+            assert made.make_context(command, [word]).params["case"] == folder
         other = made.make_context(command, ["./runs"]).params["case"]
         assert other == Path("runs")
     (tmp_path / "demo").mkdir()

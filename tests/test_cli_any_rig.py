@@ -161,6 +161,9 @@ def test_a_driven_system_is_simulated_by_turns(rig):
     )
     assert found["t1"] == pytest.approx(2 * 2 * np.pi / 12)
     assert found["system"] == "TwoStops"
+    # no state in contact is known of it: the sentence names the option
+    asked = refusal("diagram", "--rig=two_stops.toml", "--from=11", "--to=12")
+    assert "give a state to start from, as in --state 0,0" in asked
 
 
 @pytest.mark.parametrize(

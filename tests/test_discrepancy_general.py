@@ -285,7 +285,12 @@ def test_one_more_record_says_what_its_energy_says():
         more.append(segment(record, "angle_rad", noise=_NOISE))
     with pytest.raises(ValueError, match="There is no parameter 'friction'"):
         compare_experiments(found, more, ["friction"])
-    best, other = compare_experiments(found, more)
+    told = []
+    best, other = compare_experiments(
+        found, more, progress=lambda *said: told.append(said)
+    )
+    # three sentences that say what is computed, and each record's share
+    assert [share for _, share in told] == [None, None, None, 0.0, 0.5]
     assert (best.name, other.name) == ("twice", "same")
     assert best.factor == pytest.approx(np.sqrt(1 / 3), rel=0.05)
     assert other.factor == pytest.approx(np.sqrt(2 / 3), rel=0.05)

@@ -6,8 +6,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
-from jaxcam.cli._diagnose_page import _shapes, draw, unit_along
-from jaxcam.cli._diagnosis_sections import diagnosis_page
+from jaxcam.cli._diagnosis_figures import _shapes, draw, unit_along
+from jaxcam.cli._diagnosis_page import diagnosis_page
 from jaxcam.cli._output import to_text
 from jaxcam.discrepancy import Diagnosis, Verdict
 from jaxcam.discrepancy.evidence import Structure

@@ -85,18 +85,22 @@ def _force(system):
     return system.force
 
 
+def _run_notebook(name: str) -> dict:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("JAXCAM_RECORDINGS", str(ROOT.resolve()))
+        return runpy.run_path(str(HERE / "notebooks" / name))
+
+
 @pytest.fixture(scope="module")
 def told():
     """All that the notebook on these recordings finds."""
-    before = os.environ.get("JAXCAM_RECORDINGS")
-    os.environ["JAXCAM_RECORDINGS"] = str(ROOT.resolve())
-    try:
-        return runpy.run_path(str(HERE / "notebooks" / "A3_real_recordings.py"))
-    finally:
-        if before is None:
-            del os.environ["JAXCAM_RECORDINGS"]
-        else:
-            os.environ["JAXCAM_RECORDINGS"] = before
+    return _run_notebook("A3_real_recordings.py")
+
+
+@pytest.fixture(scope="module")
+def strayed():
+    """Errors of free runs, by set and model, from the notebook on them."""
+    return _run_notebook("A4_free_runs.py")["strayed"]
 
 
 @real
@@ -158,8 +162,8 @@ def test_the_stage_has_dry_friction(told):
 
 @real
 @pytest.mark.slow
-def test_free_runs_of_the_stage_need_friction_by_direction(told):
-    steps = told["strayed"]["stage"]
+def test_free_runs_of_the_stage_need_friction_by_direction(strayed):
+    steps = strayed["stage"]
     seen = [one[0] for one in steps.values()]
     # each term explains more of the record that it was fitted to
     assert seen == sorted(seen, reverse=True)
@@ -170,6 +174,6 @@ def test_free_runs_of_the_stage_need_friction_by_direction(told):
 @real
 @pytest.mark.slow
 @pytest.mark.parametrize("way", ["first to second", "second to first"])
-def test_either_half_of_the_head_tells_the_other_of_a_surface(told, way):
-    steps = told["strayed"][f"head, {way}"]
+def test_either_half_of_the_head_tells_the_other_of_a_surface(strayed, way):
+    steps = strayed[f"head, {way}"]
     assert steps["a surface"][1] < steps["textbook"][1]

@@ -94,7 +94,16 @@ def test_lobes_of_the_motion_are_found():
     for _ in range(3):
         arrived = section_turn(system, start, 0.45)
         start = arrived.state
-    lobes = find_lobes(system, start, np.linspace(-0.02, 0.02, 192), phase=0.45, most=9)
+    shares = []
+    lobes = find_lobes(
+        system,
+        start,
+        np.linspace(-0.02, 0.02, 192),
+        phase=0.45,
+        most=9,
+        progress=shares.append,
+    )
+    assert shares == sorted(shares) and 0 < shares[0] < 0.1 and shares[-1] == 1.0
     law = scaling_law(0.5)
     widths = np.abs(np.diff(lobes.corners))
     heights = np.abs(np.diff(lobes.values))

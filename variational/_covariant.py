@@ -114,7 +114,7 @@ def covariant_vectors(
 @eqx.filter_jit
 def _vectors(system, state, t0, settings, turns: int, transient: int):
     n = state.shape[0]
-    # each turn begins at the same phase, so its time need not grow
+    # each period begins at the same phase, so its time need not grow
     period: Any = system.period
 
     def turn(x):
@@ -129,7 +129,7 @@ def _vectors(system, state, t0, settings, turns: int, transient: int):
         return (after, new), (x, frame, new.T @ moved, code)
 
     def backwards(inner, triangle):
-        # of the frame behind a turn, its vectors before it
+        # of the frame after a period, its vectors before it
         solved = jax.scipy.linalg.solve_triangular(triangle, inner)
         growth = 1 / jnp.linalg.norm(solved, axis=0, keepdims=True)
         solved = solved * growth

@@ -30,7 +30,7 @@ def fly_linearised(
 ) -> LinearisedFlight:
     """Integrate the motion and its variational equations from `t0` to `t1`.
 
-    **Arguments:** `field(parameters, t, x)`, smooth on the way: no event is looked for.
+    **Arguments:** `field(parameters, t, x)`, smooth on the way: no event detection.
     """
     n, q = x.shape[0], parameters.shape[0]
 

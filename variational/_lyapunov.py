@@ -84,7 +84,7 @@ def lyapunov_spectrum(
         settings: Accuracy of the run; default a tolerance of 1e-12.
         blocks: Number of blocks for the standard error.
         max_steps: Budget of attempted steps per motion.
-        progress: Called with the part of the turns that is done.
+        progress: Called with the fraction of periods done.
 
     Returns:
         A `LyapunovSpectrum`; minus infinity where the motion sticks.
@@ -154,7 +154,7 @@ def lyapunov_spectrum(
 
 
 def _padded(lanes: int) -> int:
-    """How many lanes there are when all blocks are alike."""
+    """Number of motions with which all blocks have the same size."""
     count = -(-lanes // _BLOCK)
     return count * -(-lanes // count)
 
@@ -173,14 +173,14 @@ def _in_turn(some: Callable, batched, states):
     parts = [
         some(jax.tree.map(lambda leaf, k=k: leaf[k], batched), states[k]) for k in order
     ]
-    # the length of a turn is one for all where nothing else differs
+    # the length of a period is one for all where nothing else differs
     alike = parts[0].turn.shape[0] == 1
     whole = jax.tree.map(lambda *leaves: jnp.concatenate(leaves)[:lanes], *parts)
     return eqx.tree_at(lambda m: m.turn, whole, parts[0].turn) if alike else whole
 
 
 class _Seen:
-    """Sums of the logarithms and numbers of impacts at the end of each turn."""
+    """Sums of the logarithms and numbers of impacts at the end of each period."""
 
     def __init__(self, lanes: int, stops: int, n: int):
         self.logs = np.full((lanes, stops, n), np.nan)
@@ -192,7 +192,7 @@ class _Seen:
 
     @property
     def share(self) -> float:
-        """Part of the turns that is done, over all lanes."""
+        """Fraction of periods done, over all lanes."""
         # the first is the start of the run
         done, most = self._filled - 1, self.logs.shape[1] - 1
         return float(np.mean(np.minimum(done, most))) / most
@@ -216,7 +216,7 @@ class _Seen:
 def _summary(seen: _Seen, carry: Carried, length, transient, blocks):
     length = np.asarray(length)
     with np.errstate(invalid="ignore"):
-        # the difference of two infinities: it stuck before, and this turn as well
+        # the difference of two infinities: it stuck before, and in this period as well
         local = np.diff(seen.logs[:, transient:], axis=1) / length[:, None, None]
     stuck = np.isneginf(seen.logs[:, transient + 1 :])
     local = np.where(stuck & np.isnan(local), -np.inf, local)
@@ -265,7 +265,7 @@ _BLOCK = 128
 
 @eqx.filter_jit
 def _turn(batched, shared, length):
-    """Length of a turn in each lane, shape `(lanes,)`, or `(1,)` for all alike."""
+    """Length of a period in each lane, shape `(lanes,)`, or `(1,)` for all alike."""
 
     def one(batched):
         system = eqx.combine(batched, shared)

@@ -23,7 +23,7 @@ class Carried(NamedTuple):
     logs: Float[Array, " n"]
 
 
-# rows of the log between two looks from Python
+# rows of the log between two checks from Python
 ROWS = 256
 # the widest vectors that the machine has; XLA is shy of them by default
 _WIDE: dict[str, Any] = {"compiler_options": {"xla_cpu_prefer_vector_width": 512}}

@@ -31,11 +31,11 @@ class Stability(eqx.Module):
     """A factor between 0 and 1 that vanishes with the slowest impact speed v as M grows
     like 1/v: the least of v / (v + |a| period), with a the acceleration of the gap."""
     reason: str = eqx.field(static=True)
-    """Why some multipliers must be zero, else the empty string."""
+    """Reason why some multipliers must be zero, else the empty string."""
 
     @property
     def stable(self) -> bool:
-        """Whether all multipliers lie inside the unit circle."""
+        """Return whether all multipliers lie inside the unit circle."""
         return bool(jnp.all(jnp.abs(self.multipliers) < 1))
 
 

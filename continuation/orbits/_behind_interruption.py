@@ -1,4 +1,4 @@
-"""Behind the interruption of chattering: the orbits with finitely many impacts.
+"""Orbits with finitely many impacts beyond the interruption of chatter.
 
 Their deviation from the orbit that sticks, as it leaves the impacts near release, is
 one number x > 0, and the parameter at which they are periodic is a continuous function
@@ -30,7 +30,7 @@ from ._shooting import ImpactingOrbits
 _MOST = 48
 # its slowest rebound, over the fastest; slower impacts would be lost in the tolerance
 _SLOWEST = 1e-3
-# distances that are looked at, as powers of 2 of the width of the bounds
+# distances that are tried, as powers of 2 of the width of the bounds
 _NEAREST, _TRIALS = -40, 4
 
 

@@ -22,7 +22,7 @@ from ._shooting import ImpactingOrbits
 
 
 _TURNS, _LOOKED = 400, 64
-"""Turns after which a motion is expected to have settled, and looked at after that."""
+"""Periods until a motion is expected to have settled, and periods examined then."""
 _SAME = 1e-7
 """Motions are called equal when they differ by less than this, relative to their size.
 """
@@ -145,7 +145,7 @@ def _counted(base: float | None, period, periods) -> int:
 
 
 def _settled(system, base, number: int, free: bool, t0):
-    """State and period of the motion after many turns."""
+    """State and period of the motion after many periods."""
     if base is None:
         raise ValueError(
             "without forcing there is nothing to settle on in steps; give a guess of "
@@ -165,12 +165,11 @@ def _settled(system, base, number: int, free: bool, t0):
     for n in range(1, _LOOKED // 2 + 1) if free else (number,):
         if np.all(np.abs(states[n:] - states[:-n]) <= _SAME * size):
             return states[-1], n
-    sought = (
-        f"{number} forcing periods" if not free else f"up to {_LOOKED // 2} of them"
-    )
+    sought = f"up to {_LOOKED // 2}" if free else f"{number}"
     raise ValueError(
-        f"the motion has not settled on an orbit of {sought} after {_TURNS} turns (it "
-        "is chaotic, or slow, or another one); give a guess of the state"
+        f"after {_TURNS} forcing periods the motion has not settled on an orbit of "
+        f"{sought} of them: it is chaotic, settles slowly, or has another period. Give "
+        "a guess of the state, or other values of the parameters"
     )
 
 
@@ -216,7 +215,7 @@ def _by_shooting(system, guess, length, number, t0, settings):
     if not bool(turn.successful):
         return None, turn.result
     if int(turn.contacts.count):
-        # contact forgets what came before: the next turn is the orbit or none is near
+        # contact forgets the past: the next period is the orbit or none is near
         state = turn.final
         for _ in range(3):
             orbit, why = _confirmed(system, state, float(t0), length, settings)
@@ -244,7 +243,7 @@ def _by_shooting(system, guess, length, number, t0, settings):
 
 
 def _with_impacts_of(system, turn, number, t0, settings):
-    """The orbit with the impacts of one turn, at `t0`, and why there is none."""
+    """The orbit with the impacts of one period from `t0`, or the reason for none."""
     try:
         equations, u = seed(system, turn, number)
     except ValueError as error:
@@ -264,7 +263,7 @@ def _with_impacts_of(system, turn, number, t0, settings):
 
 
 def _touches(system, state, t0, length) -> bool:
-    """Whether a gap is closed, up to rounding."""
+    """Return whether a gap is closed, up to rounding."""
     t0 = jnp.asarray(t0)
     sizes = gap_sizes(system, t0, state, jnp.asarray(length))
     return bool(jnp.any(gaps(system, t0, state) <= _CLOSED * sizes))

@@ -73,7 +73,7 @@ def orbits_near(
 
 
 def _passes(system: HybridSystem, orbit: Orbit, state, same: float) -> bool:
-    """Whether an orbit has this state where it starts."""
+    """Return whether an orbit has this state where it starts."""
     current = np.asarray(orbit.state)
     sizes = component_sizes(system, orbit.time, current, orbit.period)
     return bool(np.all(np.abs(current - state) <= same * np.asarray(sizes)))

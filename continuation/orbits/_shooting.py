@@ -144,7 +144,7 @@ class ImpactingOrbits(AbstractProblem):
         def monitor(one: Watched) -> Monitor:
             if one.what == "gap":
                 return Monitor("grazing", ends=True)
-            # so are the gaps of the flights beside an impact without speed
+            # so are the gaps of the flights next to an impact without speed
             beside = ((one.number - 1) % m, one.number)
             names = tuple(Watched("gap", k).name for k in beside)
             return Monitor("grazing", ends=True, vanishing=names)

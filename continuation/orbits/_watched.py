@@ -8,7 +8,7 @@ class Watched(NamedTuple):
 
     what: Literal["gap", "speed"]
     number: int
-    """Of the flight that begins with impact k, or of impact k."""
+    """Number k of the impact, or of the impact that begins the flight."""
 
     @property
     def name(self) -> str:

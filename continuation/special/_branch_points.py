@@ -127,7 +127,7 @@ def differenced_crossing(
 
 
 def _solves(slack, context: Context) -> bool:
-    """Whether the point solves the equations, and not only those with slack."""
+    """Return whether the point solves the equations, and not only those with slack."""
     return bool(abs(slack) <= max(context.settings.tolerance, _SLACK))
 
 

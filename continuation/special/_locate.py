@@ -137,7 +137,7 @@ def _between_branches(
 
 
 def _next_guess(low, high, attempt: int) -> np.ndarray:
-    """Secant and bisection in turns."""
+    """Alternate secant and bisection."""
     share = 0.5
     if attempt % 3 != 2:
         share = abs(low[1]) / (abs(low[1]) + abs(high[1]))
@@ -161,7 +161,7 @@ def cubic_between(a: Corrected, b: Corrected, share: float) -> np.ndarray:
 
 
 def _inside(z, low, high, scale, slack: float = 1e-6) -> bool:
-    """Whether z lies between the ends, and near the chord."""
+    """Return whether z lies between the ends, and near the chord."""
     chord, way = (high - low) / scale, (z - low) / scale
     length = np.linalg.norm(chord)
     along = float(way @ chord) / length
@@ -209,7 +209,9 @@ def ahead(
 
 
 def pair_is_complex(problem, kind: str, context: Context, z: np.ndarray, at) -> bool:
-    """Whether a critical pair is complex; otherwise the point is a neutral saddle."""
+    """Return whether a critical pair is complex; otherwise the point is a neutral
+    saddle.
+    """
     if kind not in (HOPF, NEIMARK_SACKER):
         return True
     right, _ = null_vectors(matrix_at(problem, kind, context.leaf, z))

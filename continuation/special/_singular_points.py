@@ -23,7 +23,7 @@ from ._multilinear import second, third
 from ._test_functions import FLIP, FOLD, has_own_dynamics, HOPF, NEIMARK_SACKER
 
 
-# pairs of eigenvalues beside a critical one are watched up to this dimension
+# pairs of eigenvalues other than a critical one are watched up to this dimension
 _LARGEST_FOR_PAIRS = 8
 
 

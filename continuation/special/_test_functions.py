@@ -20,7 +20,7 @@ _HUGE = 1e100
 
 
 def kinds(problem: AbstractProblem) -> tuple[str, ...]:
-    """Special points that are looked for, besides those of the problem's monitors."""
+    """Special points that are detected, besides those of the problem's monitors."""
     if not problem.detects:
         return ()
     common = (BRANCH_POINT, FOLD)
@@ -29,7 +29,9 @@ def kinds(problem: AbstractProblem) -> tuple[str, ...]:
 
 
 def has_own_dynamics(problem: AbstractProblem) -> bool:
-    """Whether normal forms are those of another map than the linearisation is of."""
+    """Return whether normal forms are those of another map than the linearisation is
+    of.
+    """
     return type(problem).local_dynamics is not AbstractProblem.local_dynamics
 
 
@@ -77,7 +79,9 @@ def eigenvalues_at(
 
 
 def is_stable(problem: AbstractProblem, eigenvalues: Any) -> bool | None:
-    """Whether all eigenvalues are on the stable side; None where that means nothing."""
+    """Return whether all eigenvalues are on the stable side; None where that means
+    nothing.
+    """
     if problem.stability == "none" or not np.all(np.isfinite(eigenvalues)):
         return None
     if problem.stability == "map":

@@ -1,5 +1,5 @@
-"""A wall that moves takes states away from one motion and gives them to others: part of
-the initial states that end on each attractor."""
+"""Basins of attraction over the position of a wall: fractions of the initial states
+that end on each attractor."""
 
 import matplotlib.pyplot as plt
 import numpy as np

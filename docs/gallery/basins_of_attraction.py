@@ -1,4 +1,4 @@
-"""Two attractors of one oscillator, and which initial states end on which."""
+"""Basins of two coexisting attractors of one oscillator."""
 
 from jaxcam import sweeps
 from jaxcam.models import ImpactOscillator

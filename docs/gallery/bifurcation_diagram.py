@@ -1,5 +1,5 @@
 """An impact oscillator over its forcing frequency: periodic windows, period doublings
-and chaos, darker where the motion is more often."""
+and chaos, darker where states are more frequent."""
 
 import numpy as np
 

@@ -1,5 +1,5 @@
-"""The square-root map of a grazing impact: most steps are small and linear, and now and
-then one impact throws the motion far back."""
+"""The square-root map of a grazing impact: most steps are small and linear, but an
+occasional impact moves the state far away."""
 
 import variational
 from jaxcam.plotting import cobweb

@@ -1,5 +1,5 @@
-"""What an interrupted chatter leaves over: infinitely many lobes, each a smaller copy
-of the one before, as wide and as deep as two powers of the restitution say."""
+"""The map around interrupted chatter: infinitely many lobes, each a smaller copy of the
+one before, scaled by two powers of the coefficient of restitution."""
 
 from jaxcam.plotting import beta_lobes
 

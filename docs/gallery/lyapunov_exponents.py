@@ -1,5 +1,5 @@
-"""Two Lyapunov exponents of a chaotic impact oscillator settle while they are averaged;
-one is positive, and bands are their standard errors."""
+"""Two Lyapunov exponents of a chaotic impact oscillator as they are averaged; one is
+positive, and bands are their standard errors."""
 
 import variational
 from jaxcam.models import ImpactOscillator

@@ -1,5 +1,5 @@
-"""The force that a model lacks, found from a recording: a polynomial of the velocity is
-fitted together with the spring, here to a swing that is braked by the air."""
+"""The force that a model lacks, identified from a recording: a polynomial of the
+velocity is fitted together with the spring, here to a swing with air drag."""
 
 import jax
 import jax.numpy as jnp

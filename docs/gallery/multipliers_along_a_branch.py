@@ -1,5 +1,5 @@
-"""The two Floquet multipliers of a branch travel through the unit circle: in by +1 at a
-fold, round the circle of radius r, and out by –1 at a flip."""
+"""The two Floquet multipliers along a branch: they enter the unit circle through +1 at
+a fold, follow the circle of radius r, and leave through –1 at a flip."""
 
 import matplotlib.pyplot as plt
 import numpy as np

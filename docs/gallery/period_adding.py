@@ -1,4 +1,4 @@
-"""Behind a grazing bifurcation periods add up: towards the graze at zero, windows of
+"""Beyond a grazing bifurcation periods add up: towards the grazing at zero, windows of
 period 3, 4, 5, ... follow each other, with chaos between them."""
 
 import matplotlib.pyplot as plt

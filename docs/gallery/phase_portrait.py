@@ -1,4 +1,4 @@
-"""A slowly driven mass hits its wall, chatters, sticks to it, and is let go."""
+"""A slowly driven mass: impacts on the wall, chatter, sticking, and release."""
 
 import jaxcam
 from jaxcam.models import ImpactOscillator

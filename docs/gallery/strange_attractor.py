@@ -1,5 +1,5 @@
-"""Thousands of states of a chaotic impact oscillator, one a period: a strange attractor
-with the fingers that grazing impacts leave."""
+"""Thousands of states of a chaotic impact oscillator, one per period: a strange
+attractor with the fingers that grazing impacts leave."""
 
 import matplotlib.pyplot as plt
 import numpy as np

@@ -1,5 +1,5 @@
-"""The follower of a cam at 140 rpm: it is thrown off, bounces ever lower, and rides on
-the cam again until the next turn."""
+"""The follower of a cam at 140 rpm: it leaves the cam, chatter follows, and it stays in
+contact until the next cycle."""
 
 import equinox as eqx
 import jax.numpy as jnp

@@ -1,4 +1,4 @@
-"""Infinitely many bounces in finite time: each step of the staircase is an impact, and
+"""Infinitely many impacts in finite time: each step of the staircase is an impact, and
 the steps accumulate where the ball comes to rest."""
 
 import matplotlib.pyplot as plt

@@ -15,7 +15,7 @@ class Axis(NamedTuple):
 
     parameter: str
     unit: float
-    """Of one of the command line's units."""
+    """Size of one of the command line's units, in SI units."""
 
     @staticmethod
     def of(parameter: str, system: str) -> "Axis":
@@ -29,7 +29,7 @@ class Axis(NamedTuple):
 
     @property
     def name(self) -> str:
-        """As sentences and headings say it."""
+        """Name of the parameter in sentences and headings."""
         return "speed in rpm" if self.in_rpm else self.parameter
 
     @property

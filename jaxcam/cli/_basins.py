@@ -106,7 +106,7 @@ def _count(made) -> int:
 
 
 def _entropy(made, shape) -> dict | None:
-    """Of the boundary, along the components that vary; None on a coarse grid."""
+    """Entropy of the boundary along the components that vary; None on a coarse grid."""
     from ..sweeps import basin_entropy
 
     if min(k for k in shape if k > 1 or max(shape) == 1) < 5:

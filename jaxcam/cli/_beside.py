@@ -1,4 +1,4 @@
-"""Work in a process of its own, beside that of a command."""
+"""Work in a process of its own, parallel to that of a command."""
 
 import multiprocessing
 from collections.abc import Callable, Iterator

@@ -4,7 +4,7 @@ import dataclasses
 from pathlib import Path
 
 
-# Of the orbit with one impact a turn at 145 rpm, near it: angle (rad), velocity (rad/s)
+# Near the orbit with one impact per cycle at 145 rpm: angle (rad), velocity (rad/s)
 _NEAR = (0.4245, 1.828)
 _AT_RPM = 145.0
 # Bounds (rpm) of P(1,1) and of P(inf,1)
@@ -36,7 +36,7 @@ def _interrupted(point) -> bool:
 def follow_branches(folder: Path) -> Branches:
     """Follow both branches and draw them.
 
-    Made for a process of its own, beside other work: it takes half a minute to compile.
+    Runs in a process of its own, parallel to other work: it compiles for half a minute.
     """
     import equinox as eqx
     import jax.numpy as jnp

@@ -35,7 +35,11 @@ class DemoResult:
 
 def compared(runs, nominal: Rig, folder: Path, report) -> DemoResult:
     """Cut the runs, simulate their flights and the whole rig, and draw all that."""
-    segments = segment_case(tuple(runs), nominal)
+    segments = segment_case(
+        tuple(runs),
+        nominal,
+        progress=lambda share: report("finding impacts and contacts", share),
+    )
     parts, simulated = [], []
     for k, run in enumerate(segments):
         report(f"comparing {run.recording.name}", k / len(segments))

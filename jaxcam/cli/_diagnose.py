@@ -47,6 +47,7 @@ def diagnose(
     \b
     Examples:
       jaxcam diagnose demo --out ./jaxcam-diagnosis
+      jaxcam diagnose pendulum --out ./pendulum-diagnosis
       jaxcam diagnose demo --json -
       jaxcam diagnose demo --next --out ./jaxcam-next
       jaxcam diagnose ./case --system two_stops.py:TwoStops --rig two_stops.toml
@@ -114,8 +115,12 @@ def _outlook(found, nominal, predict: bool, propose: bool, seed: int, report):
 
     outlook = Outlook()
     if predict and found.verdict != discrepancy.Verdict.UNKNOWN:
-        report("predicting with and without", None)
-        outlook = Outlook(discrepancy.predictions(found))
+        words = "predicting with and without the missing physics"
+        report(words, None)
+        predicted = discrepancy.predictions(
+            found, progress=lambda share: report(words, share)
+        )
+        outlook = Outlook(predicted)
     if propose and any(one.element is not None for one in found.missing):
         report("proposing no record, as a force with a memory was found", None)
     elif propose:
@@ -133,7 +138,7 @@ def _print(output, found, notes, outlook) -> None:
     for sentence in (*notes, found.summary, *caveats):
         output.print(sentence)
     output.print(
-        f"On flights not seen: {found.heldout_before:.3e} {found.unit} before, "
+        f"On held-out flights: {found.heldout_before:.3e} {found.unit} before, "
         f"{found.heldout_after:.3e} after, noise {found.noise_floor:.3e}."
     )
     for table in outlook.tables():

@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import TypeAlias
 
 from ..discrepancy import Diagnosis
-from ._diagnose_page import draw
-from ._diagnosis_sections import diagnosis_page
+from ._diagnosis_figures import draw
+from ._diagnosis_page import diagnosis_page
 from ._outlook import Outlook
 from ._output import to_text, write_text
 from ._saved_system import as_saved

@@ -114,7 +114,7 @@ def diagram(
 def _sentence(system: str, made, axis: Axis, sweep: Sweep) -> str:
     import numpy as np
 
-    # with --dwell fewer turns fit into the seconds of slow values
+    # with --dwell fewer periods fit into the seconds of slow values
     total = int(np.prod(made.states.shape[:3]))
     if sweep.dwell is not None:
         total = int(np.isfinite(made.states[..., 0]).sum())

@@ -21,6 +21,7 @@ _OPTIONS = (
     ("or pass state=None to start", "or give --state release to start"),
     ("state=None needs", "--state release needs"),
     ("pass the state to start from", "give the state to start from with --state"),
+    ("pass the states to start from", "give a state to start from, as in --state 0,0"),
     ('engine="diffeqsolve"', "--engine diffeqsolve"),
     ("pass one (diffrax.Dopri8(), diffrax.Tsit5())", "choose --solver dopri8"),
     ('gaps="split"', "--gaps split"),
@@ -65,7 +66,7 @@ def fail(message: str) -> None:
 
 
 def _shortened(word: str) -> str:
-    """Paths have a few hundred letters at most, and nobody reads more."""
+    """Paths have a few hundred letters at most; a longer message is not read."""
     return word if len(word) <= 300 else f"{word[:40]}...{word[-20:]}"
 
 

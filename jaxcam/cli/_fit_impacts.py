@@ -9,7 +9,7 @@ from ._output import Output
 
 
 def is_table(case: Path, files: Files) -> bool:
-    """Whether a file with one impact a row is meant, and no recording."""
+    """Return whether a file with one impact a row is meant, and no recording."""
     from ..recordings.files import is_impact_table
 
     return case.is_file() and is_impact_table(case, files.named())

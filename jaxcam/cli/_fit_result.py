@@ -79,12 +79,16 @@ def fitted(
 ) -> Result:
     """Cut the runs, fit, and say what the recordings can distinguish.
 
-    **Arguments:** `bootstrap`: how often flights are weighted at random; 0 is never.
+    **Arguments:** `bootstrap`: number of random weightings of the flights; 0 is none.
 
     Raises:
         ValueError: For a rig of which nothing is to be fitted.
     """
     runs = tuple(runs)
+
+    def cutting(share: float) -> None:
+        report("finding impacts and contacts", share)
+
     if isinstance(nominal, fitting.Setup):
         model, parameters = nominal.model, nominal.parameters
         if not parameters:
@@ -92,11 +96,11 @@ def fitted(
                 "There is nothing to fit; give at least one entry of [parameters] in "
                 "the rig file a `tolerance`."
             )
-        segments = nominal.segments(runs)
+        segments = nominal.segments(runs, progress=cutting)
     else:
         model = fitting.cam_follower_model(nominal)
         parameters = fitting.cam_follower_parameters(nominal)
-        segments = segment_case(runs, nominal)
+        segments = segment_case(runs, nominal, progress=cutting)
     report("preparing the fit", None)
     problem = fitting.Problem.build(model, segments, parameters)
     before = fitting.fit(problem, free=())

@@ -11,7 +11,7 @@ from ..recordings.cut import Impacts
 
 
 def impact_laws(segments: Sequence[Segments]) -> dict[str, RestitutionFit]:
-    """Laws by the gap that was hit, for each gap with impacts enough.
+    """Laws of each gap that has enough impacts.
 
     Returns:
         Laws as of `restitution_laws`; where there are several gaps, with the number of

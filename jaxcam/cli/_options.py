@@ -5,13 +5,16 @@ from typing import Annotated, TypeAlias
 
 import typer
 
-from ..data import DEMO_RIG
+from ..data import DEMO_RIG, PENDULUM
 from ._choices import SYSTEMS
 
 
+_SHIPPED = {"demo": DEMO_RIG, "pendulum": PENDULUM}
+
+
 def _shipped(case: Path) -> Path:
-    """The folder; `demo` is that of the package where there is none of that name."""
-    return DEMO_RIG if str(case) == "demo" and not case.exists() else case
+    """The folder; one of the package for its word, unless the user has that folder."""
+    return case if case.exists() else _SHIPPED.get(str(case), case)
 
 
 System: TypeAlias = Annotated[
@@ -72,7 +75,8 @@ Case: TypeAlias = Annotated[
     Path,
     typer.Argument(
         metavar="CASE",
-        help="A folder of recordings, or one file; demo: the simulated ones shipped.",
+        help="A folder of recordings, or one file; of those shipped, demo (simulated) "
+        "or pendulum (real).",
         callback=_shipped,
     ),
 ]

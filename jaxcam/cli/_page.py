@@ -43,9 +43,9 @@ h2 { font-size: 1.15rem; margin-top: 2.4rem; }
 table { border-collapse: collapse; width: 100%; font-variant-numeric: tabular-nums; }
 th, td { padding: .4rem .6rem; text-align: right; white-space: nowrap;
   border-bottom: 1px solid var(--line); }
-th { color: var(--quiet); font-weight: 600; }
+th { color: var(--quiet); font-weight: 600; white-space: normal; }
 .text { text-align: left; }
-td.text:nth-child(n+4) { white-space: normal; min-width: 18rem; }
+td.text:last-child { white-space: normal; min-width: 18rem; }
 @media (max-width: 34rem) { table { font-size: .85rem; } th, td { padding: .35rem; } }
 figure { margin: 1.4rem 0; }
 img { display: block; width: 100%; max-width: 46rem; height: auto; background: #fff;

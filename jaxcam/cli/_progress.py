@@ -1,4 +1,4 @@
-"""A bar on the error stream while something takes long."""
+"""A progress bar on the error stream."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -19,7 +19,7 @@ COMPILING = "compiling (the first run of a system takes longest)"
 
 @contextmanager
 def progress(first: str) -> Iterator[Callable[[str, float | None], None]]:
-    """Yields `report(what, fraction)`; a fraction of None is a time nobody knows.
+    """Yield `report(sentence, fraction)`; None is a fraction that is unknown.
 
     Nothing is shown where the error stream is not a terminal.
     """

@@ -1,4 +1,4 @@
-"""`jaxcam reproduce`: tables and figures of the thesis, printed beside computed."""
+"""`jaxcam reproduce`: printed values of the thesis next to computed ones."""
 
 import time
 from pathlib import Path
@@ -11,7 +11,7 @@ from ._options import JsonFile, Resume
 
 
 _PRESETS = ("calibrated", "table-4.4")
-"""The rigs, and which of them is meant where nothing is said."""
+"""The rigs; the first is the default."""
 _SIZES = ("default", "full")
 _ALL = "all"
 
@@ -107,9 +107,16 @@ def _compute(names, preset, size, output, resume, several: bool) -> None:
         if record is None:
             with progress("computing") as report:
                 words = f"{name} ({position + 1} of {len(names)})"
-                report(words, position / len(names))
+                report(words, position / len(names) if several else None)
                 # of many targets one that fails does not cost the others
-                record = make(name, system, settings, out, keep_going=several)
+                record = make(
+                    name,
+                    system,
+                    settings,
+                    out,
+                    keep_going=several,
+                    progress=_within(report, words, position, len(names)),
+                )
             write(record, out)
         records.append(record)
         if record.error is None:
@@ -139,6 +146,18 @@ def _compute(names, preset, size, output, resume, several: bool) -> None:
     )
     if failed:
         raise typer.Exit(STOPPED_EARLY)
+
+
+def _within(report, words: str, position: int, count: int):
+    """A callback for a target that shows how far it and all the targets are."""
+
+    def callback(sentence: str, fraction: float | None) -> None:
+        if fraction is None and count > 1:
+            fraction = 0.0
+        share = None if fraction is None else (position + fraction) / count
+        report(f"{words}: {sentence}", share)
+
+    return callback
 
 
 def _rich(title: str, frame):

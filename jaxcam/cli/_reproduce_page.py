@@ -19,7 +19,7 @@ section { border-top: 1px solid var(--line); margin-top: 2.4rem; }
 section h2 { margin-top: 1.2rem; }
 td.text { white-space: normal; min-width: 8rem; }
 """
-"""What the page has besides the style that all pages share."""
+"""Style of this page, in addition to that of all pages."""
 _CHAPTERS = {
     "1": "Introduction",
     "2": "Dynamical systems, smooth and not",

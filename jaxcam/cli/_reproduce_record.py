@@ -5,7 +5,7 @@ import json
 import math
 import os
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +27,7 @@ class Origin:
     preset: str
     size: str
     code: str
-    """Of the code that computed it; see `source_mark`."""
+    """Mark of the code that computed it; see `source_mark`."""
 
     @staticmethod
     def of(preset: str, size: str) -> "Origin":
@@ -63,18 +63,20 @@ def make(
     settings: Origin,
     out: Path | None,
     keep_going: bool,
+    progress: Callable[[str, float | None], None] | None = None,
 ) -> TargetRecord:
     """Compute a target, and draw it where there is a folder for that.
 
-    **Arguments:** `keep_going`: an exception becomes part of the record.
+    **Arguments:** `keep_going`: an exception becomes part of the record; `progress`:
+    as of `reproduce`, also while it is drawn.
     """
     begin, rows, drawn = time.perf_counter(), [], False
     try:
-        table = reproduce(name, system, settings.size)
+        table = reproduce(name, system, settings.size, progress=progress)
         rows = table.to_dict(orient="records")
         if out is not None:
             table.to_csv(out / f"{name}.csv", index=False)
-            drawn = _draw(name, system, settings.size, out)
+            drawn = _draw(name, system, settings.size, out, progress)
         error = None
     except Exception as problem:
         if not keep_going:
@@ -84,12 +86,12 @@ def make(
     return TargetRecord(name, settings, seconds, rows, error, drawn)
 
 
-def _draw(name: str, system, size: str, out: Path) -> bool:
+def _draw(name: str, system, size: str, out: Path, progress) -> bool:
     """The figure of a target, where it has one."""
     from ..plotting import save_figure, style
 
     with style():
-        figure = TARGETS[name].figure(system, size)
+        figure = TARGETS[name].figure(system, size, progress=progress)
         if figure is not None:
             save_figure(figure, out / f"{name}.png")
     return figure is not None

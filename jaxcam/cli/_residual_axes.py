@@ -1,4 +1,4 @@
-"""Residuals as reports draw them: in a unit that suits them, by turn or by time."""
+"""Axes of residuals in reports: a suitable unit, over a turn of the drive or time."""
 
 import math
 from collections.abc import Sequence
@@ -21,7 +21,7 @@ def shown_in(part: Residuals) -> tuple[float, str]:
 
 
 def residual_label(part: Residuals) -> str:
-    """Of an axis, with that unit."""
+    """Label of an axis of residuals, with that unit."""
     _, unit = shown_in(part)
     return f"residual ({unit})" if unit else "residual"
 

@@ -23,8 +23,8 @@ class Intervals(NamedTuple):
     """Rests between their beginning and the release that ends them.
 
     - `begins`, `ends`: angle of the cam (rad) at either end of each, not wrapped.
-    - `turns`: how many turns of the cam were looked at.
-    - `share`: part of the time that the follower rests, also where an end was not seen.
+    - `turns`: number of turns of the cam that were examined.
+    - `share`: fraction of the time in contact, also where an end was not seen.
     """
 
     begins: Float[np.ndarray, " k"]
@@ -35,7 +35,7 @@ class Intervals(NamedTuple):
 
 @dataclasses.dataclass(frozen=True)
 class Rests:
-    """One run: its rests as recorded and as simulated."""
+    """Contact intervals of one run, as recorded and as simulated."""
 
     name: str
     rpm: float
@@ -71,7 +71,7 @@ def simulate_run(rig: Rig, run: Segments) -> Trajectory:
 
 
 def rests(run: Segments, motion: Trajectory) -> Rests:
-    """The rests of a run, and those of `simulate_run` in the same span of time."""
+    """Contact intervals of a run, and those of `simulate_run` in the same time span."""
     assert run.drive is not None
     name, rpm = run.recording.name, float(rad_s_to_rpm(run.drive.speed))
     return Rests(name, rpm, _recorded(run), _simulated(run, motion))

@@ -91,6 +91,6 @@ class RunOptions:
             raise ValueError(f"{name} has no forcing to count turns of; give --t1.")
         if not turns > 0:
             raise ValueError(f"--turns is {turns:g}; give a positive number.")
-        # a speed of zero would give an endless turn: let the system say so
+        # a speed of zero would give an endless period: let the system say so
         model.check()
         return self.t0 + turns * float(model.period)

@@ -116,6 +116,6 @@ def make_system(
 
 
 def _is_code(named: str) -> bool:
-    """Whether a Python file is meant, with a class in it or without."""
+    """Return whether a Python file is meant, with a class in it or without."""
     path, colon, _ = named.rpartition(":")
     return named.endswith(".py") or (bool(colon) and path.endswith(".py"))

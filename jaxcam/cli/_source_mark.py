@@ -9,7 +9,7 @@ from pathlib import Path
 
 _PACKAGES = ("jaxcam", "variational", "continuation")
 _BENEATH = ("jax", "jaxlib", "diffrax", "equinox", "numpy", "scipy", "matplotlib")
-"""What decides digits besides."""
+"""Packages whose versions affect digits."""
 
 
 @functools.cache

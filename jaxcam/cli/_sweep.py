@@ -16,7 +16,7 @@ from ._options import Cluster, Workers
 
 @dataclasses.dataclass(frozen=True)
 class Execution:
-    """Where a sweep runs: local threads, or a cluster."""
+    """Execution of a sweep: in local threads, or on a cluster."""
 
     workers: Workers = None
     cluster: Cluster = None

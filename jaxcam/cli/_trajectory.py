@@ -163,7 +163,7 @@ def _shown(number: int) -> list[int | None]:
 
 
 def _period(system) -> float | None:
-    """Period of a forcing that is there: a floor at rest has no phase."""
+    """Period of a forcing that acts: a floor at rest has no phase."""
     if system.period is None or float(getattr(system, "amplitude", 1.0)) == 0:
         return None
     return float(system.period)
@@ -178,7 +178,7 @@ def _phase(time: float, period: float) -> float:
 
 
 def _unit(system) -> str:
-    """Of time: a system all of whose states are dimensionless has none."""
+    """Unit of time; none for a system all of whose states are dimensionless."""
     units = system.state_units
     return "" if units and all(unit == "-" for unit in units) else "s"
 

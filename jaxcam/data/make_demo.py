@@ -42,7 +42,7 @@ class RealRig:
     wander: float = 2e-4
 
     def acceleration(self, angle: float, velocity: float) -> float:
-        """Of the free follower (rad/s^2): spring (4.9) and viscous hinge."""
+        """Acceleration (rad/s^2) of the free follower: spring (4.9), viscous hinge."""
         sine, secant = math.sin(angle), 1 / math.cos(angle)
         stretch = (self.spring_hook_x * sine + self.half_height) * secant
         arm = (self.spring_hook_x + self.half_height * sine) * secant**2
@@ -103,14 +103,14 @@ class _Cam:
 
 
 class _Follower:
-    """The follower as it flies, hits and rests, from a little above the cam."""
+    """The follower's flights, impacts and contacts, from a little above the cam."""
 
     def __init__(self, rig: RealRig, cam: _Cam, interval: float):
         self.rig, self.cam, self.interval = rig, cam, interval
         self.t, (self.x, self.v, _) = 0.0, cam.surface(0.0)
         self.x += 0.01
         self.resting, self.landed = False, 0.0
-        # of a step; the next bounce must not end inside its own first one
+        # of a step; the next flight must not end inside its own first one
         self.longest = interval
         self.impacts: list[tuple[float, float]] = []
         self.contacts: list[tuple[float, float]] = []
@@ -137,7 +137,7 @@ class _Follower:
         return bool(x < self.cam.surface(t)[0] - _ROUNDING)
 
     def _lifts(self, t: float) -> bool:
-        """Whether a follower that rests is pulled off the cam."""
+        """Return whether a follower that rests is pulled off the cam."""
         x, v, a = self.cam.surface(t)
         return bool(self.rig.acceleration(x, v) > a)
 
@@ -166,7 +166,7 @@ class _Follower:
         self.x, self.v, _ = self.cam.surface(self.t)
 
     def _hit(self, h: float) -> None:
-        """An impact after a flight of length h, or rest where bounces are short."""
+        """An impact after a flight of length h, or contact where flights are short."""
         r = self.rig.restitution
         _, before = self._fly(h)
         self.t += h
@@ -176,7 +176,7 @@ class _Follower:
         self.impacts.append((self.t, approach))
         pull = acceleration - self.rig.acceleration(self.x, self.v)
         flight = 2 * r * approach / pull if pull > 0 else self.interval
-        # the bounces left take this long together
+        # the remaining flights take this long together
         if 0 < flight < 1e-6 * (1 - r):
             self.resting, self.landed = True, self.t
             self.v, self.longest = rate, self.interval

@@ -31,7 +31,7 @@ def thinned(file: Path) -> str:
 
 
 def main(source: Path) -> None:
-    """Write both swings beside their rig file."""
+    """Write both swings next to their rig file."""
     folder = Path(__file__).parent / "pendulum"
     for name in ("swing_large", "swing_small"):
         file = folder / f"{name}.csv.gz"

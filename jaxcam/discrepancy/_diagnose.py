@@ -94,7 +94,7 @@ def _name_of(run: Recording | Segments) -> str:
 def _question(
     system, recordings, candidates, sensors, parameters, drive, report, policy
 ) -> Question:
-    """What is asked of a rig, a setup or a bare system."""
+    """The question to be answered for a rig, a setup or a bare system."""
     if isinstance(system, Rig):
         return rig_question(system, recordings, candidates, report, policy)
     if isinstance(system, Setup):

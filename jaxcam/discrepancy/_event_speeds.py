@@ -31,7 +31,7 @@ EVENTS = (
     "P(1,1) doubles its period (flip)",
     "chattering is interrupted",
 )
-"""What happens at each of the speeds, in their order."""
+"""Names of the events at the speeds, in their order."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -77,7 +77,7 @@ def event_speeds(system: WithTerms, policy: Policy = Policy()) -> EventSpeeds:
     """Find the four speeds of a rig, at whatever speed it now turns.
 
     The base is a [`jaxcam.models.CamFollower`][]; terms must not depend on time other
-    than through the phase of the cam. The policy says where orbits are looked for.
+    than through the phase of the cam. The policy says where orbits are searched for.
     """
     lift = _float_of(system)
     if lift is None:

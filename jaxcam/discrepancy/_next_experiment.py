@@ -54,7 +54,11 @@ class Experiment:
 
 
 def compare_experiments(
-    found: Diagnosis, records: Sequence[Segments], asked: Sequence[str] | None = None
+    found: Diagnosis,
+    records: Sequence[Segments],
+    asked: Sequence[str] | None = None,
+    *,
+    progress: Callable[[str, float | None], None] | None = None,
 ) -> tuple[Experiment, ...]:
     """Rank proposed records by their expected information, best first.
 
@@ -69,6 +73,7 @@ def compare_experiments(
             bands of functions without a name. Terms whose BIC is not much worse stay
             free, so that the best record also distinguishes them. If nothing is
             missing, all terms, one at a time.
+        progress: Called with a sentence and a fraction, or `None`.
 
     Returns:
         The experiments, best first.
@@ -78,31 +83,37 @@ def compare_experiments(
             its own was found: what drove it is known of the existing records alone.
     """
     _refuse_hidden(found)
+    report = progress or (lambda sentence, fraction: None)
     fit = found.after
     for name in asked or ():
         fit.problem.parameter(name)
+    report("preparing the proposed records", None)
     parameters = [_of_others(one, len(records)) for one in fit.problem.parameters]
     problem = Problem.build(fit.problem.model, records, parameters)
     values = np.repeat(np.asarray(fit.point.values)[:1], len(problem.segments), axis=0)
     point = problem.start._replace(values=jnp.asarray(values))
     # what each record has for itself says nothing of another one
     names = [p.name for p in parameters if p.known is None and not p.per_record]
+    report("computing the information of the records so far", None)
     known = blocks_of(fit.problem, fit.point, names=names)
+    report("computing the information of the proposed records", None)
     more = blocks_of(problem, point, names=names)
     questions = _questions(found, asked)
     names = [part.recording.name for part in problem.segments]
-    made = [
-        Experiment(
-            name,
-            {name: _stderr(known, None, one) for name, one in questions.items()},
-            {
-                name: _stderr(known, more.information[k], one)
-                for name, one in questions.items()
-            },
-            problem.segments[k].recording.nominal_speed,
+    made = []
+    for k, name in enumerate(names):
+        report("comparing the proposed records", k / len(names))
+        made.append(
+            Experiment(
+                name,
+                {at: _stderr(known, None, one) for at, one in questions.items()},
+                {
+                    at: _stderr(known, more.information[k], one)
+                    for at, one in questions.items()
+                },
+                problem.segments[k].recording.nominal_speed,
+            )
         )
-        for k, name in enumerate(names)
-    ]
     return tuple(sorted(made, key=lambda one: one.factor))
 
 
@@ -200,14 +211,14 @@ def next_experiments(
                 name=_named(rig, float(speed)),
             )
         )
-    report("weighing experiments", None)
+    report("cutting the simulated records", None)
     flying = [part for part in _cut(rig, made) if part.flights]
     if not flying:
         raise RecordingError(
             "Nothing would leave its constraint at any of these speeds; give `speeds` "
             "at which it flies."
         )
-    return compare_experiments(found, flying, asked)
+    return compare_experiments(found, flying, asked, progress=progress)
 
 
 def _encoder(
@@ -264,7 +275,7 @@ def _questions(found: Diagnosis, asked) -> dict[str, _Question]:
         part
         for other in found.alternatives
         if other.delta_bic < found.policy.rival
-        # one more term in addition to those named is no rival of them
+        # one more term in addition to those named is no alternative to them
         and not (named and set(named) <= set(other.terms))
         for part in other.terms
         if part in own

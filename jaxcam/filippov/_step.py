@@ -1,7 +1,7 @@
 """One attempted step: accept it, retake it shorter, or end it at the surface.
 
 Apart from the event loop of `jaxcam.hybrid`, because a switch changes the field and not
-the state: nothing bounces, and a step ends on the surface.
+the state: there are no impacts, and a step ends on the surface.
 """
 
 from typing import Any, NamedTuple

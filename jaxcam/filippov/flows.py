@@ -13,7 +13,7 @@ from .modes import first_mode
 
 
 CHUNK = 256
-"""Attempts between two looks from Python."""
+"""Attempts between two checks from Python."""
 
 
 def first_filippov_state(system: FilippovSystem, state, t0, t1) -> FilippovState:

@@ -34,7 +34,7 @@ PROMISE = 1e-3
 _GRADIENT = 1e-2
 # Steps that may follow before the first one is judged
 _CORRECTIONS = 3
-# A flight of more pieces than this is not foretold from its start at once
+# A flight of more pieces than this is not predicted from its start at once
 _LONG = 16
 # What parameters without a tolerance are multiplied by, where a fit ended far off
 _FACTORS = (0.7, 1.4, 0.5, 2.0)

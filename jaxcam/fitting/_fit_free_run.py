@@ -21,8 +21,8 @@ from .engine import (
 )
 
 
-# How often initial states are found anew; steps of the parameters, in their scales,
-# that end it
+# Times that initial states are estimated again; steps of the parameters, in their
+# scales, that end it
 _ROUNDS, _SETTLED = 4, 1e-2
 # Evaluations of a round at most
 _EVALUATIONS = 40
@@ -137,7 +137,7 @@ def _array(leaf):
 
 
 def _missed(ready: Sequence[tuple[Layout, Prepared]], values):
-    """What all recordings miss, in units of the noise."""
+    """Residuals of all recordings, in units of the noise."""
     parts = [_off(*one, jnp.asarray(values)) for one in ready]
     return _sound(np.concatenate(parts))
 

@@ -103,7 +103,7 @@ class Fit:
         return self._table().html()
 
     def _table(self) -> ShortTable:
-        """How the fit ended, and its estimates."""
+        """Outcome of the fit, and its estimates."""
         count = f"{self.problem.samples} samples, {len(self.problem.records)} records"
         trusted = "converged" if self.converged else "not to be trusted"
         rows = [
@@ -144,8 +144,10 @@ class Fit:
 
     @property
     def converged(self) -> bool:
-        """Whether the fit is at an optimum that the noise explains, with all errors
-        known; `reasons` says why not."""
+        """Return whether the fit is at an optimum that the noise explains.
+
+        All errors are known then; otherwise `reasons` says why not.
+        """
         return not self.reasons
 
     @property

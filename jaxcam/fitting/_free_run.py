@@ -260,7 +260,7 @@ def _started(model: Model, one: Prepared) -> Prepared:
 
 @eqx.filter_jit
 def _off(model: Model, one: Prepared, state):
-    """What samples miss in units of the noise, and its slopes by the initial state."""
+    """Residuals in units of the noise, and their slopes by the initial state."""
 
     def missed(state):
         found = simulated(model, dataclasses.replace(one, state=state)).channels

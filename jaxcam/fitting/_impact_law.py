@@ -17,7 +17,7 @@ from ._restitution import fit_rows, RestitutionFit
 _LEAST = 4
 # A row so many scatters off is a misread one
 _MISREAD = 6.0
-# Chance that a constant restitution looks as if it depended on the speed
+# Probability that a constant restitution seems to depend on the speed
 _CHANCE = 0.01
 # Where more than the rest is far off, nothing is set aside
 _MAJORITY = 0.7
@@ -245,7 +245,7 @@ def _typical(off, table: ImpactTable, weights) -> float:
 
 
 def _misfit(table: ImpactTable, errors, keep):
-    """Of each impact from the more general law, in standard errors."""
+    """Misfit of each impact to the more general law, in standard errors."""
     fits = _fits(table, errors, keep)
     law = fits.get("power", fits["constant"]).law
     r = np.array([float(law(0.0, v)) for v in table.approach])  # pyright: ignore

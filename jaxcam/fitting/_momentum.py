@@ -1,4 +1,4 @@
-"""Whether two bodies that hit each other keep their momentum."""
+"""Check that two colliding bodies keep their momentum."""
 
 import dataclasses
 from typing import Any
@@ -27,11 +27,11 @@ class MomentumBalance:
     ratio_stderr: float
     """Mass of the second body over that of the first, such that momentum is kept."""
     stated: float
-    """That ratio of the stated masses, or not a number."""
+    """The same ratio of the stated masses, or NaN."""
 
     @property
     def kept(self) -> bool:
-        """Whether a change is within its error, or too small to matter."""
+        """Return whether a change is within its error, or too small to matter."""
         size = abs(self.change)
         return not (size > _ERRORS * self.stderr and size > _SHARE)
 
@@ -81,7 +81,7 @@ def momentum_of(
 def _ratio(
     above: Float[np.ndarray, " k"], below: Float[np.ndarray, " k"]
 ) -> tuple[float, float]:
-    """Of two sums, with the standard error that their scatter gives."""
+    """Ratio of two sums, with the standard error from their scatter."""
     total = float(np.sum(below))
     if total == 0 or len(above) < 2:
         return np.nan, np.nan

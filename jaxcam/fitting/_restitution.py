@@ -18,7 +18,7 @@ from .engine import Turning
 
 # Errors beyond this many standard errors count by their size, not its square (Huber)
 _HUBER = 3.0
-# Runge-Kutta steps of one bounce
+# Runge-Kutta steps of one flight
 _STEPS = 200
 
 
@@ -257,7 +257,7 @@ def first_bounce(
 
     Returns:
         One coefficient for each period that has such a pair of flights, shape
-            `(turns,)`.
+            `(periods,)`.
 
     Raises:
         RecordingError: The recording has no measured drive.
@@ -322,7 +322,7 @@ def _speed_for_height(system, angle, duration, height) -> Array:
         short = top(middle) < height
         return jnp.where(short, middle, low), jnp.where(short, high, middle)
 
-    # no bounce is faster than one that falls back at the rate of its own height
+    # no flight is faster than one that falls back at the rate of its own height
     high = 8 * height / duration + 1e-9
     low, high = jax.lax.fori_loop(0, 40, halve, (zero, high + zero))
     return (low + high) / 2

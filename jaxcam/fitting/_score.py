@@ -46,7 +46,7 @@ class Linearised:
 
         Args:
             names: Names of the parameters to free.
-            beside: Parameters that are free in any case, and absorb part of the gain.
+            beside: Parameters that are free in any case and absorb part of the gain.
 
         Returns:
             The gain.

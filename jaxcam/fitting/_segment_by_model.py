@@ -1,7 +1,7 @@
 """Recordings of any system cut at its own gaps, as its channels show them."""
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import equinox as eqx
 import jax
@@ -15,7 +15,7 @@ from ..recordings.cut import Drive, padded, read_drive, segment_gaps, Segments
 from .engine import Layout, Model, Parameter, parameter_places, with_constants
 
 
-# Samples at which it is looked up what a gap depends on
+# Samples at which the dependence of a gap on the state is evaluated
 _LOOKS = 64
 
 
@@ -26,6 +26,7 @@ def segment_by_model(
     *,
     drive_channel: str | None = None,
     restitution: float = 0.5,
+    progress: Callable[[float], None] | None = None,
 ) -> tuple[Segments, ...]:
     """Cut recordings at every gap of a model's system, as measured by its channels.
 
@@ -40,6 +41,7 @@ def segment_by_model(
         parameters: Parameters whose tolerances limit the error of a gap.
         drive_channel: The encoder of a drive (rad), of a model with a `Turning` drive.
         restitution: Expected coefficient, for impacts too low to be observed.
+        progress: Called with the fraction of recordings done.
 
     Returns:
         The segments of each recording.
@@ -65,7 +67,9 @@ def segment_by_model(
     }
     primary = next(iter(model.sensors))
     found = []
-    for recording in recordings:
+    for k, recording in enumerate(recordings):
+        if progress is not None:
+            progress(k / len(recordings))
         drive = None if drive_channel is None else read_drive(recording, drive_channel)
         states = _states(model, picks, recording)
         here = with_constants(model, recording)
@@ -86,6 +90,8 @@ def segment_by_model(
                 restitution=restitution,
             )
         )
+    if progress is not None:
+        progress(1.0)
     return tuple(found)
 
 

@@ -3,7 +3,7 @@
 import dataclasses
 import fnmatch
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Literal
 
@@ -101,9 +101,14 @@ class Setup:
         return dataclasses.replace(run, constants={**found, **run.constants})
 
     def segments(
-        self, recordings: Iterable[Recording | Segments]
+        self,
+        recordings: Iterable[Recording | Segments],
+        *,
+        progress: Callable[[float], None] | None = None,
     ) -> tuple[Segments, ...]:
         """Return recordings cut at the gaps of the system; those already cut stay.
+
+        `progress` is called with the fraction of recordings done.
 
         Raises:
             RecordingError: A channel is missing, or a gap is not measured by any
@@ -120,7 +125,11 @@ class Setup:
             return cut
         whole = [run.recording if isinstance(run, Segments) else run for run in runs]
         return segment_by_model(
-            self.model, whole, self.parameters, drive_channel=self.drive_channel
+            self.model,
+            whole,
+            self.parameters,
+            drive_channel=self.drive_channel,
+            progress=progress,
         )
 
     def problem(self, recordings: Iterable[Recording | Segments]) -> Problem:
@@ -133,6 +142,6 @@ class Setup:
 
 
 def _fits(name: str, pattern: str) -> bool:
-    """Whether a record is meant, also a piece of it: `run3_piece2` by `run3`."""
+    """Return whether a record is meant, also a piece of it: `run3_piece2` by `run3`."""
     whole = re.sub(r"_piece\d+$", "", name)
     return any(fnmatch.fnmatchcase(one, pattern) for one in (name, whole))

@@ -65,7 +65,7 @@ class Settings(eqx.Module):
 
     @property
     def compiles(self) -> bool:
-        """Whether a run that is not traced is to be compiled by LLVM."""
+        """Return whether a run that is not traced is to be compiled by LLVM."""
         return self.backend != "xla" and not self.plain
 
     def check(self) -> None:

@@ -39,7 +39,7 @@ def neighbours(breaks, repeat, t):
     for b in breaks:
         turns = jnp.floor(jax.lax.stop_gradient((t - b) / again)) + 1
         turns = jnp.where(recurs, turns, 0.0)
-        # rounding may have counted the turn that ends here
+        # rounding may have counted the period that ends here
         turns = jnp.where(recurs & (b + turns * again <= t), turns + 1, turns)
         time = b + turns * again
         past = jnp.where(recurs, b + (turns - 1) * again, b)

@@ -1,4 +1,4 @@
-"""The thesis' cam-follower rig: a sprung follower that bounces on a turning cam."""
+"""The thesis' cam-follower rig: a sprung follower that impacts a turning cam."""
 
 from typing import ClassVar
 

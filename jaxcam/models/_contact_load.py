@@ -15,7 +15,7 @@ from .cams import flat_oscillating_contour, MotionPieces, MotionProgram, profile
 _TURN = 2 * np.pi
 _SAMPLES = 1025
 _HALVINGS = 60
-"""Of the golden section, from two steps of the scan to rounding."""
+"""Iterations of the golden section, from two steps of the scan to rounding."""
 _GOLDEN = (5**0.5 - 1) / 2
 
 

@@ -21,7 +21,7 @@ def parameter(default=None):
 
 
 def is_concrete(*values) -> bool:
-    """Whether all values can be looked at, which they cannot inside a `jax.jit`."""
+    """Return whether all values are known, which they are not inside a `jax.jit`."""
     return not any(isinstance(value, Tracer) for value in values)
 
 

@@ -21,7 +21,7 @@ _TURN = 2 * np.pi
 _NEAR = 4e-12
 """Distance, and velocity, that a contact can be off by, over the size of the state."""
 _BEHIND = 2e-4
-"""Of which a body that moves in is put behind the surface."""
+"""Distance by which a body that moves in is put behind the surface."""
 _Part = TypeVar("_Part", Impacts, Contacts, Steps)
 
 

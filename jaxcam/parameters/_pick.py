@@ -59,7 +59,7 @@ class Pick:
 
 
 Where = Callable[[Any], Any] | str | tuple[Callable[[Any], Any] | str, ...] | Pick
-"""What names a parameter: a function of the system, a dotted name, or several of those.
+"""Selects a parameter: a function of the system, a dotted name, or several of those.
 """
 
 
@@ -197,7 +197,7 @@ def _named_leaves(tree) -> list[tuple[str, Any]]:
 
 
 def _varies(leaf, integers: bool) -> bool:
-    """Whether a leaf is one number that can vary."""
+    """Return whether a leaf is one number that can vary."""
     if isinstance(leaf, bool):
         return False
     if isinstance(leaf, float | np.floating):

@@ -8,7 +8,7 @@ from jaxtyping import Array, ArrayLike, Float, Real
 
 
 AnyArray: TypeAlias = Array | np.ndarray
-"""Of a program, or of the host."""
+"""An array of a program, or of the host."""
 RealScalar: TypeAlias = Real[ArrayLike, ""]
 FloatScalar: TypeAlias = float | Float[AnyArray, ""]
 """A number that may be an argument of a program."""

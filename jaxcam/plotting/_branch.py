@@ -30,7 +30,7 @@ _MARKS = {
     "beginning of impacts": ("v", "#56B4E9"),
 }
 _OTHER = ("X", SECTION)
-# words beside the marks, where the kind has a long name
+# words next to the marks, where the kind has a long name
 _SHORT = {
     "Neimark-Sacker": "NS",
     "interruption of chattering": "interruption",
@@ -43,6 +43,11 @@ _ROOM = 26, 11
 def mark_of(kind: str) -> tuple[str, str]:
     """Mark and colour of a kind of special point."""
     return _MARKS.get(kind, _OTHER)
+
+
+def word_of(kind: str) -> str:
+    """Name of a kind of special point in figures."""
+    return str(_SHORT.get(kind, kind))
 
 
 @styled
@@ -158,7 +163,7 @@ def _mark(ax: Axes, branch, value, x_scale) -> None:
 
 
 def _name(ax: Axes, points, value, x_scale) -> None:
-    """A word beside each mark, where there is room for it."""
+    """A word next to each mark, where there is room for it."""
     taken: list[np.ndarray] = []
     for point in points:
         y = float(np.ravel(np.asarray(value(point), dtype=float))[0])
@@ -169,7 +174,7 @@ def _name(ax: Axes, points, value, x_scale) -> None:
         taken.append(here)
         left = ax.transAxes.inverted().transform(ax.transData.transform(place))[0] > 0.8
         ax.annotate(
-            str(_SHORT.get(point.kind, point.kind)),
+            word_of(point.kind),
             place,
             xytext=(-5 if left else 5, 5),
             textcoords="offset points",

@@ -1,4 +1,4 @@
-"""Impacts that chatter to rest, and those that lead to a graze, in one plane."""
+"""Impacts that lead to complete chatter or to grazing, in one plane."""
 
 import numpy as np
 from matplotlib.axes import Axes

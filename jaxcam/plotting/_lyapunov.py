@@ -1,4 +1,4 @@
-"""Lyapunov exponents over the first turns, to see them settle."""
+"""Lyapunov exponents over the first periods, to see them settle."""
 
 import numpy as np
 from matplotlib.axes import Axes

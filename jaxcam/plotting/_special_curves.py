@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 
 from ._axes import figure_of, one_axes
-from ._branch import mark_of
+from ._branch import mark_of, word_of
 from ._style import styled
 from .labels import labelled
 
@@ -78,7 +78,10 @@ def special_curves(
     ax.set_xlabel(labelled(*((names[0], "-") if x_label is None else x_label)))
     ax.set_ylabel(labelled(*((names[1], "-") if y_label is None else y_label)))
     ax.margins(x=0.03, y=0.0)
-    for k, curve in enumerate(several):
+    in_order = sorted(
+        several, key=lambda curve: np.mean([p.parameters[0] for p in curve.points])
+    )
+    for k, curve in enumerate(in_order):
         # neighbours are named at different heights
         _name(ax, curve, scale, 0.65 if k % 2 else 0.3)
     return figure_of(ax)
@@ -96,7 +99,7 @@ def _name(ax: Axes, curve, scale, share: float) -> None:
     ax.text(
         values[middle, 0],
         values[middle, 1],
-        kind,
+        word_of(kind),
         ha="center",
         va="center",
         # an angle in the data, which the axes turn as they are scaled

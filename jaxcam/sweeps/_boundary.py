@@ -15,7 +15,7 @@ class BasinEntropy(NamedTuple):
 
     @property
     def fractal(self) -> bool:
-        """Whether the boundary must be fractal: boundary entropy above ln 2."""
+        """Return whether the boundary must be fractal: boundary entropy above ln 2."""
         return bool(self.boundary_entropy > np.log(2))
 
 

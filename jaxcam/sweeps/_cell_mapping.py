@@ -1,11 +1,12 @@
-"""Simple cell mapping: basins from one turn of each cell. (Hsu, Section 5.3.1)"""
+"""Simple cell mapping: basins from one period of each cell. (Hsu, Section 5.3.1)"""
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 
 from ._grid import Grid
-from ._inputs import as_section
+from ._inputs import as_section, LANES
 
 
 class CellMapping(NamedTuple):
@@ -21,7 +22,13 @@ class CellMapping(NamedTuple):
     """Whether the cell is part of a cycle."""
 
 
-def cell_mapping(system, grid: Grid, *, turns: int = 1) -> CellMapping:
+def cell_mapping(
+    system,
+    grid: Grid,
+    *,
+    turns: int = 1,
+    progress: Callable[[float], None] | None = None,
+) -> CellMapping:
     """Map the centre of every cell once, and follow the cells (simple cell mapping).
 
     All states outside of the grid, and those that cannot start, are one sink cell,
@@ -34,6 +41,7 @@ def cell_mapping(system, grid: Grid, *, turns: int = 1) -> CellMapping:
         system: A hybrid system, or a section that is sampled once per period.
         grid: A [`jaxcam.sweeps.Grid`][] of states.
         turns: Number of periods of one application of the map.
+        progress: Called with the fraction of cells done.
 
     Returns:
         A `CellMapping`.
@@ -54,10 +62,15 @@ def cell_mapping(system, grid: Grid, *, turns: int = 1) -> CellMapping:
             "period or more"
         )
     states = grid.states()
-    samples = section.sample(states, turns, 1)
-    image = grid.cells(samples.final)
-    image[samples.code != 0] = -1
-    return follow_cells(image, grid.shape)
+    images = []
+    for first in range(0, len(states), LANES):
+        samples = section.sample(states[first : first + LANES], turns, 1)
+        image = grid.cells(samples.final)
+        image[samples.code != 0] = -1
+        images.append(image)
+        if progress is not None:
+            progress(min(1.0, (first + LANES) / len(states)))
+    return follow_cells(np.concatenate(images), grid.shape)
 
 
 def follow_cells(image, shape) -> CellMapping:
@@ -74,7 +87,7 @@ def follow_cells(image, shape) -> CellMapping:
     for _ in range(doublings):
         smallest = np.minimum(smallest, smallest[far])
         far = far[far]
-    # after so many turns all are on a cycle; its smallest cell is its name
+    # after so many applications all are on a cycle; its smallest cell is its name
     cyclic = np.zeros(count + 1, dtype=bool)
     cyclic[far] = True
     name = smallest[far]
@@ -88,7 +101,7 @@ def follow_cells(image, shape) -> CellMapping:
 
 
 def _steps(pointer, cyclic):
-    """Turns until a cycle is reached, by doubling."""
+    """Applications of the map until a cycle is reached, by doubling."""
     steps = np.where(cyclic, 0, 1)
     far = np.where(cyclic, np.arange(len(pointer)), pointer)
     while True:

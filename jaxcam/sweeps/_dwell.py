@@ -13,19 +13,19 @@ from .sections import AbstractSection
 
 
 _SLACK = 1e-9
-"""Of a turn, so that rounding costs none."""
+"""Fraction of a period, so that rounding costs no period."""
 
 
 def dwell_turns(
     section: AbstractSection, where: Pick, values, dwell: tuple[float, float]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Turns at each value, and how many of them are stored.
+    """Periods at each value, and the number of them that are stored.
 
-    **Arguments:** `dwell`: s to wait, and s to store. The wait ends with the turn in
-    which it is over, and whole turns alone are stored.
+    **Arguments:** `dwell`: s to wait, and s to store. The wait ends with the period in
+    which it is over, and only whole periods are stored.
 
     Raises:
-        ValueError: Where there is not one whole turn to store.
+        ValueError: Where there is not one whole period to store.
     """
     if not section.regular:
         raise ValueError("dwell needs samples once per period, not at impacts")
@@ -47,7 +47,7 @@ def dwell_turns(
 
 
 class DwellJob(CarriedJob):
-    """Up, down or both ways, with as many turns at a value as its seconds hold."""
+    """Up, down or both ways, with as many periods at a value as its seconds hold."""
 
     def __init__(self, *arguments, dwell: tuple[float, float]):
         self.dwell = dwell

@@ -25,7 +25,7 @@ class Exponents(NamedTuple):
 
     @property
     def chaotic(self) -> np.ndarray:
-        """Whether the exponent is positive by three standard errors."""
+        """Return whether the exponent is positive by three standard errors."""
         return self.largest > 3 * self.stderr
 
 

@@ -58,7 +58,8 @@ def follow_basins(
             not the same attractor. Pairs are chosen so that the sum of distances is
             smallest; the label may change, as where P(1,1) turns into P(2,2).
         out: Folder in which one sweep is stored for each value.
-        progress: Called with the fraction done.
+        progress: As for [`jaxcam.sweeps.blocks.run_blocks`][], for one value at a
+            time.
         options: As for [`jaxcam.sweeps.basins`][].
 
     Returns:

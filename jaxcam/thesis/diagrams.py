@@ -10,7 +10,7 @@ from ..sweeps import Diagram
 
 
 CASCADE = tuple(f"P({2**k},{2**k})" for k in range(1, 5))
-"""What an orbit with one impact a turn doubles to."""
+"""Orbits to which an orbit with one impact per cycle doubles."""
 
 
 class Events(NamedTuple):

@@ -13,11 +13,11 @@ from .speeds import at_speed, speed_of
 
 
 INTERRUPTION = 152.67658
-"""Where the thesis' rig is interrupted (section 6.7.1), and where Table 6.1 is taken.
+"""Interruption of the thesis' rig (section 6.7.1), and the speed of Table 6.1.
 """
 REFERENCE = 152.67
 _RANGE, _RANGES = 12.0, 5
-"""Rpm of the ranges in which an interruption is looked for, the thesis' own first, then
+"""Rpm of the ranges in which an interruption is searched for, the thesis' first, then
 the next above and below, so many times."""
 _MOVED = 0.01
 """Rpm to which the interruption of another rig moves the printed speeds around it."""

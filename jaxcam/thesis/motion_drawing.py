@@ -39,7 +39,7 @@ def draw_gap(ax, run: Trajectory) -> None:
     ax.plot(drawn.time, drawn.gap[:, 0], color=FLIGHT, lw=1.1)
     ax.axhline(0, color="0.4", lw=0.7)
     if np.nanmax(np.abs(drawn.gap)) < 1e-9:
-        # contact for good: rounding is not to be looked at
+        # permanent contact: rounding is not shown
         ax.set_ylim(-1e-3, 1e-3)
     ax.set_ylabel("over cam (rad)")
 

@@ -19,7 +19,7 @@ from .speeds import at_rpm, speed_of
 NEAR_CAM = (0.3, 0.0)
 """A state near the cam, from which Newton finds contact."""
 SEARCH, _STRIDE = 148.0, 0.5
-"""Where the search for the branch begins (rpm), and the longest stride along it."""
+"""Start of the search for the branch (rpm), and the longest step along it."""
 
 
 def first_orbit(system: CamFollower) -> ImpactOrbit | None:

@@ -1,6 +1,7 @@
 """Every target by its name, found by the names of the files in the chapters."""
 
 import pkgutil
+from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -44,7 +45,13 @@ def _discovered() -> dict[str, Target]:
 TARGETS: dict[str, Target] = _discovered()
 
 
-def reproduce(name: str, system: CamFollower, size: str = SIZES[0]) -> "pd.DataFrame":
+def reproduce(
+    name: str,
+    system: CamFollower,
+    size: str = SIZES[0],
+    *,
+    progress: Callable[[str, float | None], None] | None = None,
+) -> "pd.DataFrame":
     """Reproduce a table of the thesis, or the numbers of a figure, next to the printed
     ones.
 
@@ -53,6 +60,7 @@ def reproduce(name: str, system: CamFollower, size: str = SIZES[0]) -> "pd.DataF
         system: The rig, such as `jaxcam.models.preset("calibrated")`.
         size: "default", or "full" for diagrams and basins at the resolution of the
             published ones.
+        progress: Called with a sentence and a fraction, or `None`.
 
     Returns:
         Columns quantity, printed, computed, unit, difference, relative (the difference
@@ -72,4 +80,4 @@ def reproduce(name: str, system: CamFollower, size: str = SIZES[0]) -> "pd.DataF
     if name not in TARGETS:
         known = ", ".join(TARGETS)
         raise ValueError(f"There is no {name!r} to reproduce; choose one of {known}.")
-    return TARGETS[name].table(system, size)
+    return TARGETS[name].table(system, size, progress=progress)

@@ -1,4 +1,4 @@
-"""Turns from the release of a sticking orbit: does the next one rest?"""
+"""Cycles from the release of a sticking orbit: does the next one stick?"""
 
 import equinox as eqx
 import jax.numpy as jnp

@@ -17,7 +17,7 @@ from .target import Rows
 
 
 _TURNS, _KEEP, _RERUNS = 300, 64, 2
-"""Turns before the first look, samples kept, and how often patience is doubled."""
+"""Cycles before the first check, samples kept, and number of doublings."""
 
 
 class ShownMotion(NamedTuple):

@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ..models import CamFollower
+from .progress import Report, reporting
 
 
 if TYPE_CHECKING:
@@ -35,15 +36,34 @@ class Target:
     note: str = ""
     """Remark for the comparison."""
 
-    def table(self, system: CamFollower, size: str = SIZES[0]) -> "pd.DataFrame":
+    def table(
+        self,
+        system: CamFollower,
+        size: str = SIZES[0],
+        *,
+        progress: Report | None = None,
+    ) -> "pd.DataFrame":
         """Return printed next to computed values, as [`jaxcam.thesis.reproduce`][]
         does.
         """
-        return frame(self.compute(system, *self._size(size)))
+        with reporting(progress):
+            return frame(self.compute(system, *self._size(size)))
 
-    def figure(self, system: CamFollower, size: str = SIZES[0]) -> Figure | None:
-        """Return the drawing in the current style; None for a table."""
-        return self.draw(system, *self._size(size)) if self.draw else None
+    def figure(
+        self,
+        system: CamFollower,
+        size: str = SIZES[0],
+        *,
+        progress: Report | None = None,
+    ) -> Figure | None:
+        """Return the drawing in the current style; None for a table.
+
+        `progress` is called with a sentence and a fraction, or `None`.
+        """
+        if self.draw is None:
+            return None
+        with reporting(progress):
+            return self.draw(system, *self._size(size))
 
     def _size(self, size: str) -> tuple[str, ...]:
         if size not in SIZES:

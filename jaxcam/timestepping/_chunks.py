@@ -12,11 +12,21 @@ CHUNK = 1024
 """Steps in a chunk."""
 
 
-def in_chunks(run: Callable[[Any, Any], tuple[Any, Any]], carry, steps: int):
-    """Outputs of `steps` steps, where `run(carry, k)` makes a chunk from step k on."""
+def in_chunks(
+    run: Callable[[Any, Any], tuple[Any, Any]],
+    carry,
+    steps: int,
+    progress: Callable[[float], None] | None = None,
+):
+    """Outputs of `steps` steps, where `run(carry, k)` makes a chunk from step k on.
+
+    `progress` is called with the fraction of steps done.
+    """
     parts = []
     for first in range(0, steps, CHUNK):
         carry, found = run(carry, jnp.asarray(float(first)))
         keep = min(CHUNK, steps - first)
         parts.append(jax.tree.map(lambda leaf: np.asarray(leaf)[:keep], found))
+        if progress is not None:
+            progress((first + keep) / steps)
     return jax.tree.map(lambda *leaves: jnp.asarray(np.concatenate(leaves)), *parts)

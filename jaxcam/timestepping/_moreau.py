@@ -1,5 +1,6 @@
 """Moreau's time-stepping of a hybrid system: impacts are part of a step."""
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import equinox as eqx
@@ -51,7 +52,13 @@ class SteppedMotion(NamedTuple):
 
 
 def moreau(
-    system: HybridSystem, state: VectorLike, t0, t1, steps: int
+    system: HybridSystem,
+    state: VectorLike,
+    t0,
+    t1,
+    steps: int,
+    *,
+    progress: Callable[[float], None] | None = None,
 ) -> SteppedMotion:
     """Simulate from `t0` to `t1` by `steps` time steps without event detection
     (Moreau).
@@ -69,7 +76,8 @@ def moreau(
         state: Initial state with every gap >= 0, shape `(n,)`.
         t0: Start time (s).
         t1: End time (s).
-        steps: Number of steps; each number is compiled once.
+        steps: Number of steps.
+        progress: Called with the fraction of steps done.
 
     Returns:
         A [`jaxcam.timestepping.SteppedMotion`][].
@@ -92,7 +100,7 @@ def moreau(
     h = jnp.asarray((t1 - t0) / steps)
     start = jnp.asarray(t0)
     states, pushes, distances, codes = in_chunks(
-        lambda x, k: _run(system, x, k, start, h), state, steps
+        lambda x, k: _run(system, x, k, start, h), state, steps, progress
     )
     explain(int(jnp.max(codes)), f" of step {int(jnp.argmax(codes > 0))}")
     if not bool(jnp.all(jnp.isfinite(states))):

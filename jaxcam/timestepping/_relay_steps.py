@@ -1,5 +1,6 @@
 """Backward Euler steps of a relay system (thesis, eqs. 3.2-3.4)."""
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import equinox as eqx
@@ -27,7 +28,14 @@ class RelayMotion(NamedTuple):
     """Outputs y over each step, shape `(steps, m)`."""
 
 
-def relay_steps(system: RelaySystem, state: VectorLike, t1, steps: int) -> RelayMotion:
+def relay_steps(
+    system: RelaySystem,
+    state: VectorLike,
+    t1,
+    steps: int,
+    *,
+    progress: Callable[[float], None] | None = None,
+) -> RelayMotion:
     """Simulate a relay system from time zero to `t1` by `steps` backward Euler steps.
 
     Switches are not located and sliding needs no special treatment: infinitely many
@@ -40,6 +48,7 @@ def relay_steps(system: RelaySystem, state: VectorLike, t1, steps: int) -> Relay
         state: Initial state, shape `(n,)`.
         t1: End time (s).
         steps: Number of steps.
+        progress: Called with the fraction of steps done.
 
     Returns:
         A `RelayMotion`.
@@ -73,7 +82,7 @@ def relay_steps(system: RelaySystem, state: VectorLike, t1, steps: int) -> Relay
             "+ D is no P-matrix; change the signs of B or C, or take shorter steps."
         )
     states, inputs, outputs, codes = in_chunks(
-        lambda x, _: _run(system, x, h), state, steps
+        lambda x, _: _run(system, x, h), state, steps, progress
     )
     worst = int(jnp.max(codes))
     explain(worst, f" of step {int(jnp.argmax(codes > 0))}")

@@ -1,4 +1,4 @@
-"""Chatter: impact by impact, by its maps, complete, interrupted, over a whole turn."""
+"""Chatter: impact by impact, by its maps, complete, interrupted, over a period."""
 
 from ._adding import adding_thresholds as adding_thresholds
 from ._beta_map import (
@@ -24,6 +24,7 @@ from ._composed_map import (
     simulated_at_section as simulated_at_section,
     simulated_by_parameter as simulated_by_parameter,
 )
+from ._find_lobes import find_lobes as find_lobes, Lobes as Lobes
 from ._free_flight import fly as fly
 from ._grazing_manifold import (
     chattering_region as chattering_region,
@@ -51,10 +52,8 @@ from ._lambda_map import (
     lambda_map as lambda_map,
 )
 from ._local_map import (
-    find_lobes as find_lobes,
     fit_local_map as fit_local_map,
     iterate_local_map as iterate_local_map,
-    Lobes as Lobes,
     LocalMap as LocalMap,
 )
 from ._reversed import Reversed as Reversed

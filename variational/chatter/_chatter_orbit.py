@@ -136,7 +136,7 @@ def orbit_from(system, frame: ChatterFrame, periods: int = 1) -> ChatterOrbit:
         return s.found & ~s.settled & before & (s.count < _IMPACTS)
 
     def hop(s):
-        # a flight that misses the wall near release may come back a turn later
+        # a flight that misses the wall near release may come back a period later
         point = next_impact(system, s.time, s.state, s.speed, 2 * period)
         since = point.time - frame.release
         passed = jnp.floor(jax.lax.stop_gradient(since) / period).astype(s.turn.dtype)

@@ -1,6 +1,6 @@
-"""One turn of a chattering orbit as a map of one variable, from its local theory.
+"""One period of a chattering orbit as a map of one variable, from its local theory.
 
-At the interruption a turn is Theta, smooth, from a section after release to an impact
+At the interruption a period is Theta, smooth, from a section after release to an impact
 D* of the chattering sequence, followed by beta. All motions leave beta along one
 direction B, so one number says where they are: epsilon = tau*^2 beta, which at release
 is a relative velocity c epsilon. With A the derivative of Theta, C that of lambda and
@@ -90,7 +90,7 @@ class ComposedMap(eqx.Module):
         return self.covector @ self.matrix @ self.vector
 
     def __call__(self, epsilon, parameter=0.0) -> Float[Array, "..."]:
-        """epsilon of the next turn (thesis, eqs. 6.109 and 6.116).
+        """epsilon of the next period (thesis, eqs. 6.109 and 6.116).
 
         **Arguments:** `epsilon`, in the unit of time squared; `parameter`, its distance
         from the interruption; broadcast.
@@ -186,7 +186,7 @@ def _compose(along, value, rank, phase) -> ComposedMap:
         frame = prepared_frame(moved, jnp.asarray(phase * period, jnp.float64))
         zero = jnp.zeros(())
         point = impact_after(moved, frame.release, frame.state, zero, 0.0, rank)
-        # the orbit starts at the frame's release: a turn later than D*
+        # the orbit starts at the frame's release: a period later than D*
         return moved, frame, point.time - period, point.speed
 
     def section_of(moved, frame, velocity):

@@ -1,6 +1,6 @@
 """Integrate free flight with state, normal velocity and gap.
 
-Gap and normal velocity are integrated on their own from the surface, beside the state:
+Gap and normal velocity are integrated from the surface, next to the state:
 z' = v, v' = a, from the speed that the impact leaves, where a is the normal
 acceleration of free flight. They keep their relative accuracy where the gap computed
 from the state has lost it, so impacts 1e-12 high are as good as high ones.

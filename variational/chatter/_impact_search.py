@@ -2,7 +2,7 @@
 
 It stays apart from the event loop of `jaxcam.hybrid`, because it knows a gap to its own
 relative accuracy, and can be differentiated twice. One step is the same program whether
-it searches for the next impact, lands on it or looks for the lowest point of a flight;
+it searches for the next impact, lands on it or finds the lowest point of a flight;
 so a loop over steps is small to compile, and its forward derivative is that of the
 motion at fixed lengths of the steps, corrected where it lands.
 """
@@ -19,7 +19,7 @@ from jaxcam.hybrid.surface import normal_acceleration
 from ._free_flight import flight_rates, on_flight, runge_kutta_step, TOLERANCE
 
 
-# a dip of the gap is looked for within one step: it must not hold two of them
+# a minimum of the gap is searched for within one step, which must not hold two
 _STEPS_PER_PERIOD = 16
 # change of a landing step, over the flight and over the time in which the
 # acceleration would stop the fall, after which one more step is exact
@@ -40,17 +40,17 @@ class SearchState(NamedTuple):
 
     time: Float[Array, ""]
     y: Float[Array, " n+2"]
-    """State, normal velocity and gap: the last two are integrated beside the state from
+    """State, normal velocity and gap; the last two have integrals of their own, from
     the last impact on, so that low flights are as exact as high ones."""
     since: Float[Array, ""]
     """Time of the last impact."""
     length: Float[Array, ""]
-    """Of the next step."""
+    """Length of the next step."""
     longest: Float[Array, ""]
-    """Of any step."""
+    """Largest length of a step."""
     mode: Int[Array, ""]
     low: Float[Array, ""]
-    """Lengths before and behind what is looked for."""
+    """Lengths before and beyond the point that is searched for."""
     high: Float[Array, ""]
     tries: Int[Array, ""]
     """Steps for the same purpose."""
@@ -59,12 +59,12 @@ class SearchState(NamedTuple):
 
     @property
     def searches(self) -> Bool[Array, ""]:
-        """Whether no impact is in sight yet."""
+        """Return whether no impact is in sight yet."""
         return self.mode == _SEARCH
 
     @property
     def lands(self) -> Bool[Array, ""]:
-        """Whether the next step ends in the impact, up to one correction."""
+        """Return whether the next step ends in the impact, up to one correction."""
         return (self.mode == _LAST) | ((self.mode == _LAND) & (self.tries >= _LANDINGS))
 
 

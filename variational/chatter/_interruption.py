@@ -1,6 +1,6 @@
 """The parameter value at which complete chattering ends at the release point.
 
-The orbit that sticks once a period starts each turn at release without relative
+The orbit that sticks once per period starts each period at release without relative
 velocity, so its interruption is one scalar equation, accumulation = release + period.
 As it stands the equation is not smooth (the difference falls like a power between 1/2
 and 1), so its smooth form is solved, `ChatterOrbit.margin`, by Newton's method inside a
@@ -88,7 +88,7 @@ def interruption_in(
 
 
 def _margin(along: Line, value, periods: int):
-    """Margin; a turn without impact or chatter counts as interrupted."""
+    """Margin; a period without impact or chatter counts as interrupted."""
     orbit = prepared_orbit(along.at(value).prepared(), 0.0, periods)
     return jnp.where(jnp.isnan(orbit.margin), jnp.inf, orbit.margin)
 

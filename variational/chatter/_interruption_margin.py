@@ -103,7 +103,7 @@ def _margin(system, frame: ChatterFrame, *, periods: int) -> Float[Array, ""]:
 
     def goes_on(carry):
         flight, said, count = carry
-        # a flight that misses the wall near release may come back a turn later
+        # a flight that misses the wall near release may come back a period later
         waits = flight.time - flight.since < 2 * period
         return ~said.over & waits & (count < _MAX_STEPS)
 

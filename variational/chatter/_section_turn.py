@@ -19,7 +19,7 @@ from ._scalar import check_chatter_system, scalar_gap
 
 
 _IMPACTS = 2000
-# what is left of a complete sequence then moves the next turn by less than rounding
+# the rest of a complete sequence then moves the next period by less than rounding
 _SMALL = 1e-12
 
 

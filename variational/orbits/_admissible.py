@@ -1,4 +1,4 @@
-"""Whether a solution of the shooting equations is an orbit: no penetration anywhere."""
+"""Admissibility of a solution of the shooting equations: no penetration anywhere."""
 
 import math
 from collections.abc import Mapping

@@ -1,6 +1,6 @@
 """The impacts of a periodic orbit, as accurate as the parameters allow.
 
-A run that looks for its impacts loses digits where they are slow: an error d of the
+A run that locates its impacts loses digits where they are slow: an error d of the
 position changes an impact speed v by about a d / v. As the solution of the shooting
 equations the impacts are as well conditioned as the orbit itself, whatever their speed.
 """
@@ -24,7 +24,7 @@ _STEPS = 4
 
 
 class Knots(NamedTuple):
-    """The impacts of a turn in order, and how well flights join them."""
+    """The impacts of a period in order, and the errors of the flights between them."""
 
     rows: Float[np.ndarray, "k n1"]
     """(k, n + 1) time (s) and state just after."""
@@ -43,7 +43,7 @@ def close(
 ) -> Knots:
     """Improve the impacts of an orbit without contact; unchanged where that fails.
 
-    `scale` is what a gap and the components of a state are small or large beside.
+    `scale` is the size with which a gap and the components of a state are compared.
     The states before impacts are those on arrival of the flights.
 
     By flights of adaptive steps, so that the number of impacts is all that programs

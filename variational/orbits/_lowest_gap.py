@@ -115,7 +115,7 @@ def gap_or_speed(
 def _rise(speeds, changes):
     """Return where a velocity rises through zero in each step, by a cubic.
 
-    After a fall within the same step too: a low bounce may be shorter than a step.
+    Also within the same step: a low flight may be shorter than a step.
 
     Returns:
         The fraction of the step, the way up to there over its length, and whether there

@@ -1,4 +1,4 @@
-"""The derivative of the flow over a turn, in two ways that must agree."""
+"""The derivative of the flow over a period, in two ways that must agree."""
 
 from typing import Literal
 

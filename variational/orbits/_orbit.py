@@ -100,7 +100,7 @@ class Orbit(eqx.Module):
 
     @property
     def stable(self) -> bool:
-        """Whether all multipliers lie inside the unit circle."""
+        """Return whether all multipliers lie inside the unit circle."""
         return bool(jnp.all(jnp.abs(self.multipliers) < 1))
 
     @property

@@ -1,4 +1,4 @@
-"""A turn of an orbit cut at its events, in arrays of a few fixed lengths."""
+"""A period of an orbit cut at its events, in arrays of a few fixed lengths."""
 
 import equinox as eqx
 import numpy as np
@@ -8,7 +8,7 @@ from jaxcam.hybrid.record import Contacts, Impacts
 
 
 NOTHING, IMPACT, LAST_IMPACT = 0, 1, 2
-"""What ends a piece: nothing (its mode may change), an impact, or the impact after
+"""End of a piece: nothing (its mode may change), an impact, or the impact after
 which all later ones of a chatter are summed."""
 
 
@@ -33,9 +33,9 @@ class TurnPieces(eqx.Module):
 def cut_turn(
     impacts: Impacts, contacts: Contacts, state, t0: float, t1: float
 ) -> tuple[TurnPieces, bool]:
-    """The pieces of the turn from t0 to t1, and whether there is any contact.
+    """The pieces of the period from t0 to t1, and whether there is any contact.
 
-    **Arguments:** the events of the turn, and the state at t0.
+    **Arguments:** the events of the period, and the state at t0.
     """
     state = np.asarray(state)
     time, which = np.asarray(impacts.time), np.asarray(impacts.constraint)

@@ -1,4 +1,4 @@
-"""The derivative of a turn as a product over its flights and events."""
+"""The derivative over a period as a product over its flights and events."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -22,14 +22,14 @@ from ._pieces import IMPACT, LAST_IMPACT, TurnPieces
 
 
 class Product(NamedTuple):
-    """The derivative of a turn, and what can be said about its accuracy."""
+    """The derivative over a period, and estimates of its accuracy."""
 
     state: Float[Array, " n"]
     """(n,) state at the end."""
     matrix: Float[Array, "n columns"]
     """(n, n + q): by the state at the start, then by the q parameters."""
     determinant: Float[Array, ""]
-    """Of the first n columns, from flights and impacts one by one."""
+    """Determinant of the first n columns, from flights and impacts one by one."""
     condition: Float[Array, ""]
     """Relative error of the first n columns for a relative error of one in each factor.
     """

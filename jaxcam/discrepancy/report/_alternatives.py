@@ -120,7 +120,7 @@ def _additions(trials: Trials, choice: Choice) -> Iterator[Alternative]:
 
 
 def _worse(trials: Trials, choice: Choice, trial: Trial) -> str:
-    """Why a subset that was fitted is not the one named."""
+    """Reason why a subset that was fitted is not the one named."""
     best, samples = choice.best, trials.problem.samples
     if not trials.settled(trial):
         return "its fit did not come near the data"

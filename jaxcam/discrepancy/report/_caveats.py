@@ -77,7 +77,7 @@ def caveats_of(
 
 
 def noisier_than_stated(question: Question) -> Iterator[Caveat]:
-    """That the noise of a channel was stated too small."""
+    """Caveats for channels whose stated noise is too small."""
     for one in question.noisier:
         yield Caveat(
             Reason.NOISIER,
@@ -88,7 +88,7 @@ def noisier_than_stated(question: Question) -> Iterator[Caveat]:
 
 
 def above_noise(held: HeldOut, named: bool) -> Caveat:
-    """That held-out data are not predicted to within the noise, and why that may be."""
+    """Caveat: held-out data are not predicted to within the noise; possible reasons."""
     if named and held.after > held.before:
         return poor_prediction(held)
     return Caveat(
@@ -100,7 +100,7 @@ def above_noise(held: HeldOut, named: bool) -> Caveat:
 
 
 def poor_prediction(held: HeldOut) -> Caveat:
-    """That a part of the records does not tell what the others need."""
+    """Caveat: a part of the records does not determine what the others need."""
     return Caveat(
         Reason.POOR_PREDICTION,
         "A part of the records does not pin the parameters down well enough to "
@@ -110,7 +110,7 @@ def poor_prediction(held: HeldOut) -> Caveat:
 
 
 def small_remainder(choice: Choice, share: float) -> Caveat:
-    """That a named effect leaves a small share of what it explains."""
+    """Caveat: a named effect leaves a small share of what it explains."""
     first = choice.unexplained[0]
     return Caveat(
         Reason.SMALL_REMAINDER,
@@ -121,7 +121,7 @@ def small_remainder(choice: Choice, share: float) -> Caveat:
 
 
 def functions_fall_short(left: float) -> Caveat:
-    """That functions without a name do not explain the records to the noise."""
+    """Caveat: functions without a name do not explain the records to the noise."""
     return Caveat(
         Reason.FAR_FROM_DATA,
         f"With these functions the fit still misses by {left:.2g} times the noise: "
@@ -150,7 +150,7 @@ def _in_doubt(trials: Trials, name: str, share: float) -> Caveat:
 
 
 def _beyond(outside: Outside) -> Caveat:
-    """That a parameter is outside its tolerance, or that a term was named instead."""
+    """Caveat: a parameter is outside its tolerance, or a term was named instead."""
     one, name = outside.parameter, outside.term
     label = one.name.replace("_", " ")
     said = number(one.value, one.stderr, one.unit)
@@ -199,7 +199,7 @@ def _against(trials: Trials, share: float) -> str:
 
 
 def _far(trials: Trials) -> Caveat:
-    """That no fit comes near the data, and how near the best one comes."""
+    """Caveat: no fit comes near the data; the distance of the best one."""
     least = min(trials.known.values(), key=lambda trial: trial.fit.cost)
     named = listed(sorted(least.names)) if least.names else "none of them"
     return Caveat(

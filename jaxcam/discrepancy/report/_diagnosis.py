@@ -45,7 +45,7 @@ class Alternative(NamedTuple):
     terms: tuple[str, ...]
     """Names of its terms."""
     reason: str = ""
-    """Why it is not the verdict."""
+    """Reason why it is not the verdict."""
 
 
 @dataclasses.dataclass(frozen=True)

@@ -20,7 +20,7 @@ _STEPS = 20
 
 
 def hidden_table(found: Fit, hidden: Hidden, points: int):
-    """What an element does, over its one argument, with standard errors.
+    """Table of an element's effect over its one argument, with standard errors.
 
     A resonance: the magnitude of the force for a deflection of one, by frequency (Hz).
     A relaxation: what is left of the force so long after a deflection by one (s). A
@@ -116,7 +116,7 @@ def _n(value) -> str:
 
 
 def hidden_words(found: Fit, hidden: Hidden, element: HiddenElement, unit: str) -> str:
-    """What the element is, for an engineer."""
+    """Description of the element for an engineer."""
     first = hidden.kind.numbers[0]
     value = float(getattr(element, first.name))
     error = first.error(value, found[hidden.changes[0]].stderr)

@@ -56,7 +56,7 @@ class MissingFunction:
         remembers a deflection of one, or, for a hysteresis, how far the motion has come
         since it turned round.
     - `value`, `stderr`: in `unit`, at the points of the grid, `(n,)` or `(n, m)`.
-    - `words`: what it is, for an engineer. `records` in which it was looked for.
+    - `words`: description for an engineer. `records` in which it was searched for.
     - `formula`: of what the value is, where a form with a few numbers explains as much.
     - `element`: of a resonance or a force with a memory, what a simulation needs.
     - `numbers`: names of the fitted parameters that any other function is made of.

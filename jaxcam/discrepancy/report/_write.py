@@ -103,7 +103,7 @@ def diagnosis_of(
 
 
 def _shares_of(trials: Trials, choice: Choice) -> Shares:
-    """What each named term explains of the misfit, and what nothing explains."""
+    """Shares of the misfit that each named term explains, and the unexplained share."""
     best, before = choice.best, choice.before
     instead = {one.term: one.lost for one in choice.beyond if one.term}
     lost = {
@@ -167,8 +167,8 @@ def _of_functions(
 
 
 def _doubts_of(choice: Choice, missing: Missing, policy: Policy) -> Iterator[Caveat]:
-    """That what was found does not explain everything, or not what it has not seen, or
-    that something else explains as much."""
+    """Caveats: the functions do not explain all the data, or not the held-out data, or
+    other functions explain as much."""
     left, held = rms_of(missing.fit), choice.held
     for rival in choice.rivals:
         if rival.share > 1 - policy.sure:

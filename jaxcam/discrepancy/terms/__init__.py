@@ -1,7 +1,7 @@
 """Physics that a model may lack, and systems that have it.
 
 A `Term` has a strength; a `Shape` is a free function that says where something is
-missing and what it looks like.
+missing and its shape.
 """
 
 from ._coordinates import coordinates as coordinates

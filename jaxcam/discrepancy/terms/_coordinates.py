@@ -8,7 +8,7 @@ from jaxtyping import Float
 from ...hybrid import HybridSystem
 
 
-# Places where the field is looked at, drawn about a state of the recordings
+# Points at which the field is evaluated, drawn about a state of the recordings
 _LOOKS = 3
 
 

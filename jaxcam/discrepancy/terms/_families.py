@@ -79,7 +79,7 @@ class Family:
 
     @property
     def jumps(self) -> bool:
-        """Whether the function may jump where the velocity changes sign."""
+        """Return whether the function may jump where the velocity changes sign."""
         return (
             self.where is Where.FLIGHT
             and self.argument is Variable.VELOCITY
@@ -112,8 +112,10 @@ class Family:
         return jnp.asarray(rates), jnp.asarray(shifts)
 
     def variances(self, count: int, length: float) -> Float[np.ndarray, " count"]:
-        """Of the coefficients of a function of variance one, with this length of
-        correlation, a share of the range (of a radian, for a phase)."""
+        """Variances of the coefficients of a function of variance one.
+
+        `length`: of its correlation, a share of the range (of a radian, for a phase).
+        """
         rates = np.asarray(self.waves(count)[0])
         unit = 1.0 if self.periodic else self.high - self.low
         # spectral density of a Matern kernel of order 3/2, for one dimension

@@ -223,7 +223,7 @@ class FreeSurface(FreeFunction):
 
 
 class FreeSensor(FreeFunction):
-    """What the sensor of the first coordinate shows besides."""
+    """A free function added to the reading of the first coordinate's sensor."""
 
     name: ClassVar[str] = "free_sensor"
 

@@ -290,7 +290,7 @@ def library(
         clocked: Whether any event has a known time, as with a drive (the default) or a
             measured input. Otherwise a lag is only a shift of the time origin.
         extended: Whether to add terms that most rigs have as parameters already, or
-            that take longer to look for: forces by position with an edge, friction that
+            that take longer to find: forces by position with an edge, friction that
             differs by direction, speed or place, a restitution as a power. Their
             constants come from the recordings.
 

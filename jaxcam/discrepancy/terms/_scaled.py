@@ -24,7 +24,7 @@ class ScaledTerm(Term):
 
     @property
     def visited(self) -> Visited:
-        """What the recordings visit."""
+        """Range of the coordinate that the recordings visit."""
         return Visited(*self.ranges)
 
     def scaled(self, visited: Visited) -> "ScaledTerm":

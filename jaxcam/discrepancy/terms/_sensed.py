@@ -1,4 +1,4 @@
-"""What terms add to what the sensor of the first coordinate shows."""
+"""Contributions of terms to the reading of the first coordinate's sensor."""
 
 import dataclasses
 from collections.abc import Sequence

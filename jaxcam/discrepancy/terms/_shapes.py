@@ -1,7 +1,7 @@
 """Forces, restitutions and surfaces as free functions of one variable.
 
 A shape is no verdict. Where no named term explains what is left, the shape says where
-it is and what it looks like.
+it is and its shape.
 """
 
 import abc

@@ -144,7 +144,7 @@ class StopBelow(_WithEdge):
 
 
 def _reaction(term: ScaledTerm, depth, velocity, stiffness, damping, loss, friction):
-    """What a stop pushes back with, at a depth and a velocity into it."""
+    """Force of a stop at a depth and a velocity into it."""
     turned = jnp.tanh(velocity / term.visited.slip)
     touching = 1 - jnp.exp(-depth / (_BEGINS * term.visited.half))
     elastic = depth * (stiffness + damping * velocity + loss * turned)

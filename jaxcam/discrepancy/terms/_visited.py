@@ -1,10 +1,10 @@
-"""What recordings visit of a coordinate, from which terms take their scales."""
+"""Range of a coordinate in the recordings, from which terms take their scales."""
 
 from typing import NamedTuple
 
 
 class Visited(NamedTuple):
-    """Where a coordinate has been, in its unit, and how fast.
+    """Range of a coordinate, in its unit, and of its velocity.
 
     `low`, `high`: least and largest position; `fast`: a speed that is rarely exceeded;
     `push`: the usual acceleration; `slip`: speed within which dry friction changes

@@ -27,7 +27,7 @@ class WithHidden(HybridSystem):
 
     @property
     def _size(self) -> int:
-        """How many components the element has."""
+        """Number of components of the element."""
         return len(self.element.names)
 
     @property
@@ -52,7 +52,7 @@ class WithHidden(HybridSystem):
 
     @property
     def speed(self):
-        """Of the drive (rad/s), where the base has one."""
+        """Speed of the drive (rad/s), where the base has one."""
         return self.base.speed  # pyright: ignore
 
     def prepared(self) -> "WithHidden":

@@ -45,7 +45,7 @@ class WithTerms(HybridSystem):
 
     @property
     def speed(self):
-        """Of the drive (rad/s), where the base has one."""
+        """Speed of the drive (rad/s), where the base has one."""
         return self.base.speed  # pyright: ignore
 
     def prepared(self) -> "WithTerms":

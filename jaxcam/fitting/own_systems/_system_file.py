@@ -120,10 +120,10 @@ def _module(file: Path) -> ModuleType:
     module = ModuleType(name)
     module.__file__ = str(file)
     sys.modules[name] = module
-    # what lies beside the file can be imported by it
+    # modules next to the file can be imported by it
     sys.path.insert(0, str(file.parent))
     try:
-        # compiled here, since the cache of Python's own import looks at seconds only
+        # compiled here, since the cache of Python's own import compares seconds only
         exec(compile(content, str(file), "exec"), vars(module))
     except (Exception, SystemExit) as error:
         del sys.modules[name]

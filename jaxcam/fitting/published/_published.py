@@ -8,6 +8,7 @@ nominal values with tolerances are the prior:
 """
 
 import functools
+import itertools
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -89,6 +90,7 @@ def fit_published(
     tolerances: VectorLike,
     start: VectorLike | None = None,
     max_steps: int = 512,
+    progress: Callable[[int, float], None] | None = None,
 ) -> PublishedFit:
     """Fit parameters of a model to published numbers.
 
@@ -102,6 +104,8 @@ def fit_published(
         tolerances: Standard deviations of the priors; infinity for none.
         start: Initial values; default nominal.
         max_steps: Largest number of evaluations per scale of the errors.
+        progress: Called after each evaluation with its number and its cost, the sum
+            that is minimised.
 
     Returns:
         A [`jaxcam.fitting.published.PublishedFit`][].
@@ -145,14 +149,11 @@ def fit_published(
         jacobian, value = jax.jacfwd(twice, has_aux=True)(unknowns)
         return value, jacobian
 
-    @functools.lru_cache(maxsize=1)
-    def cached(content):
-        return jax.device_get(program(jnp.frombuffer(content), model))
+    def cost(unknowns, value):
+        misses = np.append((value - values) / errors, weights * unknowns)
+        return float(np.sum(misses**2))
 
-    def describe(unknowns):
-        # value and slope are asked for one after the other, at the same place
-        return cached(np.asarray(unknowns, dtype=float).tobytes())
-
+    describe = _described(lambda at: program(at, model), cost, progress)
     unknowns = np.zeros(nominal.shape[0])
     if start is not None:
         unknowns = (np.asarray(start, dtype=float) - np.asarray(nominal)) / scales
@@ -233,6 +234,22 @@ def _least_squares(describe, values, errors, weights, unknowns, max_steps):
         gtol=_XTOL,
         max_nfev=max_steps,
     )
+
+
+def _described(program, cost, progress):
+    """Quantities and their slopes; the last evaluation is kept."""
+    counted = itertools.count(1)
+
+    @functools.lru_cache(maxsize=1)
+    def cached(content):
+        unknowns = np.frombuffer(content)
+        value, slope = jax.device_get(program(jnp.asarray(unknowns)))
+        if progress is not None:
+            progress(next(counted), cost(unknowns, value))
+        return value, slope
+
+    # value and slope are asked for one after the other, at the same place
+    return lambda unknowns: cached(np.asarray(unknowns, dtype=float).tobytes())
 
 
 def _split(published, vector):

@@ -60,7 +60,7 @@ class Lanes(NamedTuple):
 
     system: HybridSystem
     where: Callable | None
-    """What `where(system)` picks takes `values`, `(lanes,)` or `(lanes, k)`; or
+    """The leaves picked by `where` take `values`, `(lanes,)` or `(lanes, k)`; or
     neither."""
     values: np.ndarray | None
     states: np.ndarray
@@ -73,7 +73,7 @@ class Lanes(NamedTuple):
 
 
 class Horizon(NamedTuple):
-    """The time span to run: `number` turns of a `period` (s) from `t0` (s) on.
+    """The time span to run: `number` periods of length `period` (s) from `t0` (s) on.
 
     By default the period is the system's own, lane by lane.
     """

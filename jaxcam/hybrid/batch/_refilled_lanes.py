@@ -51,7 +51,7 @@ def run_refilled(
 
 
 def _by_llvm(start: LaneStart, max_steps: int, table: Table):
-    """The loop as code of this machine; it looks after its slots itself."""
+    """The loop as code of this machine, which refills its slots itself."""
     count = start.numbers.shape[1]
     shared, shared_layout = laid_out(start.shared)
     own, own_layout = laid_out(start.own, count)
@@ -72,7 +72,7 @@ def _by_llvm(start: LaneStart, max_steps: int, table: Table):
 
 
 def _by_xla(start: LaneStart, chunking: Chunking, table: Table):
-    """Chunks of attempts in all slots, which are looked after in between."""
+    """Chunks of attempts in all slots, which are refilled between them."""
     count, (width, rows, max_steps) = start.numbers.shape[1], chunking
     packed_own, packed_shared = pack(start.own, count), pack(start.shared)
     chunk = compiled_chunk(start, packed_own, packed_shared, rows, table.row)
@@ -115,7 +115,7 @@ def costly_first(waiting, work, used, stops):
     """The waiting lanes, those first that will take most attempts.
 
     A lane that starts last and takes long leaves the other slots empty. Lanes that are
-    neighbours cost alike, so those at work tell: attempts over turns so far.
+    neighbours cost alike, so running ones tell: attempts per period so far.
     """
     order = np.argsort(work, kind="stable")
     each = used[order] / np.maximum(stops[order], 0.5)

@@ -1,4 +1,4 @@
-"""Where the rows of a log belong: a table of each batch element's own places."""
+"""A table in which each row of a log is stored at its batch element's place."""
 
 from collections.abc import Callable
 

@@ -1,4 +1,4 @@
-"""Samples of many lanes once a turn, and what happened in between."""
+"""Samples of many batch elements once per period, and the events in between."""
 
 import jax.numpy as jnp
 import numpy as np
@@ -11,7 +11,7 @@ class TurnSamples:
     """Samples of a group as they come, and what happened between them."""
 
     def __init__(self, lanes: int, turns: int, skip: int, n: int):
-        # the first place is for the turns skipped
+        # the first place is for the skipped periods
         self.table = Table(_row, lanes, turns - skip + 1, 2 + n, skip)
 
     @property
@@ -19,7 +19,7 @@ class TurnSamples:
         return self.table.numbers[:, 1:, 2:]
 
     def counts(self):
-        """Impacts and completed chatters in each turn; 0 where a lane failed."""
+        """Impacts and completed chatters in each period; 0 where an element failed."""
         so_far = np.nan_to_num(self.table.numbers[..., :2]).astype(int)
         each = np.maximum(np.diff(so_far, axis=1), 0)
         return each[..., 0], each[..., 1]

@@ -39,7 +39,7 @@ class Plan(NamedTuple):
     unseen_step: Any
     # one over the length of the run
     per_run: Any
-    # times that steps must end at, and how often they recur
+    # times that steps must end at, and their period
     breaks: tuple
     repeat: Any
     tolerance: Any
@@ -128,7 +128,7 @@ class Attempt(NamedTuple):
     lands: Any
     # which constraint was hit
     hit: list
-    # a hop that rounding hides
+    # a flight that rounding hides
     hidden: Any
     begins: Any
     # a release is near: the step is retaken to it, and then ends there
@@ -224,7 +224,7 @@ def _next_length(plan, carried, attempt, longest):
         ends = carried.jets[k], attempt.arrived[k]
         flight = time_to_contact(jet, end_curvature(*ends, inverse))
         held = jnp.minimum(time_to_release(*ends, inverse), plan.longest_step)
-        # one that was so close and did not let go only touches zero
+        # one that was so close and did not release only touches zero
         held = jnp.maximum(held, CLOSE * longest)
         limit = jnp.where(contact, held, jnp.where(flight > 0, flight, jnp.inf))
         ahead = jnp.minimum(ahead, limit)
@@ -251,7 +251,9 @@ def _struck(carried, attempt):
 
 
 def _together(carried):
-    """Whether two constraints were hit within a vanishing part of a natural step."""
+    """Return whether two constraints were hit within a vanishing part of a natural
+    step.
+    """
     room = _TOGETHER * carried.longest
     recent = [jnp.where(carried.t - t <= room, 1.0, 0.0) for t in carried.struck]
     return sum(recent) > 1

@@ -273,7 +273,7 @@ def _next_jets(carried, jets, landing: Landing, went, pressing, delay):
 
 
 def _waits_for_release(carried, jets, flown, natural, tiny):
-    """Whether a contact lets go before the impact that a step has found.
+    """Return whether a contact releases before the impact that a step has found.
 
     The impact is logged after the release.
     """

@@ -30,7 +30,7 @@ class Landing(NamedTuple):
     # whether the rest of the chatter is summed up from here
     begins: Any
     fastest: Any
-    # whether rounding hides the hop that follows, or the one before
+    # whether rounding hides the flight that follows, or the one before
     hidden: Any
 
 
@@ -72,10 +72,10 @@ def land(
     fastest = jnp.where(lands, jnp.maximum(carried.fastest, rebound), carried.fastest)
     impact = Impact(t, landed, after, approach, rebound, flown.constraint)
     chatter = rest_of_chatter(functions, plan, impact, jets, contact, end.stop)
-    # deep enough into the sequence, or so low that rounding hides the next hop
+    # deep enough into the sequence, or so low that rounding hides the next flight
     pulled = jnp.abs(of_constraint([j.acceleration for j in jets], flown.constraint))
     deep = rebound <= plan.depth * fastest
-    # a hop is v^2 / 2a high: hidden below 250 times the rounding
+    # a flight is v^2 / 2a high: hidden below 250 times the rounding
     low = 500 * of_constraint(carried.blur, flown.constraint)
     begins = lands & chatter.possible & (deep | (rebound * rebound <= low * pulled))
     hidden = _hides(

@@ -36,7 +36,7 @@ class LoopState(NamedTuple):
     # largest gap that contact has held back: the multiplier over a natural step
     held: tuple
     # of several constraints, when each was hit last, and how many impacts in a row have
-    # led to hops that rounding hides
+    # led to flights that rounding hides
     struck: tuple
     crowded: tuple
     # where each component started, and how far it has been from there: see `_scale.py`
@@ -77,7 +77,7 @@ def first_state(
     for jet, lift, tiny, slow in zip(jets, lifts, tinies, slows, strict=True):
         gap, velocity = jet.gap, jet.velocity
         near = jnp.abs(gap) <= tiny
-        # a hop so low that rounding hides it is none, nor an impact that leads to one
+        # a flight that rounding hides is none, nor is an impact that leads to one
         hop = tiny * jnp.abs(jet.acceleration)
         low = (jet.acceleration < 0) & (velocity * velocity <= hop)
         touching = near & ((jnp.abs(velocity) <= slow) | low)
@@ -95,7 +95,7 @@ def first_state(
             )
         )
     longest = jnp.minimum((t1 - t0) / 64, longest)
-    # in contact the error of a step may say nothing, and its length is looked after
+    # in contact the error estimate may be uninformative, and the length is capped
     held = any_of(contact)
     rates = functions.taylor(t0, x, contact)
     first = jnp.where(held, longest, first_step(extents, rates, t0, longest))
@@ -129,9 +129,9 @@ def first_state(
 
 
 def _presses(jet: Jet, tiny):
-    """Whether a constraint that is touched without velocity presses, or is about to.
+    """Return whether a constraint touched without velocity presses, or is about to.
 
-    A hop under acceleration and jerk that is no higher than `tiny`, 2 a^3 / (3 j^2), is
+    A flight under acceleration and jerk no higher than `tiny`, 2 a^3 / (3 j^2), is
     none.
     """
     a, j = jet.acceleration, jet.jerk

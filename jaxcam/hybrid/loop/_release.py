@@ -43,7 +43,7 @@ def judge_contact(
     near = rises & pulls & (jnp.abs(offset) <= CLOSE * scale)
     # the zero of a multiplier that has none of its rates there is only enclosed
     enclosed = passed & (h <= CLOSE * scale)
-    # a multiplier that only touches zero: no hop would come out of rounding. Its rate
+    # a multiplier that only touches zero: no flight would exceed rounding. Its rate
     # falls by a half at least, which rounding cannot make it do over a short step
     falls = (left.jerk > 0) & (2 * right.jerk <= left.jerk) & (h > 0)
     curved = jnp.where(falls, (left.jerk - right.jerk) * inverse, 1.0)
@@ -51,11 +51,11 @@ def judge_contact(
     touches = falls & (8 * peak**2 <= rounding * curved)
     # one that rises on after an inflection does not only touch
     touches = touches & ~(passed & (curvature > 0) & (a1 * h * h > rounding))
-    # it may have let go before the zero at the end of the step
+    # it may have released before the zero at the end of the step
     early = (a0 < 0) & (first > 0)
     lets_go = near & (locating | (~touches & ~early & (offset <= room)))
     lets_go = (lets_go | (enclosed & ~touches)) & ~completing
-    # short of its end a step that only might have let go is halved
+    # short of its end a step that only might have released is halved
     suspect = inside & ~passed & ((a0 < 0) | (s0 > 0))
     retake = (passed | suspect) & ~lets_go & ~touches & ~completing
     share = jnp.where(passed, _root(a0, s0, a1, s1), 0.5)
@@ -66,7 +66,7 @@ def judge_contact(
 
 
 def opens(jet: Jet, scale, rounding):
-    """Whether a multiplier that goes on like this opens a gap in a natural step.
+    """Return whether a multiplier that goes on like this opens a gap in a natural step.
 
     One that is zero but for rounding does not.
     """
@@ -76,7 +76,9 @@ def opens(jet: Jet, scale, rounding):
 
 
 def lets_go_before(jet: Jet, offset, scale, rounding):
-    """Whether a multiplier rises through zero before the impact `offset` (s) later."""
+    """Return whether a multiplier rises through zero before the impact `offset` (s)
+    later.
+    """
     at_impact = jet.acceleration + offset * jet.jerk
     return (jet.jerk > 0) & (at_impact > 0) & opens(jet, scale, rounding)
 

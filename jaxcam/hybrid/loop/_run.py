@@ -33,7 +33,7 @@ class Log(NamedTuple):
 
 
 Company = Literal["one", "few"]
-"""How many lanes `vmap` will run together: no `vmap` at all, or a few."""
+"""Number of batch elements that run together: one without `vmap`, or a few."""
 
 
 def run(

@@ -40,7 +40,7 @@ def taylor_of_release(functions, x, rates, frame, jets, tau, contact):
 def off_rounding(frame, jets, x, hit, extents):
     """The state after an impact without the gap that rounding left it, and its jets.
 
-    It would add up over the impacts of a chatter, whose last hops are lower than it. A
+    It would add up over the impacts of a chatter, whose last flights are lower. A
     gap that hardly depends on the state is left: to mend it would move the state far.
     The other gaps move along, and by more than their own rounding where the time is
     late and the constraint that was hit moves.

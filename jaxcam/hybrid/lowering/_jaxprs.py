@@ -72,7 +72,7 @@ def saving_jvp(function: Callable) -> jax.custom_jvp:
 
 @no_type_check
 def has_saving_rule(equation) -> bool:
-    """Whether an equation is a call of what `saving_jvp` has made."""
+    """Return whether an equation is a call of what `saving_jvp` has made."""
     if equation.primitive.name != "custom_jvp_call":
         return False
     inner = equation.params["call_jaxpr"].jaxpr.eqns
@@ -80,12 +80,12 @@ def has_saving_rule(equation) -> bool:
 
 
 def calls_library(jaxpr) -> bool:
-    """Whether some part of a program is left to a library, or to Python."""
+    """Return whether some part of a program is left to a library, or to Python."""
     return any(e.primitive.name in _LIBRARY for e in equations(jaxpr))
 
 
 def fits_kernel(jaxpr) -> bool:
-    """Whether the CPU backend can compile a program as one kernel."""
+    """Return whether the CPU backend can compile a program as one kernel."""
     return not any(map(_needs_more, equations(jaxpr)))
 
 

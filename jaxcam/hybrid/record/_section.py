@@ -6,7 +6,7 @@ import numpy as np
 from ._sample import pad
 
 
-# places within each step at which the section function is looked at
+# points within each step at which the section function is evaluated
 _PLACES = 8
 
 

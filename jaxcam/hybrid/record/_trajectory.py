@@ -62,7 +62,7 @@ class Trajectory(eqx.Module):
 
     @property
     def successful(self):
-        """Whether the trajectory reached t1."""
+        """Return whether the trajectory reached t1."""
         return self.code == 0
 
     @property

@@ -1,6 +1,6 @@
 """The first event in a piece of motion that diffrax made, located by Newton's method.
 
-Each step is looked through at points inside it, made by steps of their own; what is
+Each step is searched at points inside it, made by steps of their own; what is
 found is located on the length of such a step.
 """
 
@@ -58,7 +58,7 @@ class Flown(NamedTuple):
             if event is TOO_LONG:
                 return event
             if event is None and fired:
-                # the piece ends at the event, behind which nothing was looked at
+                # the piece ends at the event, beyond which nothing was checked
                 end, slope, i = curve[0][-1, -1], curve[1][-1, -1], count - 2
                 h = float(times[i + 1] - times[i])
                 # how far from zero the interpolant may put an event

@@ -35,7 +35,7 @@ from ._one_step import one_step, scaled_term
 
 # attempted steps in one call of diffrax
 _BATCH = 64
-# points at which each of its steps is looked through
+# points at which each of its steps is searched
 FRACTIONS = np.arange(1, 9) / 8
 
 
@@ -52,7 +52,7 @@ class PathPoint(NamedTuple):
 
 
 class Hop(NamedTuple):
-    """The end of a short hop: a `PathPoint`, normal velocity, height climbed, error."""
+    """End of a short flight: a `PathPoint`, normal velocity, height climbed, error."""
 
     state: jax.Array
     level: jax.Array
@@ -93,7 +93,7 @@ class CompiledMotion(eqx.Module):
     tolerance: jax.Array
     smallness: jax.Array
     scale: jax.Array
-    """Of each component, `(n,)`: what errors are relative to."""
+    """Scale of each component, `(n,)`, to which errors are relative."""
     solver: diffrax.AbstractSolver = eqx.field(static=True)
 
     def __init__(self, system, settings, scale):
@@ -179,7 +179,7 @@ class CompiledMotion(eqx.Module):
 
     @_compiled
     def hop(self, t, x, contact, h) -> Hop:
-        """The end of a hop, its height by Gauss's quadrature of the velocity."""
+        """End of a short flight; height by Gauss's quadrature of the velocity."""
         nodes, weights = np.polynomial.legendre.leggauss(5)
 
         def velocity_at(s):

@@ -5,8 +5,8 @@ Python around a few compiled functions: slower than the loop, easier to follow, 
 implicit solvers, and a check on the loop, with which it shares only the derivatives of
 the gap and the formula for the duration of a chatter.
 
-diffrax looks at the sign of an event at the ends of its steps and locates it on an
-interpolant. That is where a piece ends at the latest; `_events.py` looks through
+diffrax checks the sign of an event at the ends of its steps and locates it on an
+interpolant. That is where a piece ends at the latest; `_events.py` searches
 its steps for anything earlier.
 """
 
@@ -21,7 +21,7 @@ from ._events import Flown, TOO_LONG
 from ._motion import CompiledMotion, prepared
 
 
-# a hop whose lambda = v |j| / a^2 is smaller is one step, not a call of diffrax
+# a flight whose lambda = v |j| / a^2 is smaller is one step, not a call of diffrax
 _SHORT = 1e-3
 # so many impacts in a row, each while another gap is closed to rounding, accumulate
 # together
@@ -82,7 +82,7 @@ class _Engine:
         # the first step of the next piece, shortened where it proves too long
         self.first = np.inf
         self.fastest = 0.0
-        # let go at this instant: its gap and velocity are zero, and grow
+        # released at this instant: its gap and velocity are zero, and grow
         self.released: int | None = None
         # impacts in a row while another gap was closed to rounding, but not in contact
         self.crowded = 0
@@ -177,7 +177,7 @@ class _Engine:
             self._impact(event.constraint, t, there.state)
 
     def _hop(self, jets) -> bool:
-        """A hop too low for its gap to rise above rounding; whether there was one.
+        """A flight too low for its gap to rise above rounding; whether there was one.
 
         The height is taken from the integral of the normal velocity instead.
         """

@@ -246,7 +246,7 @@ def _law(law) -> MotionLaw:
 
 
 def _table(laws):
-    """Of each piece: its segment, where it starts in it, polynomial, wave."""
+    """For each piece: its segment, its start in it, polynomial, wave."""
     pieces = [(i, piece) for i, law in enumerate(laws) for piece in law.pieces]
     powers = max(len(piece.polynomial) for _, piece in pieces)
     owner = np.array([i for i, _ in pieces])

@@ -20,7 +20,7 @@ from ..cut import fit_local, padded
 
 
 Observe = Mapping[str, int | Callable[[Array], Array]]
-"""How a channel comes out of the state: a component, or a function of it."""
+"""Channels as functions of the state: a component, or a function of it."""
 
 _ITERATIONS = 8
 # Change (in units of the noise) that halving the steps may make to a flight

@@ -11,7 +11,7 @@ from ._comparison import Residuals
 from ._flight_fit import fit_flights, observed, rate_of, size_of, state_at
 
 
-# A flight that is shorter tells nothing beside its initial state
+# A shorter flight determines nothing but its initial state
 _LEAST_SAMPLES = 16
 
 

@@ -1,9 +1,9 @@
-"""Where a cam is bent: a dent that low harmonics cannot follow, if it is sure.
+"""Bends of a cam: dents that low harmonics cannot follow, if they are certain.
 
 A bend is a function of the cam's angle with the variances of a Gaussian process with a
 Matern kernel of order 5/2, so that it is zero where nothing is seen. Hops as low as the
-noise look like one; but they are elsewhere at another speed of the cam. So a bend is
-believed where records foretell each other by it.
+noise resemble one; but they are elsewhere at another speed of the cam. So a bend is
+accepted where it improves the prediction of one record from the others.
 """
 
 from typing import NamedTuple
@@ -26,7 +26,7 @@ _SURE = 30.0
 
 
 def waves(turned: Float[Array, "*k"]) -> Float[Array, "*k waves"]:
-    """What each number of a bend adds to the contact angle."""
+    """Contribution of each number of a bend to the contact angle."""
     orders = jnp.arange(_HIGHEST + 1, dtype=float)
     phases = jnp.multiply.outer(turned, orders)
     return jnp.concatenate([jnp.cos(phases), jnp.sin(phases[..., 1:])], axis=-1)
@@ -42,7 +42,7 @@ def spread(length: float) -> Float[np.ndarray, " waves"]:
 
 
 class Seen(NamedTuple):
-    """What one record says of the numbers of a surface, about some of their values.
+    """Information of one record on the numbers of a surface, about some values.
 
     `normal` `(p, p)` and `target` `(p,)`, those of a bend last.
     """

@@ -29,7 +29,7 @@ SHORTEST_FLIGHT = 5
 
 
 def contact_stretches(motion: Motion) -> tuple[list[Span], list[Span]]:
-    """Stretches near the surface that last, with lower bounces between them.
+    """Lasting stretches near the surface, with lower flights between them.
 
     And those that may as well be slow impacts, or grazes.
     """
@@ -64,13 +64,13 @@ def stretches(mask: np.ndarray) -> list[tuple[int, int]]:
 
 
 def overlap(one: Span, other: Span) -> bool:
-    """Whether two stretches are closer than the shortest flight."""
+    """Return whether two stretches are closer than the shortest flight."""
     margin = SHORTEST_FLIGHT
     return one[0] - margin < other[1] and other[0] < one[1] + margin
 
 
 def _grazes(motion: Motion, first: int, last: int) -> bool:
-    """Whether a short stretch near the surface is the bottom of a parabola."""
+    """Return whether a short stretch near the surface is the bottom of a parabola."""
     inside = motion.time[first:last]
     if len(inside) * motion.interval > _GRAZE or first == 0 or last == len(motion.time):
         return False
@@ -82,7 +82,7 @@ def _grazes(motion: Motion, first: int, last: int) -> bool:
 
 
 def _bounces(motion: Motion, first: int, last: int, end: int) -> bool:
-    """Whether a short stretch near the surface is a slow impact.
+    """Return whether a short stretch near the surface is a slow impact.
 
     The flight after an impact is bent down from its first sample, or it would not
     have come; the flight after a release opens as a cubic and is bent up.

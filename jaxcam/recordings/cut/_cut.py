@@ -42,7 +42,7 @@ def cut(
 
     - `sides`: the motion as each surface sees it, its gap positive; that of a surface
         above the motion is `mirrored`, and that of a body that moves is the distance.
-    - `restitution`: expected, for the bounces that are too low to be seen.
+    - `restitution`: expected, for impacts that are too low to be seen.
     """
     motion = sides[0]
     resting, doubtful, marks = _places(sides)
@@ -142,7 +142,7 @@ def _reach(side: Motion) -> float:
 
 
 def _leaves(found: dict) -> bool:
-    """Whether the motion surely went away from the surface that it is to have hit."""
+    """Return whether the motion certainly left the surface of a supposed impact."""
     return found["approach"] < -_SURE * found["before_stderr"]
 
 
@@ -237,7 +237,7 @@ def _release(motion: Motion, first: int, last: int, end: int) -> Boundary:
 def _not_before(landing: Boundary | None, release: Boundary, latest) -> Boundary:
     """The release, unless the follower may still have been landing by then.
 
-    A low hop that lands as the surface recedes bounces at once, too low to be seen. The
+    A low flight that lands as the surface recedes rebounds too low to be seen. The
     flight begins at `latest` (s) in any case.
     """
     if landing is None or landing.kind != "landing":

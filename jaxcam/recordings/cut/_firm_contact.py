@@ -1,7 +1,7 @@
-"""Where a follower surely rests, by its acceleration: no surface has to be known.
+"""Samples in certain contact, by the acceleration: no surface has to be known.
 
 In flight it has the acceleration that its spring gives it, which the rig file states
-within its tolerances. What is held up by more is on the cam, if it is smooth: bounces
+within its tolerances. What is held up by more is on the cam, if it is smooth: impacts
 are not. Where the spring hardly presses nothing can be said.
 """
 
@@ -24,7 +24,7 @@ _HALF, _LASTS = 0.0125, 0.04
 _BEYOND, _SPREAD = 4.0, 3.0
 # Standard deviations of what noise leaves of a window up to which it is smooth
 _SMOOTH = 4.0
-# Positions at which the free acceleration is looked up
+# Positions at which the free acceleration is tabulated
 _PLACES = 64
 
 
@@ -56,7 +56,7 @@ def firm_contact(
     found[half : len(samples) - half] = smooth & (held > most + error)
     firm = np.zeros(len(samples), dtype=bool)
     for first, last in stretches(found):
-        # bounces before it may be too low to be seen
+        # flights before it may be too low to be seen
         if (last - first) * recording.interval >= _LASTS:
             firm[first + half : last] = True
     return firm

@@ -34,7 +34,7 @@ def segment_gaps(
     - `tolerances`: how far each gap may be off by a constant, in its own units. Within
         it, it is put to zero where the impacts are.
     - `drive`: of the system, if it has one.
-    - `restitution`: expected, for the bounces that are too low to be seen.
+    - `restitution`: expected, for impacts that are too low to be seen.
 
     **Returns:** the parts; `impacts.side` is the gap that closed, and `before` and
     `after` are its rates of change.

@@ -1,7 +1,7 @@
 """Find flights that are lower than the encoder resolves.
 
-Just above the speed at which the valve floats, the follower hops by a few times the
-noise once a turn. Samples of such a hop look like contact. The rig file says where it
+Just above the speed at which the valve floats, the follower lifts by a few times the
+noise once a turn. Samples of such a flight resemble contact. The rig file says where it
 may happen, whatever its tolerances hide: there the spring hardly presses.
 """
 
@@ -27,11 +27,11 @@ _EARLY = 0.1
 
 
 def hop_phases(rig: Rig, speed: float) -> Bool[np.ndarray, " 720"]:
-    """Phases of the turn (of 720) at which the follower may be in a hop, or bounce.
+    """Phases of the turn (of 720) at which the follower may be in a hidden flight.
 
     From where the pressing acceleration, with three standard deviations of what the
-    tolerances say of it, allows a release, to where the hop that follows has landed and
-    its bounces have died out.
+    tolerances say of it, allows a release, to where the next flight has landed and
+    its chatter has died out.
 
     **Arguments:** `speed` of the cam (rad/s). Phase zero is the nominal cam's.
     """
@@ -52,7 +52,7 @@ def hop_phases(rig: Rig, speed: float) -> Bool[np.ndarray, " 720"]:
 
 
 def _hop(pull: np.ndarray, step: float, restitution: float) -> int:
-    """Steps from a release to rest again, at most one turn."""
+    """Steps from a release to the next contact, at most one turn."""
     rate = np.cumsum(pull) * step
     landed = np.flatnonzero(np.cumsum(rate) <= 0)
     if len(landed) == 0:
@@ -89,7 +89,7 @@ def _along(system, times):
 
 
 def may_hop(rig: Rig, drive: Drive) -> Bool[np.ndarray, " k"]:
-    """Samples of a record at which the follower may be in a hop."""
+    """Samples of a record at which the follower may be in a hidden flight."""
     phases = hop_phases(rig, drive.speed)
     return phases[np.round(drive.angle / (2 * np.pi) * _GRID).astype(int) % _GRID]
 
@@ -97,7 +97,7 @@ def may_hop(rig: Rig, drive: Drive) -> Bool[np.ndarray, " k"]:
 def pressed(rig: Rig, drive: Drive) -> Bool[np.ndarray, " k"]:
     """Samples from which the surface may be learnt, where they are near it.
 
-    Those at which no hop may be; every one of a record in which one may be anywhere.
+    Those without a possible hidden flight; all, where one may be anywhere.
     """
     doubtful = may_hop(rig, drive)
     return ~doubtful | doubtful.all()
@@ -108,7 +108,7 @@ def sure_contact(
 ) -> Bool[np.ndarray, " k"]:
     """Samples at which contact is beyond doubt, where it is contact at all.
 
-    A stretch of doubt in which a release was seen is none: the hop was seen too.
+    A stretch of doubt in which a release was seen is none: the flight was seen too.
 
     **Arguments:** what `may_hop` says, and the samples at which releases were seen.
     """

@@ -39,7 +39,7 @@ def clear_of_end(motion: Motion, span: Span) -> Span:
 
 
 def _near(motion: Motion, fit, rows):
-    """Whether a flight has come down to the surface at these samples."""
+    """Return whether a flight has come down to the surface at these samples."""
     heights = np.array([fit.value(time) for time in motion.time[rows]])
     return heights - motion.contact[rows] < LOW * motion.noise
 
@@ -47,7 +47,7 @@ def _near(motion: Motion, fit, rows):
 def settled_alike(contacts: list[Contact], flights: list[Flight]) -> list[Contact]:
     """Contacts whose beginning was not seen settle as late as the others of a record.
 
-    Where a record begins, the follower may be in the midst of bounces.
+    A record may begin in the middle of chatter.
     """
     long = [f.stop for f in flights if f.last - f.first > SHORTEST_FLIGHT]
     seen = [any(contact.start is stop for stop in long) for contact in contacts]

@@ -1,7 +1,7 @@
 """Recordings of a rig, or of any system, cut into flights, contacts and impacts."""
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from jaxtyping import Float
@@ -19,12 +19,17 @@ from ._surface import Surface
 from ._surface_fit import fit_surface, refine_surface
 
 
+# times that the surface is refined by the contacts of a cut with the one before
+_REFINED = 2
+
+
 def segment_case(
     recordings: Case | Sequence[Recording],
     rig: Rig,
     *,
     channel: str = "follower_angle_rad",
     surface: Surface | None = None,
+    progress: Callable[[float], None] | None = None,
 ) -> tuple[Segments, ...]:
     """Cut all recordings of a cam-follower rig, with one surface for all of them.
 
@@ -34,6 +39,7 @@ def segment_case(
         channel: The channel of the follower.
         surface: The cam's surface, if known; default estimated from the impacts and
             contacts of all recordings.
+        progress: Called with the fraction done.
 
     Returns:
         The segments of each recording.
@@ -51,16 +57,23 @@ def segment_case(
     recordings = tuple(recordings)
     drives = [read_drive(recording) for recording in recordings]
 
+    passes = 1 if surface is not None else _REFINED + 1
+    done = 0
+
     def cut_all(surface):
-        return tuple(
-            _segment_rig(recording, rig, drive, surface, channel)
-            for recording, drive in zip(recordings, drives)
-        )
+        nonlocal done
+        parts = []
+        for recording, drive in zip(recordings, drives):
+            parts.append(_segment_rig(recording, rig, drive, surface, channel))
+            done += 1
+            if progress is not None:
+                progress(done / (passes * len(recordings)))
+        return tuple(parts)
 
     if surface is not None:
         return cut_all(surface)
     surface = fit_surface(recordings, rig, drives, channel)
-    for _ in range(2):
+    for _ in range(_REFINED):
         surface = refine_surface(surface, rig, cut_all(surface))
     return cut_all(surface)
 

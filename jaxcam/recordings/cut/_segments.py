@@ -20,10 +20,10 @@ class Boundary:
     """Seconds; the error is not a number at the ends of the record."""
     kind: str
     """`"impact"` (flight to flight), `"several impacts"` (too close together to be told
-    apart), `"landing"` (flight to contact, with bounces too low to be seen),
+    apart), `"landing"` (flight to contact, with impacts too low to be seen),
     `"release"` (contact to flight) or `"end of record"`."""
     evidence: str
-    """Why it is there, in words."""
+    """Evidence for it, in words."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -164,7 +164,7 @@ class Segments:
     surface: Surface | None = None
     """Surface of a cam-follower's cam, from which the gap was computed."""
     sure: Bool[np.ndarray, " k"] | None = None
-    """Samples at which contact is no hidden hop, shape `(k,)`; `None`: all."""
+    """Samples at which contact is no hidden flight, shape `(k,)`; `None`: all."""
 
     def resting(self, contact: Contact) -> Bool[np.ndarray, " k"]:
         """Return the samples at which the follower is surely in settled contact."""

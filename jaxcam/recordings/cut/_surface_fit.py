@@ -31,10 +31,10 @@ from ._surface import (
 )
 
 
-# How far from the cam a follower may be where its bounces are too low to be seen, in
+# Distance from the cam that a follower may have where its flights are hidden, in
 # units of the noise
 _NEAR = 3.0
-# Samples whose mean is looked at, and how far behind the cam it may seem to be, in
+# Samples that are averaged, and the distance behind the cam that is accepted, in
 # units of the noise: 4.5 standard errors of the mean, which noise hardly reaches
 _TOGETHER, _BEHIND = 9, 1.5
 # Half-widths (rad) of the band around the surface in which samples count as contact,
@@ -148,7 +148,7 @@ def _unbent(surface: Surface) -> Surface:
 
 
 def _bend(surface: Surface, rig: Rig, turned, angle, error, ends: list[int]):
-    """How large a bend may be, by points of records that end at `ends`."""
+    """Largest bend that fits points of records that end at `ends`."""
     vector = vector_of(surface)
     misfit, rows, weight = _weighted(surface, vector, turned, angle, error)
     records = []

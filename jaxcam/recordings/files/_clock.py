@@ -31,7 +31,7 @@ def unrounded(time: Float[np.ndarray, " k"]) -> Float[np.ndarray, " k"]:
         return time
     near = np.abs(steps - usual) < 1.5 * digit
     ticks = np.round(steps / np.mean(steps[near]))
-    # none left out comes first: with few digits to a tick, rounding looks like that
+    # none left out comes first: with few digits to a tick, rounding has the same effect
     for counted in (np.ones_like(ticks), np.maximum(ticks, 1.0)):
         place = np.concatenate([[0.0], np.cumsum(counted)])
         even = np.polyval(np.polyfit(place, time, 1), place)

@@ -10,7 +10,7 @@ from ._heading import is_time, is_unit
 SEPARATORS = ("\t", ";", ",", " ")
 """Between cells, the surest first; a space stands for any white space."""
 COMMENTS = ("#", "%", "//")
-"""What begins a line that is no row."""
+"""Beginnings of lines that are no rows."""
 # lines of a preamble, at most
 _PREAMBLE = 300
 # rows that must agree before they are believed to be the table
@@ -54,7 +54,7 @@ def form_of(lines: Sequence[str]) -> Form | None:
 
 
 def is_number(text: str) -> bool:
-    """Whether a cell holds a number, with a point or a comma in it."""
+    """Return whether a cell holds a number, with a point or a comma in it."""
     return _NUMBER.fullmatch(text.lower()) is not None
 
 
@@ -98,7 +98,7 @@ def _headed(lines: Sequence[str], separator: str, first: int) -> Form:
         cells = cells_of(lines[k], separator)
         if lines[k].startswith(COMMENTS) or not any(map(is_number, cells)):
             continue
-        # words beside a number are a note where spaces separate, or nothing does
+        # words next to a number are a note where spaces separate, or nothing does
         note = len(cells) != width and (separator == " " or len(cells) == 1)
         if not note:
             return Form(separator, names, units, k)
@@ -113,7 +113,7 @@ def _is_head(line: str, separator: str, width: int) -> bool:
 
 
 def _is_other(line: str, separator: str, width: int) -> bool:
-    """Whether a line names the columns of rows that are cut in other places.
+    """Return whether a line names the columns of rows that are cut in other places.
 
     Where spaces separate, empty cells are lost; where commas do, decimal ones cut each
     number in two.
@@ -125,7 +125,9 @@ def _is_other(line: str, separator: str, width: int) -> bool:
 
 
 def _is_any_head(lines: Sequence[str], place: int, separator: str) -> bool:
-    """Whether a line right above the rows has names, if not as many as they need."""
+    """Return whether a line right above the rows has names, if not as many as they
+    need.
+    """
     if place < 0 or separator == " ":
         return False
     count = len(cells_of(lines[place], separator))

@@ -63,12 +63,12 @@ def channel_name(heading: str, unit: str = "") -> str:
 
 
 def is_unit(cell: str) -> bool:
-    """Whether a cell may stand in a line of units."""
+    """Return whether a cell may stand in a line of units."""
     return cell in ("", "-", "1") or bool(_ending(cell))
 
 
 def is_time(heading: str) -> bool:
-    """Whether a heading is that of the time, by its first word."""
+    """Return whether a heading is that of the time, by its first word."""
     return bool(re.match(r"(time|t|zeit|frame)([^a-z]|$)", heading.lower()))
 
 

@@ -19,7 +19,7 @@ from ._source import Source
 _HDF5 = b"\x89HDF"
 # of a compressed element of a MATLAB file, and where the first element is
 _COMPRESSED, _HEADER = 15, 128
-# structures in structures, and series of one array, that are looked into
+# depth of nested structures, and series of one array, that are searched
 _DEEPEST, _MOST_SERIES = 8, 300
 
 

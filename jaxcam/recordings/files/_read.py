@@ -19,9 +19,9 @@ from ._table import SUFFIXES as TEXT
 
 
 CAM_FOLLOWER = ("cam_angle_rad", "follower_angle_rad")
-"""What a recording of a cam-follower rig must contain."""
+"""Channels that a recording of a cam-follower rig must contain."""
 SUFFIXES = (*TEXT, ".mat", ".parquet", ".xlsx", ".xlsm")
-"""What the files of a case are called."""
+"""Suffixes of the files of a case."""
 # text of any kind, read where a folder has nothing else
 _LAST_RESORT = (".txt", ".dat", ".xls", ".txt.gz", ".dat.gz")
 

@@ -14,12 +14,12 @@ from ._units import unit_of
 
 _SPEED = re.compile(r"(before|after)([12]?)(_stderr)?_(m_s|rad_s)")
 
-# beside the speeds
+# in addition to the speeds
 _MORE = ("mass1_kg", "mass2_kg", "time_s")
 
 
 def is_impact_table(file: str | Path, columns: Columns | None = None) -> bool:
-    """Whether the columns of a file are those of impacts, and not of a recording.
+    """Return whether the columns of a file are those of impacts, not of a recording.
 
     **Raises:** `RecordingError` for a file that cannot be read.
     """

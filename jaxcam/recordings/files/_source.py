@@ -26,7 +26,7 @@ class Source:
 
     - `columns`: by their names; text where a file is text.
     - `headings`: other words for them, as the file has them.
-    - `rate`: samples a second, where the file states them beside the table.
+    - `rate`: samples per second, where the file states them outside the table.
     - `notes`: what was left out, in words.
     """
 

@@ -19,7 +19,7 @@ from ._text import Lines, read_lines
 
 SUFFIXES = (".csv", ".csv.gz", ".tsv", ".tsv.gz", ".lvm", ".lvm.gz")
 LEFT_OUT = "-"
-"""What a column is called that is not to be read."""
+"""Name of a column that is not to be read."""
 
 
 def read_table(file: Path, names: Sequence[str] | None = None) -> Source:

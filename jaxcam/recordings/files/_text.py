@@ -65,7 +65,7 @@ def kept_lines(file: Path, every: list[str], whole: bool = True) -> Lines:
 
 
 def _numbers(line: str) -> list[bool]:
-    """Whether each word of a line is a number."""
+    """Return whether each word of a line is a number."""
     return [is_number(word) for word in re.split(r"[\t; ]+", line) if word]
 
 

@@ -98,7 +98,7 @@ class Section:
     def _parts(self, key: str, unit: str | None) -> tuple[Any, Any]:
         self.read.append(key)
         if key not in self.table:
-            # a misspelt key is the usual reason, so look at what is there
+            # a misspelt key is the usual reason, so compare with the keys that exist
             found = difflib.get_close_matches(key, self.table, n=1)
             hint = f"; is `{found[0]}` meant?" if found else "; add it."
             raise RigError(f"{self.file}: [{self.name}] has no `{key}`{hint}")

@@ -60,7 +60,7 @@ def clusters(points, same: float) -> np.ndarray:
     points = np.asarray(points, dtype=float)
     if not len(points):
         return np.zeros(0, dtype=int)
-    # many motions end at the same point; look at each place once
+    # many motions end at the same point; examine each place once
     places, back = unique_rows(np.round(points / (same / 4)))
     tree = KDTree(places)
     pairs = tree.query_pairs(4.0, p=np.inf, output_type="ndarray")
@@ -119,7 +119,7 @@ def cell_codes(states, origin, scale, fine: float) -> np.ndarray:
 
 
 def _spanning(edges) -> np.ndarray:
-    """As few edges that join the same cells."""
+    """A smallest set of edges that joins the same cells."""
     known, group = _components(edges)
     order = np.argsort(group, kind="stable")
     starts = np.searchsorted(group[order], group)

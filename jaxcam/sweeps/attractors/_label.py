@@ -1,4 +1,4 @@
-"""Labels P(m, n): what repeats after n turns, with m impacts."""
+"""Labels P(m, n): motions that repeat after n periods, with m impacts."""
 
 from typing import NamedTuple
 
@@ -10,7 +10,7 @@ from ._unique_rows import unique_rows
 
 
 APERIODIC, ESCAPED, FAILED, OUTSIDE = 0, -1, -2, -3
-"""Instead of a number of turns."""
+"""Codes in the place of a number of periods."""
 STICKING, CONTACT, UNCOUNTED = -1, -2, -3
 """Instead of a number of impacts: infinitely many, contact without end, not counted."""
 
@@ -21,9 +21,10 @@ _STEADY = 0.9
 class Labels(NamedTuple):
     """The attractor type of each lane, as small integers.
 
-    `turns` is the period in turns (or in points, on a section that is not taken once a
-    turn), or one of `APERIODIC`, `ESCAPED`, `FAILED`, `OUTSIDE`; `impacts` counts those
-    of one orbit, or is one of `STICKING`, `CONTACT`, `UNCOUNTED`.
+    `turns` is the period in forcing periods (or in points, on a section that is not
+    sampled once per period), or one of `APERIODIC`, `ESCAPED`, `FAILED`, `OUTSIDE`;
+    `impacts` counts those of one orbit, or is one of `STICKING`, `CONTACT`,
+    `UNCOUNTED`.
     """
 
     impacts: np.ndarray
@@ -73,7 +74,7 @@ def periods(states, period_tolerance: float = 1e-6, sizes=None) -> np.ndarray:
 
 
 def _still_nearing(states, n: int) -> np.ndarray:
-    """Whether points that are not a period apart come closer to each other."""
+    """Return whether points that are not a period apart come closer to each other."""
     nearing = np.zeros(len(states), dtype=bool)
     for part in range(1, n):
         if n % part:

@@ -1,4 +1,4 @@
-"""Whether what is on disk is what was written."""
+"""Check that the files on disk are those that were written."""
 
 import json
 import warnings
@@ -90,7 +90,7 @@ def read_block(group: zarr.Group, block: int) -> dict[str, np.ndarray]:
 
 
 def checked(path: str | Path) -> xarray.Dataset:
-    """The dataset on disk, after a look at all of its blocks.
+    """The dataset on disk, after a check of all its blocks.
 
     Raises:
         ValueError: That names the blocks that are missing or damaged.

@@ -79,7 +79,7 @@ class OnDisk:
 
     def _create(self) -> None:
         layout = self.layout
-        # beside its place until it is whole
+        # next to its place until it is complete
         fresh = self.path.with_name(self.path.name + ".new")
         shutil.rmtree(fresh, ignore_errors=True)
         fresh.parent.mkdir(parents=True, exist_ok=True)
@@ -133,7 +133,7 @@ class OnDisk:
         self._check_description()
 
     def _check_description(self) -> None:
-        """Raise `ValueError` where blocks could not be written beside those there."""
+        """Raise `ValueError` where blocks do not fit those that exist."""
         layout = self.layout
         wanted = {
             name: ((layout.units, *v.tail), np.dtype(v.dtype))

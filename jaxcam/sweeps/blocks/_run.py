@@ -106,7 +106,7 @@ def run_blocks(
     workers = 1 if job.chained else workers
     own = ThreadPoolExecutor(workers) if executor is None else nullcontext(executor)
     with own as pool:
-        # enough that nobody waits for the next block, few enough to stay small
+        # enough that no worker waits for the next block, few enough to stay small
         width = 2 * (getattr(pool, "_max_workers", None) or _workers_of(pool))
         if job.chained:
             width = 1

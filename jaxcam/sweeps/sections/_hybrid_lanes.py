@@ -21,8 +21,8 @@ _WIDTHS = ((32, 16), (512, 48), (sys.maxsize, 1 << 16))
 
 
 def chunk_rows(width: int) -> int:
-    """Attempts between two looks at the lanes: few are wasted, and looks are rare."""
-    # few lanes gain from fewer looks at them
+    """Attempts between two checks of the batch: few are wasted, and checks are rare."""
+    # few batch elements gain from fewer checks
     return 1024 if width < 16 else 64
 
 
@@ -39,7 +39,7 @@ def smallest_gaps(
 
 
 def admissible(system: HybridSystem, t0, states, where=None, values=None):
-    """Whether each state is finite and in front of every constraint at `t0`."""
+    """Return whether each state is finite and in front of every constraint at `t0`."""
     states = np.asarray(states, dtype=float)
     finite = np.all(np.isfinite(states), axis=1)
     batched, shared = split_lanes(as_arrays(system), where, values)
@@ -68,8 +68,8 @@ def state_in_contact(system: HybridSystem, t0, where=None, values=None) -> np.nd
     gap = jax.eval_shape(system.gap, jnp.asarray(t0, float), jnp.zeros(2))
     if (names and len(names) != 2) or gap.size != 1:
         raise ValueError(
-            "only a system with two states and one constraint has a start of its own; "
-            "pass the states to start from"
+            "the default start, at rest in contact, exists for two states and one "
+            "constraint; pass the states to start from"
         )
     batched, shared = split_lanes(as_arrays(system), where, values)
     t0 = jnp.asarray(t0, float)
@@ -79,7 +79,7 @@ def state_in_contact(system: HybridSystem, t0, where=None, values=None) -> np.nd
 
 
 def turn_lengths(system: HybridSystem, period, where=None, values=None) -> np.ndarray:
-    """Length of a turn (s) in each lane, shape `(lanes,)`, or `(1,)` for all alike.
+    """Length of a period (s) in each lane, shape `(lanes,)`, or `(1,)` for all alike.
 
     Raises:
         ValueError: For a system without a period of its own, if none is given.
@@ -107,8 +107,8 @@ def run_lanes(run, system, t0, states, where, values, lanes: int, tails):
     """Run the motions that can start, in blocks of few different widths.
 
     Args:
-        ?- `run(states, value: - `run(states, values, width)` returns arrays with one
-            row for each lane, the last     of them the code.
+        run: `run(states, values, width)` returns arrays with one row for each
+            lane, the last of them the code.
         lanes: Motions that advance together, at most.
         tails: Shapes of a row of the arrays.
 

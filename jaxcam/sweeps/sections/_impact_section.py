@@ -1,4 +1,4 @@
-"""The impact section: every time that something is hit."""
+"""The impact section: a point at every impact."""
 
 from typing import NamedTuple
 

@@ -15,7 +15,7 @@ class AbstractSystemSection(AbstractSection):
     t0: AbstractVar[float]
     """S, where motions start."""
     period: AbstractVar[float | None]
-    """S, length of a turn; None for the system's own forcing period."""
+    """Length of a period (s); None for the system's own forcing period."""
 
     def starts(self, where=None, values=None) -> np.ndarray:
         return state_in_contact(self.system, self.t0, where, values)

@@ -26,7 +26,7 @@ _NEIGHBOURS = (0.92, 0.96, 1.0, 1.04, 1.08)
 
 
 class Zeno(NamedTuple):
-    """The bouncing ball to its rest, by events and by steps of three lengths."""
+    """The bouncing ball up to contact, by events and by steps of three lengths."""
 
     exact: float
     """Accumulation time (2.43)."""

@@ -1,6 +1,6 @@
 """Figure 2.8: the saddle, in closed form and found; its multipliers.
 
-The figure is a sketch of a flow; shown is the same for an oscillator that hits.
+The figure is a sketch of a flow; shown is the same for an impact oscillator.
 """
 
 from functools import cache

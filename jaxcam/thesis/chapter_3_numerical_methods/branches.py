@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 START_RPM = 145.0
-"""Where branches start (rpm)."""
+"""Speed at which branches start (rpm)."""
 
 
 def bounds(ends: tuple[float, float]) -> tuple[float, float]:

@@ -11,6 +11,7 @@ from ... import plotting
 from ...models import CamFollower, rad_s_to_rpm
 from ..chapter_5_bifurcations.figure_5_14 import A
 from ..chapter_5_bifurcations.table_5_2 import FLIP_SPEED, FOLD_SPEED
+from ..progress import of_point
 from ..remember import remembered
 from ..speeds import at_rpm, speed_of
 from ..target import Rows, Target
@@ -34,7 +35,12 @@ def hitting_branch(system: CamFollower) -> "Branch":
         at_rpm(system, START_RPM), jnp.array(A), periods=1
     )
     return continuation.branch(
-        start.problem, start, speed_of, bounds(_HITTING), direction="both"
+        start.problem,
+        start,
+        speed_of,
+        bounds(_HITTING),
+        direction="both",
+        callbacks=[of_point],
     )
 
 

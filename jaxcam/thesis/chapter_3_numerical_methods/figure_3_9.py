@@ -11,6 +11,7 @@ from ...models import CamFollower, rad_s_to_rpm
 from ...plotting.colours import FLIGHT, SECOND
 from ..chapter_5_bifurcations.figure_5_24 import sticking_times
 from ..interruption import INTERRUPTION, interruption
+from ..progress import of_point
 from ..remember import remembered
 from ..speeds import at_rpm, speed_of
 from ..target import Rows, Target
@@ -36,7 +37,12 @@ def sticking_branch(system: CamFollower) -> "Branch":
     end = float(rad_s_to_rpm(interruption(system).speed)) + _PAST
     start = continuation.periodic_orbits(rig, continuation.periodic_orbit(rig))
     return continuation.branch(
-        start.problem, start, speed_of, bounds((_LOWEST, end)), direction="both"
+        start.problem,
+        start,
+        speed_of,
+        bounds((_LOWEST, end)),
+        direction="both",
+        callbacks=[of_point],
     )
 
 

@@ -4,6 +4,7 @@ import numpy as np
 
 from ... import sweeps
 from ...models import CamFollower, rpm_to_rad_s
+from ..progress import of_sweep
 from ..remember import remembered
 
 
@@ -31,11 +32,22 @@ def experiment(system: CamFollower, size: str) -> tuple[sweeps.Diagram, sweeps.D
     """
     step = _STEP[size]
     forward = sweeps.diagram(
-        system, "speed", _speeds(UP, step), direction="up", dwell=DWELL
+        system,
+        "speed",
+        _speeds(UP, step),
+        direction="up",
+        dwell=DWELL,
+        progress=of_sweep("sweeping the speed up"),
     )
     end = forward.dataset["final"].values[-1]
     backward = sweeps.diagram(
-        system, "speed", _speeds(DOWN, step), end, direction="down", dwell=DWELL
+        system,
+        "speed",
+        _speeds(DOWN, step),
+        end,
+        direction="down",
+        dwell=DWELL,
+        progress=of_sweep("sweeping the speed down"),
     )
     return forward, backward
 

@@ -17,9 +17,9 @@ from ..target import Rows, Target
 
 
 _LET_GO = 0.75
-"""Where the free follower is let go (rad); not printed."""
+"""Angle at which the free follower is released (rad); not printed."""
 _HANGING = (-1.55, 0.0)
-"""Where the spring is looked for at rest (rad)."""
+"""Range in which the rest angle of the spring is searched for (rad)."""
 
 
 @eqx.filter_jit
@@ -41,7 +41,7 @@ def equilibrium(system: CamFollower) -> float:
 
 @eqx.filter_jit
 def fall_angles(system: CamFollower, times) -> jax.Array:
-    """The angle (rad) of the free follower, let go at 0.75 rad, at `times` (s)."""
+    """The angle (rad) of the free follower, released at 0.75 rad, at `times` (s)."""
     solution = diffrax.diffeqsolve(
         diffrax.ODETerm(lambda t, y, args: system.vector_field(t, y)),
         diffrax.Dopri8(),

@@ -1,4 +1,4 @@
-"""Figure 4.16, simulated part: the bounces of a turn at four speeds.
+"""Figure 4.16, simulated part: the impacts of a turn at four speeds.
 
 Heights are angles over the cam; their ratio shows what an impact leaves.
 """

@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 
 from ... import plotting, sweeps
 from ...models import CamFollower
+from ..progress import of_sweep
 from ..remember import remembered
 from ..speeds import at_rpm
 from ..target import Rows, Target
@@ -36,7 +37,7 @@ class Picture(NamedTuple):
     """Corners of the states."""
     high: tuple[float, float] = _BOX[1]
     reruns: int = _RERUNS
-    """How often motions that do not repeat yet go on, for twice as many turns."""
+    """Number of extensions of non-periodic motions, each of doubled length."""
 
 
 def basins_target(title: str, picture: Picture, note: str = "") -> Target:
@@ -51,6 +52,7 @@ def basins_target(title: str, picture: Picture, note: str = "") -> Target:
             _TURNS,
             keep=_KEEP,
             reruns=picture.reruns,
+            progress=of_sweep("simulating the states of the grid"),
         )
 
     def compute(system: CamFollower, size: str) -> Rows:

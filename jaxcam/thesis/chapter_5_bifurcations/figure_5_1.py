@@ -7,6 +7,7 @@ from matplotlib.figure import Figure
 from ... import sweeps
 from ...models import CamFollower, rpm_to_rad_s
 from ..diagrams import draw_diagram, label_spans
+from ..progress import of_sweep
 from ..remember import remembered
 from ..target import Rows, Target
 
@@ -23,7 +24,7 @@ _SAID = {
     (-1, "P(1,1)", "to"): 152.0,
     (-1, "P(4,4)", "from"): 157.5,
 }
-"""What the text says of it: sections 5.2.1 and 5.2.2."""
+"""Values from the text, sections 5.2.1 and 5.2.2."""
 
 
 @remembered
@@ -32,7 +33,13 @@ def both_ways(system: CamFollower, size: str) -> sweeps.Diagram:
     low, high = _ENDS
     speeds = np.linspace(low, high, round((high - low) / _STEP[size]) + 1)
     return sweeps.diagram(
-        system, "speed", rpm_to_rad_s(speeds), direction="both", turns=TURNS, keep=KEEP
+        system,
+        "speed",
+        rpm_to_rad_s(speeds),
+        direction="both",
+        turns=TURNS,
+        keep=KEEP,
+        progress=of_sweep("sweeping the speed up and down"),
     )
 
 

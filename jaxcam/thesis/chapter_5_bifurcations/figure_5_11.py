@@ -8,6 +8,7 @@ from ... import sweeps
 from ...models import CamFollower, rad_s_to_rpm, rpm_to_rad_s
 from ..diagrams import draw_diagram
 from ..interruption import beside_interruption, INTERRUPTION, interruption
+from ..progress import of_sweep
 from ..remember import remembered
 from ..target import Rows, Target
 from .figure_5_1 import KEEP, TURNS
@@ -23,7 +24,14 @@ def onset(system: CamFollower, size: str) -> sweeps.Diagram:
     """The diagram of Figure 5.11, each speed from contact at rest."""
     low, high = (beside_interruption(system, rpm) for rpm in _ZOOM)
     speeds = np.linspace(low, high, _ZOOMED[size])
-    return sweeps.diagram(system, "speed", rpm_to_rad_s(speeds), turns=TURNS, keep=KEEP)
+    return sweeps.diagram(
+        system,
+        "speed",
+        rpm_to_rad_s(speeds),
+        turns=TURNS,
+        keep=KEEP,
+        progress=of_sweep("sweeping the speed at the interruption"),
+    )
 
 
 def compute(system: CamFollower, size: str) -> Rows:

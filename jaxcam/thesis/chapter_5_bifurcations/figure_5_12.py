@@ -7,6 +7,7 @@ from matplotlib.figure import Figure
 from ... import sweeps
 from ...models import CamFollower, rad_s_to_rpm, rpm_to_rad_s
 from ..diagrams import draw_diagram
+from ..progress import of_sweep
 from ..remember import remembered
 from ..target import Rows, Target
 
@@ -25,7 +26,13 @@ def drawn_diagram(system: CamFollower, size: str) -> sweeps.Diagram:
     speeds = np.linspace(*_MONTE_CARLO, _DRAWN[size])
     states = sweeps.monte_carlo(*BOX, _STARTS, 0, len(speeds))
     return sweeps.diagram(
-        system, "speed", rpm_to_rad_s(speeds), states, turns=_MC_TURNS, keep=_MC_KEEP
+        system,
+        "speed",
+        rpm_to_rad_s(speeds),
+        states,
+        turns=_MC_TURNS,
+        keep=_MC_KEEP,
+        progress=of_sweep("sweeping the speed from random starts"),
     )
 
 

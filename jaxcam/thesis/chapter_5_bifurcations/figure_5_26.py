@@ -21,7 +21,7 @@ class LobeEvents(NamedTuple):
 
     fold: float
     border: float
-    """Where the fixed point of the lobe inside it is lost at their common corner."""
+    """Loss of the fixed point of the inner lobe at the common corner."""
     flip: float
 
 

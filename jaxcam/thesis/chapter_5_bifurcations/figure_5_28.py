@@ -14,6 +14,7 @@ from variational import composed_map, find_lobes, fit_local_map, iterate_local_m
 from ...models import CamFollower, rad_s_to_rpm, rpm_to_rad_s
 from ...plotting.colours import FLIGHT, IMPACT
 from ..interruption import interruption, sticking_state
+from ..progress import of_share
 from ..remember import remembered
 from ..speeds import at_speed, speed_of
 from ..target import Rows, Target
@@ -52,7 +53,12 @@ def iterated(system: CamFollower, size: str) -> Iterated:
     span = 1e-3
     deviations = np.linspace(-span / 4, span, 320)
     lobes = find_lobes(
-        rig, composed.state, deviations, direction=composed.vector, most=6
+        rig,
+        composed.state,
+        deviations,
+        direction=composed.vector,
+        most=6,
+        progress=of_share("measuring lobes"),
     )
     local = fit_local_map(lobes)
     end = float(rad_s_to_rpm(rig.speed))

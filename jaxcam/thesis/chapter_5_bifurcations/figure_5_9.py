@@ -13,6 +13,7 @@ from ...hybrid.surface import normal_velocity
 from ...models import CamFollower, rpm_to_rad_s
 from ...plotting.colours import FLIGHT
 from ..interruption import beside_interruption
+from ..progress import of_sweep
 from ..remember import remembered
 from ..speeds import speed_of
 from ..target import Rows, Target
@@ -40,6 +41,7 @@ def impacts_at(system: CamFollower) -> sweeps.Diagram:
         rpm_to_rad_s(np.array(impact_speeds(system))),
         turns=_IMPACTS,
         keep=_IMPACTS,
+        progress=of_sweep("listing impacts"),
     )
 
 

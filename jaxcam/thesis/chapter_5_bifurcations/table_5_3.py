@@ -12,6 +12,7 @@ from variational.chatter import Lobes
 
 from ...models import CamFollower
 from ..interruption import beside_interruption, sticking_state
+from ..progress import of_share
 from ..remember import remembered
 from ..speeds import at_rpm
 from ..target import Rows, Target
@@ -21,7 +22,7 @@ _MAP_SPEED = 152.6
 """Speed at which Figure 5.25 is drawn (rpm), and its range of perturbations."""
 _PERCENT = 1.0
 _DOUBLED = 4
-"""How often that is doubled for a rig whose lobes are elsewhere."""
+"""Number of doublings of it for a rig whose lobes are elsewhere."""
 Q, M, DELTA_PI, DELTA_X = -0.62, -0.535, 2.243e-4, 1.022e-3
 CUBIC = (1695.91, -15119.51, 44927.06, -44486.71)
 ROOT, X_0, P_0, ALPHA, X_INF = 0.12089, 0.33964, 0.33667, 0.33715, 0.33717
@@ -41,7 +42,8 @@ def lobes_of(system: CamFollower, most: int = 6) -> Lobes:
     for doubled in range(_DOUBLED + 1):
         deviations = 2**doubled * np.linspace(-span / 4, span, 320)
         try:
-            return find_lobes(system, state, deviations, most=most)
+            share = of_share("measuring lobes")
+            return find_lobes(system, state, deviations, most=most, progress=share)
         except ValueError:
             if doubled == _DOUBLED:
                 raise

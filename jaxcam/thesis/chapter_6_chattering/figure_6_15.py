@@ -19,7 +19,7 @@ from .table_6_3 import ANGLE, VELOCITY
 
 
 _CHANGE = 0.001 * 152.67
-"""Of Figure 6.15: largest change of the speed (rpm)."""
+"""Largest change of the speed in Figure 6.15 (rpm)."""
 
 
 @remembered

@@ -23,7 +23,7 @@ from .manifold import manifold_of
 
 
 _UNDER = 1 - 1e-11
-"""A start this much slower hits where rounding would let the graze be missed; the speed
+"""A start this much slower impacts where rounding might miss the grazing; the speed
 of that impact goes with its root."""
 
 
@@ -100,7 +100,7 @@ def draw(system: CamFollower) -> Figure:
         ax.plot(hit, np.zeros_like(hit), ".", color=IMPACT, ms=5)
         ax.axhline(0, color="0.4", lw=0.7)
         ax.set_title(one.name, fontsize=11)
-        # the graze would be lost beside the long flight after it
+        # the grazing would not be visible next to the long flight after it
         last = 1.25 * (one.until - start)
         near = drawn.time - start <= one.until - start
         top = 1.25 * np.nanmax(drawn.gap[near])

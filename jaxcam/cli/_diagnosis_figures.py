@@ -69,11 +69,11 @@ _MAPS = (
     "ends is what chance would show in one of a hundred such maps."
 )
 _SHAPES = (
-    "What the data would have the model changed by, as free functions: of the textbook "
-    "model (grey) and of the model found (colour), with twice the standard error. A "
-    "function that stays within its band of zero is not needed."
+    "Estimated corrections as free functions, of the textbook model (grey) and of the "
+    "model found (colour), with twice the standard error. A correction whose band "
+    "contains zero is not needed."
 )
-_RANKING = "How much worse other explanations are, by their BIC (a logarithmic scale)."
+_RANKING = "BIC of other explanations above that of the verdict (logarithmic scale)."
 
 
 def _unseen(plt, found: Diagnosis):
@@ -147,7 +147,7 @@ def _maps(plt, found: Diagnosis):
     for axis in axes[-1]:
         axis.set_xlabel(along.label)
     figure.colorbar(
-        image, ax=axes, label="mean residual (standard errors)", extend="both"
+        image, ax=axes, label="mean residual\n(standard errors)", extend="both"
     )
     return figure
 

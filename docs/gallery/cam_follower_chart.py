@@ -1,0 +1,48 @@
+"""Special points of the cam-follower in the plane of speed and restitution: one impact
+per cycle is stable between fold and flip, complete chatter between detachment and
+interruption."""
+
+import equinox as eqx
+import jax.numpy as jnp
+
+import continuation
+from jaxcam.models import preset, rad_s_to_rpm, rpm_to_rad_s
+from jaxcam.plotting import special_curves
+
+
+def speed(s):
+    return s.speed
+
+
+def intercept(s):
+    return s.restitution.intercept
+
+
+# speed (rpm), a state near the orbit, and where its branch is left
+orbits = [
+    (145.0, [0.4245, 1.8281], ("fold", "flip")),
+    (145.0, None, ("beginning of impacts", "interruption of chattering")),
+    (152.69, [0.3383, 0.2427], ("grazing",)),
+]
+bounds = ((rpm_to_rad_s(120.0), rpm_to_rad_s(165.0)), (-0.66, -0.58))
+curves = []
+for rpm, guess, kinds in orbits:
+    rig = eqx.tree_at(speed, preset("calibrated"), jnp.asarray(rpm_to_rad_s(rpm)))
+    orbit = continuation.periodic_orbit(rig, guess, periods=1)
+    branch = continuation.branch(
+        rig,
+        orbit,
+        speed,
+        bounds[0],
+        direction="both" if len(kinds) > 1 else 1,
+        callbacks=[lambda point, kinds=kinds: point.kind in kinds],
+    )
+    for kind in kinds:
+        point = branch.of_kind(kind)[0]
+        curves.append(continuation.curve(point, (speed, intercept), bounds))
+figure = special_curves(
+    curves,
+    x_label=("speed", "rpm"),
+    y_label=("intercept of the restitution law", "–"),
+    x_scale=rad_s_to_rpm(1.0),
+)

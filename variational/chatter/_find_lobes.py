@@ -1,0 +1,211 @@
+"""The map around the interruption, measured: lobes by the number of impacts."""
+
+from collections.abc import Callable
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jaxcam import HybridSystem
+from jaxcam.parameters import as_arrays
+
+from ._scalar import check_chatter_system
+from ._section_turn import section_turn
+
+
+# states that are followed together
+_ROW = 32
+# most rows that narrow a bracket: it ends at two neighbouring numbers before
+_PASSES = 12
+
+
+class Lobes(eqx.Module):
+    """Lobes of the stroboscopic map, found by the number of impacts in a period."""
+
+    corners: np.ndarray
+    """Ends of the lobes, where the motion grazes, farthest first, shape `(k + 1,)`."""
+    values: np.ndarray
+    """The map at the corners, shape `(k + 1,)`."""
+    points: np.ndarray
+    """Points of each lobe, from its outer corner inwards, shape `(k, samples)`."""
+    images: np.ndarray
+    """The map at these points, shape `(k, samples)`."""
+    slopes: np.ndarray
+    """Slope of the map at these points, shape `(k, samples)`."""
+    accumulation: float
+    """Point at which the lobes accumulate."""
+    limit: float
+    """The map at the accumulation."""
+    scan: np.ndarray
+    """Points of the whole measured map, shape `(n,)`."""
+    scanned: np.ndarray
+    """The map at these points, shape `(n,)`."""
+    impacts: np.ndarray
+    """Number of impacts at these points, shape `(n,)`."""
+
+
+def find_lobes(
+    system: HybridSystem,
+    state,
+    deviations,
+    *,
+    phase: float = 0.0,
+    component: int = 0,
+    direction=None,
+    samples: int = 64,
+    most: int = 8,
+    progress: Callable[[float], None] | None = None,
+) -> Lobes:
+    """Measure the stroboscopic map around the interruption and find its lobes.
+
+    A lobe ends where the number of impacts changes, to rounding (thesis, eq. 5.1).
+
+    Args:
+        system: As for [`variational.chatter_frame`][], near the interruption.
+        state: State at time `phase` x period on the sticking orbit, shape `(2,)`.
+        deviations: Deviations of `component`, `(n,)`, across the accumulation.
+        phase: Phase of the section, in periods.
+        component: Component of the state that deviates.
+        direction: Direction along which the state deviates, shape `(2,)`; default
+            `component` alone. A map to iterate needs `ComposedMap.vector`.
+        samples: Number of points measured in each lobe.
+        most: Largest number of lobes.
+        progress: Called with the fraction done, of as many lobes as asked for.
+
+    Returns:
+        The [`variational.chatter.Lobes`][].
+
+    Raises:
+        ValueError: Fewer than two lobes are found.
+    """
+    check_chatter_system(system)
+    system = as_arrays(system)
+    state = jnp.asarray(state, jnp.float64)
+    base = float(state[component])
+    axis = jnp.zeros(2).at[component].set(1.0)
+    along = axis if direction is None else jnp.asarray(direction, jnp.float64)
+    if float(along[component]) == 0:
+        raise ValueError(
+            f"direction is {np.asarray(along)}: it does not change component "
+            f"{component}. Give another component or direction."
+        )
+    along = along / along[component]
+    scan = base + np.asarray(deviations, dtype=float)
+    # of the scan, the brackets, the points of the lobes, and three single ones
+    total = _rows(len(scan)) + (most + 2) * _PASSES + _rows(most * samples) + 3
+    turn = _Rows(
+        lambda row: _turns(system, state, along, row, phase, component), total, progress
+    )
+    scanned, _, impacts, stuck = turn(scan)
+    if np.all(stuck) or not np.any(stuck):
+        raise ValueError(
+            "The deviations stay on one side of the interruption: chattering is "
+            "complete for all of them or for none. Take a wider range of both signs."
+        )
+    # outwards from the last period that sticks
+    edge = np.flatnonzero(np.diff(stuck.astype(int)))[0]
+    inner, outer = (edge, edge + 1) if stuck[edge] else (edge + 1, edge)
+    bottom, top = _bisect(turn, float(scan[inner]), float(scan[outer]), lambda n, s: s)
+    accumulation = 0.5 * (bottom + top)
+    limit = turn(np.array([bottom]))[0][0]
+
+    farthest = scan[-1] if stuck[edge] else scan[0]
+    corners = _corners(turn, accumulation, farthest, most)
+    # dense at the outer corner, where the slope is infinite
+    share = np.linspace(0.0, 1.0, samples) ** 2
+    points = corners[:-1, None] + share * np.diff(corners)[:, None]
+    images, slopes, _, _ = turn(points.ravel())
+    values = turn(corners)[0]
+    if progress is not None:
+        progress(1.0)
+    return Lobes(
+        corners=corners,
+        values=values,
+        points=points,
+        images=images.reshape(points.shape),
+        slopes=slopes.reshape(points.shape),
+        accumulation=float(accumulation),
+        limit=float(limit),
+        scan=scan,
+        scanned=scanned,
+        impacts=impacts,
+    )
+
+
+def _rows(states: int) -> int:
+    return -(-states // _ROW)
+
+
+class _Rows:
+    """The map of many states in rows of one length, so that one program serves all."""
+
+    def __init__(self, program: Callable, total: int, progress: Callable | None):
+        self._program, self._total, self._progress = program, total, progress
+        self._done = 0
+
+    def __call__(self, x) -> tuple[np.ndarray, ...]:
+        rows = _rows(len(x))
+        padded = np.concatenate([x, np.full(rows * _ROW - len(x), x[-1])])
+        parts = []
+        for row in padded.reshape(rows, _ROW):
+            parts.append(self._program(jnp.asarray(row)))
+            self._done += 1
+            if self._progress is not None:
+                self._progress(self._done / self._total)
+        return tuple(
+            np.concatenate([np.asarray(v) for v in column])[: len(x)]
+            for column in zip(*parts, strict=True)
+        )
+
+
+def _corners(turn, accumulation, farthest, most: int) -> np.ndarray:
+    """Return where the number of impacts of the period changes, farthest first."""
+    number = turn(np.array([farthest]))[2][0]
+    corners = []
+    for k in range(1, most + 2):
+        near, _ = _bisect(
+            turn, accumulation, farthest, lambda n, s, m=number + k: s | (n >= m)
+        )
+        corners.append(near)
+    corners = np.array(corners)
+    wide = np.abs(np.diff(corners)) > 1e-9 * np.abs(corners[0] - accumulation)
+    corners = corners[: 1 + np.argmin(np.append(wide, False))]
+    if len(corners) < 3:
+        raise ValueError(
+            "Fewer than two lobes were found; widen the deviations on the side of "
+            "interrupted chattering."
+        )
+    return corners
+
+
+@eqx.filter_jit
+def _turns(system, state, along, values, phase, component):
+    def image(x):
+        moved = state + (x - state[component]) * along
+        section = section_turn(system, moved.at[component].set(x), phase)
+        return section.state[component], (section.impacts, section.stuck)
+
+    def one(x):
+        end, slope, (impacts, stuck) = jax.jvp(
+            image, (x,), (jnp.ones_like(x),), has_aux=True
+        )
+        return end, slope, impacts, stuck
+
+    return jax.vmap(one)(values)
+
+
+def _bisect(turn: Callable, near: float, far: float, is_near: Callable):
+    """The two neighbouring numbers between which `is_near(impacts, stuck)` changes.
+
+    A row of points at once: each pass narrows the bracket 33-fold.
+    """
+    for _ in range(_PASSES):
+        row = np.linspace(near, far, _ROW + 2)
+        _, _, impacts, stuck = turn(row[1:-1])
+        yes = np.concatenate([[True], is_near(impacts, stuck), [False]])
+        last = int(np.argmin(yes)) - 1
+        near, far = row[last], row[last + 1]
+        if abs(far - near) <= 4e-16 * abs(near):
+            break
+    return near, far
