@@ -47,7 +47,7 @@ def choose(option: str, name: str, known: Iterable[str]) -> str:
 
 
 def ready(name: str) -> Ready:
-    """Return the default start; a user's system starts at release and runs ten periods."""
+    """Return the default start; for a user's system release, and ten periods."""
     return SYSTEMS.get(name, Ready(name, None, 10.0, 0.0))
 
 

@@ -58,8 +58,8 @@ def fit(
     if rig is None and system is None and is_table(case, files):
         if out is not None or bootstrap:
             raise ValueError(
-                f"{case} is a table of impacts, to which --out and --bootstrap "
-                f"do not apply; leave them out."
+                f"{case} is a table of impacts, without figures and bootstrap; "
+                f"leave out --out and --bootstrap."
             )
         fit_impacts(case, files, json_file)
         return

@@ -98,7 +98,7 @@ def start_lanes(lanes: Lanes, horizon: Horizon, settings, width: int) -> LaneSta
     """The start of lanes; `width` of them will run at a time."""
     pieces, count = [], len(lanes.states)
     whole = jnp.asarray(float(horizon.number))
-    # filled up, so that two compiled programs serve all numbers of lanes
+    # padded, so that two compiled programs serve all numbers of lanes
     part_size = width if count <= 2 * width else _AT_ONCE * width
     for first in range(0, count, part_size):
         some = np.minimum(np.arange(first, first + part_size), count - 1)

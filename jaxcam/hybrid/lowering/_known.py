@@ -30,14 +30,14 @@ _NUMPY = {
 }
 
 
-# asked of every scalar: see `_jaxprs.py`
+# called for every scalar: see `_jaxprs.py`
 @no_type_check
 def is_known(element) -> bool:
     return isinstance(element, (np.generic, bool, int, float))
 
 
 def join_known(elements: np.ndarray):
-    """`join` for numbers that are known while tracing."""
+    """Join numbers that are known while tracing."""
     flat = [np.asarray(e) for e in elements.ravel()]
     return np.stack(flat).reshape(elements.shape) if flat else np.zeros(elements.shape)
 

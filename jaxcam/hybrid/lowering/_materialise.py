@@ -55,7 +55,7 @@ def _chosen(jaxpr) -> list:
 
 
 def _hoisted(jaxpr, constants):
-    """A program without the operations on constants alone, which are done here."""
+    """Return a program whose operations on constants alone are evaluated here."""
     known = set(jaxpr.constvars)
     early, late = [], []
     for equation in jaxpr.eqns:
@@ -122,7 +122,7 @@ def _keeping_nothing(body, state):
 
 
 def without_library(function: Callable, argument):
-    """`function` with its calls of a library done here, if they need no argument.
+    """Evaluate the library calls of `function` here, if they need no argument.
 
     A loop that calls one cannot be a single kernel. Other operations stay where they
     are: within the kernel they cost less than as its arguments.
@@ -146,7 +146,7 @@ def without_library(function: Callable, argument):
 
 
 def depend_on(value, kept):
-    """`value`, in a way that needs all kept scalars, which else would be dropped.
+    """Make `value` depend on all kept scalars, which would otherwise be dropped.
 
     Adding 1e-300 changes no number that a count can be.
     """

@@ -1,4 +1,6 @@
-"""The arrays of a pytree as one array: a compiled call takes time for each it gets."""
+"""Pack the arrays of a pytree into one array, since each argument of a call costs
+time.
+"""
 
 import math
 from typing import Any, NamedTuple

@@ -1,4 +1,4 @@
-"""One step of any diffrax Runge-Kutta solver, explicit or implicit, by itself."""
+"""Take one step of any diffrax Runge-Kutta solver, explicit or implicit."""
 
 import diffrax
 import equinox as eqx
@@ -17,7 +17,7 @@ def one_step(solver: diffrax.AbstractSolver, tolerance, field, t, x, h, scale):
         The state after the step and the estimate of its error, both `(n,)`.
 
     Raises:
-        ValueError: For a solver without an error estimate.
+        ValueError: The solver has no error estimate.
     """
     # time counts from t: t + h - t would lose the digits of a short step
     terms = scaled_term(field, t, x, scale)
