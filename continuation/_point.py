@@ -40,8 +40,9 @@ class Point:
     """Eigenvalues of an equilibrium, or multipliers of a map or an orbit, shape `(k,)`.
     """
     stable: bool | None
-    """Whether the solution is stable; None where the problem has no stability, or a
-    multiplier is not finite."""
+    """Whether the solution is stable; None if stability is not computed, or a
+    multiplier is not finite.
+    """
     tangent: np.ndarray
     """Direction of the branch in (state, parameter), shape `(n+1,)`."""
     scale: np.ndarray
@@ -126,7 +127,7 @@ def replace(point: Point, **changes: Any) -> Point:
 
 
 def stability(stable: bool | None) -> str:
-    """In a word; none where a point has no stability."""
+    """Return stability as a word; empty if it is not computed."""
     return {True: "stable", False: "unstable", None: ""}[stable]
 
 

@@ -1,4 +1,4 @@
-"""The sequence of impacts of an orbit, changed by one impact."""
+"""Add or remove one impact of an orbit."""
 
 import jax.numpy as jnp
 import numpy as np
@@ -44,13 +44,13 @@ def with_impact(
 
 
 def _with(equations: Shooting, constraints, steps: int | None = None) -> Shooting:
-    """The same equations for impacts on these constraints."""
+    """Return the same equations for impacts on these constraints."""
     steps = equations.steps if steps is None else steps
     return Shooting(constraints, equations.periods, equations.dimension, steps)
 
 
 def _renumbered(periods, rows, number):
-    """Rows without one; without forcing time counts from the first that is left."""
+    """Remove one row; without forcing, time counts from the first remaining row."""
     if periods or number:
         return np.delete(rows, number, axis=0)
     period, later = rows[0, 0], rows[1:].copy()

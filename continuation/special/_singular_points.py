@@ -1,4 +1,4 @@
-"""Points at which a matrix is singular, as regular solutions of a larger problem."""
+"""Compute points with a singular matrix as regular solutions of a larger problem."""
 
 from typing import ClassVar
 
@@ -99,7 +99,7 @@ class SingularPoints(AbstractExtended):
         base = set_parameters(self.base, parameters)
         m = matrix_at(base, self.kind, self.leaf, u)
         left, _, right = np.linalg.svd(m)
-        # signs continue, so that test functions made of null vectors do
+        # signs are continued, so that test functions of null vectors are continuous
         b = left[:, -1] * (-1.0 if left[:, -1] @ np.asarray(self.b) < 0 else 1.0)
         c = right[-1] * (-1.0 if right[-1] @ np.asarray(self.c) < 0 else 1.0)
         return with_field(with_field(self, "b", b), "c", c)
@@ -148,7 +148,7 @@ class SingularPoints(AbstractExtended):
             names["opposite"] = "1:2 resonance"
             names["third"] = "1:3 resonance"
             names["fourth"] = "1:4 resonance"
-        # behind these the pair is real, and the points are neutral saddles
+        # beyond these the pair is real, and the points are neutral saddles
         last = ("double", "opposite") if self.kind in (HOPF, NEIMARK_SACKER) else ()
         found = {k: Monitor(v, ends=k in last) for k, v in names.items()}
         for name, monitor in self.base.monitors().items():
