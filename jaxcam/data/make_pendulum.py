@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 
 
-# every so many samples one is kept, which leaves 100 a second
+# decimation factor, for 100 samples per second
 EVERY = 10
-# what the encoder's smallest step is (rad): 40000 counts a turn
+# resolution of the encoder (rad): 40000 counts per turn
 COUNT = 2 * np.pi / 40000
 
 

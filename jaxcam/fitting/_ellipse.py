@@ -115,7 +115,8 @@ def most_correlated(labels: Sequence[str], correlation) -> str:
     kept = max(1 - value**2, np.finfo(float).eps) ** 0.5
     together = "in opposite directions" if value < 0 else "together"
     return (
-        f"{labels[k]} and {labels[i]} are the hardest to distinguish: their errors go {together} "
+        f"{labels[k]} and {labels[i]} are the hardest to distinguish: their errors "
+        f"go {together} "
         f"(correlation {value:+.4f}), and if one were known, the error of the other "
         f"would be {kept:.2g} times what it is."
     )

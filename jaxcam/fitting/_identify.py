@@ -66,7 +66,7 @@ class Identifiability:
         if not total:
             return ["Nothing is to be fitted."]
         found = [
-            f"The data determine {self.seen} of {total} combinations of parameters better "
+            f"The data see {self.seen} of {total} combinations of parameters better "
             f"than the tolerances do."
         ]
         dead = [n for n, a in zip(self.names, self.alone) if not np.isfinite(a)]
@@ -97,7 +97,7 @@ class Identifiability:
     def _unseen(self, stderr, direction, members) -> str:
         if len(members) == 1:
             return (
-                f"The data constrain less of {members[0]} than its tolerance does, so the "
+                f"The data constrain {members[0]} less than its tolerance does, so the "
                 f"tolerance decides."
             )
         shares = {self.names[k]: direction[k] for k in range(len(self.names))}
