@@ -29,8 +29,10 @@ class Unconstrained:
     def sentence(self) -> str:
         """Return the combination, and the remedy, in words."""
         if len(self.names) == 1:
-            return f"The data do not constrain {self.names[0]}; "
-                "hold it or give a tolerance."
+            return (
+                f"The data do not constrain {self.names[0]}; hold it or give it a "
+                f"tolerance."
+            )
         moves = ", ".join(
             f"{name} by {share:+.3g}" for name, share in zip(self.names, self.shares)
         )
