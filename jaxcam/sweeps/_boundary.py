@@ -122,7 +122,8 @@ def uncertainty_exponent(attractor, distances=(1, 2, 4, 8, 16)) -> Uncertainty:
             found.append((distance, different / total))
     if len(found) < 2:
         raise ValueError(
-            "fewer than two distances have states that end on different attractors; use a finer "
+            "fewer than two distances have states that end on different attractors; "
+            "use a finer "
             "grid, or one with a boundary in it"
         )
     # slow to import, and needed for this line only
