@@ -68,7 +68,7 @@ class Axes(eqx.Module):
         return jax.tree.leaves(self.tree, is_leaf=lambda x: x is None)
 
     def of_lane(self, given: PyTree, index: int) -> PyTree:
-        """The parameters of one lane."""
+        """Return the parameters of one lane."""
         flat, structure = jax.tree.flatten(given)
         chosen = [
             x[index] if axis == 0 else x
@@ -106,7 +106,7 @@ def follow_lanes(
 
 @eqx.filter_jit
 def _begin(problem, given, axes, leaf, z, signs, low, high, s, points):
-    """The first point of each branch."""
+    """Return the first point of each branch."""
     width = high - low
 
     def begin(parameters, z, sign):

@@ -39,7 +39,7 @@ def solved_start(
 def leave(
     problem: AbstractProblem, context: Context, z: np.ndarray, start: Start
 ) -> tuple[Corrected, float]:
-    """The first point of a branch that leaves z along a tangent."""
+    """Return the first point of a branch that leaves z along a tangent."""
     settings = context.settings
     zero = np.zeros_like(z)
     scale = evaluate(problem, context, z, zero + 1.0).scale
@@ -65,7 +65,7 @@ def leave(
 def _oriented(
     problem: AbstractProblem, context: Context, at: Corrected, direction: int
 ) -> Corrected:
-    """The same point with its tangent in the direction asked for."""
+    """Return the same point with its tangent in the direction asked for."""
     _, sizes, rows = np.linalg.svd(at.jacobian * at.scale[None, :])
     n = sizes.size
     null = rows[n:] if n == 0 else rows[np.append(sizes, 0) <= 1e-9 * sizes[0]]

@@ -39,7 +39,7 @@ def as_arguments(parameters: PyTree, *leaves: int) -> PyTree:
 
 
 def leaf_of(parameters: PyTree, index: int):
-    """The leaf with this index."""
+    """Return the leaf with this index."""
     return jax.tree.leaves(parameters)[index]
 
 

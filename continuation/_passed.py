@@ -45,7 +45,7 @@ def sign_changes(context: Context, current: Solution, following: Solution) -> li
 def located_between(
     context: Context, current: Solution, following: Solution, names: list[str]
 ) -> list[tuple[str, Located]]:
-    """The zeros of these test functions in the order in which they are passed.
+    """Return the zeros of these test functions in the order in which they are passed.
 
     Two functions with the same zero count once, unless a monitor ends the branch there.
     """

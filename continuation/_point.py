@@ -122,7 +122,7 @@ class Point:
 
 
 def replace(point: Point, **changes: Any) -> Point:
-    """The same point with other fields."""
+    """Return the same point with other fields."""
     return Point(**{**point.__dict__, **changes})
 
 
@@ -161,7 +161,7 @@ class Branch:
         return self._table().html()
 
     def _table(self) -> ShortTable:
-        """The ends and the special points."""
+        """Return the ends and the special points."""
         names = self.names or (self.name,)
         count = f"{len(self.points)} points, {len(self.special)} of them special"
         sentence = f"Branch over {' and '.join(names)}: {count}."
@@ -238,12 +238,12 @@ class Branch:
 
 
 def relabelled(points: Sequence[Point]) -> tuple[Point, ...]:
-    """The same points, counted from 1."""
+    """Return the same points, counted from 1."""
     return tuple(replace(point, label=i + 1) for i, point in enumerate(points))
 
 
 def with_parameter(problem: Any, leaf: int, value: Any) -> Any:
-    """The problem at another value of the parameter."""
+    """Return the problem at another value of the parameter."""
     parameters = with_leaf(problem.parameters, leaf, np.asarray(value, float))
     return set_parameters(problem, parameters)
 
@@ -258,7 +258,9 @@ def set_parameters(problem: Any, parameters: Any) -> Any:
 
 
 def with_field(module: Any, name: str, value: Any) -> Any:
-    """A module with one field replaced; what `tree_at` does, in a tenth of the time."""
+    """Return a module with one field replaced; what `tree_at` does, in a tenth of
+    the time.
+    """
     new = object.__new__(type(module))
     for f in fields(module):
         if f.name == name:

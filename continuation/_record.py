@@ -69,7 +69,7 @@ def save_branch(branch: Branch, path: str | os.PathLike) -> None:
 
 
 def header_of(branch: Branch, **more: Any) -> dict:
-    """The first line of a file, without its format."""
+    """Return the first line of a file, without its format."""
     return {
         "parameter": branch.name,
         "parameters": list(branch.names),
@@ -110,7 +110,7 @@ def load_branch(
 def read_branch(
     path: str | os.PathLike, problem: AbstractProblem | None = None
 ) -> tuple[Branch, dict]:
-    """A branch and the header of its file."""
+    """Return a branch and the header of its file."""
     try:
         text = Path(path).read_text("utf-8")
         lines = text.split("\n")[:-1]

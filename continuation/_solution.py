@@ -47,7 +47,7 @@ def point_of(
     coefficient: float | None = None,
     criticality: str = "",
 ) -> Point:
-    """The solution as a point of the branch."""
+    """Return the solution as a point of the branch."""
     at, problem = current.at, current.problem
     multipliers, why = eigenvalues_at(problem, context.leaf, at)
     z = np.asarray(at.z)

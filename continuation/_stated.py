@@ -6,7 +6,9 @@ from .problem import AbstractProblem
 
 
 def stated(problem: Any, start: Any) -> tuple[AbstractProblem, Any]:
-    """The problem and its start, where a system and an orbit of it may be given."""
+    """Return the problem and its start, where a system and an orbit of it may be
+    given.
+    """
     if isinstance(problem, AbstractProblem):
         return problem, start
     # the core imports the code for impacts only for a system with impacts

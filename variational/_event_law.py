@@ -17,17 +17,17 @@ from jaxcam.hybrid.surface import (
 
 
 def gap_of(system: HybridSystem, constraint) -> Callable:
-    """The gap of one constraint as a function of (t, x)."""
+    """Return the gap of one constraint as a function of (t, x)."""
     return lambda t, x: gaps(system, t, x)[constraint]
 
 
 def impact_of(system: HybridSystem, constraint) -> Callable:
-    """The impact law of one constraint as a function of (t, x)."""
+    """Return the impact law of one constraint as a function of (t, x)."""
     return lambda t, x: impacts(system, t, x)[constraint]
 
 
 def completed_law(system: HybridSystem, constraint) -> Callable:
-    """The law of an impact together with all later ones of its chatter.
+    """Return the law of an impact together with all later ones of its chatter.
 
     The state after it is the combination of the states before and after the impact that
     has no normal velocity: to second order in the speed, the rest of the sequence takes
@@ -89,7 +89,9 @@ def onto_contact(
 def contact_projector(
     system: HybridSystem, t, x, contact: Bool[Array, " m"]
 ) -> Float[Array, "n n"]:
-    """The derivative of `onto_contact`: exactly zero for two states in contact."""
+    """Return the derivative of `onto_contact`: exactly zero for two states in
+    contact.
+    """
     out = jax.jacfwd(lambda y: onto_contact(system, t, y, contact))(x)
     if x.shape[0] == 2:
         # zero exactly; rounding divided by a small impact speed would not be zero

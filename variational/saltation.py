@@ -243,7 +243,7 @@ def saltation_second(
 
 
 def _taylor(system, t, x, tau):
-    """The flow over a short time `tau`, to third order."""
+    """Return the flow over a short time `tau`, to third order."""
 
     def along(function):
         def rate(s, y):

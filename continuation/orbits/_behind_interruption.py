@@ -37,7 +37,7 @@ _NEAREST, _TRIALS = -40, 4
 
 
 def orbit_behind(point: Any, periods: int) -> Start | None:
-    """The orbit with finitely many impacts behind an interruption, or None.
+    """Return the orbit with finitely many impacts behind an interruption, or None.
 
     `point` is the interruption, with the tangent in the direction of the branch; the
     orbit repeats after `periods` forcing periods.

@@ -101,7 +101,7 @@ def periodic_orbit(
 
 
 def _periods(base: float | None, period, periods) -> int:
-    """The number of forcing periods; 0 without forcing."""
+    """Return the number of forcing periods; 0 without forcing."""
     if base is not None and isinstance(period, int | np.integer):
         warnings.warn(
             f"period={period} is taken as forcing periods; write periods={period}, or "
@@ -198,7 +198,7 @@ def _somewhere(system, t0):
 
 
 def _dimension(system) -> int:
-    """The number of states of a system that does not name them."""
+    """Return the number of states of a system that does not name them."""
     for n in range(1, 65):
         try:
             shape = jax.eval_shape(
@@ -246,7 +246,9 @@ def _by_shooting(system, guess, length, number, t0, settings):
 
 
 def _with_impacts_of(system, turn, number, t0, settings):
-    """The orbit with the impacts of one period from `t0`, or the reason for none."""
+    """Return the orbit with the impacts of one period from `t0`, or the reason for
+    none.
+    """
     try:
         equations, u = seed(system, turn, number)
     except ValueError as error:

@@ -214,7 +214,8 @@ def _stroboscopic(system, turn: ChatterOrbit, periods: int) -> Float[Array, "m n
 def on_release(
     system: HybridSystem, periods: int = 1, beyond: bool = False
 ) -> tuple[StickingOrbits, np.ndarray]:
-    """The problem of the orbit that sticks once in so many periods, and its unknowns.
+    """Return the problem of the orbit that sticks once in so many periods, and its
+    unknowns.
 
     Raises:
         ValueError: Contact never ends, or never begins.

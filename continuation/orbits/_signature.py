@@ -7,7 +7,9 @@ from variational.orbits import flown, Shooting
 
 
 def without_impact(equations: Shooting, u, parameters, number: int):
-    """The equations without impact `number`, and the state that leaves it out."""
+    """Return the equations without impact `number`, and the state that leaves it
+    out.
+    """
     hits, periods = equations.constraints, equations.periods
     rows = np.array(u).reshape(len(hits), -1)
     hits = hits[:number] + hits[number + 1 :]
@@ -27,7 +29,9 @@ def without_impact(equations: Shooting, u, parameters, number: int):
 def with_impact(
     equations: Shooting, u, parameters, flight: int, time: float, which: int
 ):
-    """The equations with another impact, on `which`, at `time` (s) of a flight."""
+    """Return the equations with another impact, on `which`, at `time` (s) of a
+    flight.
+    """
     u = jnp.asarray(u)
     starts, _ = equations.flights(u, parameters)
     start = starts[flight]

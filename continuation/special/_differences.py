@@ -36,7 +36,7 @@ def along(
 
 
 def _limit(values: np.ndarray) -> np.ndarray:
-    """The limit of values at distances h, h/2, ..., even in the distance."""
+    """Return the limit of values at distances h, h/2, ..., even in the distance."""
     best, error = np.full_like(values[0], np.nan), np.inf
     row = [values[0]]
     for value in values[1:]:

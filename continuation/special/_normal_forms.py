@@ -155,7 +155,7 @@ def _critical_pair(a: np.ndarray, distance: Callable) -> tuple[Any, Any] | None:
 
 
 def _adjoint(matrix: np.ndarray, q: np.ndarray) -> np.ndarray:
-    """The left null vector p with <p, q> = 1."""
+    """Return the left null vector p with <p, q> = 1."""
     _, p = null_vectors(matrix)
     return p / np.conj(np.vdot(p, q))
 

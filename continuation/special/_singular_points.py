@@ -28,7 +28,7 @@ _LARGEST_FOR_PAIRS = 8
 
 
 def singular_matrix(problem, kind: str, u, parameters):
-    """The matrix that is singular at this kind of point."""
+    """Return the matrix that is singular at this kind of point."""
     jacobian = jacobian_of(problem, u, parameters)
     if kind == FOLD:
         return jacobian
@@ -49,7 +49,9 @@ def _singular_matrix(problem, kind: str, leaf: int, z):
 
 
 def matrix_at(problem, kind: str, leaf: int, z) -> np.ndarray:
-    """The matrix that is singular at this kind of point, compiled; z = (u, p)."""
+    """Return the matrix that is singular at this kind of point, compiled; z = (u,
+    p).
+    """
     return np.asarray(_singular_matrix(problem, kind, leaf, np.asarray(z)))
 
 

@@ -19,7 +19,7 @@ COUNT = 2 * np.pi / 40000
 
 
 def thinned(file: Path) -> str:
-    """The kept lines of a recording as text, with times from zero."""
+    """Return the kept lines of a recording as text, with times from zero."""
     with gzip.open(file, "rt", encoding="utf-8") as stream:
         head, *lines = stream.read().splitlines()
     kept = [line.split(",") for line in lines[::EVERY]]

@@ -87,7 +87,7 @@ def _half(progress, second: bool, share: float) -> None:
 def _speeds(
     fit: Fit, names, present: bool, rng, policy: Policy, progress
 ) -> list[tuple[float, float]]:
-    """The speeds and their standard errors."""
+    """Return the speeds and their standard errors."""
     row = np.asarray(fit.point.values[0])
     free = [fit.problem.names.index(one.name) for one in fit.estimates]
     best = event_speeds(_system(fit, row, names, present), policy)

@@ -149,7 +149,7 @@ def onto_surface(system: FilippovSystem, t, state) -> Float[Array, " n"]:
 
 
 def mode_after(system: FilippovSystem, mode, level, t, state):
-    """The mode in which a motion continues from an event on the surface.
+    """Return the mode in which a motion continues from an event on the surface.
 
     A side ends in crossing or sliding; sliding ends where one of the fields begins to
     point away from the surface, to the side of that field.

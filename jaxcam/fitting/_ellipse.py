@@ -81,7 +81,7 @@ class Ellipse:
 def ellipse_of(
     names: Sequence[str], labels: Sequence[str], centre, covariance, level: float
 ) -> Ellipse:
-    """The region of the parameters `names` among those with these labels."""
+    """Return the region of the parameters `names` among those with these labels."""
     if not 0 < level < 1:
         raise ValueError(f"The level is {level:g}; give a probability between 0 and 1.")
     if len(set(names)) != len(names) or len(names) < 2:

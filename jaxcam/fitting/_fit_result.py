@@ -156,7 +156,7 @@ class Fit:
         return " ".join(one.sentence for one in self.reasons) or self.ended
 
     def __getitem__(self, name: str) -> Estimate:
-        """The estimate of a parameter, by name or `name@record`.
+        """Return the estimate of a parameter, by name or `name@record`.
 
         Raises:
             KeyError: The name is unknown; the message lists the names.

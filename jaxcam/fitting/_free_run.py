@@ -154,7 +154,7 @@ class Simulated(NamedTuple):
 
 
 def prepared(model: Model, recording: Recording | Segments, samples: int) -> Prepared:
-    """A recording with its initial state, and with steps that are short enough.
+    """Return a recording with its initial state, and with steps that are short enough.
 
     **Raises:** see `free_run`.
     """
@@ -295,7 +295,7 @@ def _first(one: Prepared) -> Prepared:
 
 
 def _levels(model: Model, run: Recording) -> Float[Array, " k"]:
-    """The input at each sample; zero without one."""
+    """Return the input at each sample; zero without one."""
     spacing = np.diff(run.time)
     if np.ptp(spacing) > 2 * _UNEVEN * np.mean(spacing):
         raise RecordingError(

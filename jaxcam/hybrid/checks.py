@@ -108,7 +108,7 @@ def check_system(system, t0, state) -> None:
 
 
 def _digest(system) -> bytes:
-    """A hash of all numbers of a system."""
+    """Return a hash of all numbers of a system."""
     found = hashlib.blake2b(digest_size=16)
     for leaf in jax.tree.leaves(eqx.filter(system, eqx.is_array)):
         if jnp.issubdtype(leaf.dtype, jax.dtypes.prng_key):

@@ -93,7 +93,7 @@ class Squared(NamedTuple):
 
 
 def _lower(tableau: Tableau) -> np.ndarray:
-    """The coefficients of all stages as a square matrix."""
+    """Return the coefficients of all stages as a square matrix."""
     a = np.zeros((len(tableau.weights),) * 2)
     for i, row in enumerate(tableau.lower, start=1):
         a[i, : len(row)] = row
@@ -102,7 +102,7 @@ def _lower(tableau: Tableau) -> np.ndarray:
 
 @functools.cache
 def squared(tableau: Tableau) -> Squared:
-    """The tableau applied twice. (Nystroem's form of a Runge-Kutta step)"""
+    """Return the tableau applied twice. (Nystroem's form of a Runge-Kutta step)"""
     a = _lower(tableau)
     lower = a @ a
     rows = np.vstack([lower, np.asarray(tableau.weights) @ a, tableau.error @ a])

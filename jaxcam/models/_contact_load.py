@@ -177,7 +177,7 @@ def _least_root(a, b, c):
 
 
 def _sharpest_fall(profile):
-    """The most negative jump of the profile's slope, and its cam angle.
+    """Return the most negative jump of the profile's slope, and its cam angle.
 
     An upward kink throws the follower off for either sense of rotation.
     """

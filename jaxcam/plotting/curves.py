@@ -70,7 +70,7 @@ def window(
 
 
 def hits(trajectory: Trajectory, start: float, stop: float) -> Hits:
-    """The impacts with `start <= time <= stop`."""
+    """Return the impacts with `start <= time <= stop`."""
     impacts = trajectory.impacts
     number = int(impacts.count)
     time = np.asarray(impacts.time)[:number]

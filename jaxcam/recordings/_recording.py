@@ -38,7 +38,7 @@ class Recording:
     `{"mass": 0.31}`. A fit uses them unchanged."""
 
     def __getitem__(self, channel: str) -> Float[np.ndarray, " k"]:
-        """The samples of one channel, shape `(k,)`.
+        """Return the samples of one channel, shape `(k,)`.
 
         Raises:
             RecordingError: The channel is missing; the message lists the channels.

@@ -76,7 +76,7 @@ class BasinsJob(AbstractJob):
 
 
 def default_scale(grid: Grid) -> np.ndarray:
-    """The largest extent or coordinate of the grid in each component."""
+    """Return the largest extent or coordinate of the grid in each component."""
     low, high = np.abs(grid.low), np.abs(grid.high)
     found = np.maximum(grid.extents, np.maximum(low, high))
     return np.where(found > 0, found, 1.0)

@@ -131,7 +131,7 @@ def prepared_frame(system, time) -> ChatterFrame:
 
 
 def frame_at(system, release, state) -> ChatterFrame:
-    """The frame of a known release of a system that is already `prepared`."""
+    """Return the frame of a known release of a system that is already `prepared`."""
 
     def suppressed(t, x):
         return normal_acceleration(system, t, x)[0]

@@ -114,12 +114,12 @@ def _orbit(system, time, periods) -> ChatterOrbit:
 
 
 def prepared_orbit(system, time, periods: int = 1) -> ChatterOrbit:
-    """The orbit of a system that is already `prepared`."""
+    """Return the orbit of a system that is already `prepared`."""
     return orbit_from(system, prepared_frame(system, time), periods)
 
 
 def orbit_from(system, frame: ChatterFrame, periods: int = 1) -> ChatterOrbit:
-    """The orbit of a system that is already `prepared`, from a known release."""
+    """Return the orbit of a system that is already `prepared`, from a known release."""
     period = system.period
     restitution = frame.restitution
     law = scaling_law(restitution)

@@ -22,5 +22,5 @@ def check_chatter_system(system: HybridSystem) -> None:
 
 
 def scalar_gap(system: HybridSystem, time, state):
-    """The gap of a system with one constraint, a scalar."""
+    """Return the gap of a system with one constraint, a scalar."""
     return one_constraint(system.gap(time, state), 0)

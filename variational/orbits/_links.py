@@ -78,7 +78,9 @@ def landed(
 
 
 def link(system: HybridSystem, start, time, which, steps: int) -> Link:
-    """The flight from a row (time, state) to `time` (s), and the impact there."""
+    """Return the flight from a row (time, state) to `time` (s), and the impact
+    there.
+    """
 
     def flown(x):
         before = flight_nodes(system, start[0], x, time, steps)[1][-1]
@@ -117,7 +119,7 @@ def matrix_of(links: Link, following, sign: Any = 1.0, real: Any = True):
 
 
 def links_of(shooting: Shooting, u, system: HybridSystem) -> Link:
-    """The links of an orbit, `(m, ...)`."""
+    """Return the links of an orbit, `(m, ...)`."""
     starts, ends = shooting.flights(u, system)
     return jax.vmap(lambda a, b, which: link(system, a, b, which, shooting.steps))(
         starts, ends, shooting.hit()
@@ -127,7 +129,7 @@ def links_of(shooting: Shooting, u, system: HybridSystem) -> Link:
 def product_of_links(
     links: Link, number: Int[Array, ""] | None = None
 ) -> tuple[Float[Array, "n n"], Float[Array, "n n"]]:
-    """The monodromy matrix, of the state just after the first impact.
+    """Return the monodromy matrix, of the state just after the first impact.
 
     With `number` as two matrices, regular + singular / approach speed of that impact;
     both are bounded where it is a grazing.

@@ -82,7 +82,7 @@ def product_of(
 
 
 def with_all_constraints(system, pieces: TurnPieces, state) -> TurnPieces:
-    """The flags of contact for every constraint of the system."""
+    """Return the flags of contact for every constraint of the system."""
     gap = jax.eval_shape(system.gap, pieces.start[0], state)
     missing = (gap.shape[0] if gap.shape else 1) - pieces.contact.shape[1]
 
@@ -111,7 +111,7 @@ def _held(build, parameters, t, x, contact):
 
 
 def _event(build, parameters, piece: TurnPieces, x, sticks):
-    """The derivative across the event of a piece, the state after it, and the
+    """Return the derivative across the event of a piece, the state after it, and the
     determinant of the derivative."""
     n = x.shape[0]
     plain = _across(build, parameters, piece, impact_of, sticks)

@@ -104,7 +104,7 @@ class Expansion(eqx.Module):
         return Expansion(self.model, slopes)
 
     def at(self, change: Float[Array, " m"]) -> Model:
-        """The model after a small change of the parameters."""
+        """Return the model after a small change of the parameters."""
         leaves, tree = jax.tree.flatten(self.model)
         moved = [
             leaf if slope is None else leaf + jnp.tensordot(change, slope, 1)

@@ -124,7 +124,7 @@ def contact_state(system, t, guess):
 
 
 def _least(slopes, residual):
-    """The least step that changes two conditions by a residual."""
+    """Return the least step that changes two conditions by a residual."""
     (a, b), (_, d) = slopes @ slopes.T
     det = a * d - b * b
     first, second = residual

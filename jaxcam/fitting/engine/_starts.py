@@ -48,7 +48,9 @@ def suggested_starts(model: Model, segments, cuts, pieces: Pieces):
 
 
 def _still(model: Model, part: Segments):
-    """The system with its drive at the mean speed; its field serves as a guide only."""
+    """Return the system with its drive at the mean speed; its field serves as a
+    guide only.
+    """
     if part.drive is None:
         return model.system
     # arrays: numbers would be constants of a program that is compiled for each record

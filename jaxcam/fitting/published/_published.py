@@ -210,7 +210,9 @@ def _refuse_lost(published, values) -> None:
 
 
 def _least_squares(describe, values, errors, weights, unknowns, max_steps):
-    """The optimum for these errors; `describe` gives quantities and their slopes."""
+    """Return the optimum for these errors; `describe` gives quantities and their
+    slopes.
+    """
 
     def residuals(unknowns):
         misses = (describe(unknowns)[0] - values) / errors

@@ -95,7 +95,9 @@ class Plan(NamedTuple):
 
 
 def _each(absolute) -> tuple | None:
-    """The absolute errors allowed as scalars; one alone counts for all components."""
+    """Return the absolute errors allowed as scalars; one alone counts for all
+    components.
+    """
     if absolute is None:
         return None
     numbers = jnp.ravel(jnp.asarray(absolute, dtype=jnp.float64))
@@ -191,7 +193,9 @@ def after_attempt(plan: Plan, carried: LoopState, attempt: Attempt) -> LoopState
 
 
 def _longest(plan, carried, attempt):
-    """The longest step that the error allows; short steps say little about it."""
+    """Return the longest step that the error allows; short steps say little about
+    it.
+    """
     h, effort = attempt.length, attempt.effort
     # single precision is plenty for choosing a step, and much cheaper
     rough = jnp.asarray(jnp.clip(effort, 1e-12, 1e12), dtype=jnp.float32)

@@ -122,12 +122,12 @@ class Functions:
         return tuple(tuple(row) for row in rows)
 
     def impact(self, t, x):
-        """The state after an impact at each constraint."""
+        """Return the state after an impact at each constraint."""
         rows = self._impact(t, _pack(x))
         return [tuple(rows[k]) for k in range(self.m)]
 
     def velocity(self, t, x):
-        """The normal velocities."""
+        """Return the normal velocities."""
         return tuple(self._velocity(t, _pack(x)))
 
     def frame(self, t, x) -> Frame:

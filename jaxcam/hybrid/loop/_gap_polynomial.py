@@ -76,7 +76,7 @@ def _mistrust(left: Jet, right: Jet, h):
 
 
 def lowest(polynomial: Bernstein):
-    """A lower bound of the gap inside the step, its error taken off.
+    """Return a lower bound of the gap inside the step, its error taken off.
 
     The error of the interpolation vanishes with its third derivative at both ends: it
     belongs to the two middle coefficients, with weight 64/35.

@@ -287,7 +287,7 @@ def _waits_for_release(carried, jets, flown, natural, tiny):
 
 
 def _where_passed(functions, plan, passed, t, x, contact, jets):
-    """The jets on the far side of a breakpoint, where one was passed."""
+    """Return the jets on the far side of a breakpoint, where one was passed."""
     fresh = functions.jets(after(t, plan.t1 - plan.t0), x, contact)
     return tuple(
         Jet(*select(passed, new, old)) for new, old in zip(fresh, jets, strict=True)

@@ -187,14 +187,14 @@ def _row(record: Record, _: LoopState) -> list:
 
 
 def numbers_of_row(record: Record) -> list:
-    """The numbers of a row of the log."""
+    """Return the numbers of a row of the log."""
     flags = [jnp.asarray(c, dtype=jnp.float64) for c in record.contact]
     head = [record.kind, record.constraint, record.t]
     return [jnp.asarray(v) for v in head] + [*record.before, *record.after, *flags]
 
 
 def log_of(log, n: int, m: int) -> Log:
-    """The log of rows of numbers, of `n` components and `m` constraints."""
+    """Return the log of rows of numbers, of `n` components and `m` constraints."""
     return Log(
         kind=log[:, 0],
         constraint=log[:, 1],

@@ -116,7 +116,8 @@ def says_nothing(effort, tolerance):
 
 
 def moved_extents(extents, origin, attempt) -> tuple:
-    """The scales after an attempt: the furthest that a component was from its start.
+    """Return the scales after an attempt: the furthest that a component was from its
+    start.
 
     One that has never moved takes its scale from the first attempt that moves it,
     whatever becomes of it: relative to itself the error of a motion such as t^9 does

@@ -5,7 +5,7 @@ import jax.numpy as jnp
 
 
 def taylor(x, rates, tau):
-    """The state a time `tau` (s) after `x`, to third order, by its `rates`."""
+    """Return the state a time `tau` (s) after `x`, to third order, by its `rates`."""
     first, second, third = rates
     return tuple(
         x[i] + tau * (first[i] + tau * (second[i] * 0.5 + tau * third[i] * (1 / 6)))
@@ -14,7 +14,8 @@ def taylor(x, rates, tau):
 
 
 def taylor_of_release(functions, x, rates, frame, jets, tau, contact):
-    """The sticking motion over the short time `tau` (s) to release, to second order.
+    """Return the sticking motion over the short time `tau` (s) to release, to second
+    order.
 
     `rates` of the free flight from `x`, its `frame` and `jets`, and the contacts.
     """

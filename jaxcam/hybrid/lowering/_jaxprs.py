@@ -35,7 +35,9 @@ _SAVING = "its_derivative_only_saves_work"
 
 @no_type_check
 def opened(equation):
-    """The program inside a call that only groups, and its constants; else `None`."""
+    """Return the program inside a call that only groups, and its constants; else
+    `None`.
+    """
     if equation.primitive.name not in _GROUPS:
         return None
     inner = equation.params.get("jaxpr", equation.params.get("call_jaxpr"))

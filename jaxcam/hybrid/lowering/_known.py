@@ -43,7 +43,7 @@ def join_known(elements: np.ndarray):
 
 
 def computed(equation, arrays) -> list[np.ndarray]:
-    """An operation on known numbers, done while tracing."""
+    """Return an operation on known numbers, done while tracing."""
     name, outputs = equation.primitive.name, equation.outvars
     params = equation.params
     with np.errstate(all="ignore"):

@@ -27,7 +27,7 @@ _COST |= {"exp": 20, "log": 20, "atan2": 30, "atan": 20, "asin": 30, "acos": 30}
 
 
 def _chosen(jaxpr) -> list:
-    """The variables of a jaxpr that are worth keeping."""
+    """Return the variables of a jaxpr that are worth keeping."""
     uses: dict = {}
     for equation in jaxpr.eqns:
         for v in equation.invars:
@@ -79,7 +79,7 @@ def _hoisted(jaxpr, constants):
 
 
 def with_kept(body: Callable, carry, on: bool = True):
-    """A loop body that also carries its shared scalars.
+    """Return a loop body that also carries its shared scalars.
 
     **Arguments:** `body(carry) -> (carry, row)` and an example of the carry, scalars.
     The row may be a pytree. Without `on` nothing is kept.

@@ -50,7 +50,7 @@ _SUMS = {"reduce_sum": jnp.add, "reduce_max": jnp.maximum, "reduce_min": jnp.min
 
 
 def split(array) -> np.ndarray:
-    """An array as a numpy array of scalars."""
+    """Return an array as a numpy array of scalars."""
     shape = jnp.shape(array)
     out = np.empty(shape, dtype=object)
     for index in np.ndindex(shape):
@@ -61,7 +61,7 @@ def split(array) -> np.ndarray:
 
 
 def join(elements: np.ndarray):
-    """The inverse of `split`."""
+    """Return the inverse of `split`."""
     if elements.shape == ():
         return jnp.asarray(elements[()])
     flat = [jnp.asarray(e) for e in elements.ravel()]

@@ -87,7 +87,7 @@ def while_loop(goes_on: Callable, body: Callable, start):
 
 
 def has_program(equation) -> ClosedJaxpr | None:
-    """The program inside an operation that `whole` has made; else `None`."""
+    """Return the program inside an operation that `whole` has made; else `None`."""
     if equation.primitive is not whole_p:
         return None
     return equation.params["program"].jaxpr
@@ -154,7 +154,8 @@ mlir.register_lowering(
 
 
 def _batched(program: Program, axis, mapped: list[bool], wanted: list[bool]):
-    """The program of a batch, and which outputs have a batch: all `wanted`, and more.
+    """Return the program of a batch, and which outputs have a batch: all `wanted`, and
+    more.
 
     A program and the one that it was made of agree on the outputs that they share.
     """

@@ -93,7 +93,7 @@ def _places(xp: ModuleType, mask, size: int, fill: int):
 
 
 def _least_to_come(xp: ModuleType, values):
-    """The smallest of each entry and all later ones, along the first axis."""
+    """Return the smallest of each entry and all later ones, along the first axis."""
     if xp is jnp:
         return jax.lax.cummin(values, axis=0, reverse=True)
     return np.minimum.accumulate(values[::-1])[::-1]

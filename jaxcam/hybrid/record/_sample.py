@@ -70,7 +70,7 @@ def sample(system, settings: Settings, steps: Steps, times):
 def advance(
     system, functions: Functions, settings: Settings, scale, t, x, contact, h, inside
 ):
-    """The state a time `h` after `(t, x)` in one mode, by one step.
+    """Return the state a time `h` after `(t, x)` in one mode, by one step.
 
     Functions are evaluated at `inside(time)`; errors are relative to `scale`, `(n,)`.
     """

@@ -40,7 +40,8 @@ class Flown(NamedTuple):
     tiny: Float[np.ndarray, " m"]
 
     def first_event(self, count, fired, first, first_rate, t1) -> PieceEnd | None:
-        """The first event among the steps; `TOO_LONG` where the first step hid one.
+        """Return the first event among the steps; `TOO_LONG` where the first step hid
+        one.
 
         **Arguments:** the number of points, whether diffrax `fired` an event at the
         last of them, levels and rates `(m,)` at the first, and the end of the run (s).

@@ -160,7 +160,7 @@ class CompiledMotion(eqx.Module):
 
     @_compiled
     def probe(self, t, x, contact, h) -> PathPoint:
-        """The point a step of length `h` after `(t, x)`."""
+        """Return the point a step of length `h` after `(t, x)`."""
         return self._point(t, x, contact, h)
 
     @_compiled
@@ -240,7 +240,7 @@ class CompiledMotion(eqx.Module):
 
     @_compiled
     def rates(self, t, x, contact):
-        """The rates of the state, `(n,)`."""
+        """Return the rates of the state, `(n,)`."""
         return self._field(t, x, contact)
 
     @_compiled
@@ -254,7 +254,7 @@ class CompiledMotion(eqx.Module):
 
     @_compiled
     def completion(self, t, x, contact, k, speed, incoming) -> ChatterEnd:
-        """The rest of the chatter on constraint `k` after a rebound at `speed`.
+        """Return the rest of the chatter on constraint `k` after a rebound at `speed`.
 
         As [`jaxcam.hybrid.surface.chatter_completion`][], for one of several
         constraints.

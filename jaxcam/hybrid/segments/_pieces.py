@@ -114,7 +114,9 @@ class _Engine:
             self._fly(jets, level, rate)
 
     def log(self) -> Log:
-        """The rows, padded to a power of two so that few lengths are compiled."""
+        """Return the rows, padded to a power of two so that few lengths are
+        compiled.
+        """
         n, m = len(self.x), len(self.contact)
         length = 64
         while length < len(self.rows):

@@ -60,7 +60,8 @@ def lifted(system: HybridSystem, t0, states, where=None, values=None) -> np.ndar
 
 
 def state_in_contact(system: HybridSystem, t0, where=None, values=None) -> np.ndarray:
-    """The state in contact, without velocity relative to the constraint, at `t0`.
+    """Return the state in contact, without velocity relative to the constraint, at
+    `t0`.
 
     Raises:
         ValueError: A state does not have two components, or there are several

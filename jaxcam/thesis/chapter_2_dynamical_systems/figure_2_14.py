@@ -93,7 +93,7 @@ def _between(holds, first: Belted, second: Belted) -> float:
 
 @cache
 def sliding_events() -> dict[str, SlidingEvent]:
-    """The events of the branch, from a fast belt to a slow one, by bisection.
+    """Return the events of the branch, from a fast belt to a slow one, by bisection.
 
     Grazing-sliding: the motion touches the surface and begins to slide there.
     Switching-sliding: the motion begins to cross before it slides.

@@ -58,7 +58,7 @@ class Manifolds(NamedTuple):
 
 @cache
 def manifolds() -> Manifolds:
-    """The manifolds of the saddle that a fold of P(1,1) creates.
+    """Return the manifolds of the saddle that a fold of P(1,1) creates.
 
     With V the speed before the impact, (k^2 + m^2) V^2 + 2 k sigma V + sigma^2 -
     gamma^2 = 0 for orbits with one impact a turn; the saddle has the smaller V.
