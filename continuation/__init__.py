@@ -1,4 +1,4 @@
-"""Path following of smooth problems and of periodic orbits; their special points."""
+"""Follow branches of smooth problems and of periodic orbits, with special points."""
 
 import jaxcam as _jaxcam  # noqa: F401  64-bit floats
 from variational import chatter_interruption as chatter_interruption

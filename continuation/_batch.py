@@ -1,4 +1,4 @@
-"""Many branches at once."""
+"""Follow many branches at once."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -129,7 +129,7 @@ def follow_batch(
         states: Initial states, `(lanes, n)`.
         where: As of [`continuation.follow`][].
         bounds: As of [`continuation.follow`][].
-        algorithm: One that corrects in a plane and whose predictor uses a single point,
+        algorithm: Algorithm that corrects in a plane and predicts from a single point,
             such as the tangent; default [`continuation.PseudoArclength`][].
         parameters: The problem's parameters, each float leaf `(lanes,)` or a scalar for
             all; default those of the problem.
@@ -140,7 +140,7 @@ def follow_batch(
             counts as done.
 
     Returns:
-        A `Batch`; a branch that fails says so in its reason.
+        A `Batch`; `reason` tells for each branch whether it failed.
 
     Raises:
         ValueError: Shapes do not fit, or the algorithm cannot run in a batch.

@@ -28,7 +28,7 @@ REASONS = (
 
 
 class Lane(NamedTuple):
-    """One branch of the batch on its way."""
+    """One branch of the batch during the run."""
 
     at: Corrected
     step: jax.Array
@@ -45,10 +45,10 @@ class Axes(eqx.Module):
 
     @staticmethod
     def of(one: PyTree, given: PyTree, lanes: int) -> "Axes":
-        """From the parameters of one lane and those given for all.
+        """Return the axes for the parameters of one lane and those given for all.
 
         Raises:
-            ValueError: For a wrong number of values.
+            ValueError: The number of values is wrong.
         """
         axes = jax.tree.map(
             lambda a, b: 0 if np.ndim(b) == np.ndim(a) + 1 else None, one, given
@@ -64,11 +64,11 @@ class Axes(eqx.Module):
 
     @property
     def leaves(self) -> list:
-        """In the order of the parameters' leaves."""
+        """Return the values in the order of the parameters' leaves."""
         return jax.tree.leaves(self.tree, is_leaf=lambda x: x is None)
 
     def of_lane(self, given: PyTree, index: int) -> PyTree:
-        """The parameters of one lane."""
+        """Return the parameters of one lane."""
         flat, structure = jax.tree.flatten(given)
         chosen = [
             x[index] if axis == 0 else x
@@ -98,7 +98,7 @@ def follow_lanes(
             problem, algorithm, given, axes, leaf, lanes, low, high, s, points, rounds
         )
         if progress is not None:
-            # a branch that has ended is done, with as many points as it has
+            # a branch that has ended counts as done
             done = np.where(lanes.status == _RUNNING, lanes.count / points, 1.0)
             progress(float(np.mean(done)))
     return lanes
@@ -106,7 +106,7 @@ def follow_lanes(
 
 @eqx.filter_jit
 def _begin(problem, given, axes, leaf, z, signs, low, high, s, points):
-    """The first point of each branch."""
+    """Return the first point of each branch."""
     width = high - low
 
     def begin(parameters, z, sign):
@@ -137,7 +137,7 @@ def _begin(problem, given, axes, leaf, z, signs, low, high, s, points):
 def _advance(
     problem, algorithm, given, axes, leaf, lanes, low, high, s, points, rounds,
 ):  # fmt: skip
-    """Up to `rounds` attempted steps of each branch that is not at its end."""
+    """Take up to `rounds` attempted steps of each branch that has not ended."""
     width = high - low
 
     def advance(parameters, lane: Lane) -> Lane:

@@ -1,4 +1,4 @@
-"""The first point of a branch: solved for, or reached along a tangent."""
+"""Find the first point of a branch by Newton's method, or along a tangent."""
 
 import jax.numpy as jnp
 import numpy as np
@@ -17,13 +17,13 @@ def solved_start(
     across[-1] = 1.0
     at = correct(problem, context, z, across, across)
     if not at.success:
-        # more iterations are another program: compiled only where they are needed
+        # more iterations need another program, compiled only on demand
         settings = with_field(context.settings, "max_iterations", 30)
         patient = context._replace(settings=settings)
         at = correct(problem, patient, z, across, across)
     if not at.success:
-        # Newton has no answer where the derivative is singular; the start may
-        # still be one
+        # Newton's method fails where the derivative is singular; the start may still be
+        # a solution
         given = evaluate(problem, context, z, across)
         size = np.abs(_residual(problem, z, context.leaf)) / given.scale[:-1]
         if not np.all(size <= context.settings.tolerance):
@@ -39,7 +39,7 @@ def solved_start(
 def leave(
     problem: AbstractProblem, context: Context, z: np.ndarray, start: Start
 ) -> tuple[Corrected, float]:
-    """The first point of a branch that leaves z along a tangent."""
+    """Return the first point of a branch that leaves z along a tangent."""
     settings = context.settings
     zero = np.zeros_like(z)
     scale = evaluate(problem, context, z, zero + 1.0).scale
@@ -65,7 +65,7 @@ def leave(
 def _oriented(
     problem: AbstractProblem, context: Context, at: Corrected, direction: int
 ) -> Corrected:
-    """The same point with its tangent in the direction asked for."""
+    """Return the same point with its tangent in the direction asked for."""
     _, sizes, rows = np.linalg.svd(at.jacobian * at.scale[None, :])
     n = sizes.size
     null = rows[n:] if n == 0 else rows[np.append(sizes, 0) <= 1e-9 * sizes[0]]

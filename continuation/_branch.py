@@ -1,4 +1,4 @@
-"""Whole branches."""
+"""Follow complete branches."""
 
 import dataclasses
 import os
@@ -31,7 +31,7 @@ def branch(
     out: str | os.PathLike | None = None,
     resume: bool = False,
 ) -> Branch:
-    """Follow a branch of solutions and return it as a whole.
+    """Follow a branch of solutions to its end and return it.
 
     The other arguments are those of [`continuation.follow`][].
 
@@ -43,7 +43,7 @@ def branch(
         algorithm: Default [`continuation.PseudoArclength`][].
         settings: Accuracy and step control.
         direction: 1 or -1; or `"both"`, from the start towards smaller and towards
-            larger parameters, joined in order, with labels counted anew.
+            larger parameters, joined in order and relabelled.
         callbacks: Called with each point as it is found: progress, saving. One that
             returns True ends the branch.
         out: A file to which each point is appended, for [`continuation.load_branch`][];

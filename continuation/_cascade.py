@@ -78,7 +78,7 @@ def cascade(
         algorithm: Default [`continuation.PseudoArclength`][].
         flips: Number of flips to locate.
         settings: Accuracy and step control.
-        callbacks: Called with each point as it comes, to show progress.
+        callbacks: Called with each point as it is found, to show progress.
         direction: 1 to begin towards larger parameters, -1 towards smaller ones.
 
     Returns:

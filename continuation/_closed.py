@@ -12,8 +12,8 @@ from .problem import AbstractProblem
 from .special import cubic_between
 
 
-# an earlier point is met where the branch is this close to it, in lengths of steps, for
-# tolerances from 1e-11 to 1e-8: errors of both points, and what is lost near a branch
+# the branch meets an earlier point if it is this close to it, in step lengths, for
+# tolerances from 1e-11 to 1e-8: errors of both points, and digits lost near a branch
 # point, where the equations are nearly singular
 _MISS, _LEAST, _MOST = 1e3, 1e-8, 1e-5
 # steps that must lie between a point and the return to it
@@ -23,7 +23,7 @@ _ALIGNED = 0.9
 
 
 class Passed(NamedTuple):
-    """A point that the branch has passed, in one of its descriptions."""
+    """A point that the branch has passed, in one of its representations."""
 
     z: np.ndarray
     tangent: np.ndarray
@@ -39,7 +39,7 @@ class Past:
         self.families: dict[str, list[Passed]] = {}
 
     def add(self, problem: AbstractProblem, point: Point) -> None:
-        """Keep a point that is no special one, with all its descriptions."""
+        """Store an ordinary point with all its representations."""
         problem = with_parameter(problem, self.leaf, point.parameter)
         u, v = point.state, point.tangent[:-1]
         for family, state, along in problem.representation.copies(u, v):
@@ -54,7 +54,9 @@ class Past:
     def near(
         self, current: Solution, following: Solution
     ) -> list[tuple[float, Passed]]:
-        """Points next to the step, and the share of it that lies before each."""
+        """Return the points next to the step, and the fraction of the step before
+        each.
+        """
         representation = current.problem.representation
         known = self.families.get(representation.family, [])
         known = [p for p in known if p.z.shape == current.at.z.shape]
@@ -80,7 +82,7 @@ class Past:
 def closed(
     context: Context, past: Past, current: Solution, following: Solution
 ) -> tuple[Solution, str] | None:
-    """The earlier point that this step came back to, and what that means.
+    """Return the earlier point to which this step returned, and its meaning.
 
     Solutions where the equations are regular lie on one branch only, so that a branch
     that meets one of its points again is a closed curve, or the same curve backwards.
@@ -116,7 +118,9 @@ def _cosine_where_met(
     share: float,
     passed: Passed,
 ) -> float | None:
-    """Between the directions in which the point is passed; None where it is missed."""
+    """Return the cosine between the two passing directions; None if the point is
+    missed.
+    """
     scale = current.at.scale
     chord = (following.at.z - current.at.z) / scale
     chord = chord / np.linalg.norm(chord)

@@ -44,7 +44,7 @@ def extended(
     `where` picks among the unknowns (at the end of the state).
 
     Raises:
-        ValueError: For points that form no curve.
+        ValueError: Points of this kind form no curve.
     """
     problem = point.solved
     leaf, name = pick_one(where, problem.parameters)
@@ -58,8 +58,9 @@ def extended(
         k for k, monitor in problem.monitors().items() if monitor.kind == point.kind
     ]
     if len(same) > 1:
-        # several monitors may share a kind: the one that is zero here, and the last
-        # where others vanish with it, such as the gap next to an impact without speed
+        # several monitors may share a kind: choose the monitor that is zero here, and
+        # the last one if several vanish, such as the gap next to an impact without
+        # speed
         at = evaluate(problem, context, z, np.ones_like(z))
         sizes = {k: abs(float(at.monitors[k])) for k in same}
         most = max(min(sizes.values()), _ZERO * (1.0 + float(np.max(np.abs(z)))))

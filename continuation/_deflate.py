@@ -90,7 +90,7 @@ def deflate(
         values, success = jax.device_get(
             _deflated(
                 problem,
-                # off the guess itself: it may be a solution that is divided out
+                # away from the guess: it may be a solution that is divided out
                 jnp.asarray(starts + 1e-6 * scale),
                 jnp.asarray(table),
                 jnp.asarray(len(solutions)),

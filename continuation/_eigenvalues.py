@@ -1,4 +1,4 @@
-"""Eigenvalues in a fixed order."""
+"""Compute eigenvalues in a fixed order."""
 
 from typing import Any
 
@@ -6,7 +6,7 @@ import numpy as np
 
 
 def eigenvalues_of(matrix: np.ndarray) -> Any:
-    """Eigenvalues, largest modulus first; NaN where the matrix is not finite."""
+    """Compute eigenvalues, largest modulus first; NaN if the matrix is not finite."""
     if not np.all(np.isfinite(matrix)):
         return np.full(matrix.shape[0], np.nan, complex)
     values: Any = np.linalg.eigvals(matrix).astype(complex)

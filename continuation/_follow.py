@@ -1,4 +1,4 @@
-"""Following a branch, point by point."""
+"""Follow a branch point by point."""
 
 from collections.abc import Iterator, Sequence
 from typing import Any
@@ -41,7 +41,7 @@ def follow(
         start: A state `(n,)`, on the branch at the parameter value of the problem, or
             near enough for Newton's method; or a [`continuation.Start`][], such as a
             branch to switch to; or a [`continuation.Point`][], to continue from there
-            exactly as the run that it is from did.
+            exactly as its own run did.
         where: Picks the parameter, as in `lambda parameters: parameters.speed`.
         bounds: (lowest, highest) value of the parameter; the branch ends exactly there.
         algorithm: Default [`continuation.PseudoArclength`][].
@@ -80,7 +80,7 @@ def follow(
 
 
 def checked_bounds(bounds: tuple[float, float], name: str) -> tuple[float, float]:
-    """Bounds as floats, or a `ValueError` that says what is wrong with them."""
+    """Return bounds as floats, or raise a `ValueError` with the reason."""
     try:
         low, high = (float(x) for x in bounds)
     except (TypeError, ValueError) as error:
@@ -98,7 +98,7 @@ def checked_bounds(bounds: tuple[float, float], name: str) -> tuple[float, float
 
 
 def _begun(problem: AbstractProblem, start: Any) -> tuple[AbstractProblem, Any]:
-    """The problem to begin with, and where."""
+    """Return the first problem and its start."""
     if isinstance(start, Start):
         return start.problem, start
     if isinstance(start, Point):

@@ -48,7 +48,7 @@ class LimitCycle(AbstractProblem):
     """Number of equal steps per period, by Dormand and Prince's method of order 8.
     `point.observed["error"]` is their estimated error, relative to the state."""
     stability: ClassVar[StabilityKind] = "map"
-    """Multipliers on the unit circle are bifurcations."""
+    """Multipliers on the unit circle mark bifurcations."""
     normal_forms: ClassVar[bool] = False
     """No normal-form coefficients are computed."""
 
@@ -73,7 +73,7 @@ class LimitCycle(AbstractProblem):
         self.normal, self.basis = _plane(np.asarray(normal))
 
     def _turn(self, u, parameters):
-        """State after the period, and the largest error of a step."""
+        """Return the state after the period, and the largest error of a step."""
         x, period = u[:-1], u[-1]
         _, states, errors = fixed_steps(
             DOPRI8,
@@ -156,7 +156,7 @@ def _plane(normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def cycle_at_hopf(
     vector_field: Callable, parameters: PyTree, point: Any, matrix: np.ndarray
 ) -> Start | None:
-    """The cycle born at a Hopf point: radius 0, period 2 pi / omega."""
+    """Return the cycle that emerges at a Hopf point: radius 0, period 2 pi / omega."""
     found = np.linalg.eig(matrix)
     values: Any = found.eigenvalues
     vectors: Any = found.eigenvectors

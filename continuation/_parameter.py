@@ -1,4 +1,4 @@
-"""Picking the parameter that varies out of any tree of parameters."""
+"""Pick the varying parameter in a tree of parameters."""
 
 from typing import Any
 
@@ -14,7 +14,7 @@ def pick_one(where: Where, parameters: PyTree) -> tuple[int, str]:
     """Index of the leaf that `where` picks, and its name.
 
     Raises:
-        ValueError: Where it picks nothing, or not a single number.
+        ValueError: `where` picks nothing, or not a single number.
     """
     # bifurcation problems are often stated with whole numbers
     picked = parameter_pick(where, parameters, integers=True)
@@ -27,7 +27,9 @@ def pick_one(where: Where, parameters: PyTree) -> tuple[int, str]:
 
 
 def as_arguments(parameters: PyTree, *leaves: int) -> PyTree:
-    """Floats, and the picked leaves, as float64 arrays: arguments of programs."""
+    """Convert floats and the picked leaves to float64 arrays, the arguments of
+    programs.
+    """
     flat, structure = jax.tree.flatten(parameters)
     for i, leaf in enumerate(flat):
         number = isinstance(leaf, float | np.floating | np.ndarray)
@@ -37,12 +39,12 @@ def as_arguments(parameters: PyTree, *leaves: int) -> PyTree:
 
 
 def leaf_of(parameters: PyTree, index: int):
-    """The leaf with this index."""
+    """Return the leaf with this index."""
     return jax.tree.leaves(parameters)[index]
 
 
 def with_leaf(parameters: PyTree, index: int, value: Any) -> PyTree:
-    """The same parameters, one of them replaced."""
+    """Return the parameters with one of them replaced."""
     flat, structure = jax.tree.flatten(parameters)
     flat[index] = value
     return jax.tree.unflatten(structure, flat)

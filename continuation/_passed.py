@@ -1,4 +1,4 @@
-"""Special points between two points of a branch."""
+"""Find special points between two points of a branch."""
 
 from typing import NamedTuple
 
@@ -18,7 +18,7 @@ from .special import (
 
 
 class Special(NamedTuple):
-    """A special point to stand at, and what is known of it."""
+    """A special point as a position of the run, and its data."""
 
     current: Solution
     kind: str
@@ -28,7 +28,7 @@ class Special(NamedTuple):
 
 
 def sign_changes(context: Context, current: Solution, following: Solution) -> list[str]:
-    """Names of the test functions that change sign on the way."""
+    """Return the names of the test functions that change sign in the step."""
     if not context.settings.special:
         monitors = current.problem.monitors()
         watched = {k for k, monitor in monitors.items() if monitor.ends}
@@ -45,7 +45,7 @@ def sign_changes(context: Context, current: Solution, following: Solution) -> li
 def located_between(
     context: Context, current: Solution, following: Solution, names: list[str]
 ) -> list[tuple[str, Located]]:
-    """The zeros of these test functions in the order in which they are passed.
+    """Return the zeros of these test functions in the order in which they are passed.
 
     Two functions with the same zero count once, unless a monitor ends the branch there.
     """
@@ -75,7 +75,7 @@ def located_between(
 def special_here(
     context: Context, current: Solution, chord: np.ndarray, name: str, located: Located
 ) -> Special | None:
-    """Stand at a special point; None for a neutral saddle.
+    """Return the special point as a position of the run; None for a neutral saddle.
 
     `chord` points along the branch there.
     """

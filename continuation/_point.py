@@ -40,8 +40,9 @@ class Point:
     """Eigenvalues of an equilibrium, or multipliers of a map or an orbit, shape `(k,)`.
     """
     stable: bool | None
-    """Whether the solution is stable; None where the problem has no stability, or a
-    multiplier is not finite."""
+    """Whether the solution is stable; None if stability is not computed, or a
+    multiplier is not finite.
+    """
     tangent: np.ndarray
     """Direction of the branch in (state, parameter), shape `(n+1,)`."""
     scale: np.ndarray
@@ -121,12 +122,12 @@ class Point:
 
 
 def replace(point: Point, **changes: Any) -> Point:
-    """The same point with other fields."""
+    """Return the same point with other fields."""
     return Point(**{**point.__dict__, **changes})
 
 
 def stability(stable: bool | None) -> str:
-    """In a word; none where a point has no stability."""
+    """Return stability as a word; empty if it is not computed."""
     return {True: "stable", False: "unstable", None: ""}[stable]
 
 
@@ -160,7 +161,7 @@ class Branch:
         return self._table().html()
 
     def _table(self) -> ShortTable:
-        """The ends and the special points."""
+        """Return the ends and the special points."""
         names = self.names or (self.name,)
         count = f"{len(self.points)} points, {len(self.special)} of them special"
         sentence = f"Branch over {' and '.join(names)}: {count}."
@@ -237,12 +238,12 @@ class Branch:
 
 
 def relabelled(points: Sequence[Point]) -> tuple[Point, ...]:
-    """The same points, counted from 1."""
+    """Return the same points, counted from 1."""
     return tuple(replace(point, label=i + 1) for i, point in enumerate(points))
 
 
 def with_parameter(problem: Any, leaf: int, value: Any) -> Any:
-    """The problem at another value of the parameter."""
+    """Return the problem at another value of the parameter."""
     parameters = with_leaf(problem.parameters, leaf, np.asarray(value, float))
     return set_parameters(problem, parameters)
 
@@ -257,7 +258,9 @@ def set_parameters(problem: Any, parameters: Any) -> Any:
 
 
 def with_field(module: Any, name: str, value: Any) -> Any:
-    """A module with one field replaced; what `tree_at` does, in a tenth of the time."""
+    """Return a module with one field replaced; what `tree_at` does, in a tenth of
+    the time.
+    """
     new = object.__new__(type(module))
     for f in fields(module):
         if f.name == name:

@@ -1,4 +1,4 @@
-"""Problems stated by plain functions."""
+"""Define problems by plain functions."""
 
 from collections.abc import Callable
 from typing import Any, ClassVar
@@ -16,7 +16,7 @@ from .special import FLIP, flip_direction, HOPF
 
 
 class Equations(AbstractProblem):
-    """Equations function(u, parameters) = 0 without stability.
+    """Equations function(u, parameters) = 0; stability is not computed.
 
     For example, a discretised boundary value problem.
 
@@ -54,7 +54,7 @@ class Equilibrium(AbstractProblem):
     parameters: PyTree
     """Any pytree with scalar floats among its leaves."""
     stability: ClassVar[StabilityKind] = "equilibrium"
-    """Eigenvalues on the imaginary axis are bifurcations."""
+    """Eigenvalues on the imaginary axis mark bifurcations."""
 
     def residual(self, u: Float[Array, " n"], parameters: PyTree) -> Float[Array, " n"]:
         return self.vector_field(u, parameters)
@@ -86,7 +86,7 @@ class FixedPoint(AbstractProblem):
     """Number of applications of the map, >= 1. All periods share one compiled program.
     """
     stability: ClassVar[StabilityKind] = "map"
-    """Multipliers on the unit circle are bifurcations."""
+    """Multipliers on the unit circle mark bifurcations."""
 
     def __init__(
         self, map: Callable[[Any, Any], Array], parameters: PyTree, period: int = 1
@@ -126,7 +126,7 @@ class FixedPoint(AbstractProblem):
 
 
 class PeriodicPoints(AbstractRepresentation):
-    """A periodic orbit of a map is each of its points."""
+    """A periodic orbit of a map is represented by any of its points."""
 
     family: str = eqx.field(static=True)
     problem: FixedPoint
@@ -153,7 +153,7 @@ class PeriodicPoints(AbstractRepresentation):
 
 @eqx.filter_jit
 def _mapped(problem: FixedPoint, u, tangent):
-    """The next point of an orbit, and a deviation there."""
+    """Return the next point of an orbit, and a deviation there."""
     return jax.jvp(lambda u: problem.map(u, problem.parameters), (u,), (tangent,))
 
 

@@ -1,4 +1,4 @@
-"""The compiled programs: one for each structure of a problem."""
+"""Compile one program for each structure of a problem."""
 
 import dataclasses
 from typing import Any
@@ -16,7 +16,7 @@ from .problem import AbstractProblem
 
 
 class Corrected(eqx.Module):
-    """A point on the branch and what is known about it.
+    """A point on the branch and its derivatives.
 
     Traced arrays inside programs, NumPy's outside.
     """
@@ -36,7 +36,7 @@ class Corrected(eqx.Module):
 
 
 def residual_at(problem: AbstractProblem, leaf: int, z):
-    """G at z = (u, parameter)."""
+    """Return G at z = (u, parameter)."""
     parameters = with_leaf(problem.parameters, leaf, z[-1])
     return problem.residual(z[:-1], parameters)
 
@@ -90,7 +90,7 @@ def correct_(
 ) -> Corrected:
     """Correct `guess` and evaluate everything at the point found.
 
-    Or at the guess itself, where it is `given` as a solution.
+    If the guess is `given` as a solution, evaluate at the guess itself.
 
     `normal` (n+1,) is the covector of the plane through the guess in which the solution
     is sought; it is ignored with `least_norm` (Moore-Penrose). `old` gives the
@@ -112,7 +112,7 @@ def correct_(
 
 
 def _seen(problem, leaf, z, old, width, success, iterations) -> Corrected:
-    """Everything about a point that is taken as it is."""
+    """Evaluate everything at a point that is already a solution."""
     u, p = z[:-1], z[-1]
     parameters = with_leaf(problem.parameters, leaf, p)
     jacobian, linearisation = problem.derivatives(
@@ -139,7 +139,7 @@ _correct = eqx.filter_jit(correct_)
 
 
 def _plain(at: Corrected) -> Corrected:
-    """The same with NumPy arrays, of which the host makes quicker use."""
+    """Convert to NumPy arrays, which the host uses faster."""
     return Corrected(
         **{
             f.name: jax.tree.map(np.asarray, getattr(at, f.name))
@@ -151,7 +151,9 @@ def _plain(at: Corrected) -> Corrected:
 def correct(
     problem, context: Context, guess, normal, old, least_norm=False, given=False
 ):
-    """`correct_`, compiled, with numbers as arguments and NumPy arrays as result."""
+    """Call the compiled `correct_` with numbers as arguments and NumPy arrays as
+    result.
+    """
     return _plain(
         _correct(
             problem,
@@ -169,10 +171,10 @@ def correct(
 
 
 def evaluate(problem, context: Context, z, old) -> Any:
-    """Everything about a point that is taken as it is.
+    """Evaluate everything at a point that is already a solution.
 
-    By the program of `correct`, whose iterations cost less than another program does to
-    compile.
+    It uses the program of `correct`, whose iterations cost less than compiling another
+    program.
     """
     return correct(problem, context, z, old, old, given=True)
 
@@ -183,7 +185,7 @@ def _solve(problem, u, tolerance, max_iterations: int):
 
     def equations(y):
         g = problem.residual(y * scale, problem.parameters)
-        # what is small depends on the units of the unknowns, for square problems
+        # for square problems, the tolerance is relative to the units of the unknowns
         return g / scale
 
     y, success, iterations = newton(equations, u / scale, tolerance, max_iterations)

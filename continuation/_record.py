@@ -1,12 +1,12 @@
-"""Branches on disk: one line of JSON for each point, written as it comes.
+"""Store branches on disk: one line of JSON for each point, written immediately.
 
-The format, version 1: UTF-8 text, one JSON object a line. The first is the header, with
+Format, version 1: UTF-8 text, one JSON object per line. The first is the header, with
 `format` = "continuation branch", `version`, `parameter`, `parameters`, `leaf`,
 `bounds`, and whatever the writer adds. Each further line is a point: the fields of
 `continuation.Point` without its problem. Numbers are written so that they read back as
 the same 64-bit floats; a number that is not finite is a string; complex numbers are
-pairs; `observed` arrays carry their `shape` and `dtype`. A last line without its end is
-the point that was in work when the run was interrupted, and is ignored.
+pairs; `observed` arrays carry their `shape` and `dtype`. An incomplete last line is the
+point that was being written when the run was interrupted, and is ignored.
 """
 
 import json
@@ -27,11 +27,10 @@ VERSION = 1
 
 
 class Recorder:
-    """A callback that appends points to a file as they come.
+    """A callback that appends points to a file as they are found.
 
     **Arguments:** `path`: the file; `header`: what goes into its first line besides the
-    format. With `after`, points that are there already, the file is written anew up to
-    them.
+    format. With `after` (existing points) the file is rewritten up to them.
     """
 
     def __init__(
@@ -41,7 +40,7 @@ class Recorder:
         self.path.parent.mkdir(parents=True, exist_ok=True)
         lines = [{"format": FORMAT, "version": VERSION, **header}]
         lines += [_point_to_json(point) for point in after]
-        # the old file stays whole until the new one is
+        # the old file stays intact until the new one is complete
         fresh = self.path.with_name(self.path.name + ".new")
         fresh.write_text("".join(_line(x) for x in lines), "utf-8")
         os.replace(fresh, self.path)
@@ -70,7 +69,7 @@ def save_branch(branch: Branch, path: str | os.PathLike) -> None:
 
 
 def header_of(branch: Branch, **more: Any) -> dict:
-    """The first line of a file, without its format."""
+    """Return the first line of a file, without its format."""
     return {
         "parameter": branch.name,
         "parameters": list(branch.names),
@@ -83,7 +82,7 @@ def header_of(branch: Branch, **more: Any) -> dict:
 def load_branch(
     path: str | os.PathLike, problem: AbstractProblem | None = None
 ) -> Branch:
-    """Read a saved branch, or as much of it as an interrupted run has written.
+    """Read a saved branch, or the part of it that an interrupted run has written.
 
     Args:
         path: The file to read.
@@ -111,7 +110,7 @@ def load_branch(
 def read_branch(
     path: str | os.PathLike, problem: AbstractProblem | None = None
 ) -> tuple[Branch, dict]:
-    """A branch and the header of its file."""
+    """Return a branch and the header of its file."""
     try:
         text = Path(path).read_text("utf-8")
         lines = text.split("\n")[:-1]
@@ -140,7 +139,7 @@ def read_branch(
 
 
 def _attacher(problem: AbstractProblem | None, leaf: int) -> Callable:
-    """A function that gives the problem at a signature and a parameter value."""
+    """Return a function that gives the problem at a signature and a parameter value."""
     if problem is None:
         return lambda signature, value: None
     stated: AbstractProblem = set_parameters(
@@ -161,7 +160,7 @@ def _line(value: Any) -> str:
 
 
 def _number(x: Any) -> Any:
-    """A float that JSON can hold."""
+    """Convert a float to a JSON value."""
     x = float(x)
     return x if np.isfinite(x) else str(x)
 

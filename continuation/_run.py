@@ -1,4 +1,4 @@
-"""The run along a branch."""
+"""Run along a branch."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -22,8 +22,8 @@ from .step_control import Refusal
 
 # failures in one place before an end is searched for just ahead
 _HALVINGS = 2
-# an orbit is one of half the period where its halves differ by less, in lengths of
-# steps: what is left of the square root in which they grow apart
+# an orbit has half the period if its halves differ by less than this, in step lengths:
+# the remainder of the square root in which they grow apart
 HALF = 1e-4
 JOINS = (
     "the branch joins the orbits of half the period, at a flip of theirs; it goes on "
@@ -53,7 +53,7 @@ class Run:
         kind: str = "start",
         arclength: float = 0.0,
     ) -> Solution:
-        """The first solution; its point is put into `pending` unless it is known."""
+        """Find the first solution; put its point into `pending` unless it is known."""
         if isinstance(start, Point):
             return self._resumed(problem, start, history)
         p = start.parameter
@@ -88,7 +88,7 @@ class Run:
         problem = with_parameter(problem, context.leaf, z[-1])
         problem = problem.refreshed(z[:-1], problem.parameters)
         at = evaluate(problem, context, z, start.tangent)
-        # to the last digit what they were when the point was found
+        # bit-identical to the values when the point was found
         at = with_field(at, "tangent", np.asarray(start.tangent))
         at = with_field(at, "scale", np.asarray(start.scale))
         passed = [p for p in history if not p.special and p.label < start.label]
@@ -106,10 +106,10 @@ class Run:
                 self.past.add(before, point)
         return current
 
-    # Walking
+    # Stepping
 
     def points(self, current: Solution) -> Iterator[Point]:
-        """The points from here on."""
+        """Yield the points from here on."""
         yield from self._flush()
         low, high = self.context.bounds
         outwards = current.at.tangent[-1]
@@ -141,7 +141,9 @@ class Run:
             current = self._with_fresh_references(following)
 
     def _advance(self, current: Solution) -> tuple[Solution | None, str]:
-        """The next point, and why the branch ends with it; None: it ends before."""
+        """Find the next point, and the reason if the branch ends there; None: it
+        ends before.
+        """
         step, failures = current.step, 0
         while True:
             attempted = attempt_step(
@@ -172,7 +174,7 @@ class Run:
                     if back is not None:
                         return back
                     return following, attempted.bound
-            # a bend says nothing of an end, and long steps fail for other reasons
+            # a bend is no sign of an end, and long steps fail for other reasons
             last = step / 2 < self.context.settings.min_step
             failures += attempted.refusal is not Refusal.TURNED
             if failures > _HALVINGS or last:
@@ -186,7 +188,7 @@ class Run:
             step /= 2
 
     def _stations(self, current: Solution) -> list[Station]:
-        """The last points in the lengths of the current one."""
+        """Return the last points in the scales of the current point."""
         scale = current.at.scale
         wanted = max(self.algorithm.predictor.stations, 1)
         trail = (*current.trail, (current.at.z, current.at.tangent))[-wanted:]
@@ -232,7 +234,9 @@ class Run:
     def _pass_events(
         self, current: Solution, following: Solution, passed: list[tuple[str, Located]]
     ):
-        """Put special points into `pending`; how to go on where one ends it all."""
+        """Put special points into `pending`; return the continuation if one ends the
+        problem.
+        """
         chord = following.at.z - current.at.z
         for name, located in passed:
             found = self._special(current, chord, name, located)
@@ -249,7 +253,7 @@ class Run:
     def _joins(self, current: Solution, point: Point) -> bool:
         """Return whether orbits of half the period take over.
 
-        They are a branch of their own, which is not followed twice.
+        They form a separate branch, which is not followed twice.
         """
         if point.kind != BRANCH_POINT:
             return False
@@ -264,7 +268,7 @@ class Run:
     def _special(
         self, current: Solution, chord, name: str, located: Located
     ) -> tuple[Point, Solution] | None:
-        """The special point, and the same to stand at; None for a neutral saddle."""
+        """Return the special point and its solution; None for a neutral saddle."""
         special = special_here(self.context, current, chord, name, located)
         if special is None:
             return None
@@ -284,7 +288,7 @@ class Run:
         return name in monitors and monitors[name].ends
 
     def _end_ahead(self, current: Solution, step: float):
-        """A zero of an ending monitor just ahead, where a step has failed."""
+        """Search a zero of an ending monitor just ahead of a failed step."""
         for name, monitor in current.problem.monitors().items():
             value = current.tests.get(name, np.nan)
             if not monitor.ends or not np.isfinite(value) or value == 0:
@@ -302,7 +306,7 @@ class Run:
         return None
 
     def _transition(self, current: Solution, point: Point, stood: Solution):
-        """Go on with another problem behind a point, or end there."""
+        """Continue with another problem beyond a point, or end there."""
         start = current.problem.transition(point, stood.at)
         if start is None:
             return None, f"{point.kind} ends the branch"
@@ -330,7 +334,7 @@ class Run:
         if type(current.problem).check is AbstractProblem.check:
             return ""
         point = self._point(current, "regular")
-        # it is only judged, and gets no label
+        # it is only checked, and gets no label
         self.label -= 1
         return current.problem.check(point) or ""
 

@@ -1,4 +1,4 @@
-"""Settings of path following, which do not change the branch itself."""
+"""Define settings of path following, which do not change the branch itself."""
 
 import dataclasses
 
@@ -35,7 +35,7 @@ class BranchSettings(eqx.Module):
     angle: float = 0.1
     """Change of direction per step that the step control aims at (rad)."""
     max_angle: float = 0.35
-    """Change of direction at which a step is refused (rad)."""
+    """Change of direction above which a step is rejected (rad)."""
     max_points: int = 1000
     """Largest number of ordinary points on a branch."""
     special: bool = True
@@ -78,11 +78,11 @@ located when one of its branches is requested."""
 
 
 def as_traced(settings: BranchSettings) -> BranchSettings:
-    """The settings of a batch, whose compiled program takes them as they come.
+    """Convert settings for a batch, whose compiled program takes them unchecked.
 
-    Numbers are arrays (not checked again) but for `max_iterations`, which the loop of
-    the corrector wants as an integer of Python's; what a batch does not use has its
-    default. So only `max_iterations` compiles another program.
+    Numbers become arrays (not checked again) except `max_iterations`, which the
+    corrector needs as a Python integer; settings that a batch does not use have their
+    defaults. So only `max_iterations` compiles another program.
     """
     unused = {name: getattr(BranchSettings, name) for name in _NOT_OF_A_BATCH}
     settings = dataclasses.replace(settings, **unused)

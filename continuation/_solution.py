@@ -1,4 +1,4 @@
-"""The solution that a run along a branch has reached, and the point made of it."""
+"""Represent the solution that a run has reached, and convert it to a point."""
 
 from typing import NamedTuple
 
@@ -33,7 +33,7 @@ def solution_at(
     arclength: float,
     trail=(),
 ) -> Solution:
-    """The solution with its test functions."""
+    """Return the solution with its test functions."""
     return Solution(problem, at, test_values(problem, leaf, at), step, arclength, trail)
 
 
@@ -47,7 +47,7 @@ def point_of(
     coefficient: float | None = None,
     criticality: str = "",
 ) -> Point:
-    """The solution as a point of the branch."""
+    """Return the solution as a point of the branch."""
     at, problem = current.at, current.problem
     multipliers, why = eigenvalues_at(problem, context.leaf, at)
     z = np.asarray(at.z)

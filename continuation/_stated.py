@@ -6,10 +6,12 @@ from .problem import AbstractProblem
 
 
 def stated(problem: Any, start: Any) -> tuple[AbstractProblem, Any]:
-    """The problem and its start, where a system and an orbit of it may be given."""
+    """Return the problem and its start, where a system and an orbit of it may be
+    given.
+    """
     if isinstance(problem, AbstractProblem):
         return problem, start
-    # the core knows nothing of impacts unless it is given a system that has them
+    # the core imports the code for impacts only for a system with impacts
     from .orbits import start_of
 
     begun = start_of(problem, start)

@@ -1,4 +1,4 @@
-"""One step of a given length."""
+"""Take one step of a given length."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -19,13 +19,13 @@ class StepAttempt(NamedTuple):
     """The outcome of a step."""
 
     at: Corrected | None
-    """None where it is not taken."""
+    """None if the step is rejected."""
     bound: str = ""
     """The bound on which the step ends, as a sentence; empty if none."""
     following: float = 0.0
     """Length of the step that follows."""
     refusal: Refusal | None = None
-    """Reason for not taking the step."""
+    """Reason for rejecting the step."""
 
 
 def attempt_step(
@@ -37,7 +37,7 @@ def attempt_step(
     step: float,
     name: str,
 ) -> StepAttempt:
-    """Predict and correct; never past a bound, but onto it."""
+    """Predict and correct; a step past a bound ends on the bound."""
     predicted = algorithm.predictor(stations, step) * a.scale
     k, value = _first_bound(problem, context, a.z, predicted)
     if k is None:
@@ -89,7 +89,7 @@ def _judged(
 def _first_bound(
     problem: AbstractProblem, context: Context, z: np.ndarray, target: np.ndarray
 ) -> tuple[int | None, float]:
-    """The parameter that leaves its bounds first on the way, and the bound."""
+    """Return the parameter that leaves its bounds first in the step, and the bound."""
     bounds = {z.size - 1: context.bounds}
     if isinstance(problem, AbstractExtended):
         low, high = problem.bounds

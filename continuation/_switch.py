@@ -1,4 +1,4 @@
-"""Branches that leave a special point."""
+"""Switch to branches that leave a special point."""
 
 import equinox as eqx
 import jax
@@ -28,7 +28,7 @@ def emanating(point: Point, where: Where, width: float = 1.0) -> tuple[Start, ..
     **Arguments:** `width`: of the bounds of the parameter, the unit of its directions.
 
     Raises:
-        ValueError: For a point from which no branch is known to leave.
+        ValueError: No branch is known to leave the point.
     """
     problem = point.solved
     leaf, _ = pick_one(where, problem.parameters)
@@ -121,7 +121,7 @@ def other_direction(
             jnp.asarray(left[:, -1]),
         )
     )  # fmt: skip
-    # a quadratic form in two variables is zero on two lines where it is indefinite
+    # an indefinite quadratic form in two variables is zero on two lines
     sizes, axes = np.linalg.eigh((form + form.T) / 2)
     if not sizes[0] < 0 < sizes[1]:
         raise ValueError(

@@ -1,4 +1,4 @@
-"""A table of points on the screen."""
+"""Print tables of points."""
 
 import numpy as np
 import rich.console

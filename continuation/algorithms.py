@@ -1,4 +1,4 @@
-"""Algorithms: how a branch is predicted, corrected and stepped along."""
+"""Define algorithms: predictor, corrector and step control."""
 
 import abc
 from typing import Any, ClassVar
@@ -48,8 +48,9 @@ class Natural(AbstractAlgorithm):
     control: AbstractStepControl = EffortAndAngle()
     """Step control; default by effort and angle."""
     component: str = eqx.field(static=True, default="parameter")
-    """`"parameter"`, which stops at folds; or `"fastest"`, the component that changes
-    most, chosen at each step, which passes them."""
+    """`"parameter"`, which stops at folds; or `"fastest"`, the component that
+    changes most, chosen at each step, which passes folds.
+    """
     least_norm: ClassVar[bool] = False
     """Corrections leave the component unchanged."""
 

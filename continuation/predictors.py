@@ -1,4 +1,4 @@
-"""Predictors: where the next point of a branch is expected."""
+"""Predict the next point of a branch."""
 
 import abc
 from collections.abc import Sequence
@@ -26,7 +26,7 @@ class AbstractPredictor(eqx.Module):
     """
 
     stations: eqx.AbstractClassVar[int]
-    """Number of points that are used where there are so many."""
+    """Largest number of points used."""
 
     @abc.abstractmethod
     def __call__(self, stations: Sequence[Station], step: Any) -> Any:

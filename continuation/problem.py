@@ -32,7 +32,7 @@ class Monitor(eqx.Module):
     ends: bool = eqx.field(static=True, default=False)
     """Whether the branch of this problem ends there. `AbstractProblem.transition` is
     then asked for another problem with which to continue. The zero of such a monitor is
-    also sought ahead of the last point, when a step fails or its result is refused; so
+    also sought ahead of the last point, when a step fails or its result is rejected; so
     the monitor may cease to exist, or not change sign, beyond its zero. It must have a
     nonzero slope on the near side."""
     bracket: bool = eqx.field(static=True, default=False)
@@ -70,12 +70,12 @@ class Start(eqx.Module):
     state: np.ndarray
     """State on the branch or near it, shape `(n,)`."""
     parameter: float | None = None
-    """Value of the parameter; default the one of `problem.parameters`."""
+    """Value of the parameter; default that of `problem.parameters`."""
     tangent: np.ndarray | None = None
     """Direction (state, parameter) in which the branch leaves, `(n+1,)`; its length is
-    immaterial. The first point is sought in the plane across it, so a branch that
-    leaves a branch point is found and not the known one. Default: along the branch
-    through `state`, in the requested direction."""
+    immaterial. The first point is sought in the plane across it, so that the new branch
+    at a branch point is found, not the known branch. Default: along the branch through
+    `state`, in the requested direction."""
     step: float | None = None
     """First step; default that of the settings."""
     reason: str = eqx.field(static=True, default="")
@@ -91,20 +91,20 @@ class AbstractProblem(eqx.Module):
       leaves can be continued in, picked with `where(parameters)`. The methods get a
       tree of the same structure as an argument and must use that one, never the field.
     - `stability`, a class attribute: `"equilibrium"` where eigenvalues of the
-      linearisation on the imaginary axis are bifurcations, `"map"` where those on the
-      unit circle are (fixed points, periodic orbits), `"none"` otherwise.
+      linearisation on the imaginary axis mark bifurcations, `"map"` if those on the
+      unit circle do (fixed points, periodic orbits), `"none"` otherwise.
     - `residual(u, parameters)`.
 
     The other methods have defaults. **Traced** (called inside compiled programs; jax
     functions, differentiable forward): `residual`, `linearisation`, `derivatives`,
-    `local_dynamics`, `seen`, `watched`, `scale`. Everything about them that is no array
-    must be static: one program is compiled for each structure of a problem, and reused
-    for all values of arrays in it. `residual` and monitors of `ends=False` are to be
-    smooth; where an orbit does not exist return NaN, and the step is halved.
+    `local_dynamics`, `seen`, `watched`, `scale`. All their non-array data must be
+    static: one program is compiled for each structure of a problem, and reused for all
+    values of arrays in it. `residual` and monitors of `ends=False` are to be smooth;
+    where an orbit does not exist return NaN, and the step is halved.
 
     **Python** (called between compiled programs with concrete arrays): `monitors`,
     `check`, `transition`, `refreshed`, `eigenvalues`, `representation`, `signature`,
-    `with_signature`. They may compile things of their own.
+    `with_signature`. They may compile their own programs.
 
     The order of calls for a step from point a to point b: corrector; `derivatives` and
     `seen` at b in the same program; if a monitor with `ends` changed sign, its zero is
@@ -222,7 +222,7 @@ class AbstractProblem(eqx.Module):
         size = jnp.maximum(1.0, jnp.sqrt(jnp.mean(u * u)))
         return jnp.broadcast_to(size, u.shape)
 
-    # -- what is watched
+    # -- monitors
 
     def monitors(self) -> Mapping[str, Monitor]:
         """Return the test functions of this problem by name; may depend on its
@@ -263,7 +263,7 @@ class AbstractProblem(eqx.Module):
     # -- between compiled programs
 
     def check(self, point: Any) -> str | None:
-        """Return None where the point is admissible, else the reason why not, in words.
+        """Return None if the point is admissible, otherwise the reason as text.
 
         Returns:
             A sentence, or None.
@@ -295,7 +295,7 @@ class AbstractProblem(eqx.Module):
         """Return the same problem with its internal references taken from this point.
 
         References are borders and phase conditions. They must depend on the point only,
-        not on the way there, so that a resumed branch is the identical branch; only
+        not on the history, so that a resumed branch is identical; only
         signs may be chosen by those before, and must be, where test functions depend on
         them. Structure and shapes stay.
 
@@ -324,7 +324,7 @@ class AbstractProblem(eqx.Module):
 
     @property
     def representation(self) -> AbstractRepresentation:
-        """The ways in which a solution can be represented."""
+        """The representations of a solution."""
         return Unique(self.signature)
 
     @property

@@ -1,4 +1,4 @@
-"""The ways in which one solution can be written down."""
+"""Define the representations of one solution."""
 
 import abc
 
@@ -15,7 +15,9 @@ class AbstractRepresentation(eqx.Module):
     """
 
     family: eqx.AbstractVar[str]
-    """Problems of one family have the same solutions, as states of one form."""
+    """Name of the family; problems of one family have the same solutions in the same
+    form.
+    """
 
     @abc.abstractmethod
     def copies(
@@ -36,7 +38,7 @@ class AbstractRepresentation(eqx.Module):
     def brought_near(
         self, states: Float[np.ndarray, "k n"], u: np.ndarray
     ) -> Float[np.ndarray, "k n"]:
-        """Return the same solutions with phases and angles moved by whole turns,
+        """Return the same solutions with phases and angles shifted by full turns to be
         nearest to `u`.
 
         Args:
@@ -49,8 +51,7 @@ class AbstractRepresentation(eqx.Module):
 
     @abc.abstractmethod
     def half_away(self, u: np.ndarray, parameters: PyTree) -> float | None:
-        """Return the distance of a periodic orbit from one of half the period run
-        through twice.
+        """Return the distance of a periodic orbit from an orbit of half its period.
 
         Args:
             u: Unknowns of the equations, shape `(u,)`.

@@ -1,4 +1,4 @@
-"""Accept or refuse steps, and choose the length of the next one."""
+"""Accept or reject steps, and choose the length of the next step."""
 
 import abc
 import enum
@@ -11,7 +11,7 @@ from ._settings import BranchSettings
 
 
 class Refusal(enum.StrEnum):
-    """Reasons why a step is refused, as the end of a sentence."""
+    """Reasons for rejecting a step, as the end of a sentence."""
 
     NOT_CONVERGED = "the corrector did not converge"
     FARTHER = "the corrector went farther than the step was long"
@@ -30,13 +30,13 @@ class Way(NamedTuple):
 
 
 class AbstractStepControl(eqx.Module):
-    """Accepts or refuses steps and chooses their lengths, for a branch or a batch."""
+    """Accepts or rejects steps and chooses their lengths, for a branch or a batch."""
 
     @abc.abstractmethod
     def refusals(
         self, way: Way, step: Any, settings: BranchSettings
     ) -> dict[Refusal, Bool[Any, ""]]:
-        """Return for each reason to refuse a step whether it holds; the first is
+        """Return for each reason to reject a step whether it holds; the first is
         reported.
 
         Args:
@@ -63,7 +63,7 @@ class AbstractStepControl(eqx.Module):
 
 
 class EffortAndAngle(AbstractStepControl):
-    """Lengthen steps where the corrector is quick and the branch straight.
+    """Adapt the step length to corrector iterations and curvature of the branch.
 
     See the thesis, section 3.4.4.
     """
@@ -84,7 +84,7 @@ class EffortAndAngle(AbstractStepControl):
 
 
 def way_between(a: Any, b: Any, guess: Any) -> Way:
-    """From point a of a branch to b, which the corrector found from `guess`."""
+    """Measure the step from a to b, corrected from `guess`."""
     xp = _namespace(b.z)
     old, new = a.tangent / b.scale, b.tangent / b.scale
     cosine = (old @ new) / (xp.linalg.norm(old) * xp.linalg.norm(new))
@@ -94,5 +94,5 @@ def way_between(a: Any, b: Any, guess: Any) -> Way:
 
 
 def _namespace(x: Any) -> Any:
-    """NumPy or jax.numpy."""
+    """Return NumPy or jax.numpy."""
     return x.__array_namespace__()

@@ -1,7 +1,7 @@
-"""Motion of mechanical systems with impacts.
+"""Simulate and analyse mechanical systems with impacts.
 
-State a system (vector field, gap, impact law), simulate it, and differentiate what
-comes out. Importing this package turns on 64-bit floats in JAX.
+Define a system (vector field, gap, impact law), simulate it, and differentiate the
+result. Importing this package turns on 64-bit floats in JAX.
 """
 
 from importlib.metadata import version as _version
@@ -9,7 +9,7 @@ from importlib.metadata import version as _version
 import jax as _jax
 
 
-# before anything below makes an array
+# before any array is created below
 _jax.config.update("jax_enable_x64", True)
 
 from ._citation import citation as citation

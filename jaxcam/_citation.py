@@ -1,4 +1,4 @@
-"""BibTeX of the methods behind a result."""
+"""Return BibTeX entries of the methods behind a result."""
 
 import re
 from importlib.metadata import version
@@ -6,7 +6,7 @@ from pathlib import Path
 
 
 _REFERENCES = Path(__file__).with_name("references.bib")
-"""One entry a publication; the only copy of the bibliography."""
+"""The bibliography, one entry per publication."""
 
 _TOPICS: dict[str, tuple[str, ...]] = {
     "basin entropy": ("daza2016",),
@@ -74,7 +74,7 @@ def citation(*names: str) -> str:
 
 
 def _entries() -> dict[str, str]:
-    """Entries by key; each ends with a brace at the start of a line."""
+    """Return entries by key; each ends with a brace at the start of a line."""
     text = _REFERENCES.read_text(encoding="utf-8")
     found = re.finditer(r"^@\w+\{([^,\s]+),\n.*?^\}\n", text, re.DOTALL | re.MULTILINE)
     return {entry[1]: entry[0] for entry in found}

@@ -1,4 +1,4 @@
-"""Short tables of results, and units that suit the size of a number."""
+"""Print short tables of results, and choose suitable units."""
 
 from collections.abc import Sequence
 from html import escape
@@ -10,21 +10,21 @@ import numpy as np
 # rows shown of a longer table: the first and the last
 _MOST = 20
 _CELL = 'style="text-align: {}"'
-# units that a prefix can be put before; others (rpm, -) keep their numbers
+# units that accept a prefix; others (rpm, -) keep their numbers
 _TAKES_PREFIX = ("rad", "m", "s", "N", "V")
 
 
 class ShortTable(NamedTuple):
-    """A sentence and a table below it; of many rows the first and the last ones."""
+    """A sentence and a table below it, with the first and last rows of a long table."""
 
     sentence: str
     headings: tuple[str, ...]
     rows: Sequence[tuple[str, ...]]
-    # headings of the columns that are words
+    # headings of text columns
     words: tuple[str, ...] = ()
 
     def text(self) -> str:
-        """Columns of equal width, numbers to the right."""
+        """Return the table as text with aligned columns."""
         if not self.rows:
             return self.sentence
         lines = [self.headings, *self._shown()]
@@ -39,7 +39,7 @@ class ShortTable(NamedTuple):
         return "\n".join([self.sentence, *made])
 
     def html(self) -> str:
-        """The same for a notebook."""
+        """Return the table as HTML for a notebook."""
         sides = ["left" if one in self.words else "right" for one in self.headings]
 
         def row(cells, tag: str) -> str:
@@ -64,7 +64,7 @@ class ShortTable(NamedTuple):
 
 
 def scaled(unit: str, largest: float) -> tuple[float, str]:
-    """A factor and a unit in which `largest` (in `unit`) is not far from one."""
+    """Return a factor and a unit in which `largest` (in `unit`) is of order 1."""
     if unit.partition("/")[0] not in _TAKES_PREFIX or not 0 < largest < 0.05:
         return 1.0, unit
     if not np.isfinite(largest) or largest > 2e-5:

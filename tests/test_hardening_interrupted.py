@@ -127,7 +127,7 @@ def test_two_on_one_folder(whole, tmp_path):
     finish(first)
     if second.returncode == 2:
         (sentence,) = errors.splitlines()
-        assert "another jaxcam is writing" in sentence
+        assert "another jaxcam process is writing" in sentence
     else:
         # it came when the first had gone
         assert alone and second.returncode == 0, errors
@@ -155,7 +155,7 @@ def test_a_diagnosis_that_is_killed_goes_on(tmp_path):
     second = start(line, out, "--resume")
     _, errors = second.communicate(timeout=600)
     (sentence,) = errors.splitlines()
-    assert second.returncode == 2 and "another jaxcam is writing" in sentence
+    assert second.returncode == 2 and "another jaxcam process is writing" in sentence
     # some way into the fits
     time.sleep(random.Random(4).uniform(0.1, 0.3) * alone)
     process.kill()

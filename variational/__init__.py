@@ -1,4 +1,6 @@
-"""Derivatives of trajectories: orbits, saltation matrices, monodromy, multipliers."""
+"""Compute derivatives of trajectories: saltation and monodromy matrices,
+multipliers.
+"""
 
 from ._covariant import covariant_vectors as covariant_vectors
 from ._filippov import (

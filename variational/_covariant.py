@@ -1,4 +1,6 @@
-"""Covariant Lyapunov vectors: the directions that a motion carries along with it."""
+"""Compute covariant Lyapunov vectors, the directions invariant under the linearised
+flow.
+"""
 
 from typing import Any
 
@@ -27,7 +29,7 @@ class CovariantVectors(eqx.Module):
     local: Float[Array, "turns n"]
     """Growth rate of each vector in the period (1/s), shape `(turns, n)`."""
     code: Array
-    """0 where every period was finished, else an index into `RESULTS`."""
+    """0 if every period was finished, otherwise an index into `RESULTS`."""
 
     @property
     def exponents(self) -> Float[Array, " n"]:
@@ -76,8 +78,8 @@ def covariant_vectors(
         settings: Accuracy of the run; default a tolerance of 1e-12.
 
     Returns:
-        A `CovariantVectors`. A motion that sticks forgets every deviation, so it has no
-            such directions, and all of them are NaN.
+        A `CovariantVectors`. Sticking removes every deviation, so a motion that sticks
+            has no such directions, and all of them are NaN.
 
     Raises:
         ValueError: The system has no period, or a number of periods is invalid.
@@ -140,7 +142,7 @@ def _vectors(system, state, t0, settings, turns: int, transient: int):
     _, (states, frames, triangles, codes) = jax.lax.scan(
         forwards, start, None, length=count
     )
-    # with ones above the diagonal no vector lies in a smaller space than it should
+    # ones above the diagonal keep every vector out of smaller subspaces
     upper = jnp.triu(jnp.ones((n, n)))
     upper = upper / jnp.linalg.norm(upper, axis=0, keepdims=True)
     _, (inner, growth) = jax.lax.scan(

@@ -1,4 +1,4 @@
-"""Propagate a deviation through an event: impact, entering contact, release."""
+"""Propagate a deviation through an event: impact, start of contact, release."""
 
 from collections.abc import Callable
 
@@ -17,21 +17,21 @@ from jaxcam.hybrid.surface import (
 
 
 def gap_of(system: HybridSystem, constraint) -> Callable:
-    """The gap of one constraint as a function of (t, x)."""
+    """Return the gap of one constraint as a function of (t, x)."""
     return lambda t, x: gaps(system, t, x)[constraint]
 
 
 def impact_of(system: HybridSystem, constraint) -> Callable:
-    """The impact law of one constraint as a function of (t, x)."""
+    """Return the impact law of one constraint as a function of (t, x)."""
     return lambda t, x: impacts(system, t, x)[constraint]
 
 
 def completed_law(system: HybridSystem, constraint) -> Callable:
-    """The law of an impact together with all later ones of its chatter.
+    """Return the law of an impact together with all later ones of its chatter.
 
-    The state between before and after that has no normal velocity: the rest of the
-    sequence takes no time compared with the motion along the constraint, to second
-    order in the speed.
+    The state after it is the combination of the states before and after the impact that
+    has no normal velocity: to second order in the speed, the rest of the sequence takes
+    negligible time.
     """
     impact = impact_of(system, constraint)
 
@@ -45,7 +45,7 @@ def completed_law(system: HybridSystem, constraint) -> Callable:
 
 
 def field_of(system: HybridSystem, contact: Bool[Array, " m"] | None) -> Callable:
-    """Free flight, or the field of contact with the constraints marked."""
+    """Return the field of free flight, or of contact with the marked constraints."""
     if contact is None:
         return system.vector_field
     return lambda t, x: field_in_force(system, t, x, contact)
@@ -69,11 +69,11 @@ def event_crossing(
 def onto_contact(
     system: HybridSystem, t, x, contact: Bool[Array, " m"]
 ) -> Float[Array, " n"]:
-    """One Newton step onto gap = normal velocity = 0 for constraints in contact.
+    """Take one Newton step onto gap = normal velocity = 0 for constraints in contact.
 
-    At a state in contact it changes nothing, but its derivative takes from a deviation
-    what contact takes: the rank falls by two for each constraint, and what remains is
-    how the state of contact follows the parameters.
+    At a state in contact it changes nothing, but its derivative projects deviations
+    onto those allowed by contact: the rank falls by two for each constraint, and the
+    dependence of the contact state on the parameters remains.
     """
     values = gaps(system, t, x)
     normals = jax.jacfwd(lambda y: gaps(system, t, y))(x)
@@ -89,9 +89,11 @@ def onto_contact(
 def contact_projector(
     system: HybridSystem, t, x, contact: Bool[Array, " m"]
 ) -> Float[Array, "n n"]:
-    """The derivative of `onto_contact`: exactly zero for two states in contact."""
+    """Return the derivative of `onto_contact`: exactly zero for two states in
+    contact.
+    """
     out = jax.jacfwd(lambda y: onto_contact(system, t, y, contact))(x)
     if x.shape[0] == 2:
-        # nothing is left; rounding divided by a small impact speed would be something
+        # zero exactly; rounding divided by a small impact speed would not be zero
         out = jnp.where(jnp.any(contact), jnp.zeros_like(out), out)
     return out

@@ -1,4 +1,4 @@
-"""Derivatives of motions that cross a surface or slide on it."""
+"""Differentiate motions that cross a surface or slide on it."""
 
 import equinox as eqx
 import jax

@@ -1,4 +1,4 @@
-"""One flight (or one stretch of contact) together with its deviations."""
+"""Integrate one flight (or one contact interval) with its deviations."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -15,7 +15,7 @@ TOLERANCE = 1e-14
 
 
 class LinearisedFlight(NamedTuple):
-    """The end of a flight and how it depends on its start."""
+    """The end of a flight and its derivatives by the start."""
 
     state: Float[Array, " n"]
     """(n,) state at the end."""
@@ -30,7 +30,8 @@ def fly_linearised(
 ) -> LinearisedFlight:
     """Integrate the motion and its variational equations from `t0` to `t1`.
 
-    **Arguments:** `field(parameters, t, x)`, smooth on the way: no event detection.
+    **Arguments:** `field(parameters, t, x)`, smooth on the interval; there is no event
+    detection.
     """
     n, q = x.shape[0], parameters.shape[0]
 

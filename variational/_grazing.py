@@ -3,7 +3,7 @@
 At a graze the gap has a minimum of zero: H = v = 0 and a > 0. A neighbour whose gap
 would reach the depth d = -min H > 0 hits with the speed sqrt(2 a d), which the impact
 changes by (1 + r) sqrt(2 a d) in the direction D of the impulse (v_x D = 1). All else
-being of higher order, the flow is what it would be without the wall, after the map
+being of higher order, the flow is that of the system without the wall, after the map
 
     z -> z + b sqrt(d(z)),   b = (1 + r) sqrt(2 a) D,   d(z) = -(H_x z + H_mu mu).
 
@@ -81,12 +81,12 @@ class GrazingForm(eqx.Module):
 
     @property
     def multipliers(self) -> Complex[Array, " n"]:
-        """Multipliers of the orbit as long as it does not touch, shape `(n,)`."""
+        """Multipliers of the orbit without contact, shape `(n,)`."""
         return eigenvalues(self.matrix)
 
     @property
     def coefficient(self) -> Float[Array, ""]:
-        """H_x N b: the gap at the next pass for a square root of one."""
+        """The gap H_x N b at the next pass for a unit square root."""
         return self.normal @ self.matrix @ self.zero_time
 
     def depth(self, z: Float[Array, " n"], mu=None) -> Float[Array, ""]:

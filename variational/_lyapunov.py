@@ -1,4 +1,4 @@
-"""Lyapunov exponents of a motion with impacts.
+"""Compute Lyapunov exponents of a motion with impacts.
 
 The event loop runs without derivatives; those of its steps are taken from its log
 afterwards, all at once, and multiplied in order.
@@ -38,8 +38,9 @@ class LyapunovSpectrum(eqx.Module):
     """Length of a period (s); shape `(1,)` where it is the same for all batch elements.
     """
     code: Array
-    """0 where every period was finished, else an index into `RESULTS`; the exponents
-    are NaN there."""
+    """0 if every period was finished, otherwise an index into `RESULTS`, with NaN
+    exponents.
+    """
 
     @property
     def running(self) -> Float[Array, "*lanes turns n"]:
@@ -69,7 +70,7 @@ def lyapunov_spectrum(
     """Compute all Lyapunov exponents, impacts included, by repeated orthogonalisation.
 
     Steps are differentiated one by one, with saltation matrices at events, and their
-    product is applied to a frame that is orthonormalised again and again (Benettin et
+    product is applied to a frame that is orthonormalised repeatedly (Benettin et
     al., Meccanica 15, 1980; for impacts Mueller, Chaos, Solitons and Fractals 5, 1995).
 
     Args:
@@ -154,15 +155,16 @@ def lyapunov_spectrum(
 
 
 def _padded(lanes: int) -> int:
-    """Number of motions with which all blocks have the same size."""
+    """Return the number of motions with which all blocks have the same size."""
     count = -(-lanes // _BLOCK)
     return count * -(-lanes // count)
 
 
 def _in_turn(some: Callable, batched, states):
-    """`some(batched, states)` for a block of lanes after the other, put together.
+    """Call `some(batched, states)` for one block of lanes after another, and
+    concatenate.
 
-    Blocks are alike, so that one program serves all; the last lane fills them up.
+    Blocks have equal sizes, so that one program serves all; the last lane pads them.
     """
     lanes = states.shape[0]
     count = -(-lanes // _BLOCK)
@@ -173,7 +175,7 @@ def _in_turn(some: Callable, batched, states):
     parts = [
         some(jax.tree.map(lambda leaf, k=k: leaf[k], batched), states[k]) for k in order
     ]
-    # the length of a period is one for all where nothing else differs
+    # all share one period length if nothing else differs
     alike = parts[0].turn.shape[0] == 1
     whole = jax.tree.map(lambda *leaves: jnp.concatenate(leaves)[:lanes], *parts)
     return eqx.tree_at(lambda m: m.turn, whole, parts[0].turn) if alike else whole
@@ -192,7 +194,7 @@ class _Seen:
 
     @property
     def share(self) -> float:
-        """Fraction of periods done, over all lanes."""
+        """Return the fraction of periods done, over all lanes."""
         # the first is the start of the run
         done, most = self._filled - 1, self.logs.shape[1] - 1
         return float(np.mean(np.minimum(done, most))) / most
@@ -216,7 +218,7 @@ class _Seen:
 def _summary(seen: _Seen, carry: Carried, length, transient, blocks):
     length = np.asarray(length)
     with np.errstate(invalid="ignore"):
-        # the difference of two infinities: it stuck before, and in this period as well
+        # the difference of two infinities: the motion stuck before and in this period
         local = np.diff(seen.logs[:, transient:], axis=1) / length[:, None, None]
     stuck = np.isneginf(seen.logs[:, transient + 1 :])
     local = np.where(stuck & np.isnan(local), -np.inf, local)
@@ -240,7 +242,9 @@ def _summary(seen: _Seen, carry: Carried, length, transient, blocks):
 
 
 def _lanes(system, state, where, values):
-    """The system split in what differs between lanes and what they share."""
+    """Split the system into the parts that differ between lanes and the shared
+    parts.
+    """
     if where is None:
         return None, system, jnp.atleast_2d(state)
     values = jnp.asarray(values, dtype=jnp.float64)
@@ -259,13 +263,15 @@ def _lanes(system, state, where, values):
     return batched, shared, state
 
 
-# lanes in one program: their logs stay in the cache, and they wait less for each other
+# lanes in one program: their logs stay in the cache, and waiting times are short
 _BLOCK = 128
 
 
 @eqx.filter_jit
 def _turn(batched, shared, length):
-    """Length of a period in each lane, shape `(lanes,)`, or `(1,)` for all alike."""
+    """Return the length of a period in each lane, shape `(lanes,)`, or `(1,)` if
+    equal.
+    """
 
     def one(batched):
         system = eqx.combine(batched, shared)
@@ -278,7 +284,7 @@ def _turn(batched, shared, length):
 
 @eqx.filter_jit
 def _restitutions(batched, shared, t0, states):
-    """Coefficients of restitution, (lanes, m)."""
+    """Return coefficients of restitution, (lanes, m)."""
 
     def one(batched, state):
         return restitutions(eqx.combine(batched, shared), t0, state)

@@ -1,4 +1,4 @@
-"""Forward derivatives as products with one Jacobian, however many are asked for."""
+"""Compute any number of forward derivatives as products with one Jacobian."""
 
 from collections.abc import Callable
 
@@ -10,12 +10,13 @@ from jax.flatten_util import ravel_pytree
 def with_one_jacobian(
     function: Callable, finish: Callable = lambda by_each: by_each
 ) -> Callable:
-    """`function`, whose derivative is its Jacobian by all numbers times the direction.
+    """Wrap `function` so that its derivative is one full Jacobian times the direction.
 
-    So a chain of flights costs as much as its flights and not as their square. Can be
-    differentiated again, unless `finish`, which gets the Jacobian, refuses.
+    The cost of a chain of flights is then proportional to their number, not to its
+    square. The result can be differentiated again, unless `finish`, which receives the
+    Jacobian, raises an error.
 
-    **Arguments:** a function of pytrees by place, and of what is static by name, that
+    **Arguments:** a function of positional pytrees and static keyword arguments that
     returns one array.
     """
 

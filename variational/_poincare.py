@@ -1,4 +1,4 @@
-"""The linearised Poincare map of a smooth flow."""
+"""Linearise the Poincare map of a smooth flow."""
 
 from collections.abc import Callable
 

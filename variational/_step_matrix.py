@@ -1,4 +1,4 @@
-"""The derivative of each step of a recorded run, all steps at once."""
+"""Compute the derivatives of all steps of a recorded run at once."""
 
 from typing import NamedTuple
 
@@ -48,9 +48,10 @@ def step_matrix(
     point: StepStart,
     row: LogRow,
 ) -> Float[Array, "n n"]:
-    """The derivative of one step and of the event at its end; the identity for none.
+    """Return the derivative of one step and of its final event; the identity for no
+    step.
 
-    The step is the one the run took, so its derivative needs no control of its own.
+    The step length is that of the run, so the derivative needs no step control.
     """
     n = functions.n
     taken = row.kind != float(RowKind.NOTHING)
@@ -77,7 +78,7 @@ def step_matrix(
     before, now = jnp.stack(row.before), jnp.stack(row.contact)
     held = jnp.stack(point.contact)
     if functions.planar:
-        # contact leaves nothing of a deviation
+        # contact removes the deviation
         matrix = jnp.where(held[0], 0.0, matrix)
     else:
         matrix = contact_projector(system, row.t, before, held) @ matrix
@@ -111,5 +112,5 @@ def _across(system, row: LogRow, before, held, now, law_of, planar):
 
 
 def elementwise_product(a, b):
-    """A matrix product that stays elementwise in a batch."""
+    """Multiply matrices by elementwise operations, for batches."""
     return jnp.sum(a[:, :, None] * b[None, :, :], axis=1)

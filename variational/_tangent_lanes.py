@@ -1,4 +1,4 @@
-"""Frames of tangent vectors that are carried along many lanes, chunk by chunk."""
+"""Propagate frames of tangent vectors along many lanes, chunk by chunk."""
 
 from typing import Any, NamedTuple
 
@@ -64,7 +64,7 @@ def _row(record, _):
 
 @eqx.filter_jit(**_WIDE)
 def next_rows(batched, shared, length, t0, turns, settings, carry: Carried):
-    """The next `ROWS` attempts: what is carried on, and the rows that they leave.
+    """Run the next `ROWS` attempts; return the carried state and the rows of the log.
 
     Rows are kinds, sums of the logarithms of growth `(rows, n)`, and states.
     """
@@ -81,7 +81,7 @@ def next_rows(batched, shared, length, t0, turns, settings, carry: Carried):
         taken = kind != float(RowKind.NOTHING)
         started = after
         if not functions.planar:
-            # what follows a chatter starts without normal velocity
+            # the motion after a chatter starts without normal velocity
             rest = jax.vmap(lambda s, y, k: completed_law(system, k)(s, y))
             at_rest = (kind == float(RowKind.LAST_IMPACT))[:, None]
             started = jnp.where(at_rest, rest(t, before, side), after)
@@ -89,7 +89,7 @@ def next_rows(batched, shared, length, t0, turns, settings, carry: Carried):
         def first_and(old, new):
             return jnp.concatenate([jnp.asarray(old)[None], new])
 
-        # the latest row that was taken, counted from the one before the first
+        # the latest row used, counted from the row before the first
         latest = jax.lax.cummax(jnp.where(taken, jnp.arange(1, kind.shape[0] + 1), 0))
         previous = jnp.concatenate([jnp.zeros_like(latest[:1]), latest[:-1]])
         times = first_and(carry.point.t, t)
@@ -118,9 +118,9 @@ def next_rows(batched, shared, length, t0, turns, settings, carry: Carried):
 
 
 def orthonormal(matrix: Float[Array, "n n"]):
-    """Orthonormal columns that span the same, and the lengths they had (Gram-Schmidt).
+    """Orthonormalise columns (Gram-Schmidt); return them and the previous lengths.
 
-    A column of zeros stays one.
+    A column of zeros stays zero.
     """
     columns, lengths = [], []
     for k in range(matrix.shape[0]):

@@ -1,4 +1,4 @@
-"""Multipliers of a periodic orbit, and the functions whose zeros are bifurcations."""
+"""Compute multipliers of a periodic orbit, and test functions of bifurcations."""
 
 import equinox as eqx
 import jax
@@ -55,8 +55,8 @@ def floquet_multipliers(
         settings: Accuracy of "flow"; default a tolerance of 1e-12.
 
     Returns:
-        Multipliers, shape `(n,)`, complex. Zero where the orbit sticks, because contact
-            fixes gap and normal velocity whatever they were.
+        Multipliers, shape `(n,)`, complex. Zero if the orbit sticks, because contact
+            fixes gap and normal velocity regardless of their previous values.
 
     Examples:
         >>> import continuation, variational

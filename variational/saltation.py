@@ -1,4 +1,4 @@
-"""Compute how a deviation passes an event: impact, start of contact, release."""
+"""Propagate deviations through events: impact, start of contact, release."""
 
 import equinox as eqx
 import jax
@@ -28,7 +28,7 @@ def saltation_matrix(
 
         S = R_x + (F+ - R_t - R_x F-) H_x / (H_t + H_x F-),
 
-    explicit time included, so that moving constraints need nothing extra (M. di
+    explicit time included, so that moving constraints need no extra terms (M. di
     Bernardo, C. J. Budd, A. R. Champneys, P. Kowalczyk, Piecewise-smooth Dynamical
     Systems, 2008, chapter 2).
 
@@ -243,7 +243,7 @@ def saltation_second(
 
 
 def _taylor(system, t, x, tau):
-    """The flow over a short time `tau`, to third order."""
+    """Return the flow over a short time `tau`, to third order."""
 
     def along(function):
         def rate(s, y):

@@ -1,10 +1,11 @@
-"""Orbits with finitely many impacts beyond the interruption of chatter.
+"""Find orbits with finitely many impacts beyond the interruption of chatter.
 
 Their deviation from the orbit that sticks, as it leaves the impacts near release, is
 one number x > 0, and the parameter at which they are periodic is a continuous function
-of it that ends at the interruption for x = 0. So they are one branch, which begins
-there; but on the way to it they have more and more impacts, by a grazing each. The
-branch is therefore taken up a little behind its end, and followed away from it.
+of it that ends at the interruption for x = 0. So these orbits form one branch that
+begins at the interruption; towards it their number of impacts grows, by one at each
+grazing. The branch is therefore started at a small distance from the interruption and
+followed away from it.
 """
 
 from typing import Any
@@ -26,19 +27,20 @@ from ..problem import Start
 from ._shooting import ImpactingOrbits
 
 
-# impacts from release to release, of the orbit that is taken up
+# impacts from release to release of the first orbit
 _MOST = 48
-# its slowest rebound, over the fastest; slower impacts would be lost in the tolerance
+# ratio of its slowest to its fastest rebound; slower impacts would be below the
+# tolerance
 _SLOWEST = 1e-3
 # distances that are tried, as powers of 2 of the width of the bounds
 _NEAREST, _TRIALS = -40, 4
 
 
 def orbit_behind(point: Any, periods: int) -> Start | None:
-    """The orbit with finitely many impacts behind an interruption, or None.
+    """Return the orbit with finitely many impacts behind an interruption, or None.
 
-    `point` is the interruption, its tangent pointing to where the branch goes; the
-    orbit repeats after so many `periods` of the forcing.
+    `point` is the interruption, with the tangent in the direction of the branch; the
+    orbit repeats after `periods` forcing periods.
     """
     width = float(point.scale[-1])
     sense = 1.0 if point.tangent[-1] >= 0 else -1.0
@@ -70,8 +72,8 @@ def _from_release(parameters: HybridSystem, leaf: int, values, periods: int):
     """Impacts of the motion that starts at release, at each value of the parameter.
 
     Returns:
-        Phases and states `(k, _MOST, 3)`, how many of them belong to the orbit (0 where
-            it sticks), and the slowest rebound over the fastest.
+        Phases and states `(k, _MOST, 3)`, the number that belong to the orbit (0 if it
+            sticks), and the ratio of the slowest to the fastest rebound.
     """
 
     def one(value):
@@ -100,8 +102,8 @@ def _from_release(parameters: HybridSystem, leaf: int, values, periods: int):
 def _closed_up(
     periods: int, point: Any, value: float, rows, sense: float, width: float
 ) -> Start | None:
-    """The periodic orbit near the motion from release, and where the branch leaves."""
-    # an array of JAX: the period is asked of it outside of a program
+    """Return the periodic orbit near the motion from release, and its tangent."""
+    # a JAX array: its period is evaluated outside of a program
     moved = jnp.asarray(value, jnp.float64)
     parameters = with_leaf(point.problem.parameters, point.leaf, moved)
     count = len(rows)

@@ -1,4 +1,4 @@
-"""The ways in which an orbit with impacts can be written down."""
+"""Define the representations of an orbit with impacts."""
 
 from typing import Any
 
@@ -10,7 +10,9 @@ from ._run_twice import away_from_half, rotations
 
 
 class ImpactSequences(AbstractRepresentation):
-    """An orbit with m impacts begins at each of them, and m unknowns are times."""
+    """An orbit with m impacts may start at any of them; m of the unknowns are impact
+    times.
+    """
 
     family: str = eqx.field(static=True)
     problem: Any

@@ -1,4 +1,4 @@
-"""Continue an orbit past a grazing: with one impact less, or one more."""
+"""Continue an orbit past a grazing, with one impact fewer or more."""
 
 from typing import Any
 
@@ -33,7 +33,7 @@ def _lowest(problem, u, parameters):
 
 
 def orbit_grazing(problem: Any, point: Any) -> Start | None:
-    """The orbit at a grazing, with the impact of speed zero taken out or put in.
+    """Return the orbit at a grazing, with the impact of zero speed removed or inserted.
 
     `problem` is one of `ImpactingOrbits`, and so is that of the start.
 
@@ -76,10 +76,10 @@ def orbit_grazing(problem: Any, point: Any) -> Start | None:
 def _direction(
     problem, context: Context, u, point: Any, watched: str
 ) -> np.ndarray | None:
-    """The direction of the branch in which a monitor grows.
+    """Return the direction of the branch in which a monitor grows.
 
-    By the program that the branch continues with; only the sign of the slope is wanted,
-    for which differences do.
+    It uses the program of the continued branch; differences are sufficient, because
+    only the sign of the slope matters.
     """
     z = np.append(u, point.parameter)
     one = np.ones_like(z)

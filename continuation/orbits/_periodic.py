@@ -1,4 +1,4 @@
-"""From an orbit to the problem whose solutions it is one of."""
+"""Find the continuation problem that a given orbit solves."""
 
 from typing import Any
 
@@ -72,7 +72,7 @@ def periodic_orbits(
 
 
 def start_of(system: Any, start: Any) -> Start:
-    """`follow(system, orbit, ...)` in terms of a problem."""
+    """Convert the arguments of `follow(system, orbit, ...)` to a problem."""
     if isinstance(start, Start):
         return start
     if isinstance(start, Orbit) or start is None:

@@ -1,4 +1,4 @@
-"""Finding one periodic orbit: from a guess, or from where the motion settles."""
+"""Find one periodic orbit from a guess, or from the settled motion."""
 
 import warnings
 
@@ -22,14 +22,16 @@ from ._shooting import ImpactingOrbits
 
 
 _TURNS, _LOOKED = 400, 64
-"""Periods until a motion is expected to have settled, and periods examined then."""
+"""Periods until transients are expected to have decayed, and periods examined after
+them.
+"""
 _SAME = 1e-7
 """Motions are called equal when they differ by less than this, relative to their size.
 """
 _SAME_TIME = 1e-9
 """Times are equal that differ by less than this of the period."""
 _CLOSED = 1e-9
-"""A gap is closed up to this, relative to its size."""
+"""A gap counts as closed below this, relative to its size."""
 
 
 def periodic_orbit(
@@ -53,8 +55,8 @@ def periodic_orbit(
         guess: State at `t0`, shape `(n,)`. By default the state in which the motion has
             settled after some hundred forcing periods (a stable orbit).
         period: Period of the orbit (s); for a system without forcing a guess of it.
-        periods: Instead of `period`, the number of forcing periods in it. With neither,
-            it is one; without a guess, as many as are detected.
+        periods: Instead of `period`, the number of forcing periods in it. By default it
+            is 1; without a guess, it is detected.
         t0: Time of the guess (s).
         settings: Accuracy of the runs; default a tolerance of 1e-12.
 
@@ -99,7 +101,7 @@ def periodic_orbit(
 
 
 def _periods(base: float | None, period, periods) -> int:
-    """The number of forcing periods; 0 without forcing."""
+    """Return the number of forcing periods; 0 without forcing."""
     if base is not None and isinstance(period, int | np.integer):
         warnings.warn(
             f"period={period} is taken as forcing periods; write periods={period}, or "
@@ -131,7 +133,7 @@ def _periods(base: float | None, period, periods) -> int:
 
 
 def _counted(base: float | None, period, periods) -> int:
-    """The number of forcing periods, where it is given."""
+    """Return the number of forcing periods, if it is given."""
     if base is None:
         raise ValueError(
             "this system has no forcing whose periods could be counted; give a guess "
@@ -174,7 +176,7 @@ def _settled(system, base, number: int, free: bool, t0):
 
 
 def _somewhere(system, t0):
-    """A state outside the constraints: the release point where there is one."""
+    """Return a state outside the constraints: the release point if it exists."""
     names = system.state_names
     n = len(names) or _dimension(system)
     try:
@@ -196,7 +198,7 @@ def _somewhere(system, t0):
 
 
 def _dimension(system) -> int:
-    """The number of states of a system that does not name them."""
+    """Return the number of states of a system that does not name them."""
     for n in range(1, 65):
         try:
             shape = jax.eval_shape(
@@ -210,12 +212,13 @@ def _dimension(system) -> int:
 
 
 def _by_shooting(system, guess, length, number, t0, settings):
-    """The orbit with the impacts that the motion from the guess has, and why not."""
+    """Find the orbit with the impacts of the motion from the guess, or the reason."""
     turn = simulate(system, guess, t0, float(t0) + length, settings=settings)
     if not bool(turn.successful):
         return None, turn.result
     if int(turn.contacts.count):
-        # contact forgets the past: the next period is the orbit or none is near
+        # contact erases the past: either the next period is the orbit, or no orbit is
+        # near
         state = turn.final
         for _ in range(3):
             orbit, why = _confirmed(system, state, float(t0), length, settings)
@@ -243,7 +246,9 @@ def _by_shooting(system, guess, length, number, t0, settings):
 
 
 def _with_impacts_of(system, turn, number, t0, settings):
-    """The orbit with the impacts of one period from `t0`, or the reason for none."""
+    """Return the orbit with the impacts of one period from `t0`, or the reason for
+    none.
+    """
     try:
         equations, u = seed(system, turn, number)
     except ValueError as error:
@@ -270,7 +275,7 @@ def _touches(system, state, t0, length) -> bool:
 
 
 def _by_flow(system, guess, length, number, t0, settings):
-    """Newton's method on the motion over one period, by the event loop."""
+    """Apply Newton's method to the motion over one period, by the event loop."""
     if number == 0:
         return None, "it needs a forcing period"
     state, success = _root(
@@ -298,7 +303,9 @@ def _root(system, guess, t0, length, settings):
 
 
 def _at(equations: Shooting, u, system, t0):
-    """State of an orbit at `t0` (in the first flight without forcing), time, period."""
+    """Return state of an orbit at `t0` (in the first flight without forcing), time,
+    period.
+    """
     u = jnp.asarray(u)
     starts, ends = map(np.asarray, equations.flights(u, system))
     length = float(equations.period(u, system))

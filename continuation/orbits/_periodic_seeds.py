@@ -1,4 +1,4 @@
-"""Orbits to start from: out of many states that a sweep or a recording has seen."""
+"""Find starting orbits from many states of a sweep or a recording."""
 
 import numpy as np
 from jaxtyping import ArrayLike, Float
@@ -73,7 +73,7 @@ def orbits_near(
 
 
 def _passes(system: HybridSystem, orbit: Orbit, state, same: float) -> bool:
-    """Return whether an orbit has this state where it starts."""
+    """Return whether an orbit starts at this state."""
     current = np.asarray(orbit.state)
     sizes = component_sizes(system, orbit.time, current, orbit.period)
     return bool(np.all(np.abs(current - state) <= same * np.asarray(sizes)))

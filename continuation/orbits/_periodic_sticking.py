@@ -1,4 +1,4 @@
-"""Orbits that stick once in some periods: explicit, because sticking forgets."""
+"""Define orbits that stick once in n periods by their release point."""
 
 from collections.abc import Mapping
 from typing import Any, ClassVar
@@ -42,11 +42,11 @@ _STEPS = 64
 class StickingOrbits(AbstractProblem):
     """P(inf, n): the orbit that leaves contact, chatters, and sticks every n periods.
 
-    While it sticks it follows the constraint, so it starts anew at the release point:
-    the time t and the state x at which gap, normal velocity and normal acceleration are
-    zero. Those are the equations; the unknowns, shape `(3,)`, are the phase of release
-    (time in forcing periods) and the state there. All multipliers are zero. Two
-    monitors decide where the orbit exists:
+    While it sticks it follows the constraint, so its state at release is independent of
+    the past: the time t and the state x at which gap, normal velocity and normal
+    acceleration are zero. Those are the equations; the unknowns, shape `(3,)`, are the
+    phase of release (time in forcing periods) and the state there. All multipliers are
+    zero. Two monitors decide where the orbit exists:
 
     - the margin of [`variational.chatter_accumulation`][], zero where the impacts
       accumulate exactly at the n-th release. The sticking time itself falls
@@ -69,7 +69,7 @@ class StickingOrbits(AbstractProblem):
     """
 
     stability: ClassVar[StabilityKind] = "map"
-    """Multipliers on the unit circle are bifurcations."""
+    """Multipliers on the unit circle mark bifurcations."""
     normal_forms: ClassVar[bool] = False
     """No normal-form coefficients are computed."""
     detects: ClassVar[bool] = False
@@ -94,7 +94,7 @@ class StickingOrbits(AbstractProblem):
         return jnp.concatenate(rows)
 
     def linearisation(self, u, parameters, jacobian) -> Float[Array, "2 2"]:
-        """Zero: nothing of a deviation survives sticking.
+        """Return zeros: sticking removes every deviation.
 
         Args:
             u: Unknowns of the equations, shape `(u,)`.
@@ -176,7 +176,7 @@ class StickingOrbits(AbstractProblem):
 
     def with_signature(self, signature: str) -> AbstractProblem:
         if signature.startswith("impacts"):
-            # a branch that has gone on behind the interruption
+            # a branch continued beyond the interruption
             orbits = ImpactingOrbits(self.parameters, (), self.periods, 2)
             return orbits.with_signature(signature)
         return super().with_signature(signature)
@@ -214,10 +214,11 @@ def _stroboscopic(system, turn: ChatterOrbit, periods: int) -> Float[Array, "m n
 def on_release(
     system: HybridSystem, periods: int = 1, beyond: bool = False
 ) -> tuple[StickingOrbits, np.ndarray]:
-    """The problem of the orbit that sticks once in so many periods, and its unknowns.
+    """Return the problem of the orbit that sticks once in so many periods, and its
+    unknowns.
 
     Raises:
-        ValueError: Where contact never ends, or is never made.
+        ValueError: Contact never ends, or never begins.
     """
     frame = _frame(system)
     if not bool(jnp.isfinite(frame.release)):

@@ -1,4 +1,4 @@
-"""An orbit written down from another impact on, and one run through twice."""
+"""Represent an orbit from another impact on, or traversed twice."""
 
 from typing import Any
 
@@ -7,7 +7,9 @@ from jaxtyping import Float
 
 
 def run_twice(problem: Any, u, deviation) -> tuple[np.ndarray, np.ndarray]:
-    """State and tangent of the orbit run through twice, deviating with each sign."""
+    """Return state and tangent of the orbit traversed twice, with opposite
+    deviations.
+    """
     if not problem.constraints:
         # the state at time zero only
         return u, deviation
@@ -31,7 +33,7 @@ def run_twice(problem: Any, u, deviation) -> tuple[np.ndarray, np.ndarray]:
 def rotations(
     problem: Any, u: Float[np.ndarray, " u"], rate: bool = False
 ) -> Float[np.ndarray, "m u"]:
-    """The same orbit, beginning with each of its m impacts in turn.
+    """Return the orbit starting at each of its m impacts.
 
     **Arguments:** `rate`: `u` is a derivative of the unknowns along a branch.
     """

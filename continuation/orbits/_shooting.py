@@ -1,4 +1,4 @@
-"""Periodic orbits with impacts as a problem to follow: their equations, and events."""
+"""Define periodic orbits with impacts as a continuation problem."""
 
 from collections.abc import Mapping
 from typing import Any, ClassVar
@@ -41,7 +41,7 @@ class ImpactingOrbits(AbstractProblem):
     """
 
     stability: ClassVar[StabilityKind] = "map"
-    """Multipliers on the unit circle are bifurcations."""
+    """Multipliers on the unit circle mark bifurcations."""
     costly: ClassVar[bool] = True
     """Second derivatives take long to compile."""
 
@@ -136,7 +136,7 @@ class ImpactingOrbits(AbstractProblem):
         )
         return whole, self._returned(u, parameters_at(p), matrix)
 
-    # -- what to watch
+    # -- monitors
 
     def monitors(self) -> Mapping[str, Monitor]:
         m = len(self.constraints)

@@ -1,4 +1,4 @@
-"""Multipliers of an impacting orbit, also where one of its impacts has no speed."""
+"""Compute multipliers of an impacting orbit, including an impact of zero speed."""
 
 from typing import Any
 
@@ -17,8 +17,9 @@ from .._eigenvalues import eigenvalues_of
 from ._watched import Watched
 
 
-# speed of an impact that is a grazing, relative to one plus the largest component of
-# the state: a located one has less, and what a matrix divided by it says is rounding
+# speed below which an impact counts as a grazing, relative to one plus the largest
+# component of the state: a located grazing is below it, and a matrix divided by that
+# speed contains only rounding errors
 _NO_SPEED = 1e-8
 ONE = (
     "an impact has no speed here: one multiplier is infinite, the limit from orbits "
@@ -33,8 +34,9 @@ NONE = (
 def multipliers_of(
     equations: Shooting, u: np.ndarray, parameters: Any, at: Any
 ) -> tuple[Any, str]:
-    """Multipliers (k,), the largest modulus first, and a sentence where one is not
-    finite or not known."""
+    """Return multipliers (k,), the largest modulus first, and a sentence if one is
+    not finite or unknown.
+    """
     m = len(equations.constraints)
     speeds = np.array([float(at.monitors[Watched("speed", k).name]) for k in range(m)])
     least = _NO_SPEED * (1.0 + float(np.max(np.abs(u))))

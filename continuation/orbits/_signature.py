@@ -1,4 +1,4 @@
-"""The sequence of impacts of an orbit, changed by one impact."""
+"""Add or remove one impact of an orbit."""
 
 import jax.numpy as jnp
 import numpy as np
@@ -7,7 +7,9 @@ from variational.orbits import flown, Shooting
 
 
 def without_impact(equations: Shooting, u, parameters, number: int):
-    """The equations without impact `number`, and the state that leaves it out."""
+    """Return the equations without impact `number`, and the state that leaves it
+    out.
+    """
     hits, periods = equations.constraints, equations.periods
     rows = np.array(u).reshape(len(hits), -1)
     hits = hits[:number] + hits[number + 1 :]
@@ -27,7 +29,9 @@ def without_impact(equations: Shooting, u, parameters, number: int):
 def with_impact(
     equations: Shooting, u, parameters, flight: int, time: float, which: int
 ):
-    """The equations with another impact, on `which`, at `time` (s) of a flight."""
+    """Return the equations with another impact, on `which`, at `time` (s) of a
+    flight.
+    """
     u = jnp.asarray(u)
     starts, _ = equations.flights(u, parameters)
     start = starts[flight]
@@ -44,13 +48,13 @@ def with_impact(
 
 
 def _with(equations: Shooting, constraints, steps: int | None = None) -> Shooting:
-    """The same equations for impacts on these constraints."""
+    """Return the same equations for impacts on these constraints."""
     steps = equations.steps if steps is None else steps
     return Shooting(constraints, equations.periods, equations.dimension, steps)
 
 
 def _renumbered(periods, rows, number):
-    """Rows without one; without forcing time counts from the first that is left."""
+    """Remove one row; without forcing, time counts from the first remaining row."""
     if periods or number:
         return np.delete(rows, number, axis=0)
     period, later = rows[0, 0], rows[1:].copy()

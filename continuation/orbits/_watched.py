@@ -1,4 +1,4 @@
-"""Monitors of orbits with impacts: gaps of flights, and speeds of impacts."""
+"""Define monitors of orbits with impacts: gaps of flights and speeds of impacts."""
 
 from typing import Literal, NamedTuple
 
@@ -18,9 +18,9 @@ class Watched(NamedTuple):
 
 
 def watched_of(impacts: int) -> dict[str, Watched]:
-    """All of an orbit with so many impacts, by the names of the monitors.
+    """Return all monitors of an orbit with this number of impacts, by name.
 
-    In the order in which `gap_or_speed` numbers them: gaps first.
+    Their order is that of `gap_or_speed`: gaps first.
     """
     gaps = [Watched("gap", k) for k in range(max(impacts, 1))]
     speeds = [Watched("speed", k) for k in range(impacts)]

@@ -1,4 +1,4 @@
-"""Special points of a branch: seen, located, and their normal forms."""
+"""Detect and locate special points of a branch; compute their normal forms."""
 
 from ._extended import AbstractExtended as AbstractExtended, varied as varied
 from ._locate import (

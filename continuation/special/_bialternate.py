@@ -1,4 +1,6 @@
-"""Second compound matrices: singular where a pair of eigenvalues is critical."""
+"""Compute second compound matrices, singular where a pair of eigenvalues is
+critical.
+"""
 
 import jax.numpy as jnp
 import numpy as np
@@ -11,7 +13,8 @@ def pairs(n: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def additive(a: Float[Array, "n n"]) -> Float[Array, "m m"]:
-    """Twice the bialternate product of A and I: eigenvalues are l_i + l_j, i < j.
+    """Return twice the bialternate product of A and I, with eigenvalues l_i + l_j, i <
+    j.
 
     Kuznetsov, Elements of Applied Bifurcation Theory, section 10.2.
     """
@@ -26,25 +29,29 @@ def additive(a: Float[Array, "n n"]) -> Float[Array, "m m"]:
 
 
 def multiplicative(a: Float[Array, "n n"]) -> Float[Array, "m m"]:
-    """Bialternate product of A with itself: eigenvalues are l_i l_j, i < j."""
+    """Return the bialternate product of A with itself: eigenvalues are l_i l_j, i <
+    j.
+    """
     i, j = pairs(a.shape[0])
     return a[np.ix_(i, i)] * a[np.ix_(j, j)] - a[np.ix_(i, j)] * a[np.ix_(j, i)]
 
 
 def plane(w: Float[Array, " m"], n: int) -> Float[Array, "n n"]:
-    """The antisymmetric matrix of a vector over pairs; its range is their plane."""
+    """Return the antisymmetric matrix of a vector over pairs; its range is their
+    plane.
+    """
     i, j = pairs(n)
     upper = jnp.zeros((n, n), w.dtype).at[i, j].set(w)
     return upper - upper.T
 
 
 def trace_on_plane(a: Float[Array, "n n"], w: Float[Array, " m"]):
-    """l_i + l_j of the pair of eigenvalues whose plane w is."""
+    """Return l_i + l_j of the pair of eigenvalues with the invariant plane w."""
     p = plane(w, a.shape[0])
     return jnp.sum(p * (a @ p + p @ a.T)) / jnp.sum(p * p)
 
 
 def determinant_on_plane(a: Float[Array, "n n"], w: Float[Array, " m"]):
-    """l_i l_j of the pair of eigenvalues whose plane w is."""
+    """Return l_i l_j of the pair of eigenvalues with the invariant plane w."""
     p = plane(w, a.shape[0])
     return jnp.sum(p * (a @ p @ a.T)) / jnp.sum(p * p)

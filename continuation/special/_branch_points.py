@@ -1,4 +1,4 @@
-"""Branch points as regular solutions of a larger problem."""
+"""Compute branch points as regular solutions of a larger problem."""
 
 from typing import Any, ClassVar
 
@@ -69,8 +69,9 @@ _crossing: Any = BranchPoints
 def solved_crossing(
     problem: AbstractProblem, context: Context, guess
 ) -> tuple[np.ndarray, bool]:
-    """The branch point near z = (u, parameter), by Newton's method with its second
-    derivatives, and whether it is one."""
+    """Find the branch point near z = (u, parameter) by Newton's method with second
+    derivatives, and whether it succeeded.
+    """
     at = _at(problem, context, guess)
     if not np.all(np.isfinite(at.jacobian)):
         return guess, False
@@ -85,16 +86,16 @@ def solved_crossing(
 def differenced_crossing(
     problem: AbstractProblem, context: Context, guess
 ) -> tuple[np.ndarray, bool]:
-    """The same with differences of Jacobians, by the program of the corrector.
+    """Find the branch point with differences of Jacobians, by the corrector's program.
 
-    The second derivatives are taken once; the iteration is linear, and fast from next
-    to the branch point, where bracketing ends because the equations are singular.
+    The second derivatives are taken once; convergence is linear, and fast near the
+    branch point, where bracketing ends because the equations are singular.
     """
     guess = np.asarray(guess, float)
     at = _at(problem, context, guess)
     if not np.all(np.isfinite(at.jacobian)):
         return guess, False
-    # rows and columns scaled as the corrector does it
+    # rows and columns scaled as in the corrector
     n, scale = guess.size - 1, np.asarray(at.scale)
     rows = scale[:-1, None]
 

@@ -1,4 +1,4 @@
-"""Derivatives of a matrix function along a line, by differences with extrapolation."""
+"""Compute derivatives of a matrix function along a line by extrapolated differences."""
 
 from collections.abc import Callable
 
@@ -12,7 +12,7 @@ STEPS = 8
 def along(
     matrices: Callable[[np.ndarray], np.ndarray], direction: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """First and second derivative of a matrix along a direction.
+    """Compute the first and second derivative of a matrix along a direction.
 
     Central differences at distances that are halved, extrapolated to zero as often as
     that still helps (Ridders, Advances in Engineering Software 4, 1982): with Jacobians
@@ -36,7 +36,7 @@ def along(
 
 
 def _limit(values: np.ndarray) -> np.ndarray:
-    """The limit of values at distances h, h/2, ..., even in the distance."""
+    """Return the limit of values at distances h, h/2, ..., even in the distance."""
     best, error = np.full_like(values[0], np.nan), np.inf
     row = [values[0]]
     for value in values[1:]:

@@ -1,4 +1,4 @@
-"""Extend a problem by one more unknown, the parameter."""
+"""Extend a problem by one unknown, the parameter."""
 
 from typing import ClassVar
 
@@ -57,6 +57,6 @@ class AbstractExtended(AbstractProblem):
 
 
 def varied(problem: AbstractProblem, z) -> tuple[float, ...]:
-    """Values of the parameters that vary, at z = (u, parameter): two on a curve."""
+    """Return values of the varying parameters at z = (u, parameter): two on a curve."""
     first = (float(z[-2]),) if isinstance(problem, AbstractExtended) else ()
     return *first, float(z[-1])

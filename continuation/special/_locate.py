@@ -1,4 +1,4 @@
-"""Locating special points between two points of a branch."""
+"""Locate special points between two points of a branch."""
 
 from typing import Any, NamedTuple
 
@@ -36,7 +36,9 @@ class Located(NamedTuple):
 def singular_points(
     problem: AbstractProblem, kind: str, context: Context, z: np.ndarray
 ) -> SingularPoints:
-    """The extended problem of a kind of special point, with borders from near it."""
+    """Return the extended problem of a kind of special point, with borders from near
+    it.
+    """
     m = matrix_at(problem, kind, context.leaf, z)
     border = np.zeros(m.shape[0])
     empty = _singular(
@@ -52,7 +54,7 @@ def singular_points(
 
 
 def _newton(problem, name: str, context: Context, guess: np.ndarray):
-    """Newton on the extended system: (z, success)."""
+    """Apply Newton's method to the extended system: (z, success)."""
     if name == BRANCH_POINT:
         return solved_crossing(problem, context, guess)
     if name in problem.monitors():
@@ -71,7 +73,7 @@ def locate(
     b: Corrected,
     values: tuple[float, float],
 ) -> Located:
-    """The zero of a test function between points a and b of a branch.
+    """Locate the zero of a test function between points a and b of a branch.
 
     Newton on the extended system, from the secant's estimate; where that fails or
     leaves the bracket, the bracket is shrunk with points of the branch first.
@@ -124,7 +126,7 @@ def _between_branches(
     b: Corrected,
     guess: np.ndarray,
 ) -> Located:
-    """The branch point near where bracketing has come to its end."""
+    """Find the branch point near the end of the bracketing."""
     z, success = differenced_crossing(problem, context, guess)
     if success and _inside(z, a.z, b.z, a.scale):
         return Located(z, True, "")
@@ -174,10 +176,10 @@ def ahead(
     problem: AbstractProblem, name: str, context: Context, a: Corrected, value: float,
     reach: float,
 ) -> Located | None:  # fmt: skip
-    """The zero of a monitor within `reach` ahead of a point of the branch, if any.
+    """Find the zero of a monitor within `reach` ahead of a point of the branch, if any.
 
-    For monitors that do not change sign or end the branch: where nothing exists behind
-    the zero, or not even at it, it is approached from this side, level by level.
+    For monitors that do not change sign or end the branch: the solution may not exist
+    at or beyond the zero, which is approached from this side, level by level.
     """
     z, level, failures = a.z, value, 0
 
@@ -196,7 +198,7 @@ def ahead(
         target = level * (0.1 if failures == 0 else 0.5)
         found, success, near = reached(target)
         if near:
-            # the rest of the way, which is as short as it can be told
+            # the remaining distance, at the limit of resolution
             rest = target / (level - target) * (found - z)
             z, level = found, target
             if float(np.linalg.norm(rest / a.scale)) <= context.settings.tolerance:

@@ -1,4 +1,4 @@
-"""Points at which a monitor is zero, as solutions of a larger problem."""
+"""Compute points at which a monitor is zero as solutions of a larger problem."""
 
 from typing import Any, ClassVar
 
@@ -53,8 +53,8 @@ class MonitorPoints(AbstractExtended):
 class MonitorLevel(AbstractProblem):
     """The point (u, parameter) on a branch where a monitor has some value.
 
-    The number of the monitor is an array where no derivative of one is costly, so that
-    one program finds the zeros of all.
+    The number of the monitor is an array unless derivatives of a monitor are costly, so
+    that one program finds the zeros of all.
     """
 
     base: AbstractProblem
@@ -89,7 +89,7 @@ _level: Any = MonitorLevel
 def monitor_level(
     problem: AbstractProblem, name: str, context: Context, level: float = 0.0
 ) -> MonitorLevel:
-    """The problem of the point where a monitor has this value."""
+    """Return the problem of the point where a monitor has this value."""
     monitors = problem.monitors()
     number: Any = list(monitors).index(name)
     if not any(monitor.bracket for monitor in monitors.values()):

@@ -1,10 +1,10 @@
-"""Second and third derivatives of a vector function along given directions."""
+"""Compute second and third derivatives of a vector function along directions."""
 
 import jax
 
 
 def second(function, u, a, b):
-    """B(a, b), the second derivative at u."""
+    """Return B(a, b), the second derivative at u."""
 
     def first(u):
         return jax.jvp(function, (u,), (a,))[1]
@@ -13,5 +13,5 @@ def second(function, u, a, b):
 
 
 def third(function, u, a, b, c):
-    """C(a, b, c), the third derivative at u."""
+    """Return C(a, b, c), the third derivative at u."""
     return jax.jvp(lambda u: second(function, u, a, b), (u,), (c,))[1]

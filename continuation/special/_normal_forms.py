@@ -1,4 +1,4 @@
-"""Normal-form coefficients at special points (Kuznetsov, chapters 3 to 5)."""
+"""Compute normal-form coefficients at special points (Kuznetsov, chapters 3 to 5)."""
 
 from collections.abc import Callable
 from typing import Any
@@ -37,23 +37,23 @@ def _c(problem, parameters, u, a, b, c):
 
 @eqx.filter_jit
 def _jacobians(problem, parameters, u, moves):
-    """The Jacobian of the local map next to a solution, displaced by these."""
+    """Return the Jacobian of the local map at displacements from a solution."""
     local = problem.local_dynamics(u, parameters)
     return jax.lax.map(lambda move: local.jacobian(local.at + move), moves)
 
 
 def _parts(x: Any):
-    """Real vectors and their factors that make up a complex vector."""
+    """Split a complex vector into real vectors and their factors."""
     if np.isrealobj(x):
         return [(1.0, x)]
     return [(1.0, x.real), (1j, x.imag)]
 
 
 class _Derivatives:
-    """A, B and C of a problem at a point, for complex arguments too.
+    """The derivatives A, B, C of a problem at a point, also for complex arguments.
 
-    By nested differentiation, or where the problem says that this is costly by
-    differences of Jacobians.
+    They come from nested differentiation, or from differences of Jacobians if the
+    problem sets `costly`.
     """
 
     def __init__(self, problem: AbstractProblem, context: Context, z: np.ndarray):
@@ -113,7 +113,9 @@ class _Derivatives:
         )  # fmt: skip
 
     def _along(self, direction, of_residual: bool = False):
-        """First and second derivative of the Jacobian along a real direction."""
+        """Compute the first and second derivative of the Jacobian along a real
+        direction.
+        """
         length = float(np.max(np.abs(direction)))
         if length == 0:
             n = direction.size
@@ -127,7 +129,7 @@ class _Derivatives:
         return np.asarray(_jacobians(self.problem, self.parameters, self.u, moves))
 
     def _residual_jacobians(self, moves: np.ndarray) -> np.ndarray:
-        """By the program of the corrector, which need not be compiled again."""
+        """Use the program of the corrector, which is already compiled."""
         n, one = moves.shape[1], np.ones_like(self.z)
         return np.stack(
             [
@@ -140,8 +142,9 @@ class _Derivatives:
 
 
 def _critical_pair(a: np.ndarray, distance: Callable) -> tuple[Any, Any] | None:
-    """The eigenvalue of a complex pair that has the least distance, and its unit
-    eigenvector; None where there is no such pair."""
+    """Return the eigenvalue of the complex pair closest to critical, and its unit
+    eigenvector; None without such a pair.
+    """
     found: Any = np.linalg.eig(a)
     values, vectors = (x.astype(complex) for x in found)
     critical = values.imag > 0
@@ -152,7 +155,7 @@ def _critical_pair(a: np.ndarray, distance: Callable) -> tuple[Any, Any] | None:
 
 
 def _adjoint(matrix: np.ndarray, q: np.ndarray) -> np.ndarray:
-    """The left null vector p with <p, q> = 1."""
+    """Return the left null vector p with <p, q> = 1."""
     _, p = null_vectors(matrix)
     return p / np.conj(np.vdot(p, q))
 
@@ -169,7 +172,9 @@ def flip_direction(linearisation: np.ndarray) -> np.ndarray:
 
 
 def fold_form(d: _Derivatives, at: Corrected) -> tuple[float | None, str]:
-    """Coefficient a of x' = a x^2 or x -> x + a x^2, and where the branch opens."""
+    """Return coefficient a of x' = a x^2 or x -> x + a x^2, and the side of the
+    branch.
+    """
     n, jacobian, problem = at.jacobian.shape[0], at.jacobian, d.problem
     right, left = null_vectors(jacobian[:, :n])
     bending = float(left @ d.b(right, right, True))
@@ -191,7 +196,9 @@ def fold_form(d: _Derivatives, at: Corrected) -> tuple[float | None, str]:
 
 
 def flip_form(d: _Derivatives, at: Corrected) -> tuple[float | None, str]:
-    """Coefficient c of x -> -x + c x^3; positive: the doubled orbit is stable."""
+    """Return coefficient c of x -> -x + c x^3; positive: the doubled orbit is
+    stable.
+    """
     a = d.a(at)
     one = np.eye(a.shape[0])
     right, left = null_vectors(a + one)
@@ -202,7 +209,7 @@ def flip_form(d: _Derivatives, at: Corrected) -> tuple[float | None, str]:
 
 
 def hopf_form(d: _Derivatives, at: Corrected) -> tuple[float | None, str]:
-    """First Lyapunov coefficient; negative: the limit cycle is stable."""
+    """Return the first Lyapunov coefficient; negative: the limit cycle is stable."""
     a = d.a(at)
     one = np.eye(a.shape[0])
     pair = _critical_pair(a, lambda values: np.abs(values.real))
@@ -222,7 +229,9 @@ def hopf_form(d: _Derivatives, at: Corrected) -> tuple[float | None, str]:
 
 
 def neimark_sacker_form(d: _Derivatives, at: Corrected) -> tuple[float | None, str]:
-    """Real part of the cubic coefficient; negative: the invariant curve is stable."""
+    """Return the real part of the cubic coefficient; negative: stable invariant
+    curve.
+    """
     a = d.a(at)
     one = np.eye(a.shape[0])
     pair = _critical_pair(a, lambda values: np.abs(np.abs(values) - 1))
@@ -256,7 +265,9 @@ def normal_form(
     z: np.ndarray,
     at: Corrected,
 ) -> tuple[float | None, str]:
-    """Normal-form coefficient of a special point, and what its sign says."""
+    """Return the normal-form coefficient of a special point, and the meaning of its
+    sign.
+    """
     if kind not in _FORMS or (kind != FOLD and not problem.normal_forms):
         return None, ""
     try:

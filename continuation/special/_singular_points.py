@@ -1,4 +1,4 @@
-"""Points at which a matrix is singular, as regular solutions of a larger problem."""
+"""Compute points with a singular matrix as regular solutions of a larger problem."""
 
 from typing import ClassVar
 
@@ -28,7 +28,7 @@ _LARGEST_FOR_PAIRS = 8
 
 
 def singular_matrix(problem, kind: str, u, parameters):
-    """The matrix that is singular at this kind of point."""
+    """Return the matrix that is singular at this kind of point."""
     jacobian = jacobian_of(problem, u, parameters)
     if kind == FOLD:
         return jacobian
@@ -49,7 +49,9 @@ def _singular_matrix(problem, kind: str, leaf: int, z):
 
 
 def matrix_at(problem, kind: str, leaf: int, z) -> np.ndarray:
-    """The matrix that is singular at this kind of point, compiled; z = (u, p)."""
+    """Return the matrix that is singular at this kind of point, compiled; z = (u,
+    p).
+    """
     return np.asarray(_singular_matrix(problem, kind, leaf, np.asarray(z)))
 
 
@@ -99,7 +101,7 @@ class SingularPoints(AbstractExtended):
         base = set_parameters(self.base, parameters)
         m = matrix_at(base, self.kind, self.leaf, u)
         left, _, right = np.linalg.svd(m)
-        # signs continue, so that test functions made of null vectors do
+        # signs are continued, so that test functions of null vectors are continuous
         b = left[:, -1] * (-1.0 if left[:, -1] @ np.asarray(self.b) < 0 else 1.0)
         c = right[-1] * (-1.0 if right[-1] @ np.asarray(self.c) < 0 else 1.0)
         return with_field(with_field(self, "b", b), "c", c)
@@ -148,7 +150,7 @@ class SingularPoints(AbstractExtended):
             names["opposite"] = "1:2 resonance"
             names["third"] = "1:3 resonance"
             names["fourth"] = "1:4 resonance"
-        # behind these the pair is real, and the points are neutral saddles
+        # beyond these the pair is real, and the points are neutral saddles
         last = ("double", "opposite") if self.kind in (HOPF, NEIMARK_SACKER) else ()
         found = {k: Monitor(v, ends=k in last) for k, v in names.items()}
         for name, monitor in self.base.monitors().items():

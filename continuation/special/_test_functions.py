@@ -1,4 +1,4 @@
-"""Test functions: they change sign at special points."""
+"""Evaluate test functions, which change sign at special points."""
 
 from typing import Any
 
@@ -20,7 +20,7 @@ _HUGE = 1e100
 
 
 def kinds(problem: AbstractProblem) -> tuple[str, ...]:
-    """Special points that are detected, besides those of the problem's monitors."""
+    """Return the kinds of special points detected in addition to the monitors."""
     if not problem.detects:
         return ()
     common = (BRANCH_POINT, FOLD)
@@ -29,18 +29,16 @@ def kinds(problem: AbstractProblem) -> tuple[str, ...]:
 
 
 def has_own_dynamics(problem: AbstractProblem) -> bool:
-    """Return whether normal forms are those of another map than the linearisation is
-    of.
-    """
+    """Return whether normal forms and linearisation belong to different maps."""
     return type(problem).local_dynamics is not AbstractProblem.local_dynamics
 
 
 def test_values(problem: AbstractProblem, leaf: int, at: Corrected) -> dict[str, float]:
     """Values of all test functions at a point.
 
-    Those of eigenvalues are symmetric in them, products over all eigenvalues or pairs
-    (as the determinant of a bialternate product is), so none has to be followed. Only
-    their signs are used; the size is that of the smallest factor.
+    Test functions of eigenvalues are symmetric, products over all eigenvalues or pairs
+    (such as the determinant of a bialternate product), so no single eigenvalue has to
+    be tracked. Only their signs are used; the size is that of the smallest factor.
     """
     values = {name: float(value) for name, value in at.monitors.items()}
     wanted = kinds(problem)
@@ -62,7 +60,7 @@ def test_values(problem: AbstractProblem, leaf: int, at: Corrected) -> dict[str,
 
 
 def _product(factors: np.ndarray) -> float:
-    """A number with the sign of the (real) product."""
+    """Return a number with the sign of the (real) product."""
     sizes = np.abs(factors)
     if not factors.size or not np.all(sizes > 0):
         return 0.0
@@ -73,15 +71,13 @@ def _product(factors: np.ndarray) -> float:
 def eigenvalues_at(
     problem: AbstractProblem, leaf: int, at: Corrected
 ) -> tuple[Any, str]:
-    """Eigenvalues at a point of a branch, and what is to be known of them."""
+    """Return eigenvalues at a point of a branch, and a remark on them."""
     parameters = with_leaf(problem.parameters, leaf, np.asarray(at.z[-1]))
     return problem.eigenvalues(at.z[:-1], parameters, at)
 
 
 def is_stable(problem: AbstractProblem, eigenvalues: Any) -> bool | None:
-    """Return whether all eigenvalues are on the stable side; None where that means
-    nothing.
-    """
+    """Return whether all eigenvalues are on the stable side; None if undefined."""
     if problem.stability == "none" or not np.all(np.isfinite(eigenvalues)):
         return None
     if problem.stability == "map":

@@ -1,4 +1,4 @@
-"""The parameter along which a command goes: its unit, its bounds, its name."""
+"""Name, unit and bounds of the parameter that a command varies."""
 
 import math
 from typing import NamedTuple
@@ -10,7 +10,7 @@ from ._choices import CAM
 class Axis(NamedTuple):
     """A parameter in the unit of the command line.
 
-    Speeds are rpm there and rad/s inside; all others are as they are.
+    The command line gives speeds in rpm, which become rad/s; other parameters are SI.
     """
 
     parameter: str
@@ -19,7 +19,7 @@ class Axis(NamedTuple):
 
     @staticmethod
     def of(parameter: str, system: str) -> "Axis":
-        """The axis of a parameter of a system, by their names."""
+        """Return the axis of a parameter of a system, both given by name."""
         in_rpm = parameter == "speed" and system == CAM
         return Axis(parameter, math.pi / 30 if in_rpm else 1.0)
 
@@ -39,7 +39,7 @@ class Axis(NamedTuple):
 
 
 def ordered_bounds(low: float | None, high: float | None) -> tuple[float, float]:
-    """`--from` and `--to`, both given and in order. **Raises:** `ValueError`."""
+    """Return `--from` and `--to` in order. **Raises:** `ValueError`."""
     if low is None or high is None:
         raise ValueError(
             "Give the lowest and the highest value of the parameter: --from A --to B."
@@ -48,7 +48,7 @@ def ordered_bounds(low: float | None, high: float | None) -> tuple[float, float]
     check_finite("--to", high)
     if not low < high:
         raise ValueError(
-            f"--from {low:g} --to {high:g} is the wrong way round; give the lower "
+            f"--from {low:g} --to {high:g} has the higher value first; give the lower "
             "value first and choose --direction."
         )
     return low, high

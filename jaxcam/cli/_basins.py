@@ -106,7 +106,9 @@ def _count(made) -> int:
 
 
 def _entropy(made, shape) -> dict | None:
-    """Entropy of the boundary along the components that vary; None on a coarse grid."""
+    """Compute the boundary entropy over the varying components; None on a coarse
+    grid.
+    """
     from ..sweeps import basin_entropy
 
     if min(k for k in shape if k > 1 or max(shape) == 1) < 5:
@@ -129,7 +131,7 @@ def _attractors(made, shares) -> list[dict]:
 
 
 def _points(orbit):
-    """Points of an orbit, without what it is filled up with."""
+    """Return the points of an orbit without its padding."""
     import numpy as np
 
     if orbit is None:

@@ -1,4 +1,4 @@
-"""The options of `jaxcam basins`, and what is asked of their values."""
+"""Options of `jaxcam basins` and checks of their values."""
 
 import dataclasses
 from typing import Annotated
@@ -9,7 +9,7 @@ from ._checks import at_least, check_size, numbers
 from ._choices import CAM
 
 
-# where something happens, for systems where nothing is said
+# default corners: a region with impacts
 _BOXES = {
     CAM: ((0.33, -3.0), (0.55, 3.0)),
     "impact-oscillator": ((-1.0, -2.0), (0.0, 2.0)),
@@ -18,7 +18,7 @@ _BOXES = {
 
 @dataclasses.dataclass(frozen=True)
 class Cells:
-    """The grid of initial states, and how long each is followed."""
+    """The grid of initial states, and the duration of each run."""
 
     low: Annotated[
         str | None, typer.Option(metavar="A,B", help="Lower corner of the grid.")
@@ -47,7 +47,7 @@ class Cells:
         """
 
         Raises:
-            ValueError: That names the option at fault.
+            ValueError: An option is invalid; the message names it.
         """
         self.corners(system)
         cells = self.counts
@@ -57,7 +57,7 @@ class Cells:
         check_size("--shape and --keep", *(max(1, k) for k in cells), self.keep)
 
     def corners(self, system: str) -> tuple[tuple[float, ...], tuple[float, ...]]:
-        """Lowest and highest state, those of the system where none are given."""
+        """Return the lowest and highest state; default those of the system."""
         box = _BOXES.get(system)
         if box is None and (self.low is None or self.high is None):
             raise ValueError(

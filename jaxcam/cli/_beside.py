@@ -1,4 +1,4 @@
-"""Work in a process of its own, parallel to that of a command."""
+"""Run work in a separate process, parallel to that of the command."""
 
 import multiprocessing
 from collections.abc import Callable, Iterator
@@ -15,14 +15,15 @@ T = TypeVar("T")
 def beside(
     work: Callable[[Path], T], folder: Path | None
 ) -> Iterator[Callable[[], T | None]]:
-    """Begin `work(folder)` in another process; the function given waits for its result.
+    """Start `work(folder)` in another process; return a function that awaits the
+    result.
 
     Without a folder nothing is done and the result is `None`.
     """
     if folder is None:
         yield lambda: None
         return
-    # a fork would share the threads of a compiler that is at work already
+    # a fork would share the threads of a compiler that is already running
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(1, mp_context=context) as pool:
         running = pool.submit(work, folder)

@@ -1,4 +1,4 @@
-"""Compiled programs are kept on disk, so that a second run starts at once."""
+"""Keep compiled programs on disk, so that a second run starts at once."""
 
 import os
 import warnings
@@ -7,8 +7,8 @@ import warnings
 def keep_compiled_programs() -> None:
     """Turn on JAX's compilation cache, in the user's cache folder.
 
-    A folder named by `JAX_COMPILATION_CACHE_DIR` is left as it is. Without a place to
-    write there is no cache, and everything is compiled anew.
+    A folder named by `JAX_COMPILATION_CACHE_DIR` is left as it is. If no folder is
+    writable there is no cache, and everything is compiled again.
     """
     import jax
 

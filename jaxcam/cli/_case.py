@@ -1,4 +1,4 @@
-"""The recordings of a case and the rig they are of, as commands name them."""
+"""Read the recordings of a case and the description of their rig."""
 
 from pathlib import Path
 
@@ -6,15 +6,15 @@ from ._files_options import Files
 
 
 def read(case: Path, rig: Path | None, files: Files, system: str | None = None):
-    """The runs of a folder or of one file, and the rig as its maker states it.
+    """Read the runs of a folder or of one file, and the rig file.
 
-    **Arguments:** `system` is `FILE.py:CLASS`, in the place of that of the rig file.
+    **Arguments:** `system` is `FILE.py:CLASS` and replaces the system of the rig file.
 
     Returns:
         A `Case`, and a `Rig` or a `Setup`.
 
     Raises:
-        ValueError: That names the file at fault and the fix.
+        ValueError: A file is invalid; the message names it and the fix.
     """
     from ..fitting import is_setup, read_setup
     from ..recordings import read_rig
@@ -31,7 +31,7 @@ def read(case: Path, rig: Path | None, files: Files, system: str | None = None):
 
 
 def _runs(case: Path, channels, files: Files, layout):
-    """The recordings; what the command line says of them comes first."""
+    """Read the recordings; options of the command line take precedence."""
     from ..recordings import read_case
     from ..recordings.files import Case, read_recordings
 

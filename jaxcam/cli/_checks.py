@@ -4,17 +4,17 @@ import math
 from pathlib import Path
 
 
-# numbers that a sweep keeps; a few of 8 bytes each fit into the memory of a laptop
+# largest number of values kept by a sweep: 8 bytes each must fit into a laptop's memory
 _MOST = 2 * 10**8
 
 
 def numbers(
     option: str, text: str, example: str, finite: bool = True
 ) -> tuple[float, ...]:
-    """Numbers with commas between them. **Raises:** `ValueError`.
+    """Parse numbers separated by commas. **Raises:** `ValueError`.
 
-    **Arguments:** `finite`: refuse those that are not; a system refuses them, too, in
-    words of its own.
+    **Arguments:** `finite`: reject non-finite numbers; a system rejects them too, with
+    its own message.
     """
     try:
         found = tuple(float(part) for part in text.split(","))
@@ -39,7 +39,7 @@ def check_finite(option: str, value: float | None) -> None:
 
 
 def check_size(options: str, *counts: int) -> None:
-    """Refuse a sweep that would not fit into memory, before it is tried."""
+    """Reject a sweep that would not fit into memory, before it starts."""
     if math.prod(counts) > _MOST:
         raise ValueError(
             f"{options} are {' times '.join(f'{float(c):.6g}' for c in counts)} "

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 
 class Ready(NamedTuple):
-    """A system with a name, and how it is started where nothing else is said."""
+    """A named system and its default start."""
 
     model: str
     state: tuple[float, ...] | None
@@ -30,12 +30,12 @@ SOLVERS = {
 }
 ENGINES = ("loop", "diffeqsolve")
 CAM = "cam-follower"
-# more names than these are not read
+# longer lists are cut
 _LISTED = 20
 
 
 def choose(option: str, name: str, known: Iterable[str]) -> str:
-    """The name, if it is known. **Raises:** `ValueError` that lists those that are."""
+    """Return a known name. **Raises:** `ValueError` that lists the known names."""
     known = tuple(known)
     if name in known:
         return name
@@ -47,14 +47,12 @@ def choose(option: str, name: str, known: Iterable[str]) -> str:
 
 
 def ready(name: str) -> Ready:
-    """Return the start of a system; one's own from its release point, for ten
-    periods.
-    """
+    """Return the default start; for a user's system release, and ten periods."""
     return SYSTEMS.get(name, Ready(name, None, 10.0, 0.0))
 
 
 def make_solver(name: str):
-    """A diffrax solver. **Raises:** `ValueError` that lists the names."""
+    """Return a diffrax solver. **Raises:** `ValueError` that lists the names."""
     import diffrax
 
     return getattr(diffrax, SOLVERS[choose("--solver", name, SOLVERS)])()

@@ -109,7 +109,7 @@ def _refuse_interrupted(path: Path) -> None:
     """
 
     Raises:
-        ValueError: Where the branch that a folder holds has no end.
+        ValueError: The folder holds an interrupted branch.
     """
     import continuation
 

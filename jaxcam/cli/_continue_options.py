@@ -1,4 +1,4 @@
-"""The options of `jaxcam continue`, and what is asked of their values."""
+"""Options of `jaxcam continue` and checks of their values."""
 
 import dataclasses
 from typing import Annotated
@@ -21,7 +21,7 @@ DIRECTIONS = {"up": 1, "down": -1, "both": "both"}
 
 @dataclasses.dataclass(frozen=True)
 class BranchRange:
-    """The parameter, its bounds, and where the branch starts."""
+    """The parameter, its bounds, and its value at the start."""
 
     parameter: Annotated[
         str,
@@ -41,14 +41,14 @@ class BranchRange:
 
     @property
     def bounds(self) -> tuple[float, float]:
-        """Lowest and highest value."""
+        """Return the lowest and highest value."""
         return ordered_bounds(self.low, self.high)
 
     def started(self, model, axis: Axis):
-        """The system with the parameter at its first value.
+        """Return the system with the parameter at its first value.
 
         Raises:
-            ValueError: For no such parameter, or a start outside.
+            ValueError: The parameter is unknown, or the start is out of bounds.
         """
         import equinox as eqx
         import jax.numpy as jnp
@@ -74,7 +74,7 @@ class BranchRange:
 
 @dataclasses.dataclass(frozen=True)
 class Following:
-    """The orbit to begin with, and how its branch is followed."""
+    """The first orbit, and the settings of its branch."""
 
     state: Annotated[
         str | None,
@@ -103,7 +103,7 @@ class Following:
         """
 
         Raises:
-            ValueError: That names the option at fault.
+            ValueError: An option is invalid; the message names it.
         """
         choose("--direction", self.direction, DIRECTIONS)
         choose("--algorithm", self.algorithm, ALGORITHMS)
@@ -112,7 +112,7 @@ class Following:
 
     @property
     def guess(self):
-        """A state near the orbit, or None."""
+        """Return a state near the orbit, or None."""
         import numpy as np
 
         if self.state is None:

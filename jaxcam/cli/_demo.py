@@ -21,7 +21,8 @@ def demo(
     gaps: Annotated[
         str,
         typer.Option(
-            metavar="NAME", help="Runs with missing samples: refuse or split."
+            metavar="NAME",
+            help="Runs with missing samples: refuse (stop with an error) or split.",
         ),
     ] = "refuse",
     out: Annotated[
@@ -39,8 +40,8 @@ def demo(
     """
     Compare recordings with a model, diagnose it, and continue two orbits.
 
-    By default the simulated recordings that ship with the package. The report is
-    DIR/index.html, with the figures in it, and DIR/result.json; the diagnosis is in
+    By default, it uses the simulated recordings that ship with the package. The report
+    is DIR/index.html, with the figures in it, and DIR/result.json; the diagnosis is in
     DIR/diagnosis.
 
     \b

@@ -22,9 +22,9 @@ class Branches:
 
 HEADINGS = ("orbit", "what happens", "at (rpm)", "size of the largest multiplier")
 _CAPTION = (
-    "The rig of the thesis, path following: angle of the follower once a turn against "
-    "the speed of the cam. Stable orbits solid, unstable ones dashed. P(1,1) hits once "
-    "a turn, P(inf,1) chatters, sticks and is released again."
+    "Path following for the rig of the thesis: follower angle once per cycle against "
+    "the speed of the cam. Stable orbits solid, unstable ones dashed. P(1,1) has one "
+    "impact per cycle; P(inf,1) chatters, sticks and is released again."
 )
 
 

@@ -23,7 +23,7 @@ def draw(
     comparison: Comparison,
     simulated: Sequence[Trajectory],
 ) -> list[tuple[Path, str]]:
-    """Write all figures; each comes with its caption."""
+    """Write all figures, and return each with its caption."""
     found = []
 
     def keep(figure, name: str, caption: str) -> None:
@@ -52,7 +52,7 @@ def draw(
                 figure,
                 f"residual_by_mode_{against}",
                 f"Recording minus model by mode, against {_AGAINST[against]}. The "
-                "band is twice the noise on either side.",
+                "band is +-2 standard deviations of the noise.",
             )
     for motion in _slowest_and_fastest(simulated):
         rpm = float(rad_s_to_rpm(motion.system.speed))  # pyright: ignore
@@ -60,7 +60,7 @@ def draw(
         keep(
             plotting.time_history(motion, between=last(motion, 4.0)),
             f"time_history_{rpm:.1f}rpm",
-            f"The nominal rig at {at}: simulated motion, last turns.",
+            f"The nominal rig at {at}: simulated motion, last cycles.",
         )
         keep(
             plotting.phase_portrait(motion, between=last(motion, 12.0)),

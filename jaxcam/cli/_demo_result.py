@@ -1,4 +1,4 @@
-"""The result of `jaxcam demo`: computed, and as page, data and words."""
+"""Compute the result of `jaxcam demo`, and write it as page, data and text."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -17,7 +17,7 @@ from ._rests import rest_table, Rests, rests, simulate_run
 
 @dataclasses.dataclass(frozen=True)
 class DemoResult:
-    """Recordings compared with their rig's model, and the diagnosis."""
+    """Comparison of recordings with the model of their rig, and the diagnosis."""
 
     case: str
     segments: Sequence[Segments]
@@ -29,12 +29,14 @@ class DemoResult:
     simulated: bool = False
 
     def kind(self) -> str:
-        """Recordings, and whether they were measured."""
+        """Return the kind of the recordings: measured or simulated."""
         return "simulated recordings" if self.simulated else "recordings"
 
 
 def compared(runs, nominal: Rig, folder: Path, report) -> DemoResult:
-    """Cut the runs, simulate their flights and the whole rig, and draw all that."""
+    """Segment the runs, simulate their flights and the complete model, and draw
+    both.
+    """
     segments = segment_case(
         tuple(runs),
         nominal,
@@ -55,7 +57,7 @@ def compared(runs, nominal: Rig, folder: Path, report) -> DemoResult:
 
 
 def write_result(folder: Path, found: DemoResult) -> dict[str, Any]:
-    """Write index.html and result.json; what is in the latter."""
+    """Write index.html and result.json; return the data of the latter."""
     lacks, branches = found.lacks, found.branches
     result = {
         "command": "demo",
@@ -91,7 +93,7 @@ def write_result(folder: Path, found: DemoResult) -> dict[str, Any]:
 
 
 def print_result(output: Output, found: DemoResult) -> None:
-    """Tables and sentences for the terminal."""
+    """Print tables and sentences to the terminal."""
     if found.simulated:
         output.print("The recordings that ship with the package are simulated.")
     for run in found.segments:

@@ -21,7 +21,7 @@ def diagnose(
     predict: Annotated[
         bool,
         typer.Option(
-            help="Predict bifurcation speeds, with and without the missing physics."
+            help="Predict bifurcation speeds with and without the missing physics."
         ),
     ] = True,
     propose: Annotated[
@@ -89,16 +89,16 @@ def diagnose(
 
 
 def _kept_fits(out: Path | None, resume: bool) -> Path | None:
-    """The folder of fits that a run which is stopped leaves.
+    """Return the folder of the fits that a stopped run leaves.
 
     Raises:
-        ValueError: Where there is nothing to go on with, or something in the way.
+        ValueError: There is nothing to resume, or the folder holds a stopped run.
     """
     keep = None if out is None else out / "fits"
     if resume and (keep is None or not keep.is_dir()):
         raise ValueError(
-            "--resume: there is nothing to go on with; give --out the folder of a run "
-            "that was stopped, or leave --resume out to begin anew."
+            "--resume: there is nothing to resume; give --out the folder of a run "
+            "that was stopped, or leave --resume out to start again."
         )
     if keep is not None and not resume and any(keep.glob("*.npz")):
         raise ValueError(
@@ -109,7 +109,9 @@ def _kept_fits(out: Path | None, resume: bool) -> Path | None:
 
 
 def _outlook(found, nominal, predict: bool, propose: bool, seed: int, report):
-    """Speeds with and without what was found, and what to record next."""
+    """Predict bifurcation speeds with and without the found terms, and the next
+    record.
+    """
     from .. import discrepancy
     from ._outlook import Outlook
 

@@ -37,7 +37,7 @@ def write_verdict(
     notes: Sequence[str],
     outlook: Outlook = Outlook(),
 ) -> None:
-    """Write verdict.json, and index.html with figures that are drawn already."""
+    """Write verdict.json, and index.html with figures that already exist."""
     verdict = to_text({**found.to_json(), **outlook.data()})
     write_text(folder / "verdict.json", verdict + "\n")
     page = diagnosis_page(found, figures, tuple(notes), outlook)

@@ -25,7 +25,7 @@ _BINS = 36
 
 
 def unit_along(variable: str, motion: str) -> str:
-    """Unit of what a shape depends on, in a motion in this unit."""
+    """Return the unit of a shape's argument, for a motion in this unit."""
     of_drive = {Variable.PHASE: "rad", Variable.TIME: "s"}
     if variable in of_drive:
         return of_drive[Variable(variable)]
@@ -35,7 +35,7 @@ def unit_along(variable: str, motion: str) -> str:
 
 
 def draw(folder: Path, found: Diagnosis) -> list[tuple[Path, str]]:
-    """Write all figures; each comes with its caption."""
+    """Write all figures, and return each with its caption."""
     import matplotlib.pyplot as plt
 
     maps = _MAPS.format(Along(found.unseen[0]).word)
@@ -61,7 +61,7 @@ _MISSING = (
 _UNSEEN = (
     "Residuals on a record that no parameter has seen, one flight ahead: the textbook "
     "model refitted to the other records (above), and with what was found (below). The "
-    "band is twice the noise on either side."
+    "band is +-2 standard deviations of the noise."
 )
 _MAPS = (
     "Mean residual of each record by {}, in standard errors, before (left) and after "
@@ -108,7 +108,7 @@ def _unseen(plt, found: Diagnosis):
 
 
 def _improvement(pair: tuple[Residuals, Residuals]) -> float:
-    """Ratio of the mean squares of a record before and after."""
+    """Return the ratio of the mean squares of a record before and after."""
     before, after = (float(np.mean(part.value**2)) for part in pair)
     return before / max(after, 1e-300)
 
@@ -153,7 +153,7 @@ def _maps(plt, found: Diagnosis):
 
 
 def _sides(parts: Sequence[Residuals]) -> tuple[bool, ...]:
-    """Flight, and contact where there is any."""
+    """Return flight, and contact if the record has any."""
     return (False, True) if any(np.any(part.resting) for part in parts) else (False,)
 
 
@@ -195,7 +195,7 @@ def _missing(plt, found: Diagnosis):
 
 
 def _unit_of(one: MissingFunction, argument: str, motion: str) -> str:
-    """Unit of an argument of what is missing, in a motion in this unit."""
+    """Return the unit of an argument of a missing term, for a motion in this unit."""
     if argument == "frequency":
         return "Hz"
     if argument == "memory":

@@ -21,7 +21,7 @@ def diagnosis_page(
     notes: Sequence[str],
     outlook: Outlook = Outlook(),
 ) -> str:
-    """The page as text; nothing in it is loaded from elsewhere."""
+    """Return the page as text; it loads nothing from elsewhere."""
     title = f"{found.case or 'Recordings'}: {_title(found)}"
     parts = [
         f"<h1>{escape(title)}</h1>",

@@ -114,7 +114,7 @@ def diagram(
 def _sentence(system: str, made, axis: Axis, sweep: Sweep) -> str:
     import numpy as np
 
-    # with --dwell fewer periods fit into the seconds of slow values
+    # with --dwell, fewer periods fit into the time at low speeds
     total = int(np.prod(made.states.shape[:3]))
     if sweep.dwell is not None:
         total = int(np.isfinite(made.states[..., 0]).sum())
@@ -128,7 +128,7 @@ def _sentence(system: str, made, axis: Axis, sweep: Sweep) -> str:
 
 
 def _table(ranges, axis: Axis):
-    """The labels in the order in which they were met, not more than a screenful."""
+    """Tabulate the labels in the order of the parameter, at most a screenful."""
     from rich.table import Table
 
     table = Table(title=f"what motions settle on, by {axis.name}")

@@ -1,4 +1,4 @@
-"""The options of `jaxcam diagram`, and what is asked of their values."""
+"""Options of `jaxcam diagram` and checks of their values."""
 
 import dataclasses
 from typing import Annotated
@@ -58,7 +58,7 @@ class Sweep:
         """
 
         Raises:
-            ValueError: That names the option at fault.
+            ValueError: An option is invalid; the message names it.
         """
         choose("--direction", self.direction, DIRECTIONS)
         choose("--section", self.section, SECTIONS)
@@ -69,12 +69,12 @@ class Sweep:
 
     @property
     def bounds(self) -> tuple[float, float]:
-        """Lowest and highest value."""
+        """Return the lowest and highest value."""
         return ordered_bounds(self.low, self.high)
 
     @property
     def seconds(self) -> tuple[float, ...] | None:
-        """To wait and to store."""
+        """Return the seconds to wait and to store."""
         if self.dwell is None:
             return None
         found = numbers("--dwell", self.dwell, "60,10")
@@ -114,7 +114,7 @@ class Starts:
         """
 
         Raises:
-            ValueError: That names the option at fault.
+            ValueError: An option is invalid; the message names it.
         """
         at_least("--starts", self.starts, 1)
         at_least("--seed", self.seed, 0)
@@ -129,17 +129,17 @@ class Starts:
 
     @property
     def given(self) -> tuple[float, ...] | None:
-        """The one state to start from."""
+        """Return the single initial state."""
         return None if self.state is None else numbers("--state", self.state, "0.4,1.8")
 
     @property
     def box(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
-        """The corners between which random starts are drawn."""
+        """Return the corners of the box from which random starts are drawn."""
         low = numbers("--low", str(self.corner), "0.34,-2")
         return low, numbers("--high", str(self.opposite), "0.5,3")
 
     def states(self, sweep: Sweep):
-        """The states to start from, as [`jaxcam.sweeps.diagram`][] takes them."""
+        """Return the initial states as [`jaxcam.sweeps.diagram`][] takes them."""
         from ..sweeps import monte_carlo
 
         if self.starts is None:

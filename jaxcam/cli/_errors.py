@@ -1,4 +1,4 @@
-"""From exceptions to one sentence on the error stream and an exit code."""
+"""Turn exceptions into one sentence on standard error and an exit code."""
 
 import functools
 from collections.abc import Callable
@@ -31,7 +31,7 @@ _OPTIONS = (
 
 
 def one_sentence(command: Callable[_P, _R]) -> Callable[_P, _R]:
-    """A command that ends with a sentence where its input is at fault."""
+    """Wrap a command so that invalid input ends it with one sentence."""
 
     @functools.wraps(command)
     def wrapper(*args: _P.args, **kwargs: _P.kwargs) -> _R:
@@ -41,7 +41,7 @@ def one_sentence(command: Callable[_P, _R]) -> Callable[_P, _R]:
             fail("Stopped by Ctrl-C before the end; run it again to finish.")
             raise typer.Exit(INTERRUPTED) from None
         except BrokenPipeError:
-            # whoever read the output has seen enough (jaxcam ... | head)
+            # the reader of the pipe has closed it (jaxcam ... | head)
             raise
         except OSError as error:
             fail(_about_file(error))
@@ -56,9 +56,9 @@ def one_sentence(command: Callable[_P, _R]) -> Callable[_P, _R]:
 
 
 def fail(message: str) -> None:
-    """Print one line on the error stream."""
+    """Print one line on standard error."""
     line = " ".join(map(_shortened, message.split()))
-    # what stands in a file or an argument does not steer the terminal
+    # control characters of a file or an argument must not reach the terminal
     line = "".join(c if c.isprintable() else "?" for c in line)
     for python, option in _OPTIONS:
         line = line.replace(python, option)
@@ -66,7 +66,7 @@ def fail(message: str) -> None:
 
 
 def _shortened(word: str) -> str:
-    """Paths have a few hundred letters at most; a longer message is not read."""
+    """Shorten a message that contains an excessively long path."""
     return word if len(word) <= 300 else f"{word[:40]}...{word[-20:]}"
 
 

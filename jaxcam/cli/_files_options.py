@@ -1,4 +1,4 @@
-"""Options of commands that read recordings: how the columns of their files are read."""
+"""Options for reading the columns of recordings."""
 
 import dataclasses
 import math
@@ -38,25 +38,25 @@ class Files:
         """
 
         Raises:
-            ValueError: That names the option at fault.
+            ValueError: An option is invalid; the message names it.
         """
         choose("--gaps", self.gaps, ("mend", "refuse", "split"))
         if self.rate is not None and not (math.isfinite(self.rate) and self.rate > 0):
             raise ValueError(
-                f"--rate is {self.rate:g}; give samples a second, such as 200."
+                f"--rate is {self.rate:g}; give samples per second, such as 200."
             )
         self.named()
 
     @property
     def how(self) -> Literal["mend", "refuse", "split"]:
-        """`gaps` as readers take it."""
+        """Return `gaps` as readers take it."""
         return self.gaps  # pyright: ignore
 
     def named(self) -> list[str] | dict[str, tuple[str, float]] | None:
-        """`--columns` as readers take it.
+        """Return `--columns` as readers take it.
 
         Raises:
-            ValueError: For names and pairs together, or a factor that is none.
+            ValueError: Names and pairs are mixed, or a factor is not a number.
         """
         if self.columns is None:
             return None

@@ -19,7 +19,7 @@ def fit(
     bootstrap: Annotated[
         int,
         typer.Option(
-            metavar="N", help="Weight flights at random N times, for other errors."
+            metavar="N", help="Standard errors from N Bayesian bootstrap replicates."
         ),
     ] = 0,
     json_file: Annotated[
@@ -58,8 +58,8 @@ def fit(
     if rig is None and system is None and is_table(case, files):
         if out is not None or bootstrap:
             raise ValueError(
-                f"{case} is a table of impacts, of which there are no figures and no "
-                f"redrawn flights; leave out --out and --bootstrap."
+                f"{case} is a table of impacts, without figures and bootstrap; "
+                f"leave out --out and --bootstrap."
             )
         fit_impacts(case, files, json_file)
         return

@@ -9,17 +9,17 @@ from ._output import Output
 
 
 def is_table(case: Path, files: Files) -> bool:
-    """Return whether a file with one impact a row is meant, and no recording."""
+    """Return whether a file is a table with one impact per row."""
     from ..recordings.files import is_impact_table
 
     return case.is_file() and is_impact_table(case, files.named())
 
 
 def fit_impacts(case: Path, files: Files, json_file: Path | None) -> None:
-    """Print the law that the impacts support, and write it as data.
+    """Print the restitution law that the impacts support, and write it as data.
 
     Raises:
-        ValueError: That names the row at fault and the fix.
+        ValueError: The table is invalid; the message names the row and the fix.
     """
     from ..fitting import impact_law
     from ..recordings import read_impacts
@@ -32,7 +32,7 @@ def fit_impacts(case: Path, files: Files, json_file: Path | None) -> None:
         table.add_column(heading, justify="right")
     for name, gain in found.delta_bic.items():
         law = found.laws.get(name)
-        cells = "the constant one"
+        cells = "the constant law"
         if law is not None:
             rows = zip(law.names, law.values, law.stderr)
             cells = ", ".join(f"{n} = {v:.5g} +- {e:.1g}" for n, v, e in rows)

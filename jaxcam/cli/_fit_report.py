@@ -14,7 +14,7 @@ from ._residual_axes import Along, residual_label, shown_in, title_of
 
 
 def parameter_table(problem: Problem, found: Fit, again: Bootstrap | None) -> Table:
-    """Nominal and fitted values with their errors."""
+    """Tabulate nominal and fitted values with their errors."""
     table = Table(title="Parameters")
     table.add_column("parameter", no_wrap=True)
     headings = ["nominal", "tolerance", "fitted", "stderr"]
@@ -39,7 +39,7 @@ def parameter_table(problem: Problem, found: Fit, again: Bootstrap | None) -> Ta
 
 
 def correlation_table(found: Fit) -> Table:
-    """The strongest correlations, which say what cannot be distinguished."""
+    """Tabulate the strongest correlations between parameters."""
     table = Table(title="Strongest correlations")
     for heading in ("one", "other"):
         table.add_column(heading, no_wrap=True)
@@ -56,7 +56,9 @@ def correlation_table(found: Fit) -> Table:
 
 
 def draw(folder: Path, before: Fit, after: Fit) -> list[Path]:
-    """Residuals of each record before and after the fit, against time and drive."""
+    """Draw residuals of each record before and after the fit, over time and drive
+    angle.
+    """
     import matplotlib.pyplot as plt
 
     from ..plotting import save_figure, style

@@ -1,4 +1,4 @@
-"""The result of `jaxcam fit`: computed, and as words and data."""
+"""Compute the result of `jaxcam fit`, and print and save it."""
 
 import dataclasses
 from collections.abc import Iterable, Mapping, Sequence
@@ -16,7 +16,7 @@ from ._saved_system import as_saved
 
 @dataclasses.dataclass(frozen=True)
 class Result:
-    """A fit of a rig's parameters, and what says how good it is."""
+    """A fit of a rig's parameters, with measures of its quality."""
 
     problem: fitting.Problem
     segments: Sequence[Segments]
@@ -47,7 +47,9 @@ class Result:
         )
 
     def to_json(self, about: Mapping[str, Any]) -> dict[str, Any]:
-        """The fitted system, for `--system` of other commands, with its errors."""
+        """Return the fitted system with its errors, for `--system` of other
+        commands.
+        """
         fit: dict[str, Any] = self.after.to_json()
         fit |= {
             "case": about["case"],
@@ -64,12 +66,13 @@ class Result:
         drive, model = self.segments[0].drive, self.after.model(0)
         for one in self.problem.parameters:
             if one.known is not None:
-                # what was so in the first record only
+                # conditions of the first record only
                 usual = one.where(self.problem.model)
                 model = eqx.tree_at(one.where, model, usual)
         system = model.system
         if drive is not None:
-            # the rig as a whole: the encoder's zero is the geometry's, the speed free
+            # the complete model: the encoder's zero is that of the geometry, the speed
+            # is free
             system = model.driven(0.0, 0.0 * drive.phase, drive.speed)
         return as_saved(system, fit)
 
@@ -77,12 +80,12 @@ class Result:
 def fitted(
     runs: Iterable[Recording], nominal: Rig | fitting.Setup, bootstrap: int, report
 ) -> Result:
-    """Cut the runs, fit, and say what the recordings can distinguish.
+    """Segment the runs and fit; report the parameters that the data distinguish.
 
-    **Arguments:** `bootstrap`: number of random weightings of the flights; 0 is none.
+    **Arguments:** `bootstrap`: number of Bayesian bootstrap replicates; 0 omits them.
 
     Raises:
-        ValueError: For a rig of which nothing is to be fitted.
+        ValueError: No parameter of the rig has a tolerance.
     """
     runs = tuple(runs)
 
@@ -121,7 +124,7 @@ def fitted(
 
 
 def print_fit(output: Output, found: Result, notes: Sequence[str]) -> None:
-    """Tables and sentences for the terminal."""
+    """Print tables and sentences to the terminal."""
     for sentence in (*notes, *found.seen.sentences()):
         output.print(sentence)
     output.print(parameter_table(found.problem, found.after, found.again))

@@ -1,4 +1,4 @@
-"""Commands whose options come in groups: a dataclass a group, an option a field."""
+"""Group the options of a command: one dataclass per group, one field per option."""
 
 import dataclasses
 import functools
@@ -8,7 +8,7 @@ from typing import Any, get_type_hints
 
 
 def grouped(command: Callable[..., Any]) -> Callable[..., Any]:
-    """A command that typer can read, of one whose parameters may be dataclasses.
+    """Convert a command whose parameters may be dataclasses into one for typer.
 
     Typer sees the fields of each dataclass in its place, as options of their own, and
     the command is given the dataclass with their values.

@@ -11,11 +11,11 @@ from ..recordings.cut import Impacts
 
 
 def impact_laws(segments: Sequence[Segments]) -> dict[str, RestitutionFit]:
-    """Laws of each gap that has enough impacts.
+    """Fit restitution laws for each gap that has enough impacts.
 
     Returns:
-        Laws as of `restitution_laws`; where there are several gaps, with the number of
-            the gap before their names.
+        Laws as of `restitution_laws`; if there are several gaps, the names begin with
+            the number of the gap.
     """
     sides = np.unique(np.concatenate([part.impacts.side for part in segments]))
     found = {}
@@ -25,14 +25,14 @@ def impact_laws(segments: Sequence[Segments]) -> dict[str, RestitutionFit]:
         try:
             laws = restitution_laws(there)
         except RecordingError:
-            # a fit of the motion needs no impacts, so they are no condition
+            # a fit of the motion needs no impacts
             continue
         found |= {f"{before}{name}": law for name, law in laws.items()}
     return found
 
 
 def _on(part: Segments, side: int) -> Segments:
-    """A record with the impacts on one of its gaps only."""
+    """Return a record with the impacts on one of its gaps only."""
     keep = part.impacts.side == side
     columns = {
         field.name: getattr(part.impacts, field.name)[keep]

@@ -1,4 +1,4 @@
-"""A folder that is written to by one command at a time."""
+"""Lock an output folder, so that one command at a time writes to it."""
 
 import os
 from pathlib import Path
@@ -8,13 +8,14 @@ _held: list[int] = []
 
 
 def hold(folder: Path) -> None:
-    """Keep other commands out of a folder until `release`, or the end of the process.
+    """Lock a folder until `release` or the end of the process.
 
-    The lock is the kernel's, so that a command that is killed leaves none behind. Where
-    there is no such thing (Windows, some network file systems) nothing is kept out.
+    The operating system holds the lock, so a killed command leaves no stale lock. On
+    systems without such locks (Windows, some network file systems) the folder stays
+    unlocked.
 
     Raises:
-        ValueError: Where another command holds it.
+        ValueError: Another command holds the lock.
     """
     try:
         import fcntl
@@ -26,8 +27,8 @@ def hold(folder: Path) -> None:
     except BlockingIOError:
         os.close(handle)
         raise ValueError(
-            f"{folder}: another jaxcam is writing to this folder; wait until it is "
-            f"done, or give --out another one."
+            f"{folder}: another jaxcam process is writing to this folder; wait "
+            f"for it to finish, or choose another folder with --out."
         ) from None
     except OSError:
         os.close(handle)
@@ -36,6 +37,6 @@ def hold(folder: Path) -> None:
 
 
 def release() -> None:
-    """Let go of everything that this process holds."""
+    """Release all locks of this process."""
     while _held:
         os.close(_held.pop())

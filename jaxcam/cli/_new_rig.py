@@ -1,4 +1,4 @@
-"""`jaxcam new-rig`: an example of a system of one's own, to be changed."""
+"""`jaxcam new-rig`: write an example of a user's system, to be edited."""
 
 import keyword
 import re
@@ -53,7 +53,7 @@ def new_rig(
 
 
 def _class_name(name: str) -> str:
-    """TwoStops of two_stops."""
+    """Convert a file name to a class name, such as two_stops to TwoStops."""
     found = "".join(
         part[0].upper() + part[1:] for part in re.split("[_-]", name) if part
     )

@@ -1,4 +1,4 @@
-"""Arguments and options that several commands share, each said once."""
+"""Arguments and options that several commands share."""
 
 from pathlib import Path
 from typing import Annotated, TypeAlias
@@ -13,7 +13,7 @@ _SHIPPED = {"demo": DEMO_RIG, "pendulum": PENDULUM}
 
 
 def _shipped(case: Path) -> Path:
-    """The folder; one of the package for its word, unless the user has that folder."""
+    """Return the folder; the word for shipped recordings yields that of the package."""
     return case if case.exists() else _SHIPPED.get(str(case), case)
 
 
@@ -89,7 +89,7 @@ OwnSystem: TypeAlias = Annotated[
     typer.Option(
         "--system",
         metavar="FILE.py:CLASS",
-        help="A system of your own; default: that of the rig file.",
+        help="A system in your own Python file; default: that of the rig file.",
     ),
 ]
 Gaps: TypeAlias = Annotated[

@@ -1,4 +1,4 @@
-"""Conclusions from a diagnosis: for the terminal, for its page, and as data."""
+"""Conclusions from a diagnosis, for the terminal, the page and verdict.json."""
 
 import dataclasses
 import math
@@ -12,7 +12,7 @@ from ..discrepancy.terms import Value
 
 
 class Rows(NamedTuple):
-    """One table, and what its columns mean."""
+    """One table with the meaning of its columns."""
 
     title: str
     headings: tuple[str, ...]
@@ -22,27 +22,27 @@ class Rows(NamedTuple):
 
 @dataclasses.dataclass(frozen=True)
 class Outlook:
-    """Speeds at which the motion changes, and what to record next, the best first."""
+    """Bifurcation speeds and proposed experiments, the best first."""
 
     speeds: tuple[Prediction, ...] = ()
     experiments: tuple[Experiment, ...] = ()
 
     def tables(self) -> Iterator[Rows]:
-        """Those that there is something in; speeds in rpm."""
+        """The tables that are not empty; speeds in rpm."""
         if self.speeds:
             yield Rows(
                 "What changes",
                 ("what happens", "textbook (rpm)", "with what was found (rpm)"),
                 [(one.name, _rpm(one.before), _rpm(one.after)) for one in self.speeds],
-                "Speeds of the cam at which the motion of this rig changes, with the "
-                "standard errors that those of the fit make.",
+                "Cam speeds at which the motion of this rig changes; the standard "
+                "errors follow from those of the fit.",
             )
         if self.experiments:
             yield Rows(
                 "What to record next",
                 ("one more record at", "errors become", "of"),
                 [(one.name, f"{one.factor:.0%}", _asked(one)) for one in self.shown],
-                "Standard errors with such a record beside those there are, from the "
+                "Standard errors with this record in addition to the others, from the "
                 "sensitivities of the model that was found.",
             )
 
@@ -51,7 +51,9 @@ class Outlook:
         return self.experiments[:_SHOWN]
 
     def data(self) -> dict[str, Any]:
-        """For verdict.json: speeds in rad/s; without what there is nothing of."""
+        """Return the data for verdict.json (speeds in rad/s); empty parts are
+        omitted.
+        """
         found: dict[str, Any] = {}
         if self.speeds:
             found["predictions"] = [dataclasses.asdict(one) for one in self.speeds]
@@ -68,7 +70,7 @@ _SHOWN = 5
 
 
 def terminal_table(rows: Rows) -> Table:
-    """One table for the terminal."""
+    """Return one table for the terminal."""
     table = Table(*rows.headings, title=rows.title)
     for row in rows.rows:
         table.add_row(*row)

@@ -17,11 +17,11 @@ from ._lock import hold
 class Output:
     """Terminal, `--json FILE` and `--out DIR` of one command.
 
-    Places that cannot be written are found before the work begins, not after it.
+    Paths that cannot be written are reported before the work begins.
 
     Raises:
-        ValueError: Or.
-        OSError: For those.
+        ValueError: A path has the wrong kind.
+        OSError: A path cannot be written.
     """
 
     def __init__(self, json_file: Path | None, folder: Path | None):
@@ -44,20 +44,20 @@ class Output:
                 _try(json_file)
             elif json_file.is_file():
                 _try(_beside(json_file))
-        # nothing but JSON goes to standard output where that is asked for
+        # with `--json -`, only JSON goes to standard output
         self.console = Console(quiet=self.to_stdout, highlight=False)
 
     def print(self, *what) -> None:
-        """Tables as tables, and sentences word by word as they are."""
+        """Print tables as tables, and sentences unchanged."""
         self.console.print(*what, markup=False)
 
     def print_figures(self, files: Sequence[Path]) -> None:
-        """Say where figures are, if there are any."""
+        """Print the location of the figures, if any."""
         if files:
             self.print(f"Figures: {', '.join(map(str, files))}")
 
     def write_json(self, found: dict[str, Any]) -> None:
-        """Write what was found, where `--json` says so."""
+        """Write the result to the file given by `--json`."""
         if self.json_file is None:
             return
         text = to_text(found)
@@ -69,9 +69,11 @@ class Output:
 
 
 def write_text(file: Path, text: str) -> None:
-    """Write a file; a run that is killed leaves the old one or the new one."""
+    """Write a file atomically: a killed run leaves either the old file or the new
+    one.
+    """
     if file.exists() and (file.is_symlink() or not file.is_file()):
-        # a device, or what a link points to, is written where it is
+        # a device, or the target of a link, is written in place
         file.write_text(text, encoding="utf-8")
         return
     part = _beside(file)
@@ -83,12 +85,12 @@ def write_text(file: Path, text: str) -> None:
 
 
 def _beside(file: Path) -> Path:
-    """Return a temporary path next to a file, from which it is moved into place."""
+    """Return a temporary path next to a file."""
     return file.with_name(f"{file.name[:200]}.{os.getpid()}.part")
 
 
 def to_text(found: dict[str, Any]) -> str:
-    """Valid JSON: numbers that are not finite are null."""
+    """Return valid JSON, with null for non-finite numbers."""
     return json.dumps(_plain(found), indent=1, allow_nan=False, ensure_ascii=False)
 
 

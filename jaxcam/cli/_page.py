@@ -14,7 +14,7 @@ from ._rests import HEADINGS, rest_rows, Rests
 
 @dataclasses.dataclass(frozen=True)
 class Report:
-    """The content of the page, from top to bottom; figures have captions."""
+    """The content of the page in order; figures have captions."""
 
     title: str
     sentence: str
@@ -63,14 +63,14 @@ def _lacks(summary: str | None) -> list[str]:
     return [
         "<h2>What the model lacks</h2>",
         *(f'<p class="sentence">{escape(s)}</p>' for s in sentences(summary)),
-        '<p class="note"><a href="diagnosis/index.html">How that was found</a>: '
-        "the fit before and after, what else was tried, and what could not be seen."
+        '<p class="note"><a href="diagnosis/index.html">Details of the diagnosis</a>: '
+        "the fit before and after, other explanations, and detection limits."
         "</p>",
     ]
 
 
 def _branches(found: Branches | None) -> list[str]:
-    """Two branches of orbits and where they change."""
+    """Return the section on two branches of orbits and their bifurcations."""
     if found is None:
         return []
     return [
@@ -81,12 +81,12 @@ def _branches(found: Branches | None) -> list[str]:
 
 
 def page(report: Report) -> str:
-    """The page as text; nothing in it is loaded from elsewhere."""
+    """Return the page as text; it loads nothing from elsewhere."""
     parts = [
         f"<h1>{escape(report.title)}</h1>",
         *_lacks(report.lacks),
         "<h2>Recording and simulation</h2>",
-        # one idea a line is easier to take in than a paragraph of numbers
+        # one statement per line is easier to read than a paragraph of numbers
         *(f'<p class="sentence">{escape(s)}</p>' for s in sentences(report.sentence)),
         *_branches(report.branches),
         "<h2>Residuals by mode</h2>",
@@ -159,7 +159,7 @@ def figure_html(file: Path, caption: str) -> str:
 
 
 def sentences(sentence: str) -> list[str]:
-    """The sentences of a text, where a full stop comes before a capital letter."""
+    """Split a text into sentences, at a full stop before a capital letter."""
     lines, begin = [], 0
     for k in range(len(sentence) - 2):
         if sentence[k : k + 2] == ". " and sentence[k + 2].isupper():

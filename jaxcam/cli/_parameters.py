@@ -15,7 +15,7 @@ from ..models import CamFollower, ConstantRestitution
 from ._source import make_system, Source
 
 
-# of a cam in rad/s, while it is rpm at the command line and has an option of its own
+# the cam speed is in rad/s, but rpm on the command line, with its own option
 _SPEED = "speed"
 _CONSTANT = "restitution.r"
 
@@ -27,26 +27,26 @@ def make_model(
     source: Source,
     assignments: Sequence[str] | None,
 ) -> HybridSystem:
-    """A system with parameters of its own, as a command line names it.
+    """Create a system with the parameters given on the command line.
 
     Raises:
-        ValueError: That names the fix.
+        ValueError: A name or value is invalid; the message names the fix.
     """
     return assign_parameters(make_system(name, preset, rpm, source), assignments or ())
 
 
 def parameters(system: HybridSystem) -> dict[str, float]:
-    """All parameters and their values, in SI units."""
+    """Return all parameters and their values, in SI units."""
     return {name: _plain(leaf) for name, leaf in _leaves(system).items()}
 
 
 def assign_parameters(system: HybridSystem, assignments: Sequence[str]) -> HybridSystem:
-    """The system with `name=value` for some of its parameters.
+    """Return the system with `name=value` for some of its parameters.
 
     `restitution.r=0.6` gives a cam-follower a constant restitution.
 
     Raises:
-        ValueError: For a name that is not a parameter, or no number.
+        ValueError: A name is not a parameter, or a value is not a number.
     """
     for assignment in assignments:
         name, value = _split(assignment)
@@ -96,7 +96,7 @@ def _split(assignment: str) -> tuple[str, float]:
         value = math.nan
     if not math.isfinite(value):
         raise ValueError(
-            f"--set {assignment}: {text.strip() or 'nothing'} is no finite number; "
+            f"--set {assignment}: {text.strip() or 'nothing'} is not a finite number; "
             f"give one, such as {name.strip()}=0.6."
         )
     return name.strip(), value
@@ -106,7 +106,7 @@ def _leaves(system) -> dict[str, jax.Array]:
     kept = eqx.filter(system, eqx.is_inexact_array)
     found, _ = jax.tree_util.tree_flatten_with_path(kept)
     names = (jax.tree_util.keystr(path).lstrip(".") for path, _ in found)
-    # the drive of a system with terms is called what it is called without them
+    # a system with added terms keeps the names of its drive
     names = [_SPEED if name == f"base.{_SPEED}" else name for name in names]
     return dict(zip(names, (leaf for _, leaf in found)))
 

@@ -1,4 +1,4 @@
-"""A progress bar on the error stream."""
+"""A progress bar on standard error."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -19,9 +19,9 @@ COMPILING = "compiling (the first run of a system takes longest)"
 
 @contextmanager
 def progress(first: str) -> Iterator[Callable[[str, float | None], None]]:
-    """Yield `report(sentence, fraction)`; None is a fraction that is unknown.
+    """Yield `report(sentence, fraction)`; the fraction is None if unknown.
 
-    Nothing is shown where the error stream is not a terminal.
+    Nothing is shown unless standard error is a terminal.
     """
     console = Console(stderr=True)
     columns = (

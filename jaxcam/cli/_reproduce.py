@@ -31,7 +31,7 @@ def reproduce(
         str,
         typer.Option(
             metavar="NAME",
-            help="full: diagrams and basins as fine as published; or default.",
+            help="full: diagrams and basins at the published resolution; or default.",
         ),
     ] = _SIZES[0],
     list_: Annotated[
@@ -108,7 +108,7 @@ def _compute(names, preset, size, output, resume, several: bool) -> None:
             with progress("computing") as report:
                 words = f"{name} ({position + 1} of {len(names)})"
                 report(words, position / len(names) if several else None)
-                # of many targets one that fails does not cost the others
+                # a failed target does not stop the others
                 record = make(
                     name,
                     system,
@@ -149,7 +149,7 @@ def _compute(names, preset, size, output, resume, several: bool) -> None:
 
 
 def _within(report, words: str, position: int, count: int):
-    """A callback for a target that shows how far it and all the targets are."""
+    """Return a callback that shows the progress of a target and of all targets."""
 
     def callback(sentence: str, fraction: float | None) -> None:
         if fraction is None and count > 1:
@@ -161,7 +161,7 @@ def _within(report, words: str, position: int, count: int):
 
 
 def _rich(title: str, frame):
-    """A pandas table as a table for the terminal."""
+    """Convert a pandas table to a table for the terminal."""
     from rich.table import Table
 
     from ._reproduce_page import cells, HEADINGS

@@ -31,7 +31,7 @@ _CHAPTERS = {
 
 
 def cells(row) -> tuple[str, ...]:
-    """A row of a table in words, under `HEADINGS`."""
+    """Return a row of a table as text, under `HEADINGS`."""
     printed, lost = math.isfinite(row.printed), not math.isfinite(row.computed)
     both = printed and not lost
     relative = both and math.isfinite(row.relative)
@@ -48,9 +48,9 @@ def cells(row) -> tuple[str, ...]:
 def write_page(
     folder: Path, records: Sequence[TargetRecord], settings: Origin, of: int
 ) -> Path:
-    """Write `index.html`, replacing one that is there at once.
+    """Write `index.html`, replacing an existing file atomically.
 
-    **Arguments:** `of`: how many targets there will be.
+    **Arguments:** `of`: total number of targets.
     """
     part = folder / "index.html.part"
     part.write_text(_page(folder, records, settings, of), encoding="utf-8")
@@ -69,8 +69,8 @@ def _page(folder, records, settings, of) -> str:
         f'<p class="sentence">{escape(sentence)}</p>',
         f'<p class="note">jaxcam {escape(settings.version)}, rig '
         f"{escape(settings.preset)}, sizes {escape(settings.size)}. A relative "
-        "difference is that over the size of the printed value. Where nothing is "
-        "printed the thesis draws something and gives no number.</p>",
+        "difference is divided by the size of the printed value. Where nothing is "
+        "printed, the thesis shows a drawing and gives no number.</p>",
     ]
     for chapter, words in _CHAPTERS.items():
         own = [r for r in records if r.name.partition("-")[2].startswith(chapter)]

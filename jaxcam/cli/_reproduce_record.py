@@ -15,13 +15,13 @@ from ._output import to_text
 from ._source_mark import source_mark
 
 
-# what a file that is not a record raises, brackets in brackets included
+# exceptions of a file that is not a record, deeply nested brackets included
 _BROKEN = (OSError, ValueError, TypeError, LookupError, AttributeError, RecursionError)
 
 
 @dataclasses.dataclass(frozen=True)
 class Origin:
-    """Everything besides its target that determines a result."""
+    """Everything that determines a result apart from its target."""
 
     version: str
     preset: str
@@ -38,7 +38,7 @@ class Origin:
 
 @dataclasses.dataclass(frozen=True)
 class TargetRecord:
-    """One target: its numbers and how long they took (s), or why there are none."""
+    """One target: its numbers and computing time (s), or the reason for its failure."""
 
     name: str
     settings: Origin
@@ -49,7 +49,7 @@ class TargetRecord:
 
     @property
     def table(self):
-        """The rows as pandas has them."""
+        """Return the rows as a pandas table."""
         import pandas as pd
 
         numbers = ("printed", "computed", "difference", "relative")
@@ -65,7 +65,7 @@ def make(
     keep_going: bool,
     progress: Callable[[str, float | None], None] | None = None,
 ) -> TargetRecord:
-    """Compute a target, and draw it where there is a folder for that.
+    """Compute a target, and draw it if a folder is given.
 
     **Arguments:** `keep_going`: an exception becomes part of the record; `progress`:
     as of `reproduce`, also while it is drawn.
@@ -87,7 +87,7 @@ def make(
 
 
 def _draw(name: str, system, size: str, out: Path, progress) -> bool:
-    """The figure of a target, where it has one."""
+    """Draw the figure of a target, if it has one."""
     from ..plotting import save_figure, style
 
     with style():
@@ -98,7 +98,9 @@ def _draw(name: str, system, size: str, out: Path, progress) -> bool:
 
 
 def write(record: TargetRecord, out: Path | None) -> None:
-    """Store a record; a run that is killed leaves the old one or the new one."""
+    """Store a record atomically: a killed run leaves either the old or the new
+    record.
+    """
     if out is None:
         return
     text = to_text(dataclasses.asdict(record))
@@ -108,7 +110,7 @@ def write(record: TargetRecord, out: Path | None) -> None:
 
 
 def earlier(out: Path, name: str, settings: Origin) -> TargetRecord | None:
-    """The record of a run before with the same settings, if it is complete."""
+    """Return the record of an earlier run with the same settings, if complete."""
     try:
         record = _read(out, name)
         rows = [
@@ -126,7 +128,7 @@ def earlier(out: Path, name: str, settings: Origin) -> TargetRecord | None:
 
 
 def by_other_code(out: Path, names: Iterable[str], settings: Origin) -> list[str]:
-    """The targets that were computed with the same settings, but by other code."""
+    """Return the targets computed with the same settings, but by other code."""
     found = []
     for name in names:
         try:
@@ -141,7 +143,7 @@ def by_other_code(out: Path, names: Iterable[str], settings: Origin) -> list[str
 
 def _read(out: Path, name: str) -> TargetRecord:
     found = json.loads((out / f"{name}.json").read_text(encoding="utf-8"))
-    # records of versions that had no mark are those of other code
+    # records without a mark are those of other code
     found["settings"] = Origin(**{"code": "", **found["settings"]})
     if found["name"] != name or not isinstance(found.get("figure", False), bool):
         raise ValueError("the record of another target, or damaged")

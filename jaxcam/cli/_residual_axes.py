@@ -1,4 +1,4 @@
-"""Axes of residuals in reports: a suitable unit, over a turn of the drive or time."""
+"""Axes of residual plots: a suitable unit, over the drive angle or time."""
 
 import math
 from collections.abc import Sequence
@@ -11,29 +11,29 @@ from ..recordings.files import unit_of
 from ..tables import scaled
 
 
-# Residuals that are nothing but noise seldom reach this many of its deviations
+# Residuals of pure noise seldom exceed this many standard deviations
 REACH = 10.0
 
 
 def shown_in(part: Residuals) -> tuple[float, str]:
-    """A factor and the unit in which the residuals of a channel are drawn."""
+    """Return a factor and the unit in which the residuals of a channel are drawn."""
     return scaled(unit_of(part.channel), REACH * part.noise)
 
 
 def residual_label(part: Residuals) -> str:
-    """Label of an axis of residuals, with that unit."""
+    """Return the label of an axis of residuals, with its unit."""
     _, unit = shown_in(part)
     return f"residual ({unit})" if unit else "residual"
 
 
 def title_of(part: Residuals, parts: Sequence[Residuals]) -> str:
-    """The record, and the channel where there are several."""
+    """Return the name of the record, and of the channel if there are several."""
     several = len({one.channel for one in parts}) > 1
     return f"{part.record}, {part.channel}" if several else part.record
 
 
 class Along:
-    """The axis of a residual plot: a turn of the drive, or time without a drive."""
+    """The axis of a residual plot: the drive angle, or time without a drive."""
 
     def __init__(self, parts: Sequence[Residuals]):
         self.turns = all(np.any(np.isfinite(part.turned)) for part in parts)
@@ -45,7 +45,7 @@ class Along:
 
     @property
     def label(self) -> str:
-        return "drive angle in its turn (rad)" if self.turns else "time (s)"
+        return "drive angle (rad)" if self.turns else "time (s)"
 
     @property
     def word(self) -> str:

@@ -15,16 +15,17 @@ from ..models import rad_s_to_rpm
 from ..recordings import Rig, Segments
 
 
-# turns before the recording begins, for the motion to settle
+# cam turns before the recording begins, for transients to decay
 _SETTLE = 20.0
 
 
 class Intervals(NamedTuple):
-    """Rests between their beginning and the release that ends them.
+    """Contact intervals, each from its start to the release.
 
     - `begins`, `ends`: angle of the cam (rad) at either end of each, not wrapped.
     - `turns`: number of turns of the cam that were examined.
-    - `share`: fraction of the time in contact, also where an end was not seen.
+    - `share`: fraction of the time in contact, including intervals cut by the record's
+      ends.
     """
 
     begins: Float[np.ndarray, " k"]
@@ -35,7 +36,7 @@ class Intervals(NamedTuple):
 
 @dataclasses.dataclass(frozen=True)
 class Rests:
-    """Contact intervals of one run, as recorded and as simulated."""
+    """Recorded and simulated contact intervals of one run."""
 
     name: str
     rpm: float
@@ -43,7 +44,7 @@ class Rests:
     simulated: Intervals
 
     def to_json(self) -> dict[str, Any]:
-        """Plain data; angles of the cam in its turn (rad)."""
+        """Return plain data; cam angles in one turn (rad)."""
         return {
             which: {
                 "per_turn": len(part.begins) / part.turns,
@@ -60,9 +61,9 @@ class Rests:
 
 
 def simulate_run(rig: Rig, run: Segments) -> Trajectory:
-    """The nominal rig at the mean speed of a run, until the run's end.
+    """Simulate the nominal model at the mean speed of a run, until the run's end.
 
-    It starts at a release point, twenty turns before the run does.
+    It starts at a release point, twenty cam turns before the run.
     """
     assert run.drive is not None
     system = rig.system(run.drive.speed, run.drive.phase)
@@ -71,15 +72,17 @@ def simulate_run(rig: Rig, run: Segments) -> Trajectory:
 
 
 def rests(run: Segments, motion: Trajectory) -> Rests:
-    """Contact intervals of a run, and those of `simulate_run` in the same time span."""
+    """Return contact intervals of a run, and those of `simulate_run` in its time
+    span.
+    """
     assert run.drive is not None
     name, rpm = run.recording.name, float(rad_s_to_rpm(run.drive.speed))
     return Rests(name, rpm, _recorded(run), _simulated(run, motion))
 
 
 def rest_table(found: list[Rests]) -> Table:
-    """One row for each run and kind, for the terminal."""
-    table = Table(title="Rests of the follower on the cam")
+    """Return a table with one row for each run and kind, for the terminal."""
+    table = Table(title="Contact intervals of the follower")
     table.add_column("run", no_wrap=True)
     table.add_column("")
     for heading in HEADINGS[2:]:
@@ -94,7 +97,7 @@ HEADINGS = ("run", "", "a turn", "from (rad)", "to (rad)", "of the time")
 
 
 def rest_rows(one: Rests) -> list[tuple[str, ...]]:
-    """The cells of the two rows of a run, under `HEADINGS`."""
+    """Return the cells of the two rows of a run, under `HEADINGS`."""
     rows = []
     for which, part in one.parts:
         name = one.name if which == "recorded" else ""
@@ -137,7 +140,7 @@ def _simulated(run: Segments, motion: Trajectory) -> Intervals:
 
 
 def _typical(angle: Float[np.ndarray, " k"]) -> str:
-    """Mean angle in its turn, and the spread about it where there are several."""
+    """Return the mean cam angle in one turn, and the spread of several intervals."""
     if not len(angle):
         return "-"
     mean = np.mean(np.exp(1j * angle))

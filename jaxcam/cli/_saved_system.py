@@ -1,4 +1,4 @@
-"""Systems that commands write and read again, those of a user's own files too."""
+"""Save and load systems, including those defined in a user's Python file."""
 
 import json
 from pathlib import Path
@@ -7,14 +7,14 @@ from typing import Any
 from ..hybrid import HybridSystem
 
 
-# where a saved system of a user's own comes from: FILE.py:CLASS
+# origin of a saved system of the user: FILE.py:CLASS
 _SOURCE = "source"
 
 
 def as_saved(system: HybridSystem, about: dict[str, Any]) -> dict[str, Any]:
-    """A system as data, with what names its file where it is not one of the package.
+    """Return a system as data, with the file of a system outside the package.
 
-    A system that cannot be saved leaves `about`, and `not_saved`, a sentence why.
+    A system that cannot be saved yields `about`, and `not_saved` with the reason.
     """
     from ..discrepancy.terms import WithTerms
     from ..fitting.own_systems import system_source
@@ -30,12 +30,12 @@ def as_saved(system: HybridSystem, about: dict[str, Any]) -> dict[str, Any]:
 
 
 def load_saved(file: Path) -> HybridSystem:
-    """The system in a file of `jaxcam fit` or `jaxcam diagnose`.
+    """Load the system in a file of `jaxcam fit` or `jaxcam diagnose`.
 
-    The Python file that a system of a user's own comes from is run.
+    The Python file that defines a user's system is executed.
 
     Raises:
-        ValueError: That says what is wrong with it.
+        ValueError: The file is invalid; the message gives the reason.
     """
     from ..discrepancy.terms import saved_classes
     from ..fitting.own_systems import classes_beside, split_name, system_class
@@ -57,7 +57,7 @@ def _source_of(file: Path) -> str | None:
     try:
         found = json.loads(file.read_text("utf-8"))
     except (ValueError, RecursionError):
-        # what is wrong with it is said by those who read the rest
+        # other errors are reported when the rest is read
         return None
     source = found.get(_SOURCE) if isinstance(found, dict) else None
     return source if isinstance(source, str) else None

@@ -1,4 +1,4 @@
-"""`jaxcam simulate`: one trajectory of a ready system."""
+"""`jaxcam simulate`: one trajectory of a system."""
 
 from pathlib import Path
 from typing import Annotated, Any

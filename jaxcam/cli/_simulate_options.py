@@ -1,4 +1,4 @@
-"""The options of `jaxcam simulate`, and what is asked of their values."""
+"""Options of `jaxcam simulate` and checks of their values."""
 
 import dataclasses
 from typing import Annotated
@@ -51,19 +51,19 @@ class RunOptions:
         """
 
         Raises:
-            ValueError: That names the option at fault.
+            ValueError: An option is invalid; the message names it.
         """
         choose("--solver", self.solver, SOLVERS)
         choose("--engine", self.chosen_engine, ENGINES)
 
     @property
     def chosen_engine(self) -> str:
-        """The engine, or the one that the solver needs."""
+        """Return the engine, or the engine that the solver needs."""
         implicit = self.solver.startswith("kvaerno")
         return self.engine or ("diffeqsolve" if implicit else "loop")
 
     def start(self, name: str):
-        """The state to start from; None for the release point."""
+        """Return the initial state; None for the release point."""
         import numpy as np
 
         if self.state == "release":
@@ -91,6 +91,6 @@ class RunOptions:
             raise ValueError(f"{name} has no forcing to count turns of; give --t1.")
         if not turns > 0:
             raise ValueError(f"--turns is {turns:g}; give a positive number.")
-        # a speed of zero would give an endless period: let the system say so
+        # a speed of zero would give an infinite period, which the system reports
         model.check()
         return self.t0 + turns * float(model.period)

@@ -1,4 +1,4 @@
-"""The system that a command works on: a ready one, a saved one, or one's own."""
+"""The system that a command uses: built in, saved, or in a user's file."""
 
 import dataclasses
 import math
@@ -14,7 +14,7 @@ from ._options import SavedSystem
 
 @dataclasses.dataclass(frozen=True)
 class Source:
-    """A system that is not chosen by its name, with `--system` and `--rig`."""
+    """A saved or user-defined system, given by `--system` and `--rig`."""
 
     saved: SavedSystem = None
     rig: Annotated[
@@ -28,10 +28,10 @@ class Source:
         return self.saved is not None or self.rig is not None
 
     def system(self) -> HybridSystem:
-        """The system that was saved, or that of a file with its nominal values.
+        """Return the saved system, or that of a file with its nominal values.
 
         Raises:
-            ValueError: That names the file at fault and the fix.
+            ValueError: A file is invalid; the message names it and the fix.
         """
         from ..fitting import is_setup, read_setup
         from ..fitting.own_systems import stated_system, system_class
@@ -57,10 +57,10 @@ class Source:
         return read_rig(self.rig).system(float(CamFollower().speed))
 
     def name(self, word: str) -> str:
-        """The name of the system; `word` is that of a ready one.
+        """Return the name of the system; `word` names a built-in system.
 
         Raises:
-            ValueError: For an unknown one, or a file that is at fault.
+            ValueError: The name is unknown, or the file is invalid.
         """
         if not self:
             if _is_code(word):
@@ -81,10 +81,10 @@ class Source:
 def make_system(
     name: str, preset: str | None, rpm: float | None, source: Source = Source()
 ) -> HybridSystem:
-    """A system; `preset` and a speed in rpm are for the cam-follower alone.
+    """Create a system; `preset` and a speed in rpm apply to the cam-follower only.
 
     Raises:
-        ValueError: That names the fix.
+        ValueError: The options do not fit the system; the message names the fix.
     """
     import equinox as eqx
     import jax.numpy as jnp
@@ -116,6 +116,6 @@ def make_system(
 
 
 def _is_code(named: str) -> bool:
-    """Return whether a Python file is meant, with a class in it or without."""
+    """Return whether a text names a Python file, with or without a class."""
     path, colon, _ = named.rpartition(":")
     return named.endswith(".py") or (bool(colon) and path.endswith(".py"))

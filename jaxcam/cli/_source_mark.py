@@ -1,4 +1,4 @@
-"""A mark of the code that computes, by which results of other code are told apart."""
+"""A hash of the source code, to distinguish results of other versions."""
 
 import functools
 import hashlib
@@ -9,15 +9,15 @@ from pathlib import Path
 
 _PACKAGES = ("jaxcam", "variational", "continuation")
 _BENEATH = ("jax", "jaxlib", "diffrax", "equinox", "numpy", "scipy", "matplotlib")
-"""Packages whose versions affect digits."""
+"""Packages whose versions affect the digits of results."""
 
 
 @functools.cache
 def source_mark() -> str:
-    """A hash of every source file of the project and of the versions beneath it.
+    """Hash all source files of the project and the versions of its dependencies.
 
-    It changes with a comment, too: what is computed once too often costs minutes, a
-    result of code that is gone costs trust.
+    It changes with a comment, too: an unnecessary computation costs minutes, a result
+    of outdated code costs trust.
     """
     folders = [folder for name in _PACKAGES for folder in _folders(name)]
     versions = [f"{name} {_version(name)}" for name in _BENEATH]
@@ -25,7 +25,7 @@ def source_mark() -> str:
 
 
 def source_hash(folders: list[Path], words: list[str]) -> str:
-    """Hash of all that Python reads in some folders: names, contents; and of words."""
+    """Hash the names and contents of Python's files in some folders, and some words."""
     found = hashlib.sha256("\n".join(words).encode())
     for folder in folders:
         for file in sorted(folder.rglob("*")):

@@ -1,4 +1,4 @@
-"""Options that `jaxcam diagram` and `jaxcam basins` share: where they run."""
+"""Execution options that `jaxcam diagram` and `jaxcam basins` share."""
 
 import dataclasses
 import math
@@ -22,7 +22,7 @@ class Execution:
     cluster: Cluster = None
 
     def check(self) -> None:
-        """Find a wrong number or address before the work begins."""
+        """Reject a wrong number or address before the work begins."""
         at_least("--workers", self.workers, 1)
         address = self.cluster
         if address is not None and address != "local" and "://" not in address:
@@ -35,7 +35,7 @@ class Execution:
         """
 
         Raises:
-            ValueError: For one that other processes could not import.
+            ValueError: Other processes could not import the system.
         """
         from ..discrepancy.terms import WithTerms
         from ..fitting.own_systems import system_source
@@ -50,7 +50,7 @@ class Execution:
 
     @contextmanager
     def running(self) -> Iterator[dict]:
-        """Options of a sweep that say so."""
+        """Return the execution options of a sweep."""
         try:
             if self.cluster is None:
                 yield {"workers": self.workers}
@@ -59,7 +59,7 @@ class Execution:
 
             from ..sweeps import cluster
 
-            # new processes find the programs that are compiled already
+            # new processes find the compiled programs
             folder = jax.config.jax_compilation_cache_dir  # pyright: ignore
             if folder:
                 os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(folder))
@@ -71,7 +71,7 @@ class Execution:
 
 
 def show(report):
-    """A callback that shows how far a sweep is, and how long it will still take."""
+    """Return a callback that shows the progress of a sweep and the remaining time."""
 
     def callback(at) -> None:
         words = f"{at.done} of {at.total} blocks"

@@ -14,12 +14,12 @@ from ._parameters import parameters
 
 # rows shown at either end of a table
 _ENDS = 6
-# more periods than these fill a time history, and a phase portrait, with ink
+# largest numbers of periods that stay readable in a time history and a phase portrait
 _HISTORY, _PORTRAIT = 6.0, 40.0
 
 
 def impact_table(trajectory: Trajectory) -> Table | None:
-    """The first and the last impacts; None where there was none."""
+    """Tabulate the first and the last impacts; None without impacts."""
     impacts, system = trajectory.impacts, trajectory.system
     time = np.asarray(impacts.time)
     if not len(time):
@@ -54,7 +54,7 @@ def impact_table(trajectory: Trajectory) -> Table | None:
 
 
 def contact_table(trajectory: Trajectory) -> Table | None:
-    """The first and the last contacts; None where there was none."""
+    """Tabulate the first and the last contacts; None without contacts."""
     contacts, system = trajectory.contacts, trajectory.system
     start, end = np.asarray(contacts.start), np.asarray(contacts.end)
     if not len(start):
@@ -85,7 +85,7 @@ def summary(name: str, trajectory: Trajectory) -> str:
         at = f" at {float(rad_s_to_rpm(speed)):.6g} rpm"
     impacts = _counted(int(trajectory.impacts.count), "impact")
     contacts = _counted(int(trajectory.contacts.count), "contact")
-    # a run that begins at the release point begins there, a little before t0
+    # a run from the release point begins there, slightly before t0
     began = float(trajectory.steps.time[0])
     span = f"from {began:.6g} to {reached:.6g}{unit and f' {unit}'}"
     kept = bool(np.any(trajectory.steps.contact[-1]))
@@ -95,7 +95,7 @@ def summary(name: str, trajectory: Trajectory) -> str:
 
 
 def about(trajectory: Trajectory) -> dict[str, Any]:
-    """Everything about it as plain data, in SI units."""
+    """Return all data of the trajectory in SI units."""
     system, impacts = trajectory.system, trajectory.impacts
     contacts = trajectory.contacts
     return {
@@ -129,7 +129,7 @@ def about(trajectory: Trajectory) -> dict[str, Any]:
 
 
 def draw(trajectory: Trajectory, folder: Path) -> list[Path]:
-    """Time history, phase portrait and impact map, as files in a folder."""
+    """Draw time history, phase portrait and impact map to files in a folder."""
     import matplotlib
 
     matplotlib.use("Agg")
@@ -147,7 +147,7 @@ def draw(trajectory: Trajectory, folder: Path) -> list[Path]:
 
 
 def last(trajectory: Trajectory, periods: float) -> tuple[float, float] | None:
-    """The last periods of a run that has more of them; None for all of it."""
+    """Return the span of the last periods of a longer run; None for all of it."""
     period = trajectory.system.period
     if period is None:
         return None
@@ -163,7 +163,7 @@ def _shown(number: int) -> list[int | None]:
 
 
 def _period(system) -> float | None:
-    """Period of a forcing that acts: a floor at rest has no phase."""
+    """Return the period of an active forcing; a floor at rest has none."""
     if system.period is None or float(getattr(system, "amplitude", 1.0)) == 0:
         return None
     return float(system.period)
@@ -178,7 +178,7 @@ def _phase(time: float, period: float) -> float:
 
 
 def _unit(system) -> str:
-    """Unit of time; none for a system all of whose states are dimensionless."""
+    """Return the unit of time; empty for a system with dimensionless states only."""
     units = system.state_units
     return "" if units and all(unit == "-" for unit in units) else "s"
 

@@ -2,9 +2,9 @@
 
     python -m jaxcam.data.make_demo
 
-The rig is simulated here with a scalar Runge-Kutta loop that shares nothing with
-`jaxcam.hybrid`, so that comparing the two means something. It has a viscous hinge,
-which the textbook model lacks, a drive that wanders, and encoders with noise.
+The rig is simulated here with a scalar Runge-Kutta loop that is independent of
+`jaxcam.hybrid`, so that the comparison is meaningful. It has a viscous hinge, which the
+textbook model lacks, a drive that wanders, and encoders with noise.
 """
 
 import dataclasses
@@ -22,7 +22,7 @@ _ROUNDING = 1e-13
 
 @dataclasses.dataclass(frozen=True)
 class RealRig:
-    """A rig as it is, not as its maker states it (SI units).
+    """The real parameters of a rig, different from its rig file (SI units).
 
     - `height`: cam radius plus half height of the follower (m).
     - `damping`: viscous, of the follower's velocity (1/s).
@@ -229,7 +229,7 @@ def measure(samples: np.ndarray, noise: float, counts: int, rng) -> np.ndarray:
 
 
 def recording_text(truth: Truth, rng, *, sensors: Sequence[float]) -> str:
-    """A recording as CSV; `sensors` are noise and counts of cam and follower."""
+    """Return a recording as CSV; `sensors` are noise and counts of cam and follower."""
     cam_noise, cam_counts, noise, counts = sensors
     # as an encoder that is zeroed once a turn before the record begins
     turned = truth.turned - 2 * np.pi * np.floor(truth.turned[0] / (2 * np.pi))

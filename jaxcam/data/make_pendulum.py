@@ -12,14 +12,14 @@ from pathlib import Path
 import numpy as np
 
 
-# every so many samples one is kept, which leaves 100 a second
+# decimation factor, for 100 samples per second
 EVERY = 10
-# what the encoder's smallest step is (rad): 40000 counts a turn
+# resolution of the encoder (rad): 40000 counts per turn
 COUNT = 2 * np.pi / 40000
 
 
 def thinned(file: Path) -> str:
-    """The kept lines of a recording as text, with times from zero."""
+    """Return the kept lines of a recording as text, with times from zero."""
     with gzip.open(file, "rt", encoding="utf-8") as stream:
         head, *lines = stream.read().splitlines()
     kept = [line.split(",") for line in lines[::EVERY]]

@@ -1,4 +1,4 @@
-"""From recordings to a verdict: effect, none or unknown."""
+"""Diagnose recordings: the verdict is an effect, none or unknown."""
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -57,15 +57,15 @@ def diagnose(
         case: Name of the case.
         seed: Seed of the block bootstrap.
         progress: Called with a sentence and a fraction, or `None`.
-        keep: Folder in which fits are kept until the diagnosis is done; an interrupted
-            one continues from there.
+        keep: Folder in which fits are stored until the diagnosis is done; an
+            interrupted diagnosis continues from there.
         policy: Settings that decide a verdict, and limit the time of a search.
 
     Returns:
         A [`jaxcam.discrepancy.Diagnosis`][].
 
     Raises:
-        RecordingError: The recordings do not suffice; the message says why.
+        RecordingError: The recordings are insufficient; the message gives the reason.
         ValueError: A term acts nowhere.
     """
     report = progress or (lambda sentence, fraction: None)
@@ -94,7 +94,7 @@ def _name_of(run: Recording | Segments) -> str:
 def _question(
     system, recordings, candidates, sensors, parameters, drive, report, policy
 ) -> Question:
-    """The question to be answered for a rig, a setup or a bare system."""
+    """Return the question to be answered for a rig, a setup or a bare system."""
     if isinstance(system, Rig):
         return rig_question(system, recordings, candidates, report, policy)
     if isinstance(system, Setup):
@@ -119,7 +119,7 @@ def _answered(
     keep: Path | None,
     policy: Policy,
 ) -> Diagnosis:
-    """Search, doubt, and write down."""
+    """Search for terms, test the result, and return the diagnosis."""
     ripple = None
     if question.drives:
         report("reading the drive", None)

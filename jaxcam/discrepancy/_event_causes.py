@@ -1,8 +1,7 @@
 """Find the physics that would move predicted event speeds to the observed ones.
 
-For a rig without recordings whose motion was seen to change at known speeds: each
-term is given the strength, and the rig one parameter beside it, with which the speeds
-come nearest.
+This serves a rig without recordings whose bifurcation speeds are known. The strength of
+each term and one parameter of the rig are fitted to these speeds.
 """
 
 import dataclasses
@@ -53,11 +52,11 @@ def event_causes(
     policy: Policy = Policy(),
     progress: Callable[[float], None] | None = None,
 ) -> tuple[EventCause, ...]:
-    """Rank terms by how near they bring a rig to the observed event speeds.
+    """Rank terms by their fit to the observed event speeds of a rig.
 
-    Each term is tried alone. A few numbers cannot decide between terms that each
-    have a strength of their own: terms within a few units of misfit of the first are
-    equally good.
+    Each term is tried alone. A few numbers hardly distinguish between terms with
+    separate strengths: terms within a few units of misfit of the first are equally
+    good.
 
     Args:
         rig: The rig.
@@ -69,10 +68,10 @@ def event_causes(
             as `lambda rig: rig.restitution.intercept`.
         tolerance: Tolerance of this parameter.
         policy: Settings that limit the search of strengths.
-        progress: Called with the fraction of the terms that is done.
+        progress: Called with the fraction of the terms done.
 
     Returns:
-        Explanations, best first; one of them is no term at all.
+        Explanations, best first, including that without a term.
 
     Raises:
         ValueError: A term has several strengths, or `observed` is not four speeds.
@@ -92,7 +91,7 @@ def event_causes(
     paths, here = [], None
     for term in terms or (None,):
         system = WithTerms(rig, () if term is None else (term,))
-        # with a strength of zero every system is the same rig
+        # with zero strength every system is the same rig
         paths.append(_Path(goal, jax.tree.map(jnp.asarray, system), here))
         here = paths[0].here
     found = [_none(paths[0])]
@@ -120,7 +119,7 @@ class _Goal:
 
 
 class _Path:
-    """The four speeds of a rig whose strength and parameter change by small steps."""
+    """The four speeds of a rig along small steps of strength and parameter."""
 
     def __init__(self, goal: _Goal, system: WithTerms, here: EventSpeeds | None):
         self.goal, self.system = goal, system
@@ -191,7 +190,7 @@ def _best(path: _Path, term: Term) -> EventCause:
 
 
 def _along(path: _Path, size: float) -> tuple[float, float, EventSpeeds]:
-    """Least misfit on the way from nothing to large strengths, and where it is."""
+    """Find the least misfit between zero and large strengths."""
     best, policy = (math.inf, 0.0, path.here), path.goal.policy
     first, ratio, most = policy.cause_strengths
     for k in range(most):

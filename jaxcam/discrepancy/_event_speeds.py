@@ -1,8 +1,7 @@
-"""Speeds at which the motion of a cam-follower rig changes.
+"""Compute the speeds at which the motion of a cam-follower changes.
 
-Where contact is lost for the first time (valve float), where the orbit with one impact
-a turn appears in a fold and where it doubles its period, and where complete chattering
-is interrupted.
+These are the speeds of detachment (valve float), of the fold and the flip of the orbit
+with one impact per turn, and of the interruption of complete chattering.
 """
 
 import dataclasses
@@ -36,7 +35,7 @@ EVENTS = (
 
 @dataclasses.dataclass(frozen=True)
 class EventSpeeds:
-    """The four speeds (rad/s) of one system, and what is needed to find those nearby.
+    """The four speeds (rad/s) of one system, and starts to find those of neighbours.
 
     `values`: shape `(4,)`, in the order of `EVENTS`; NaN where one was not found.
     """
@@ -48,7 +47,7 @@ class EventSpeeds:
     policy: Policy = Policy()
 
     def near(self, system: WithTerms) -> "EventSpeeds":
-        """Those of a system that differs a little."""
+        """Return the speeds of a slightly different system."""
         values, found = np.full(4, np.nan), []
         if self.lift is not None:
             orbit = self.lift.orbit
@@ -74,10 +73,10 @@ class EventSpeeds:
 
 
 def event_speeds(system: WithTerms, policy: Policy = Policy()) -> EventSpeeds:
-    """Find the four speeds of a rig, at whatever speed it now turns.
+    """Find the four speeds of a rig, independent of its present speed.
 
     The base is a [`jaxcam.models.CamFollower`][]; terms must not depend on time other
-    than through the phase of the cam. The policy says where orbits are searched for.
+    than through the phase of the cam. The policy gives the search range of orbits.
     """
     lift = _float_of(system)
     if lift is None:
@@ -105,7 +104,7 @@ def _at(system, speed):
 
 
 def _float_of(system: WithTerms) -> SpecialPoint | None:
-    """Valve float, from where the base alone would float."""
+    """Return the valve-float speed, searched from that of the base."""
     base = float_speed(system.base)  # pyright: ignore
     if not (np.isfinite(base.speed) and base.speed > 0):
         return None
@@ -121,7 +120,7 @@ def _float_of(system: WithTerms) -> SpecialPoint | None:
 def _towards(
     system, start: SpecialPoint, sign: float, stride: float
 ) -> SpecialPoint | None:
-    """The fold (+1) or the flip (-1) of the branch through an orbit.
+    """Find the fold (+1) or the flip (-1) of the branch through an orbit.
 
     The sum of the multipliers is monotonic along the branch, also around the fold,
     where the speed is not; at the two points it is +-(1 + their product).

@@ -1,4 +1,4 @@
-"""Recommend the next record: the one that is most informative."""
+"""Recommend the most informative next record."""
 
 import dataclasses
 import math
@@ -62,13 +62,13 @@ def compare_experiments(
 ) -> tuple[Experiment, ...]:
     """Rank proposed records by their expected information, best first.
 
-    From the sensitivities alone: the Fisher information of each record is added to that
-    of the records of the diagnosis.
+    The ranking needs only sensitivities: the Fisher information of each record is added
+    to that of the records of the diagnosis.
 
     Args:
         found: The diagnosis of the records so far.
         records: Records simulated with the diagnosed system (`found.system()`) by
-            [`jaxcam.recordings.record`][], and cut.
+            [`jaxcam.recordings.record`][], and segmented.
         asked: Names of parameters; default the strengths of the named terms, and the
             bands of functions without a name. Terms whose BIC is not much worse stay
             free, so that the best record also distinguishes them. If nothing is
@@ -79,8 +79,8 @@ def compare_experiments(
         The experiments, best first.
 
     Raises:
-        ValueError: For a name that is no parameter, or where a force with a state of
-            its own was found: what drove it is known of the existing records alone.
+        ValueError: A name is not a parameter, or a force with its own state was found,
+            whose excitation is known only for the existing records.
     """
     _refuse_hidden(found)
     report = progress or (lambda sentence, fraction: None)
@@ -92,7 +92,7 @@ def compare_experiments(
     problem = Problem.build(fit.problem.model, records, parameters)
     values = np.repeat(np.asarray(fit.point.values)[:1], len(problem.segments), axis=0)
     point = problem.start._replace(values=jnp.asarray(values))
-    # what each record has for itself says nothing of another one
+    # parameters of single records give no information on another record
     names = [p.name for p in parameters if p.known is None and not p.per_record]
     report("computing the information of the records so far", None)
     known = blocks_of(fit.problem, fit.point, names=names)
@@ -126,7 +126,9 @@ def _refuse_hidden(found: Diagnosis) -> None:
 
 
 def _of_others(parameter: Parameter, records: int) -> Parameter:
-    """A parameter that is known of each record, for others: as in the first one."""
+    """Return a parameter with known values per record, for others: as in the first
+    record.
+    """
     if parameter.known is None:
         return parameter
     return dataclasses.replace(parameter, known=parameter.known[:1] * records)
@@ -147,19 +149,19 @@ def next_experiments(
     Args:
         found: The diagnosis of the records so far.
         rig: As given to `diagnose`.
-        speeds: Of the drive (rad/s) that can be had; by default some between those of
-            the records and a little beyond.
-        duration: Of a record (s); by default as before.
+        speeds: Available speeds of the drive (rad/s); default some within and slightly
+            beyond the range of the records.
+        duration: Duration of a record (s); default that of the existing records.
         asked: As in [`jaxcam.discrepancy.compare_experiments`][].
-        seed: Of the simulated noise.
+        seed: Seed of the simulated noise.
         progress: Called with a sentence and a fraction, or `None`.
 
     Returns:
         One `Experiment` for each speed, the most informative first.
 
     Raises:
-        ValueError: For a rig whose drive does not turn.
-        RecordingError: Where nothing flies at any of the speeds.
+        ValueError: The drive of the rig does not turn.
+        RecordingError: There is no flight at any of the speeds.
     """
     parts = found.after.problem.segments
     drives = [part.drive for part in parts if part.drive is not None]
@@ -202,7 +204,7 @@ def next_experiments(
                 model.sensors,
                 length,
                 rng=rng,
-                # a follower starts from its release, anything else as it was recorded
+                # a follower starts from its release, other systems as recorded
                 state=None if isinstance(rig, Rig) else jnp.asarray(states[nearest]),
                 settle=found.policy.next_settle,
                 interval=parts[0].recording.interval,
@@ -224,7 +226,7 @@ def next_experiments(
 def _encoder(
     rig: Rig | Setup, parts: Sequence[Segments]
 ) -> tuple[str, tuple[float, float]]:
-    """The channel of the drive, with its noise and resolution (rad)."""
+    """Return the channel of the drive, with its noise and resolution (rad)."""
     if isinstance(rig, Rig):
         sensors = rig.sensors
         counts = sensors.cam_counts_per_turn
@@ -239,7 +241,7 @@ def _cut(rig: Rig | Setup, made: Sequence[Recording]) -> Sequence[Segments]:
 
 
 def _named(rig: Rig | Setup, speed: float) -> str:
-    """A record by its speed, as a cam's is given by convention in rpm."""
+    """Name a record by its speed, by convention in rpm for a cam."""
     if isinstance(rig, Rig):
         return f"{speed * 30 / math.pi:.1f} rpm"
     return f"{speed / (2 * math.pi):.4g} Hz"
@@ -275,7 +277,7 @@ def _questions(found: Diagnosis, asked) -> dict[str, _Question]:
         part
         for other in found.alternatives
         if other.delta_bic < found.policy.rival
-        # one more term in addition to those named is no alternative to them
+        # an additional term is not an alternative to the named terms
         and not (named and set(named) <= set(other.terms))
         for part in other.terms
         if part in own

@@ -17,7 +17,7 @@ from .report import Diagnosis
 from .terms import Value, WithTerms
 
 
-# Part of a unit variance that keeps a covariance definite against rounding
+# Regularisation of a covariance, relative to unit variance
 _DEFINITE = 1e-12
 
 
@@ -25,8 +25,9 @@ _DEFINITE = 1e-12
 class Prediction:
     """A predicted speed of the cam (rad/s) at which the motion changes.
 
-    `before` and `after`: of the textbook model refitted, and with what it lacked, with
-    the standard errors that those of the fits make; NaN where there is no such speed.
+    `before` and `after`: predictions of the refitted textbook model, and with the
+    missing effects, with standard errors from those of the fits; NaN if there is no
+    such speed.
 
     Examples:
         >>> from jaxcam.discrepancy import Prediction
@@ -55,16 +56,16 @@ def predictions(
 
     Valve float, the fold and the flip of P(1,1), and the interruption of complete
     chattering. Their errors come from rigs drawn from the errors of the fits. The named
-    terms are part of the second model, except those that have a frequency
-    of their own: their motion is not periodic with the cam.
+    terms are part of the second model, except those with an independent frequency,
+    whose motion is not periodic with the cam.
 
     Args:
         found: The diagnosis.
         seed: Seed of the rigs that are drawn.
-        progress: Called with the fraction of them that is done.
+        progress: Called with the fraction of the rigs done.
 
     Returns:
-        The predictions; none for a system that is no cam-follower.
+        The predictions; none for a system other than a cam-follower.
     """
     if not isinstance(found.after.model(0).system.base, CamFollower):  # pyright: ignore
         return ()
@@ -86,7 +87,7 @@ def _half(progress, second: bool, share: float) -> None:
 def _speeds(
     fit: Fit, names, present: bool, rng, policy: Policy, progress
 ) -> list[tuple[float, float]]:
-    """The speeds and their standard errors."""
+    """Return the speeds and their standard errors."""
     row = np.asarray(fit.point.values[0])
     free = [fit.problem.names.index(one.name) for one in fit.estimates]
     best = event_speeds(_system(fit, row, names, present), policy)
@@ -111,9 +112,9 @@ def _spread(drawn: np.ndarray) -> float:
 
 
 def _system(fit: Fit, values: np.ndarray, names, present: bool) -> WithTerms:
-    """The rig with some parameters; terms have no strength where they are absent.
+    """Return the rig with some parameters; absent terms have zero strength.
 
-    Both models are of one kind, so that one program serves them.
+    Both models have the same structure, so that one program serves them.
     """
     model = fit.problem.layout.at(jnp.asarray(values))
     system = model.system

@@ -1,4 +1,4 @@
-"""One record that does not belong to the others: found, set aside and said.
+"""Find and set aside a record that is inconsistent with the others.
 
 A misread record (another gain, another rig, a wrong unit) is explained by no physics
 that the others share, and would hide what is missing in all of them.
@@ -13,7 +13,8 @@ from .report import Caveat, Diagnosis, Reason
 
 
 def odd_record(found: Diagnosis) -> str | None:
-    """The record that a diagnosis leaves unexplained while it explains all others.
+    """Return the record that a diagnosis leaves unexplained while it explains all
+    others.
 
     It is one of at least `policy.records_apart`; its cost per sample is not `near` the
     data, and exceeds that of every other record by a factor of `policy.odd`.
@@ -28,7 +29,7 @@ def odd_record(found: Diagnosis) -> str | None:
 
 
 def cost_by_record(found: Fit) -> dict[str, float]:
-    """Cost per sample of each record; one where nothing but noise is left."""
+    """Return the cost per sample of each record; 1 if only noise remains."""
     problem, costs = found.problem, found.costs
     exists = np.asarray(problem.pieces.exists)
     flown = np.where(exists, np.asarray(costs.flown) + np.asarray(costs.joints), 0.0)
@@ -42,9 +43,10 @@ def cost_by_record(found: Fit) -> dict[str, float]:
 
 
 def set_aside(found: Diagnosis, again: Diagnosis, name: str) -> Diagnosis:
-    """The diagnosis of the other records, if it explains what the first one did not.
+    """Return the diagnosis of the other records, if it explains them better.
 
-    **Arguments:** the diagnosis of all records, that without one, and its name.
+    **Arguments:** the diagnosis of all records, that without the odd record, and its
+    name.
     """
     costs = cost_by_record(found.after)
     better = max(cost_by_record(again.after).values()) < costs[name] / found.policy.odd

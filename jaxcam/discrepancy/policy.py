@@ -1,9 +1,9 @@
-"""All numbers that a diagnosis was given, in one place.
+"""Define all settings of a diagnosis.
 
-The first group decides a verdict; what follows from the data or from another number
-(the BIC, the error rate shared out over the terms, the detection limit) is derived. The
-second bounds the search: it can change the time that is taken and should not change the
-verdict. A few numbers do neither and choose only what a report shows.
+The first group decides a verdict; quantities that follow from the data or from another
+setting (the BIC, the error rate per term, the detection limit) are derived. The second
+group limits the search: it changes the computing time and should not change the
+verdict. A third group selects the content of a report.
 """
 
 import dataclasses

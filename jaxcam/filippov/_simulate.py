@@ -1,4 +1,4 @@
-"""The motion of a Filippov system, with every switch located."""
+"""Simulate a Filippov system and locate every switch."""
 
 import jax
 import jax.numpy as jnp
@@ -34,9 +34,9 @@ def simulate_filippov(
 ) -> FilippovTrajectory:
     """Simulate a Filippov system from `t0` to `t1`.
 
-    Switches are located to the accuracy of the steps; switches that a step would leap
-    over are detected as far as a cubic in time shows them. On the surface the motion
-    crosses, or slides by Filippov's convex combination until one field becomes tangent.
+    Switches are located to the accuracy of the steps; switches within a step are
+    detected by a cubic in time. On the surface the motion crosses, or slides by
+    Filippov's convex combination until one field becomes tangent.
 
     Args:
         system: The system.

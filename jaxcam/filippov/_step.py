@@ -1,7 +1,7 @@
-"""One attempted step: accept it, retake it shorter, or end it at the surface.
+"""Take one attempted step: accept it, shorten it, or end it at the surface.
 
-Apart from the event loop of `jaxcam.hybrid`, because a switch changes the field and not
-the state: there are no impacts, and a step ends on the surface.
+It is separate from the event loop of `jaxcam.hybrid`, because a switch changes the
+field and not the state: there are no impacts, and a step ends on the surface.
 """
 
 from typing import Any, NamedTuple
@@ -24,7 +24,7 @@ _RETAKES = 80
 
 
 class FilippovState(NamedTuple):
-    """A motion on its way."""
+    """The state of a motion during the simulation."""
 
     t: Any
     x: Any
@@ -49,12 +49,12 @@ class StepRow(NamedTuple):
 
 
 def in_mode(system: FilippovSystem, mode, t, x, h):
-    """A step of the field in force; sliding stays on the surface."""
+    """Take a step of the field in force; sliding stays on the surface."""
 
     def field(s, y):
         return mode_field(system, mode, s, y)
 
-    # of order five: over its steps a level is a cubic, nearly, and its dips are seen
+    # of order five: over its steps a level is nearly cubic, so its minima are detected
     after, error, _ = array_step(DOPRI5, field, t, x, h, unrolled=True)
     held = onto_surface(system, t + h, after)
     return jnp.where(mode == 0, held, after), error
@@ -88,7 +88,7 @@ def attempt(
     fall = rate1 < 0
     offset = jnp.where(fall, -level1 / jnp.where(fall, rate1, 1.0), 0.0)
     through = level1 < 0
-    # an instant cannot be told from another one closer than this
+    # smallest difference of two times
     blur = 1e-14 * (1 + jnp.abs(end))
     reached = fall & (jnp.abs(offset) <= _CLOSE * h + blur)
     where = jnp.where(
@@ -103,7 +103,7 @@ def attempt(
     retake = fits & (part < 1)
     good = fits & ~retake & active
 
-    # the event: the rest of the way by a series, which also carries its derivative
+    # the event: the remaining time by a series, which also carries its derivative
     delta = jnp.where(lands, offset[which], 0.0)
 
     def field(t, x):
@@ -149,7 +149,7 @@ def attempt(
 
 
 def _dip(value0, slope0, value1, slope1):
-    """Return where the cubic through two ends dips below zero; 1 where nowhere.
+    """Return the place at which the cubic through two ends is below zero; 1 if nowhere.
 
     The place is that of its least value, as a fraction of the step.
     """

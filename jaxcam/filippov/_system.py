@@ -15,7 +15,7 @@ class FilippovSystem(eqx.Module):
     never jumps. In a [`jaxcam.hybrid.HybridSystem`][], by contrast, the surface is
     never crossed, contact takes two conditions on the state (gap and normal velocity)
     and begins by an impact. Here both sides are open and sliding takes one condition,
-    so that the two have event loops of their own.
+    so the two kinds have separate event loops.
 
     Examples:
         >>> from jaxcam.filippov import FilippovSystem, simulate_filippov
@@ -53,5 +53,5 @@ class FilippovSystem(eqx.Module):
         return None
 
     def check(self) -> None:
-        """Raise `ValueError` where a parameter has no physical meaning."""
+        """Raise `ValueError` if a parameter has no physical meaning."""
         return None

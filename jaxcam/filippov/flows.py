@@ -1,4 +1,4 @@
-"""Runs of the loop: with a record, without one, and of one leg alone."""
+"""Run the loop with or without a record, or integrate a single mode."""
 
 import equinox as eqx
 import equinox.internal as eqxi
@@ -32,7 +32,7 @@ def start(system, state, t0, t1) -> FilippovState:
 
 @eqx.filter_jit
 def chunk(system, tolerance, t1, carried: FilippovState):
-    """Many attempts, with a row for each."""
+    """Run many attempts, with a row for each."""
 
     def one(carried, _):
         return attempt(system, tolerance, t1, carried)

@@ -31,7 +31,9 @@ def surface_rates(
 
 
 def sliding_share(system: FilippovSystem, t, state) -> Float[Array, ""]:
-    """Share of the field above in sliding motion: between 0 and 1 where it slides."""
+    """Return the share of the field above in sliding: between 0 and 1 where it
+    slides.
+    """
     above, below = surface_rates(system, t, state)
     difference = below - above
     safe = jnp.where(difference == 0, 1.0, difference)
@@ -132,7 +134,7 @@ def mode_field(system: FilippovSystem, mode, t, state) -> Float[Array, " n"]:
 def levels(system: FilippovSystem, mode, t, state) -> Float[Array, " 2"]:
     """Return the quantities that stay positive in a mode: H, or both inward rates.
 
-    The second level of a side is one, always.
+    The second level of a side is always 1.
     """
     above, below = surface_rates(system, t, state)
     height = mode * system.switching(t, state)
@@ -141,13 +143,13 @@ def levels(system: FilippovSystem, mode, t, state) -> Float[Array, " 2"]:
 
 
 def onto_surface(system: FilippovSystem, t, state) -> Float[Array, " n"]:
-    """The state moved to the surface along its gradient."""
+    """Move the state to the surface along its gradient."""
     value, gradient = jax.value_and_grad(system.switching, argnums=1)(t, state)
     return state - value * gradient / jnp.sum(gradient * gradient)
 
 
 def mode_after(system: FilippovSystem, mode, level, t, state):
-    """The mode in which a motion continues from an event on the surface.
+    """Return the mode in which a motion continues from an event on the surface.
 
     A side ends in crossing or sliding; sliding ends where one of the fields begins to
     point away from the surface, to the side of that field.
@@ -160,7 +162,7 @@ def mode_after(system: FilippovSystem, mode, level, t, state):
 
 
 def first_mode(system: FilippovSystem, t, state):
-    """The mode of a start; escaping counts as above."""
+    """Return the mode of a start; escaping counts as above."""
     height = system.switching(t, state)
     above, below = surface_rates(system, t, state)
     on = jnp.abs(height) <= 1e-12 * (1.0 + jnp.max(jnp.abs(state)))

@@ -1,4 +1,4 @@
-"""Block bootstrap: how the estimates scatter when flights count more or less."""
+"""Bayesian bootstrap over blocks: the scatter of estimates under random weights."""
 
 import dataclasses
 from collections.abc import Callable
@@ -13,7 +13,7 @@ from .engine import Weights
 
 @dataclasses.dataclass(frozen=True)
 class Bootstrap:
-    """Estimates from reweighted data, in the fit's order.
+    """Estimates of a Bayesian bootstrap, in the order of the fit.
 
     Unlike the Fisher information they account for the actual residuals: a
     model with a discrepancy scatters more than the noise explains.
@@ -52,23 +52,24 @@ def bootstrap(
     iterations: int = 8,
     progress: Callable[[int, int], None] | None = None,
 ) -> Bootstrap:
-    """Fit again with random weights on flights and contacts (block bootstrap; Rubin,
-    1981).
+    """Repeat a fit with random weights of flights and contacts (Bayesian bootstrap over
+    blocks; Rubin, 1981).
 
-    A block is one flight, all its pieces together, or one contact, since residuals
-    tend to be alike throughout one part of a motion. Weights are exponential with mean
-    one; drawing blocks with replacement has the same mean and variance, but leaves
-    out some blocks, and with them the impacts at both their ends. Each repetition
-    starts at the optimum and needs few iterations.
-    The example continues that of [`jaxcam.fitting.fit`][].
+    A block is one flight, all its pieces together, or one contact, since residuals are
+    correlated within one part of a motion. Weights are exponential with mean 1. Drawing
+    blocks with replacement would give weights of the same mean and variance, but would
+    omit some blocks, and with them the impacts at both their ends. Each repetition
+    starts at the optimum and needs few iterations. The example continues that of
+    [`jaxcam.fitting.fit`][].
 
     Args:
         found: The fit.
         repetitions: Number of repetitions.
         seed: Seed of the random weights.
-        prior: As for `found`.
+        prior: Whether tolerances count as prior knowledge; use the value used for
+            `found`.
         iterations: Largest number of iterations of each repetition.
-        progress: Called with the number of repetitions done, and of all.
+        progress: Called with the number of repetitions done, and their total number.
 
     Returns:
         A [`jaxcam.fitting.Bootstrap`][].

@@ -1,4 +1,4 @@
-"""The cam-follower rig as a problem: its parameters, tolerances and sensors."""
+"""State the cam-follower as a fitting problem: parameters, tolerances and sensors."""
 
 import math
 from collections.abc import Sequence
@@ -10,7 +10,7 @@ from .engine import cam_follower_drive, Model, Parameter, Sensor
 def cam_follower_model(
     rig: Rig, channels: Sequence[str] = ("follower_angle_rad",)
 ) -> Model:
-    """Return the nominal rig with its sensors; the drive follows the cam's encoder.
+    """Return the nominal model with its sensors; the drive follows the cam's encoder.
 
     Args:
         rig: The rig.
@@ -132,6 +132,6 @@ def cam_follower_parameters(rig: Rig, base=lambda system: system) -> list[Parame
             unit=unit,
         )
         for name, where, tolerance, unit in table
-        # a quantity without tolerance is known
+        # a quantity without tolerance is held fixed
         if tolerance > 0
     ]

@@ -8,12 +8,12 @@ import numpy as np
 from .engine import Costs, FLIGHT, IMPACT, Point, Problem, Weights
 
 
-# Cost of a sample, or of a component of a joint, that noise does not explain: it is one
-# on average, and the usual piece of thousands is within a few per cent of that
+# Cost of a sample, or of a component of a joint, that noise does not explain: it is 1
+# on average, and a piece of thousands of samples is within a few per cent of that
 _PIECE, _JOINT, _MEAN = 4.0, 9.0, 9.0
-# Part of the pieces that must be that good: a bad record among many is an outlier
+# Fraction of the pieces that must be below it: a bad record among many is an outlier
 _USUAL = 0.75
-# A bound is reached to this part of the parameter's scale
+# Tolerance for reaching a bound, relative to the parameter's scale
 _ON_BOUND = 1e-9
 
 
@@ -43,7 +43,7 @@ class Reason(NamedTuple):
 
 
 def not_finite(problem: Problem, point: Point, cost: float, costs: Costs) -> str:
-    """Return a sentence that names what is not finite; empty where everything is."""
+    """Return a sentence that names the non-finite quantity; empty if all are finite."""
     pieces = problem.pieces
     flown = np.asarray(costs.flown) + np.asarray(costs.joints)
     exists = np.asarray(pieces.exists)
@@ -66,10 +66,10 @@ def not_finite(problem: Problem, point: Point, cost: float, costs: Costs) -> str
 
 
 def far_from_data(problem: Problem, costs: Costs, weights: Weights | None) -> str:
-    """Return a sentence where the cost is far above the noise; empty where it is not.
+    """Return a sentence if the cost is far above the noise, otherwise the empty string.
 
-    Compared are what three quarters of the pieces keep below, so that one bad record
-    among many is no reason, and the mean, so that no part may be far off altogether.
+    The test uses the upper quartile over the pieces, so that one bad record among many
+    does not count, and the mean, so that no part may be very far off.
     """
     pieces = problem.pieces
     weights = weights or problem.everything()
@@ -119,7 +119,7 @@ def far_from_data(problem: Problem, costs: Costs, weights: Weights | None) -> st
 
 
 def on_a_bound(problem: Problem, free, point: Point) -> list[str]:
-    """Free parameters that are at a bound, each in a sentence."""
+    """Return a sentence for each free parameter that is at a bound."""
     values, found = np.asarray(point.values), []
     for name in free:
         parameter = problem.parameter(name)

@@ -1,4 +1,6 @@
-"""The joint confidence region of parameters: the ellipsoid of their covariance."""
+"""Compute the joint confidence region of parameters, the ellipsoid of their
+covariance.
+"""
 
 import dataclasses
 from collections.abc import Sequence
@@ -14,8 +16,8 @@ class Ellipse:
 
     The points p with (p - centre)' C^-1 (p - centre) below the quantile of a chi-square
     with d degrees of freedom, C the covariance of these parameters with all others left
-    free. As exact as the model is straight over the region; see
-    [`jaxcam.fitting.excess_cost`][] for one that bends.
+    free. It is exact for a model that is linear over the region; for a nonlinear model
+    see [`jaxcam.fitting.excess_cost`][].
     """
 
     names: tuple[str, ...]
@@ -25,7 +27,7 @@ class Ellipse:
     covariance: Float[np.ndarray, "d d"]
     """`(d,)` and `(d, d)`, in the units of the parameters."""
     level: float
-    """Probability that the region holds the truth."""
+    """Probability that the region contains the true values."""
 
     @property
     def limit(self) -> float:
@@ -36,8 +38,8 @@ class Ellipse:
     def axes(self) -> Float[np.ndarray, "d d"]:
         """Half axes, one a row, from the centre to the edge, the longest first.
 
-        They are at right angles where each parameter is counted in its standard error,
-        so that they do not depend on the units.
+        They are orthogonal with each parameter in units of its standard error, so they
+        do not depend on the units.
         """
         return (self._roots() * np.sqrt(self.limit)).T
 
@@ -57,7 +59,7 @@ class Ellipse:
         drawing.
 
         Raises:
-            ValueError: For more than two parameters.
+            ValueError: There are more than two parameters.
         """
         if len(self.names) != 2:
             raise ValueError(
@@ -70,7 +72,7 @@ class Ellipse:
         )
 
     def _roots(self) -> Float[np.ndarray, "d d"]:
-        """Columns whose outer products add to the covariance."""
+        """Return columns whose outer products add up to the covariance."""
         size = np.sqrt(np.diag(self.covariance))
         values, vectors = np.linalg.eigh(self.covariance / np.outer(size, size))
         return (size[:, None] * vectors * np.sqrt(np.maximum(values, 0.0)))[:, ::-1]
@@ -79,7 +81,7 @@ class Ellipse:
 def ellipse_of(
     names: Sequence[str], labels: Sequence[str], centre, covariance, level: float
 ) -> Ellipse:
-    """The region of the parameters `names` among those with these labels."""
+    """Return the region of the parameters `names` among those with these labels."""
     if not 0 < level < 1:
         raise ValueError(f"The level is {level:g}; give a probability between 0 and 1.")
     if len(set(names)) != len(names) or len(names) < 2:
@@ -104,7 +106,7 @@ def ellipse_of(
 
 
 def most_correlated(labels: Sequence[str], correlation) -> str:
-    """The pair of parameters that are most correlated, in a sentence."""
+    """Describe the most correlated pair of parameters in a sentence."""
     if len(labels) < 2:
         return "Fewer than two parameters were fitted, so none are correlated."
     size = np.abs(np.where(np.isfinite(correlation), correlation, 0.0))
@@ -113,7 +115,8 @@ def most_correlated(labels: Sequence[str], correlation) -> str:
     kept = max(1 - value**2, np.finfo(float).eps) ** 0.5
     together = "in opposite directions" if value < 0 else "together"
     return (
-        f"{labels[k]} and {labels[i]} are told apart worst: their errors go {together} "
+        f"{labels[k]} and {labels[i]} are the hardest to distinguish: their errors "
+        f"go {together} "
         f"(correlation {value:+.4f}), and if one were known, the error of the other "
         f"would be {kept:.2g} times what it is."
     )

@@ -1,4 +1,4 @@
-"""Levenberg-Marquardt on the parameters of a `Problem`, its states eliminated."""
+"""Fit the parameters of a `Problem` by Levenberg-Marquardt, with eliminated states."""
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -34,9 +34,9 @@ PROMISE = 1e-3
 _GRADIENT = 1e-2
 # Steps that may follow before the first one is judged
 _CORRECTIONS = 3
-# A flight of more pieces than this is not predicted from its start at once
+# A flight with more pieces than this is not predicted from its start at first
 _LONG = 16
-# What parameters without a tolerance are multiplied by, where a fit ended far off
+# Factors of parameters without a tolerance, for restarts after a fit ended far off
 _FACTORS = (0.7, 1.4, 0.5, 2.0)
 # in units of the parameters' scales, over which a model may bend
 _FIRST_DAMPING, _LEAST_DAMPING, _MOST_DAMPING = 1.0, 1e-6, 1e12
@@ -55,9 +55,9 @@ def fit(
 ) -> Fit:
     """Fit the free parameters of a problem.
 
-    Where a fit from the problem's own start ends far above the noise, and neither
-    `start` nor `stop` was given, it is tried again from other places, and the one that
-    fits best is returned.
+    If a fit from the problem's own start ends far above the noise, and neither `start`
+    nor `stop` was given, it is repeated from other starts, and the best fit is
+    returned.
 
     Args:
         problem: The problem.
@@ -68,8 +68,9 @@ def fit(
         prior: Whether the tolerances count as prior knowledge; bounds always hold.
         iterations: Largest number of iterations.
         stop: Called after each iteration with the costs so far, from the start on; if
-            it returns True, the fit ends, not converged. Long flights are first fitted
-            with loose joints, to the end; the costs are those that follow.
+            it returns True, the fit ends without convergence. Long flights are first
+            fitted completely with loose joints; the costs are those of the iterations
+            after that.
         progress: Called with the number of the iteration and the cost.
 
     Returns:
@@ -108,8 +109,8 @@ def fit(
     long = problem.longest_flight > _LONG and fresh
     first = loosely() if long else point
     found = _descend(problem, columns, extras, first, prior, iterations, stop, progress)
-    # elsewhere than at the noise there may be a better optimum; a caller who stops
-    # fits or names a start looks after that
+    # above the noise there may be a better optimum; a caller who gives `stop` or
+    # `start` is responsible for that
     if fresh and stop is None and iterations > 0 and _far(problem, found, weights):
         for other in _other_starts(problem, columns, extras, point, prior, loosely):
             again = _descend(problem, columns, extras, other, prior, iterations)
@@ -138,10 +139,10 @@ def _far(problem, found: _Descent, weights) -> bool:
 
 
 def _other_starts(problem, columns, extras, point, prior, loosely):
-    """Starts for a fit that ended far from the data, the cheapest first.
+    """Return starts for a fit that ended far from the data, the lowest cost first.
 
-    With joints that give, and parameters that differ by a few of their scales: the
-    cost of an oscillation that is followed over many periods has many valleys.
+    They use loose joints, and parameters that differ by a few of their scales: the cost
+    of an oscillation over many periods has many local minima.
     """
     yield loosely()
     loose = loosened(extras)
@@ -166,7 +167,7 @@ def _other_starts(problem, columns, extras, point, prior, loosely):
 def _descend(
     problem, columns, extras, point, prior, iterations, stop=None, progress=None
 ):
-    """Damped scoring from a point to an optimum near it."""
+    """Iterate damped scoring from a point to an optimum near it."""
     local, scales = jnp.asarray(columns.local), jnp.asarray(columns.scales)
 
     def linearise(point):
@@ -184,7 +185,8 @@ def _descend(
         step, promise = damped_step(problem, columns, blocks, point, damping, prior)
         fine = np.isfinite(promise)
         if fine and promise < PROMISE and damping <= 1e-1:
-            # a damped step promises little along a valley; the whole one must as well
+            # a damped step predicts little gain along a valley; the undamped step must
+            # as well
             _, whole = damped_step(
                 problem, columns, blocks, point, _LEAST_DAMPING, prior
             )
@@ -198,7 +200,7 @@ def _descend(
             value = total(changed, step)
         for _ in range(_CORRECTIONS):
             # the valley is curved and steep: a long step along it ends on its side, and
-            # is judged by where the next ones lead
+            # is judged after the next steps
             if value <= cost or not np.isfinite(value):
                 break
             step, _ = damped_step(problem, columns, found, step, damping, prior)

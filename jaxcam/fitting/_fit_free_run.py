@@ -1,4 +1,4 @@
-"""Parameters by the error of whole free runs, as benchmarks judge a model."""
+"""Fit parameters to the error of complete free runs, the criterion of benchmarks."""
 
 import dataclasses
 from collections.abc import Mapping, Sequence
@@ -21,8 +21,8 @@ from .engine import (
 )
 
 
-# Times that initial states are estimated again; steps of the parameters, in their
-# scales, that end it
+# Number of updates of the initial states; parameter step, in scales, at which the
+# iteration ends
 _ROUNDS, _SETTLED = 4, 1e-2
 # Evaluations of a round at most
 _EVALUATIONS = 40
@@ -50,12 +50,13 @@ def fit_free_run(
     start: Mapping[str, float] | None = None,
     samples: int = 20,
 ) -> FreeRunFit:
-    """Fit parameters to whole free runs.
+    """Fit parameters to complete free runs.
 
-    `fit` asks whether each piece of a recording follows from the one before, and says
-    how well each parameter is known. This asks how far a simulation from the first
-    samples strays in the end; what the model lacks adds up, and parameters are bent to
-    make up for it, so no errors are given. Channels count in units of their noise.
+    `fit` compares each piece of a recording with a prediction from the piece before,
+    and estimates the error of each parameter. This function minimises the error of a
+    simulation that starts at the first samples. A model discrepancy accumulates in it
+    and biases the parameters, so no errors are given. Channels count in units of their
+    noise.
 
     Args:
         model: A system with its sensors and its input.
@@ -69,9 +70,9 @@ def fit_free_run(
         A `FreeRunFit`.
 
     Raises:
-        RecordingError: As by `free_run`.
+        RecordingError: See `free_run`.
         ValueError: A parameter is not one number of the model, or a start is none of
-            the parameters; also as by `free_run`.
+            the parameters; see also `free_run`.
 
     Examples:
         >>> from jaxcam.fitting import fit_free_run, Model, Parameter, Sensor
@@ -137,20 +138,20 @@ def _array(leaf):
 
 
 def _missed(ready: Sequence[tuple[Layout, Prepared]], values):
-    """Residuals of all recordings, in units of the noise."""
+    """Return the residuals of all recordings, in units of the noise."""
     parts = [_off(*one, jnp.asarray(values)) for one in ready]
     return _sound(np.concatenate(parts))
 
 
 def _slopes(ready: Sequence[tuple[Layout, Prepared]], scale, values):
-    """Derivatives of that to the parameters."""
+    """Return the derivatives of the residuals by the parameters."""
     units = jnp.asarray(scale)
     rows = [_along(*one, jnp.asarray(values), units) for one in ready]
     return _sound(np.concatenate(rows, axis=1).T) / scale
 
 
 def _sound(numbers):
-    # a motion that is lost is very far off
+    # a motion that is not finite counts as a very large error
     return np.nan_to_num(numbers, nan=1e12, posinf=1e12, neginf=-1e12)
 
 

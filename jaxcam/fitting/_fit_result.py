@@ -76,7 +76,7 @@ class Fit:
     estimates: tuple[Estimate, ...]
     """One for each free number, in the order of `covariance`."""
     covariance: Float[np.ndarray, "g g"]
-    """From the Fisher information, what was known beforehand included."""
+    """Covariance from the Fisher information, prior knowledge included."""
     cost: float
     """Minus twice the log-likelihood (less a constant) with the prior; `costs`: of each
     piece, without it."""
@@ -118,7 +118,7 @@ class Fit:
     def reasons(self) -> tuple[Reason, ...]:
         """The reasons not to trust the fit; empty where it has converged.
 
-        Found from what the fit holds, so that it cannot disagree with it.
+        They are computed from the fit itself, so they cannot contradict it.
         """
         found = []
         if not self.optimal:
@@ -156,10 +156,10 @@ class Fit:
         return " ".join(one.sentence for one in self.reasons) or self.ended
 
     def __getitem__(self, name: str) -> Estimate:
-        """The estimate of a parameter, by name or `name@record`.
+        """Return the estimate of a parameter, by name or `name@record`.
 
         Raises:
-            KeyError: That lists the names there are.
+            KeyError: The name is unknown; the message lists the names.
         """
         for one in self.estimates:
             if name in (one.name, one.label):
@@ -239,7 +239,7 @@ def finish(
     prior,
     weights=None,
 ):
-    """Standard errors, and everything in one place."""
+    """Compute standard errors and collect the result."""
     information, _ = reduced(columns, blocks)
     known = np.diag(prior_information(problem, columns, prior))
     information = information + known
@@ -260,7 +260,7 @@ def finish(
             columns.scale,
             lambda: held_firmer(columns, blocks) + known,
         )
-        # what is not known has no error that a number could state
+        # an unconstrained parameter has no finite error
         unknown = {name for one in blind for name in one.names}
         rows = [k for k, label in enumerate(labels) if label in unknown]
         covariance[rows, :] = 0.0

@@ -1,4 +1,4 @@
-"""A model simulated from its inputs alone, against a recording that it did not see."""
+"""Simulate a model from its inputs alone, and compare it with a recording."""
 
 import dataclasses
 import math
@@ -26,7 +26,7 @@ from .engine import (
 
 # Steps of Newton's method on the initial state, and its relative tolerance
 _NEWTON, _STILL = 20, 1e-12
-# Part of its own information that keeps a state in place that no sample shows
+# Fraction of the information that holds an unobserved state in place
 _LEAST = 1e-12
 # Steps between two samples: to begin with, and at most
 _FIRST_STEPS, _MOST_STEPS = 2, 64
@@ -71,12 +71,12 @@ class FreeRun:
 def free_run(
     model: Model, recording: Recording | Segments, *, samples: int = 20
 ) -> FreeRun:
-    """Simulate a whole recording from its first samples and its input.
+    """Simulate a complete recording from its first samples and its input.
 
     The state at the first sample is the one whose motion fits the first `samples` best.
     From there on nothing but the measured input is used, held between samples, so that
-    errors add up over the whole recording. This is how benchmarks of identification
-    judge a model; a fit judges it piece by piece.
+    errors accumulate over the recording. This is how benchmarks of identification judge
+    a model; a fit judges it piece by piece.
 
     Args:
         model: A system with its sensors and its input, such as `found.model()`.
@@ -129,7 +129,7 @@ def free_run(
 
 
 class Prepared(eqx.Module):
-    """A recording as a free run needs it.
+    """A recording prepared for a free run.
 
     `state` `(n,)` at the first sample, found from `samples` of them; times `start` and
     `interval` (s); the input's `level` `(k,)`; `data` `(k, c)` and their `noise`
@@ -154,9 +154,9 @@ class Simulated(NamedTuple):
 
 
 def prepared(model: Model, recording: Recording | Segments, samples: int) -> Prepared:
-    """A recording with its initial state, and with steps that are short enough.
+    """Return a recording with its initial state, and with steps that are short enough.
 
-    **Raises:** as `free_run` does.
+    **Raises:** see `free_run`.
     """
     run = recording.recording if isinstance(recording, Segments) else recording
     if isinstance(model.drive, Turning):
@@ -198,7 +198,7 @@ def prepared(model: Model, recording: Recording | Segments, samples: int) -> Pre
 
 @eqx.filter_jit
 def simulated(model: Model, one: Prepared) -> Simulated:
-    """The motion from the initial state on, at each sample."""
+    """Simulate the motion from the initial state, at each sample."""
     step = one.interval / one.steps
     size = one.state.shape[0] - len(filtered_channels(model))
 
@@ -231,7 +231,7 @@ def simulated(model: Model, one: Prepared) -> Simulated:
 
 
 def _first_state(model: Model, data) -> Float[Array, " n"]:
-    """Positions where the first samples have them, all else at rest."""
+    """Return positions from the first samples, with all velocities zero."""
     state = jnp.zeros(state_size(model) + len(filtered_channels(model)))
     for k, sensor in enumerate(model.sensors.values()):
         seen = np.flatnonzero(np.isfinite(data[:, k]))
@@ -242,7 +242,7 @@ def _first_state(model: Model, data) -> Float[Array, " n"]:
 
 
 def _started(model: Model, one: Prepared) -> Prepared:
-    """With the state whose motion fits the first samples best, by Gauss-Newton."""
+    """Fit the initial state to the first samples by Gauss-Newton."""
     few = _first(one)
     state, cost = np.asarray(one.state), math.inf
     for _ in range(_NEWTON):
@@ -251,7 +251,7 @@ def _started(model: Model, one: Prepared) -> Prepared:
         if not now < cost * (1 - _STILL):
             break
         cost = now
-        # rows in like units: a state that no sample shows does not move
+        # rows in equal units: an unobserved state does not move
         scale = np.linalg.norm(rows, axis=0)
         scale = np.where(scale > 0, scale, 1.0)
         state = state - np.linalg.lstsq(rows / scale, missed, rcond=None)[0] / scale
@@ -260,7 +260,7 @@ def _started(model: Model, one: Prepared) -> Prepared:
 
 @eqx.filter_jit
 def _off(model: Model, one: Prepared, state):
-    """Residuals in units of the noise, and their slopes by the initial state."""
+    """Return residuals in units of the noise, and their slopes by the initial state."""
 
     def missed(state):
         found = simulated(model, dataclasses.replace(one, state=state)).channels
@@ -271,13 +271,14 @@ def _off(model: Model, one: Prepared, state):
 
 
 def restarted(model: Model, one: Prepared) -> Prepared:
-    """With the initial state that goes with another model, to first order.
+    """Return the recording with the initial state for another model, to first order.
 
-    Differentiable, so that a fit knows how the start moves with a parameter.
+    It is differentiable, so that a fit includes the dependence of the start on
+    parameters.
     """
     few = _first(one)
     missed, rows = _off(model, few, few.state)
-    # slopes are exact enough where the state was found; only their size changes
+    # slopes are exact enough at the fitted state; only their size changes
     scale = jnp.linalg.norm(jax.lax.stop_gradient(rows), axis=0)
     scale = jnp.where(scale > 0, scale, 1.0)
     rows = rows / scale[None]
@@ -287,14 +288,14 @@ def restarted(model: Model, one: Prepared) -> Prepared:
 
 
 def _first(one: Prepared) -> Prepared:
-    """The samples that the initial state is found from."""
+    """Return the samples used to fit the initial state."""
     return dataclasses.replace(
         one, level=one.level[: one.samples], data=one.data[: one.samples]
     )
 
 
 def _levels(model: Model, run: Recording) -> Float[Array, " k"]:
-    """The input at each sample; zero without one."""
+    """Return the input at each sample; zero without one."""
     spacing = np.diff(run.time)
     if np.ptp(spacing) > 2 * _UNEVEN * np.mean(spacing):
         raise RecordingError(

@@ -12,7 +12,8 @@ from ._fit_result import Fit
 from .engine import assemble, free_columns, Problem, reduced
 
 
-# a combination is seen if the data narrow it to this part of the tolerance
+# a combination is identifiable if the data reduce its error to this part of the
+# tolerance
 _SEEN = 0.5
 # Squared share of a parameter in a direction that rounding may make
 _ROUNDING = 1e-12
@@ -80,7 +81,7 @@ class Identifiability:
             if t < _SEEN and np.isfinite(a)
         ]
         if alone:
-            found.append(f"Each by itself can be told: {_listed(alone)}.")
+            found.append(f"Separately identifiable: {_listed(alone)}.")
         for stderr, direction in zip(self.stderr[::-1], self.directions[::-1]):
             members = self._members(direction)
             if stderr < _SEEN or not members or set(members) <= set(dead):
@@ -96,7 +97,7 @@ class Identifiability:
     def _unseen(self, stderr, direction, members) -> str:
         if len(members) == 1:
             return (
-                f"The data say less of {members[0]} than its tolerance does, so the "
+                f"The data constrain {members[0]} less than its tolerance does, so the "
                 f"tolerance decides."
             )
         shares = {self.names[k]: direction[k] for k in range(len(self.names))}

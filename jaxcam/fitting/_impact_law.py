@@ -1,4 +1,4 @@
-"""The law of restitution of a table of impacts, and how well momentum is kept."""
+"""Fit the law of restitution of a table of impacts, and check momentum conservation."""
 
 import dataclasses
 from typing import Any
@@ -13,19 +13,19 @@ from ._momentum import momentum_of, MomentumBalance
 from ._restitution import fit_rows, RestitutionFit
 
 
-# Fewer say nothing of a law and of their own scatter
+# Smallest number of impacts for a law and its scatter
 _LEAST = 4
-# A row so many scatters off is a misread one
+# A row this many standard deviations off is an outlier
 _MISREAD = 6.0
-# Probability that a constant restitution seems to depend on the speed
+# Probability that a constant restitution appears to depend on the speed
 _CHANCE = 0.01
-# Where more than the rest is far off, nothing is set aside
+# If more than this fraction is far off, nothing is set aside
 _MAJORITY = 0.7
 # standard deviations in the median of the size of a Gaussian number
 _MAD = 1.4826
-# Speeds that differ by less tell nothing of how restitution depends on them
+# Smallest ratio of speeds that shows a dependence of restitution on speed
 _RANGE = 1.5
-# Of the squared scatter, which is one where it is any
+# Share of the squared scatter
 _NOTHING = 1e-4
 
 
@@ -50,8 +50,9 @@ class ImpactLaw:
     best: str
     """Name of the law that the impacts support."""
     delta_bic: dict[str, float]
-    """BIC of each law less that of the constant one; below zero is better. A power law
-    that the impacts do not support is the constant with one number more."""
+    """BIC of each law minus that of the constant law; below zero is better. A power
+    law that the impacts do not support is the constant law with one extra parameter.
+    """
     p_value: float
     """Probability of the power law's gain where restitution is constant."""
     scatter: float
@@ -66,7 +67,7 @@ class ImpactLaw:
 
     @property
     def law(self) -> RestitutionFit:
-        """The one that the impacts support."""
+        """The law that the impacts support."""
         return self.laws[self.best]
 
     def sentences(self) -> list[str]:
@@ -213,7 +214,7 @@ def _weights(table: ImpactTable) -> dict[str, Float[np.ndarray, " k"]]:
 
 
 def _fits(table: ImpactTable, errors, keep) -> dict[str, RestitutionFit]:
-    """Both laws fitted to some of the impacts."""
+    """Fit both laws to some of the impacts."""
     zero = np.zeros(len(table))
     rows = (zero, table.approach, table.separation, zero, errors, zero)
     data = np.stack(rows)[:, keep]
@@ -228,7 +229,7 @@ def _fits(table: ImpactTable, errors, keep) -> dict[str, RestitutionFit]:
 
 
 def _sound(table: ImpactTable, weights) -> Bool[np.ndarray, " k"]:
-    """Rows that are not far from what the others say, by the more general law."""
+    """Return the rows that are not outliers of the more general law."""
     every = np.ones(len(table), dtype=bool)
     typical = _typical(_off(table, np.median(_r(table))) / weights, table, weights)
     off = np.zeros(len(table))
@@ -239,13 +240,13 @@ def _sound(table: ImpactTable, weights) -> Bool[np.ndarray, " k"]:
 
 
 def _typical(off, table: ImpactTable, weights) -> float:
-    """Scatter without regard to outliers; of a table without any, that of rounding."""
+    """Estimate the scatter robustly; for an exact table, that of rounding."""
     least = 1e-9 * float(np.max(table.separation / weights)) + 1e-300
     return max(_MAD * float(np.median(np.abs(off))), least)
 
 
 def _misfit(table: ImpactTable, errors, keep):
-    """Misfit of each impact to the more general law, in standard errors."""
+    """Return the misfit of each impact to the more general law, in standard errors."""
     fits = _fits(table, errors, keep)
     law = fits.get("power", fits["constant"]).law
     r = np.array([float(law(0.0, v)) for v in table.approach])  # pyright: ignore
@@ -253,7 +254,7 @@ def _misfit(table: ImpactTable, errors, keep):
 
 
 def _likelihood(table: ImpactTable, weights, keep) -> float:
-    """Logarithm of that of a Gaussian scatter in proportion to the weights."""
+    """Return the log-likelihood of a Gaussian scatter in proportion to the weights."""
     scale = _typical(_misfit(table, weights, keep)[keep], table, weights)
     off = _misfit(table, weights * scale, keep)[keep] * scale
     size = max(float(np.sqrt(np.mean(off**2))), 1e-300)
@@ -284,7 +285,7 @@ def _chosen(table: ImpactTable, kind: str, weights, keep) -> ImpactLaw:
         direction = "falling" if power.values[1] > 0 else "rising"
         other = "rising" if direction == "falling" else "falling"
         laws[direction] = power
-        # where a constant leaves nothing, there is no gain
+        # if a constant law leaves no residual, there is no gain
         nothing = constant.cost <= _NOTHING * count
         ratio = 1.0 if nothing else constant.cost / max(power.cost, 1e-300)
         extra = float(np.log(count))

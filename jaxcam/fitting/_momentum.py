@@ -9,7 +9,8 @@ from jaxtyping import Bool, Float
 from ..recordings import ImpactTable
 
 
-# Standard errors, and share of what is exchanged, beyond which momentum is not kept
+# Limits of the momentum error, in standard errors and as a share of the exchanged
+# momentum
 _ERRORS, _SHARE = 3.0, 0.005
 
 
@@ -60,7 +61,7 @@ class MomentumBalance:
 def momentum_of(
     table: ImpactTable, keep: Bool[np.ndarray, " k"]
 ) -> MomentumBalance | None:
-    """The balance of some impacts; `None` where there is one body only."""
+    """Return the momentum balance of some impacts; `None` for a single body."""
     if table.bodies is None:
         return None
     bodies = table.bodies
@@ -81,7 +82,7 @@ def momentum_of(
 def _ratio(
     above: Float[np.ndarray, " k"], below: Float[np.ndarray, " k"]
 ) -> tuple[float, float]:
-    """Ratio of two sums, with the standard error from their scatter."""
+    """Return the ratio of two sums, with the standard error from their scatter."""
     total = float(np.sum(below))
     if total == 0 or len(above) < 2:
         return np.nan, np.nan

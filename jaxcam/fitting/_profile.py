@@ -1,4 +1,4 @@
-"""Profile likelihood: how much worse the best fit is with parameters held."""
+"""Compute profile likelihoods: the cost of the best fit with some parameters held."""
 
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
@@ -15,8 +15,8 @@ from .engine import Weights
 class Profile:
     """The profile likelihood of one parameter.
 
-    The 95 % interval is where the cost is below 3.84; `interval` is interpolated,
-    infinite on a side where no value with such a cost was tried.
+    The cost is below 3.84 inside the 95 % interval; `interval` is interpolated,
+    infinite on a side without a value of higher cost.
     """
 
     name: str
@@ -71,16 +71,17 @@ def profile(
         points: Number of values, the optimum included.
         values: Values at which to hold it instead, in any order; a value is inside the
             95 % interval if its cost is below 3.84.
-        weights: As for `found`.
-        prior: As for `found`.
-        progress: Called with the number of values done and of all.
+        weights: Weight of each piece of the data; use the value used for `found`.
+        prior: Whether tolerances count as prior knowledge; use the value used for
+            `found`.
+        progress: Called with the number of values done and their total number.
 
     Returns:
         A `Profile`.
 
     Raises:
         KeyError: The parameter was not fitted.
-        ValueError: It differs from record to record.
+        ValueError: The parameter differs from record to record.
 
     Examples:
         >>> from jaxcam.fitting import profile
@@ -111,7 +112,7 @@ def profile(
             fits[k] = near
             if progress is not None:
                 progress(len(fits), len(tried))
-    # what was known of the parameter itself counts although it is held
+    # prior knowledge of the held parameter counts as well
     cost = np.array([fits[k].cost for k in range(len(tried))])
     if prior:
         cost = cost + _known(problem, name, tried)
@@ -141,8 +142,9 @@ def excess_cost(
     Args:
         found: The fit, in which all of these were free.
         values: Values by name.
-        weights: As for `found`.
-        prior: As for `found`.
+        weights: Weight of each piece of the data; use the value used for `found`.
+        prior: Whether tolerances count as prior knowledge; use the value used for
+            `found`.
 
     Returns:
         The cost.

@@ -1,4 +1,4 @@
-"""Reading the rig file of a system of one's own."""
+"""Read the rig file of a user's system."""
 
 import math
 from collections.abc import Iterator
@@ -35,12 +35,12 @@ _TABLES = (
     "records",
     *LAYOUT_KEYS,
 )
-# what is written of one number
+# keys of one entry
 _NUMBER = ("value", "tolerance", "lower", "upper", "unit")
 
 
 class _Stated(NamedTuple):
-    """One entry of `[parameters]`; without a tolerance it is known."""
+    """One entry of `[parameters]`; without a tolerance it is held fixed."""
 
     value: float | bool | str
     tolerance: float = 0.0
@@ -59,7 +59,7 @@ def read_setup(
 
     Args:
         path: The file.
-        system: Another system than that of the file: a class, or `FILE.py:CLASS`
+        system: System that replaces that of the file: a class, or `FILE.py:CLASS`
             relative to the working directory.
 
     Returns:
@@ -142,7 +142,7 @@ def _class(file: Path, tables, system) -> type[HybridSystem]:
 
 
 def _parameters(file: Path, tables) -> Iterator[tuple[str, _Stated]]:
-    """The entries of `[parameters]`, those of parts under dotted names."""
+    """Read the entries of `[parameters]`, with dotted names for parts."""
     if "parameters" not in tables:
         return
     section = Section(file, "parameters", tables)
@@ -207,9 +207,9 @@ def _parameter(name: str, one: _Stated) -> Parameter:
 def _records(
     file: Path, tables, system: HybridSystem, taken: set[str]
 ) -> dict[str, dict[str, float]]:
-    """The constants of records, by patterns of their names.
+    """Read the constants of records, by patterns of their names.
 
-    **Arguments:** `taken` are the numbers that are fitted, or that a channel says.
+    **Arguments:** `taken` are the numbers that are fitted or measured by a channel.
     """
     if "records" not in tables:
         return {}
@@ -236,7 +236,7 @@ def _entries(section: Section) -> Iterator[tuple[str, None]]:
 
 
 def _phase_of(drive: Turning | Input | None) -> str | None:
-    """The field of a turning drive's phase: of the encoder's zero, to be fitted."""
+    """Return the phase field of a turning drive, the encoder's zero to be fitted."""
     if not isinstance(drive, Turning):
         return None
     assert isinstance(drive.phase, Field)
@@ -246,7 +246,9 @@ def _phase_of(drive: Turning | Input | None) -> str | None:
 def _drive(
     file: Path, tables
 ) -> tuple[Turning | Input | None, str | None, dict[str, float]]:
-    """The drive, its channel if it turns, and what its fields hold at rest."""
+    """Return the drive, its channel if it turns, and the values of its fields at
+    rest.
+    """
     if "drive" in tables and "input" in tables:
         raise RigError(
             f"{file}: there are both [drive] and [input]; remove the one that the "
@@ -272,7 +274,7 @@ def _drive(
 
 
 def _sensors(file: Path, tables, system: HybridSystem) -> dict[str, Sensor]:
-    """A sensor for each table of `[channels]`."""
+    """Create a sensor for each table of `[channels]`."""
     outer = Section(file, "channels", tables)
     if not outer.table:
         raise RigError(
@@ -299,7 +301,7 @@ def _sensor(outer: Section, name: str, system: HybridSystem) -> Sensor:
 
 
 def _channel(section: Section, name: str) -> str:
-    """The name of a channel, which is read in SI units."""
+    """Check the name of a channel, which is read in SI units."""
     renamed, factor = si(name)
     if renamed != name or factor != 1.0:
         raise section.error(

@@ -1,4 +1,4 @@
-"""The law of restitution from every impact that was recorded, and the thesis' way."""
+"""Fit laws of restitution to all recorded impacts, and by the thesis' method."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -46,10 +46,10 @@ class RestitutionFit:
     """Its parameters."""
     cost: float
     """Sum of squares (of Huber's kind) in standard errors, and impacts less parameters;
-    their ratio is one where the law says all there is."""
+    their ratio is 1 if the law explains all impacts."""
     freedom: int
     """Sum of squares (of Huber's kind) in standard errors, and impacts less parameters;
-    their ratio is one where the law says all there is."""
+    their ratio is 1 if the law explains all impacts."""
 
     def sentence(self) -> str:
         """Return the law in words."""
@@ -68,12 +68,12 @@ def restitution_laws(segments: Sequence[Segments]) -> dict[str, RestitutionFit]:
     """Fit three restitution laws to the impacts of some recordings.
 
     Args:
-        segments: The recordings, cut into their parts.
+        segments: The segmented recordings.
 
     Returns:
         `"constant"`, `"speed"` (linear in the speed of the drive, Figure 4.15 of the
-            thesis) and `"approach"` (a power of the approach speed); without a law
-            whose parameters the impacts do not determine.
+            thesis) and `"approach"` (a power of the approach speed); laws with
+            undetermined parameters are omitted.
 
     Raises:
         RecordingError: There are too few impacts.
@@ -170,7 +170,7 @@ def fit_restitution(
 def fit_rows(
     data: Float[np.ndarray, "6 k"], law: eqx.Module, names: Sequence[str]
 ) -> RestitutionFit:
-    """Fit parameters of a law to impacts, as rows of numbers.
+    """Fit parameters of a law to impacts given as arrays.
 
     **Arguments:** speed of the drive, approach speed, separation speed, and the
     standard errors of approach, separation and surface speed; law and names as for
@@ -201,17 +201,17 @@ def _with(law, names, values):
 
 
 def _misfit(values, data, law, names):
-    """In standard errors, `(k,)`."""
+    """Return the misfit in standard errors, `(k,)`."""
     speed, approach, separation, before, after, surface = data
     changed = _with(law, names, values)
     r = jax.vmap(changed)(speed, approach)
     error = jnp.sqrt(after**2 + (r * before) ** 2 + ((1 + r) * surface) ** 2)
-    # the error is a weight, not a way to make the misfit smaller
+    # the error is a weight and must not reduce the misfit
     return (separation - r * approach) / jax.lax.stop_gradient(error)
 
 
 def _huber(off):
-    """The square root of Huber's loss, with the sign of the misfit."""
+    """Return the square root of Huber's loss, with the sign of the misfit."""
     size = jnp.abs(off)
     safe = jnp.where(size > _HUBER, size, _HUBER)
     return jnp.where(
@@ -252,7 +252,7 @@ def first_bounce(
 
     Args:
         system: The system.
-        segments: A recording, cut into its parts.
+        segments: A segmented recording.
         drive: The measured drive.
 
     Returns:
@@ -290,7 +290,7 @@ def first_bounce(
 
 @eqx.filter_jit
 def _speed_for_height(system, angle, duration, height) -> Array:
-    """Separation speed whose flight rises by `height`, by bisection."""
+    """Find the separation speed of a flight of this `height` by bisection."""
     # the gap is an angle less the cam's; on the cam both agree
     contact = angle - system.gap(jnp.asarray(0.0), jnp.stack([angle, 0.0 * angle]))
     start = jnp.stack([contact, jnp.zeros_like(contact)])
@@ -307,7 +307,7 @@ def _speed_for_height(system, angle, duration, height) -> Array:
             k4 = system.vector_field(t + h, x + h * k3)
             x = x + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
             gap = system.gap(t + h, x)
-            # a flight is over once it is back on the cam
+            # a flight ends when it is back on the cam
             open_ = (highest >= 0) & (gap > 0)
             return (t + h, x, jnp.where(open_, jnp.maximum(highest, gap), highest)), gap
 
@@ -322,7 +322,7 @@ def _speed_for_height(system, angle, duration, height) -> Array:
         short = top(middle) < height
         return jnp.where(short, middle, low), jnp.where(short, high, middle)
 
-    # no flight is faster than one that falls back at the rate of its own height
+    # upper bound of the speed from the height
     high = 8 * height / duration + 1e-9
     low, high = jax.lax.fori_loop(0, 40, halve, (zero, high + zero))
     return (low + high) / 2

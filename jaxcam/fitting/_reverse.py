@@ -1,4 +1,4 @@
-"""Gradients in reverse mode, for systems with very many parameters."""
+"""Compute gradients in reverse mode, for systems with very many parameters."""
 
 import dataclasses
 from collections.abc import Callable
@@ -17,7 +17,7 @@ from .engine import cost_of, Layout, Model, Point, Problem
 def cost_and_gradient(
     problem: Problem, point: Point, where: Callable[[Model], Any], values: Any
 ) -> tuple[Any, Any]:
-    """Cost of a problem and its gradient to any part of the model, by reverse mode.
+    """Return the cost of a problem and its gradient by any part of the model.
 
     It takes about as long for a neural network with thousands of weights in the vector
     field as for one parameter. The states of the pieces stay as they are in `point`; at
@@ -28,7 +28,7 @@ def cost_and_gradient(
 
     - `where`: picks a field, or a tuple of fields, out of the model: `lambda m:
         m.system.network`.
-    - `values`: what to put there; its inexact arrays are differentiated.
+    - `values`: values of the picked fields; their inexact arrays are differentiated.
 
     **Returns:** the cost, and the gradient as a tree like `values`.
     """
@@ -115,7 +115,7 @@ def train(
         costs.append(float(cost))
         if progress is not None:
             progress(len(costs), costs[-1])
-        # in units of a sample, so that the first step is not a leap
+        # per sample, so that the first step is not too long
         return costs[-1] / problem.samples, np.asarray(flat) / problem.samples
 
     found = scipy.optimize.minimize(
@@ -130,7 +130,7 @@ def train(
 
 
 def _with_part(problem: Problem, where: Callable[[Model], Any], values: Any) -> Problem:
-    """The problem with another part in its model."""
+    """Return the problem with a part of its model replaced."""
     model = eqx.tree_at(where, problem.model, values)
     layout = eqx.tree_at(lambda found: found.model, problem.layout, model)
     return dataclasses.replace(problem, model=model, layout=layout)

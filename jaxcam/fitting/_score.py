@@ -1,4 +1,4 @@
-"""Score and information of all parameters at a fit, whether they were free or not."""
+"""Compute score and information of all parameters at a fit, free or not."""
 
 import dataclasses
 from collections.abc import Iterable
@@ -58,7 +58,7 @@ class Linearised:
     def step(self, names: Iterable[str]) -> dict[str, tuple[float, float]]:
         """Return the change of each freed parameter, and its standard error.
 
-        Exact where the likelihood is quadratic. Parameters that differ from record to
+        It is exact for a quadratic likelihood. Parameters that differ from record to
         record are named `name@record`.
         """
         rows = self._rows(names)

@@ -1,4 +1,4 @@
-"""Recordings of any system cut at its own gaps, as its channels show them."""
+"""Segment recordings of any system at its own gaps, computed from its channels."""
 
 import dataclasses
 from collections.abc import Callable, Sequence
@@ -96,7 +96,7 @@ def segment_by_model(
 
 
 def _states(model: Model, picks, recording) -> Float[np.ndarray, "k n"]:
-    """The state as far as it is measured, zero elsewhere."""
+    """Return the measured components of the state, zero elsewhere."""
     size = size_of(model.system, {n: s.observe for n, s in model.sensors.items()})
     states = np.zeros((len(recording), size))
     for place, name in picks.items():
@@ -124,7 +124,7 @@ def _gaps(model: Model, parameters, recording, states, drive: Drive | None):
     by_state, by_value = (np.asarray(x) for x in _slopes(layout, values, *looks))
     slopes = np.max(np.abs(by_state), axis=0)
     moved = np.max(np.abs(by_value), axis=0)
-    # what is not known at all must not make zero times infinity
+    # an unknown component must not give zero times infinity
     parts = np.where(moved > 0, moved * np.where(moved > 0, tolerances, 0.0), 0.0)
     return gaps, slopes, np.sum(parts, axis=-1)
 
@@ -138,7 +138,9 @@ def _gap(layout: Layout, values, times, states, angles, rates):
 
 @eqx.filter_jit
 def _slopes(layout: Layout, values, times, states, angles, rates):
-    """Slopes of the gaps by the state and by the parameters, sample by sample."""
+    """Return slopes of the gaps by the state and by the parameters, sample by
+    sample.
+    """
 
     def one(time, state, angle, rate):
         by_state = jax.jacfwd(lambda x: _gaps_at(layout, values, time, x, angle, rate))
@@ -155,7 +157,7 @@ def _gaps_at(layout: Layout, values, time, state, angle, rate):
 
 
 def _refuse_unseen(model: Model, picks, recording, slopes) -> None:
-    """**Raises:** `RecordingError` for a gap that the channels do not show."""
+    """Raise `RecordingError` for a gap that the channels do not determine."""
     names = model.system.state_names
     for number, row in enumerate(slopes):
         for place in np.flatnonzero(row):

@@ -1,4 +1,4 @@
-"""A rig of any kind: its system, what is measured of it, and what is known of it."""
+"""Represent the rig file of any system: its sensors and known values."""
 
 import dataclasses
 import fnmatch
@@ -15,7 +15,7 @@ from .engine import Input, Model, Parameter, Problem
 
 @dataclasses.dataclass(frozen=True)
 class Setup:
-    """A rig file of a system of one's own; `read_setup` reads it.
+    """The content of a user's rig file, as read by `read_setup`.
 
     Examples:
         >>> from jaxcam.data import NEW_RIG
@@ -37,7 +37,7 @@ class Setup:
     speeds."""
     records: Mapping[str, Mapping[str, float]] = dataclasses.field(default_factory=dict)
     """Known constants of single records, by patterns of their names:
-    `{"run3*": {"mass": 0.31}}`; of several that match, the last one counts."""
+    `{"run3*": {"mass": 0.31}}`; of several matches, the last counts."""
     files: FileLayout = FileLayout()
     """Names of the columns of recordings, and their sampling rate."""
 
@@ -97,7 +97,7 @@ class Setup:
         for pattern, constants in self.records.items():
             if _fits(run.name, pattern):
                 found |= constants
-        # what a recording says of itself is nearer to it
+        # constants in the recording take precedence
         return dataclasses.replace(run, constants={**found, **run.constants})
 
     def segments(
@@ -106,7 +106,8 @@ class Setup:
         *,
         progress: Callable[[float], None] | None = None,
     ) -> tuple[Segments, ...]:
-        """Return recordings cut at the gaps of the system; those already cut stay.
+        """Return recordings segmented at the gaps of the system; segments are
+        unchanged.
 
         `progress` is called with the fraction of recordings done.
 
@@ -133,7 +134,7 @@ class Setup:
         )
 
     def problem(self, recordings: Iterable[Recording | Segments]) -> Problem:
-        """Return the fitting problem of recordings, cut already or not.
+        """Return the fitting problem of recordings, segmented or not.
 
         Raises:
             ValueError: As for `segments` and `Problem.build`.
@@ -142,6 +143,8 @@ class Setup:
 
 
 def _fits(name: str, pattern: str) -> bool:
-    """Return whether a record is meant, also a piece of it: `run3_piece2` by `run3`."""
+    """Return whether a name denotes a record or a piece of it: `run3_piece2` by
+    `run3`.
+    """
     whole = re.sub(r"_piece\d+$", "", name)
     return any(fnmatch.fnmatchcase(one, pattern) for one in (name, whole))

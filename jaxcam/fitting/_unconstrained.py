@@ -1,4 +1,4 @@
-"""Combinations of parameters that the data say nothing of."""
+"""Find combinations of parameters that the data do not constrain."""
 
 import dataclasses
 from collections.abc import Callable, Sequence
@@ -7,10 +7,11 @@ import numpy as np
 from jaxtyping import Float
 
 
-# Part of the largest singular value, in units of what each parameter does by itself,
-# below which a combination is rounding, and below which it may be
+# Fractions of the largest singular value, with columns of unit length, below which a
+# combination is rounding, and may be rounding
 _BLIND, _DOUBTFUL = 1e-6, 3e-3
-# Growth, where the states are held a hundred times as firmly, of what is only theirs
+# Growth of information that comes from the states alone, if they are held a hundred
+# times as firmly
 _GROWS = 10.0
 # Members of a combination that are named: at least this part of the largest
 _MEMBER = 0.1
@@ -29,7 +30,8 @@ class Unconstrained:
         """Return the combination, and the remedy, in words."""
         if len(self.names) == 1:
             return (
-                f"The data say nothing of {self.names[0]}; hold it or give a tolerance."
+                f"The data do not constrain {self.names[0]}; hold it or give it a "
+                f"tolerance."
             )
         moves = ", ".join(
             f"{name} by {share:+.3g}" for name, share in zip(self.names, self.shares)
@@ -46,7 +48,7 @@ def unconstrained(
     scale: Float[np.ndarray, " g"],
     firmer: Callable[[], Float[np.ndarray, "g g"]],
 ) -> tuple[Unconstrained, ...]:
-    """Combinations that are not seen: right singular vectors of the Jacobian.
+    """Find unconstrained combinations: right singular vectors of the Jacobian.
 
     The eigenvectors of the information J^T J are those of J, and its eigenvalues are
     the squares of the singular values, with every column of J at unit length.
@@ -71,7 +73,7 @@ def unconstrained(
         )
         for value, vector in zip(values, vectors.T):
             rounding = value <= _BLIND**2 * len(rows) * values[-1]
-            # a state that nothing holds but rounding lends its information
+            # a state held by rounding only contributes its information
             lent = vector @ held @ vector > _GROWS * max(value, 0.0)
             if not (rounding or (value <= _DOUBTFUL**2 * values[-1] and lent)):
                 continue

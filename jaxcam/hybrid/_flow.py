@@ -1,4 +1,4 @@
-"""Compute the flow map alone: the final state, without a record of the events."""
+"""Compute the flow map: the final state, without a record of the events."""
 
 import functools
 
@@ -19,7 +19,7 @@ from .loop import first_state, Functions, iteration, Plan
 from .lowering import depend_on, one_kernel, whole, with_kept
 
 
-# iterations before it is asked whether any lane still runs
+# iterations between two checks whether any lane still runs
 _BLOCK = 4
 
 

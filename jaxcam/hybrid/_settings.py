@@ -59,13 +59,13 @@ class Settings(eqx.Module):
 
     backend: Literal["auto", "llvm", "xla"] = eqx.field(default="xla", static=True)
     """Compiler of runs that are not traced: `"xla"`, through which all traced runs and
-    derivatives go; `"llvm"`, which is faster and refuses a system that needs an
-    operation it lacks; or `"auto"`, LLVM where it can and XLA where it cannot. Results
-    differ by rounding."""
+    derivatives go; `"llvm"`, which is faster and rejects a system with an unsupported
+    operation; or `"auto"`, LLVM if possible, otherwise XLA. Results differ by
+    rounding."""
 
     @property
     def compiles(self) -> bool:
-        """Return whether a run that is not traced is to be compiled by LLVM."""
+        """Return whether LLVM compiles a run that is not traced."""
         return self.backend != "xla" and not self.plain
 
     def check(self) -> None:

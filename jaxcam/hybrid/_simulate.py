@@ -127,7 +127,7 @@ def simulate(
 
 
 def _chosen(settings, tolerance, solver, max_step) -> Settings:
-    """Return the settings of a run, given as a whole or one by one."""
+    """Return the settings of a run, given as `Settings` or as single arguments."""
     if settings is None:
         chosen = diffrax.Dopri8() if solver is None else solver
         return Settings(tolerance=tolerance, solver=chosen, max_step=max_step)
@@ -186,21 +186,21 @@ def _forward(
 
 
 def _reversible(system, settings, t0, state, t1, rows: int):
-    """Do the same as a scan."""
+    """Run the same loop as a scan."""
     return _of_rows(run_reversible, system, settings, t0, state, t1, rows)
 
 
 def _of_rows(runner, system, settings, t0, state, t1, rows):
     functions, plan, carried = prepare(system, settings, t0, state, t1, True)
     contact = jnp.stack(carried.contact)
-    # a start that is refused leads nowhere
+    # an invalid start is not integrated
     state = jnp.where(carried.status == RUNNING, state, jnp.nan)
     carried, log = runner(functions, plan, carried, rows)
     return assemble(system, t0, state, contact, log, (rows, rows)), _code(carried)
 
 
 def _assemble(system, t0, state, contact, log: Log) -> Parts:
-    """The parts of a run that is not traced."""
+    """Assemble the parts of a run that is not traced."""
     t0, state, contact, log = jax.tree.map(np.asarray, (t0, state, contact, log))
     log = Log(*(part[log.kind > 0] for part in log))
     rows, width = log.contact.shape
@@ -218,8 +218,8 @@ def _code(carried: LoopState):
 def _trim(parts: Parts) -> Parts:
     def cut(part):
         number = int(part.count)
-        # in numpy: jax would compile a slice for every new length; copied, or the whole
-        # log would stay in memory with it
+        # in numpy: jax would compile a slice for every new length; copied, because a
+        # view would keep the entire log in memory
         return jax.tree.map(
             lambda a: np.asarray(a)[:number].copy() if a.ndim else a, part
         )

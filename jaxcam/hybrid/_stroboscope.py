@@ -17,7 +17,7 @@ from .loop import starts_behind
 from .surface import check_restitution, restitutions
 
 
-# lanes of a group over lanes of a block
+# ratio of lanes in a group to lanes in a block
 _GROUP = 64
 
 

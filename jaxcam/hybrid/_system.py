@@ -46,7 +46,7 @@ class HybridSystem(eqx.Module):
     """Names of the constraints, in the order of `gap`, such as `("left", "right")`."""
     active: ClassVar[bool] = False
     """Whether impacts may add energy, as at a driven bumper or in reversed time.
-    Otherwise a coefficient of restitution above one is refused."""
+    Otherwise a coefficient of restitution above one is an error."""
 
     @abc.abstractmethod
     def vector_field(

@@ -1,4 +1,4 @@
-"""A run that is not traced: chunk by chunk, by LLVM or by XLA, as far as it goes."""
+"""Run the loop outside of traces, chunk by chunk, by LLVM or by XLA."""
 
 from collections.abc import Callable
 from typing import Any
@@ -30,9 +30,9 @@ _CHUNK = 2048
 def run_untraced(
     system, settings, t0, state, t1, budget: int, progress: Callable | None
 ) -> tuple[Log, Any, Int[Array, ""]]:
-    """Log, contacts at the start, and result code of a run of at most `budget` rows.
+    """Return log, initial contacts and result code of a run of at most `budget` rows.
 
-    A run that goes on after that has the code of `RUNNING`.
+    A run that has not ended by then has the code `RUNNING`.
     """
     case = system, settings, t0, state, t1
     if settings.compiles:
@@ -44,7 +44,7 @@ def run_untraced(
 
 
 def prepare(system, settings, t0, state, t1, differentiable):
-    """Functions, plan and first state of a run."""
+    """Return functions, plan and first state of a run."""
     system = system.prepared()
     functions = Functions(system, state.shape[0], settings.plain)
     plan = Plan.of(system, settings, t0, t1, differentiable=differentiable)
@@ -65,7 +65,7 @@ def _start(system, settings, t0, state, t1):
 
 
 def _row(record, lane: LoopState):
-    """All attempts in a row."""
+    """Record an attempted step as a row."""
     return lane.steps - 1.0, numbers_of_row(record)
 
 

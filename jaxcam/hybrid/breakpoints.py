@@ -15,7 +15,7 @@ _SIDE = 2e-15
 
 
 def declared(system) -> tuple:
-    """The breakpoints of a system (s), one scalar each."""
+    """Return the breakpoints of a system (s), one scalar each."""
     times = system.breakpoints
     if times is None:
         return ()
@@ -24,12 +24,15 @@ def declared(system) -> tuple:
 
 
 def next_breakpoint(breaks, repeat, t):
-    """The first breakpoint after `t`; they recur every `repeat` (s), inf for never."""
+    """Return the first breakpoint after `t`; they recur every `repeat` (s), inf for
+    never.
+    """
     return neighbours(breaks, repeat, t)[1]
 
 
 def neighbours(breaks, repeat, t):
-    """The last breakpoint at or before `t`, and the first after it; else -inf and inf.
+    """Return the last breakpoint at or before `t`, and the first after it; else -inf
+    and inf.
 
     They recur every `repeat` (s), inf for never.
     """
@@ -49,7 +52,9 @@ def neighbours(breaks, repeat, t):
 
 
 def between(t, low, high, span):
-    """The time `t` moved inside (low, high), without a change of its derivative."""
+    """Return the time `t` moved inside (low, high), without a change of its
+    derivative.
+    """
     inside = jnp.maximum(after(low, span), jnp.minimum(t, before(high, span)))
     return t + jax.lax.stop_gradient(inside - t)
 

@@ -78,8 +78,8 @@ def check_start(system: HybridSystem, settings: Settings, t0, state, t1) -> None
 _starts_behind = eqx.filter_jit(starts_behind)
 _restitutions = eqx.filter_jit(restitutions)
 
-# what passed: to look again costs as much as a short run. Systems whose shapes fit, and
-# systems with all their numbers
+# systems that passed, because a check costs as much as a short run: by their shapes,
+# and by all their numbers
 _WELL_SHAPED: set = set()
 _SOUND: set = set()
 _MANY = 1000
@@ -108,7 +108,7 @@ def check_system(system, t0, state) -> None:
 
 
 def _digest(system) -> bytes:
-    """A hash of all numbers of a system."""
+    """Return a hash of all numbers of a system."""
     found = hashlib.blake2b(digest_size=16)
     for leaf in jax.tree.leaves(eqx.filter(system, eqx.is_array)):
         if jnp.issubdtype(leaf.dtype, jax.dtypes.prng_key):
@@ -118,7 +118,7 @@ def _digest(system) -> bytes:
 
 
 def _signature(system, state):
-    """All that the shapes of a system's functions can depend on; `None` if unknown."""
+    """Return everything that determines the shapes of a system; `None` if unknown."""
     arrays, rest = eqx.partition(system, eqx.is_array)
     shapes = tuple((leaf.shape, leaf.dtype) for leaf in jax.tree.leaves(arrays))
     fixed, structure = jax.tree.flatten(rest)

@@ -1,4 +1,4 @@
-"""Codes of log rows, and the reasons why a run ended, in words."""
+"""Define codes of log rows and messages for the end of a run."""
 
 import enum
 import operator

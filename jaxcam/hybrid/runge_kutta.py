@@ -1,8 +1,8 @@
-"""Explicit Runge-Kutta steps: of scalars or arrays, unrolled or in a loop, and flights.
+"""Take explicit Runge-Kutta steps of scalars or arrays, and integrate flights.
 
-Every free flight is made of these, with the tableau of a diffrax solver: the event loop
-takes steps unrolled into scalars, theory and fits steps of an array by a loop over the
-stages, which runs as fast and compiles in a tenth of the time.
+Every free flight consists of these steps, with the tableau of a diffrax solver. The
+event loop unrolls steps into scalars. Theory and fits use array steps with a loop over
+the stages, which run equally fast and compile in a tenth of the time.
 """
 
 import functools
@@ -38,7 +38,7 @@ def tableau_of(solver) -> Tableau:
     estimate.
 
     Raises:
-        ValueError: For an implicit solver or one without an error estimate.
+        ValueError: The solver is implicit or has no error estimate.
     """
     table = getattr(solver, "tableau", None)
     name = type(solver).__name__
@@ -93,7 +93,7 @@ class Squared(NamedTuple):
 
 
 def _lower(tableau: Tableau) -> np.ndarray:
-    """The coefficients of all stages as a square matrix."""
+    """Return the coefficients of all stages as a square matrix."""
     a = np.zeros((len(tableau.weights),) * 2)
     for i, row in enumerate(tableau.lower, start=1):
         a[i, : len(row)] = row
@@ -102,11 +102,11 @@ def _lower(tableau: Tableau) -> np.ndarray:
 
 @functools.cache
 def squared(tableau: Tableau) -> Squared:
-    """The tableau applied twice. (Nystroem's form of a Runge-Kutta step)"""
+    """Return the tableau applied twice. (Nystroem's form of a Runge-Kutta step)"""
     a = _lower(tableau)
     lower = a @ a
     rows = np.vstack([lower, np.asarray(tableau.weights) @ a, tableau.error @ a])
-    # sums that vanish by the order conditions leave rounding behind
+    # sums that vanish by the order conditions leave rounding errors
     rows[np.abs(rows) < 1e-14] = 0.0
     *stages, weights, error = (tuple(map(float, row)) for row in rows)
     return Squared(tuple(stages[1:]), weights, error)
@@ -164,7 +164,7 @@ def rates_among(x, rates) -> dict[int, int]:
         for j, component in enumerate(x):
             if rate is component and i != j:
                 found[i] = j
-    # the rate itself must be integrated as it is, or there would be a third level
+    # the rate itself is integrated directly; otherwise there would be a third level
     return {i: j for i, j in found.items() if j not in found}
 
 
@@ -310,7 +310,7 @@ def adaptive_steps(
         size = jax.lax.stop_gradient(jnp.max(scaled))
         good = size <= 1
         factor = 0.9 * jnp.maximum(size, 1e-12) ** (-1 / tableau.order)
-        # a size that is no number is a step too long
+        # a NaN error means that the step is too long
         factor = jnp.where(jnp.isfinite(size), jnp.clip(factor, 0.2, 2.0), 0.2)
         share = jnp.where(good, share + part, share)
         return share, part * factor, jnp.where(good, end, x), count + 1

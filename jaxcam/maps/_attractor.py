@@ -1,4 +1,4 @@
-"""Classify the attractor of an orbit: a cycle, and of which period, or chaos."""
+"""Classify the attractor of an orbit: a cycle with its period, or chaos."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -14,7 +14,7 @@ class Attractor(NamedTuple):
     """The attractor of one orbit."""
 
     period: int
-    """Smallest period up to the longest detected one; 0 where there is none."""
+    """Smallest detected period; 0 if there is none."""
     lyapunov: float
     """Lyapunov exponent, the mean of log |f'| along the orbit: positive in chaos."""
     bounded: bool
@@ -22,7 +22,7 @@ class Attractor(NamedTuple):
 
     @property
     def kind(self) -> str:
-        """The kind in words."""
+        """The kind as text."""
         if not self.bounded:
             return "none"
         if self.period == 1:

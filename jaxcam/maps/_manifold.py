@@ -1,4 +1,4 @@
-"""Invariant manifolds of saddles of plane maps, grown from the saddle."""
+"""Compute invariant manifolds of saddles of planar maps, grown from the saddle."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -17,7 +17,7 @@ _MOST_POINTS = 20_000
 
 
 class Saddle(NamedTuple):
-    """A fixed point of a plane map with one multiplier inside the unit circle.
+    """A fixed point of a planar map with one multiplier inside the unit circle.
 
     Examples:
         >>> from jaxcam.maps import saddle_at
@@ -37,14 +37,14 @@ def saddle_at(system: Callable, guess: VectorLike) -> Saddle:
     """Find the saddle near a guess by Newton's method.
 
     Args:
-        system: A map of the plane.
+        system: A planar map.
         guess: Guess of the saddle, shape `(2,)`.
 
     Returns:
         A [`jaxcam.maps.Saddle`][].
 
     Raises:
-        ValueError: There is no fixed point, or it is no saddle.
+        ValueError: There is no fixed point, or it is not a saddle.
 
     Examples:
         >>> from jaxcam.maps import saddle_at
@@ -145,11 +145,11 @@ def grow_manifold(
 
 
 def _refined(system, point, unit, start, ratio, fractions, order, spacing):
-    """Images of the first segment, with points between any two that are far apart."""
+    """Return images of the first segment, refined between points that are far apart."""
 
     def images(parts):
         first = point + start * ratio ** parts[:, None] * unit
-        # few lengths, so that few programs are compiled
+        # few array lengths, so that few programs are compiled
         room = 64
         while room < len(first):
             room *= 2

@@ -62,5 +62,7 @@ NORMAL_FORMS: dict[str, NormalForm] = {
         discrete=True,
     ),
 }
-"""Those of Figure 2.7. The map printed for period doubling, (1 + mu) x - x^3, has its
-multiplier at +1 and is a pitchfork; with the sign of the map changed it doubles."""
+"""The normal forms of Figure 2.7. The map printed for period doubling, (1 + mu) x -
+x^3, has its multiplier at +1 and is a pitchfork; with the sign of the map changed it
+doubles.
+"""

@@ -1,4 +1,4 @@
-"""Ready systems with impacts, Filippov systems, cams and restitution laws."""
+"""Systems with impacts, Filippov systems, cams and restitution laws."""
 
 from ._belt_oscillator import BeltOscillator as BeltOscillator
 from ._bouncing_ball import BouncingBall as BouncingBall

@@ -69,7 +69,7 @@ class BeltOscillator(FilippovSystem):
         return 2 * jnp.pi / self.omega
 
     def check(self) -> None:
-        """Raise `ValueError` where a parameter has no physical meaning."""
+        """Raise `ValueError` if a parameter has no physical meaning."""
         require_positive(friction=self.friction, omega=self.omega)
         require_not_negative(weakening=self.weakening, damping=self.damping)
         require_finite(belt=self.belt, amplitude=self.amplitude)

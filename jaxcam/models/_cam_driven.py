@@ -32,7 +32,9 @@ class AbstractCamDriven(HybridSystem):
         return self.speed
 
     def after_impact(self, t, state) -> jax.Array:
-        """State after an impact on the cam: the relative velocity v becomes -r v."""
+        """Return the state after an impact on the cam: the relative velocity v
+        becomes -r v.
+        """
         cam = (self.cam_angle(t),), (self.cam_velocity,)
         _, moved = jax.jvp(self.profile, *cam)
         velocity = state[1] - moved
@@ -45,11 +47,11 @@ class AbstractCamDriven(HybridSystem):
         return 2 * jnp.pi / self.speed
 
     def prepared(self: _System) -> _System:
-        """The same system with a profile that is cheaper to evaluate."""
+        """Return the same system with a profile that is cheaper to evaluate."""
         return eqx.tree_at(lambda s: s.profile, self, self.profile.prepared())
 
     def check_cam(self) -> None:
-        """Raise `ValueError` for a profile or a restitution that cannot be."""
+        """Raise `ValueError` for an invalid profile or restitution."""
         unit = self.state_units[1]
         for approach_speed in (0.0, 1.0):
             r = self.restitution(self.speed, jnp.asarray(approach_speed))  # pyright: ignore

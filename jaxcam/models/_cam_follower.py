@@ -61,7 +61,9 @@ class CamFollower(AbstractCamDriven):
     """Contact angle as a function of the cam's angle, a [`jaxcam.models.CamProfile`][].
     """
     restitution: eqx.Module = eqx.field(default_factory=LinearInSpeed)
-    """Law `r(speed, approach_speed)`, any Module; approach speed in rad/s."""
+    """Restitution law `r(speed, approach_speed)`, any Module; approach speed in
+    rad/s.
+    """
     rotation: str = eqx.field(default="clockwise", static=True)
     """"clockwise" or "counterclockwise". The thesis' tables need a cam that turns
     clockwise, although its Table 4.3 counts angles the other way."""

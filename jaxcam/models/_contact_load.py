@@ -35,7 +35,7 @@ def contact_load(
 
     A torque (N m) about the hinge of a [`jaxcam.models.CamFollower`][], a force (N) on
     a [`jaxcam.models.ValveTrain`][], at the system's speed (thesis, eq. 4.10). Contact
-    is lost where it would have to be negative.
+    is lost where the load would have to be negative.
 
     Args:
         system: The system.
@@ -144,7 +144,7 @@ def float_speed(system: CamFollower | ValveTrain) -> FloatSpeed:
     refined = (low + high) / 2
     coarse = angles.reshape(-1)[best]
     better = speed_at(piece, refined) < speed_at(piece, coarse)
-    # the place of a minimum may be taken as fixed when its value is differentiated
+    # the place of a minimum is fixed when its value is differentiated
     angle = jax.lax.stop_gradient(jnp.where(better, refined, coarse))
     speed = speed_at(piece, angle)
     fall, where = _sharpest_fall(system.profile)
@@ -177,14 +177,14 @@ def _least_root(a, b, c):
 
 
 def _sharpest_fall(profile):
-    """The most negative jump of the profile's slope, and its cam angle.
+    """Return the most negative jump of the profile's slope, and its cam angle.
 
-    A kink that points up throws the follower off, whichever way the cam turns.
+    An upward kink throws the follower off for either sense of rotation.
     """
     if not isinstance(profile, MotionProgram):
         return jnp.zeros(()), jnp.zeros(())
     angles, jumps = profile.joints()
-    # less is rounding of slopes of this size
+    # smaller jumps are rounding of slopes of this size
     scale = 1e-9 * jnp.max(jnp.abs(profile.rises / profile.widths))
     falls = jnp.where(jumps[:, 1] < -scale, jumps[:, 1], 0.0)
     first = jnp.argmin(falls)

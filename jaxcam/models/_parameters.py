@@ -1,4 +1,4 @@
-"""Parameters of models: how they are stored, and what makes one meaningless."""
+"""Store and check parameters of models."""
 
 import equinox as eqx
 import jax
@@ -9,19 +9,19 @@ from ..parameters import real_array
 
 
 def as_parameter(value) -> jax.Array:
-    """A number, list or traced value as a floating-point array."""
+    """Convert a number, list or traced value to a floating-point array."""
     return real_array(value, "a parameter")
 
 
 def parameter(default=None):
-    """A floating-point field; without a default it must be given."""
+    """Declare a floating-point field; without a default it must be given."""
     if default is None:
         return eqx.field(converter=as_parameter)
     return eqx.field(default=default, converter=as_parameter)
 
 
 def is_concrete(*values) -> bool:
-    """Return whether all values are known, which they are not inside a `jax.jit`."""
+    """Return whether all values are known, that is, not traced by `jax.jit`."""
     return not any(isinstance(value, Tracer) for value in values)
 
 
@@ -48,7 +48,7 @@ def require_not_negative(**values) -> None:
 
 
 def require_restitution(value, where: str = "") -> None:
-    """Restitution outside [0, 1] would let a body stick in, or gain energy."""
+    """Raise `ValueError` for a restitution outside [0, 1], which is unphysical."""
     if not np.all((np.asarray(value) >= 0) & (np.asarray(value) <= 1)):
         raise ValueError(
             "Choose a coefficient of restitution between 0 and 1; it is "

@@ -1,4 +1,4 @@
-"""Two linear systems joined along a line, and when their origin is stable."""
+"""Define two linear systems joined along a line, and the stability of their origin."""
 
 from typing import NamedTuple
 
@@ -63,8 +63,9 @@ class PlanarStability(NamedTuple):
     period: float
     """Period of these motions (s); NaN where they are not periodic."""
     growth: float
-    """Growth of the logarithm of the amplitude in one turn around the origin; NaN where
-    nothing turns."""
+    """Growth of the logarithm of the amplitude in one turn around the origin; NaN
+    without rotation.
+    """
 
 
 def planar_stability(system: PiecewiseLinear) -> PlanarStability:

@@ -1,4 +1,4 @@
-"""Parameter sets with a name."""
+"""Define named parameter sets."""
 
 from collections.abc import Callable
 
@@ -41,8 +41,8 @@ def preset(name: str) -> CamFollower:
     Args:
         name: "table-4.4", the thesis' Table 4.4 as printed, or "calibrated", the
             parameters behind its Tables 5.2 and 6.1, recovered from those tables by a
-            fit that starts at Table 4.4. Time zero of the latter is where the cam lifts
-            the follower highest, as in the thesis' chapters 5 and 6.
+            fit that starts at Table 4.4. At time zero of the latter the cam lifts the
+            follower highest, as in the thesis' chapters 5 and 6.
 
     Returns:
         A [`jaxcam.models.CamFollower`][].

@@ -1,4 +1,4 @@
-"""Laws of restitution: how much of the approach speed an impact gives back."""
+"""Define laws of restitution: separation speed over approach speed of an impact."""
 
 import equinox as eqx
 import jax
@@ -10,7 +10,7 @@ from ._units import rad_s_to_rpm
 
 # Laws are called as `law(speed, approach_speed)`, with the speed of the drive (rad/s)
 # and the magnitude of the normal velocity just before the impact, in the units of the
-# gap a second. Any Module with this call is a law.
+# gap per second. Any Module with this call is a law.
 
 
 class ConstantRestitution(eqx.Module):
@@ -33,11 +33,11 @@ class ConstantRestitution(eqx.Module):
 class LinearInSpeed(eqx.Module):
     """Restitution that grows linearly with the speed of the drive, limited to [0, 1].
 
-    The thesis identifies such a law (section 4.6.1, Figure 4.15) but does not print
-    it. Its Table 5.2 does so indirectly: free flight is conservative, hence the
-    product of the two multipliers of an orbit with one impact per period is r^2. The
-    defaults are the line through the ten values of r found that way, rounded (which
-    moves r by 5e-7).
+    The thesis identifies such a law (section 4.6.1, Figure 4.15) but does not print it.
+    It follows from its Table 5.2: free flight is conservative, hence the product of the
+    two multipliers of an orbit with one impact per period is r^2. The defaults are the
+    line through the ten values of r found in this manner, rounded (which changes r by
+    5e-7).
 
     Examples:
         >>> from jaxcam.models import LinearInSpeed

@@ -1,4 +1,4 @@
-"""Motion on a cam whose program has joints: each joint is an event of its own."""
+"""Simulate motion on a cam whose program has joints; each joint is an event."""
 
 from typing import Any, TypeVar
 
@@ -19,9 +19,9 @@ from .cams import CamProfile, MotionPieces, MotionProgram
 
 _TURN = 2 * np.pi
 _NEAR = 4e-12
-"""Distance, and velocity, that a contact can be off by, over the size of the state."""
+"""Tolerance of distance and velocity in contact, relative to the size of the state."""
 _BEHIND = 2e-4
-"""Distance by which a body that moves in is put behind the surface."""
+"""Distance by which a body that moves inwards is placed behind the surface."""
 _Part = TypeVar("_Part", Impacts, Contacts, Steps)
 
 
@@ -45,7 +45,7 @@ class OnePiece(CamProfile):
 def simulate_through_joints(
     system: CamFollower | ValveTrain | DesmodromicCam, state, t0, t1, **options: Any
 ) -> Trajectory:
-    """Simulate a cam given by a motion program, exact also at its joints.
+    """Simulate a cam given by a motion program, including its joints exactly.
 
     The run stops at every joint and continues with the piece after it, so that each
     part is smooth. At a joint where the slope of the lift jumps up, a follower in
@@ -64,7 +64,7 @@ def simulate_through_joints(
         One trajectory; a contact that lasts through a joint is listed once.
 
     Raises:
-        ValueError: The profile is another one; and as for `simulate`.
+        ValueError: The profile is not a motion program; see also `simulate`.
 
     Examples:
         >>> from jaxcam.models import DesmodromicCam, MotionProgram, Segment
@@ -109,7 +109,7 @@ def simulate_through_joints(
 
 
 def _joint_times(system, angles, t0, t1):
-    """t0, the instants of the joints between, and t1."""
+    """Return t0, the times of the joints in between, and t1."""
     first = float(system.cam_angle(0.0))
     rate = float(system.cam_angle(1.0)) - first
     turned = first + rate * np.array([t0, t1])
@@ -128,10 +128,10 @@ def _piece(pieces: MotionPieces, angle) -> OnePiece:
 
 
 def _settled(system, t, state):
-    """The state without what rounding has left of gap and velocity in contact.
+    """Remove rounding errors of gap and velocity from a state in contact.
 
-    On the next piece it begins with an impact where that moves into the follower, and
-    an impact begins at a gap that is not positive.
+    If the next piece moves into the follower, it begins with an impact, which requires
+    a gap that is not positive.
     """
     t = jnp.asarray(t, dtype=float)
     near = _NEAR * (1.0 + jnp.max(jnp.abs(state)))
@@ -152,7 +152,7 @@ def _settled(system, t, state):
 
 
 def _joined(parts: list[_Part]) -> _Part:
-    """The parts of several runs one after the other."""
+    """Concatenate the parts of several runs."""
     total = sum(int(part.count) for part in parts)
     leaves = [
         np.concatenate(found) if np.ndim(found[0]) else total
@@ -162,7 +162,7 @@ def _joined(parts: list[_Part]) -> _Part:
 
 
 def _merged(contacts: Contacts) -> Contacts:
-    """Contacts that end where the next begins, on the same constraint, made one."""
+    """Merge contacts that end where the next begins, on the same constraint."""
     keep, ends, released = [], [], []
     start, end = np.asarray(contacts.start), np.asarray(contacts.end)
     which = np.asarray(contacts.constraint)

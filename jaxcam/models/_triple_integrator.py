@@ -1,4 +1,4 @@
-"""The simplest system that leaves chatter at a release point."""
+"""Define the simplest system with chatter and a release point."""
 
 from typing import ClassVar
 
@@ -51,5 +51,5 @@ class TripleIntegrator(HybridSystem):
         return jnp.stack([state[0], -self.restitution * state[1], state[2]])
 
     def check(self) -> None:
-        """Raise `ValueError` where the restitution has no physical meaning."""
+        """Raise `ValueError` if the restitution has no physical meaning."""
         require_restitution(self.restitution)

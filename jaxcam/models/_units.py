@@ -1,4 +1,4 @@
-"""Revolutions per minute, which appear only at the edges of the program."""
+"""Convert revolutions per minute, used only in input and output."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""A valve, or any mass that slides, pressed onto a cam by a spring."""
+"""Define a valve, or any sliding mass, pressed onto a cam by a spring."""
 
 from typing import ClassVar
 
@@ -86,7 +86,7 @@ class ValveTrain(AbstractCamDriven):
         )
 
     def check(self) -> None:
-        """Raise `ValueError` where a parameter has no physical meaning."""
+        """Raise `ValueError` if a parameter has no physical meaning."""
         require_positive(speed=self.speed, mass=self.mass)
         require_not_negative(
             stiffness=self.stiffness, preload=self.preload, damping=self.damping

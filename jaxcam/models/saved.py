@@ -1,4 +1,4 @@
-"""Systems as JSON: the name of the class and its parameters, nothing that is run.
+"""Save systems as JSON: the name of the class and its parameters, no code.
 
 ```json
 {"format": "jaxcam.system", "version": 1,
@@ -6,8 +6,8 @@
             "fields": {"gravity": 9.81, "restitution": 0.8, ...}}}
 ```
 
-A field is a number, a list of numbers, a word, another object of this kind, or several
-of them, as `{"items": [...]}`.
+A field is a number, a list of numbers, a string, another object of this kind, or a list
+of these, as `{"items": [...]}`.
 """
 
 import dataclasses
@@ -57,8 +57,8 @@ def save_system(
     Args:
         system: The system.
         file: The file to write.
-        about: Anything else to store with it, in plain JSON: errors of the parameters,
-            their origin.
+        about: Additional data to store, in plain JSON: errors of the parameters, their
+            origin.
 
     Raises:
         ValueError: A field of the system is not a number, an array, a word or another
@@ -80,8 +80,9 @@ def load_system(file: str | Path, *, classes: Iterable[type] = ()) -> HybridSyst
 
     Args:
         file: The file to read.
-        classes: Classes besides those of `jaxcam.models` that may occur in it, such as
-            a system of your own, or `jaxcam.discrepancy.terms.saved_classes()`.
+        classes: Additional classes, other than those of `jaxcam.models`, that may occur
+            in it, such as a system of your own, or
+            `jaxcam.discrepancy.terms.saved_classes()`.
 
     Returns:
         The system.
@@ -116,7 +117,7 @@ def system_to_json(
 
     Args:
         system: The system.
-        about: Anything else to store with it, in plain JSON.
+        about: Additional data to store, in plain JSON.
 
     Returns:
         A dictionary.
@@ -131,13 +132,14 @@ def system_from_json(found: Any, *, classes: Iterable[type] = ()) -> HybridSyste
 
     Args:
         found: The parsed JSON.
-        classes: Classes besides those of `jaxcam.models` that may occur in it.
+        classes: Additional classes, other than those of `jaxcam.models`, that may occur
+            in it.
 
     Returns:
         The system.
 
     Raises:
-        ValueError: The description is invalid; the message says where.
+        ValueError: The description is invalid; the message gives the place.
     """
     if not isinstance(found, dict) or found.get("format") != _FORMAT:
         raise ValueError(
@@ -159,7 +161,7 @@ def system_from_json(found: Any, *, classes: Iterable[type] = ()) -> HybridSyste
         with np.errstate(all="ignore"):
             system.check()
     except _MISFITS:
-        # a word where a number belongs, a list where a law does
+        # a string instead of a number, or a list instead of a law
         raise ValueError(_MISFIT.format("system")) from None
     return system
 
@@ -219,7 +221,7 @@ def _decode(found: Any, known: dict[str, type], place: str) -> Any:
     cls = known[name]
     fields = {field.name: field for field in dataclasses.fields(cls)}
     given = found["fields"] if isinstance(found["fields"], dict) else {}
-    # what a class has only since a file was written is as it was then
+    # fields that are newer than the file have their former meaning
     spare = {name for name, field in fields.items() if field.metadata.get("spare")}
     for wrong in sorted((set(given) ^ set(fields)) - spare):
         what = "lacks" if wrong in fields else "has an unknown field"

@@ -1,4 +1,4 @@
-"""Floats as arrays, so that they are arguments of a program and not constants in it."""
+"""Convert floats to arrays, so that they are arguments of a program, not constants."""
 
 from typing import TypeVar
 
@@ -13,8 +13,8 @@ _Tree = TypeVar("_Tree")
 def as_arrays(tree: _Tree) -> _Tree:
     """Return the same tree with every Python or NumPy float as a float64 array.
 
-    A field declared as `stiffness: float = 3.0` is then a parameter like any other.
-    Arrays, traced values, integers and flags stay as they are.
+    A field declared as `stiffness: float = 3.0` is then an ordinary parameter.
+    Arrays, traced values, integers and flags are unchanged.
 
     Args:
         tree: Any pytree.

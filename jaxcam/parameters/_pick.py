@@ -1,4 +1,4 @@
-"""Picking the parameters that vary: by a function, or by a dotted name."""
+"""Pick varying parameters by a function or by a dotted name."""
 
 import re
 from collections.abc import Callable
@@ -119,7 +119,7 @@ def unit_tangent(where: Where, tree: _Tree) -> _Tree:
         tree: A system, or any other pytree.
 
     Returns:
-        Zeros for every inexact array of the tree, one for the parameter that `where`
+        Zeros for every inexact array of the tree, 1 for the parameter that `where`
             picks, `None` for all other leaves.
 
     Examples:
@@ -155,7 +155,7 @@ def parameter_names(tree: PyTree, *, integers: bool = False) -> list[str]:
 
 
 def _places(where: Callable | str, tree, integers) -> tuple[int, ...]:
-    """Places among the leaves of what one function or name picks."""
+    """Return the places among the leaves picked by a function or name."""
     if isinstance(where, str):
         names = [name for name, _ in _named_leaves(tree)]
         # a name may be written as Python spells it: terms[0].c1

@@ -1,4 +1,4 @@
-"""Numbers from outside, as real arrays."""
+"""Convert input numbers to real arrays."""
 
 import jax
 import jax.numpy as jnp
@@ -15,7 +15,7 @@ def real_array(values, name: str = "state") -> jax.Array:
         A real array.
 
     Raises:
-        ValueError: For complex numbers, whose imaginary part would be lost.
+        ValueError: The numbers are complex; their imaginary part would be lost.
 
     Examples:
         >>> from jaxcam.parameters import real_array

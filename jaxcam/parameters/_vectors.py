@@ -1,4 +1,4 @@
-"""Array types of numbers that come from outside or return to the host."""
+"""Array types of input from outside and of results on the host."""
 
 from collections.abc import Sequence
 from typing import TypeAlias

@@ -1,4 +1,4 @@
-"""Figures, in one style. Imported by thesis, command line and notebooks."""
+"""Draw figures in one style, for thesis, command line and notebooks."""
 
 from ._basins import basin_picture as basin_picture
 from ._branch import branch_diagram as branch_diagram

@@ -1,4 +1,4 @@
-"""Axes to draw on: those that are given, or a new figure; and what all axes share."""
+"""Provide axes to draw on, given or new, and common elements of axes."""
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -11,21 +11,21 @@ _LETTERS_PER_INCH = 12.5
 
 
 def one_axes(ax: Axes | None) -> Axes:
-    """The axes given, or those of a new figure."""
+    """Return the given axes, or those of a new figure."""
     return plt.subplots()[1] if ax is None else ax
 
 
 def figure_of(ax: Axes) -> Figure:
-    """The figure that the axes are in; of a subfigure, the whole."""
+    """Return the figure of the axes; for a subfigure, its parent figure."""
     figure = ax.get_figure(root=True)
     assert figure is not None
     return figure
 
 
 def several_axes(axes, shape: tuple[int, int], **layout) -> tuple[Figure, np.ndarray]:
-    """A figure and its axes, shape `shape`; `layout` goes to `plt.subplots`.
+    """Return a figure and its axes, shape `shape`; `layout` goes to `plt.subplots`.
 
-    **Raises:** `ValueError` where `axes` has another number of them.
+    **Raises:** `ValueError` if the number of `axes` is wrong.
     """
     rows, columns = shape
     if axes is None:
@@ -42,12 +42,12 @@ def several_axes(axes, shape: tuple[int, int], **layout) -> tuple[Figure, np.nda
 
 
 def legend_above(ax: Axes) -> None:
-    """A legend on top of the axes, where it hides no curve; in two rows if need be."""
+    """Draw a legend above the axes, clear of the curves; in two rows if necessary."""
     handles, labels = ax.get_legend_handles_labels()
     unique = dict(zip(labels, handles, strict=True))
     if unique:
         width = ax.get_window_extent().width / ax.figure.dpi
-        # the lines and spaces between take the room of about six letters each
+        # line and space of an entry take the width of about six letters
         letters = sum(map(len, unique)) + 6 * len(unique)
         rows = 1 if letters <= _LETTERS_PER_INCH * width else 2
         ax.legend(

@@ -1,4 +1,4 @@
-"""Pictures of basins of attraction."""
+"""Draw basins of attraction."""
 
 from typing import TYPE_CHECKING
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from ..sweeps import Basins
 
 
-# attractors with a colour and a line of the legend of their own
+# attractors with a separate colour and legend entry
 _SHOWN = len(COLOURS) - 1
 _OTHERS = "#D9D9D9"
 # cells of a picture along its shorter side, at least
@@ -68,14 +68,14 @@ def basin_picture(
     if len(drawn) < 2 or min(drawn) < 2 or any(grid.shape[i] > 1 for i in others):
         raise ValueError(
             f"the grid is {grid.shape}; a picture needs several values of the two "
-            "components drawn, and one value of each other one"
+            "components drawn, and one value of each other component"
         )
     number = np.moveaxis(basins.attractor, axes, (0, 1)).reshape(
         grid.shape[axes[0]], grid.shape[axes[1]]
     )
     colours, handles = _colours(basins, orbits)
     low, high = (np.array(corner)[list(axes)] for corner in (grid.low, grid.high))
-    # white below, one colour an attractor, grey for those without
+    # white below, one colour per attractor, grey for the others
     index = np.where(number < 0, 0, np.minimum(number, len(colours) - 2) + 1)
     image = ax.imshow(
         _finer(index, len(colours)).T,
@@ -108,7 +108,7 @@ def basin_picture(
 
 
 def _finer(index, count: int) -> np.ndarray:
-    """The same regions in smaller cells, so that slanting boundaries are no stairs.
+    """Refine the regions into smaller cells, to smooth slanting boundaries.
 
     A small cell belongs to the region that has most of its neighbourhood. Where that
     would change what was computed, at the centre of a cell, the cell stays as it was:
@@ -126,7 +126,7 @@ def _finer(index, count: int) -> np.ndarray:
             share = gaussian_filter(
                 (cells == region).astype(float), _BLUR * factor, mode="nearest"
             )
-            # where no motion starts, more than all basins together, not than each
+            # inadmissible states, if more than all basins together
             least = 0.5 if region == 0 else most
             finer = np.where(share > least, region, finer)
             most = np.where(share > least, share, most)
@@ -136,7 +136,7 @@ def _finer(index, count: int) -> np.ndarray:
 
 
 def _colours(basins, orbits: bool):
-    """Colours by number, behind one for what is no attractor; and the legend."""
+    """Return colours by number, after that for no attractor, and the legend."""
     names = basins.names
     colours = [NOTHING, *COLOURS[: min(len(names), _SHOWN)]]
     shares = basins.shares
@@ -164,8 +164,8 @@ def _mark(ax: Axes, basins, axes) -> None:
 
 
 def _mark_of(basins, k: int) -> dict:
-    """Return the marker of attractor `k`: white shows on every colour."""
-    # what does not repeat has many points
+    """Return the marker of attractor `k`: white is visible on every colour."""
+    # a non-periodic attractor has many points
     irregular = basins.labels[k, 1] == 0
     return {
         "marker": "o" if irregular else _MARKS[k % len(_MARKS)],

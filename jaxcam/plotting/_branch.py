@@ -1,4 +1,4 @@
-"""Branches of a path follower: the bifurcation figure."""
+"""Draw bifurcation diagrams of continued branches."""
 
 from collections.abc import Callable, Iterable
 from itertools import groupby
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from continuation import Branch, Point
 
 
-# one mark and one colour for each kind of special point, in every figure
+# mark and colour of each kind of special point, in every figure
 _MARKS = {
     "fold": ("o", IMPACT),
     "flip": ("s", "#009E73"),
@@ -36,7 +36,7 @@ _SHORT = {
     "interruption of chattering": "interruption",
     "beginning of impacts": "detachment",
 }
-# a word nearer than this to one that is there is left out (points)
+# a word nearer than this to another is omitted (points)
 _ROOM = 26, 11
 
 
@@ -68,12 +68,12 @@ def branch_diagram(
         ax: Axes to draw on; default a new figure.
         value: Returns from each point the number, or several, drawn against the
             parameter; default the first component of the state once per forcing period,
-            where the points have it, else of their solution.
+            if the points have it, otherwise of their solution.
         x_label: Name and unit of the x-axis; default the parameter's name.
         y_label: Name and unit of the y-axis.
         x_scale: Factor of the parameters (30/pi for a speed in rpm).
-        letters: Whether words name the special points besides the legend; one that
-            would cover another is left out.
+        letters: Whether labels name the special points in addition to the legend; a
+            label that would cover another is omitted.
 
     Returns:
         The figure.
@@ -117,7 +117,7 @@ def _first_component(point) -> np.ndarray:
 
 
 def _draw(ax: Axes, branch, value, x_scale) -> None:
-    """One line for each run of points of one stability and one signature."""
+    """Draw one line for each run of points of equal stability and signature."""
     points = [p for p in branch.points if p.converged]
     before = None
     for (_, stable), run in groupby(points, key=lambda p: (p.signature, _solid(p))):
@@ -163,7 +163,7 @@ def _mark(ax: Axes, branch, value, x_scale) -> None:
 
 
 def _name(ax: Axes, points, value, x_scale) -> None:
-    """A word next to each mark, where there is room for it."""
+    """Write a word next to each mark, if there is room."""
     taken: list[np.ndarray] = []
     for point in points:
         y = float(np.ravel(np.asarray(value(point), dtype=float))[0])

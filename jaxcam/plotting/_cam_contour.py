@@ -1,4 +1,4 @@
-"""The shape of a cam."""
+"""Draw the shape of a cam."""
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -11,10 +11,10 @@ from ._style import CAM, IMPACT, styled
 
 @styled
 def cam_contour(contour: CamContour, ax: Axes | None = None) -> Figure:
-    """Draw a cam in its own frame, its axis, and where it is undercut.
+    """Draw a cam in its own frame, its axis, and its undercut parts.
 
     Args:
-        contour: The contour over a whole turn.
+        contour: The contour over a full turn.
         ax: Axes to draw on; default a new figure.
 
     Returns:

@@ -1,4 +1,4 @@
-"""A channel of a recording is named after what it is and its unit."""
+"""Convert names of channels to labels with units."""
 
 from .labels import labelled
 
@@ -18,7 +18,7 @@ _ENDINGS = {
 
 
 def name_and_unit(channel: str) -> tuple[str, str]:
-    """`follower_angle_rad` is "follower angle" in "rad"."""
+    """Split a name: `follower_angle_rad` becomes "follower angle" and "rad"."""
     for ending, unit in _ENDINGS.items():
         if channel.endswith(ending) and len(channel) > len(ending):
             return channel.removesuffix(ending).replace("_", " "), unit
@@ -26,5 +26,5 @@ def name_and_unit(channel: str) -> tuple[str, str]:
 
 
 def channel_label(channel: str) -> str:
-    """`follower_angle_rad` is drawn on an axis "follower angle (rad)"."""
+    """Return an axis label: "follower angle (rad)" for `follower_angle_rad`."""
     return labelled(*name_and_unit(channel))

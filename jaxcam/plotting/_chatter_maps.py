@@ -1,4 +1,4 @@
-"""The maps of the theory of chattering: lambda-map, and lobes with their scales."""
+"""Draw the maps of chattering theory: lambda-map, and lobes with their scales."""
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -18,9 +18,9 @@ def lambda_cobweb(r: float, ax: Axes | None = None, *, start=None) -> Figure:
     Args:
         r: Coefficient of restitution.
         ax: Axes to draw on; default a new figure.
-        start: First values of lambda from which cobwebs are drawn; default one either
-            side of the fixed point, where chattering completes and where it is
-            interrupted.
+        start: First values of lambda from which cobwebs are drawn; default one value on
+            either side of the fixed point, with complete and with interrupted
+            chattering.
 
     Returns:
         The figure.
@@ -143,7 +143,7 @@ def lobe_scaling(distance, height, kappa: float, ax: Axes | None = None) -> Figu
     ax.loglog(
         distance, law, color=SECTION, ls="--", lw=1, label=rf"$\kappa$ = {kappa:.4f}"
     )
-    # the labels of minor ticks run into each other over less than two decades
+    # over less than two decades the labels of minor ticks overlap
     ax.xaxis.set_minor_formatter(NullFormatter())
     ax.set(xlabel="distance from the interruption (–)", ylabel="height of the lobe (–)")
     legend_above(ax)

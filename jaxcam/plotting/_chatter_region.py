@@ -1,4 +1,4 @@
-"""Impacts that lead to complete chatter or to grazing, in one plane."""
+"""Draw the impacts that lead to complete chatter or to grazing."""
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -12,11 +12,11 @@ from ._axes import figure_of, legend_above, one_axes
 from ._style import BAND, FLIGHT, IMPACT, SECTION, styled
 
 
-# how much of white is in the last curve of a family
+# share of white in the last curve of a family
 _LIGHTEST = 0.5
-# parts of a curve that are shorter than this (periods) have no name
+# shorter parts of a curve (periods) are not labelled
 _NAMED = 0.04
-# nor has a curve this near to the axis (part of the picture's height)
+# nor are curves this near to the axis (fraction of the picture's height)
 _LOWEST = 0.03
 
 
@@ -39,7 +39,7 @@ def chattering_picture(
         manifold: From [`variational.grazing_manifold`][].
         ax: Axes to draw on; default a new figure.
         period: Forcing period (s).
-        most: Largest speed drawn; default that of the region.
+        most: Largest speed drawn; default 1.3 times that of the region.
 
     Returns:
         The figure: rebound speed over time from release, modulo the period.
@@ -76,13 +76,13 @@ def chattering_picture(
         _draw(ax, manifold.after, release, period, IMPACT, "W")
     ax.axvline(0, color=SECTION, lw=0.8, ls=":", label="release")
     ax.set_xlabel("time from release (periods)")
-    ax.set_ylabel("rebound speed (gap / s)")
+    ax.set_ylabel("rebound speed (units of the gap per s)")
     legend_above(ax)
     return figure_of(ax)
 
 
 def _draw(ax, curves, release, period, colour, name):
-    """Curves from dark to light by their numbers, which stand at their parts."""
+    """Draw curves from dark to light by their numbers, with labels."""
     count = len(curves.time)
     for k, (time, speed) in enumerate(
         zip(np.asarray(curves.time), np.asarray(curves.speed), strict=True)
@@ -102,13 +102,13 @@ def _draw(ax, curves, release, period, colour, name):
 
 
 def _number(ax, x, y, word: str, colour, stagger: float) -> None:
-    """The name of a curve at each part that is long enough."""
+    """Write the name of a curve at each part that is long enough."""
     ends, top = np.flatnonzero(np.isnan(y)), ax.get_ylim()[1]
     for part in np.split(np.arange(len(y)), ends):
         part = part[(y[part] > _LOWEST * top) & (y[part] < top)]
         if len(part) < 2 or np.ptp(x[part]) < _NAMED:
             continue
-        # neighbouring curves are named at different places
+        # neighbouring curves are labelled at different places
         at = part[np.argsort(x[part])][int((0.1 + 0.5 * stagger) * len(part))]
         ax.text(
             x[at], y[at], word, color=colour, fontsize="small", ha="center",

@@ -1,4 +1,4 @@
-"""A recording and simulations of it, a few turns of the cam, and what remains."""
+"""Plot a recording, its simulations and the residuals."""
 
 from collections.abc import Mapping, Sequence
 from typing import TypeAlias
@@ -41,14 +41,14 @@ def compare_recording(
     Args:
         recording: The recording.
         simulated: The channel as simulated at the samples of the recording, shape
-            `(k,)`, NaN where it was not; or a comparison that the recording is in; or
-            several of these by name.
+            `(k,)`, NaN where it was not; or a comparison that contains the recording;
+            or several of these by name.
         axes: Two axes; default a new figure.
         channel: The channel to compare.
         contact: Value of the channel in contact with the cam, shape `(k,)`; drawn as
             the surface below the motion.
         noise: Standard deviation of a sample of the channel, in its unit; drawn as a
-            band of twice that on either side.
+            +-2 sigma band.
         turns: Number of turns of the cam to draw; without a cam, all is drawn.
         start: Start time (s); default the first sample.
 
@@ -82,7 +82,7 @@ def compare_recording(
     above.plot(
         over[keep],
         samples[keep],
-        # wide and pale, so that it is seen behind a simulation that agrees with it
+        # wide and pale, so that it is visible behind a simulation that agrees with it
         color=RECORDED,
         linewidth=4.5,
         label="recorded",
@@ -132,13 +132,13 @@ def _fitting(recording: Recording, values: ArrayLike) -> np.ndarray:
 
 
 def _horizontal(recording: Recording, turns: float, start: float | None):
-    """Horizontal positions, which samples are drawn, and the label."""
+    """Return horizontal positions, the samples drawn, and the label."""
     first = 0 if start is None else int(np.searchsorted(recording.time, start))
     later = np.arange(len(recording)) >= first
     if "cam_angle_rad" not in recording.channels:
         return recording.time, later, labelled("time", "s")
     turned = recording["cam_angle_rad"] / (2 * np.pi)
-    # the cam's angle grows or falls, as its sense of rotation says
+    # the cam angle grows or falls with the sense of rotation
     turned = turned if turned[-1] >= turned[0] else -turned
     begin = turned[min(first, len(turned) - 1)]
     return turned - np.floor(begin), later & (turned - begin <= turns), "cam (turns)"

@@ -1,4 +1,4 @@
-"""A figure recoloured for a dark page."""
+"""Recolour a figure for a dark page."""
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -18,7 +18,7 @@ _BACKGROUND = np.array([0x1E, 0x21, 0x29]) / 255
 _TEXT = np.array([0.92, 0.92, 0.94])
 # colours are lightened by this much: pure blue is hard to see on black
 _LIGHTER = 0.25
-# spread of the channels from which a colour counts as a colour and not as a grey
+# spread of the channels above which a colour is not grey
 _COLOURFUL = 0.25
 # properties of an artist that hold a colour
 _PROPERTIES = {
@@ -30,9 +30,9 @@ _PROPERTIES = {
 
 
 def on_dark(figure: Figure) -> Figure:
-    """Recolour a figure for a dark page: greys are turned round, colours lightened.
+    """Recolour a figure for a dark page: greys are inverted, colours lightened.
 
-    The figure is changed in place, whatever drew it; save the light version first.
+    The figure is changed in place; save the light version first.
 
     Args:
         figure: The figure.
@@ -66,7 +66,7 @@ def on_dark(figure: Figure) -> Figure:
 
 
 def dark(colours: np.ndarray) -> np.ndarray:
-    """RGBA colours, shape `(..., 4)`, as they are drawn on a dark page."""
+    """Convert RGBA colours, shape `(..., 4)`, for a dark page."""
     rgb, alpha = colours[..., :3], colours[..., 3:]
     turned = _TEXT + rgb.mean(axis=-1, keepdims=True) * (_BACKGROUND - _TEXT)
     lightened = rgb + _LIGHTER * (1 - rgb)
@@ -75,7 +75,7 @@ def dark(colours: np.ndarray) -> np.ndarray:
 
 
 def _recolour(artist, names: tuple[str, ...]) -> None:
-    # all are read before one is set: setting one may set another
+    # read all colours before setting any: setting one may change another
     colours = {name: getattr(artist, f"get_{name}")() for name in names}
     for name, colour in colours.items():
         if isinstance(colour, str) and colour in ("none", "auto"):

@@ -1,4 +1,4 @@
-"""Bifurcation diagrams by brute force, and charts over two parameters."""
+"""Draw brute-force bifurcation diagrams, and charts over two parameters."""
 
 from typing import TYPE_CHECKING
 
@@ -24,12 +24,12 @@ COLOURS = (
     "#0072B2", "#56B4E9", "#E69F00", "#009E73", "#CC79A7", "#D55E00", "#F0E442",
     "#8C8C8C", "#004D7A", "#A6D8F5", "#8A5F00", "#7FD1B9", "#7A3F62", "#F4B183",
 )  # fmt: skip
-"""Colours of Okabe and Ito, then lighter ones, for things that are many."""
-# heights that a diagram tells apart
+"""Colours of Okabe and Ito, then lighter colours, for large numbers of items."""
+# resolution of a diagram in height
 _ROWS = 600
 # smallest and largest dots (points)
 _DOTS = 0.6, 2.4
-# for what is not an attractor
+# for motions without an attractor
 NOTHING = "#FFFFFF"
 
 
@@ -44,7 +44,7 @@ def sweep_diagram(
     y_label: tuple[str, str] | None = None,
     x_scale: float = 1.0,
 ) -> Figure:
-    """Draw a bifurcation diagram over the parameter, darker where motions are often.
+    """Draw a bifurcation diagram over the parameter, darker where samples are frequent.
 
     Dots are drawn as an image, so that millions of them stay a small file.
 
@@ -90,7 +90,7 @@ def sweep_diagram(
     for way in ways:
         colour, word = _WAYS[way]
         some = diagram.direction == way
-        # where both ways lead to the same, the larger dots remain visible
+        # if both directions give the same, the larger dots remain visible
         larger = 1.5 if way == 1 and len(ways) > 1 else 1.0
         size = larger * _dot_size(ax, int(np.sum(some)))
         _dots(ax, x[some], y[some], colour, size, 2 if way >= 0 else 3)
@@ -109,16 +109,18 @@ def sweep_diagram(
 
 
 def _dot_size(ax: Axes, columns: int) -> float:
-    """Diameter of a dot (points): the distance of the columns, within limits."""
+    """Return the diameter of a dot (points): the distance of the columns, within
+    limits.
+    """
     width = ax.get_window_extent().width * 72 / ax.figure.dpi
     return float(np.clip(1.2 * width / max(columns, 1), *_DOTS))
 
 
 def _dots(ax: Axes, x, y, colour: str, size: float, zorder: float) -> None:
-    """A dot for each height at which there are samples, darker where there are many.
+    """Draw a dot at each height with samples, darker for many samples.
 
-    `x` and `y` have the shape `(columns, starts, keep)`. One sample of all those kept
-    is still seen, and a motion that repeats is as dark as can be.
+    `x` and `y` have the shape `(columns, starts, keep)`. A single sample remains
+    visible, and a periodic motion has full darkness.
     """
     finite = np.isfinite(y)
     if not np.any(finite):
@@ -177,7 +179,7 @@ def sweep_chart(
     ax = one_axes(ax)
     labels = chart.labels[..., start].astype(str)
     known, counts = np.unique(labels, return_counts=True)
-    # the most frequent labels get the colours that are easiest to tell apart
+    # the most frequent labels get the most distinct colours
     known = known[np.argsort(-counts, kind="stable")]
     number = np.argmax(labels[..., None] == known, axis=-1)
     shown = min(len(known), len(COLOURS))

@@ -1,4 +1,4 @@
-"""A one-dimensional map with its cobweb."""
+"""Draw a one-dimensional map with its cobweb."""
 
 from collections.abc import Callable
 
@@ -30,7 +30,7 @@ def cobweb(
         turns: Number of iterations drawn.
         ax: Axes to draw on; default a new figure.
         skip: Number of iterations before that.
-        edge: Where impacts begin, marked by a dashed line.
+        edge: Value at which impacts begin, marked by a dashed line.
         name: Name of the variable, in TeX.
 
     Returns:

@@ -1,4 +1,4 @@
-"""Each impact against the one before: its phase (or time) and its speed."""
+"""Draw each impact against the previous impact: phase (or time) and speed."""
 
 from collections.abc import Sequence
 from typing import Literal
@@ -30,13 +30,13 @@ def impact_return_map(
     """Draw impact k+1 against impact k, with the diagonal.
 
     The first panel shows the impact times, the second the approach speeds
-    (the normal speed just before). Points on the diagonal are impacts that repeat.
+    (the normal speed just before). Points on the diagonal are repeating impacts.
 
     Args:
         trajectory: A trajectory of `jaxcam.simulate`.
         axes: Two axes; default a new figure.
         against: "phase" for the phase of the forcing (rad, from 0 to 2 pi), "time" for
-            the time itself (s), which is also drawn where there is no period.
+            the time itself (s), which is also drawn without a period.
         period: Forcing period (s); default the system's own.
         between: Time span to draw (s), for example without a transient.
 

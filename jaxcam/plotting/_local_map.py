@@ -1,4 +1,4 @@
-"""The local map of section 5.4 with its cobwebs."""
+"""Draw the local map of thesis section 5.4 with its cobwebs."""
 
 import jax.numpy as jnp
 import numpy as np
@@ -20,14 +20,15 @@ def local_map(
     shift: float = 0.0,
     turns: int = 60,
 ) -> Figure:
-    """Draw the fitted map over the measured one, with a cobweb (thesis, Figures 5.25,
+    """Draw the fitted map over the simulated map, with a cobweb (thesis, Figures 5.25,
     5.26).
 
     Args:
         local: From [`variational.fit_local_map`][].
-        lobes: The measurement, drawn as dots and only without a shift.
+        lobes: The simulated lobes, drawn as dots and only without a shift.
         ax: Axes to draw on; default a new figure.
-        shift: Distance by which the map is moved to the left, as by a parameter.
+        shift: Distance by which the map is shifted to the left, the effect of a
+            parameter.
         turns: Number of iterations of the cobweb, the first half of which is not drawn.
 
     Returns:
@@ -61,7 +62,7 @@ def local_map(
             label="measured",
             zorder=3,
         )
-    # the fit stands for the first lobe and those inside it
+    # the fit describes the first lobe and those inside it
     shown = np.asarray(local(jnp.asarray(x)))
     ax.plot(x - shift, shown, color=FLIGHT, lw=1.2, label="fitted")
     ends = np.array([x[0] - shift, x[-1] - shift])

@@ -1,4 +1,4 @@
-"""Lyapunov exponents over the first periods, to see them settle."""
+"""Draw the convergence of Lyapunov exponents over the first periods."""
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -20,7 +20,7 @@ def lyapunov_convergence(spectrum, ax: Axes | None = None) -> Figure:
         The figure.
 
     Raises:
-        ValueError: The spectra are those of many motions.
+        ValueError: The spectrum has several motions.
 
     Examples:
         >>> from jaxcam.models import ImpactOscillator

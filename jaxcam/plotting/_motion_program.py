@@ -1,4 +1,4 @@
-"""A cam's motion program as handbooks draw it: s, v, a and j over a turn."""
+"""Draw a cam's motion program: s, v, a and j over a turn."""
 
 import jax.numpy as jnp
 import numpy as np
@@ -17,8 +17,8 @@ _POINTS = 200
 def motion_program(program: MotionProgram, axes=None, *, unit: str = "rad") -> Figure:
     """Draw lift, velocity, acceleration and jerk, per radian of the cam.
 
-    Where a derivative jumps the curve is broken: the values on both sides are joined by
-    a dashed line. A jump of the derivative before it, which is a pulse of unbounded
+    At a jump of a derivative the curve is broken: the values on both sides are joined
+    by a dashed line. A jump of the derivative before it, which is a pulse of unbounded
     height, is not drawn.
 
     Args:

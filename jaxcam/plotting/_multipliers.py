@@ -1,4 +1,4 @@
-"""Floquet multipliers in the complex plane, with the unit circle."""
+"""Draw Floquet multipliers in the complex plane, with the unit circle."""
 
 from collections.abc import Sequence
 

@@ -1,4 +1,4 @@
-"""One component of the state against another, usually velocity against position."""
+"""Draw one state component against another, usually velocity against position."""
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -34,8 +34,9 @@ def phase_portrait(
         period: Time between stroboscopic points (s); default the forcing period, and no
             points for a system without one.
         phase: Time from t0 to one of these points (s).
-        between: Time span to draw (s); default the whole trajectory.
-        samples: Number of points of a curve, besides those that short flights need.
+        between: Time span to draw (s); default the entire trajectory.
+        samples: Number of points of a curve, in addition to those that short flights
+            need.
 
     Returns:
         The figure.
@@ -82,7 +83,7 @@ def _draw_motion(ax: Axes, drawn: Curve, right: int, up: int) -> None:
 
 
 def _resting(drawn: Curve) -> np.ndarray:
-    """States of the contacts that are points, as on a floor at rest.
+    """Return the states of contacts that are points, as on a floor at rest.
 
     A line through equal points cannot be seen.
     """
@@ -119,7 +120,7 @@ def _stroboscopic(trajectory, period, phase, between) -> np.ndarray:
         return np.empty((0, 0))
     start, stop = window(trajectory, between)
     first, period = float(trajectory.t0) + phase, float(period)
-    # a point at the very end of the span is not lost to round-off
+    # keeps a point at the end of the span despite rounding
     count = np.floor(np.array([first - start, stop - first]) / period + 1e-9)
     times = first + period * np.arange(-count[0], count[1] + 1)
     if not len(times):

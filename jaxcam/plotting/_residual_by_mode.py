@@ -1,4 +1,4 @@
-"""Residuals of a model: in flight, in contact and at the impacts."""
+"""Draw residuals of a model in flight, in contact and at the impacts."""
 
 from collections.abc import Sequence
 from typing import Literal
@@ -33,9 +33,9 @@ def residual_by_mode(
 ) -> Figure:
     """Draw recording minus model, one row for each mode and channel.
 
-    On the left the residuals, with a grey band of twice the noise on either side; on
-    the right their histogram (bars), and that of the noise
-    alone (black line). Impacts carry their standard errors.
+    The left panel shows the residuals with a grey +-2 sigma band of the noise, the
+    right panel their histogram (bars), and that of the noise alone (black line).
+    Impacts carry their standard errors.
 
     Args:
         comparison: From `jaxcam.recordings.compare` or `compare_case`.
@@ -86,7 +86,8 @@ def residual_by_mode(
     left.set_xlabel("time (s)" if against == "time" else "cam angle in its turn (rad)")
     right.set_xlabel("share (%)")
     grid[0, 1].set_title("line: noise alone", fontsize="small")
-    # for all rows; the noise of a large residual is all in one bin, and may be cut off
+    # for all rows; next to a large residual the noise fills one bin, which may be cut
+    # off
     right.set_xlim(0.0, 1.25 * highest)
     if against == "phase":
         left.set_xticks(np.arange(5) * np.pi / 2, _ANGLE_TICKS)
@@ -95,7 +96,7 @@ def residual_by_mode(
 
 
 def _groups(comparison: Comparison, record: str | None) -> list[list[Residuals]]:
-    """Residuals by mode and channel, in the order of the comparison."""
+    """Return residuals by mode and channel, in the order of the comparison."""
     groups: dict[tuple[str, str], list[Residuals]] = {}
     for part in comparison.residuals:
         if record in (None, part.record) and len(part.value):
@@ -157,7 +158,7 @@ def _draw_part(ax: Axes, part: Residuals, factor, colour, against) -> None:
             label=part.record,
         )
         return
-    # thousands of dots make a file of vectors large and slow
+    # thousands of dots make a vector file large and slow
     ax.plot(
         place,
         factor * part.value,
@@ -201,6 +202,6 @@ def _name_records(figure: Figure, colours: dict[str, str]) -> None:
 
 
 def _title(part: Residuals) -> str:
-    # the channel of an impact is the one that was cut; flights may have several
+    # the channel of an impact is the segmented channel; flights may have several
     channel = name_and_unit(part.channel)[0]
     return f"{part.mode}, {channel}" if part.mode == "flight" else part.mode

@@ -1,4 +1,4 @@
-"""Evaluate the model at the samples of a recording: the channel as simulated."""
+"""Evaluate the model at the samples of a recording."""
 
 import numpy as np
 from jaxtyping import Float
@@ -10,11 +10,11 @@ from ..recordings.against_model import Comparison
 def simulated_channel(
     comparison: Comparison, recording: Recording, channel: str
 ) -> Float[np.ndarray, " k"]:
-    """The channel as simulated, at the samples of the recording; NaN elsewhere.
+    """Return the simulated channel at the samples of the recording; NaN elsewhere.
 
     A comparison keeps the differences in flight and in contact, each at its sample.
 
-    **Raises:** `ValueError` where the recording is not in the comparison.
+    **Raises:** `ValueError` if the recording is not in the comparison.
     """
     parts = [
         part

@@ -1,4 +1,4 @@
-"""Curves of special points in two parameters: a chart of where what happens."""
+"""Draw curves of special points in two parameters."""
 
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
@@ -82,13 +82,13 @@ def special_curves(
         several, key=lambda curve: np.mean([p.parameters[0] for p in curve.points])
     )
     for k, curve in enumerate(in_order):
-        # neighbours are named at different heights
+        # neighbours are labelled at different heights
         _name(ax, curve, scale, 0.65 if k % 2 else 0.3)
     return figure_of(ax)
 
 
 def _name(ax: Axes, curve, scale, share: float) -> None:
-    """The kind of a curve, along it, at a share of its height."""
+    """Write the kind of a curve along it, at a fraction of its height."""
     values = scale * np.array([point.parameters for point in curve.points])
     height = values[:, 1]
     wanted = height.min() + share * np.ptp(height)
@@ -102,7 +102,7 @@ def _name(ax: Axes, curve, scale, share: float) -> None:
         word_of(kind),
         ha="center",
         va="center",
-        # an angle in the data, which the axes turn as they are scaled
+        # an angle in data units, which the axes transform
         rotation=(np.rad2deg(np.arctan2(along[1], along[0])) + 90) % 180 - 90,
         rotation_mode="anchor",
         transform_rotates_text=True,

@@ -1,4 +1,4 @@
-"""One style for all figures, and what its colours stand for."""
+"""Define one style for all figures, and the meaning of its colours."""
 
 import functools
 from collections.abc import Callable
@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 _STYLE_FILE = Path(__file__).with_name("jaxcam.mplstyle")
 
-# colours of Okabe and Ito, by what they mean in every figure
+# colours of Okabe and Ito, by their meaning in every figure
 FLIGHT = "#0072B2"
 IMPACT = "#D55E00"
 CONTACT = "#E69F00"
@@ -19,9 +19,9 @@ SECTION = "#000000"
 RECORDED = "#ABABAB"
 BAND = "#BDBDBD"
 CAM = "#8A5F00"
-# a second thing of the same sort: another method, another manifold
+# a second item of the same kind: another method, another manifold
 SECOND = "#009E73"
-# constraints side by side, in none of the colours of impact and contact
+# several constraints, in colours different from impact and contact
 _GAPS = (FLIGHT, "#009E73", "#CC79A7", "#56B4E9", SECTION)
 
 _P = ParamSpec("_P")
@@ -29,7 +29,7 @@ _R = TypeVar("_R")
 
 
 def gap_colour(number: int) -> str:
-    """Colour of one of several constraints."""
+    """Return the colour of one of several constraints."""
     return _GAPS[number % len(_GAPS)]
 
 
@@ -48,7 +48,7 @@ def style():
 
 
 def styled(function: Callable[_P, _R]) -> Callable[_P, _R]:
-    """Draw in the project's style, and leave the reader's own settings as they were."""
+    """Draw in the project's style without changing the user's settings."""
 
     @functools.wraps(function)
     def wrapper(*args: _P.args, **kwargs: _P.kwargs) -> _R:

@@ -1,4 +1,4 @@
-"""State and gap against time, with impacts marked and contacts shaded."""
+"""Draw state and gap against time, with impacts marked and contacts shaded."""
 
 import textwrap
 from collections.abc import Sequence
@@ -29,10 +29,11 @@ def time_history(
 
     Args:
         trajectory: A trajectory of `jaxcam.simulate`.
-        axes: One for each component and one for the gap; default a new figure.
+        axes: Axes for each component and for the gap; default a new figure.
         components: Components to draw; default all.
-        between: Time span to draw (s); default the whole trajectory.
-        samples: Number of points of a curve, besides those that short flights need.
+        between: Time span to draw (s); default the entire trajectory.
+        samples: Number of points of a curve, in addition to those that short flights
+            need.
 
     Returns:
         The figure.
@@ -87,7 +88,7 @@ def _draw_component(ax: Axes, drawn: Curve, component: int) -> None:
 def _draw_gap(ax: Axes, drawn: Curve, system: HybridSystem) -> None:
     number = drawn.gap.shape[1]
     for k in range(number):
-        # one constraint needs no name, several are told apart by the colour cycle
+        # one constraint needs no name, several are distinguished by the colour cycle
         one = number == 1
         label = None if one else system.constraint_name(k)
         colour = FLIGHT if one else gap_colour(k)

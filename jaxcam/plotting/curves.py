@@ -1,4 +1,4 @@
-"""A trajectory as curves to draw: broken at impacts, rich in points between them."""
+"""Convert a trajectory to curves, broken at impacts and dense between them."""
 
 from typing import NamedTuple
 
@@ -8,7 +8,7 @@ from jaxtyping import Bool, Float, Int
 from ..hybrid import Trajectory
 
 
-# points in a flight that is too short for the even sampling to see
+# points in a flight that is shorter than the even sampling
 _SHORT_FLIGHT = 8
 _POINTS_IN_STEP = 4
 
@@ -17,7 +17,7 @@ class Curve(NamedTuple):
     """The curve of a trajectory between two times.
 
     A row of NaN ends every flight and every contact, so that a line through the rows
-    shows no jump; the jumps are apart.
+    shows no jump; jumps are stored separately.
     """
 
     time: Float[np.ndarray, " k"]
@@ -52,9 +52,9 @@ class Hits(NamedTuple):
 def window(
     trajectory: Trajectory, between: tuple[float, float] | None
 ) -> tuple[float, float]:
-    """The span of time (s) to draw; the whole trajectory for `None`.
+    """Return the span of time (s) to draw; the entire trajectory for `None`.
 
-    **Raises:** `ValueError` where the trajectory does not cover it.
+    **Raises:** `ValueError` if the trajectory does not cover it.
     """
     last = int(trajectory.steps.count) - 1
     t0, t1 = float(trajectory.t0), float(np.asarray(trajectory.steps.time)[last])
@@ -70,7 +70,7 @@ def window(
 
 
 def hits(trajectory: Trajectory, start: float, stop: float) -> Hits:
-    """The impacts with `start <= time <= stop`."""
+    """Return the impacts with `start <= time <= stop`."""
     impacts = trajectory.impacts
     number = int(impacts.count)
     time = np.asarray(impacts.time)[:number]
@@ -91,7 +91,7 @@ def hits(trajectory: Trajectory, start: float, stop: float) -> Hits:
 def contact_spans(
     trajectory: Trajectory, start: float, stop: float
 ) -> Float[np.ndarray, "contacts 2"]:
-    """Start and end of every contact that overlaps the span, cut to it."""
+    """Return start and end of every contact that overlaps the span, cut to it."""
     contacts = trajectory.contacts
     spans = np.stack([np.asarray(contacts.start), np.asarray(contacts.end)], axis=1)
     spans = spans[: int(contacts.count)].clip(start, stop)
@@ -108,7 +108,7 @@ def trajectory_curve(
 
     Args:
         trajectory: A trajectory of `jaxcam.simulate`.
-        between: Time span (s); default the whole trajectory.
+        between: Time span (s); default the entire trajectory.
         samples: Number of points.
 
     Returns:
@@ -126,7 +126,7 @@ def trajectory_curve(
     state = np.array(trajectory.at(padded))[: len(time)]
     gap = np.asarray(trajectory.gap(padded))[: len(time)].reshape(len(time), -1)
 
-    # `at` answers with the state after an impact; a flight ends in the one before
+    # `at` returns the state after an impact; a flight ends in the state before it
     for end, knot in zip(ends, knots[1:], strict=True):
         (hit,) = np.nonzero(found.time == knot)
         if len(hit):
@@ -150,9 +150,9 @@ def trajectory_curve(
 
 
 def _points(trajectory: Trajectory, knots, samples: int) -> list[int]:
-    """Points of the piece between each two knots."""
+    """Return the points of the piece between each two knots."""
     even = np.ceil(samples * np.diff(knots) / (knots[-1] - knots[0])) + 1
-    # a long run turns often between two even samples; its steps follow every turn
+    # a long run oscillates between two even samples; its steps follow every oscillation
     steps = np.asarray(trajectory.steps.time)[: int(trajectory.steps.count)]
     follows = _POINTS_IN_STEP * np.diff(np.searchsorted(steps, knots))
     return np.maximum(np.maximum(even, follows), _SHORT_FLIGHT).astype(int).tolist()

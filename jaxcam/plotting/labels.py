@@ -1,4 +1,4 @@
-"""Axis labels: a name and a unit for every quantity of a system."""
+"""Return axis labels: a name and a unit for every quantity of a system."""
 
 from ..hybrid import HybridSystem
 from ..tables import scaled as scaled
@@ -26,7 +26,7 @@ def state_label(system: HybridSystem, component: int) -> str:
 
 
 def gap_unit(system: HybridSystem) -> str:
-    """Unit of the gap: `gap_unit` of the system, or else that of its first state.
+    """Return the unit of the gap: `gap_unit` of the system, or that of its first state.
 
     A system whose gap is not in the unit of its first state declares
     `gap_unit: ClassVar[str] = "m"`.
@@ -40,7 +40,7 @@ def gap_label(system: HybridSystem) -> str:
 
 
 def time_unit(system: HybridSystem) -> str:
-    """Seconds, or - for a system all of whose states are dimensionless."""
+    """Return s, or - for a system with dimensionless states only."""
     units = system.state_units
     return "-" if units and all(unit in ("-", "") for unit in units) else "s"
 
@@ -50,7 +50,7 @@ def time_label(system: HybridSystem) -> str:
 
 
 def speed_unit(system: HybridSystem) -> str:
-    """Unit of the normal velocity, the rate of change of the gap."""
+    """Return the unit of the normal velocity, the rate of change of the gap."""
     unit, time = gap_unit(system), time_unit(system)
     if time == "-":
         return unit

@@ -1,5 +1,5 @@
-"""Read and check recordings, cut them into flights and contacts, compare with a
-model.
+"""Read and check recordings, segment them into flights and contacts, and compare
+them with a model.
 """
 
 from ._errors import RecordingError as RecordingError, RigError as RigError

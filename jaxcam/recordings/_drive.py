@@ -1,4 +1,4 @@
-"""The drive of a rig, from its encoder: angle, rate, mean speed, clock."""
+"""Estimate the drive of a rig from its encoder: angle, rate, mean speed, clock."""
 
 import dataclasses
 
@@ -34,10 +34,11 @@ class Drive:
 
     @property
     def clock(self) -> Float[np.ndarray, " k"]:
-        """Time (s) at which a drive of constant `speed` is where this one was.
+        """Return the time (s) at which a drive of constant `speed` has the measured
+        angle.
 
-        A simulation at constant speed is compared on this clock, so that a slow
-        wandering of the drive is not taken for something that the model lacks.
+        A simulation at constant speed is compared on this clock, so that slow wandering
+        of the drive is not attributed to a missing effect.
         """
         return (self.angle - self.phase) / self.speed
 
@@ -45,7 +46,7 @@ class Drive:
 def read_drive(recording: Recording, channel: str = "cam_angle_rad") -> Drive:
     """Smooth the encoder of a drive with local parabolas over 50 ms.
 
-    **Raises:** `RecordingError` for a record shorter than that, or a drive that stands.
+    **Raises:** `RecordingError` for a shorter record, or a drive at rest.
     """
     raw = recording[channel]
     if np.any(np.abs(np.diff(raw)) > np.pi):

@@ -1,4 +1,4 @@
-"""Impacts that were measured one by one: a row for each, speeds before and after."""
+"""Store a table of measured impacts, with speeds before and after."""
 
 import dataclasses
 
@@ -44,11 +44,11 @@ class ImpactTable:
     separation_stderr: Float[np.ndarray, " k"] | None = None
     """Standard errors of the separation speeds, or `None`."""
     bodies: Bodies | None = None
-    """Velocities of both bodies; `None` where one hits something fixed."""
+    """Velocities of both bodies; `None` for impacts on a fixed surface."""
     time: Float[np.ndarray, " k"] | None = None
     """Times (s), or `None`."""
     notes: tuple[str, ...] = ()
-    """Rows that were left out of the file, in words."""
+    """Remarks on omitted rows of the file."""
 
     def __len__(self) -> int:
         return len(self.approach)

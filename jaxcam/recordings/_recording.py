@@ -1,4 +1,4 @@
-"""A recording is what the sensors of one run said; a case is a folder of runs."""
+"""Store recordings, the sensor data of one run, and cases, folders of runs."""
 
 import dataclasses
 from collections.abc import Iterator, Mapping
@@ -32,16 +32,16 @@ class Recording:
     nominal_speed: float | None = None
     """Speed of the drive according to the file name (rad/s), or `None`."""
     meta: Mapping[str, Any] = dataclasses.field(default_factory=dict)
-    """Any other information (the file, the piece of it, ...)."""
+    """Additional information (the file, the piece of it, ...)."""
     constants: Mapping[str, float] = dataclasses.field(default_factory=dict)
     """Known constants of this run alone, by names of fields of the system:
     `{"mass": 0.31}`. A fit uses them unchanged."""
 
     def __getitem__(self, channel: str) -> Float[np.ndarray, " k"]:
-        """The samples of one channel, shape `(k,)`.
+        """Return the samples of one channel, shape `(k,)`.
 
         Raises:
-            RecordingError: That lists the channels there are.
+            RecordingError: The channel is missing; the message lists the channels.
         """
         if channel not in self.channels:
             raise RecordingError(
@@ -98,7 +98,7 @@ class Case:
         return len(self.recordings)
 
     def __getitem__(self, index: int | str) -> Recording:
-        """A run by its place or by the beginning of its name (`"run4"`)."""
+        """Return a run by its index or by the beginning of its name (`"run4"`)."""
         if isinstance(index, int):
             return self.recordings[index]
         found = [run for run in self.recordings if run.name.startswith(index)]

@@ -1,4 +1,4 @@
-"""The rig as its maker states it: nominal parameters, tolerances and sensors."""
+"""Represent a rig file: nominal parameters, tolerances and sensors."""
 
 import dataclasses
 import difflib
@@ -45,7 +45,7 @@ class Gyro:
 
 @dataclasses.dataclass(frozen=True)
 class Sensors:
-    """Sample rate (Hz), counts a turn and noise (rad) of the two encoders."""
+    """Sampling rate (Hz), counts per turn and noise (rad) of the two encoders."""
 
     sample_rate: float
     """Sampling rate (Hz)."""
@@ -102,7 +102,7 @@ class References:
     def of_speed(cls, fast: float) -> "References":
         """Return the constants for a motion whose fast speeds are about `fast`.
 
-        Each speed relates to those of the motion as it does in the thesis' rig.
+        The ratio of each speed to those of the motion is that of the thesis' rig.
         """
         share, usual = fast / _FAST, cls()
         return cls(
@@ -114,8 +114,8 @@ class References:
         )
 
     def sharper(self, share: float) -> "References":
-        """Return the same with dry friction that changes sign within a share of the
-        speed.
+        """Return the constants with dry friction that changes sign within a share of
+        the speed.
         """
         return dataclasses.replace(
             self,
@@ -196,12 +196,12 @@ class Rig:
         *,
         restitution: eqx.Module | None = None,
     ) -> CamFollower:
-        """Return the nominal rig as a `CamFollower` with its cam at `speed` (rad/s).
+        """Return the nominal model, a `CamFollower` with its cam at `speed` (rad/s).
 
         Args:
             speed: Speed of the cam (rad/s).
             phase: Angle that the cam has turned at time zero (rad).
-            restitution: Another law than the rig's constant one.
+            restitution: Law that replaces the rig's constant coefficient.
         """
         if restitution is None:
             restitution = ConstantRestitution(self.restitution.array)

@@ -1,4 +1,4 @@
-"""Recordings of a system that is known: to try an experiment before it is run."""
+"""Simulate recordings of a known system, to test an experiment in advance."""
 
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -14,7 +14,7 @@ from ._errors import RecordingError
 from ._recording import Recording
 
 
-# Steps in a sample in which a sensor's filter is integrated: impacts fall between them
+# Filter steps per sample, since impacts fall between samples
 _FINER = 256
 
 
@@ -22,7 +22,7 @@ class Wandering(HybridSystem):
     """A driven system whose drive wanders slowly, as real drives do.
 
     The drive turns at `speed (1 + depth w)` with w = 0.7 cos(2 pi 0.31 t) + 0.3 cos(2
-    pi 0.87 t): two slow tones that have no simple ratio.
+    pi 0.87 t): two slow harmonics with incommensurate frequencies.
 
     Examples:
         >>> from jaxcam.models import preset
@@ -84,7 +84,7 @@ class Wandering(HybridSystem):
         return self.at(t).vector_field(t, state)
 
     def gap(self, t, state):
-        # only the angle matters here, and its own rate of change comes with it
+        # only the angle matters here; its rate of change follows
         phase = self.angle(t) - self.speed(self.base) * t
         base = eqx.tree_at(lambda s: self.phase(s), self.base, phase)
         return base.gap(t, state)
@@ -173,7 +173,7 @@ def _sense(sensor, trajectory, settle, count, interval, rng) -> Float[np.ndarray
 
 
 def _filtered(samples, step: float) -> np.ndarray:
-    """First-order filter of a signal that is linear between its samples."""
+    """Apply a first-order filter to a signal that is linear between its samples."""
     from scipy.signal import lfilter
 
     keep = np.exp(-step)

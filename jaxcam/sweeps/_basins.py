@@ -35,8 +35,8 @@ def basins(
     """Compute basins of attraction: the attractor on which each state of a grid ends.
 
     Motions are simulated and sampled once per period. Periodic motions are on the same
-    attractor where their orbits agree; other motions are where they visit common
-    cells. Neither depends on the order of states, on blocks, or on the executor.
+    attractor if their orbits agree, other motions if they visit common cells. The
+    result does not depend on the order of states, on blocks, or on the executor.
 
     Args:
         system: A hybrid system, or a section that is sampled once per period.
@@ -45,7 +45,8 @@ def basins(
         turns: Number of periods simulated.
         keep: Number of samples used; periods up to `keep / 2` are detected.
         period_tolerance: Tolerance for detecting periods.
-        same: Orbits that differ by less, in units of `scale`, are the same attractor.
+        same: Orbits that differ by less, in units of `scale`, count as the same
+            attractor.
         reruns: Number of extensions of non-periodic runs, each twice as long as the one
             before.
         scale: Scale of the motions, shape `(n,)`; default the largest extent or

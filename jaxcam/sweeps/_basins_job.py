@@ -17,7 +17,7 @@ _FINE = 1 / 64
 
 
 class BasinsJob(AbstractJob):
-    """Some rows of the grid at a time."""
+    """Computes some rows of the grid at a time."""
 
     def __init__(
         self,
@@ -44,7 +44,7 @@ class BasinsJob(AbstractJob):
             "fingerprint": StoredVariable(
                 (*dims, "mean"), (*tail, fingerprint_size(n)), "float64"
             ),
-            # zero for motions that repeat, and then next to nothing on disk
+            # zero for periodic motions, which compresses well on disk
             "cells": StoredVariable((*dims, "sample"), (*tail, keep), "int64"),
         }
         coordinates = {
@@ -76,7 +76,7 @@ class BasinsJob(AbstractJob):
 
 
 def default_scale(grid: Grid) -> np.ndarray:
-    """The largest extent or coordinate of the grid in each component."""
+    """Return the largest extent or coordinate of the grid in each component."""
     low, high = np.abs(grid.low), np.abs(grid.high)
     found = np.maximum(grid.extents, np.maximum(low, high))
     return np.where(found > 0, found, 1.0)
@@ -85,7 +85,7 @@ def default_scale(grid: Grid) -> np.ndarray:
 def some_rows(
     section, grid, scale, bounds, turns, keep, period_tolerance, reruns
 ) -> Arrays:
-    """The motions from some rows of the grid."""
+    """Compute the motions from some rows of the grid."""
     states = grid.states(*bounds)
     samples, labels = settle(
         section, states, turns, keep, period_tolerance=period_tolerance, reruns=reruns

@@ -1,4 +1,4 @@
-"""Basins of attraction, and what can be read off them."""
+"""Represent basins of attraction and their properties."""
 
 import json
 from typing import NamedTuple

@@ -6,7 +6,7 @@ import numpy as np
 
 
 class BasinEntropy(NamedTuple):
-    """Basin entropy, and that of the boxes on the boundary alone (nats)."""
+    """Basin entropy and boundary basin entropy (nats)."""
 
     entropy: float
     """Average over all boxes (nats)."""
@@ -83,8 +83,9 @@ def basin_entropy(attractor, box: int = 5) -> BasinEntropy:
 def uncertainty_exponent(attractor, distances=(1, 2, 4, 8, 16)) -> Uncertainty:
     """Return the exponent with which the fraction of uncertain states decreases.
 
-    A state is uncertain if one at the given distance along an axis ends elsewhere;
-    their fraction scales as distance^exponent (McDonald et al., Physica D 17, 1985).
+    A state is uncertain if another state at the given distance along an axis ends on
+    another attractor; their fraction scales as distance^exponent (McDonald et al.,
+    Physica D 17, 1985).
 
     Args:
         attractor: Numbers of attractors on a grid of any dimension; pairs with a state
@@ -121,10 +122,11 @@ def uncertainty_exponent(attractor, distances=(1, 2, 4, 8, 16)) -> Uncertainty:
             found.append((distance, different / total))
     if len(found) < 2:
         raise ValueError(
-            "fewer than two distances have states that end elsewhere; use a finer "
+            "fewer than two distances have states that end on different attractors; "
+            "use a finer "
             "grid, or one with a boundary in it"
         )
-    # slow to import, and needed for this one line
+    # slow to import, and needed for this line only
     from scipy.stats import linregress
 
     distance, fraction = map(np.array, zip(*found, strict=True))

@@ -17,7 +17,7 @@ class CellMapping(NamedTuple):
     period: np.ndarray
     """Number of cells of the cycle on which it ends; 0 for the sink cell."""
     steps: np.ndarray
-    """Number of applications of the map until that is reached."""
+    """Number of applications of the map until the cycle is reached."""
     cyclic: np.ndarray
     """Whether the cell is part of a cycle."""
 
@@ -31,11 +31,11 @@ def cell_mapping(
 ) -> CellMapping:
     """Map the centre of every cell once, and follow the cells (simple cell mapping).
 
-    All states outside of the grid, and those that cannot start, are one sink cell,
-    which maps to itself. Cells are an approximation: a cycle of cells is an attractor
-    where they are small, and groups are numbered by their first cell (Hsu, Global
-    analysis by cell mapping, 1992). Compare with [`jaxcam.sweeps.basins`][], which
-    simulates each motion itself.
+    All states outside of the grid, and inadmissible states, form one sink cell,
+    which maps to itself. The cells are an approximation: a cycle of small cells is an
+    attractor. Groups are numbered by their first cell (Hsu, Global analysis by cell
+    mapping, 1992). Compare with [`jaxcam.sweeps.basins`][], which simulates each motion
+    itself.
 
     Args:
         system: A hybrid system, or a section that is sampled once per period.
@@ -47,7 +47,7 @@ def cell_mapping(
         A `CellMapping`.
 
     Raises:
-        ValueError: Another kind of section, or fewer than one period.
+        ValueError: The section is of another kind, or there is less than one period.
 
     Examples:
         >>> from jaxcam import sweeps
@@ -74,20 +74,20 @@ def cell_mapping(
 
 
 def follow_cells(image, shape) -> CellMapping:
-    """Groups of cells that lead to one cycle.
+    """Return groups of cells that lead to one cycle.
 
-    **Arguments:** `image`: the cell that each cell leads to, -1 for the sink.
+    **Arguments:** `image`: the image of each cell, -1 for the sink.
     """
     image = np.asarray(image)
     count = len(image)
-    # the sink is a cell of its own at the end
+    # the sink is an additional cell at the end
     pointer = np.append(np.where(image < 0, count, image), count)
     doublings = max(1, int(count + 1).bit_length())
     far, smallest = pointer.copy(), np.minimum(np.arange(count + 1), pointer)
     for _ in range(doublings):
         smallest = np.minimum(smallest, smallest[far])
         far = far[far]
-    # after so many applications all are on a cycle; its smallest cell is its name
+    # after this many applications all are on a cycle, named by its smallest cell
     cyclic = np.zeros(count + 1, dtype=bool)
     cyclic[far] = True
     name = smallest[far]
@@ -101,7 +101,7 @@ def follow_cells(image, shape) -> CellMapping:
 
 
 def _steps(pointer, cyclic):
-    """Applications of the map until a cycle is reached, by doubling."""
+    """Return the applications of the map until a cycle is reached, by doubling."""
     steps = np.where(cyclic, 0, 1)
     far = np.where(cyclic, np.arange(len(pointer)), pointer)
     while True:

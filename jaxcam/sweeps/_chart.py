@@ -1,4 +1,4 @@
-"""Charts of labels, and of exponents, over two parameters."""
+"""Compute charts of labels and exponents over two parameters."""
 
 import functools
 from collections.abc import Callable
@@ -26,7 +26,7 @@ from .sections import AbstractSection
 
 
 _LANES = 1024
-"""Motions in a block; fewer than elsewhere, as exponents take long."""
+"""Motions in a block; fewer than in other sweeps, as exponents take long."""
 
 
 def chart(
@@ -60,7 +60,8 @@ def chart(
         keep: As for [`jaxcam.sweeps.basins`][].
         period_tolerance: As for [`jaxcam.sweeps.basins`][].
         reruns: As for [`jaxcam.sweeps.basins`][].
-        exponents: With it, the largest Lyapunov exponent over so many further periods.
+        exponents: Number of further periods for the largest Lyapunov exponent; 0 for
+            none.
         out: As for [`jaxcam.sweeps.blocks.run_blocks`][].
         resume: As for [`jaxcam.sweeps.blocks.run_blocks`][].
         executor: As for [`jaxcam.sweeps.blocks.run_blocks`][].
@@ -111,7 +112,7 @@ def chart(
 
 
 class ChartJob(AbstractJob):
-    """Some values of the second parameter, all of the first."""
+    """Computes some values of the second parameter and all of the first."""
 
     def __init__(
         self,
@@ -188,7 +189,7 @@ def some_pairs(
     section, where, pairs, starts, shape, turns, keep, period_tolerance, reruns,
     exponents,
 ) -> Arrays:  # fmt: skip
-    """Labels, and exponents if wanted, at some pairs of values."""
+    """Compute labels, and exponents if requested, at some pairs of values."""
     count, n = starts.shape[1:]
     values = np.repeat(pairs, count, axis=0)
     samples, labels = settle(

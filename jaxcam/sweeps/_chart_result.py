@@ -10,8 +10,8 @@ class Chart:
     """The result of [`jaxcam.sweeps.chart`][].
 
     `dataset` has a dimension for each parameter, the second one first, and `start`; the
-    variables are `impacts` and `turns` (the label), `code` (0, or why a motion failed),
-    and, if asked for, `exponent` and `exponent_stderr` (1/s).
+    variables are `impacts` and `turns` (the label), `code` (0, or the reason of a
+    failure), and, if requested, `exponent` and `exponent_stderr` (1/s).
 
     Examples:
         >>> from jaxcam import sweeps
@@ -43,9 +43,7 @@ class Chart:
 
     @property
     def labels(self) -> np.ndarray:
-        """Labels in words, shape `(l, k, starts)`; "chaotic" where an exponent says
-        so.
-        """
+        """Labels as text, shape `(l, k, starts)`; "chaotic" for a positive exponent."""
         numbers = Labels(self.dataset["impacts"].values, self.dataset["turns"].values)
         found = label_names(numbers)
         if "exponent" in self.dataset:

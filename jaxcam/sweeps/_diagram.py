@@ -1,4 +1,4 @@
-"""Bifurcation diagrams by brute force."""
+"""Compute bifurcation diagrams by brute force."""
 
 from collections.abc import Callable
 from concurrent.futures import Executor
@@ -49,7 +49,7 @@ def diagram(
             `(points, starts, n)` for others at each, such as from
             [`jaxcam.sweeps.monte_carlo`][]. Default: in contact at rest.
         turns: Number of periods simulated.
-        keep: Number of last periods that are kept.
+        keep: Number of final periods that are kept.
         direction: "each" value from the same start; "up", "down" or "both" carry the
             state from one value to the next, which shows hysteresis.
         dwell: Times (s) to wait and to record at each value, instead of `turns`,

@@ -20,11 +20,11 @@ from .sections import AbstractSection, component_coordinates, filled
 
 
 _CHAIN = 16
-"""Values of a block where the state is carried from one to the next."""
+"""Values of a block if the state is carried from one value to the next."""
 
 
 class DiagramJob(AbstractJob):
-    """Every value by itself."""
+    """Computes every value independently."""
 
     chained = False
 
@@ -112,7 +112,9 @@ class DiagramJob(AbstractJob):
 
 
 class CarriedJob(DiagramJob):
-    """Up, down or both ways, each value from where the one before it ended."""
+    """Computes values upwards, downwards or both, each from the final state of the
+    last.
+    """
 
     chained = True
 
@@ -153,7 +155,7 @@ class CarriedJob(DiagramJob):
 
 
 def each_value(section, where, values, starts, turns, keep, period_tolerance) -> Arrays:
-    """All motions of some values at once."""
+    """Compute all motions of some values at once."""
     points, count, n = starts.shape
     lanes = np.repeat(values, count, axis=0)
     samples, labels = settle(
@@ -172,17 +174,17 @@ def each_value(section, where, values, starts, turns, keep, period_tolerance) ->
 def one_after_the_other(
     section, where, values, starts, first, carried, turns, keep, room, period_tolerance
 ) -> Arrays:
-    """Some values in order; `first` says which of them begin anew.
+    """Compute some values in order; `first` marks those that start again.
 
-    **Arguments:** `turns`, `keep`: of each value; `room`: samples that there is room
-    for, NaN where fewer are kept.
+    **Arguments:** `turns`, `keep`: of each value; `room`: capacity for samples, padded
+    with NaN.
     """
     rows = []
     for value, start, anew, many, kept in zip(
         values, starts, first, turns, keep, strict=True
     ):
         state = start if anew or carried is None else carried
-        # a lane that failed begins anew
+        # a failed lane starts again
         state = np.where(np.isfinite(state).all(axis=1, keepdims=True), state, start)
         lanes = np.full(len(state), value)
         state = section.lifted(state, where, lanes)

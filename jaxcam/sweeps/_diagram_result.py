@@ -1,4 +1,4 @@
-"""A bifurcation diagram, and what can be read off it."""
+"""Represent a bifurcation diagram and its properties."""
 
 from typing import NamedTuple
 
@@ -12,13 +12,13 @@ class Range(NamedTuple):
     """Neighbouring values of the parameter with motions of one label."""
 
     label: str
-    """The label in words."""
+    """The label as text."""
     low: float
     """Smallest value of the parameter."""
     high: float
     """Largest value of the parameter."""
     direction: int
-    """1 for values visited upwards, -1 downwards, 0 where each starts anew."""
+    """1 for values visited upwards, -1 downwards, 0 for independent starts."""
 
 
 class Diagram:
@@ -27,9 +27,8 @@ class Diagram:
     `dataset` has the dimensions point (a value of the parameter, in the order in which
     they were visited), start, sample and component, and the variables `state`, `hits`
     (impacts since the previous sample), `impacts` and `turns` (the label, see
-    [`jaxcam.sweeps.attractors.Labels`][]), `code` (0, or why a motion failed), and,
-    where samples are not a period apart, `time` (s) and `phase` (in periods, from 0 to
-    1).
+    [`jaxcam.sweeps.attractors.Labels`][]), `code` (0, or the reason of a failure), and,
+    if samples are not a period apart, `time` (s) and `phase` (in periods, from 0 to 1).
 
     Examples:
         >>> from jaxcam import sweeps
@@ -65,7 +64,7 @@ class Diagram:
 
     @property
     def labels(self) -> np.ndarray:
-        """Labels in words, such as P(1,1) or P(inf,1), shape `(points, starts)`."""
+        """Labels as text, such as P(1,1) or P(inf,1), shape `(points, starts)`."""
         numbers = Labels(self.dataset["impacts"].values, self.dataset["turns"].values)
         return label_names(numbers)
 

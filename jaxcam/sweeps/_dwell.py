@@ -1,4 +1,4 @@
-"""A diagram in seconds, as a rig makes one: wait at each value, then store."""
+"""Compute a diagram in seconds, as in an experiment: wait at each value, then store."""
 
 import functools
 import math
@@ -13,19 +13,19 @@ from .sections import AbstractSection
 
 
 _SLACK = 1e-9
-"""Fraction of a period, so that rounding costs no period."""
+"""Tolerance in periods, so that rounding does not lose a period."""
 
 
 def dwell_turns(
     section: AbstractSection, where: Pick, values, dwell: tuple[float, float]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Periods at each value, and the number of them that are stored.
+    """Return the periods at each value, and the number of stored periods.
 
-    **Arguments:** `dwell`: s to wait, and s to store. The wait ends with the period in
-    which it is over, and only whole periods are stored.
+    **Arguments:** `dwell`: s to wait, and s to store. The waiting time is rounded up to
+    full periods, and only full periods are stored.
 
     Raises:
-        ValueError: Where there is not one whole period to store.
+        ValueError: Less than one full period would be stored.
     """
     if not section.regular:
         raise ValueError("dwell needs samples once per period, not at impacts")
@@ -47,7 +47,9 @@ def dwell_turns(
 
 
 class DwellJob(CarriedJob):
-    """Up, down or both ways, with as many periods at a value as its seconds hold."""
+    """Computes values upwards, downwards or both, with the periods of the given
+    seconds.
+    """
 
     def __init__(self, *arguments, dwell: tuple[float, float]):
         self.dwell = dwell

@@ -1,4 +1,4 @@
-"""The largest Lyapunov exponent of many motions, to tell chaos from long transients."""
+"""Compute largest Lyapunov exponents, to distinguish chaos from long transients."""
 
 from collections.abc import Callable
 from functools import partial
@@ -46,7 +46,7 @@ def largest_exponents(
         turns: Number of periods averaged, at least 16.
         where: As for a section; motions of one second parameter are computed together.
         values: As for a section.
-        progress: Called with the part that is done.
+        progress: Called with the fraction done.
 
     Returns:
         An `Exponents`.
@@ -104,7 +104,7 @@ def _within(progress, begun: float, size: float, share: float) -> None:
 
 
 def _together(system, where, values, lanes):
-    """Lanes that a call can take together, their system, and what varies in it."""
+    """Return lanes for one call, their system, and its varying parameters."""
     everybody = np.arange(lanes)
     if where is None:
         yield everybody, system, None, None

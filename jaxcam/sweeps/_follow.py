@@ -1,4 +1,4 @@
-"""Basins along a parameter, each attractor with one number throughout."""
+"""Compute basins along a parameter, with consistent numbers of attractors."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -25,7 +25,7 @@ class FollowedBasins(NamedTuple):
     basins: tuple[Basins, ...]
     """Basins at each value."""
     numbers: tuple[np.ndarray, ...]
-    """For each value, the number that each of its attractors keeps throughout."""
+    """For each value, the consistent numbers of its attractors."""
     shares: np.ndarray
     """Fraction of the states that ends on each attractor, shape `(values, numbers)`; 0
     where it does not exist."""
@@ -56,7 +56,7 @@ def follow_basins(
         turns: Number of periods simulated.
         most: Distance of two orbits, in units of the first scale, beyond which they are
             not the same attractor. Pairs are chosen so that the sum of distances is
-            smallest; the label may change, as where P(1,1) turns into P(2,2).
+            smallest; the label may change, for example from P(1,1) to P(2,2).
         out: Folder in which one sweep is stored for each value.
         progress: As for [`jaxcam.sweeps.blocks.run_blocks`][], for one value at a
             time.
@@ -66,7 +66,7 @@ def follow_basins(
         A `FollowedBasins`.
 
     Raises:
-        ValueError: As for [`jaxcam.sweeps.basins`][].
+        ValueError: See [`jaxcam.sweeps.basins`][].
 
     Examples:
         >>> from jaxcam import sweeps
@@ -81,7 +81,7 @@ def follow_basins(
     values = as_values(values, 1)
     made: list[Basins] = []
     numbers: list[np.ndarray] = []
-    # the latest that was seen of each attractor
+    # the latest orbit of each attractor
     latest: list[np.ndarray] = []
     for k, value in enumerate(values):
         moved = eqx.tree_at(picked, section.system, jnp.asarray(value))

@@ -1,4 +1,4 @@
-"""Grids of initial states, and the cells that they are the centres of."""
+"""Represent grids of initial states, the centres of cells."""
 
 import equinox as eqx
 import numpy as np
@@ -90,7 +90,7 @@ class Grid(eqx.Module):
         sizes = np.where(self.sizes > 0, self.sizes, 1.0)
         with np.errstate(invalid="ignore"):
             place = np.floor((states - np.array(self.low)) / sizes)
-        # a component that does not vary does not tell cells apart
+        # a component that does not vary does not distinguish cells
         place = np.where(np.array(self.shape) == 1, 0.0, place)
         inside = np.all((place >= 0) & (place < np.array(self.shape)), axis=-1)
         safe = np.where(inside[..., None], place, 0).astype(int)

@@ -7,14 +7,14 @@ from .sections import AbstractSection, Stroboscopic
 
 
 LANES = 4096
-"""Motions in a block, unless something else is asked for."""
+"""Default number of motions in a block."""
 
 
 def as_section(system) -> AbstractSection:
-    """A section as it is; a hybrid system seen once a period of its forcing.
+    """Return a section unchanged, and a hybrid system as its stroboscopic section.
 
     Raises:
-        ValueError: For anything else, or a system without a period.
+        ValueError: The argument is neither, or the system has no period.
     """
     if isinstance(system, AbstractSection):
         section = system
@@ -38,7 +38,7 @@ def as_section(system) -> AbstractSection:
 def check_turns(
     turns: int, keep: int, period_tolerance: float, reruns: int = 0
 ) -> None:
-    """Raise `ValueError` for numbers that make no sense together."""
+    """Raise `ValueError` for inconsistent numbers."""
     if not 1 <= keep <= turns:
         raise ValueError(
             f"keep is {keep} and turns {turns}; keep 1 or more of the turns"

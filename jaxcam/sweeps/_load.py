@@ -1,4 +1,4 @@
-"""Sweeps read back from disk."""
+"""Load sweeps from disk."""
 
 import json
 from pathlib import Path
@@ -20,7 +20,7 @@ def load_sweep(path: str | Path) -> Diagram | Basins | Chart:
         path: Folder of the sweep.
 
     Returns:
-        The result as it was returned.
+        The result of the sweep.
 
     Raises:
         ValueError: Blocks are missing or damaged (the message names them), or the

@@ -1,4 +1,4 @@
-"""Initial states at random."""
+"""Draw random initial states."""
 
 import numpy as np
 
@@ -11,11 +11,11 @@ def monte_carlo(low, high, count: int, seed: int = 0, points: int | None = None)
         high: Upper corner of the box, shape `(n,)`.
         count: Number of states.
         seed: Seed of the random numbers.
-        points: With it, a separate set for each of so many values of a parameter.
+        points: Number of parameter values, each with a separate set of states.
 
     Returns:
-        Shape `(count, n)`, or `(points, count, n)`. Those of the first values do not
-            depend on how many follow.
+        Shape `(count, n)`, or `(points, count, n)`. The sets of the first values do not
+            depend on the number of values.
 
     Raises:
         ValueError: The corners do not fit together, or `count` is below one.

@@ -1,4 +1,4 @@
-"""Attractors of all blocks together, and which of them each state ends on."""
+"""Find the attractors of all blocks, and the attractor of each state."""
 
 import numpy as np
 import xarray
@@ -19,13 +19,13 @@ from .sections import AbstractSection, component_coordinates
 
 
 _SHOWN = 64
-"""Points of an orbit that are kept of each attractor."""
+"""Number of points kept of each attractor."""
 _ALIKE = 0.05
-"""Distance of two orbits that are one attractor, in units of the scale."""
+"""Distance within which two orbits are one attractor, in units of the scale."""
 
 
 def together(job: BasinsJob, store: Store, known: Basins | None) -> xarray.Dataset:
-    """Number of the attractor of each state, and the attractors themselves."""
+    """Return the number of the attractor of each state, and the attractors."""
     grid, section, layout = job.grid, job.section, job.layout
     impacts, turns, fingerprint = [], [], []
     visited, lanes = [], 0
@@ -74,7 +74,7 @@ def together(job: BasinsJob, store: Store, known: Basins | None) -> xarray.Datas
 
 
 def _orbits(section: AbstractSection, starts, job: BasinsJob) -> np.ndarray:
-    """The last points of the motions that stand for the attractors, in order."""
+    """Return the last points of the motions that represent the attractors, in order."""
     turns, keep, period_tolerance, reruns = job.settings
     n = len(job.grid.shape)
     made = np.full((len(starts), min(_SHOWN, turns), n), np.nan)
@@ -87,7 +87,7 @@ def _orbits(section: AbstractSection, starts, job: BasinsJob) -> np.ndarray:
     for k, length in enumerate(labels.turns):
         orbit = longer[k]
         if length > 0:
-            # the smallest point first, and what follows it
+            # start at the smallest point
             one = orbit[:length]
             first = int(np.lexsort(np.round(one, 6).T[::-1])[0])
             orbit = np.full_like(orbit, np.nan)
@@ -97,7 +97,7 @@ def _orbits(section: AbstractSection, starts, job: BasinsJob) -> np.ndarray:
 
 
 def _renumbered(number, found: Attractors, orbit, known: Basins):
-    """The numbers that attractors have in other basins; new ones come after those."""
+    """Return the numbers of attractors in other basins; new attractors follow."""
     labels = np.stack([found.impacts, found.turns], axis=1)
     both = (known.labels, labels)
     pairs = match_orbits(known.orbits, orbit, known.scale, _ALIKE, both)

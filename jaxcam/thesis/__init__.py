@@ -1,3 +1,3 @@
-"""Tables and figures of the thesis: printed values, computed ones, drawings."""
+"""Reproduce tables and figures of the thesis: printed and computed values, drawings."""
 
 from .registry import reproduce as reproduce, TARGETS as TARGETS

@@ -1,4 +1,4 @@
-"""Diagrams over the speed, and the main events of Table 5.1 in them."""
+"""Find the main events of Table 5.1 in diagrams over the speed."""
 
 from typing import Any, NamedTuple
 
@@ -28,7 +28,9 @@ class Events(NamedTuple):
 
 
 def label_spans(made: Diagram, label: str, way: int) -> list[tuple[float, float]]:
-    """Ranges (rpm) of a label in one direction (0: in any), the widest first."""
+    """Return the ranges (rpm) of a label in one direction (0: any), the widest
+    first.
+    """
     found = [
         (float(rad_s_to_rpm(r.low)), float(rad_s_to_rpm(r.high)))
         for r in made.ranges()
@@ -38,14 +40,14 @@ def label_spans(made: Diagram, label: str, way: int) -> list[tuple[float, float]
 
 
 def events(up: Diagram, down: Diagram) -> Events:
-    """The events, of what was met on the way up and on the way down.
+    """Return the events of the upward and the downward sweep.
 
-    Contact and what follows from it belong to the way up, as does the beginning of
-    aperiodic motion; orbits with one impact a turn are met on the way down, P(1,1)
-    below the P(2,2) that it doubles to. The chattering route to chaos begins behind the
-    last speed with P(inf,1) and ends, with the chaos it leads to, at the first speed of
-    the way up from which the motion is on the period-doubling cascade; without one, at
-    the last speed.
+    Contact, the orbits that follow from it, and the beginning of aperiodic motion are
+    taken from the upward sweep; orbits with one impact per turn from the downward
+    sweep, P(1,1) below its doubled orbit P(2,2). The chattering route to chaos begins
+    after the last speed with P(inf,1). It ends, with the resulting chaos, at the first
+    upward speed on the period-doubling cascade; without such a speed, at the last
+    speed.
     """
     contact = label_spans(up, "contact", 1)[0]
     sticking = label_spans(up, "P(inf,1)", 1)[0]
@@ -72,7 +74,7 @@ def events(up: Diagram, down: Diagram) -> Events:
 
 
 def _way(made: Diagram, way: int) -> tuple[np.ndarray, np.ndarray]:
-    """Speeds (rpm) and labels of one direction."""
+    """Return speeds (rpm) and labels of one direction."""
     some = made.direction == way
     return np.asarray(rad_s_to_rpm(made.values))[some], made.labels[some, 0]
 
@@ -81,7 +83,7 @@ _LABELS = ("angle", "rad"), ("velocity", "rad/s")
 
 
 def draw_diagram(made: Diagram, ax, component: int = 0) -> None:
-    """Angle, or velocity as component 1, over the speed in rpm."""
+    """Draw the angle (component 0) or velocity (component 1) over the speed in rpm."""
     plotting.sweep_diagram(
         made,
         ax,

@@ -1,4 +1,4 @@
-"""The rig at the interruption of complete chattering."""
+"""Find the interruption of complete chattering of the rig."""
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -17,18 +17,19 @@ INTERRUPTION = 152.67658
 """
 REFERENCE = 152.67
 _RANGE, _RANGES = 12.0, 5
-"""Rpm of the ranges in which an interruption is searched for, the thesis' first, then
-the next above and below, so many times."""
+"""Width of the search ranges (rpm), and the number of further ranges above and below
+that of the thesis.
+"""
 _MOVED = 0.01
-"""Rpm to which the interruption of another rig moves the printed speeds around it."""
+"""Resolution (rpm) of printed speeds shifted to another rig's interruption."""
 
 
 @remembered
 def interruption(system: CamFollower) -> CamFollower:
-    """The rig at the speed where its complete chattering is interrupted.
+    """Return the rig at the speed of the interruption of its complete chattering.
 
     Raises:
-        ValueError: Where that is not within 66 rpm of the thesis' speed.
+        ValueError: The interruption is not within 66 rpm of the thesis' speed.
     """
     places = [0, *(way * k for k in range(1, _RANGES + 1) for way in (1, -1))]
     for place in places:
@@ -36,7 +37,8 @@ def interruption(system: CamFollower) -> CamFollower:
         ends = np.array([middle - _RANGE / 2, middle + _RANGE / 2])
         low, high = np.asarray(rpm_to_rad_s(ends))
         found = _search(system, low, high)
-        # behind it chattering is interrupted; where impacts begin it is the other way
+        # above it chattering is interrupted; at the beginning of impacts it is the
+        # reverse
         if bool(found.converged) and found.ends[0] < 0 < found.ends[1]:
             return at_speed(system, found.value)
     far = _RANGE * (_RANGES + 0.5)
@@ -53,9 +55,10 @@ def _search(system, low, high):
 
 
 def beside_interruption(system: CamFollower, rpm: float) -> float:
-    """A speed (rpm) as far from the interruption of `system` as a printed one is.
+    """Return a speed (rpm) at the same distance from the interruption as a printed
+    speed.
 
-    To 0.01 rpm, so that a rig whose interruption is the thesis' keeps printed speeds.
+    It is rounded to 0.01 rpm, so that printed speeds are unchanged for the thesis' rig.
     """
     own = float(rad_s_to_rpm(interruption(system).speed))
     moved = round((own - INTERRUPTION) / _MOVED) * _MOVED
@@ -63,9 +66,9 @@ def beside_interruption(system: CamFollower, rpm: float) -> float:
 
 
 def reference(system: CamFollower) -> CamFollower:
-    """The rig as far below its interruption as Table 6.1 is below the thesis' own.
+    """Return the rig at the distance of Table 6.1 below its interruption.
 
-    Close to the interruption everything that chatters depends on that distance.
+    Close to the interruption chattering depends only on that distance.
     """
     below = float(rpm_to_rad_s(INTERRUPTION - REFERENCE))
     return at_speed(system, speed_of(interruption(system)) - below)
@@ -78,7 +81,9 @@ contact_at = eqx.filter_jit(surface_state)
 
 @eqx.filter_jit
 def sticking_state(system: CamFollower):
-    """State, gap and relative velocity at the end of the period of a sticking orbit."""
+    """Return state, gap and relative velocity at the end of the period of a sticking
+    orbit.
+    """
     system = system.prepared()
     release = chatter_frame(system)
     left = system.period - release.release

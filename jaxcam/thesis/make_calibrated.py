@@ -1,10 +1,10 @@
-"""The rig behind the thesis' numbers, recovered from Tables 5.2 and 6.1.
+"""Recover the rig parameters behind the thesis' numbers from Tables 5.2 and 6.1.
 
 Table 4.4 is rounded, the spring was fitted again after it was printed, and neither the
-restitution nor the sense of rotation is stated. All of that is found here:
+restitution nor the sense of rotation is stated. This module finds them:
 
 1. Free flight is conservative, so the product of the two multipliers of P(1,1) is r^2.
-   A straight line through the ten values of r that Table 5.2 gives is the law.
+   The law is a straight line through the ten values of r from Table 5.2.
 2. Seven parameters start at Table 4.4 with a tolerance of 2 % and are fitted to the
    sums of the multipliers from 147.9 to 153.4 rpm and to Table 6.1.
 3. Both senses of rotation are fitted. Only one fits.
@@ -35,7 +35,7 @@ from .speeds import at_rpm, speed_of
 
 
 TOLERANCE = 0.02
-"""Relative tolerance of what Table 4.4 prints."""
+"""Relative tolerance of the values in Table 4.4."""
 TRACE_ERROR = 1e-6
 """Error of a printed sum of multipliers: they have twelve digits, but come from AUTO,
 whose orbits are converged to 1e-6 or 1e-7 as a rule."""
@@ -54,10 +54,10 @@ NAMES = (
 
 
 class Observed(eqx.Module):
-    """The rig, and the instant to which the first row of Table 6.1 belongs.
+    """The rig, and the time of the first row of Table 6.1.
 
-    The instant is printed with five digits, while angle and velocity there are known
-    better than that fixes them: it is one more unknown.
+    The time is printed with five digits, which is less accurate than angle and velocity
+    require, so it is an additional unknown.
     """
 
     system: CamFollower
@@ -65,14 +65,14 @@ class Observed(eqx.Module):
 
 
 class Law(NamedTuple):
-    """Restitution against speed, and how far the ten values are from the line."""
+    """Restitution as a function of speed, and the residuals of the ten values."""
 
     law: LinearInSpeed
     residuals: Float[np.ndarray, " rows"]
 
 
 def restitution_law() -> Law:
-    """The line through the roots of the products of the multipliers."""
+    """Fit the line to the square roots of the products of the multipliers."""
     r = np.sqrt(table_5_2.PRODUCTS)
     slope, intercept = np.polyfit(table_5_2.SPEEDS, r, 1)
     law = LinearInSpeed(slope=rad_s_to_rpm(slope), intercept=intercept)
@@ -80,10 +80,10 @@ def restitution_law() -> Law:
 
 
 def nominal_rig(rotation: str = "clockwise") -> CamFollower:
-    """Table 4.4 with that law, and time zero where the cam lifts highest.
+    """Return the rig of Table 4.4 with that law, and time zero at the largest lift.
 
-    The last column of Table 6.1 shows that: its velocities relative and absolute agree
-    at the end of the period, so the contact velocity is zero there.
+    The last column of Table 6.1 implies this: relative and absolute velocity agree at
+    the end of the period, so the contact velocity is zero there.
     """
     system = CamFollower(restitution=restitution_law().law, rotation=rotation)
     angles = jnp.linspace(0.0, 2 * jnp.pi, 4097)
@@ -109,10 +109,10 @@ def free(observed: Observed):
 
 
 def tolerances(system: CamFollower) -> list[float]:
-    """2 % of each nominal value; y0, which is zero, has that of x0.
+    """Return 2 % of each nominal value; y0, which is zero, has the tolerance of x0.
 
-    Only the sum of the cam's radius and the follower's half height is seen, so the
-    radius carries the tolerance of both. The phases have none.
+    Only the sum of the cam's radius and the follower's half height is identifiable, so
+    the radius has the tolerance of both. The phases have none.
     """
     cam = system.profile
     sizes = [
@@ -128,10 +128,10 @@ def tolerances(system: CamFollower) -> list[float]:
 
 
 def published(system: CamFollower) -> list[Published]:
-    """Tables 5.2 and 6.1, with the functions that compute them near `system`.
+    """Return Tables 5.2 and 6.1 with functions that compute them near `system`.
 
     Raises:
-        ValueError: Where the rig has no P(1,1) at 148 rpm to start from.
+        ValueError: The rig has no P(1,1) at 148 rpm to start from.
     """
     guess = first_orbit(system)
     if guess is None:
@@ -181,7 +181,7 @@ def published(system: CamFollower) -> list[Published]:
 
 
 def fit_rig(rotation: str = "clockwise", max_steps: int = 512) -> PublishedFit:
-    """Seven parameters of the rig, and two phases, from Tables 5.2 and 6.1."""
+    """Fit seven parameters of the rig, and two phases, to Tables 5.2 and 6.1."""
     nominal = nominal_rig(rotation)
     start = Observed(nominal, jnp.asarray(table_6_1.ACCUMULATION[0]))
     return fit_published(

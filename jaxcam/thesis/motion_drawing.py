@@ -1,4 +1,4 @@
-"""Drawings of motions that have settled: time series next to phase portraits."""
+"""Draw settled motions: time series next to phase portraits."""
 
 from collections.abc import Sequence
 
@@ -15,7 +15,7 @@ from .settled import run_of, SettledMotion
 
 
 _TURNS = 4
-"""Turns drawn, at least."""
+"""Smallest number of turns drawn."""
 
 
 def _cam(run: Trajectory, times):
@@ -25,7 +25,7 @@ def _cam(run: Trajectory, times):
 
 
 def draw_angles(ax, run: Trajectory) -> None:
-    """Cam, dashed, and follower against time."""
+    """Draw cam (dashed) and follower against time."""
     drawn = trajectory_curve(run, None, 3000)
     ax.plot(drawn.time, drawn.state[:, 0], color=FLIGHT, lw=1.3, label="follower")
     times = np.linspace(float(run.t0), float(run.t1), 1500)
@@ -34,7 +34,7 @@ def draw_angles(ax, run: Trajectory) -> None:
 
 
 def draw_gap(ax, run: Trajectory) -> None:
-    """Follower less cam against time."""
+    """Draw the angle between follower and cam against time."""
     drawn = trajectory_curve(run, None, 3000)
     ax.plot(drawn.time, drawn.gap[:, 0], color=FLIGHT, lw=1.1)
     ax.axhline(0, color="0.4", lw=0.7)
@@ -45,7 +45,7 @@ def draw_gap(ax, run: Trajectory) -> None:
 
 
 def draw_portrait(ax, run: Trajectory, motion: SettledMotion) -> None:
-    """Velocity over angle, with the samples once per period."""
+    """Draw velocity over angle, with the samples once per period."""
     drawn = trajectory_curve(run, None, 3000)
     ax.plot(drawn.state[:, 0], drawn.state[:, 1], color=FLIGHT, lw=0.9)
     for before, after in zip(drawn.before, drawn.after, strict=True):
@@ -62,7 +62,7 @@ def _turns(motion: SettledMotion) -> int:
 
 
 def motion_figure(system: CamFollower, found: Sequence[SettledMotion]) -> Figure:
-    """A row for each motion: angles, the gap beneath, and the phase portrait."""
+    """Draw a row for each motion: angles, the gap below, and the phase portrait."""
     rows = len(found)
     figure = plt.figure(figsize=(9.6, 3.6 * rows))
     grid = figure.add_gridspec(2 * rows, 2, width_ratios=(3, 2))
@@ -87,7 +87,7 @@ def motion_figure(system: CamFollower, found: Sequence[SettledMotion]) -> Figure
 
 
 def series_figure(system: CamFollower, found: Sequence[SettledMotion]) -> Figure:
-    """Angles alone, a panel for each motion. (Figure 5.2)"""
+    """Draw only angles, with a panel for each motion (Figure 5.2)."""
     rows = -(-len(found) // 2)
     figure, axes = plt.subplots(rows, 2, figsize=(9.6, 2.4 * rows), squeeze=False)
     for ax, motion in zip(axes.flat, found, strict=False):

@@ -1,4 +1,4 @@
-"""Figures that show motions: what they are, and time series next to portraits."""
+"""Define figures that show motions, as time series next to phase portraits."""
 
 import dataclasses
 from collections.abc import Callable, Sequence
@@ -29,7 +29,7 @@ class MotionTarget(Target):
 
 
 def motions(system: CamFollower, cases: tuple[ShownMotion, ...]) -> list[SettledMotion]:
-    """The motions of a figure; those of all figures are computed together, once."""
+    """Return the motions of a figure; those of all figures are computed together."""
     from .registry import TARGETS
 
     shown = (t.cases for t in TARGETS.values() if isinstance(t, MotionTarget))
@@ -44,9 +44,9 @@ def motion_target(
     note: str = "",
     layout: Callable[[CamFollower, Sequence[SettledMotion]], Figure] = motion_figure,
 ) -> MotionTarget:
-    """A figure that shows motions; they are drawn one below the other.
+    """Create the target of a figure of motions, drawn one below the other.
 
-    **Arguments:** `layout`: another drawing, of the rig and its motions.
+    **Arguments:** `layout`: function that draws the rig's motions instead.
     """
 
     def compute(system: CamFollower) -> Rows:

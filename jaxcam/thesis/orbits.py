@@ -1,4 +1,4 @@
-"""The P(1,1) branch of a rig: one impact in one turn, from fold to flip and beyond."""
+"""Compute the P(1,1) branch of a rig from its fold to its flip and beyond."""
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -17,19 +17,19 @@ from .speeds import at_rpm, speed_of
 
 
 NEAR_CAM = (0.3, 0.0)
-"""A state near the cam, from which Newton finds contact."""
+"""A state near the cam, from which Newton's method finds contact."""
 SEARCH, _STRIDE = 148.0, 0.5
 """Start of the search for the branch (rpm), and the longest step along it."""
 
 
 def first_orbit(system: CamFollower) -> ImpactOrbit | None:
-    """P(1,1) at 148 rpm that is no saddle, or None."""
+    """Return the P(1,1) at 148 rpm that is not a saddle, or None."""
     orbits = one_impact_orbits(at_rpm(system, SEARCH), jnp.array(NEAR_CAM))
     return orbits[0] if orbits else None
 
 
 def orbit_at(system: CamFollower, start: ImpactOrbit, rpm: float) -> ImpactOrbit:
-    """The orbit that `start`, at 148 rpm, becomes at another speed."""
+    """Follow the orbit `start` from 148 rpm to another speed."""
     strides = max(1, int(np.ceil(abs(rpm - SEARCH) / _STRIDE)))
     orbit = start
     for speed in np.linspace(SEARCH, rpm, strides + 1)[1:]:
@@ -38,13 +38,13 @@ def orbit_at(system: CamFollower, start: ImpactOrbit, rpm: float) -> ImpactOrbit
 
 
 def multipliers_at(system: CamFollower, start: ImpactOrbit, rpm: float) -> np.ndarray:
-    """The two multipliers of P(1,1); NaN where it is lost."""
+    """Return the two multipliers of P(1,1); NaN if it does not exist."""
     orbit = orbit_at(system, start, rpm)
     return ordered_multipliers(compiled_monodromy(at_rpm(system, rpm), orbit))
 
 
 def ordered_multipliers(matrix) -> np.ndarray:
-    """Eigenvalues, the larger in magnitude last; complex pairs as -, +."""
+    """Return eigenvalues, the larger in magnitude last; complex pairs as -, +."""
     matrix = np.asarray(matrix)
     if not np.all(np.isfinite(matrix)):
         return np.full(2, np.nan, dtype=complex)
@@ -62,7 +62,7 @@ FOLD, FLIP = (1.0, 1.0), (-1.0, -1.0)
 def point_on_line(
     system: CamFollower, guess: SpecialPoint, line: tuple[float, float]
 ) -> SpecialPoint:
-    """Return where the branch meets a line; `guess.parameter` in rad/s."""
+    """Return the point of the branch on a line; `guess.parameter` is in rad/s."""
     system = eqx.tree_at(speed_of, system, guess.parameter)
     return _point(system, guess.orbit, jnp.asarray(line[0]), jnp.asarray(line[1]))
 
@@ -70,7 +70,7 @@ def point_on_line(
 def along_traces(
     system: CamFollower, start: ImpactOrbit, trace: float, stride: float = 0.1
 ) -> SpecialPoint:
-    """Return where the sum of the multipliers is `trace`, reached from 148 rpm.
+    """Return the point with the sum of multipliers `trace`, reached from 148 rpm.
 
     The trace is monotonic along the branch, also around the fold, where the speed is
     not.

@@ -1,7 +1,7 @@
-"""Progress of the long computations of a target.
+"""Report progress of the long computations of a target.
 
-Targets are functions of a rig, whose results are remembered by their arguments.
-Therefore the callback is not an argument of each, but of the context that runs them.
+Targets are functions of a rig whose results are cached by their arguments. Therefore
+the callback is set by a context manager, not passed as an argument.
 """
 
 from collections.abc import Callable, Iterator
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 Report: TypeAlias = Callable[[str, float | None], None]
-"""Takes a sentence and a fraction, or None."""
+"""Callback that takes a sentence and a fraction, or None."""
 
 
 def _ignore(sentence: str, fraction: float | None) -> None:
@@ -30,7 +30,7 @@ _REPORT: ContextVar[Report] = ContextVar("report", default=_ignore)
 
 @contextmanager
 def reporting(progress: Report | None) -> Iterator[None]:
-    """Let the targets that are computed inside report to `progress`."""
+    """Direct the reports of targets computed inside the context to `progress`."""
     token = _REPORT.set(progress or _ignore)
     try:
         yield
@@ -39,12 +39,12 @@ def reporting(progress: Report | None) -> Iterator[None]:
 
 
 def report(sentence: str, fraction: float | None = None) -> None:
-    """Tell the caller of the target its present computation, and the fraction done."""
+    """Report the present computation of a target, and the fraction done."""
     _REPORT.get()(sentence, fraction)
 
 
 def of_sweep(sentence: str) -> Callable[[Progress], None]:
-    """The `progress` of a sweep inside a target."""
+    """Return the `progress` callback of a sweep inside a target."""
 
     def callback(at: Progress) -> None:
         report(sentence, at.done / at.total)
@@ -53,10 +53,12 @@ def of_sweep(sentence: str) -> Callable[[Progress], None]:
 
 
 def of_share(sentence: str) -> Callable[[float], None]:
-    """The `progress` of a computation that tells the fraction done."""
+    """Return the `progress` callback of a computation that reports the fraction
+    done.
+    """
     return lambda share: report(sentence, share)
 
 
 def of_point(point: "Point") -> None:
-    """A callback of a branch over the speed."""
+    """Return a callback for a branch over the speed."""
     report(f"following a branch, {float(rad_s_to_rpm(point.parameter)):.6g} rpm")

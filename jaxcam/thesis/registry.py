@@ -1,4 +1,4 @@
-"""Every target by its name, found by the names of the files in the chapters."""
+"""Find all targets by the file names in the chapters."""
 
 import pkgutil
 from collections.abc import Callable
@@ -19,13 +19,17 @@ _KINDS = ("table", "figure")
 
 
 def _place(module: str) -> tuple[int, int, int]:
-    """Chapter, tables first, and number of a file such as `figure_5_11`."""
+    """Return the sort key of a file such as `figure_5_11`: chapter, tables first,
+    number.
+    """
     kind, chapter, number = module.rpartition(".")[2].split("_")
     return int(chapter), _KINDS.index(kind), int(number)
 
 
 def _discovered() -> dict[str, Target]:
-    """`TARGET` of each file `table_C_N.py` or `figure_C_N.py` in a chapter's folder."""
+    """Return the `TARGET` of each file `table_C_N.py` or `figure_C_N.py` of the
+    chapters.
+    """
     here = Path(__file__).parent
     modules = [
         f"{chapter.name}.{module.name}"
@@ -65,8 +69,8 @@ def reproduce(
     Returns:
         Columns quantity, printed, computed, unit, difference, relative (the difference
             over the size of the printed value); speeds in rpm and everything else in SI
-            units. NaN where the rig has no such quantity, and under printed where the
-            thesis draws something but gives no number.
+            units. NaN if the rig has no such quantity; a printed value is NaN if the
+            thesis shows only a drawing.
 
     Raises:
         ValueError: The name or size is unknown.

@@ -1,4 +1,4 @@
-"""Cycles from the release of a sticking orbit: does the next one stick?"""
+"""Simulate cycles from the release of a sticking orbit, to see if the next sticks."""
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -15,13 +15,13 @@ from .target import Rows, Target
 
 
 _LOOKS = 8
-"""Times in a period at which a release is asked for."""
+"""Times in a period at which a release is searched for."""
 
 
 def released_turn(system: CamFollower, rpm: float) -> Trajectory:
-    """The motion of one turn and a tenth from the release of a sticking orbit."""
+    """Simulate 1.1 turns from the release of a sticking orbit."""
     rig = at_speed(system, rpm_to_rad_s(rpm))
-    # a rig of another phase may be in contact at time zero: ask later, too
+    # a rig of another phase may be in contact at time zero: try later times, too
     times = float(rig.period) / _LOOKS * np.arange(_LOOKS)
     found = [_release(rig, time) for time in times]
     release = next((one for one in found if float(one.holds) == 0), found[0])
@@ -42,7 +42,7 @@ def sticking_time(run: Trajectory) -> float:
 
 
 def draw_turn(run: Trajectory, ax, label: str, colour: str, dashes="solid") -> None:
-    """The gap against the time from release."""
+    """Draw the gap against the time from release."""
     times = np.linspace(float(run.t0), float(run.t1), 1500)
     gap = np.asarray(run.gap(times))
     ax.plot(times - times[0], gap, color=colour, ls=dashes, lw=1.2, label=label)
@@ -51,10 +51,10 @@ def draw_turn(run: Trajectory, ax, label: str, colour: str, dashes="solid") -> N
 
 
 def released_target(title: str, *cases: tuple[float, float], note: str = "") -> Target:
-    """A figure that shows one turn from release at several speeds.
+    """Create the target of a figure of one turn from release at several speeds.
 
-    **Arguments:** `cases`: speed (rpm), and whether it sticks: 1, 0, or NaN where that
-    is not said.
+    **Arguments:** `cases`: speed (rpm), and whether it sticks: 1, 0, or NaN if not
+    stated.
     """
 
     def compute(system: CamFollower) -> Rows:
@@ -74,7 +74,7 @@ def released_target(title: str, *cases: tuple[float, float], note: str = "") -> 
 
 
 def _draw(system: CamFollower, cases) -> Figure:
-    """The gap in the turn from a release, a panel for each speed."""
+    """Draw the gap in the turn from a release, with a panel for each speed."""
     figure, axes = plt.subplots(len(cases), 2, figsize=(9.6, 2.4 * len(cases)))
     for (left, right), (rpm, _) in zip(axes, cases, strict=True):
         run = released_turn(system, rpm)

@@ -1,4 +1,4 @@
-"""Results of long computations, kept for what draws them after their numbers."""
+"""Cache results, so that a figure reuses the computation of its table."""
 
 from collections import OrderedDict
 from collections.abc import Callable, Hashable
@@ -14,9 +14,9 @@ _KEPT = 6
 
 
 def remembered(function: Callable[..., _T]) -> Callable[..., _T]:
-    """Keep the last results of a function of a rig and of hashable arguments.
+    """Cache the last results of a function of a rig and of hashable arguments.
 
-    A table and a figure of one sweep need it computed once. Rigs are told apart by the
+    A sweep is computed once for its table and its figure. Rigs are distinguished by the
     values of their parameters.
     """
     kept: OrderedDict[Hashable, _T] = OrderedDict()

@@ -1,4 +1,4 @@
-"""Motions of the rig that have settled, and what they are next to what is printed."""
+"""Compute settled motions of the rig, and compare their labels with printed ones."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -21,20 +21,20 @@ _TURNS, _KEEP, _RERUNS = 300, 64, 2
 
 
 class ShownMotion(NamedTuple):
-    """A motion that the thesis shows: where it starts, and what it is said to be."""
+    """A motion shown in the thesis: its start and its printed label."""
 
     rpm: float
     state: tuple[float, float] | None
     """At time zero; None is in contact at rest."""
     impacts: float
-    """Printed P(impacts, turns); zero impacts are contact for good, zero turns chaos.
+    """Printed P(impacts, turns); zero impacts mean permanent contact, zero turns chaos.
     """
     turns: int
     name: str = ""
 
     @property
     def title(self) -> str:
-        """The speed, and the letter of the start where it has one."""
+        """The speed, and the letter of the start, if any."""
         return f"{self.name + ', ' if self.name else ''}{self.rpm:g} rpm"
 
 
@@ -46,19 +46,19 @@ class SettledMotion(NamedTuple):
     """As in `jaxcam.sweeps.attractors.Labels`."""
     turns: int
     rests: int
-    """Rests in one orbit, or in all the turns kept."""
+    """Number of contact intervals in one orbit, or in all the turns kept."""
     state: Float[np.ndarray, " 2"]
-    """At the end, at time zero in its turn."""
+    """Final state, at time zero of its turn."""
 
     @property
     def label(self) -> str:
-        """The label in words."""
+        """The label as text."""
         return label_name(self.impacts, self.turns)
 
 
 @remembered
 def settled(system: CamFollower, cases: tuple[ShownMotion, ...]) -> list[SettledMotion]:
-    """Follow the cases until they repeat, or for 2100 turns."""
+    """Simulate the cases until they repeat, or for 2100 turns."""
     section = Stroboscopic(system)
     speeds = np.asarray(rpm_to_rad_s(np.array([case.rpm for case in cases])))
     states = np.array(section.starts(speed_of, speeds))
@@ -81,7 +81,7 @@ def settled(system: CamFollower, cases: tuple[ShownMotion, ...]) -> list[Settled
 
 
 def run_of(system: CamFollower, motion: SettledMotion, turns: float) -> Trajectory:
-    """The settled motion itself, over some turns from time zero."""
+    """Simulate the settled motion over some turns from time zero."""
     rig = at_rpm(system, motion.case.rpm)
     touching = motion.impacts == CONTACT
     state = None if touching else jnp.asarray(motion.state)
@@ -89,7 +89,7 @@ def run_of(system: CamFollower, motion: SettledMotion, turns: float) -> Trajecto
 
 
 def motion_rows(found: Sequence[SettledMotion]) -> Rows:
-    """Rows that compare labels, as numbers, with those that are printed."""
+    """Return rows that compare labels, as numbers, with the printed labels."""
     rows: Rows = []
     for motion in found:
         case, at = motion.case, motion.case.title

@@ -1,4 +1,4 @@
-"""The speed of the cam: what picks it, and the rig at another one."""
+"""Get and set the cam speed of a model."""
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -7,15 +7,15 @@ from ..models import CamFollower, rpm_to_rad_s
 
 
 def speed_of(system):
-    """The speed of the cam (rad/s), the parameter of most targets."""
+    """Return the cam speed (rad/s), the parameter of most targets."""
     return system.speed
 
 
 def at_speed(system: CamFollower, speed) -> CamFollower:
-    """The rig at another speed (rad/s)."""
+    """Return the model at another speed (rad/s)."""
     return eqx.tree_at(speed_of, system, jnp.asarray(speed, dtype=jnp.float64))
 
 
 def at_rpm(system: CamFollower, rpm) -> CamFollower:
-    """The rig at another speed, given in rpm."""
+    """Return the model at another speed, given in rpm."""
     return at_speed(system, rpm_to_rad_s(rpm))

@@ -1,4 +1,4 @@
-"""A target: printed values, the computation, the drawing."""
+"""Define targets: printed values, the computation, the drawing."""
 
 import dataclasses
 from collections.abc import Callable, Iterable
@@ -73,10 +73,10 @@ class Target:
 
 
 def frame(rows: Iterable[Row]) -> "pd.DataFrame":
-    """A table from rows of quantity, printed value, computed value and unit.
+    """Create a table from rows of quantity, printed value, computed value and unit.
 
-    The relative difference is that over the size of the printed value; NaN where that
-    is zero and the computed one is not.
+    The relative difference is the difference divided by the size of the printed value;
+    NaN if the printed value is zero and the computed value is not.
     """
     import pandas as pd
 

@@ -1,4 +1,4 @@
-"""Many steps as chunks of one length, so that any number of them is compiled once."""
+"""Run steps in chunks of equal length, so that any number of steps compiles once."""
 
 from collections.abc import Callable
 from typing import Any
@@ -18,7 +18,7 @@ def in_chunks(
     steps: int,
     progress: Callable[[float], None] | None = None,
 ):
-    """Outputs of `steps` steps, where `run(carry, k)` makes a chunk from step k on.
+    """Return the outputs of `steps` steps; `run(carry, k)` runs a chunk from step k on.
 
     `progress` is called with the fraction of steps done.
     """

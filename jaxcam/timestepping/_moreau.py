@@ -1,4 +1,4 @@
-"""Moreau's time-stepping of a hybrid system: impacts are part of a step."""
+"""Simulate a hybrid system by Moreau's time-stepping: impacts are part of a step."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -63,13 +63,13 @@ def moreau(
     """Simulate from `t0` to `t1` by `steps` time steps without event detection
     (Moreau).
 
-    A step flies freely, by the midpoint rule. If that ends behind a constraint, the
-    velocities jump halfway, by complementarity: each normal velocity at the end is at
-    least that of the impact law, never negative, and larger only where no percussion
-    acts (after J. J. Moreau, Unilateral contact and dry friction in finite freedom
-    dynamics, 1988). Impacts, simultaneous impacts, chatter and sticking follow from
-    this one rule without tuning. The error is of order one in the step, and gaps are
-    violated by as much.
+    A step integrates free flight by the midpoint rule. If it ends behind a constraint,
+    the velocities jump at mid-step, by complementarity: each normal velocity at the end
+    is at least that of the impact law, never negative, and larger only where no
+    percussion acts (after J. J. Moreau, Unilateral contact and dry friction in finite
+    freedom dynamics, 1988). Impacts, simultaneous impacts, chatter and sticking follow
+    from this one rule without tuning. The error is of order one in the step, and gaps
+    are violated by as much.
 
     Args:
         system: The system.
@@ -127,7 +127,8 @@ def _run(system, state, first, t0, h):
         free = x + h * field(middle, half)
         behind = gaps(system, end, free) <= 0
         directions = normal_directions(system, end, free)
-        # the jump happens half way: its effect on the rest of the step is a derivative
+        # the jump happens at mid-step: its effect on the rest of the step is a
+        # derivative
         moves = jax.vmap(
             lambda d: d + h / 2 * jax.jvp(lambda y: field(end, y), (free,), (d,))[1]
         )(directions)
@@ -136,13 +137,13 @@ def _run(system, state, first, t0, h):
             return normal_velocity(system, end, y)
 
         gradient = jax.jacfwd(speed)(free)
-        # what an impact half way would leave at the end; rest, where that is nothing
+        # the effect of an impact at mid-step on the end; rest if there is none
         after = impacts(system, middle, half)
         later = jax.vmap(lambda y: y + h / 2 * field(middle, y))(after)
         least = jnp.maximum(jnp.diagonal(jax.vmap(speed)(later)), 0.0)
         approaching = normal_velocity(system, middle, half) < 0
         least = jnp.where(approaching, least, 0.0)
-        # a constraint that is not reached asks for nothing
+        # a constraint that is not reached imposes no condition
         both = behind[:, None] & behind[None]
         matrix = jnp.where(both, gradient @ moves.T, jnp.eye(behind.shape[0]))
         vector = jnp.where(behind, speed(free) - least, 1.0)

@@ -10,7 +10,7 @@ from jaxtyping import Array, ArrayLike, Float, Int
 
 # entries of the tableau below this part of the largest one are rounding
 _TINY = 1e-12
-# a vertex is never met twice, and few of the 2^m are met at all
+# no vertex is visited twice, and only few of the 2^m are visited
 _PIVOTS = 40
 
 SOLVED, RAY, EXHAUSTED = 0, 1, 2
@@ -137,7 +137,7 @@ def explain(code: int, where: str = "") -> None:
 
 
 def _least(rows, allowed, m):
-    """The lexicographically least of the allowed rows."""
+    """Return the lexicographically least of the allowed rows."""
     mask = allowed
     for k in range(m + 1):
         values = jnp.where(mask, rows[:, k], jnp.inf)

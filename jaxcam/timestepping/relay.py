@@ -1,4 +1,4 @@
-"""Linear systems with ideal relays, and the problem that one step of them poses."""
+"""Define linear systems with ideal relays, and the problem of one step."""
 
 import equinox as eqx
 import jax
@@ -20,8 +20,8 @@ class RelaySystem(eqx.Module):
     """Linear system with relays: x' = A x + B u, y = C x + D u, each u_i the relay of
     -y_i.
 
-    A relay gives 1 for y < 0, -1 for y > 0, and anything between where y = 0, which is
-    what sliding needs (thesis, eq. 3.1). D is zero by default.
+    A relay gives 1 for y < 0, -1 for y > 0, and anything between where y = 0, as
+    sliding requires (thesis, eq. 3.1). D is zero by default.
 
     Raises:
         ValueError: The shapes do not fit.

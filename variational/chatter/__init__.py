@@ -1,4 +1,4 @@
-"""Chatter: impact by impact, by its maps, complete, interrupted, over a period."""
+"""Analyse chatter by its maps: complete, interrupted, and over a period."""
 
 from ._adding import adding_thresholds as adding_thresholds
 from ._beta_map import (

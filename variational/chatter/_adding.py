@@ -1,4 +1,4 @@
-"""Parameter values at which the interrupted sequence loses its impacts, one by one."""
+"""Find the parameter values at which the interrupted sequence loses an impact."""
 
 import equinox as eqx
 import jax

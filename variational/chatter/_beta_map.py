@@ -1,4 +1,4 @@
-"""All remaining impacts of an interrupted chattering sequence in one function."""
+"""Compute the deviation left by an interrupted chattering sequence, beta(lambda)."""
 
 import equinox as eqx
 import jax
@@ -11,25 +11,30 @@ from ._lambda_map import hop_ratio, lambda_map, LAMBDA_MAX
 from ._scaling_law import scaling_law
 
 
-# impacts before the iteration gives up; lambda - lambda_bar grows by 1/q each
+# largest number of impacts; lambda - lambda_bar grows by 1/q at each (q: thesis, eq.
+# 6.49)
 _IMPACTS = 4000
 
 
 class BetaMap(eqx.Module):
     """The deviation left by a chattering sequence after its last impact.
 
-    With tau* the time from release of the first impact, the motion after the last one
-    is, at tau_P after release (thesis, eqs. 6.54 and 6.94), with c the jerk
+    An impact at time tau < 0 from release with rebound speed v has the coordinate
+    lambda = v / (c tau^2), where c is the rate of the relative acceleration at release
+    (thesis, eqs. 6.28 and 6.84); the next impact is at time h(lambda) tau (eq. 6.33).
+    Let tau* be the time of the first impact from release. At the section time tau_P
+    after release (eqs. 6.54 and 6.94) the motion after the last impact has
 
         velocity = c (tau_P^2 / 2 + beta tau*^2),
         gap = c (tau_P^3 / 6 + beta tau*^2 tau_P + gamma tau*^3).
     """
 
     beta: Float[Array, "..."]
-    """P^2 (lambda - 1/2) at the last impact, P the product of the h (thesis, eq. 6.43).
+    """P^2 (lambda - 1/2) at the last impact, where P is the product of h(lambda) over
+    the impacts before it (thesis, eqs. 6.33 and 6.43).
     """
     gamma: Float[Array, "..."]
-    """P^3 (1/3 - lambda) there, the term that thesis eq. 6.55 drops."""
+    """P^3 (1/3 - lambda) at the last impact, the term that thesis eq. 6.55 omits."""
     impacts: Int[Array, "..."]
     """Number of impacts that follow the first."""
 
@@ -38,12 +43,13 @@ def beta_parts(lam, r) -> BetaMap:
     """Iterate the lambda-map to the last impact (thesis, eqs. 6.43, 6.44 and 6.97).
 
     Args:
-        lam: Dimensionless, >= 0, any shape.
+        lam: Coordinate lambda of the first impact, dimensionless, >= 0, any shape.
         r: Coefficient of restitution in (0, 1), broadcast against `lam`.
 
     Returns:
-        A [`variational.chatter.BetaMap`][]. Zero up to lambda_bar, where chattering
-            completes before release (`impacts` is then 0).
+        A [`variational.chatter.BetaMap`][]. Zero up to lambda_bar, the fixed point of
+            the lambda-map (thesis, eq. 6.45), where chattering completes before release
+            (`impacts` is then 0).
     """
     lam, r = jnp.broadcast_arrays(
         jnp.asarray(lam, jnp.float64), jnp.asarray(r, jnp.float64)
@@ -59,12 +65,13 @@ def beta_map(lam, r) -> Float[Array, "..."]:
     """Return beta(lambda): the deviation left by an interrupted chattering sequence.
 
     Args:
-        lam: Dimensionless, >= 0, any shape.
+        lam: Coordinate lambda of the first impact, dimensionless, >= 0, any shape.
         r: Coefficient of restitution in (0, 1), broadcast against `lam`.
 
     Returns:
         Beta, dimensionless (thesis, eq. 6.97): 0 up to lambda_bar, then lobes between
-            square-root corners, each q^-1 wider and p^-2 higher than the one before.
+            square-root corners, each 1/q wider and 1/p^2 higher than the one before,
+            with the scales p and q of [`variational.scaling_law`][] (eq. 6.49).
 
     Examples:
         >>> from variational import beta_map
@@ -90,7 +97,7 @@ def _one(lam, r, bar):
     safe = jnp.where(after, lam, 0.35)
     end = jnp.where(after, lambda_map(safe, r), lam)
     scale = scale * jnp.where(after, hop_ratio(safe), 1.0)
-    # a flight that lands on release itself has lambda = inf and scale = 0
+    # a flight that lands exactly at release has lambda = inf and scale = 0
     speed = jnp.where(jnp.isinf(end), 0.0, scale * scale * end)
     beta = speed - scale * scale / 2
     gamma = scale * (scale * scale / 3 - speed)

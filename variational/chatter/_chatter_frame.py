@@ -19,7 +19,7 @@ from ._beta_map import beta_parts
 from ._scalar import check_chatter_system
 
 
-# of the contact acceleration over a period, to find where nothing can stick
+# samples of the contact acceleration over a period, to find where contact is impossible
 _SAMPLES = 256
 
 
@@ -115,12 +115,13 @@ def _frame(system, time) -> ChatterFrame:
 
 
 def prepared_frame(system, time) -> ChatterFrame:
-    """The frame of a system that is already `prepared`."""
+    """Return the frame of a system that is already `prepared`."""
     time = jnp.asarray(time, jnp.float64)
     period = system.period
     grid = time + period * jnp.linspace(0.0, 1.0, _SAMPLES, endpoint=False)
     push = contact_acceleration(system, grid, jnp.zeros(2))
-    # where contact is least possible nothing sticks: the release is the last before
+    # at the largest contact acceleration nothing sticks: the release is the last one
+    # before
     found = release_point(system, grid[jnp.argmax(push)])
     release = found.time + jnp.where(found.time < time, period, jnp.zeros_like(period))
 
@@ -130,7 +131,7 @@ def prepared_frame(system, time) -> ChatterFrame:
 
 
 def frame_at(system, release, state) -> ChatterFrame:
-    """The frame of a known release of a system that is already `prepared`."""
+    """Return the frame of a known release of a system that is already `prepared`."""
 
     def suppressed(t, x):
         return normal_acceleration(system, t, x)[0]

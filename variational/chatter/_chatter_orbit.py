@@ -1,4 +1,4 @@
-"""The motion that leaves the release point, one impact after the other to its end."""
+"""Follow the motion from the release point, impact by impact, to its accumulation."""
 
 from typing import NamedTuple
 
@@ -24,11 +24,11 @@ from ._scalar import check_chatter_system
 from ._scaling_law import scaling_law
 
 
-# impacts before the search gives up
+# largest number of impacts in the search
 _IMPACTS = 2000
 # lambda/(1 - r) below which the completion of second order is exact to 1e-12
 _SMALL = 1e-6
-# time from release, over the period, below which rounding decides what comes next
+# time from release, over the period, below which rounding determines the next event
 _NEAR = 1e-12
 
 
@@ -53,13 +53,13 @@ class ChatterOrbit(eqx.Module):
 
 
 class _Search(NamedTuple):
-    """The last impact, and the one that the margin is taken from."""
+    """The last impact, and the impact that defines the margin."""
 
     time: Float[Array, ""]
     state: Float[Array, " n"]
     speed: Float[Array, ""]
     found: Bool[Array, ""]
-    # whether what follows is a complete sequence, up to rounding
+    # whether the remaining sequence is complete, up to rounding
     settled: Bool[Array, ""]
     # number of the period, from 1, whose end is the next release
     turn: Int[Array, ""]
@@ -78,13 +78,13 @@ def chatter_accumulation(
 ) -> ChatterOrbit:
     """Compute where the chattering of an orbit that sticks once per period accumulates.
 
-    Such an orbit forgets its past while it sticks: it leaves the release point without
-    relative velocity, so the motion from there decides. It is interrupted where
+    Sticking erases the past: the orbit leaves the release point without relative
+    velocity, so only the motion from there matters. It is interrupted where
     `accumulation` reaches the last release; `margin` is the smooth form of that
     equation. With K the coordinate in which the lambda-map is multiplication by 1/q
     ([`variational.koenigs`][]), q^k K(lambda_k) is the same for every impact k of the
-    last period up to terms of order q^k tau_k, and it is zero at the interruption.
-    The function is pure; it may be compiled, batched and differentiated forward.
+    last period up to terms of order q^k tau_k, and it is zero at the interruption. The
+    function is pure; it may be compiled, batched and differentiated forward.
 
     Args:
         system: A system with two states, one constraint and a period.
@@ -114,19 +114,19 @@ def _orbit(system, time, periods) -> ChatterOrbit:
 
 
 def prepared_orbit(system, time, periods: int = 1) -> ChatterOrbit:
-    """The orbit of a system that is already `prepared`."""
+    """Return the orbit of a system that is already `prepared`."""
     return orbit_from(system, prepared_frame(system, time), periods)
 
 
 def orbit_from(system, frame: ChatterFrame, periods: int = 1) -> ChatterOrbit:
-    """The orbit of a system that is already `prepared`, from a known release."""
+    """Return the orbit of a system that is already `prepared`, from a known release."""
     period = system.period
     restitution = frame.restitution
     law = scaling_law(restitution)
     half = law.lambda_bar / 2
 
     def coordinate(tau, speed):
-        # after release there is none: a number that is no impact's
+        # after release there is none: use an invalid number
         early = tau < -_NEAR * period
         safe = jnp.where(early, tau, -period)
         return early, speed / (frame.jerk * safe * safe)
@@ -136,7 +136,7 @@ def orbit_from(system, frame: ChatterFrame, periods: int = 1) -> ChatterOrbit:
         return s.found & ~s.settled & before & (s.count < _IMPACTS)
 
     def hop(s):
-        # a flight that misses the wall near release may come back a period later
+        # a flight that misses the wall near release may return a period later
         point = next_impact(system, s.time, s.state, s.speed, 2 * period)
         since = point.time - frame.release
         passed = jnp.floor(jax.lax.stop_gradient(since) / period).astype(s.turn.dtype)
@@ -191,7 +191,7 @@ def orbit_from(system, frame: ChatterFrame, periods: int = 1) -> ChatterOrbit:
         s.rank.astype(jnp.float64) * jnp.log(law.q)
     )
     # an impact after release belongs to the sequence if it comes as soon as the
-    # lambda-map has it: not later than half of the time left at the one before
+    # lambda-map predicts: within half of the time left at the previous impact
     local = s.found & (s.tau < jnp.abs(s.tau_before))
     listed = jnp.where(complete | local, s.count, s.count - 1)
     return ChatterOrbit(

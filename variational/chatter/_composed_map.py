@@ -1,16 +1,17 @@
-"""One period of a chattering orbit as a map of one variable, from its local theory.
+"""Compute the one-dimensional map of a period of a chattering orbit, by local theory.
 
-At the interruption a period is Theta, smooth, from a section after release to an impact
-D* of the chattering sequence, followed by beta. All motions leave beta along one
-direction B, so one number says where they are: epsilon = tau*^2 beta, which at release
-is a relative velocity c epsilon. With A the derivative of Theta, C that of lambda and
-mu the distance of the parameter from the interruption,
+At the interruption a period consists of Theta, a smooth map from a section after
+release to an impact D* of the chattering sequence (at time tau* from release), followed
+by beta. All motions leave beta along one direction B, so one number determines them:
+epsilon = tau*^2 beta, which at release is a relative velocity c epsilon. With A the
+derivative of Theta, C that of lambda and mu the distance of the parameter from the
+interruption,
 
     epsilon' = tau*^2 beta(lambda_bar + C A B epsilon + lambda_mu mu),
 
-where the deviation is first carried to where it is small, since it grows linearly in
-the coordinate K of [`variational.koenigs`][] only (thesis, eqs. 6.104 and 6.116). leave
-out tau*^2; the thesis' K_beta appears to stand for it.
+where the deviation is first mapped to an earlier impact at which it is small, since it
+grows linearly only in the coordinate K of [`variational.koenigs`][]. The thesis (eqs.
+6.104 and 6.116) leaves out tau*^2; its K_beta appears to stand for it.
 """
 
 import equinox as eqx
@@ -37,8 +38,7 @@ from ._section_turn import (
 )
 
 
-# deviation of lambda up to which K and lambda - lambda_bar agree to as many digits as
-# rounding leaves of it
+# deviation of lambda up to which K and lambda - lambda_bar agree within rounding
 _LINEAR = 1e-8
 
 
@@ -90,7 +90,7 @@ class ComposedMap(eqx.Module):
         return self.covector @ self.matrix @ self.vector
 
     def __call__(self, epsilon, parameter=0.0) -> Float[Array, "..."]:
-        """epsilon of the next period (thesis, eqs. 6.109 and 6.116).
+        """Return epsilon of the next period (thesis, eqs. 6.109 and 6.116).
 
         **Arguments:** `epsilon`, in the unit of time squared; `parameter`, its distance
         from the interruption; broadcast.
@@ -123,9 +123,9 @@ class ComposedMap(eqx.Module):
         return self._section(self._left(self.incidence * parameter), parameter)
 
     def _left(self, deviation):
-        """epsilon by a deviation that grew over all the impacts before D*.
+        """Return epsilon for a deviation that grew over all the impacts before D*.
 
-        It is linear in the coordinate K only, so beta is taken so many impacts earlier,
+        It is linear in the coordinate K only, so beta is evaluated n impacts earlier,
         where the deviation is small and K is lambda - lambda_bar; there tau is larger
         by p^-n.
         """
@@ -190,7 +190,9 @@ def _compose(along, value, rank, phase) -> ComposedMap:
         return moved, frame, point.time - period, point.speed
 
     def section_of(moved, frame, velocity):
-        """State, gap and velocity at the section by the velocity left at release."""
+        """Return derivatives of state, gap and velocity at the section by the
+        velocity left at release.
+        """
         direction = normal_directions(moved, frame.release, frame.state)[0]
         start = frame.state + velocity * direction
         section = (phase + 1) * moved.period

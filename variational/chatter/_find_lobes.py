@@ -1,4 +1,4 @@
-"""The map around the interruption, measured: lobes by the number of impacts."""
+"""Sample the map around the interruption and find its lobes by the impact number."""
 
 from collections.abc import Callable
 
@@ -16,7 +16,8 @@ from ._section_turn import section_turn
 
 # states that are followed together
 _ROW = 32
-# most rows that narrow a bracket: it ends at two neighbouring numbers before
+# largest number of rows that narrow a bracket: it ends earlier at two neighbouring
+# floats
 _PASSES = 12
 
 
@@ -38,7 +39,7 @@ class Lobes(eqx.Module):
     limit: float
     """The map at the accumulation."""
     scan: np.ndarray
-    """Points of the whole measured map, shape `(n,)`."""
+    """Points of the sampled map, shape `(n,)`."""
     scanned: np.ndarray
     """The map at these points, shape `(n,)`."""
     impacts: np.ndarray
@@ -57,7 +58,7 @@ def find_lobes(
     most: int = 8,
     progress: Callable[[float], None] | None = None,
 ) -> Lobes:
-    """Measure the stroboscopic map around the interruption and find its lobes.
+    """Sample the stroboscopic map around the interruption and find its lobes.
 
     A lobe ends where the number of impacts changes, to rounding (thesis, eq. 5.1).
 
@@ -69,9 +70,9 @@ def find_lobes(
         component: Component of the state that deviates.
         direction: Direction along which the state deviates, shape `(2,)`; default
             `component` alone. A map to iterate needs `ComposedMap.vector`.
-        samples: Number of points measured in each lobe.
+        samples: Number of points sampled in each lobe.
         most: Largest number of lobes.
-        progress: Called with the fraction done, of as many lobes as asked for.
+        progress: Called with the fraction done, relative to `most` lobes.
 
     Returns:
         The [`variational.chatter.Lobes`][].
@@ -138,7 +139,7 @@ def _rows(states: int) -> int:
 
 
 class _Rows:
-    """The map of many states in rows of one length, so that one program serves all."""
+    """Evaluates the map of many states in rows of equal length, with one program."""
 
     def __init__(self, program: Callable, total: int, progress: Callable | None):
         self._program, self._total, self._progress = program, total, progress
@@ -160,7 +161,9 @@ class _Rows:
 
 
 def _corners(turn, accumulation, farthest, most: int) -> np.ndarray:
-    """Return where the number of impacts of the period changes, farthest first."""
+    """Return the points at which the number of impacts per period changes, farthest
+    first.
+    """
     number = turn(np.array([farthest]))[2][0]
     corners = []
     for k in range(1, most + 2):
@@ -196,9 +199,9 @@ def _turns(system, state, along, values, phase, component):
 
 
 def _bisect(turn: Callable, near: float, far: float, is_near: Callable):
-    """The two neighbouring numbers between which `is_near(impacts, stuck)` changes.
+    """Find the two neighbouring floats between which `is_near(impacts, stuck)` changes.
 
-    A row of points at once: each pass narrows the bracket 33-fold.
+    Each pass evaluates a row of points and narrows the bracket 33-fold.
     """
     for _ in range(_PASSES):
         row = np.linspace(near, far, _ROW + 2)

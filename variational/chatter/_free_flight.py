@@ -3,7 +3,8 @@
 Gap and normal velocity are integrated from the surface, next to the state:
 z' = v, v' = a, from the speed that the impact leaves, where a is the normal
 acceleration of free flight. They keep their relative accuracy where the gap computed
-from the state has lost it, so impacts 1e-12 high are as good as high ones.
+from the state has lost it, so impacts after flights of height 1e-12 are as accurate as
+high ones.
 """
 
 import jax.numpy as jnp
@@ -19,13 +20,14 @@ TOLERANCE = 1e-14
 
 
 def runge_kutta_step(rates, s, y, h):
-    """One step of length `h`: the state after it and the error estimate."""
+    """Take one step of length `h`; return the state after it and the error estimate."""
     return array_step(DOPRI8, rates, s, y, h)[:2]
 
 
 def flight_rates(system: HybridSystem, time: ArrayLike = 0.0):
-    """Rates of state, normal velocity and gap, `y` of shape `(n + 2,)`, along free
-    flight, by the time after `time`."""
+    """Return the rates of state, normal velocity and gap, `y` of shape `(n + 2,)`,
+    along free flight, as a function of the time after `time`.
+    """
 
     def rates(s, y):
         t, x = time + s, y[:-2]

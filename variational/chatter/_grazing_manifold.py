@@ -1,4 +1,4 @@
-"""Pre-images and images of impacts without speed, and the region they accumulate on."""
+"""Compute pre-images and images of grazing impacts, and the chattering region."""
 
 import equinox as eqx
 import jax
@@ -17,7 +17,7 @@ from ._scaling_law import scaling_law
 
 
 class ImpactCurve(eqx.Module):
-    """Points in the plane of impact time and rebound speed; NaN where there is none."""
+    """Points in the plane of impact time and rebound speed; NaN if there is none."""
 
     time: Float[Array, "..."]
     """Times of the impacts (s)."""
@@ -93,7 +93,7 @@ def _manifold(system, n, points, horizon) -> GrazingManifold:
             s, x, speed, going = carry
             point = next_impact(field, s, x, speed, horizon * system.period)
             going = going & point.found
-            # backwards, the speed that arrives is the one that the impact left
+            # backwards, the approach speed is the rebound speed of the impact
             found = jnp.abs(point.approach) if sense < 0 else point.speed
             pair = jnp.stack([sense * point.time, found])
             carry = (point.time, point.state, point.speed, going)
@@ -151,7 +151,7 @@ def chattering_region(
 def _boundary(system, points, impacts, near) -> ImpactCurve:
     frame = prepared_frame(system, 0.0)
     law = scaling_law(frame.restitution)
-    # a fundamental piece: its first point is the image of its last
+    # a fundamental segment: its first point is the image of its last
     share = jnp.arange(points) / points
     tau = -near * system.period * law.p ** (1 - share)
     speed = law.lambda_bar * frame.jerk * tau * tau
@@ -160,7 +160,8 @@ def _boundary(system, points, impacts, near) -> ImpactCurve:
     def chain(tau, speed):
         time = frame.release + tau
         state = surface_state(system, time, speed)
-        # backwards, the impact comes first: from the speed left to that which arrived
+        # backwards, the impact comes first: from the rebound speed to the approach
+        # speed
         start = backwards.impact(-time, state)
         arrived = speed / frame.restitution
 

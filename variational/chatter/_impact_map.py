@@ -1,4 +1,4 @@
-"""From one impact to the next, exact to rounding however low the impact."""
+"""Map one impact to the next, exact to rounding for arbitrarily slow impacts."""
 
 import equinox as eqx
 import jax
@@ -96,10 +96,11 @@ def next_impact(
 
 
 def rebound_speed(system: HybridSystem, time, before, approach):
-    """Speed after an impact, to the relative accuracy of the speed before it.
+    """Return the speed after an impact, to the relative accuracy of the speed before
+    it.
 
-    The difference of two nearly equal velocities would not do for slow impacts; there
-    the law is integrated from the impact without speed.
+    The difference of two nearly equal velocities is inaccurate for slow impacts, for
+    which the law is integrated from the impact of zero speed.
     """
     direction = normal_directions(system, time, before)[0]
     rest = before - approach * direction

@@ -1,10 +1,10 @@
-"""The search for the next impact, one Runge-Kutta step at a time.
+"""Search for the next impact, one Runge-Kutta step at a time.
 
-It stays apart from the event loop of `jaxcam.hybrid`, because it knows a gap to its own
-relative accuracy, and can be differentiated twice. One step is the same program whether
-it searches for the next impact, lands on it or finds the lowest point of a flight;
-so a loop over steps is small to compile, and its forward derivative is that of the
-motion at fixed lengths of the steps, corrected where it lands.
+It is separate from the event loop of `jaxcam.hybrid`, because it computes gaps to their
+own relative accuracy and can be differentiated twice. One step is the same program
+whether it searches for the next impact, lands on it or finds the lowest point of a
+flight; so a loop over steps compiles quickly, and its forward derivative is that of the
+motion at fixed step lengths, corrected at the impact.
 """
 
 from typing import NamedTuple
@@ -27,7 +27,7 @@ _LAST_CHANGE = 1e-3
 # steps towards a landing or a lowest point, before the last is taken for it
 _LANDINGS, _LOWERINGS = 100, 12
 
-# length of the first step, in speeds over accelerations: a little behind the impact
+# length of the first step, in speeds over accelerations: slightly beyond the impact
 _BEHIND = 2.2
 
 _SEARCH, _LAND, _LAST, _BOTTOM = range(4)
@@ -40,8 +40,9 @@ class SearchState(NamedTuple):
 
     time: Float[Array, ""]
     y: Float[Array, " n+2"]
-    """State, normal velocity and gap; the last two have integrals of their own, from
-    the last impact on, so that low flights are as exact as high ones."""
+    """State, normal velocity and gap; the last two are integrated separately from
+    the last impact on, so that low flights are as accurate as high ones.
+    """
     since: Float[Array, ""]
     """Time of the last impact."""
     length: Float[Array, ""]
@@ -71,9 +72,9 @@ class SearchState(NamedTuple):
 def take_off(
     system: HybridSystem, time, state, speed, longest, height: ArrayLike = 0.0
 ) -> SearchState:
-    """The start of a flight from an impact, from release, or at a `height`.
+    """Start a flight from an impact, from release, or at a `height`.
 
-    `longest` is the step that is taken at most.
+    `longest` is the largest step.
     """
     longest, time = frozen(longest), jnp.asarray(time, jnp.float64)
     pull = -frozen(normal_acceleration(system, time, state)[0])
@@ -95,7 +96,7 @@ def take_off(
 
 
 def longest_step(system: HybridSystem, horizon=jnp.inf) -> Float[Array, ""]:
-    """The longest step: within the horizon, and of a part of the forcing period."""
+    """Return the longest step: within the horizon, and a part of the forcing period."""
     if system.period is None:
         return jnp.asarray(horizon, jnp.float64)
     part = jnp.asarray(system.period, jnp.float64) / _STEPS_PER_PERIOD
@@ -105,7 +106,7 @@ def longest_step(system: HybridSystem, horizon=jnp.inf) -> Float[Array, ""]:
 def search_step(
     system: HybridSystem, f: SearchState
 ) -> tuple[SearchState, Bool[Array, ""]]:
-    """One step, and whether it ends in an impact: the motion is then just before it."""
+    """Take one step; return whether it ends just before an impact."""
 
     rates = flight_rates(system)
     end, wrong = runge_kutta_step(rates, f.time, f.y, f.length)
@@ -135,7 +136,7 @@ def _next(f: SearchState, end, wrong, rate) -> tuple[SearchState, Bool[Array, ""
     searches, bottoms = f.mode == _SEARCH, f.mode == _BOTTOM
     good = ~searches | (size <= 1)
 
-    # landing, where a parabola through the end of the step does
+    # landing, where a parabola through the end of the step lands
     enters = good & (gap < 0) & (searches | bottoms)
     landing = enters | (f.mode == _LAND)
     falls = (rise < 0) & (rise * rise > 2 * pull * gap)

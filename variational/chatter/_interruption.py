@@ -1,4 +1,4 @@
-"""The parameter value at which complete chattering ends at the release point.
+"""Find the parameter value at which complete chattering ends at the release point.
 
 The orbit that sticks once per period starts each period at release without relative
 velocity, so its interruption is one scalar equation, accumulation = release + period.
@@ -25,7 +25,7 @@ _ITERATIONS = 200
 
 
 class Line(eqx.Module):
-    """A system along one parameter: everything but the parameter, and where it goes.
+    """A system along one parameter: all other data, and the place of the parameter.
 
     A pytree, so one compiled program serves every choice of parameter.
     """
@@ -40,7 +40,9 @@ class Line(eqx.Module):
 
 
 def line(system: HybridSystem, where: Where) -> Line:
-    """The systems that differ from `system` in the parameter that `where` picks."""
+    """Return the systems that differ from `system` in the parameter that `where`
+    picks.
+    """
     system = as_arrays(system)
     picked = pick(where, system)
     return Line(
@@ -88,13 +90,13 @@ def interruption_in(
 
 
 def _margin(along: Line, value, periods: int):
-    """Margin; a period without impact or chatter counts as interrupted."""
+    """Return the margin; a period without impact or chatter counts as interrupted."""
     orbit = prepared_orbit(along.at(value).prepared(), 0.0, periods)
     return jnp.where(jnp.isnan(orbit.margin), jnp.inf, orbit.margin)
 
 
 def _slope(along: Line, value, periods: int):
-    """Margin and its derivative by the parameter."""
+    """Return the margin and its derivative by the parameter."""
 
     def margin(value):
         return _margin(along, value, periods)
@@ -109,7 +111,7 @@ def _solve(along: Line, low, high, *, periods: int) -> Interruption:
 
 @_solve.def_jvp
 def _solve_jvp(primals, tangents, *, periods: int):
-    """Implicit function theorem: margin(value, parameters) stays zero."""
+    """Apply the implicit function theorem: margin(value, parameters) stays zero."""
     along, low, high = primals
     moved, _, _ = tangents
     found = _solve(along, low, high, periods=periods)
@@ -129,13 +131,15 @@ def _no_tangent(leaf):
 
 @eqx.filter_jit
 def _rate(along: Line, moved: Line, value, periods: int):
-    """Change of the margin at a fixed value of the parameter."""
+    """Return the change of the margin at a fixed value of the parameter."""
     return eqx.filter_jvp(lambda a: _margin(a, value, periods), (along,), (moved,))[1]
 
 
 @eqx.filter_jit
 def _search(along: Line, low, high, periods: int) -> Interruption:
-    """Newton's method, halving where it leaves the bracket or does not converge."""
+    """Apply Newton's method with bisection if it leaves the bracket or does not
+    converge.
+    """
 
     def look(carry):
         points, signs, value, step, ends, _, count, _ = carry

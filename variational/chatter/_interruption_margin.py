@@ -1,4 +1,4 @@
-"""The equation of an interruption, cheap enough to follow it in two parameters."""
+"""Evaluate the interruption equation cheaply, for curves in two parameters."""
 
 import functools
 from typing import NamedTuple
@@ -22,9 +22,9 @@ from ._scaling_law import scaling_law
 _MAX_STEPS = 100_000
 # lambda/(1 - r) below which the rest of the sequence is certain to be complete
 _SMALL = 1e-6
-# what later impacts add to the margin, below which they are left out
+# contribution to the margin below which later impacts are omitted
 _ENOUGH = 1e-16
-# time from release, over the period, below which rounding decides what comes next
+# time from release, over the period, below which rounding determines the next event
 _NEAR = 1e-12
 
 
@@ -35,8 +35,9 @@ class _Sequence(NamedTuple):
     turn: Int[Array, ""]
     """Number of the period, from 1, whose end is the next release."""
     tau: Float[Array, ""]
-    """Time from that release and speed of the impact that the margin is taken from, and
-    its number in its period."""
+    """Time from that release and speed of the impact that defines the margin, and
+    its number in its period.
+    """
     speed: Float[Array, ""]
     rank: Int[Array, ""]
     here: Int[Array, ""]
@@ -45,12 +46,12 @@ class _Sequence(NamedTuple):
 def interruption_margin(
     system: HybridSystem, frame: ChatterFrame, periods: int = 1
 ) -> Float[Array, ""]:
-    """Signed distance of an orbit that sticks once in some periods from interruption.
+    """Return the signed distance from interruption of an orbit that sticks once.
 
     The margin of [`variational.chatter_accumulation`][], to the same accuracy: zero
     where the impacts accumulate at the last release, negative where they do before.
-    Impacts so near to that release that they change nothing are left out, and the
-    derivative comes with one run along the motion, whatever the number of directions.
+    Impacts too near to that release to matter are omitted, and the derivative takes one
+    run along the motion for any number of directions.
 
     **Arguments:** a system with two states, one constraint and a period, already
     `prepared`; its release; `periods` from there to the last release. Pure; may be
@@ -60,14 +61,16 @@ def interruption_margin(
         NaN for a last period without impact, or where contact comes earlier.
 
     Raises:
-        ValueError: Where it is differentiated twice.
+        ValueError: It is differentiated twice.
     """
     return _margin(system, frame, periods=periods)
 
 
 @jax.custom_jvp
 def _last(slope):
-    """The slope itself, which has no derivative: landings are right to first order."""
+    """Return the slope, which has no derivative: landings are correct to first
+    order.
+    """
     return slope
 
 
@@ -83,7 +86,7 @@ def _last_jvp(primals, tangents):
 
 @functools.partial(with_one_jacobian, finish=_last)
 def _margin(system, frame: ChatterFrame, *, periods: int) -> Float[Array, ""]:
-    """The margin, from the motion that leaves the release."""
+    """Return the margin, from the motion that leaves the release."""
     period = jnp.asarray(system.period, jnp.float64)
 
     def look(carry):
@@ -103,7 +106,7 @@ def _margin(system, frame: ChatterFrame, *, periods: int) -> Float[Array, ""]:
 
     def goes_on(carry):
         flight, said, count = carry
-        # a flight that misses the wall near release may come back a period later
+        # a flight that misses the wall near release may return a period later
         waits = flight.time - flight.since < 2 * period
         return ~said.over & waits & (count < _MAX_STEPS)
 
@@ -121,7 +124,7 @@ def _margin(system, frame: ChatterFrame, *, periods: int) -> Float[Array, ""]:
 
 
 def _heard(system, frame, periods: int, s: _Sequence, f: SearchState) -> _Sequence:
-    """Return the state of the sequence after the impact that was just passed."""
+    """Return the state of the sequence after the latest impact."""
     period = jnp.asarray(system.period, jnp.float64)
     law = scaling_law(frozen(frame.restitution))
     since, speed = f.time - frame.release, f.y[-2]
@@ -138,7 +141,7 @@ def _heard(system, frame, periods: int, s: _Sequence, f: SearchState) -> _Sequen
     rank, here = jnp.where(new, -1, s.rank), jnp.where(new, 0, s.here)
     # the last impact before release that is not far below lambda_bar
     takes = early & last & ((lam >= law.lambda_bar / 2) | (rank < 0))
-    # terms of order q^k tau_k are what later impacts could still change
+    # later impacts change terms of order q^k tau_k only
     rest = jnp.exp(here.astype(jnp.float64) * jnp.log(law.q)) * jnp.abs(tau)
     return _Sequence(
         over=settled | (last & (~early | (rest <= _ENOUGH * period))),
@@ -151,7 +154,7 @@ def _heard(system, frame, periods: int, s: _Sequence, f: SearchState) -> _Sequen
 
 
 def _bounced(system: HybridSystem, f: SearchState) -> SearchState:
-    """Just after the impact that the motion is just before."""
+    """Apply the impact law to the motion just before an impact."""
     x, approach = f.y[:-2], f.y[-2]
     after = one_constraint(system.impact(f.time, x), 1)
     speed = rebound_speed(system, f.time, x, approach)

@@ -1,4 +1,4 @@
-"""The map of low-velocity impacts close to release, in its own coordinate.
+"""Compute the map of low-velocity impacts close to release, in the coordinate lambda.
 
 Close to the release point of sticking the relative acceleration is c tau, with tau the
 time from release and c the jerk there. An impact at tau < 0 that leaves with speed v
@@ -13,13 +13,14 @@ from jaxcam.hybrid.lowering import while_loop
 
 
 LAMBDA_MAX = 3 / 8
-"""Above it the motion does not return (thesis, eq. 6.47); above 1/3 it does so after
-release."""
+"""Largest lambda for which the motion returns (thesis, eq. 6.47); above 1/3 it
+returns after release.
+"""
 
 
 def _root(lam):
-    """s = sqrt(1 - 8 lambda / 3), NaN where there is no next impact (thesis,
-    eq. 6.32).
+    """Return s = sqrt(1 - 8 lambda / 3); NaN if no impact follows (thesis, eq.
+    6.32).
     """
     return jnp.sqrt(1 - 8 * lam / 3)
 

@@ -1,4 +1,4 @@
-"""The map of section 5.4: lobes around the interruption, fitted and iterated."""
+"""Fit and iterate the map of thesis section 5.4, with lobes around the interruption."""
 
 import equinox as eqx
 import jax
@@ -54,9 +54,10 @@ class LocalMap(eqx.Module):
         return smooth + self.root * jnp.sqrt(jnp.abs(self.delta_x) * inside)
 
     def __call__(self, x) -> Float[Array, "..."]:
-        """The map: constant beyond the accumulation, else lobe j of thesis eq. 5.4.
+        """Evaluate the map: constant beyond the accumulation, else lobe j (thesis, eq.
+        5.4).
 
-        NaN outside the first lobe, of which the fit knows nothing.
+        It is NaN outside the first lobe, which the fit does not cover.
         """
         width = 1 - jnp.exp(self.M)
         # sum of beta_k up to j - 1, solved for j
@@ -76,12 +77,12 @@ class LocalMap(eqx.Module):
 def fit_local_map(lobes: Lobes) -> LocalMap:
     """Fit thesis eqs. 5.2-5.5: scales by lines through logarithms, one lobe by eq. 5.3.
 
-    The cubic with a root passes through both ends of the first lobe and has the
-    measured slope where that is 1, 0 and -1; a slope that the lobe does not have is
-    replaced by its nearest.
+    The cubic with a root passes through both ends of the first lobe and matches the
+    sampled slope at its points of slope 1, 0 and -1; a slope that the lobe does not
+    reach is replaced by the nearest.
 
     Args:
-        lobes: The measured lobes.
+        lobes: The sampled lobes.
 
     Returns:
         A [`variational.chatter.LocalMap`][].
@@ -113,7 +114,7 @@ def fit_local_map(lobes: Lobes) -> LocalMap:
 
 
 def _where_slope(points, slopes, wanted):
-    """A point of the lobe with this slope, or with the nearest to it."""
+    """Return a point of the lobe with this slope, or with the nearest slope."""
     finite = np.isfinite(slopes) & (np.arange(len(slopes)) > 0)
     points, slopes = points[finite], slopes[finite]
     change = np.flatnonzero((slopes[:-1] - wanted) * (slopes[1:] - wanted) <= 0)

@@ -1,4 +1,4 @@
-"""The same motion with time running backwards."""
+"""Reverse the time of a system."""
 
 from typing import ClassVar
 

@@ -1,4 +1,4 @@
-"""Systems of one constraint may state its gap as a scalar or as a vector of one."""
+"""Handle scalar gaps and gap vectors of length one of single-constraint systems."""
 
 import jax.numpy as jnp
 
@@ -6,12 +6,14 @@ from jaxcam import HybridSystem
 
 
 def one_constraint(value, ndim: int):
-    """`value` without the axis of constraints, if it has one."""
+    """Return `value` without its axis of constraints, if it has one."""
     return jnp.reshape(value, value.shape[-ndim:] if ndim else ())
 
 
 def check_chatter_system(system: HybridSystem) -> None:
-    """Raise `ValueError` where the theory of chattering needs a period."""
+    """Raise `ValueError` for a system without the period that chattering theory
+    needs.
+    """
     if system.period is None:
         raise ValueError(
             "this system has no forcing period; chattering that ends at a release "
@@ -20,5 +22,5 @@ def check_chatter_system(system: HybridSystem) -> None:
 
 
 def scalar_gap(system: HybridSystem, time, state):
-    """The gap of a system with one constraint, a scalar."""
+    """Return the gap of a system with one constraint, a scalar."""
     return one_constraint(system.gap(time, state), 0)

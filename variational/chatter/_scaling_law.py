@@ -1,4 +1,4 @@
-"""Scales of the lobes that appear where complete chattering is interrupted."""
+"""Compute the scales of the lobes at the interruption of complete chattering."""
 
 import equinox as eqx
 import jax

@@ -1,4 +1,4 @@
-"""From a section to the next, impact by impact, through chattering and sticking."""
+"""Map a section to the next, impact by impact, through chattering and sticking."""
 
 from typing import NamedTuple
 
@@ -19,7 +19,8 @@ from ._scalar import check_chatter_system, scalar_gap
 
 
 _IMPACTS = 2000
-# the rest of a complete sequence then moves the next period by less than rounding
+# the remaining impacts of a complete sequence then change the next period below
+# rounding
 _SMALL = 1e-12
 
 
@@ -33,10 +34,9 @@ class SectionArrival(eqx.Module):
     velocity: Float[Array, "..."]
     """Normal velocity there, more accurate than computed from the state."""
     impacts: Int[Array, "..."]
-    """Number of impacts on the way; of a complete sequence those before it became
-    negligible."""
+    """Number of impacts; for a complete sequence those before it became negligible."""
     stuck: Bool[Array, "..."]
-    """Whether the motion stuck on the way."""
+    """Whether the motion stuck."""
 
 
 class _Run(NamedTuple):
@@ -116,7 +116,7 @@ def section_turn(system: HybridSystem, state, phase=0.0) -> SectionArrival:
     """Apply the stroboscopic map through chattering: state at a phase to that a period
     later.
 
-    It is exact to rounding however many and however low the impacts, unlike a
+    It is exact to rounding for any number and speed of impacts, unlike a
     simulation that completes chattering near its interruption (thesis, eq. 5.1). The
     function is pure; it may be compiled, batched and differentiated forward.
 
@@ -149,7 +149,7 @@ def _turn(system, state, phase) -> SectionArrival:
 
 
 def flight_start(system, time, state):
-    """A state off the surface as the start of a flight, and its gap."""
+    """Return a state off the surface as the start of a flight, and its gap."""
     state = jnp.asarray(state, jnp.float64)
     speed = normal_velocity(system, time, state)[0]
     yes = jnp.asarray(True)
@@ -196,7 +196,7 @@ def _following(system, time, state, speed, height, count) -> ImpactPoint:
 
 
 def impact_after(system, time, state, speed, height, rank) -> ImpactPoint:
-    """Impact number `rank`, from 0, after a start on or off the surface.
+    """Return impact number `rank`, from 0, after a start on or off the surface.
 
     `rank` may be an array: one program serves all.
     """

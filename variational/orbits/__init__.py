@@ -1,6 +1,7 @@
-"""Compute periodic orbits; `continuation` and `jaxcam.fitting` build on this package.
+"""Compute periodic orbits.
 
-What `continuation` and `jaxcam.fitting` build on; the face of it is `variational`.
+`continuation` and `jaxcam.fitting` use this package; its public interface is
+`variational`.
 """
 
 from ._admissible import inadmissible as inadmissible, refuse as refuse

@@ -1,4 +1,4 @@
-"""Admissibility of a solution of the shooting equations: no penetration anywhere."""
+"""Check the admissibility of a solution of the shooting equations: no penetration."""
 
 import math
 from collections.abc import Mapping
@@ -12,10 +12,10 @@ from jaxcam.hybrid import HybridSystem
 from ._shooting import Shooting
 
 
-# what rounding and the equations' tolerance leave of a gap or a speed of zero, relative
-# to the size of gaps: a gap that is lower is a penetration
+# error of a zero gap or speed from rounding and the equations' tolerance, relative to
+# the size of gaps: a lower gap is a penetration
 _ROUNDING = 1e-9
-# error of the flights up to which the gaps are believed
+# largest error of the flights for which the gaps are reliable
 _ERROR = 1e-9
 
 
@@ -28,7 +28,7 @@ def inadmissible(
     period: Any,
     steps: int,
 ) -> str | None:
-    """Return why a solution is not admissible, or None.
+    """Return the reason why a solution is not admissible, or None.
 
     **Arguments:** lowest gap of each flight and approach speed of each impact, by their
     numbers, the error of the flights and the size of gaps, as in
@@ -56,7 +56,7 @@ def inadmissible(
 
 
 def refuse(shooting: Shooting, u, system: HybridSystem) -> str | None:
-    """Return why a solution of the equations is not admissible, or None."""
+    """Return the reason why a solution of the equations is not admissible, or None."""
     seen, period = _look(shooting, jnp.asarray(u), system)
     gaps, speeds = (
         dict(enumerate(map(float, row))) for row in (seen.gaps, seen.speeds)

@@ -1,4 +1,4 @@
-"""Multipliers of an orbit at a grazing, as limits from the side of the impact."""
+"""Compute multipliers of an orbit at a grazing, as limits from the impacting side."""
 
 from typing import Any
 
@@ -9,7 +9,7 @@ from jaxtyping import Complex, Float
 def multipliers_at_grazing(
     regular: Float[np.ndarray, "n n"], singular: Float[np.ndarray, "n n"]
 ) -> Complex[np.ndarray, " n"]:
-    """Eigenvalues of regular + singular / speed as the speed tends to zero from below.
+    """Return eigenvalues of regular + singular / speed for speed -> 0 from below.
 
     Next to a grazing the monodromy matrix is of this form, its second part of rank one,
     b c' (saltation_parts, times the flights and the other impacts). One multiplier
@@ -29,7 +29,7 @@ def multipliers_at_grazing(
         return unknown
     _, sizes, right = np.linalg.svd(singular)
     growth = float(np.trace(singular))
-    # what is left of a growth that cancels
+    # tolerance for a cancelled growth
     if not abs(growth) > 1e-9 * sizes[0]:
         return unknown
     plane = right[1:].T

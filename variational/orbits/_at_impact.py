@@ -1,4 +1,4 @@
-"""A state that is just before or just after an impact."""
+"""Find whether a state is just before or just after an impact."""
 
 from typing import NamedTuple
 
@@ -13,12 +13,12 @@ from jaxcam.hybrid.surface import gaps, impacts, normal_acceleration, normal_vel
 from ._gap_sizes import gap_sizes
 
 
-# what rounding leaves of a gap or a speed of zero, relative to their sizes
+# rounding error of a zero gap or speed, relative to their sizes
 _ZERO = 1e-11
 
 
 class ImpactStart(NamedTuple):
-    """The impact that an orbit starts at."""
+    """The impact at the start of an orbit."""
 
     constraint: int
     after: np.ndarray
@@ -28,7 +28,9 @@ class ImpactStart(NamedTuple):
 
 
 def start_at_impact(system: HybridSystem, t, state, period) -> ImpactStart | None:
-    """The impact at `state`, or nothing where no constraint is touched with a speed."""
+    """Return the impact at `state`, or None if no constraint is touched with a
+    speed.
+    """
     # as arrays: numbers would be compiled in
     t, period = (jnp.asarray(x, dtype=jnp.float64) for x in (t, period))
     gap, speed, fall, after, size = map(np.asarray, _look(system, t, state, period))
@@ -58,7 +60,7 @@ def _look(system, t, state, period):
 
 @eqx.filter_jit
 def after_and_speeds(system, time, before, sides):
-    """States after impacts, and normal velocities before and after."""
+    """Return states after impacts, and normal velocities before and after."""
 
     def one(t, x, side):
         after = impacts(system, t, x)[side]

@@ -1,6 +1,6 @@
-"""The impacts of a periodic orbit, as accurate as the parameters allow.
+"""Refine the impacts of a periodic orbit to the accuracy of its parameters.
 
-A run that locates its impacts loses digits where they are slow: an error d of the
+A run that locates its impacts loses digits at slow impacts: an error d of the
 position changes an impact speed v by about a d / v. As the solution of the shooting
 equations the impacts are as well conditioned as the orbit itself, whatever their speed.
 """
@@ -31,7 +31,9 @@ class Knots(NamedTuple):
     before: Float[np.ndarray, "k n"]
     """(k, n) state just before."""
     miss: float
-    """Largest miss of a flight before the first step, relative to the scale."""
+    """Largest closing error of a flight before the first step, relative to the
+    scale.
+    """
 
 
 def close(
@@ -41,13 +43,13 @@ def close(
     period,
     scale: Float[ArrayLike, " n1"],
 ) -> Knots:
-    """Improve the impacts of an orbit without contact; unchanged where that fails.
+    """Refine the impacts of an orbit without contact; unchanged if that fails.
 
     `scale` is the size with which a gap and the components of a state are compared.
     The states before impacts are those on arrival of the flights.
 
-    By flights of adaptive steps, so that the number of impacts is all that programs
-    differ by, filled up to a power of two.
+    Flights use adaptive steps, so that programs differ only by the number of impacts,
+    padded to a power of two.
     """
     number = len(rows)
     length = 1
@@ -97,7 +99,7 @@ def _newton(system, rows, sides, real, following, period, scale):
         links, _, miss = linear(rows)
         matrix = matrix_of(links, following, real=real)
         if system.period is None:
-            # any shift in time solves it: the smallest change is taken
+            # any shift in time is a solution: use the smallest change
             step = jnp.linalg.lstsq(matrix, miss.ravel())[0]
         else:
             step = jnp.linalg.solve(matrix, miss.ravel())

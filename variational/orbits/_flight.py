@@ -1,4 +1,4 @@
-"""One free flight of known length, compiled lean, with a derivative that is cheap.
+"""Integrate one free flight of known length, with a cheap derivative.
 
 The event loop finds out when a flight ends; here its duration is an unknown of the
 equations, so that a fixed number of Runge-Kutta steps suffices and the end depends
@@ -17,7 +17,8 @@ from .._one_jacobian import with_one_jacobian
 def flight_nodes(
     system: HybridSystem, t0, x0: Float[Array, " n"], t1, steps: int
 ) -> tuple[Float[Array, " steps"], Float[Array, "steps n"], Float[Array, ""]]:
-    """Free flight from `x0` at `t0` to `t1` (s) in equal steps of order eight.
+    """Integrate free flight from `x0` at `t0` to `t1` (s) in equal steps of order
+    eight.
 
     Returns:
         The times and states at the ends of the steps, and the sum of the error
@@ -30,10 +31,10 @@ def flight_nodes(
 
 
 def flight_end(system: HybridSystem, t0, x0, t1, *, steps: int) -> Float[Array, " n"]:
-    """State at `t1` (s) after free flight from `x0` at `t0`.
+    """Return the state at `t1` (s) after free flight from `x0` at `t0`.
 
-    Its forward derivative is one small Jacobian a flight, whatever the number of
-    directions asked for. Can be differentiated again.
+    Its forward derivative is one small Jacobian per flight, for any number of
+    directions. It can be differentiated again.
     """
     return _end(system, t0, x0, t1, steps=steps)
 

@@ -1,4 +1,4 @@
-"""Scale of each gap of a motion, for comparisons without units."""
+"""Measure the scale of each gap of a motion, for dimensionless comparisons."""
 
 import jax
 import jax.numpy as jnp
@@ -17,7 +17,7 @@ def gap_sizes(
 ) -> Float[Array, " m"]:
     """Return the scale of each gap, in its units.
 
-    Its change, at most, where each component of the state changes by
+    It is the largest change of the gap if each component of the state changes by
     [`jaxcam.hybrid.sizes.component_sizes`][].
 
     **Arguments:** time (s), state `(n,)`, and the period of the motion (s).

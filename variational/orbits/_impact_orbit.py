@@ -1,7 +1,7 @@
-"""A periodic orbit given by its impacts, smooth in every parameter of its system.
+"""Represent a periodic orbit by its impacts, smooth in every parameter.
 
-The number of impacts is given, so no events have to be found: that is what a fit to
-published numbers needs.
+The number of impacts is given, so no events have to be found, as needed for a fit to
+published numbers.
 """
 
 import equinox as eqx
@@ -38,7 +38,7 @@ class ImpactOrbit(eqx.Module):
 
     @property
     def shooting(self) -> Shooting:
-        """The equations that it solves."""
+        """The equations of the orbit."""
         hit = (0,) * self.number if self.constraints is None else self.constraints
         return Shooting(hit, self.periods, self.states.shape[1], self.steps)
 

@@ -1,4 +1,4 @@
-"""Roots by Newton's method, differentiated by the implicit function theorem."""
+"""Find roots by Newton's method, with derivatives by the implicit function theorem."""
 
 from collections.abc import Callable
 
@@ -8,7 +8,7 @@ from jaxtyping import Array, Float
 
 
 _STEPS = 60
-# a residual of this size may be all that rounding leaves
+# a residual of this size may be rounding error
 _ROUNDING = 1e-10
 
 
@@ -31,7 +31,7 @@ def implicit_root(
     """
 
     def newton(function, start):
-        # one call site, since tracing and compiling the residual is what takes long
+        # one call site, since tracing and compiling the residual takes most of the time
         def twice(x):
             value = function(x)
             return value, value

@@ -1,4 +1,4 @@
-"""Flights with the impacts that end them, and all derivatives that follow from them.
+"""Compute flights with their final impacts, and all derivatives of the orbit.
 
 One Jacobian of each flight, by the state at its start, gives the matrix of the shooting
 equations, the derivative of one impact by another, and the monodromy matrix, also as a
@@ -37,15 +37,19 @@ class Link(NamedTuple):
 
     @property
     def by_impact(self) -> Float[Array, "k k"]:
-        """Derivative of time and state of the impact by those at the start."""
+        """Return the derivative of time and state of the impact by those at the
+        start.
+        """
         sooner = -self.by_start[0] / self.by_end[0]
         moved = self.by_start[1:] + jnp.outer(self.by_end[1:], sooner)
         return jnp.concatenate([sooner[None], moved])
 
     @property
     def parts(self) -> tuple[Float[Array, "n n"], Float[Array, "n n"], Array]:
-        """Derivative of the state by that at the start, both at times of their own, as
-        regular + singular / speed; the speed is the normal velocity on arrival."""
+        """Return the derivative of the state by that at the start, each at its own
+        time, as regular + singular / speed; the speed is the normal velocity on
+        arrival.
+        """
         left = jnp.outer(self.field - self.by_end[1:], self.by_start[0, 1:])
         return self.by_start[1:, 1:], left, self.by_end[0]
 
@@ -53,8 +57,9 @@ class Link(NamedTuple):
 def landed(
     system: HybridSystem, start, time, which, before, by_state: Float[Array, "n n"]
 ) -> Link:
-    """The link of a flight from a row (time, state), whose end and derivative by the
-    state are known."""
+    """Return the link of a flight from a row (time, state), given its end and
+    derivative by the state.
+    """
 
     def arrive(t, x):
         return jnp.append(gaps(system, t, x)[which], impacts(system, t, x)[which])
@@ -62,7 +67,7 @@ def landed(
     value = arrive(time, before)
     by_time, by_before = jax.jacfwd(arrive, argnums=(0, 1))(time, before)
     by_x = by_before @ by_state
-    # a later start at the same state is the same flight, begun from further back
+    # a later start at the same state is the same flight with an earlier state
     by_t = -by_x @ system.vector_field(start[0], start[1:])
     return Link(
         value,
@@ -73,7 +78,9 @@ def landed(
 
 
 def link(system: HybridSystem, start, time, which, steps: int) -> Link:
-    """The flight from a row (time, state) to `time` (s), and the impact there."""
+    """Return the flight from a row (time, state) to `time` (s), and the impact
+    there.
+    """
 
     def flown(x):
         before = flight_nodes(system, start[0], x, time, steps)[1][-1]
@@ -84,7 +91,8 @@ def link(system: HybridSystem, start, time, which, steps: int) -> Link:
 
 
 def matrix_of(links: Link, following, sign: Any = 1.0, real: Any = True):
-    """Derivative of all equations (gap, next state - state left) by all rows.
+    """Return the derivative of all equations (gap, next state - state left) by all
+    rows.
 
     **Arguments:** links `(m, ...)`; the index of the row after each; factors of the
     entries by that row; which rows are real, others having the identity.
@@ -111,7 +119,7 @@ def matrix_of(links: Link, following, sign: Any = 1.0, real: Any = True):
 
 
 def links_of(shooting: Shooting, u, system: HybridSystem) -> Link:
-    """The links of an orbit, `(m, ...)`."""
+    """Return the links of an orbit, `(m, ...)`."""
     starts, ends = shooting.flights(u, system)
     return jax.vmap(lambda a, b, which: link(system, a, b, which, shooting.steps))(
         starts, ends, shooting.hit()
@@ -121,7 +129,7 @@ def links_of(shooting: Shooting, u, system: HybridSystem) -> Link:
 def product_of_links(
     links: Link, number: Int[Array, ""] | None = None
 ) -> tuple[Float[Array, "n n"], Float[Array, "n n"]]:
-    """The monodromy matrix, of the state just after the first impact.
+    """Return the monodromy matrix, of the state just after the first impact.
 
     With `number` as two matrices, regular + singular / approach speed of that impact;
     both are bounded where it is a grazing.
@@ -139,12 +147,15 @@ def product_of_links(
 
 
 def monodromy_of(shooting: Shooting, u, system: HybridSystem) -> Float[Array, "n n"]:
-    """Derivative of the state one period after the first impact by that there."""
+    """Return the derivative of the state one period after the first impact by that
+    there.
+    """
     return product_of_links(links_of(shooting, u, system))[0]
 
 
 def antiperiodic(shooting: Shooting, u, system: HybridSystem) -> Float[Array, "u u"]:
-    """Derivative of the equations for a deviation that changes sign each period.
+    """Return the derivative of the equations for a deviation that changes sign each
+    period.
 
     It is singular at a flip, where its null vector is the deviation of the doubled
     orbit. The first column belongs to the first phase, also without forcing.
@@ -161,7 +172,8 @@ def antiperiodic(shooting: Shooting, u, system: HybridSystem) -> Float[Array, "u
 def equations_and_monodromy(
     shooting: Shooting, u, p, system_at: Callable
 ) -> tuple[Float[Array, "u u+1"], Float[Array, "n n"]]:
-    """Derivative of the equations by unknowns and parameter, and the monodromy matrix.
+    """Return the derivative of the equations by unknowns and parameter, and the
+    monodromy matrix.
 
     For orbits with impacts; the system is `system_at(p)`.
     """
@@ -211,14 +223,15 @@ def equations_and_monodromy(
 
 
 def _column_scale(shooting: Shooting, u, system) -> Float[Array, "1 u"]:
-    """From derivatives by times (s) to those by phases."""
+    """Return the factors from derivatives by times (s) to those by phases."""
     unit = shooting.period(u, system) / max(shooting.periods, 1)
     row = jnp.ones(1 + shooting.dimension).at[0].set(unit)
     return jnp.tile(row, len(shooting.constraints))[None, :]
 
 
 def return_map(shooting: Shooting, u, system: HybridSystem, matrix):
-    """Derivative of the return map to the first constraint, from the monodromy matrix.
+    """Return the derivative of the return map to the first constraint, from the
+    monodromy matrix.
 
     In coordinates on the surface, k = n - 1.
     """
@@ -234,10 +247,10 @@ def return_map(shooting: Shooting, u, system: HybridSystem, matrix):
 
 
 def around_the_period(shooting: Shooting, u, system: HybridSystem):
-    """The Jacobian of the map from the first impact to the one a period later.
+    """Return the Jacobian of the map from the first impact to that a period later.
 
-    Of (phase, state), without forcing of the state, without impacts of the state at
-    time zero.
+    Its variables are (phase, state); without forcing the state, without impacts the
+    state at time zero.
 
     Returns:
         The Jacobian as a function of a point near the orbit's own, and that.

@@ -1,4 +1,4 @@
-"""The lowest gap within a flight: where an orbit may graze, or go through."""
+"""Find the lowest gap within a flight, where an orbit may graze or penetrate."""
 
 import jax
 import jax.numpy as jnp
@@ -15,7 +15,7 @@ _HALVINGS = 20
 
 
 def nodes_of(system: HybridSystem, start, end, steps: int):
-    """Times and states at both ends of all steps of a flight, and its error."""
+    """Return times and states at both ends of all steps of a flight, and its error."""
     later, states, wrong = flight_nodes(system, start[0], start[1:], end, steps)
     times = jnp.concatenate([start[:1], later])
     return times, jnp.concatenate([start[None, 1:], states]), wrong
@@ -24,7 +24,7 @@ def nodes_of(system: HybridSystem, start, end, steps: int):
 def lowest_times(
     system: HybridSystem, start, end, steps: int, whole_turn: bool = False, nodes=None
 ) -> tuple[Float[Array, " m"], Float[Array, " m"]]:
-    """Return when each gap has its lowest minimum within a flight, and the gap there.
+    """Return the time and value of the lowest minimum of each gap within a flight.
 
     A minimum lies where the normal velocity rises through zero; the ends of the flight,
     where it starts and ends in contact, do not count. With `whole_turn` the flight is a
@@ -87,12 +87,13 @@ def gap_or_speed(
     hit: Int[Array, " m"] | None,
     steps: int,
 ) -> Float[Array, ""]:
-    """The lowest gap of flight `number`, or from m on the approach speed of an impact.
+    """Return the lowest gap of flight `number`, or from m on the approach speed of an
+    impact.
 
-    Flown once for either, so that one small program serves for all. Differentiable: at
-    a minimum the time of it does not matter to first order, so the derivative is that
-    of the gap at a fixed time. `hit` are the constraints that end the flights; None for
-    a closed orbit without impacts.
+    One integration serves both, so that one small program is sufficient. It is
+    differentiable: the time of a minimum has no first-order effect, so the derivative
+    is that of the gap at a fixed time. `hit` are the constraints that end the flights;
+    None for a closed orbit without impacts.
     """
     m = ends.shape[0]
     landed = number >= m
@@ -113,13 +114,13 @@ def gap_or_speed(
 
 
 def _rise(speeds, changes):
-    """Return where a velocity rises through zero in each step, by a cubic.
+    """Return the place at which a velocity rises through zero in each step, by a cubic.
 
     Also within the same step: a low flight may be shorter than a step.
 
     Returns:
-        The fraction of the step, the way up to there over its length, and whether there
-            is such a rise; `(steps, m)` each.
+        The fraction of the step, the relative distance covered up to there, and whether
+            there is such a rise; `(steps, m)` each.
     """
     a, b = speeds[:-1], speeds[1:]
     p, q = changes[:-1], changes[1:]

@@ -1,4 +1,4 @@
-"""The derivative of the flow over a period, in two ways that must agree."""
+"""Compute the derivative of the flow over a period by two methods that must agree."""
 
 from typing import Literal
 

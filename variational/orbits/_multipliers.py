@@ -1,4 +1,4 @@
-"""Eigenvalues of a monodromy matrix whose entries may be huge."""
+"""Compute eigenvalues of a monodromy matrix with possibly very large entries."""
 
 import jax
 import jax.numpy as jnp

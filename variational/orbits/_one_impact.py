@@ -1,4 +1,4 @@
-"""Orbits with one impact a period, found without a simulation."""
+"""Find orbits with one impact per period without a simulation."""
 
 import equinox as eqx
 import jax

@@ -72,7 +72,7 @@ class Orbit(eqx.Module):
         return None if is_traced(self) else self._table().html()
 
     def _table(self) -> ShortTable:
-        """Stability in a sentence, and the impacts of one period."""
+        """Tabulate the impacts of one period, with a sentence on stability."""
         sizes = ", ".join(f"{abs(m):.3g}" for m in self.multipliers)
         sentence = (
             f"{'stable' if self.stable else 'unstable'} orbit of period "
@@ -107,7 +107,7 @@ class Orbit(eqx.Module):
     def signature(self) -> tuple[Event, ...]:
         """Events of one period, in order.
 
-        Of a completed chatter it lists the impacts up to the completion.
+        For a completed chatter it lists the impacts up to the completion.
         """
         return signature_of(self.impacts, self.contacts)
 
@@ -133,7 +133,7 @@ def orbit_of(
             flight, because the flow jumps at an impact and has no derivative from
             there.
         period: Period (s); default the forcing's own.
-        t0: s.
+        t0: Time of `state` (s).
         settings: Accuracy of the run; default a tolerance of 1e-12.
         closure: Deviation after one period that is allowed, relative to
             [`jaxcam.hybrid.sizes.component_sizes`][].
@@ -215,11 +215,13 @@ def _check_closure(miss, closure, period) -> None:
 
 
 def _knots(system, impacts: Impacts, start: ImpactStart | None, t0, period, scale):
-    """The impacts as a boundary value problem, and which constraints they hit."""
+    """Return the impacts as a boundary value problem, and the constraints that they
+    hit.
+    """
     time, after = np.asarray(impacts.time), np.asarray(impacts.after)
     sides = np.asarray(impacts.constraint)
     if start is not None:
-        # the impact at the start, which the run may also have met at its end
+        # the impact at the start, which may also occur at the end of the run
         other = (time > t0) & (time < t0 + period - start.window)
         time = np.append(t0, time[other])
         after = np.concatenate([start.after[None], after[other]])
@@ -235,7 +237,9 @@ def _half_a_flight_on(knots: Knots, t0, period) -> float:
 
 
 def _rebuilt(system, knots: Knots, sides, t0, period):
-    """The impacts after t0 in order, and the state at t0, from improved impacts."""
+    """Return the impacts after t0 in order, and the state at t0, from refined
+    impacts.
+    """
     time = knots.rows[:, 0]
     time = time + np.where(time <= t0, period, 0.0)
     order = np.argsort(time, kind="stable")
@@ -257,7 +261,7 @@ def _rebuilt(system, knots: Knots, sides, t0, period):
 
 
 def signature_of(impacts: Impacts, contacts: Contacts) -> tuple[Event, ...]:
-    """Impacts, starts of contact and releases as one sequence in time."""
+    """Return impacts, starts of contact and releases as one sequence in time."""
     found = []
     for k in range(int(impacts.count)):
         found.append((float(impacts.time[k]), 0, "impact", int(impacts.constraint[k])))

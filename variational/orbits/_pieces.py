@@ -1,4 +1,4 @@
-"""A period of an orbit cut at its events, in arrays of a few fixed lengths."""
+"""Cut a period of an orbit at its events, in arrays of a few fixed lengths."""
 
 import equinox as eqx
 import numpy as np
@@ -8,14 +8,15 @@ from jaxcam.hybrid.record import Contacts, Impacts
 
 
 NOTHING, IMPACT, LAST_IMPACT = 0, 1, 2
-"""End of a piece: nothing (its mode may change), an impact, or the impact after
-which all later ones of a chatter are summed."""
+"""End of a piece: nothing (its mode may change), an impact, or the impact at which a
+chatter is completed.
+"""
 
 
 class TurnPieces(eqx.Module):
     """Pieces of flight or contact, each with the event at its end.
 
-    Those beyond the last event take no time and do nothing. Kept as numpy arrays.
+    Pieces beyond the last event are padding without duration. Kept as numpy arrays.
     """
 
     start: Float[np.ndarray, " k"]
@@ -25,15 +26,16 @@ class TurnPieces(eqx.Module):
     before: Float[np.ndarray, "k n"]
     """(k, n) state before the event."""
     contact: Bool[np.ndarray, "k m"]
-    """(k, m) constraints in contact in the piece, and in the one after; for those that
-    are hit or touched, further ones are not."""
+    """(k, m) constraints in contact in the piece, and in the one after; only for
+    constraints that are hit or touched.
+    """
     contact_after: Bool[np.ndarray, "k m"]
 
 
 def cut_turn(
     impacts: Impacts, contacts: Contacts, state, t0: float, t1: float
 ) -> tuple[TurnPieces, bool]:
-    """The pieces of the period from t0 to t1, and whether there is any contact.
+    """Return the pieces of the period from t0 to t1, and whether there is any contact.
 
     **Arguments:** the events of the period, and the state at t0.
     """
@@ -56,7 +58,7 @@ def cut_turn(
         spans.append((begin, end, side))
     releases = [end for _, end, _ in spans if end < t1]
     own = [(time[i], kind[i], which[i], before[i]) for i in range(number)]
-    # an impact may be what ends a contact: then it comes alone
+    # an impact may end a contact: then it is a separate event
     let_go = [(end, NOTHING, 0, state) for end in releases if end not in time]
     events = sorted(own + let_go, key=lambda event: event[0])
     events.append((t1, NOTHING, 0, state))

@@ -1,4 +1,4 @@
-"""The derivative over a period as a product over its flights and events."""
+"""Compute the derivative over a period as a product over its flights and events."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -82,7 +82,7 @@ def product_of(
 
 
 def with_all_constraints(system, pieces: TurnPieces, state) -> TurnPieces:
-    """The flags of contact for every constraint of the system."""
+    """Return the flags of contact for every constraint of the system."""
     gap = jax.eval_shape(system.gap, pieces.start[0], state)
     missing = (gap.shape[0] if gap.shape else 1) - pieces.contact.shape[1]
 
@@ -97,12 +97,12 @@ def with_all_constraints(system, pieces: TurnPieces, state) -> TurnPieces:
 
 
 def _compose(outer, inner, n):
-    """The chain rule for matrices [by state | by parameters]."""
+    """Apply the chain rule to matrices [by state | by parameters]."""
     return (outer[:, :n] @ inner).at[:, n:].add(outer[:, n:])
 
 
 def _held(build, parameters, t, x, contact):
-    """The derivative of what contact does to a state, by state and parameters."""
+    """Return the derivative of the projection onto contact, by state and parameters."""
     by_state = contact_projector(build(parameters), t, x, contact)
     by_parameter = jax.jacfwd(lambda p: onto_contact(build(p), t, x, contact))(
         parameters
@@ -111,7 +111,7 @@ def _held(build, parameters, t, x, contact):
 
 
 def _event(build, parameters, piece: TurnPieces, x, sticks):
-    """The derivative across the event of a piece, the state after it, and the
+    """Return the derivative across the event of a piece, the state after it, and the
     determinant of the derivative."""
     n = x.shape[0]
     plain = _across(build, parameters, piece, impact_of, sticks)
@@ -150,7 +150,7 @@ def _across(build, parameters, piece: TurnPieces, law_of, sticks):
     law_p = jax.jacfwd(lambda p: law(p)(t, x))(parameters)
     by_parameter = law_p + jnp.outer(share, jax.jacfwd(height)(parameters))
     landed = law(parameters)(t, x)
-    # the law keeps the gap, so that its part across the surface is the change of speed
+    # the law keeps the gap, so its component across the surface is the change of speed
     rate, slope = jax.grad(gap_of(system, side), argnums=(0, 1))(t, landed)
     speed_after = rate + slope @ after(t, landed)
     change = jnp.linalg.det(law_x) * speed_after / jnp.where(hit, speed, 1.0)

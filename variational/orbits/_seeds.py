@@ -1,4 +1,4 @@
-"""The unknowns of the shooting equations, read from a motion that has been seen."""
+"""Read the unknowns of the shooting equations from a known motion."""
 
 from typing import TYPE_CHECKING
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 _STEPS = (16, 32, 64, 128, 256)
-"""Numbers of steps to choose from, and the error allowed in a flight."""
+"""Available numbers of steps, and the error allowed in a flight."""
 _ALLOWED = 1e-12
 
 
@@ -32,7 +32,7 @@ def steps_for(system: HybridSystem, starts, ends) -> int:
     ends.
 
     Raises:
-        ValueError: Where 256 steps are not enough.
+        ValueError: 256 steps are not enough.
     """
     starts, ends = jnp.asarray(starts), jnp.asarray(ends)
     for steps in _STEPS:
@@ -57,8 +57,7 @@ def _errors(system, starts, ends, steps: int):
 def seed(
     system: HybridSystem, motion: "Trajectory | Orbit", periods: int
 ) -> tuple[Shooting, Float[np.ndarray, " u"]]:
-    """Return the equations of the orbit that one period of a motion shows, and the
-    unknowns.
+    """Return the shooting equations and unknowns for one period of a motion.
 
     Args:
         system: The system.

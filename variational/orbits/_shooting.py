@@ -1,4 +1,4 @@
-"""Multiple shooting: one segment a flight, the impact times among the unknowns.
+"""Set up multiple shooting: one segment per flight, impact times among the unknowns.
 
 An orbit with m impacts is the list of its impacts: time t_k and state x_k just after
 each. With phi the free flight and H, R gap and law of the constraint that is hit,
@@ -7,8 +7,8 @@ each. With phi the free flight and H, R gap and law of the constraint that is hi
     x_{k+1} = R(t_{k+1}, phi(t_{k+1}; t_k, x_k)),
 
 closed by t_{m+1} = t_1 + n T, x_{m+1} = x_1. Nothing in these equations divides by an
-impact speed, so they are as regular at grazing as elsewhere; they go on behind it, to
-motions through the constraint, which `seen` distinguishes.
+impact speed, so they are as regular at grazing as elsewhere. Their solutions continue
+beyond it as motions through the constraint, which `seen` detects.
 """
 
 from typing import NamedTuple
@@ -30,7 +30,7 @@ class Seen(NamedTuple):
     """Admissibility of a solution of the shooting equations, and its flights."""
 
     gaps: Float[Array, " flights"]
-    """Lowest gap inside each flight, or of the whole orbit without impacts, shape
+    """Lowest gap inside each flight, or of the entire orbit without impacts, shape
     `(m,)`."""
     speeds: Float[Array, " m"]
     """Approach speed of each impact, positive where it is physical, shape `(m,)`."""

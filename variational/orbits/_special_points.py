@@ -36,7 +36,9 @@ def _where(
     guess: ImpactOrbit,
     test: Callable[[Shooting, Any, HybridSystem], Float[Array, ""]],
 ) -> SpecialPoint:
-    """Orbit and parameter for which `test(equations, unknowns, system)` is zero."""
+    """Find orbit and parameter for which `test(equations, unknowns, system)` is
+    zero.
+    """
     shooting = guess.shooting
 
     def residual(unknowns):
@@ -146,9 +148,9 @@ def graze_of_orbit(
     """Find the parameter value at which a periodic orbit grazes.
 
     The value is differentiable in all other parameters. A graze is an impact without
-    speed; the square root of a grazing bifurcation is in the orbits behind it, not in
-    the graze. Whether the gap has a minimum there, not a maximum, and is open elsewhere
-    is not checked; see [`jaxcam.hybrid.surface.normal_acceleration`][].
+    speed; the square-root singularity of a grazing bifurcation belongs to the orbits
+    beyond it, not to the graze. It is not checked that the gap has a minimum there and
+    is open elsewhere; see [`jaxcam.hybrid.surface.normal_acceleration`][].
 
     Args:
         system: The system, with the parameter near the graze.

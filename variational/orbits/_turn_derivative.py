@@ -33,11 +33,11 @@ class TurnDerivative(eqx.Module):
     """Relative error of `state` per relative error in each flight and saltation matrix.
     """
     sticks: bool = eqx.field(static=True)
-    """Whether there is sustained contact, which forgets the past."""
+    """Whether there is sustained contact, which erases the past."""
 
 
 def picked(system, where: Pick | None) -> Float[Array, " q"]:
-    """The parameters picked, as one vector."""
+    """Return the picked parameters as one vector."""
     if where is None:
         return jnp.zeros(0)
     leaves = jax.tree.leaves(where(system))
@@ -45,7 +45,7 @@ def picked(system, where: Pick | None) -> Float[Array, " q"]:
 
 
 def builder(system, where: Pick | None) -> Callable:
-    """From a vector of parameters to the system, made cheap to evaluate."""
+    """Return the function from a parameter vector to the prepared system."""
 
     def build(values):
         if where is None:
@@ -79,7 +79,7 @@ def by_product(system, values, where, state, pieces: TurnPieces, sticks):
 
 @eqx.filter_jit
 def flown(system, t0, state, t1) -> Float[Array, " n"]:
-    """The end of a flight that meets nothing."""
+    """Return the end of a flight without events."""
     system = system.prepared()
     return fly_linearised(
         lambda _, t, x: system.vector_field(t, x), jnp.zeros(0), t0, state, t1

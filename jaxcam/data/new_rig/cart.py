@@ -1,7 +1,7 @@
-"""A cart on a spring between two stops: change it into the system that you have.
+"""A cart on a spring between two stops: an example to be edited.
 
-A system says three things of a state: how it moves freely, how far it is from each
-thing that it can hit, and what an impact does. Units are SI.
+A system defines three functions of the state: the free motion, the gap to each
+constraint, and the state after an impact. Units are SI.
 """
 
 import jax.numpy as jnp
@@ -14,8 +14,8 @@ class Cart(HybridSystem):
     state_names = ("position", "velocity")
     state_units = ("m", "m/s")
 
-    # parameters; cart.toml states their values and how well they are known
-    stiffness: float = 40.0  # of the spring, divided by the mass (1/s^2)
+    # parameters; cart.toml states their values and tolerances
+    stiffness: float = 40.0  # stiffness of the spring divided by the mass (1/s^2)
     damping: float = 0.3  # divided by the mass (1/s)
     left: float = -0.05  # places of the stops (m)
     right: float = 0.06
@@ -23,20 +23,22 @@ class Cart(HybridSystem):
     restitution_right: float = 0.7
 
     def vector_field(self, t, state):
-        """Rate of change of the state in free motion: velocity and acceleration."""
+        """Return the rate of change of the state in free motion: velocity,
+        acceleration.
+        """
         position, velocity = state
         acceleration = -self.stiffness * position - self.damping * velocity
         return jnp.stack([velocity, acceleration])
 
     def gap(self, t, state):
-        """Distance to each stop (m): positive when free, zero in contact.
+        """Return the distance to each stop (m): positive when free, zero in contact.
 
         With one stop it is a number, and `impact` returns one state.
         """
         return jnp.stack([state[0] - self.left, self.right - state[0]])
 
     def impact(self, t, state):
-        """The state after an impact, a row for each stop.
+        """Return the state after an impact, one row for each stop.
 
         The velocity at which the gap closes is multiplied by -restitution.
         """

@@ -1,4 +1,4 @@
-"""A rigid pendulum, as a textbook has it: no friction at all."""
+"""A rigid textbook pendulum without friction."""
 
 import jax.numpy as jnp
 
@@ -19,7 +19,7 @@ class Pendulum(HybridSystem):
         return jnp.stack([rate, -self.stiffness * jnp.sin(angle - self.hanging)])
 
     def gap(self, t, state):
-        return jnp.ones_like(t)  # there is nothing to hit
+        return jnp.ones_like(t)  # without constraints
 
     def impact(self, t, state):
         return state

@@ -1,4 +1,4 @@
-"""Recordings and a model as a problem, and the normal equations of its fit."""
+"""Combine recordings and a model into a problem with its normal equations."""
 
 from ._columns import (
     Columns as Columns,

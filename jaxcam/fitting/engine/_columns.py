@@ -1,4 +1,4 @@
-"""The free numbers of a fit: where they are, what is known of them, their equations."""
+"""Locate the free numbers of a fit, with their priors and normal equations."""
 
 import dataclasses
 from collections.abc import Iterable
@@ -19,7 +19,7 @@ class Columns:
     """The free numbers of a fit.
 
     `local` `(r, m)`: which parameter each column of a record's equations is;
-    `place` `(r, m)`: where it is among the free numbers, -1 where it fills up.
+    `place` `(r, m)`: its index among the free numbers, -1 for padding.
     """
 
     parameter: Int[np.ndarray, " g"]
@@ -87,20 +87,19 @@ def free_columns(problem: Problem, free: Iterable[str] | None) -> Columns:
 
 
 def reduced(columns: Columns, blocks: Blocks):
-    """Information and score of the free numbers, in units of their scales."""
+    """Return information and score of the free numbers, in units of their scales."""
     return gathered(columns, eliminate_states(blocks))
 
 
 def held_firmer(columns: Columns, blocks: Blocks):
-    """`reduced` information where the states are held a hundred times as firmly.
-
-    What grows with it is no information of the data.
+    """Return `reduced` information with the states held a hundred times as firmly. A
+    part that grows with it is not information of the data.
     """
     return gathered(columns, eliminate_states(blocks, jnp.asarray(100 * LEAST)))[0]
 
 
 def gathered(columns: Columns, found):
-    """Sums over the records, each number in its place."""
+    """Sum over the records, with each number in its place."""
     size = len(columns.scale)
     information, score = np.zeros((size + 1, size + 1)), np.zeros(size + 1)
     for r, place in enumerate(columns.place):
@@ -125,7 +124,7 @@ def invert_information(
         Shape `(g, g)`.
 
     Raises:
-        ValueError: It is not finite, as that of a model with NaN.
+        ValueError: The matrix is not finite, for example for a model with NaN.
     """
     if not np.all(np.isfinite(information)):
         raise ValueError(
@@ -189,7 +188,7 @@ def prior_information(problem: Problem, columns: Columns, prior: bool):
 
 
 def prior_cost(problem: Problem, columns: Columns, point: Point, prior: bool) -> float:
-    """Squared distance of the free numbers from what was known of them."""
+    """Return the squared distance of the free numbers from their priors."""
     if not prior or not len(columns.scale):
         return 0.0
     off = off_nominal(problem, columns, point)
@@ -197,7 +196,7 @@ def prior_cost(problem: Problem, columns: Columns, point: Point, prior: bool) ->
 
 
 def inside(problem: Problem, columns: Columns, point: Point) -> Point:
-    """The point, moved inside the bounds of the free parameters."""
+    """Return the point, moved inside the bounds of the free parameters."""
     values = np.array(point.values)
     for p in set(columns.parameter.tolist()):
         one = problem.parameters[p]

@@ -1,4 +1,4 @@
-"""One damped step of scoring, within the bounds of the parameters."""
+"""Take one damped step of scoring, within the bounds of the parameters."""
 
 import jax.numpy as jnp
 import numpy as np
@@ -9,7 +9,9 @@ from ._linearise import Blocks, Point
 
 
 def damped_step(problem, columns, blocks, point, damping, prior):
-    """One damped step, within the bounds; and by how much it should lower the cost."""
+    """Return one damped step within the bounds, and the predicted decrease of the
+    cost.
+    """
     found = eliminate_states(blocks)
     size = len(columns.scale)
     information, score = gathered(columns, found)
@@ -24,7 +26,7 @@ def damped_step(problem, columns, blocks, point, damping, prior):
     for r, (place, local) in enumerate(zip(columns.place, columns.local)):
         used = place >= 0
         values[r, local[used]] += change[place[used]] * columns.scale[place[used]]
-    # what the quadratic model of the cost says of the whole step
+    # prediction of the quadratic model of the cost for the full step
     gain = float(change @ score) + _state_gain(blocks, found)
     moved = Point(jnp.asarray(values), point.states + states)
     return moved, gain
@@ -39,7 +41,7 @@ def _state_gain(blocks: Blocks, found) -> float:
 
 
 def _bounded(problem, columns, point, information, score, damping):
-    """Newton's step with the numbers that press against a bound held at it."""
+    """Compute Newton's step with the numbers at an active bound held."""
     size = len(columns.scale)
     change = np.zeros(size)
     if not size:
@@ -61,7 +63,7 @@ def _bounded(problem, columns, point, information, score, damping):
         try:
             change[open_] = np.linalg.solve(damped[np.ix_(open_, open_)], right)
         except np.linalg.LinAlgError:
-            # singular to rounding: more damping is asked for
+            # singular to rounding: more damping is needed
             return np.full(size, np.nan)
         beyond = open_ & ((change < low) | (change > high))
         if not np.any(beyond):

@@ -1,4 +1,4 @@
-"""The same program for every record, on all cores: XLA runs one of them on one core."""
+"""Run the same program for every record on all cores (XLA uses one core per call)."""
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -17,7 +17,7 @@ def each_record(function: Callable[[int], T], records: int) -> T:
     Calls run in threads, so nothing may be traced here. The result does not depend on
     the number of cores.
     """
-    # the first call may compile, which two threads would do twice
+    # the first call may compile, which must not happen in two threads
     parts = [function(0)]
     if records > 1:
         with ThreadPoolExecutor() as pool:

@@ -16,7 +16,7 @@ from jaxtyping import Array, Float
 from ._linearise import Blocks
 
 
-# Part of its own information that keeps a state in place of which nothing is known
+# Fraction of the information that holds an unconstrained state in place
 LEAST = 1e-13
 
 
@@ -79,10 +79,10 @@ def _eliminate(blocks: Blocks, part):
     size, width = blocks.sp.shape[1:]
 
     def forwards(carry, inputs):
-        # what the pieces before say about this one's state, parameters and both
+        # information of the pieces before on this piece's state, parameters and both
         ss, sp, s, information, score = carry
         here_ss, here_sp, here_s, after = inputs
-        # a state that nothing is known of does not move
+        # an unconstrained state does not move
         diagonal = jnp.diagonal(here_ss)
         least = jnp.where(diagonal > 0, part * diagonal, 1.0)
         matrix = here_ss + ss + jnp.diag(least)

@@ -19,12 +19,12 @@ from ._parameter import Parameter
 def known_constants(
     model: Model, recordings: Sequence[Recording]
 ) -> tuple[Parameter, ...]:
-    """A parameter for each name in the `constants` of recordings.
+    """Create a parameter for each name in the `constants` of recordings.
 
     A record that does not state one has the value of the model.
 
-    **Raises:** `RecordingError` for a name that is no number of the system, or a value
-    that is none.
+    **Raises:** `RecordingError` if a name is not a number of the system, or a value is
+    not a number.
     """
     names = dict.fromkeys(name for run in recordings for name in run.constants)
     found = []
@@ -39,9 +39,9 @@ def known_constants(
 
 
 def with_constants(model: Model, recording: Recording) -> Model:
-    """The model as it is in one record, with the constants of that.
+    """Return the model with the constants of one record.
 
-    **Raises:** as `known_constants` does.
+    **Raises:** see `known_constants`.
     """
     for name, value in recording.constants.items():
         where = Field(f"system.{_place(model.system, recording, name)}")
@@ -51,7 +51,7 @@ def with_constants(model: Model, recording: Recording) -> Model:
 
 
 def _place(system: HybridSystem, recording: Recording, name: str) -> str:
-    """The full name of a number of the system, or of what the system wraps.
+    """Return the full name of a number of the system, or of a wrapped system.
 
     Of several parts with such a number, it is that of the outermost.
     """

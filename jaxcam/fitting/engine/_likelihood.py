@@ -11,7 +11,7 @@ from jaxtyping import Array, Float
 from ._model import Sensor
 
 
-# Standard deviations of the noise that no sample strays from its interval
+# Largest deviation of a sample from its interval, in standard deviations of the noise
 _FAR = 5.0
 
 
@@ -19,7 +19,7 @@ class Scored(NamedTuple):
     """Of each sample, elementwise.
 
     - `cost`: minus twice the logarithm of the likelihood, less a constant, so that a
-        sample of Gaussian noise costs one on average.
+      sample of Gaussian noise costs 1 on average.
     - `score`: derivative of the logarithm of the likelihood to the prediction.
     - `information`: the expected square of the score.
     """
@@ -30,11 +30,13 @@ class Scored(NamedTuple):
 
 
 def score(sensor: Sensor, value, predicted) -> Scored:
-    """Likelihood of `value` where `predicted` is what a perfect sensor would show."""
+    """Evaluate the likelihood of `value`, given the noise-free prediction
+    `predicted`.
+    """
     found = _within(sensor, value, predicted)
     if math.isinf(sensor.limit):
         return found
-    # a saturated sample only says that the truth was beyond the limit
+    # a saturated sample only implies that the true value was beyond the limit
     over = jnp.abs(value) >= sensor.limit - sensor.resolution / 2
     censored = _beyond(sensor, value, predicted)
     return Scored(*(jnp.where(over, c, w) for c, w in zip(censored, found)))
@@ -43,7 +45,7 @@ def score(sensor: Sensor, value, predicted) -> Scored:
 def _within(sensor: Sensor, value, predicted) -> Scored:
     off = value - predicted
     if not math.isinf(sensor.tails):
-        # Student's distribution, of the width that noise and rounding have together
+        # Student's distribution, with the total width of noise and rounding
         nu, variance = sensor.tails, sensor.floor**2
         square = off * off / variance
         return Scored(
@@ -70,12 +72,12 @@ def _rounded(sensor: Sensor, off) -> Scored:
     chance = high + jnp.log1p(-jnp.exp(low - high))
     density = _log_density(z + half), _log_density(z - half)
     pull = jnp.exp(density[1] - chance) - jnp.exp(density[0] - chance)
-    # the constant: half a sample of noise of the same variance costs nothing
+    # the constant normalises the cost of noise of the same variance
     variance = sensor.floor**2
     constant = jnp.log(sensor.resolution**2 / (2 * jnp.pi * variance))
     slope = -jnp.sign(off) * pull / sensor.noise
-    # far out, where no noise leads but a bad start may, the cost is steeper than the
-    # mean information tells, and a step by it alone would go too far
+    # far out, reached by bad starts only, the cost is steeper than the mean information
+    # predicts, and a step by it alone would go too far
     far = jnp.abs(off) > sensor.resolution / 2 + _FAR * sensor.noise
     safe = jnp.where(far, off, 1.0)
     information = jnp.where(far, slope / safe, 1 / variance)
@@ -83,7 +85,7 @@ def _rounded(sensor: Sensor, off) -> Scored:
 
 
 def _beyond(sensor: Sensor, value, predicted) -> Scored:
-    """The chance of a truth beyond the limit: Phi(z)."""
+    """Return the probability of a true value beyond the limit: Phi(z)."""
     z = (jnp.sign(value) * predicted - sensor.limit) / sensor.noise
     chance = log_ndtr(z)
     ratio = jnp.exp(_log_density(z) - chance)
@@ -101,7 +103,7 @@ def _log_density(z):
 
 
 def score_all(sensors, values, predicted) -> Scored:
-    """All channels, along the last axis."""
+    """Evaluate all channels, along the last axis."""
     columns = [
         score(sensor, values[..., k], predicted[..., k])
         for k, sensor in enumerate(sensors)

@@ -123,7 +123,7 @@ def linear_pieces(
     part = pieces.rested
     found = score_all(sensors, part.value, rest_seen)
     weight = jnp.where(part.known, extras.rest_weight[:, None, None, None], 0.0)
-    # where the surface cannot be found, nothing can be learnt from it
+    # if the surface cannot be found, it gives no information
     rest_rows = jnp.where(part.known[..., None], rest_rows, 0.0)
     pp = jnp.einsum(
         "knmca,knmc,knmcb->ab", rest_rows, weight * found.information, rest_rows
@@ -172,10 +172,11 @@ def linear_pieces(
 
 
 def _columns(function, *args):
-    """Value and Jacobian of a function of some vectors, its columns side by side.
+    """Return value and Jacobian of a function of some vectors, its columns side by
+    side.
 
-    Vectors stay apart: what depends on one of them alone is then worked out once, for
-    all the pieces that share it.
+    Vectors are separate arguments: parts that depend on one of them alone are then
+    computed once, for all the pieces that share it.
     """
     count = sum(len(one) for one in args)
     edges = np.cumsum([len(one) for one in args])[:-1]
@@ -221,9 +222,9 @@ def joint_inputs(pieces: Pieces):
 
 
 def joint(model: Model, reach, before, state, t, angle, rate, kind):
-    """State and gap in one vector `(n + 1,)`, whichever kind of joint it is."""
+    """Return state and gap in one vector `(n + 1,)` for any kind of joint."""
     inner = jnp.concatenate([*_flat(flight_joint(before, state))])
-    # where there is no impact the search for one must not spoil the derivatives
+    # without an impact, its search must not affect the derivatives
     hit = kind == IMPACT
     found = impact_joint(model, before, state, t, angle, rate, reach)
     outer = jnp.concatenate([*_flat(found)])
@@ -235,7 +236,7 @@ def _flat(joint):
 
 
 def strength(sharpness: Sharpness, kind):
-    """One over the error of each part of a joint, zero where there is none."""
+    """Return the inverse error of each part of a joint, zero if there is none."""
     error = jnp.concatenate([sharpness.impact, sharpness.gap[..., None]], axis=-1)
     flight = jnp.concatenate(
         [sharpness.flight, jnp.full_like(sharpness.gap[..., None], jnp.inf)], axis=-1

@@ -42,7 +42,7 @@ def _as_it_is(model: Model) -> Model:
 class Layout(eqx.Module):
     """The location of the parameters in a model: its leaves, and the fitted ones.
 
-    `ready` works out what a model needs at every step, once for all of them.
+    `ready` computes the quantities that a model needs at every step once for all.
     """
 
     model: Model
@@ -85,8 +85,8 @@ class Layout(eqx.Module):
 class Expansion(eqx.Module):
     """A model to first order in its parameters.
 
-    What it needs at every step is worked out and differentiated once, instead of in
-    each of the pieces.
+    The quantities needed at every step are computed and differentiated once, instead of
+    in each piece.
 
     - `slopes`: of each leaf, a row for each parameter; None where it depends on none.
     """
@@ -95,7 +95,7 @@ class Expansion(eqx.Module):
     slopes: tuple[Float[Array, "..."] | None, ...]
 
     def by(self, columns: Int[Array, " m"], scales: Float[Array, " m"]) -> "Expansion":
-        """The same, by some of the parameters in units of their scales."""
+        """Return the expansion by some of the parameters in units of their scales."""
 
         def rows(slope):
             return slope[columns] * scales.reshape(-1, *[1] * (slope.ndim - 1))
@@ -104,7 +104,7 @@ class Expansion(eqx.Module):
         return Expansion(self.model, slopes)
 
     def at(self, change: Float[Array, " m"]) -> Model:
-        """The model after a small change of the parameters."""
+        """Return the model after a small change of the parameters."""
         leaves, tree = jax.tree.flatten(self.model)
         moved = [
             leaf if slope is None else leaf + jnp.tensordot(change, slope, 1)
@@ -177,7 +177,7 @@ def assemble(
 
 @eqx.filter_jit
 def assemble_one(near, pieces, extras, states, columns, scales, row):
-    """`assemble` of one record: its number is not part of the program."""
+    """Apply `assemble` to one record; its number is not part of the program."""
     one = pieces, extras, states, columns, scales
     pieces, extras, states, columns, scales = jax.tree.map(lambda leaf: leaf[row], one)
     near = near.by(columns, scales)
@@ -193,7 +193,7 @@ def assemble_one(near, pieces, extras, states, columns, scales, row):
 
 @eqx.filter_jit
 def predict(layout: Layout, pieces: Pieces, extras: Extras, point: Point):
-    """Predicted samples in flight and in contact, and the joints, of all records."""
+    """Predict samples in flight and in contact, and the joints, of all records."""
 
     def record(pieces, extras, values, states):
         model = layout.at(values)
@@ -212,7 +212,7 @@ def predict(layout: Layout, pieces: Pieces, extras: Extras, point: Point):
 
 @eqx.filter_jit
 def cost_of(layout: Layout, pieces: Pieces, extras: Extras, point: Point) -> Costs:
-    """Costs without derivatives; can be differentiated in reverse mode."""
+    """Return costs without derivatives; can be differentiated in reverse mode."""
     seen, resting, off = predict(layout, pieces, extras, point)
     sensors = tuple(layout.model.sensors.values())
 

@@ -39,7 +39,7 @@ class Sensor(eqx.Module):
     resolution: float = eqx.field(default=0.0, static=True)
     """Smallest step of the channel; zero for a continuous one."""
     limit: float = eqx.field(default=float("inf"), static=True)
-    """Largest magnitude that it can show."""
+    """Largest magnitude of the channel."""
     bandwidth_hz: float = eqx.field(default=float("inf"), static=True)
     """Bandwidth of a first-order filter (Hz); infinite for none."""
     tails: float = eqx.field(default=float("inf"), static=True)
@@ -52,8 +52,9 @@ class Sensor(eqx.Module):
     lag: Float[Array, ""] = _number(0.0)
     """Lag (s), short compared with the time in which the motion changes."""
     error: Callable | None = eqx.field(default=None, static=True)
-    """What else the sensor shows in a fit, `error(system, t, value, slope)` of the
-    value and its rate of change; nothing by default."""
+    """Systematic error of the sensor in a fit, `error(system, t, value, slope)` of
+    the value and its rate of change; default none.
+    """
 
     def __check_init__(self):
         if not self.noise > 0:
@@ -82,9 +83,9 @@ class Sensor(eqx.Module):
 class Turning(eqx.Module):
     """A measured drive: the fields in which a system keeps its speed and its phase.
 
-    While a recording is predicted, the speed follows the measured one and the phase is
-    such that the drive is where it was measured. `phase` of the fitted system is then
-    an offset between its angle and the encoder's.
+    While a recording is predicted, the speed follows the measured one and the phase
+    places the drive at its measured angle. `phase` of the fitted system is then an
+    offset between its angle and the encoder's.
 
     Examples:
         >>> from jaxcam.fitting import Turning

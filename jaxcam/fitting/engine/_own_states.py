@@ -1,4 +1,6 @@
-"""States of single pieces by the model's own least squares, from several starts."""
+"""Fit the states of single pieces by least squares of the model, from several
+starts.
+"""
 
 from collections.abc import Sequence
 
@@ -15,11 +17,11 @@ from ._pieces import FLIGHT, IMPACT, Pieces
 from ._sharpness import states_only
 
 
-# Directions of a state that its samples see less than this part of the best one stay
+# Directions of a state with less than this fraction of the largest information are held
 _BLIND = 1e-10
-# Samples of a piece that show its curvature well enough
+# Number of samples that determine the curvature of a piece
 _FEW = 24
-# Cost of a sample above which a start is no start: three times the noise
+# Cost of a sample above which a start is rejected: three times the noise
 _FAR = 9.0
 # Damped steps from each start
 _STEPS = 12
@@ -35,7 +37,7 @@ def own_states(
     point: Point,
     others: Sequence[Float[Array, "r k n"]] = (),
 ) -> Point:
-    """States of pieces that polynomials do not tell, by the model.
+    """Fit the states of pieces that polynomials do not determine.
 
     Few samples do not show the curvature of a flight, and with a wrong velocity it
     never meets the flight before it: one step of Gauss and Newton without joints.

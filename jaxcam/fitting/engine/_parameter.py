@@ -25,13 +25,14 @@ class Parameter:
     where: Callable[[Model], Array]
     """Picks it out of a `Model`: `lambda m: m.system.stiffness`."""
     tolerance: float = math.inf
-    """Largest deviation from `nominal`, as a maker states it: any value within it is
-    equally likely. The fit uses a Gaussian of the same standard deviation,
-    `tolerance / sqrt(3)`. Infinite without prior knowledge."""
+    """Largest deviation from `nominal`, as stated by the manufacturer: any value
+    within it is equally likely. The fit uses a Gaussian of the same standard
+    deviation, `tolerance / sqrt(3)`. Infinite without prior knowledge.
+    """
     nominal: float | None = None
     """Nominal value; default the model's own."""
     scale: float | None = None
-    """Size of a change that matters; by default the tolerance, or else a hundredth of
+    """Size of a relevant change; by default the tolerance, or else a hundredth of
     the value. It does not influence the result."""
     lower: float = -math.inf
     """Lower bound."""
@@ -42,8 +43,9 @@ class Parameter:
     unit: str = ""
     """For tables."""
     known: tuple[float, ...] | None = None
-    """A value for each record, which no fit changes. `Problem.build` makes such
-    parameters of the `constants` of recordings."""
+    """A value for each record, which no fit changes. `Problem.build` creates such
+    parameters from the `constants` of recordings.
+    """
 
     def __post_init__(self):
         if not self.tolerance > 0:
@@ -59,11 +61,11 @@ class Parameter:
 
     @property
     def prior_stderr(self) -> float:
-        """Standard deviation of what is known beforehand."""
+        """Standard deviation of the prior."""
         return self.tolerance / math.sqrt(3.0)
 
     def size(self, value: float) -> float:
-        """Return a change that matters, positive."""
+        """Return the size of a relevant change, positive."""
         if self.scale is not None:
             return self.scale
         if math.isfinite(self.tolerance):

@@ -4,12 +4,12 @@ import numpy as np
 from jaxtyping import Float
 
 
-# Shorter pieces would hardly tell their own initial states
+# Shorter pieces would hardly determine their own initial states
 _SHORTEST = 12
-# A cubic must leave less than this part of what a straight line leaves: a sine passes
-# up to about half of its period
+# The residual of a cubic must be less than this fraction of that of a straight line: a
+# sine passes up to about half of its period
 _PART = 0.05
-# Residuals up to so many times the noise are noise, whatever the curvature
+# Residuals up to this multiple of the noise are noise, for any curvature
 _NOISE = 2.0
 # Part of the windows of a flight that must pass
 _MOST = 0.75
@@ -18,11 +18,11 @@ _MOST = 0.75
 def bearable_length(
     samples: Float[np.ndarray, " k"], noise: float, longest: int
 ) -> int:
-    """Longest piece of a flight that a cubic follows, in samples.
+    """Return the longest piece of a flight that a cubic follows, in samples.
 
     The state at the beginning of a piece is found from a polynomial through it, and a
     prediction over more than half a period has more than one optimum in the frequency.
-    Tried are `longest` and shorter lengths by factors of about 0.7.
+    It tries `longest` and shorter lengths by factors of about 0.7.
 
     **Arguments:** samples of one flight, their noise, and the most samples of a piece.
     """
@@ -35,7 +35,7 @@ def bearable_length(
 
 
 def _followed(values, noise: float, length: int) -> bool:
-    """Whether cubics follow most windows of this length."""
+    """Return whether cubics follow most windows of this length."""
     length = min(length, len(values))
     if length < _SHORTEST:
         return True
@@ -48,7 +48,7 @@ def _followed(values, noise: float, length: int) -> bool:
 
 
 def _left_over(windows, degree: int):
-    """Rms of what a polynomial leaves of each window, `(w,)`."""
+    """Return the rms residual of a polynomial in each window, `(w,)`."""
     length = windows.shape[1]
     place = np.linspace(-1.0, 1.0, length)
     basis, _ = np.linalg.qr(place[:, None] ** np.arange(degree + 1))

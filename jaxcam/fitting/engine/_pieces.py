@@ -1,4 +1,4 @@
-"""Recordings cut into short pieces, as arrays for a compiled program."""
+"""Cut recordings into short pieces, as arrays for a compiled program."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -14,11 +14,11 @@ from ...recordings.cut import measured_noise
 from ._piece_length import bearable_length
 
 
-# A piece has at most so many samples: long enough for its own initial state, short
-# beside the time over which impacts magnify an error
+# Largest number of samples in a piece: enough for its own initial state, short compared
+# with the time over which impacts magnify an error
 _PIECE = 100
-# A flight with fewer samples than this tells nothing by itself; between two impacts, so
-# few show its velocity, and it ties the flights before and after it
+# A flight with fewer samples than this gives no information by itself; between two
+# impacts, this many determine its velocity and link the flights before and after it
 _LEAST, _TIED = 8, 3
 # what precedes a piece
 FREE, FLIGHT, IMPACT = 0, 1, 2
@@ -48,7 +48,7 @@ class Pieces(eqx.Module):
     """Everything of some records that a fit needs.
 
     - `flown`, `rested`: samples in flight and in contact.
-    - `joint`: what comes before each piece of flight: nothing, flight, or an impact.
+    - `joint`: the predecessor of each piece of flight: nothing, flight, or an impact.
     - `exists`: false where padded. `angle`, `rate` `(r, k, n)`: the drive in the middle
         of each step; `angle_at`, `rate_at` `(r, k)`: at the beginning of each piece.
         Of a measured input, `angle` is the level and `rate` is zero.
@@ -74,7 +74,7 @@ class Pieces(eqx.Module):
 
 @dataclasses.dataclass(frozen=True)
 class Span:
-    """One piece: from when to when, which samples, and what came before it."""
+    """One piece: its time span, its samples, and its predecessor."""
 
     start: float
     stop: float
@@ -86,10 +86,10 @@ class Span:
 def spans(
     segments: Segments, curved: Sequence[str] | None = None, rests: bool = True
 ) -> tuple[list[Span], list[Span]]:
-    """The pieces of flight and of contact of one record.
+    """Return the pieces of flight and of contact of one record.
 
-    **Arguments:** pieces of an oscillation are shorter, by the channels `curved` (by
-    default the one that was cut). Contacts are left out without `rests`.
+    **Arguments:** pieces of an oscillation are shorter, by the channels `curved`
+    (default the segmented channel). Contacts are left out without `rests`.
     """
     record = segments.recording
     time, interval = record.time, record.interval
@@ -129,7 +129,7 @@ def spans(
     rested = []
     for number, contact in enumerate(segments.contacts if rests else ()):
         rows = np.flatnonzero(segments.resting(contact) & valid)
-        # by time: where little of a contact is beyond doubt, samples lie far apart
+        # by time: if little of a contact is certain, samples lie far apart
         whole = np.arange(rows[0], rows[-1] + 1) if len(rows) else rows
         for stretch in np.array_split(whole, max(1, -(-len(whole) // _PIECE))):
             block = np.intersect1d(stretch, rows, assume_unique=True)
@@ -140,19 +140,23 @@ def spans(
 
 
 def _sharp(edge, interval: float) -> bool:
-    """Whether a boundary is an impact whose time is known well enough to join there."""
+    """Return whether a boundary is an impact with a time known well enough for a
+    joint.
+    """
     return edge.kind == "impact" and bool(edge.stderr < 2 * interval)
 
 
 def _margin(edge, interval: float) -> float:
-    """Samples closer to a boundary than this may be on its other side."""
+    """Return the distance from a boundary within which samples may be on its other
+    side.
+    """
     if edge.kind == "end of record":
         return 0.0
     if edge.kind == "several impacts":
         return edge.stderr
     error = edge.stderr if np.isfinite(edge.stderr) else interval
     least = interval / 2 + 2 * min(error, 2 * interval)
-    # a flight that seems to begin too early would be asked to follow a contact
+    # a flight that appears to begin too early would be fitted to a contact
     return max(least, error) if edge.kind == "release" else least
 
 
@@ -164,14 +168,14 @@ def gather(
     curved: Sequence[str] | None = None,
     rests: bool = True,
 ) -> tuple[Pieces, list[tuple[list[Span], list[Span]]]]:
-    """Pieces of some records, padded so that similar records share a program.
+    """Gather pieces of some records, padded so that similar records share a program.
 
     **Arguments:** `measured` is the channel of an input, in the place of a drive;
     `curved` and `rests` are those of `spans`.
 
-    **Raises:** `RecordingError` where there is nothing to fit.
+    **Raises:** `RecordingError` if there is nothing to fit.
     """
-    # the curvature that a measured input makes is known
+    # the curvature due to a measured input is known
     curved = curved if measured is None else ()
     cuts = [spans(part, curved, rests) for part in segments]
     if not any(flown for flown, _ in cuts):

@@ -27,7 +27,7 @@ class Nodes(NamedTuple):
 
 
 def fly(model: Model, state, start, step, angle, rate):
-    """One piece of flight by classical Runge-Kutta.
+    """Integrate one piece of flight by classical Runge-Kutta.
 
     **Returns:** the state at its end `(n,)`, and its `Nodes`.
     """
@@ -35,7 +35,7 @@ def fly(model: Model, state, start, step, angle, rate):
     def advance(x, inputs):
         number, a, w = inputs
         t0 = start + number * step
-        # the drive turns evenly within a step
+        # the drive turns uniformly within a step
         system = model.driven(t0 + step / 2, a, w)
         x1, k1 = runge_kutta(model, system, t0, x, step)
         return x1, (x, k1)
@@ -74,7 +74,9 @@ def runge_kutta(model: Model, system, t, x, h):
 
 
 def rest(model: Model, guess, start, step, angle, rate):
-    """`Nodes` of one piece of contact; `guess` `(n,)` is a state near the surface."""
+    """Return `Nodes` of one piece of contact; `guess` `(n,)` is a state near the
+    surface.
+    """
 
     def seen(x):
         return jnp.stack([s.seen(x) for s in model.sensors.values()])
@@ -122,7 +124,7 @@ def contact_state(system, t, guess):
 
 
 def _least(slopes, residual):
-    """The least step that changes two conditions by a residual."""
+    """Return the least step that changes two conditions by a residual."""
     (a, b), (_, d) = slopes @ slopes.T
     det = a * d - b * b
     first, second = residual
@@ -131,10 +133,10 @@ def _least(slopes, residual):
 
 
 def samples(model: Model, nodes: Nodes, start, step, place, along):
-    """Every channel at each sample, shape `(n, m, c)`, by cubic Hermite polynomials.
+    """Sample every channel, shape `(n, m, c)`, by cubic Hermite polynomials.
 
-    **Arguments:** `along` each step, when the drive is where it is stated, its angle
-    and its rate.
+    **Arguments:** the position `along` each step at which the drive is given, its angle
+    and rate.
     """
     u = place[..., None]
     left, right = nodes.left[:, None], nodes.right[:, None]
@@ -161,7 +163,7 @@ def samples(model: Model, nodes: Nodes, start, step, place, along):
 
 
 def _errors(model: Model, start, step, place, along, value, slope):
-    """What sensors show besides, at each sample, `(n, m, c)`."""
+    """Return systematic errors of the sensors at each sample, `(n, m, c)`."""
 
     def one_step(number, places, when, angle, rate, values, slopes):
         system = model.driven(when, angle, rate)
@@ -193,14 +195,15 @@ class Joint(NamedTuple):
 
 
 def flight_joint(end, state) -> Joint:
-    """Between two pieces of the same flight."""
+    """Return the joint between two pieces of the same flight."""
     return Joint(state - end, jnp.zeros_like(end[0]))
 
 
 def impact_joint(model: Model, end, state, t, angle, rate, reach) -> Joint:
-    """Between two flights, at the instant at which they have the same gap.
+    """Return the joint between two flights, at the time at which they have the same
+    gap.
 
-    Not a search for an event: both flights are known, and which impact joins them.
+    No event search is needed: both flights and the impact between them are known.
     """
     size = end.shape[0] - len(filtered_channels(model))
     system = model.driven(t, angle, rate)
@@ -211,7 +214,9 @@ def impact_joint(model: Model, end, state, t, angle, rate, reach) -> Joint:
         return _nearest(system, t, x[:size])
 
     def moved(shift):
-        """Both flights at another time: states, their rates, gaps and their rates."""
+        """Return both flights at another time: states, their rates, gaps and their
+        rates.
+        """
 
         def move(x):
             x = runge_kutta(model, system, t, x, shift)[0]

@@ -1,11 +1,11 @@
-"""Recordings and a model, ready to be fitted: the engine's front door.
+"""Build fitting problems from recordings and a model: the interface of the engine.
 
 **How it works.** A recording is cut (`jaxcam.recordings.segment`) into flights,
 contacts and impacts. Every flight is cut again into pieces of at most 100 samples and
 about half a period of what it shows. Each piece has an initial state of its own and is
-predicted from it alone, all pieces of all records side by side, so nothing is predicted
-over longer than it can be known; a chaotic record is as good as any other. Pieces are
-tied together by what the model says of their joints:
+predicted from it alone, all pieces of all records side by side, so no prediction
+exceeds the predictable time, also in a chaotic record. Pieces are connected by joints,
+whose conditions the model gives:
 
 - within a flight, a piece begins where the one before it ends;
 - at an impact, two flights meet at the instant at which their gaps agree (an event, not
@@ -13,10 +13,10 @@ tied together by what the model says of their joints:
   zero and the motion after be the impact law of the motion before;
 - contacts are predicted from the surface alone.
 
-A joint is as sharp as the drive is known, by its encoder. The initial states are
-eliminated exactly (they form a chain, hence block-tridiagonal normal equations); what
-remains are the normal equations of the few parameters. One iteration over six records
-of 4 s at 2 kHz with ten parameters takes about a tenth of a second.
+The accuracy of a joint is that of the drive, measured by its encoder. The initial
+states are eliminated exactly (they form a chain, hence block-tridiagonal normal
+equations); what remains are the normal equations of the few parameters. One iteration
+over six records of 4 s at 2 kHz with ten parameters takes about a tenth of a second.
 
 **Use.**
 
@@ -39,10 +39,10 @@ compiled program, as long as the number of free ones, rounded up to a multiple o
 is the same. So candidates for missing physics are best stated as terms of one system
 with strengths of zero, all in one problem, and freed by name. `linearise(problem, fit)`
 gives score and information of all parameters at once, free or not: what each candidate
-would gain is then linear algebra (`Linearised.gain`). `weights` (one a piece) leave
-records or blocks out without compiling anew; `held_out_cost(problem, found, weights)`
-is what a fit says of data it has not seen: the states of their pieces are fitted to
-them, the parameters are not.
+would gain is then linear algebra (`Linearised.gain`). `weights` (one a piece) omit
+records or blocks without compiling again; `held_out_cost(problem, found, weights)` is
+the cost of held-out data: the states of their pieces are fitted to them, the parameters
+are not.
 """
 
 import dataclasses
@@ -106,7 +106,7 @@ class Problem:
     parameters: tuple[Parameter, ...]
     """Parameters that may be fitted."""
     segments: tuple[Segments, ...]
-    """The recordings, cut into their parts."""
+    """The segmented recordings."""
     pieces: Pieces
     """Pieces of the recordings, as arrays."""
     spans: tuple[tuple[list[Span], list[Span]], ...]
@@ -127,17 +127,17 @@ class Problem:
         Args:
             model: A system with its sensors, at nominal parameters.
             segments: Recordings from `jaxcam.recordings.segment_case` or `segment`;
-                what is in their `constants` becomes a parameter that no fit changes.
+                their `constants` become parameters that no fit changes.
             parameters: Those that may be fitted, free or not.
 
         Returns:
             A `Problem`.
 
         Raises:
-            RecordingError: For a missing channel, a record without flight, or a
-                constant that is no number of the system.
-            ValueError: For a parameter that is not one number of the model, or a model
-                that gives none where the data are.
+            RecordingError: A channel is missing, a record has no flight, or a constant
+                is not a number of the system.
+            ValueError: A parameter is not one number of the model, or the model is not
+                finite near the data.
         """
         segments = tuple(segments)
         if not segments:
@@ -161,7 +161,7 @@ class Problem:
         steps, first, extras = _STEPS, _STEPS, None
         # filtered channels are smooth where the motion is not
         curved = [name for name in model.sensors if not model.sensors[name].filtered]
-        # what is at rest in a motion of several coordinates, contact does not tell
+        # contact does not show which of several coordinates are at rest
         rests = state_size(model) <= 2
         while True:
             pieces, cuts = gather(
@@ -174,7 +174,7 @@ class Problem:
             point = Point(jnp.asarray(values), jnp.asarray(states))
             refuse_not_finite(layout, segments, pieces, point)
             if extras is None:
-                # as a scale of errors, that of the first steps will do for all
+                # the error scale of the first steps is sufficient for all
                 extras, first = joint_sharpness(layout, pieces, point, guess), steps
             fine = fine_enough(layout, pieces, extras, point, longest_flight(cuts))
             if steps >= _MOST_STEPS or fine:
@@ -213,14 +213,14 @@ class Problem:
 
     @property
     def longest_flight(self) -> int:
-        """Number of pieces of the flight that has most of them."""
+        """Largest number of pieces in a flight."""
         return longest_flight(self.spans)
 
     def parameter(self, name: str) -> Parameter:
         """Return the parameter of this name.
 
         Raises:
-            ValueError: That lists the names there are.
+            ValueError: The name is unknown; the message lists the names.
         """
         for parameter in self.parameters:
             if parameter.name == name:

@@ -1,4 +1,4 @@
-"""Refuse an invalid problem before anything is fitted; each message is a sentence."""
+"""Reject an invalid problem before fitting; each message is a sentence."""
 
 import equinox as eqx
 import jax
@@ -11,7 +11,7 @@ from ._pieces import Pieces
 
 
 def refuse_not_finite(layout: Layout, segments, pieces: Pieces, point: Point) -> None:
-    """A field that is no number where the data are cannot be fitted to them."""
+    """Raise `ValueError` for a vector field that is not finite near the data."""
     rates = np.asarray(_rates(layout, point, pieces))
     bad = pieces.exists & ~np.all(np.isfinite(rates), axis=-1)
     if np.any(bad):
@@ -26,7 +26,7 @@ def refuse_not_finite(layout: Layout, segments, pieces: Pieces, point: Point) ->
 
 @eqx.filter_jit
 def _rates(layout: Layout, point: Point, pieces: Pieces):
-    """Rate of change of each state that pieces start from."""
+    """Return the rate of change at the initial state of each piece."""
 
     def one(values, states, start, angle, rate):
         model = layout.at(values)

@@ -1,4 +1,4 @@
-"""Choose the sharpness of the joints between pieces, from drive and samples."""
+"""Choose the accuracy of the joints between pieces, from drive and samples."""
 
 import equinox as eqx
 import jax
@@ -12,11 +12,11 @@ from ._pieces import IMPACT, Pieces
 from ._predict import fly
 
 
-# A joint within a flight is this much sharper than what its samples say of the state
+# A joint within a flight is this much sharper than its samples determine the state
 JOINT = 1e-3
-# An impact is this much sharper than what the flights on both sides say of themselves:
-# a tenth of their variance is next to nothing to lose, and it forgets what chaos and
-# small faults of the model make of the past
+# An impact is this much sharper than the flights on both sides are determined: losing a
+# tenth of their variance is negligible, and it removes the effects of chaos and of
+# small model errors
 _IMPACT = 10**-0.5
 _WIDTH = 4
 # Columns above which programs are as wide as what is free, and by how many they differ
@@ -26,15 +26,17 @@ _FEW_STEPS = 20
 
 
 def width_of(number: int) -> int:
-    """Columns that programs are compiled for: a multiple of four, to share them."""
+    """Return the number of columns of compiled programs: a multiple of four, to
+    share them.
+    """
     return _WIDTH * max(1, -(-number // _WIDTH))
 
 
 def shared_width(free: int, most: int) -> int:
-    """Columns of a program for some of so many numbers.
+    """Return the number of columns of a program for a subset of the numbers.
 
-    Few are all computed at once, whichever are free, so that one program serves every
-    choice; of many, no more than a multiple of thirty-two.
+    A small set is always computed completely, so that one program serves every choice;
+    a large set is rounded up to a multiple of 32.
     """
     whole = width_of(most)
     return whole if whole <= _MANY else min(whole, _STRIDE * -(-free // _STRIDE))
@@ -55,13 +57,13 @@ def joint_sharpness(layout: Layout, pieces: Pieces, point: Point, guess) -> Extr
     blocks, _ = states_only(layout, alone, extras, point)
     information = jnp.diagonal(blocks.ss, axis1=-2, axis2=-1)
     usual = jnp.nanmedian(jnp.where(information > 0, information, jnp.nan), axis=(0, 1))
-    # a state that no sample sees is tied as tightly as the least visible one
+    # an unobserved state is tied as tightly as the least observable state
     usual = jnp.where(jnp.isnan(usual), jnp.nanmin(usual), usual)
     floor = JOINT / jnp.sqrt(usual)
     flight = jnp.broadcast_to(floor, one.shape)
     piece = flight / JOINT
     if np.any(np.asarray(pieces.drive_error) > 0):
-        # a field that the drive acts on is known as well as the drive
+        # a component driven by the drive is known as well as the drive
         by_drive = _drive_in_flight(layout, pieces, point)
         flight = jnp.sqrt(flight**2 + jnp.nan_to_num(by_drive) ** 2)
     sharp = extras._replace(sharpness=Sharpness(flight, flight, one[..., 0], piece))
@@ -78,7 +80,9 @@ def joint_sharpness(layout: Layout, pieces: Pieces, point: Point, guess) -> Extr
 
 
 def states_only(layout: Layout, pieces: Pieces, extras: Extras, point: Point):
-    """Normal equations of the states, with all parameters held, and the costs."""
+    """Return normal equations of the states, with all parameters held, and the
+    costs.
+    """
     # as wide as a fit of everything, which then is compiled already; of many steps, a
     # program of its own is soon worth the time that it takes to compile
     few = pieces.angle.shape[-1] <= _FEW_STEPS
@@ -89,21 +93,21 @@ def states_only(layout: Layout, pieces: Pieces, extras: Extras, point: Point):
 
 
 def loosened(extras: Extras) -> Extras:
-    """Joints within flights that give as much as the samples of a piece allow.
+    """Return joints within flights that are as loose as the samples of a piece allow.
 
-    States that the data suggest do not join. Where a flight has many pieces, to close
-    them all at once would be to foretell the last one from the first, with parameters
-    that are not yet known.
+    States that the data suggest do not join. Where a flight has many pieces, closing
+    all of them at once would predict the last piece from the first with inaccurate
+    parameters.
     """
     sharpness = extras.sharpness
     return extras._replace(sharpness=sharpness._replace(flight=sharpness.piece))
 
 
 def separated(extras: Extras) -> Extras:
-    """Joints that tie next to nothing, so that what each piece shows speaks alone.
+    """Return joints that are so loose that each piece is fitted separately.
 
-    A force that the model lacks is in every piece; what becomes of it through impacts
-    and other flights is far from linear.
+    A force that the model lacks acts in every piece; its effect through impacts and
+    other flights is strongly nonlinear.
     """
     sharp = extras.sharpness
     return extras._replace(
@@ -114,7 +118,9 @@ def separated(extras: Extras) -> Extras:
 
 
 def _variances(ss, before):
-    """Variance of each state from the samples of its own flight, shape `(r, k, n)`."""
+    """Return the variance of each state from the samples of its flight, shape `(r,
+    k, n)`.
+    """
     records, width, size, _ = ss.shape
     found = np.zeros((records, width, size))
     for r in range(records):
@@ -134,10 +140,10 @@ def _variances(ss, before):
 
 @eqx.filter_jit
 def _drive_in_flight(layout: Layout, pieces: Pieces, point: Point):
-    """Error of the state at the beginning of each piece, `(r, k, n)`, due to the drive.
+    """Return the error of each piece's initial state, `(r, k, n)`, due to the drive.
 
-    Errors of the drive during the piece before it make it, independent from piece to
-    piece.
+    It results from errors of the drive during the previous piece, independent from
+    piece to piece.
     """
 
     def one(values, error, states, start, step, angles, rates):
@@ -161,7 +167,9 @@ def _drive_in_flight(layout: Layout, pieces: Pieces, point: Point):
 
 @eqx.filter_jit
 def _drive_slopes(layout: Layout, pieces: Pieces, point: Point):
-    """Slope of the gap, `(r, k, n)`, and errors of an impact due to the drive."""
+    """Return the slope of the gap, `(r, k, n)`, and errors of an impact due to the
+    drive.
+    """
 
     def one(values, state, t, angle, rate, error):
         model = layout.at(values)

@@ -1,4 +1,4 @@
-"""States from which the pieces of a recording are predicted at first."""
+"""Estimate initial states of the pieces of a recording."""
 
 import dataclasses
 
@@ -14,12 +14,12 @@ from ._pieces import Pieces, Span
 
 
 def state_size(model: Model) -> int:
-    """Number of components of the system's state."""
+    """Return the number of components of the system's state."""
     return size_of(model.system, {n: s.observe for n, s in model.sensors.items()})
 
 
 def suggested_starts(model: Model, segments, cuts, pieces: Pieces):
-    """States that polynomials through the samples suggest, shape `(r, k, n)`."""
+    """Estimate states by polynomials through the samples, shape `(r, k, n)`."""
     size = state_size(model)
     lags = filtered_channels(model)
     sensors = model.sensors
@@ -48,7 +48,9 @@ def suggested_starts(model: Model, segments, cuts, pieces: Pieces):
 
 
 def _still(model: Model, part: Segments):
-    """The system with its drive at the mean speed; its field serves as a guide only."""
+    """Return the system with its drive at the mean speed; its field serves as a
+    guide only.
+    """
     if part.drive is None:
         return model.system
     # arrays: numbers would be constants of a program that is compiled for each record
@@ -57,7 +59,9 @@ def _still(model: Model, part: Segments):
 
 
 def _with_samples(side: list[Span]):
-    """Pieces too short for a polynomial borrow the samples of their neighbours."""
+    """Extend pieces that are too short for a polynomial by samples of their
+    neighbours.
+    """
     for k, span in enumerate(side):
         if len(span.rows) >= 4:
             yield span
@@ -68,7 +72,7 @@ def _with_samples(side: list[Span]):
 
 
 def _local(part: Segments, span: Span, channel: str, sensor):
-    """Value and slope of a channel at the beginning of a piece."""
+    """Return value and slope of a channel at the beginning of a piece."""
     time = part.recording.time[span.rows]
     values = part.recording[channel][span.rows]
     fine = np.isfinite(values)

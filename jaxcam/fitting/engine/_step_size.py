@@ -1,4 +1,4 @@
-"""Whether the steps of pieces are short enough for the model and its sensors."""
+"""Check that the steps of pieces are short enough for the model and its sensors."""
 
 import equinox as eqx
 import jax
@@ -14,7 +14,7 @@ from ._predict import fly
 
 # Change (in units of the noise) that halving the steps may make
 _STEP_ERROR = 0.01
-# Pieces of a flight from which on that must be less, as errors add up along it
+# Number of pieces above which the limit decreases, as errors add up along a flight
 _LONG = 16
 # Step over time constant of a filter: Hermite's error is then 1e-4 of a jump
 _FILTER_STEP = 0.4
@@ -27,9 +27,9 @@ def longest_flight(cuts) -> int:
 
 
 def follows_inputs(model: Model, segments, pieces: Pieces) -> bool:
-    """Whether the steps are short beside the filters of the sensors, and the input.
+    """Return whether the steps are short compared with sensor filters and input.
 
-    A filter is not at rest after an impact, which the states to begin with do not show.
+    A filter is not at rest after an impact, which the initial states do not show.
     """
     longest = float(np.max(np.where(pieces.exists, pieces.flown.step, 0.0)))
     interval = min(part.recording.interval for part in segments)
@@ -42,7 +42,7 @@ def follows_inputs(model: Model, segments, pieces: Pieces) -> bool:
 def fine_enough(
     layout: Layout, pieces: Pieces, extras: Extras, point: Point, flight: int
 ) -> bool:
-    """Whether half the steps would change no state by a part of its error.
+    """Return whether halving the steps changes all states by less than their errors.
 
     **Arguments:** `flight` is the number of pieces of the longest flight.
     """

@@ -1,4 +1,4 @@
-"""Systems in Python files of a user's own, and their fields by name."""
+"""Load systems from a user's Python files, and access their fields by name."""
 
 from ._field import Field as Field
 from ._stated_system import stated_system as stated_system

@@ -1,4 +1,4 @@
-"""A number of a system by its dotted name, as what picks it."""
+"""Pick a number of a system by its dotted name."""
 
 import dataclasses
 from typing import Any

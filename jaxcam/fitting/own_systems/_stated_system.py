@@ -1,4 +1,4 @@
-"""A system made of the values that a rig file states for its fields."""
+"""Create a system from the values in a rig file."""
 
 import difflib
 import inspect
@@ -19,7 +19,7 @@ from ._system_file import fault
 
 
 Stated: TypeAlias = float | bool | str
-"""A number, or what a field holds that is none."""
+"""A number, or another value of a field."""
 
 
 def stated_system(
@@ -88,7 +88,7 @@ def stated_system(
 def _as_declared(
     file: Path, name: str, value: Stated, declared: inspect.Parameter, varies: bool
 ) -> Any:
-    """The value as a field of its kind holds it.
+    """Convert a value to the type of its field.
 
     **Raises:** `RigError` for a word or a flag where a number belongs.
     """
@@ -120,7 +120,7 @@ def _unknown(
 
 
 def _refuse_broken(file: Path, system: HybridSystem) -> None:
-    """**Raises:** `RigError` for functions that fail, or are of the wrong shape."""
+    """Raise `RigError` for functions that fail, or return a wrong shape."""
     name, count = type(system).__name__, len(system.state_names)
     if not count:
         raise RigError(

@@ -1,4 +1,4 @@
-"""Systems in Python files of their own: `two_stops.py:TwoStops`."""
+"""Load systems from Python files: `two_stops.py:TwoStops`."""
 
 import difflib
 import hashlib
@@ -15,7 +15,7 @@ from ...recordings import RigError
 from ...recordings.files import printable
 
 
-# letters of somebody else's message that are repeated
+# number of characters of a foreign message that are repeated
 _MOST = 200
 # programs are compiled for classes: a file that did not change is not run again
 _loaded: dict[Path, tuple[bytes, ModuleType]] = {}
@@ -74,7 +74,7 @@ def system_source(cls: type[HybridSystem]) -> str | None:
 
 
 def classes_beside(cls: type[HybridSystem]) -> tuple[type, ...]:
-    """Modules that the file of a system has: what `load_system` may meet."""
+    """Return the classes in the file of a system, for `load_system`."""
     there = vars(sys.modules[cls.__module__]).values()
     return tuple(
         one for one in there if inspect.isclass(one) and issubclass(one, eqx.Module)
@@ -82,7 +82,7 @@ def classes_beside(cls: type[HybridSystem]) -> tuple[type, ...]:
 
 
 def split_name(named: str) -> tuple[str, str]:
-    """File and class of `FILE.py:CLASS`; no class where none is named."""
+    """Split `FILE.py:CLASS` into file and class; the class may be missing."""
     path, colon, name = named.rpartition(":")
     # the colon of a drive, as in C:\rigs\cart.py, names no class
     return (path, name) if colon and name.isidentifier() else (named, "")
@@ -105,7 +105,7 @@ def fault(error: BaseException, file: Path | None = None) -> str:
 
 
 def _module(file: Path) -> ModuleType:
-    """Return the definitions of a file, run once as long as it stays the same."""
+    """Return the definitions of a file, which is run again only if it changes."""
     if file.suffix != ".py":
         raise RigError(f"{file}: name a Python file and a class, as in cart.py:Cart.")
     if not file.is_file():
@@ -135,7 +135,7 @@ def _module(file: Path) -> ModuleType:
 
 
 def _systems(module: ModuleType) -> list[str]:
-    """Names of the systems that a file defines itself."""
+    """Return the names of the systems defined in a file."""
     return [
         name
         for name, one in vars(module).items()

@@ -1,4 +1,4 @@
-"""Parameters from printed numbers instead of recordings."""
+"""Fit parameters to printed numbers instead of recordings."""
 
 from ._free_fall import fit_free_fall as fit_free_fall, FreeFall as FreeFall
 from ._interruption_point import (

@@ -1,4 +1,4 @@
-"""The ratio of inertia to stiffness from a free fall, as in section 4.6."""
+"""Fit the ratio of inertia to stiffness to a free fall (thesis, section 4.6)."""
 
 import dataclasses
 from collections.abc import Callable
@@ -18,7 +18,7 @@ from ._published_fit import PublishedFit
 
 
 class FreeFall(eqx.Module):
-    """A system, and the state from which it was released."""
+    """A system and its state at release."""
 
     system: HybridSystem
     """The system."""

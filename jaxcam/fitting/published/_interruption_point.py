@@ -1,4 +1,4 @@
-"""The parameter at which complete chattering is interrupted, as a published number."""
+"""Compute the parameter at which complete chattering is interrupted, for a fit."""
 
 from collections.abc import Callable
 from typing import Any

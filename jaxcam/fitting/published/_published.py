@@ -1,6 +1,6 @@
-"""Parameters from printed numbers instead of recordings.
+"""Fit parameters to printed numbers instead of recordings.
 
-The data are numbers that somebody published (multipliers, positions, speeds,
+The data are published numbers (multipliers, positions, speeds,
 bifurcation points), the model is the differentiable function that computes them, and
 nominal values with tolerances are the prior:
 
@@ -34,7 +34,7 @@ class Published(eqx.Module):
     """Printed numbers, and the function that computes them from the model.
 
     Raises:
-        ValueError: For an error that is not positive.
+        ValueError: An error is not positive.
 
     Examples:
         >>> from jaxcam.fitting import Published
@@ -141,7 +141,7 @@ def fit_published(
 
     @eqx.filter_jit
     def program(unknowns, model):
-        # one call site: tracing and compiling the quantities is what takes long
+        # one call site: tracing and compiling the quantities takes most of the time
         def twice(unknowns):
             value = predicted(unknowns, model)
             return value, value
@@ -197,7 +197,7 @@ def _check_lengths(number: int, names, priors) -> None:
 
 
 def _refuse_lost(published, values) -> None:
-    """Raise where a quantity cannot be computed."""
+    """Raise `ValueError` if a quantity cannot be computed."""
     lost = [
         p.name
         for p, part in zip(published, _split(published, values), strict=True)
@@ -210,7 +210,9 @@ def _refuse_lost(published, values) -> None:
 
 
 def _least_squares(describe, values, errors, weights, unknowns, max_steps):
-    """The optimum for these errors; `describe` gives quantities and their slopes."""
+    """Return the optimum for these errors; `describe` gives quantities and their
+    slopes.
+    """
 
     def residuals(unknowns):
         misses = (describe(unknowns)[0] - values) / errors
@@ -237,7 +239,7 @@ def _least_squares(describe, values, errors, weights, unknowns, max_steps):
 
 
 def _described(program, cost, progress):
-    """Quantities and their slopes; the last evaluation is kept."""
+    """Return quantities and their slopes; the last evaluation is cached."""
     counted = itertools.count(1)
 
     @functools.lru_cache(maxsize=1)

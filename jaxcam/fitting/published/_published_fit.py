@@ -36,13 +36,15 @@ class PublishedFit:
     covariance: Float[np.ndarray, "p p"]
     """Covariance of the estimates, shape `(p, p)`."""
     shares: Float[np.ndarray, " p"]
-    """`(p,)` and `(p, p)`; how much of what is known of each combination of parameters
-    comes from the data and not from the priors (1 all, 0 nothing), ascending, and the
-    combinations, one a row, in units of the tolerances."""
+    """`(p,)` and `(p, p)`; share of the information on each combination of
+    parameters that comes from the data and not from the priors (0 to 1), ascending,
+    and the combinations, one per row, in units of the tolerances.
+    """
     directions: Float[np.ndarray, "p p"]
-    """`(p,)` and `(p, p)`; how much of what is known of each combination of parameters
-    comes from the data and not from the priors (1 all, 0 nothing), ascending, and the
-    combinations, one a row, in units of the tolerances."""
+    """`(p,)` and `(p, p)`; share of the information on each combination of
+    parameters that comes from the data and not from the priors (0 to 1), ascending,
+    and the combinations, one per row, in units of the tolerances.
+    """
     published: tuple[Any, ...]
     """The published numbers."""
     predicted: Float[np.ndarray, " n"]
@@ -73,7 +75,7 @@ class PublishedFit:
         units = np.where(finite, tolerances, np.where(nominal == 0, 1, np.abs(nominal)))
         scaled = jacobian * units
         information = scaled.T @ scaled
-        # a parameter without a prior has no share of one
+        # a parameter without a prior has no prior share
         prior = np.diag(finite.astype(float))
         inverse = np.linalg.pinv(information + prior, hermitian=True)
         eigenvalues, vectors = np.linalg.eigh(information)

@@ -1,4 +1,4 @@
-"""Run many trajectories in fewer slots than there are trajectories."""
+"""Run many trajectories in a smaller number of batch positions."""
 
 from ._layout import Horizon as Horizon, Lanes as Lanes, split_lanes as split_lanes
 from ._refilled_lanes import Chunking as Chunking, run_refilled as run_refilled

@@ -67,7 +67,7 @@ class Lanes(NamedTuple):
     """(lanes, n)."""
 
     def some(self, which: slice) -> "Lanes":
-        """A part of the lanes."""
+        """Return a part of the lanes."""
         values = None if self.values is None else self.values[which]
         return self._replace(values=values, states=self.states[which])
 
@@ -95,10 +95,10 @@ class LaneStart(NamedTuple):
 
 
 def start_lanes(lanes: Lanes, horizon: Horizon, settings, width: int) -> LaneStart:
-    """The start of lanes; `width` of them will run at a time."""
+    """Return the start of lanes; `width` of them will run at a time."""
     pieces, count = [], len(lanes.states)
     whole = jnp.asarray(float(horizon.number))
-    # filled up, so that two compiled programs serve all numbers of lanes
+    # padded, so that two compiled programs serve all numbers of lanes
     part_size = width if count <= 2 * width else _AT_ONCE * width
     for first in range(0, count, part_size):
         some = np.minimum(np.arange(first, first + part_size), count - 1)
@@ -118,8 +118,8 @@ def start_lanes(lanes: Lanes, horizon: Horizon, settings, width: int) -> LaneSta
 def compiled_chunk(
     start: LaneStart, own: Packed, shared: Packed, rows: int, row: Callable
 ):
-    """The compiled loop: own and shared parts, each as numbers and what is apart, and
-    the numbers of the lanes, to numbers and log.
+    """Return the compiled loop: own and shared parts, each as numbers and what is
+    apart, and the numbers of the lanes, to numbers and log.
 
     It makes `rows` attempts in each slot, in whole blocks. `row` is that of a `Table`;
     of each of its numbers the log has one array, `(rows, slots)`, first the places plus
@@ -172,7 +172,7 @@ def _chunk(
 
 
 def split_lanes(system, where, values):
-    """The system as a batched and a shared part for `filter_vmap`."""
+    """Return the system as a batched and a shared part for `filter_vmap`."""
     if where is None:
         return None, system
     nothing = jax.tree.map(lambda _: False, system)

@@ -1,4 +1,6 @@
-"""Run a group of lanes in fewer slots: a lane that ends makes room for the next."""
+"""Run a group of lanes in fewer batch positions; the next lane replaces an ended
+one.
+"""
 
 from typing import NamedTuple
 
@@ -33,9 +35,9 @@ class Chunking(NamedTuple):
 def run_refilled(
     lanes: Lanes, horizon: Horizon, settings, chunking: Chunking, table: Table
 ):
-    """Run some lanes; one that ends makes room for the next.
+    """Run some lanes; the next lane replaces one that has ended.
 
-    Lanes do not know of each other, so their order and company change no result. The
+    Lanes are independent, so their order and grouping change no result. The
     log of all goes into the `table`.
 
     Returns:
@@ -51,7 +53,7 @@ def run_refilled(
 
 
 def _by_llvm(start: LaneStart, max_steps: int, table: Table):
-    """The loop as code of this machine, which refills its slots itself."""
+    """Run the loop as LLVM code, which replaces ended lanes itself."""
     count = start.numbers.shape[1]
     shared, shared_layout = laid_out(start.shared)
     own, own_layout = laid_out(start.own, count)
@@ -72,14 +74,14 @@ def _by_llvm(start: LaneStart, max_steps: int, table: Table):
 
 
 def _by_xla(start: LaneStart, chunking: Chunking, table: Table):
-    """Chunks of attempts in all slots, which are refilled between them."""
+    """Run chunks of attempts in all positions, which are refilled between chunks."""
     count, (width, rows, max_steps) = start.numbers.shape[1], chunking
     packed_own, packed_shared = pack(start.own, count), pack(start.shared)
     chunk = compiled_chunk(start, packed_own, packed_shared, rows, table.row)
     place = start.slots.rows
     ends = np.zeros((count, 3), dtype=int)
-    # spread evenly, to learn what the others will cost; slots without a lane of their
-    # own show the last one, and do not run
+    # spread evenly, to estimate the cost of the others; positions without a lane of
+    # their own hold the last one and do not run
     first = np.linspace(0, count - 1, min(width, count)).astype(int)
     work, used = np.full(width, count - 1), np.zeros(width)
     work[: len(first)], running = first, np.arange(width) < count
@@ -98,7 +100,7 @@ def _by_xla(start: LaneStart, chunking: Chunking, table: Table):
         numbers = np.array(numbers)
         counted = [place.status, place.impacts, place.steps]
         ends[work[over]] = numbers[counted].T[over]
-        # who has used up the budget stays where it is
+        # a lane that has used up the budget stays where it is
         numbers[place.status, over], running[over] = FINISHED, False
         if not sorted_yet:
             waiting = costly_first(waiting, work, used, numbers[place.stops])
@@ -112,10 +114,10 @@ def _by_xla(start: LaneStart, chunking: Chunking, table: Table):
 
 
 def costly_first(waiting, work, used, stops):
-    """The waiting lanes, those first that will take most attempts.
+    """Sort the waiting lanes by expected attempts, the largest first.
 
-    A lane that starts last and takes long leaves the other slots empty. Lanes that are
-    neighbours cost alike, so running ones tell: attempts per period so far.
+    A long lane that starts last leaves the other positions idle. Neighbouring lanes
+    have similar costs, so the attempts per period of running lanes predict them.
     """
     order = np.argsort(work, kind="stable")
     each = used[order] / np.maximum(stops[order], 0.5)

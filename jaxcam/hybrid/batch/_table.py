@@ -8,10 +8,10 @@ import numpy as np
 class Table:
     """Rows by batch element and place; NaN where nothing has been written.
 
-    **Arguments:** `row(record, state)`, which makes a place (negative for none) and the
-    numbers of the row there of what an attempt did and the state after it; how many
-    batch elements, places and numbers there are; and the place that comes `first`. A
-    later row replaces an earlier one in its place.
+    **Arguments:** `row(record, state)`, which returns the place (negative for none) and
+    the numbers of the row for an attempt and the state after it; the numbers of batch
+    elements, places and columns; and the place that comes `first`. A later row replaces
+    an earlier one in its place.
     """
 
     def __init__(
@@ -21,9 +21,9 @@ class Table:
         self.numbers = np.full((lanes, places, width), np.nan)
 
     def take(self, work, log) -> None:
-        """Put what some attempts made, `(attempts, slots)` each, where it belongs.
+        """Store the results of attempts, `(attempts, slots)` each, at their places.
 
-        Of the places, which come first, the log has one more: zero is none.
+        Places come first in the log, plus one; zero means none.
         """
         lanes, places, width = self.numbers.shape
         place, *values = [np.asarray(part).ravel() for part in log]

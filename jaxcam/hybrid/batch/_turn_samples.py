@@ -8,7 +8,7 @@ from ._table import Table
 
 
 class TurnSamples:
-    """Samples of a group as they come, and what happened between them."""
+    """Samples of a group, and the events between them."""
 
     def __init__(self, lanes: int, turns: int, skip: int, n: int):
         # the first place is for the skipped periods
@@ -19,13 +19,15 @@ class TurnSamples:
         return self.table.numbers[:, 1:, 2:]
 
     def counts(self):
-        """Impacts and completed chatters in each period; 0 where an element failed."""
+        """Count impacts and completed chatters in each period; 0 where an element
+        failed.
+        """
         so_far = np.nan_to_num(self.table.numbers[..., :2]).astype(int)
         each = np.maximum(np.diff(so_far, axis=1), 0)
         return each[..., 0], each[..., 1]
 
 
 def _row(record, lane):
-    """At the number of a stop, impacts and completed chatters so far, and the state."""
+    """Return stop number, impacts and completed chatters so far, and the state."""
     stop = jnp.where(record.kind == float(RowKind.STOP), lane.stops, -1.0)
     return stop, [lane.impacts, lane.chatters, *record.after]

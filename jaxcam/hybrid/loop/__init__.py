@@ -1,7 +1,7 @@
-"""One attempt at a step of whatever mode is in force, and the loop that repeats it.
+"""Take one attempted step in the current mode, and repeat it in a loop.
 
-A `LoopState` is what a trajectory carries; `iteration` makes an attempt and says what
-it was.
+A `LoopState` holds the state of a trajectory; `iteration` takes an attempted step and
+returns its record.
 """
 
 from ._advance import Plan as Plan

@@ -32,10 +32,10 @@ class Plan(NamedTuple):
     t1: Any
     # the run also stops, and records, at t0 + k stop_period
     stop_period: Any
-    # so short that no whole rise and fall of a surface fits in, where the error of a
-    # step says nothing: in contact, and at rest without a force
+    # caps the step where the error estimate is uninformative: in contact, and at rest
+    # without a force
     longest_step: Any
-    # the same where the error of a step says nothing, also without a period
+    # the same cap without a period
     unseen_step: Any
     # one over the length of the run
     per_run: Any
@@ -48,7 +48,7 @@ class Plan(NamedTuple):
     smallness: Any
     depth: Any
     tableau: Tableau
-    # without what makes the loop fast
+    # without the compiler passes that make the loop fast
     plain: bool
     # whether a step ends exactly at a release, which only derivatives need: the state
     # follows by a series over the little time left
@@ -95,7 +95,9 @@ class Plan(NamedTuple):
 
 
 def _each(absolute) -> tuple | None:
-    """The absolute errors allowed as scalars; one alone counts for all components."""
+    """Return the absolute errors allowed as scalars; one alone counts for all
+    components.
+    """
     if absolute is None:
         return None
     numbers = jnp.ravel(jnp.asarray(absolute, dtype=jnp.float64))
@@ -109,15 +111,15 @@ class Attempt(NamedTuple):
     x: tuple
     contact: tuple
     jets: tuple
-    # the jets before what happened at the end of the step
+    # the jets before the event at the end of the step
     arrived: tuple
     length: Any
     # error of the step over the error allowed
     effort: Any
-    # how far the step itself moved each component, right or wrong
+    # change of each component in the step, accepted or not
     tried: tuple
-    # whether the motion moves on; if not: is the error small enough, are all numbers
-    # finite, is Newton on the surface still settling, and what is a better length
+    # whether the step is accepted; if not: is the error small enough, are all numbers
+    # finite, is Newton's method on the surface still converging, and a better length
     good: Any
     fits: Any
     finite: Any
@@ -143,13 +145,13 @@ class Attempt(NamedTuple):
 
 
 def after_attempt(plan: Plan, carried: LoopState, attempt: Attempt) -> LoopState:
-    """The loop state after an attempt."""
+    """Return the loop state after an attempt."""
     active = carried.status == RUNNING
     good = attempt.good
     longest = _longest(plan, carried, attempt)
     trial = _next_length(plan, carried, attempt, longest)
     fixed = (good & attempt.begins) | (carried.completing & ~good) | attempt.locates
-    # steps too short to move the clock lead nowhere either
+    # steps too short to advance the time make no progress either
     moved = good & (attempt.t > carried.t)
     failures = jnp.where(moved | ~active, 0.0, carried.failures + 1.0)
     stop_gradient = jax.lax.stop_gradient
@@ -191,7 +193,9 @@ def after_attempt(plan: Plan, carried: LoopState, attempt: Attempt) -> LoopState
 
 
 def _longest(plan, carried, attempt):
-    """The longest step that the error allows; short steps say little about it."""
+    """Return the longest step that the error allows; short steps say little about
+    it.
+    """
     h, effort = attempt.length, attempt.effort
     # single precision is plenty for choosing a step, and much cheaper
     rough = jnp.asarray(jnp.clip(effort, 1e-12, 1e12), dtype=jnp.float32)
@@ -224,7 +228,7 @@ def _next_length(plan, carried, attempt, longest):
         ends = carried.jets[k], attempt.arrived[k]
         flight = time_to_contact(jet, end_curvature(*ends, inverse))
         held = jnp.minimum(time_to_release(*ends, inverse), plan.longest_step)
-        # one that was so close and did not release only touches zero
+        # a multiplier this close that did not release only touches zero
         held = jnp.maximum(held, CLOSE * longest)
         limit = jnp.where(contact, held, jnp.where(flight > 0, flight, jnp.inf))
         ahead = jnp.minimum(ahead, limit)
@@ -238,7 +242,7 @@ def _next_length(plan, carried, attempt, longest):
 
 
 def _struck(carried, attempt):
-    """Return when each of several constraints was hit last, and the hidden flights."""
+    """Return the last impact time of each constraint, and the hidden flights."""
     if not carried.struck:
         return carried.struck, carried.crowded
     struck = tuple(

@@ -22,7 +22,7 @@ _CLOSE = 2e-3
 _STRAIGHT = 4e-3
 # error of the gap's polynomial over the largest gap, up to which it is believed
 _TRUST = 0.02
-# over this part of the longest step a motion that leaves the surface does not return
+# fraction of the longest step within which a motion off the surface does not return
 _SHORT = 1e-3
 
 
@@ -77,8 +77,7 @@ def judge(
 
 
 def moves_in(jet: Jet, rounding):
-    """Return whether the motion at this instant goes, or is pulled, into the
-    constraint.
+    """Return whether the motion now enters, or is accelerated into, the constraint.
 
     A parabola that turns before it is below rounding only touches.
     """
@@ -90,7 +89,7 @@ def moves_in(jet: Jet, rounding):
 
 
 def earliest(verdicts: list[StepVerdict]) -> StepVerdict:
-    """Return the outcome of the step as a whole: the first event in it."""
+    """Return the outcome of the step: its first event."""
     best = verdicts[0]
     for k, v in enumerate(verdicts[1:], start=1):
         sooner = v.lands & (~best.lands | (v.offset < best.offset))

@@ -42,8 +42,8 @@ class Functions:
     """Functions of `(t, x)`, `x` a tuple of scalars, with the parameters bound.
 
     `planar` systems have two states and one constraint: gap and normal velocity fix
-    the state during contact, which then needs no integration. `plain` ones are called
-    as they are stated, on arrays.
+    the state during contact, which then needs no integration. `plain` functions are
+    called unchanged, on arrays.
     """
 
     def __init__(self, system: HybridSystem, n: int, plain: bool = False):
@@ -91,7 +91,7 @@ class Functions:
 
     @contextlib.contextmanager
     def sharing(self):
-        """Within this block, what is computed from the same scalars is computed once.
+        """Within this block, equal expressions of the same scalars are computed once.
 
         All calls in the block must belong to one trace (no loop or branch inside).
         """
@@ -102,7 +102,7 @@ class Functions:
             self._memory = None
 
     def field(self, t, x, contact):
-        """Rate of change: flight, or (not planar) sticking where in contact."""
+        """Return the rate of change: flight, or (not planar) sticking in contact."""
         return tuple(self._field(t, _pack(x), _pack(contact)))
 
     def pairs(self, t, x) -> dict[int, int]:
@@ -112,7 +112,7 @@ class Functions:
         return rates_among(x, tuple(self._free(t, _pack(x))))
 
     def jets(self, t, x, contact) -> list[Jet]:
-        """One jet for each constraint."""
+        """Return one jet for each constraint."""
         rows = self._jets(t, _pack(x), _pack(contact))
         return [Jet(*rows[k]) for k in range(self.m)]
 
@@ -122,12 +122,12 @@ class Functions:
         return tuple(tuple(row) for row in rows)
 
     def impact(self, t, x):
-        """The state after an impact at each constraint."""
+        """Return the state after an impact at each constraint."""
         rows = self._impact(t, _pack(x))
         return [tuple(rows[k]) for k in range(self.m)]
 
     def velocity(self, t, x):
-        """The normal velocities."""
+        """Return the normal velocities."""
         return tuple(self._velocity(t, _pack(x)))
 
     def frame(self, t, x) -> Frame:

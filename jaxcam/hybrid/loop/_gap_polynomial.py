@@ -2,9 +2,9 @@
 
 H, v, a and j at the two ends of a step fix a polynomial of degree seven. Its Bernstein
 coefficients bound it from below: where they are positive the step has not crossed the
-constraint, as far as the polynomial is right. The difference to the polynomial of
-degree five that ignores the jerks tells how far that is. All functions take scalars and
-are free of branches.
+constraint, within the error of the polynomial, which is estimated by its difference
+from the polynomial of degree five that ignores the jerks. All functions take scalars
+and are free of branches.
 """
 
 from typing import Any, NamedTuple
@@ -76,7 +76,7 @@ def _mistrust(left: Jet, right: Jet, h):
 
 
 def lowest(polynomial: Bernstein):
-    """A lower bound of the gap inside the step, its error taken off.
+    """Return a lower bound of the gap inside the step, its error taken off.
 
     The error of the interpolation vanishes with its third derivative at both ends: it
     belongs to the two middle coefficients, with weight 64/35.
@@ -133,7 +133,7 @@ def crossing(c, halvings: int = 3, newtons: int = 2):
 
 
 def lowest_point(polynomial: Bernstein, c):
-    """Return the suspected minimum of the polynomial in (0, 1)."""
+    """Estimate the minimum of the polynomial in (0, 1)."""
     b = polynomial.coefficients
     s, best = jnp.full_like(c[0], 1 / 7), b[1]
     for k in range(2, 7):

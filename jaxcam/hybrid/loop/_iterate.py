@@ -1,7 +1,7 @@
-"""The event loop: one iteration, one attempt at a step of whatever mode is in force.
+"""Define one iteration of the event loop: one attempted step in the current mode.
 
-There is no loop within the loop. A step that crosses a constraint, or might have, is
-not accepted; the lane stays where it is and the next iteration tries a better length.
+The loop has no inner loop. A step that crosses a constraint, or may have crossed it, is
+rejected; the lane keeps its state and the next iteration tries a better length.
 Everything is arithmetic on scalars and selection, so that a batch of lanes, each in its
 own mode, advances together; lengths of steps carry no derivative, times of events do.
 """
@@ -40,13 +40,13 @@ class Judged(NamedTuple):
 
     flown: StepVerdict
     lands: Any
-    # whether the step is accepted, as far as its flights are concerned
+    # whether the flights allow the step
     good: Any
     # whether it ends behind a constraint that is hit after a release
     over: Any
     # the length of a step that errors alone would allow
     natural: Any
-    # largest gap that contact has held back; a gap that cannot be told from zero there
+    # largest gap that contact has suppressed; resolution of a zero gap there
     held: list
     tiny: list
 
@@ -54,7 +54,7 @@ class Judged(NamedTuple):
 def iteration(
     functions: Functions, plan: Plan, carried: LoopState
 ) -> tuple[LoopState, Record]:
-    """One attempt at a step."""
+    """Take one attempted step."""
     with functions.sharing():
         return _iterate(functions, plan, carried)
 
@@ -86,7 +86,7 @@ def _iterate(
     good = judged.good & ~locates
     good = good & ~(held.retake & sticking & ~lands) & converged
 
-    # the state and the jets to go on with
+    # the state and the jets to continue with
     delay = jnp.where(reached, held.offset, 0.0)
     left = taylor_of_release(
         functions, settled, made.rates, made.frame, landing.jets, delay, landing.contact
@@ -98,7 +98,7 @@ def _iterate(
     x = select(begins, chatter.state, x)
     t = landing.t + delay
     went = [released & (held.constraint == k) for k in range(functions.m)]
-    # who only touches zero still presses
+    # a multiplier that only reaches zero has not released
     pressing = sticking & good & ~lands & ~released & ~carried.completing
     contact = tuple(
         (landing.contact[k] | (begins & landing.hit[k])) & ~went[k] & active
@@ -106,7 +106,7 @@ def _iterate(
     )
     jets = _next_jets(carried, jets, landing, went, pressing, delay)
     if plan.breaks:
-        # what goes on from a breakpoint is seen from its other side
+        # the motion after a breakpoint is evaluated on its far side
         passed = end.at_stop & (end.stop < end.asked) & good & ~lands & ~released
         jets = _where_passed(functions, plan, passed, t, x, contact, jets)
     finite = jnp.isfinite(sum(x) + t + sum(j.gap + j.velocity for j in jets))
@@ -182,7 +182,7 @@ def _judge_flights(
         ]
     )
     natural = jnp.minimum(carried.longest, plan.longest_step)
-    # what the multipliers held back counts as gap: rounding is a part of it
+    # the motion suppressed by the multipliers counts as gap: rounding is a part of it
     held = [
         jnp.maximum(s, natural * natural * jnp.abs(j.acceleration))
         for s, j in zip(carried.held, carried.jets, strict=True)
@@ -224,7 +224,7 @@ def _judge_contacts(
 
 
 def _shorter(functions, end: StepEnd, judged: Judged, held: StepVerdict, converged):
-    """The length to try instead, where the step is not accepted."""
+    """Return the length to try next, if the step is not accepted."""
     shorter = jnp.minimum(judged.flown.length, held.length)
     to_impact = jnp.minimum(shorter, end.length + judged.flown.offset)
     shorter = jnp.where(judged.over, to_impact, shorter)
@@ -287,7 +287,7 @@ def _waits_for_release(carried, jets, flown, natural, tiny):
 
 
 def _where_passed(functions, plan, passed, t, x, contact, jets):
-    """The jets on the far side of a breakpoint, where one was passed."""
+    """Return the jets on the far side of a breakpoint, where one was passed."""
     fresh = functions.jets(after(t, plan.t1 - plan.t0), x, contact)
     return tuple(
         Jet(*select(passed, new, old)) for new, old in zip(fresh, jets, strict=True)

@@ -1,4 +1,4 @@
-"""An impact at the end of a step, and whether the rest of its sequence may follow."""
+"""Apply the impact at the end of a step, and decide on completing its chatter."""
 
 from typing import Any, NamedTuple
 
@@ -18,7 +18,7 @@ class Landing(NamedTuple):
     """The end of a step, with the impact there if it lands."""
 
     t: Any
-    # the time as functions are evaluated at it
+    # the time at which functions are evaluated
     seen: Any
     x: tuple
     contact: tuple
@@ -27,7 +27,7 @@ class Landing(NamedTuple):
     hit: list
     impact: Impact
     chatter: Rest
-    # whether the rest of the chatter is summed up from here
+    # whether the chatter is completed from here
     begins: Any
     fastest: Any
     # whether rounding hides the flight that follows, or the one before
@@ -44,7 +44,7 @@ def land(
     flown: StepVerdict,
     rounding,
 ) -> Landing:
-    """The state after the impact if the step `lands`, at its end if not."""
+    """Return the state after the impact if the step `lands`, otherwise at its end."""
     offset = jnp.where(lands, flown.offset, 0.0)
     landed = taylor(made.x, made.rates, offset)
     t = end.t + offset
@@ -64,7 +64,7 @@ def land(
     contact = _kept_contacts(functions, carried, lands, seen, landed, x)
     jets = functions.jets(seen, x, contact)
 
-    # does the rest of the impacts follow in no time?
+    # do the remaining impacts take negligible time?
     hit = [lands & (flown.constraint == k) for k in range(functions.m)]
     rebound = jnp.maximum(
         of_constraint([j.velocity for j in jets], flown.constraint), 0.0

@@ -24,32 +24,32 @@ class LoopState(NamedTuple):
     # the next step to try, and the longest one that the error allows
     step: Any
     longest: Any
-    # the end of this step is an accumulation of impacts, or a release: not a choice
+    # the end of this step is an accumulation or a release, so its length is fixed
     completing: Any
     locating: Any
     stops: Any
     # fastest rebound since the last release; largest gap of each constraint
     fastest: Any
     scale: tuple
-    # what rounding can tell of each gap
+    # resolution of each gap
     blur: tuple
-    # largest gap that contact has held back: the multiplier over a natural step
+    # largest gap that contact has suppressed: the multiplier over a natural step
     held: tuple
-    # of several constraints, when each was hit last, and how many impacts in a row have
-    # led to flights that rounding hides
+    # for several constraints: time of the last impact on each, and the number of
+    # consecutive impacts whose flights are below rounding
     struck: tuple
     crowded: tuple
-    # where each component started, and how far it has been from there: see `_scale.py`
+    # start value and largest excursion of each component: see `_scale.py`
     origin: tuple
     extents: tuple
-    # the steps after the start are no longer than this
+    # longest allowed step
     ramp: Any
     failures: Any
     # a code of `codes.py`
     status: Any
     steps: Any
     impacts: Any
-    # impacts after which the rest of a chatter was summed
+    # number of completed chatters
     chatters: Any
 
 
@@ -58,9 +58,9 @@ def first_state(
 ) -> LoopState:
     """The first loop state, in contact where gap and velocity are zero and a < 0.
 
-    Where there is no force to say, contact is taken: it ends as soon as one pulls.
-    A start that is refused is one of NaN. `longest` is the longest step (s) that is
-    allowed, and `period` that of the forcing.
+    Without a normal force, contact is assumed; it ends as soon as a force pulls. An
+    invalid start becomes NaN. `longest` is the longest step (s) that is allowed, and
+    `period` that of the forcing.
     """
     free = tuple(jnp.asarray(False) for _ in range(functions.m))
     jets = functions.jets(t0, x, free)
@@ -77,12 +77,12 @@ def first_state(
     for jet, lift, tiny, slow in zip(jets, lifts, tinies, slows, strict=True):
         gap, velocity = jet.gap, jet.velocity
         near = jnp.abs(gap) <= tiny
-        # a flight that rounding hides is none, nor is an impact that leads to one
+        # flights below rounding do not count, nor do the impacts that lead to them
         hop = tiny * jnp.abs(jet.acceleration)
         low = (jet.acceleration < 0) & (velocity * velocity <= hop)
         touching = near & ((jnp.abs(velocity) <= slow) | low)
         contact.append(touching & _presses(jet, tiny) & (status == RUNNING))
-        # off the surface a start is taken as it is; on it, rounding is removed
+        # off the surface a start is unchanged; on it, rounding is removed
         behind = near & (gap < 0)
         shift = jax.lax.stop_gradient(jnp.where(behind, gap, 0.0))
         x = tuple(a - shift * b for a, b in zip(x, lift, strict=True))

@@ -26,7 +26,7 @@ def judge_contact(
     a0, a1 = left.acceleration, right.acceleration
     s0, s1 = h * left.jerk, h * right.jerk
     trust = jnp.abs(a1 - a0 - (s0 + s1) / 2)
-    # a pull so weak that it opens no gap in the step is none
+    # a pull too weak to open a gap in the step is ignored
     first = a0 + s0 * (1 / 3)
     highest = jnp.maximum(first, a1 - s1 * (1 / 3)) + trust
     inside = (highest > 0) & (highest * h * h > rounding)
@@ -38,18 +38,18 @@ def judge_contact(
     inverse = jnp.where(h > 0, 1.0, 0.0) / jnp.where(h > 0, h, 1.0)
     curvature = end_curvature(left, right, inverse)
     bend = straight * curvature / (2 * slope)
-    # so small over the short time left that the first correction is enough
+    # the remaining time is so short that the first correction is enough
     offset = straight * (1 - jnp.where(jnp.abs(bend) < 0.01, bend, 0.0))
     near = rises & pulls & (jnp.abs(offset) <= CLOSE * scale)
     # the zero of a multiplier that has none of its rates there is only enclosed
     enclosed = passed & (h <= CLOSE * scale)
     # a multiplier that only touches zero: no flight would exceed rounding. Its rate
-    # falls by a half at least, which rounding cannot make it do over a short step
+    # falls by at least half, which rounding cannot cause over a short step
     falls = (left.jerk > 0) & (2 * right.jerk <= left.jerk) & (h > 0)
     curved = jnp.where(falls, (left.jerk - right.jerk) * inverse, 1.0)
     peak = a1 + right.jerk**2 / (2 * curved)
     touches = falls & (8 * peak**2 <= rounding * curved)
-    # one that rises on after an inflection does not only touch
+    # a multiplier that keeps rising after an inflection releases
     touches = touches & ~(passed & (curvature > 0) & (a1 * h * h > rounding))
     # it may have released before the zero at the end of the step
     early = (a0 < 0) & (first > 0)
@@ -66,9 +66,8 @@ def judge_contact(
 
 
 def opens(jet: Jet, scale, rounding):
-    """Return whether a multiplier that goes on like this opens a gap in a natural step.
-
-    One that is zero but for rounding does not.
+    """Return whether the extrapolated multiplier opens a gap in a natural step. A
+    multiplier that is zero up to rounding does not.
     """
     rise = jnp.maximum(jet.jerk, 0.0)
     pull = jnp.maximum(jet.acceleration, 0.0) + rise * (scale / 3)

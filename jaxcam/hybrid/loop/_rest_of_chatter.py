@@ -1,4 +1,4 @@
-"""Check whether chatter may be completed at once after an impact, and where it ends."""
+"""Check whether chatter may be completed after an impact, and compute its end."""
 
 from typing import Any, NamedTuple
 
@@ -9,7 +9,7 @@ from ._select import of_constraint, select
 
 
 class Rest(NamedTuple):
-    """The rest of a chatter, as if it began with this impact."""
+    """The remaining impacts of a chatter, starting with this impact."""
 
     possible: Any
     duration: Any
@@ -31,10 +31,10 @@ class Impact(NamedTuple):
 
 
 def rest_of_chatter(functions, plan, impact: Impact, jets, contact, stop) -> Rest:
-    """Complete the chatter after an impact, and say whether the completion may be used.
+    """Complete the chatter after an impact; return whether the completion is valid.
 
     **Arguments:** the `jets` of all gaps after the impact, the constraints in `contact`
-    then, and where the run has to `stop` (s).
+    then, and the time (s) of the next `stop` of the run.
     """
     t, before, after, approach, rebound, constraint = impact
     dampings, restitutions, states = functions.chatter(t, before, after)

@@ -1,4 +1,4 @@
-"""Running the loop: a batch-friendly while loop, or a scan that can be transposed."""
+"""Run the event loop as a batched while loop, or as a scan that can be transposed."""
 
 from collections.abc import Callable
 from typing import Literal, NamedTuple
@@ -16,7 +16,7 @@ from ._iterate import iteration, Record
 from ._loop_state import LoopState
 
 
-# iterations before it is asked whether any lane still runs, and between two writes to
+# iterations between two checks for running lanes, and between two writes to
 # the log, which under vmap are costly
 _BLOCK = 16
 
@@ -60,9 +60,9 @@ def run_raw(
     row,
     company: Company = "few",
 ):
-    """`run` with a log of what `row(record, state)` makes of each attempt: scalars.
+    """Run the loop with a log of the scalars `row(record, state)` of each attempt.
 
-    It is compiled in the way that is best in this `company`.
+    It is compiled for the number of batch elements, `company`.
     """
     carried = jax.tree.map(jnp.asarray, carried)
 
@@ -70,7 +70,7 @@ def run_raw(
         carried, record = iteration(functions, plan, carried)
         return carried, jnp.stack(row(record, carried))
 
-    # scalars of one run are never computed twice, and to keep them costs compile time
+    # scalars of one run are never computed twice; keeping them costs compile time
     alone = company == "one"
     keeping, kept = with_kept(body, carried, on=not (functions.plain or alone))
     width = len(row(_empty_record(functions.n, functions.m), carried))
@@ -87,7 +87,7 @@ def run_raw(
         return count + 1, state, jax.lax.dynamic_update_slice(log, some, start)
 
     def loop(state):
-        # made here: the kernel keeps what it is given
+        # allocated here: the kernel keeps its arguments
         log = jnp.zeros((blocks * _BLOCK, width))
         start = (jnp.asarray(0, jnp.int32), state, log)
         _, last, log = jax.lax.while_loop(unfinished, several, start)
@@ -99,7 +99,7 @@ def run_raw(
 
 
 def attempts(functions: Functions, plan: Plan, carried: LoopState, row):
-    """A block of attempts of one run, to be mapped over many.
+    """Run a block of attempts of one trajectory, to be mapped over many.
 
     Returns:
         The lane, and of each number in `row` an array, one for each attempt.
@@ -126,7 +126,8 @@ def run_many(some: Callable, lanes: LoopState, rows: int, row):
     Returns:
         The lanes and the log, `(rows, lanes)` for each number in a row.
     """
-    # the log is written as it will lie: under `vmap` each write would move all of it
+    # the log is written in its final layout: under `vmap` each write would move all of
+    # it
     blocks, width = -(-rows // _BLOCK), len(lanes.status)
     parts = row(_empty_record(len(lanes.x), len(lanes.jets)), lanes)
     log = [jnp.zeros((blocks * _BLOCK, width)) for _ in parts]
@@ -186,14 +187,14 @@ def _row(record: Record, _: LoopState) -> list:
 
 
 def numbers_of_row(record: Record) -> list:
-    """The numbers of a row of the log."""
+    """Return the numbers of a row of the log."""
     flags = [jnp.asarray(c, dtype=jnp.float64) for c in record.contact]
     head = [record.kind, record.constraint, record.t]
     return [jnp.asarray(v) for v in head] + [*record.before, *record.after, *flags]
 
 
 def log_of(log, n: int, m: int) -> Log:
-    """The log of rows of numbers, of `n` components and `m` constraints."""
+    """Return the log of rows of numbers, of `n` components and `m` constraints."""
     return Log(
         kind=log[:, 0],
         constraint=log[:, 1],

@@ -1,7 +1,7 @@
-"""Measure the size of a motion, to which its errors and its rounding are relative.
+"""Measure the size of a motion, the reference of its error and rounding.
 
-Nothing here has units of its own: a motion in micrometres and milliseconds is treated
-as one in metres and seconds.
+All measures are independent of units: motions in micrometres and milliseconds or in
+metres and seconds are treated equally.
 """
 
 import jax
@@ -10,7 +10,7 @@ import jax.numpy as jnp
 from ._select import largest
 
 
-# an error below so many parts of a component's scale is rounding
+# an error below this fraction of a component's scale is rounding
 _ROUNDING = 1e-15
 # error allowed over the tolerance times the scale of the motion: a state of order one,
 # moving by as much, is then as accurate as with an absolute error of the tolerance
@@ -65,10 +65,11 @@ def scales(extents, before, after, pairs, h, per_run) -> tuple:
 
 
 def held_scales(scale, carried, push, pairs, h) -> tuple:
-    """Scales of a step in contact: what the multipliers hold back counts as moved.
+    """Scales of a step in contact: motion suppressed by the multipliers counts as
+    moved.
 
     Bodies at rest under forces that balance move by the rounding of these forces, which
-    says nothing of how large their motion is. `push` are the directions in which the
+    is no measure of the size of their motion. `push` are the directions in which the
     multipliers act, the accelerations of the lane's jets; `pairs` as in `scales`.
     """
     found = list(scale)
@@ -84,8 +85,8 @@ def held_scales(scale, carried, push, pairs, h) -> tuple:
 def error_allowed(scale, before, after, tolerance, absolute) -> tuple:
     """Error that a step may make in each component; below it is only rounding.
 
-    **Arguments:** scales, states at both ends, the relative tolerance, and what was
-    asked for instead of a share of the scale: a number for each component, or `None`.
+    **Arguments:** scales, states at both ends, the relative tolerance, and the absolute
+    error requested for each component, or `None` for a share of the scale.
     """
     sizes = [
         jnp.maximum(jnp.abs(a), jnp.abs(b)) for a, b in zip(before, after, strict=True)
@@ -115,7 +116,8 @@ def says_nothing(effort, tolerance):
 
 
 def moved_extents(extents, origin, attempt) -> tuple:
-    """The scales after an attempt: the furthest that a component was from its start.
+    """Return the scales after an attempt: the furthest that a component was from its
+    start.
 
     One that has never moved takes its scale from the first attempt that moves it,
     whatever becomes of it: relative to itself the error of a motion such as t^9 does
@@ -132,7 +134,7 @@ def moved_extents(extents, origin, attempt) -> tuple:
 
 
 def first_step(extents, rates, t, longest):
-    """Length of the first step from `t` (s): a part of the time in which all changes.
+    """Return the length of the first step from `t` (s): a part of the time scale.
 
     The shortest in which a component moves by its scale, by any of its first three
     `rates`; but the clock must move. (Hairer, Norsett and Wanner, Solving Ordinary

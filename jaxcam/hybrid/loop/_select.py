@@ -1,4 +1,4 @@
-"""Choosing between scalars, and tuples of scalars, without branches."""
+"""Select between scalars, and tuples of scalars, without branches."""
 
 from typing import Any
 

@@ -1,11 +1,11 @@
-"""The state over the short times at an event, by Taylor series."""
+"""Propagate the state over short times at an event by Taylor series."""
 
 import jax
 import jax.numpy as jnp
 
 
 def taylor(x, rates, tau):
-    """The state a time `tau` (s) after `x`, to third order, by its `rates`."""
+    """Return the state a time `tau` (s) after `x`, to third order, by its `rates`."""
     first, second, third = rates
     return tuple(
         x[i] + tau * (first[i] + tau * (second[i] * 0.5 + tau * third[i] * (1 / 6)))
@@ -14,9 +14,10 @@ def taylor(x, rates, tau):
 
 
 def taylor_of_release(functions, x, rates, frame, jets, tau, contact):
-    """The sticking motion over the short time `tau` (s) to release, to second order.
+    """Return the sticking motion over the short time `tau` (s) to release, to second
+    order.
 
-    `rates` of the free flight from `x`, its `frame` and `jets`, and what is in contact.
+    `rates` of the free flight from `x`, its `frame` and `jets`, and the contacts.
     """
     first, second, _ = rates
     if not functions.planar:
@@ -38,12 +39,11 @@ def taylor_of_release(functions, x, rates, frame, jets, tau, contact):
 
 
 def off_rounding(frame, jets, x, hit, extents):
-    """The state after an impact without the gap that rounding left it, and its jets.
-
-    It would add up over the impacts of a chatter, whose last flights are lower. A
-    gap that hardly depends on the state is left: to mend it would move the state far.
-    The other gaps move along, and by more than their own rounding where the time is
-    late and the constraint that was hit moves.
+    """Remove the rounding error of the gap from the state after an impact, and from its
+    jets. The error would accumulate over the impacts of a chatter, whose last flights
+    are lower. A gap that hardly depends on the state is left unchanged: its correction
+    would move the state far. The other gaps move along, and by more than their own
+    rounding where the time is late and the constraint that was hit moves.
     """
     jets = list(jets)
     for k, (direction, here) in enumerate(zip(frame.lift, hit, strict=True)):

@@ -1,4 +1,4 @@
-"""Refuse invalid starts, traced or not."""
+"""Reject invalid starts, traced or not."""
 
 import jax.numpy as jnp
 
@@ -13,7 +13,7 @@ def starts_behind(system, t, state):
 
 
 def first_status(t0, x, t1, gaps, rooms):
-    """Return the status of a run at its start: `RUNNING`, or why it cannot start.
+    """Return the status of a run at its start: `RUNNING`, or the reason for an error.
 
     **Arguments:** times (s), the state, all gaps and their resolution (`start_room`) as
     tuples of scalars.

@@ -1,4 +1,4 @@
-"""One attempt at a step: where it ends, and the motion up to there."""
+"""Take one attempted step: choose its end and integrate to it."""
 
 from typing import Any, NamedTuple
 
@@ -21,10 +21,10 @@ class StepEnd(NamedTuple):
 
     length: Any
     t: Any
-    # what must not be passed (s): a breakpoint, or a time that was asked for
+    # time that must not be passed (s): a breakpoint or a requested time
     stop: Any
     asked: Any
-    # whether the step ends there, and how far it is from there else
+    # whether the step ends there, otherwise its distance from there
     at_stop: Any
     room: Any
     # the last breakpoint before the step, and the first after it
@@ -32,12 +32,12 @@ class StepEnd(NamedTuple):
 
 
 class Step(NamedTuple):
-    """A step that was made: what is known at its end."""
+    """A completed step: the quantities at its end."""
 
-    # the end as Runge-Kutta says, and put on the surfaces of contact
+    # the end from Runge-Kutta, and its projection onto the contact surfaces
     raw: tuple
     x: tuple
-    # the gaps, and how states are put on the surface
+    # the gaps, and the projection of states onto the surface
     jets: list
     frame: Frame
     # rates of the state, of first, second and third order
@@ -80,7 +80,7 @@ def seen_from_inside(plan: Plan, end: StepEnd):
 def make_step(
     functions: Functions, plan: Plan, carried: LoopState, end: StepEnd
 ) -> Step:
-    """The step to that end, in the modes that are in force."""
+    """Integrate the step to that end, in the current modes."""
     inside, h = seen_from_inside(plan, end), end.length
     x, error, stages = step(
         plan.tableau,

@@ -1,6 +1,6 @@
 """Adapt programs to JAX's tracing and XLA's compiler: speed changes, results do not.
 
-The one exception is `whole`, which gives a loop the transformations that it lacks.
+The only exception is `whole`, which adds missing transformations to a loop.
 """
 
 from ._jaxprs import opened as opened, saving_jvp as saving_jvp

@@ -22,7 +22,7 @@ _LIBRARY = frozenset(
     symmetric_product triangular_solve tridiagonal tridiagonal_solve
     """.split()
 )
-# what the CPU backend does not write into a kernel
+# operations that the CPU backend does not write into a kernel
 _CALLS = frozenset(
     """
     approx_top_k conv_general_dilated select_and_scatter_add select_and_gather_add sort
@@ -35,7 +35,9 @@ _SAVING = "its_derivative_only_saves_work"
 
 @no_type_check
 def opened(equation):
-    """The program inside a call that only groups, and its constants; else `None`."""
+    """Return the program inside a call that only groups, and its constants; else
+    `None`.
+    """
     if equation.primitive.name not in _GROUPS:
         return None
     inner = equation.params.get("jaxpr", equation.params.get("call_jaxpr"))
@@ -57,10 +59,9 @@ def equations(jaxpr) -> Iterator:
 
 
 def saving_jvp(function: Callable) -> jax.custom_jvp:
-    """`jax.custom_jvp` for a derivative that is that of the function, at less work.
-
-    A function whose rule says something of its own must be called as it is; this one
-    may be taken apart, and is then as fast as any other arithmetic.
+    """Apply `jax.custom_jvp` for a derivative that equals that of the function at less
+    cost. A function with a different rule must be called unchanged; this function may
+    be inlined, and is then as fast as any other arithmetic.
     """
 
     def marked(*arguments):
@@ -72,7 +73,7 @@ def saving_jvp(function: Callable) -> jax.custom_jvp:
 
 @no_type_check
 def has_saving_rule(equation) -> bool:
-    """Return whether an equation is a call of what `saving_jvp` has made."""
+    """Return whether an equation calls a function made by `saving_jvp`."""
     if equation.primitive.name != "custom_jvp_call":
         return False
     inner = equation.params["call_jaxpr"].jaxpr.eqns
@@ -80,7 +81,7 @@ def has_saving_rule(equation) -> bool:
 
 
 def calls_library(jaxpr) -> bool:
-    """Return whether some part of a program is left to a library, or to Python."""
+    """Return whether some part of a program calls a library or Python."""
     return any(e.primitive.name in _LIBRARY for e in equations(jaxpr))
 
 
@@ -93,7 +94,7 @@ def fits_kernel(jaxpr) -> bool:
 def _needs_more(equation) -> bool:
     name = equation.primitive.name
     if name.startswith("scatter"):
-        # one place is a slice, several are a scatter of its own
+        # one index is a slice, several are a scatter
         return math.prod(equation.invars[1].aval.shape[:-1]) > 1
     if name == "dot_general":
         return equation.outvars[0].aval.ndim > 1

@@ -30,20 +30,20 @@ _NUMPY = {
 }
 
 
-# asked of every scalar: see `_jaxprs.py`
+# called for every scalar: see `_jaxprs.py`
 @no_type_check
 def is_known(element) -> bool:
     return isinstance(element, (np.generic, bool, int, float))
 
 
 def join_known(elements: np.ndarray):
-    """`join` for numbers that are known while tracing."""
+    """Join numbers that are known while tracing."""
     flat = [np.asarray(e) for e in elements.ravel()]
     return np.stack(flat).reshape(elements.shape) if flat else np.zeros(elements.shape)
 
 
 def computed(equation, arrays) -> list[np.ndarray]:
-    """An operation on known numbers, done while tracing."""
+    """Return an operation on known numbers, done while tracing."""
     name, outputs = equation.primitive.name, equation.outvars
     params = equation.params
     with np.errstate(all="ignore"):

@@ -27,7 +27,7 @@ _COST |= {"exp": 20, "log": 20, "atan2": 30, "atan": 20, "asin": 30, "acos": 30}
 
 
 def _chosen(jaxpr) -> list:
-    """The variables of a jaxpr that are worth keeping."""
+    """Return the variables of a jaxpr that are worth keeping."""
     uses: dict = {}
     for equation in jaxpr.eqns:
         for v in equation.invars:
@@ -55,7 +55,7 @@ def _chosen(jaxpr) -> list:
 
 
 def _hoisted(jaxpr, constants):
-    """A program without the operations on constants alone, which are done here."""
+    """Return a program whose operations on constants alone are evaluated here."""
     known = set(jaxpr.constvars)
     early, late = [], []
     for equation in jaxpr.eqns:
@@ -79,7 +79,7 @@ def _hoisted(jaxpr, constants):
 
 
 def with_kept(body: Callable, carry, on: bool = True):
-    """A loop body that also carries its shared scalars.
+    """Return a loop body that also carries its shared scalars.
 
     **Arguments:** `body(carry) -> (carry, row)` and an example of the carry, scalars.
     The row may be a pytree. Without `on` nothing is kept.
@@ -122,7 +122,7 @@ def _keeping_nothing(body, state):
 
 
 def without_library(function: Callable, argument):
-    """`function` with its calls of a library done here, if they need no argument.
+    """Evaluate the library calls of `function` here, if they need no argument.
 
     A loop that calls one cannot be a single kernel. Other operations stay where they
     are: within the kernel they cost less than as its arguments.
@@ -146,7 +146,7 @@ def without_library(function: Callable, argument):
 
 
 def depend_on(value, kept):
-    """`value`, in a way that needs all kept scalars, which else would be dropped.
+    """Make `value` depend on all kept scalars, which would otherwise be dropped.
 
     Adding 1e-300 changes no number that a count can be.
     """

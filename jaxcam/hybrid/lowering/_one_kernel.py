@@ -2,8 +2,8 @@
 
 XLA's CPU backend compiles a small loop into a single function, and runs a large one as
 a sequence of kernels whose calls cost more than the arithmetic of a step. It marks the
-small ones by an attribute on a call. Here the attribute is set from the start, on this
-loop alone; a version of XLA that does not know it ignores it. Results are the same.
+small ones by an attribute on a call. This module sets the attribute in advance, for
+this loop only; versions of XLA without the attribute ignore it. Results are the same.
 """
 
 from collections.abc import Callable
@@ -12,7 +12,7 @@ from ._whole import whole
 
 
 def one_kernel(function: Callable, batch: bool = False, on: bool = True) -> Callable:
-    """`function` of one pytree, as a call that the CPU backend keeps in one piece.
+    """Wrap `function` of one pytree as a call that the CPU backend does not split.
 
     With `batch` the calls inside are inlined: better for wide vectors, worse for single
     trajectories and their derivatives. A function that the backend cannot write as one

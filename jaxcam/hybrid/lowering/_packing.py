@@ -1,4 +1,6 @@
-"""The arrays of a pytree as one array: a compiled call takes time for each it gets."""
+"""Pack the arrays of a pytree into one array, since each argument of a call costs
+time.
+"""
 
 import math
 from typing import Any, NamedTuple
@@ -17,7 +19,9 @@ class Packing(NamedTuple):
     """
 
     def unpacked(self, numbers, apart):
-        """The pytree of these numbers, `(k,)`, and of the leaves that stayed apart."""
+        """Return the pytree of these numbers, `(k,)`, and of the leaves that stayed
+        apart.
+        """
         leaves, first, rest = [], 0, iter(apart)
         for shape in self.shapes:
             if shape is None:
@@ -44,7 +48,9 @@ class Packed(NamedTuple):
 
 
 def pack(tree, lanes: int | None = None) -> Packed:
-    """The arrays of a pytree packed; with `lanes` each has a row for each lane."""
+    """Return the arrays of a pytree packed; with `lanes` each has a row for each
+    lane.
+    """
     leaves, structure = jax.tree.flatten(tree)
     plain = [leaf.dtype == jnp.float64 for leaf in leaves]
     floats = [np.asarray(leaf) for leaf, fits in zip(leaves, plain) if fits]

@@ -23,7 +23,7 @@ from ._known import computed, is_known, join_known
 from ._sincos import sincos
 
 
-# operations that only move elements: what goes where is found by moving indices
+# operations that only move elements: the permutation is found by moving indices
 _MOVES = frozenset(
     {
         "reshape",
@@ -50,7 +50,7 @@ _SUMS = {"reduce_sum": jnp.add, "reduce_max": jnp.maximum, "reduce_min": jnp.min
 
 
 def split(array) -> np.ndarray:
-    """An array as a numpy array of scalars."""
+    """Return an array as a numpy array of scalars."""
     shape = jnp.shape(array)
     out = np.empty(shape, dtype=object)
     for index in np.ndindex(shape):
@@ -61,7 +61,7 @@ def split(array) -> np.ndarray:
 
 
 def join(elements: np.ndarray):
-    """The inverse of `split`."""
+    """Return the inverse of `split`."""
     if elements.shape == ():
         return jnp.asarray(elements[()])
     flat = [jnp.asarray(e) for e in elements.ravel()]
@@ -69,7 +69,7 @@ def join(elements: np.ndarray):
 
 
 def joined(function: Callable) -> Callable:
-    """`function` of arrays as one of split arrays: it is evaluated as it is."""
+    """Convert a `function` of arrays to split arrays, by joining its arguments."""
 
     def call(*arguments):
         return jax.tree.map(split, function(*(join(_boxed(a)) for a in arguments)))
@@ -78,14 +78,13 @@ def joined(function: Callable) -> Callable:
 
 
 def scalarise(function: Callable, *example) -> Callable:
-    """`function`, evaluated on split arguments and returning split results.
+    """Evaluate `function` on split arguments and return split results.
 
     **Arguments:** the function of arrays, and examples of its arguments (pytrees of
     arrays or `jax.ShapeDtypeStruct`).
 
     Returns:
-        A function of the same pytrees whose leaves are what `split` makes of the
-            arrays.
+        A function of the same pytrees with split arrays as leaves.
     """
     closed, shape = jax.make_jaxpr(function, return_shape=True)(*example)
     treedef = jax.tree.structure(shape)
@@ -134,7 +133,7 @@ def _evaluate(jaxpr, consts, arguments, memory):
 def _apply(equation, inputs, memory):
     name = equation.primitive.name
     params = equation.params
-    # of a rule of reverse mode alone there is only the body
+    # a rule for reverse mode only has just the body
     if has_saving_rule(equation) or name == "custom_vjp_call":
         inside = params["call_jaxpr"].jaxpr, params["call_jaxpr"].consts
     else:
@@ -159,7 +158,7 @@ def _apply(equation, inputs, memory):
         return [_product(inputs, params)]
     if name in _ELEMENTWISE:
         return [_elementwise(equation, inputs, outputs[0].shape, memory)]
-    # a rule of the reader's, as custom derivatives are, comes among these parameters
+    # a user-defined rule, such as a custom derivative, is among these parameters
     params = equation.primitive.get_bind_params(params)
     made = equation.primitive.bind(*[join(i) for i in inputs], **params)
     made = made if equation.primitive.multiple_results else [made]
@@ -190,7 +189,7 @@ def _move(equation, inputs):
             equation.primitive.bind(*map(jnp.asarray, (indices, *others)), **params)
         )
     if target.size and (target.min() < 0 or target.max() >= first.size):
-        # a gather that fills what lies outside
+        # a gather with a fill value outside the range
         return split(equation.primitive.bind(join(first), *others, **params))
     out = np.empty(target.shape, dtype=object)
     out.ravel()[:] = first.ravel()[target.ravel()]

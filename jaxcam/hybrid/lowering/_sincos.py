@@ -40,7 +40,9 @@ _COSINE = (
 
 
 def _eight(c, z, z2, z4):
-    """A polynomial of eight coefficients in `z`; few of its steps wait for another."""
+    """Return a polynomial of eight coefficients in `z`; few of its steps wait for
+    another.
+    """
     low = (c[0] + c[1] * z) + (c[2] + c[3] * z) * z2
     high = (c[4] + c[5] * z) + (c[6] + c[7] * z) * z2
     return low + high * z4

@@ -1,11 +1,11 @@
-"""Make a program one operation that JAX transforms as a whole, never in part.
+"""Wrap a program as one primitive that JAX transforms as a unit.
 
-Linearisation splits a program into known and linear parts, and drops unused
-results. XLA aborts where results of a loop that is compiled as one
-kernel (`_one_kernel.py`) are dropped, and no loop can be run backward. Here a program
-is one operation (a primitive): `vmap` and `jvp` make another such operation of it,
-linearisation evaluates it and its derivative one after the other, and a gradient comes
-from its forward derivatives, one for each number differentiated by.
+JAX's linearisation splits a program into known and linear parts, and drops unused
+results. XLA aborts if results of a loop that is compiled as one kernel
+(`_one_kernel.py`) are dropped, and no loop can be run backward. This module wraps a
+program as one primitive. `vmap` and `jvp` yield another such primitive. Linearisation
+evaluates the function, then its derivative. A gradient is built from one forward
+derivative per input.
 """
 
 import functools
@@ -36,21 +36,21 @@ class Program(NamedTuple):
     jaxpr: ClosedJaxpr
     # whether the CPU backend compiles it as one function
     kernel: bool
-    # the program that this one was made of by differentiation: its inputs and outputs
-    # come first among those here, tangents after them
+    # the program from which this one was differentiated: its inputs and outputs come
+    # first here, followed by the tangents
     plain: "Program | None" = None
 
 
 def whole(function: Callable, *, kernel: dict[str, str] | None = None) -> Callable:
-    """`function` as one operation, which is transformed as a whole.
+    """Wrap `function` as one primitive, which JAX transforms as a unit.
 
-    **Arguments:** a function of pytrees; what is not an array in them is static. With
+    **Arguments:** a function of pytrees; their non-array leaves are static. With
     `kernel`, attributes of the calls inside, the CPU backend compiles it as one
     function, if it can.
 
     Returns:
-        A function of the same arguments with the same results (arrays, and what is
-            static). It can be compiled, batched and differentiated in both modes, any
+        A function of the same arguments with the same results (arrays and static
+            leaves). It can be compiled, batched and differentiated in both modes, any
             number of times. A gradient costs as much as a forward derivative in all
             numbers differentiated by.
     """
@@ -82,19 +82,19 @@ def whole(function: Callable, *, kernel: dict[str, str] | None = None) -> Callab
 
 
 def while_loop(goes_on: Callable, body: Callable, start):
-    """`jax.lax.while_loop`, with a gradient too."""
+    """Run `jax.lax.while_loop` with support for gradients."""
     return whole(lambda start: jax.lax.while_loop(goes_on, body, start))(start)
 
 
 def has_program(equation) -> ClosedJaxpr | None:
-    """The program inside an operation that `whole` has made; else `None`."""
+    """Return the program inside an operation that `whole` has made; else `None`."""
     if equation.primitive is not whole_p:
         return None
     return equation.params["program"].jaxpr
 
 
 def _open(closed: ClosedJaxpr):
-    """The jaxpr with what it captures of outer transformations as its first inputs."""
+    """Return the jaxpr with captured outer tracers as its first inputs."""
     jaxpr = closed.jaxpr
     pairs = list(zip(jaxpr.constvars, closed.consts, strict=True))
     traced = [(v, c) for v, c in pairs if isinstance(c, Tracer)]
@@ -154,7 +154,8 @@ mlir.register_lowering(
 
 
 def _batched(program: Program, axis, mapped: list[bool], wanted: list[bool]):
-    """The program of a batch, and which outputs have a batch: all `wanted`, and more.
+    """Return the program of a batch, and which outputs have a batch: all `wanted`, and
+    more.
 
     A program and the one that it was made of agree on the outputs that they share.
     """
@@ -202,7 +203,7 @@ ad.primitive_jvps[whole_p] = _jvp
 
 
 def _partly_known(trace, *tracers, program: Program):
-    """Linearisation: values are known, tangents are not."""
+    """Apply partial evaluation: values are known, tangents are not."""
     known = [tracer.is_known() for tracer in tracers]
     if program.plain is None or all(known):
         return trace.default_process_primitive(whole_p, tracers, {"program": program})
@@ -219,7 +220,7 @@ partial_eval.custom_partial_eval_rules[whole_p] = _partly_known
 
 
 def _partly_known_equation(saveable, unknown, instantiated, equation):
-    """The same for an equation, under `jax.checkpoint`."""
+    """Apply partial evaluation to an equation under `jax.checkpoint`."""
     del saveable
     program = equation.params["program"]
     inputs, outputs = (0, 0) if program.plain is None else _sizes(program.plain)
@@ -245,7 +246,9 @@ partial_eval.partial_eval_jaxpr_custom_rules[whole_p] = _partly_known_equation
 
 @functools.lru_cache(maxsize=256)
 def _without(program: Program, first: int) -> Program:
-    """The program without its first outputs, which are then computed in vain."""
+    """Return the program without its first outputs, which are then computed
+    unnecessarily.
+    """
     jaxpr = program.jaxpr.jaxpr
     jaxpr = jaxpr.replace(
         outvars=jaxpr.outvars[first:], debug_info=jaxpr.debug_info.with_unknown_names()
@@ -254,7 +257,9 @@ def _without(program: Program, first: int) -> Program:
 
 
 def _transpose(cotangents, *arguments, program: Program):
-    """Cotangents of the inputs that the program is linear in, by its whole matrix."""
+    """Compute cotangents of the inputs in which the program is linear, by its full
+    matrix.
+    """
     linear = [ad.is_undefined_primal(a) for a in arguments]
     zeros = [
         jnp.zeros(a.aval.shape, a.aval.dtype) if unknown else None
@@ -270,7 +275,7 @@ def _transpose(cotangents, *arguments, program: Program):
         total = jnp.zeros((), flat.dtype)
         for cotangent, moved in zip(cotangents, made, strict=True):
             if type(cotangent) is not ad.Zero:
-                # a result that does not count may move infinitely
+                # an unused result may have an infinite derivative
                 counts = jnp.where(cotangent == 0, 0, cotangent * moved)
                 total = total + jnp.sum(counts.astype(flat.dtype))
         return total

@@ -1,4 +1,4 @@
-"""From the log of a run to impacts, contacts and steps."""
+"""Convert the log of a run to impacts, contacts and steps."""
 
 from types import ModuleType
 from typing import NamedTuple
@@ -14,7 +14,7 @@ from ..surface import normal_velocity
 from ._events import Contacts, Impacts, Steps
 
 
-# Numbers of velocities that programs are compiled for: the least, and by what they grow
+# Numbers of velocities that programs are compiled for: the least, and the growth factor
 _FEWEST, _LONGER = 1024, 4
 
 
@@ -93,7 +93,7 @@ def _places(xp: ModuleType, mask, size: int, fill: int):
 
 
 def _least_to_come(xp: ModuleType, values):
-    """The smallest of each entry and all later ones, along the first axis."""
+    """Return the smallest of each entry and all later ones, along the first axis."""
     if xp is jnp:
         return jax.lax.cummin(values, axis=0, reverse=True)
     return np.minimum.accumulate(values[::-1])[::-1]
@@ -111,7 +111,7 @@ def _speeds(xp: ModuleType, system, times, sides, which):
         size = _FEWEST
         while size < 2 * count:
             size *= _LONGER
-        # the last one again: a system may not be defined at zero
+        # padded with the last entry: a system may not be defined at zero
         rows = np.minimum(np.arange(size), 2 * count - 1)
         times, states, which = times[rows], states[rows], which[rows]
     speeds = _normal_velocities(system, times, states, which)

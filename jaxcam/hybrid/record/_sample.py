@@ -1,4 +1,4 @@
-"""The state between the points of a trajectory, by one more step of the same method."""
+"""Sample the state between points by one more step of the same method."""
 
 import diffrax
 import equinox as eqx
@@ -59,7 +59,7 @@ def sample(system, settings: Settings, steps: Steps, times):
 
         point = start, x, contact, t - start
         moved = advance(system, functions, settings, scale, *point, inside)
-        # beyond what the run covered there is no answer
+        # NaN beyond the interval of the run
         room = 1e-12 * jnp.maximum(jnp.abs(steps.time[0]), jnp.abs(last))
         covered = (t >= steps.time[0] - room) & (t <= last + room)
         return jnp.where(covered, jnp.stack(moved), jnp.nan)
@@ -70,7 +70,7 @@ def sample(system, settings: Settings, steps: Steps, times):
 def advance(
     system, functions: Functions, settings: Settings, scale, t, x, contact, h, inside
 ):
-    """The state a time `h` after `(t, x)` in one mode, by one step.
+    """Return the state a time `h` after `(t, x)` in one mode, by one step.
 
     Functions are evaluated at `inside(time)`; errors are relative to `scale`, `(n,)`.
     """

@@ -22,7 +22,8 @@ def crossings(trajectory, function, direction: int):
     points = np.asarray(trajectory.steps.time)[: int(trajectory.steps.count)]
     share = np.linspace(0.0, 1.0, _PLACES + 1)
     grid = points[:-1, None] + share[None, :] * np.diff(points)[:, None]
-    # an impact belongs to the step after it: every step ends just before its end
+    # an impact belongs to the step after it: every step is searched up to just before
+    # its end
     tiny = 1e-12 * np.maximum(np.abs(points[1:]), np.diff(points))
     ends = np.maximum(points[1:] - tiny, points[:-1])
     grid = np.minimum(grid, ends[:, None])

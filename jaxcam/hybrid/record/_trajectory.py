@@ -46,7 +46,7 @@ class Trajectory(eqx.Module):
     """Index into `RESULTS`: 0 if the run reached t1."""
 
     def __str__(self) -> str:
-        # of a batch there is no one line
+        # batches have no one-line summary
         if is_traced(self) or np.ndim(self.code):
             return repr(self)
         end = float(np.asarray(self.steps.time)[int(self.steps.count) - 1])

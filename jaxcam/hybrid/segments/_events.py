@@ -1,7 +1,7 @@
-"""The first event in a piece of motion that diffrax made, located by Newton's method.
+"""Locate the first event in a piece of motion from diffrax by Newton's method.
 
-Each step is searched at points inside it, made by steps of their own; what is
-found is located on the length of such a step.
+Each step is searched at points inside it, which are computed by separate steps;
+Newton's method then varies the length of such a step.
 """
 
 from typing import NamedTuple
@@ -28,10 +28,9 @@ TOO_LONG = PieceEnd(-1, 0, 0.0)
 
 class Flown(NamedTuple):
     """Points of a piece of motion: `k` times (s) and states of size `n`; and which of
-    the `m` constraints are in contact all along.
-
-    A level is a gap in flight, and what holds the contact in contact; `tiny` is what
-    rounding can tell of each gap, and of a contact a part of the largest level.
+    the `m` constraints stay in contact. A level is the gap in flight, and the contact
+    pressure in contact; `tiny` is the resolution of each gap, and for a contact a part
+    of the largest level.
     """
 
     motion: CompiledMotion
@@ -41,7 +40,8 @@ class Flown(NamedTuple):
     tiny: Float[np.ndarray, " m"]
 
     def first_event(self, count, fired, first, first_rate, t1) -> PieceEnd | None:
-        """The first event among the steps; `TOO_LONG` where the first step hid one.
+        """Return the first event among the steps; `TOO_LONG` where the first step hid
+        one.
 
         **Arguments:** the number of points, whether diffrax `fired` an event at the
         last of them, levels and rates `(m,)` at the first, and the end of the run (s).
@@ -61,11 +61,11 @@ class Flown(NamedTuple):
                 # the piece ends at the event, beyond which nothing was checked
                 end, slope, i = curve[0][-1, -1], curve[1][-1, -1], count - 2
                 h = float(times[i + 1] - times[i])
-                # how far from zero the interpolant may put an event
+                # tolerance of the interpolant at an event
                 if abs(end) <= abs(slope) * 1e-2 * h + 10 * tiny:
                     event = self._locate(k, i, 0.0, None, h)
             if event is not None:
-                # no step ends behind t1, so only rounding can put an event there
+                # no step ends after t1, so an event there is due to rounding
                 length = min(event.length, t1 - times[event.row])
                 found.append(event._replace(length=float(length)))
         return min(found, key=lambda e: times[e.row] + e.length, default=None)

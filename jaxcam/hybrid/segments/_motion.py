@@ -1,4 +1,4 @@
-"""The compiled functions that the engine of `_pieces.py` is made of."""
+"""Compile the functions used by the engine of `_pieces.py`."""
 
 import functools
 from typing import NamedTuple
@@ -40,7 +40,7 @@ FRACTIONS = np.arange(1, 9) / 8
 
 
 class PathPoint(NamedTuple):
-    """A state on the way, and for each constraint how far it is from its event.
+    """An intermediate state, and for each constraint the distance from its event.
 
     The level is the gap of a free constraint and the pressure (minus the multiplier)
     of one in contact; the event is where it falls through zero.
@@ -76,7 +76,9 @@ def prepared(system):
 
 
 def _compiled(method):
-    """Compile once: numbers become arrays, which are not part of the program."""
+    """Compile a function once: numbers become arrays, which are not part of the
+    program.
+    """
     compiled = eqx.filter_jit(method)
 
     @functools.wraps(method)
@@ -105,12 +107,14 @@ class CompiledMotion(eqx.Module):
         self.solver = settings.solver
 
     def measured(self, scale) -> "CompiledMotion":
-        """The same with errors relative to another scale."""
+        """Return the same functions with errors relative to another scale."""
         return eqx.tree_at(lambda m: m.scale, self, jnp.asarray(scale))
 
     @_compiled
     def fly(self, t0, x, contact, t1, first, longest):
-        """Steps up to an event, `t1` or the end of the batch, and how many are real."""
+        """Return steps up to an event, `t1` or the end of the batch, and their
+        number.
+        """
 
         def lowest(t, y, args, **kwargs):
             del kwargs
@@ -156,7 +160,7 @@ class CompiledMotion(eqx.Module):
 
     @_compiled
     def probe(self, t, x, contact, h) -> PathPoint:
-        """The point a step of length `h` after `(t, x)`."""
+        """Return the point a step of length `h` after `(t, x)`."""
         return self._point(t, x, contact, h)
 
     @_compiled
@@ -174,7 +178,7 @@ class CompiledMotion(eqx.Module):
                 jnp.asarray(FRACTIONS),
             )
 
-        # one after the other: a batch of them takes much longer to compile
+        # sequential: a batch takes much longer to compile
         return jax.lax.map(inside, (starts, origins, lengths))
 
     @_compiled
@@ -236,7 +240,7 @@ class CompiledMotion(eqx.Module):
 
     @_compiled
     def rates(self, t, x, contact):
-        """The rates of the state, `(n,)`."""
+        """Return the rates of the state, `(n,)`."""
         return self._field(t, x, contact)
 
     @_compiled
@@ -250,7 +254,7 @@ class CompiledMotion(eqx.Module):
 
     @_compiled
     def completion(self, t, x, contact, k, speed, incoming) -> ChatterEnd:
-        """The rest of the chatter on constraint `k` after a rebound at `speed`.
+        """Return the rest of the chatter on constraint `k` after a rebound at `speed`.
 
         As [`jaxcam.hybrid.surface.chatter_completion`][], for one of several
         constraints.
@@ -281,7 +285,7 @@ class CompiledMotion(eqx.Module):
         )
 
     def _field(self, t, x, contact):
-        # free flight does not pay for the multipliers of contact
+        # free flight does not need the contact multipliers
         return jax.lax.cond(
             jnp.any(contact),
             lambda: field_in_force(self.system, t, x, contact),

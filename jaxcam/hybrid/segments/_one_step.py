@@ -1,4 +1,4 @@
-"""One step of any diffrax Runge-Kutta solver, explicit or implicit, by itself."""
+"""Take one step of any diffrax Runge-Kutta solver, explicit or implicit."""
 
 import diffrax
 import equinox as eqx
@@ -17,7 +17,7 @@ def one_step(solver: diffrax.AbstractSolver, tolerance, field, t, x, h, scale):
         The state after the step and the estimate of its error, both `(n,)`.
 
     Raises:
-        ValueError: For a solver without an error estimate.
+        ValueError: The solver has no error estimate.
     """
     # time counts from t: t + h - t would lose the digits of a short step
     terms = scaled_term(field, t, x, scale)
@@ -39,7 +39,8 @@ def one_step(solver: diffrax.AbstractSolver, tolerance, field, t, x, h, scale):
 
 
 def scaled_term(field, t, x, scale) -> diffrax.ODETerm:
-    """The equation of motion of (state - x) / scale, `(n,)`, by the time after `t`.
+    """Return the equation of motion of (state - x) / scale, `(n,)`, by the time after
+    `t`.
 
     An absolute tolerance means the same for it in all units. Arguments of the equation
     are handed on to `field(t, x, *args)`.
@@ -53,7 +54,9 @@ def scaled_term(field, t, x, scale) -> diffrax.ODETerm:
 
 
 def _with_root_finder(solver, tolerance):
-    """The solver with a tolerance for its equations, as `diffeqsolve` would set it."""
+    """Return the solver with a tolerance for its equations, as `diffeqsolve` would
+    set it.
+    """
     if not isinstance(solver, diffrax.AbstractImplicitSolver):
         return solver
     tolerance = jnp.maximum(tolerance, 1e-14)

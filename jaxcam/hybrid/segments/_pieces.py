@@ -1,4 +1,4 @@
-"""The other engine: one call of `diffrax.diffeqsolve` for each piece of motion.
+"""Second engine: one call of `diffrax.diffeqsolve` for each piece of motion.
 
 A piece is flight or contact, up to the next event. Everything is arranged in plain
 Python around a few compiled functions: slower than the loop, easier to follow, open to
@@ -6,8 +6,8 @@ implicit solvers, and a check on the loop, with which it shares only the derivat
 the gap and the formula for the duration of a chatter.
 
 diffrax checks the sign of an event at the ends of its steps and locates it on an
-interpolant. That is where a piece ends at the latest; `_events.py` searches
-its steps for anything earlier.
+interpolant. A piece ends there at the latest; `_events.py` searches its steps for
+earlier events.
 """
 
 import jax
@@ -23,8 +23,8 @@ from ._motion import CompiledMotion, prepared
 
 # a flight whose lambda = v |j| / a^2 is smaller is one step, not a call of diffrax
 _SHORT = 1e-3
-# so many impacts in a row, each while another gap is closed to rounding, accumulate
-# together
+# this many consecutive impacts, each while another gap is zero up to rounding, count as
+# a joint accumulation
 _MANY = 80
 
 
@@ -64,7 +64,7 @@ class _Engine:
         self.settings = settings
         self.motion = CompiledMotion(prepared(system), settings, np.ones_like(state))
         self.span = t1 - t0
-        # breakpoints are passed between pieces: this is where the next one lies
+        # breakpoints are passed between pieces: time of the next one
         own = system.period
         self.breaks = breakpoints.declared(system)
         self.repeat = np.inf if own is None else own
@@ -74,12 +74,12 @@ class _Engine:
         tiny = np.asarray(self.motion.start_room(self.t, state))
         touching = np.all(np.abs(jets[:, :2]) <= tiny.T, axis=1)
         self.contact = touching & (jets[:, 2] < 0)
-        # where components are measured from, and how far they have been from there
+        # origins of the components, and their largest excursions
         self.origin, self.extents = map(np.asarray, self.motion.extents(t0, state))
         period, longest = system.period, settings.max_step
         self.longest = self.span / 8 if period is None else float(period) / 8
         self.longest = min(self.longest, np.inf if longest is None else float(longest))
-        # the first step of the next piece, shortened where it proves too long
+        # the first step of the next piece, shortened if it is too long
         self.first = np.inf
         self.fastest = 0.0
         # released at this instant: its gap and velocity are zero, and grow
@@ -91,7 +91,7 @@ class _Engine:
         self.code: float | None = None
 
     def advance(self):
-        """One piece of motion, or one event that takes no time."""
+        """Advance by one piece of motion, or by one event without duration."""
         if self.t >= self.end:
             self._pass_breakpoint()
             return
@@ -114,7 +114,9 @@ class _Engine:
             self._fly(jets, level, rate)
 
     def log(self) -> Log:
-        """The rows, padded to a power of two so that few lengths are compiled."""
+        """Return the rows, padded to a power of two so that few lengths are
+        compiled.
+        """
         n, m = len(self.x), len(self.contact)
         length = 64
         while length < len(self.rows):
@@ -127,7 +129,7 @@ class _Engine:
         return Log(*head, *map(jnp.asarray, columns[3:]))
 
     def _fly(self, jets, level, rate):
-        """Up to the next event, or as far as one call of diffrax goes."""
+        """Integrate to the next event, or to the end of one diffrax call."""
         first = min(self.first, self.longest / 16)
         self._rescale(first)
         for k, jet in enumerate(jets):
@@ -177,7 +179,7 @@ class _Engine:
             self._impact(event.constraint, t, there.state)
 
     def _hop(self, jets) -> bool:
-        """A flight too low for its gap to rise above rounding; whether there was one.
+        """Compute a flight too low to rise above rounding; return whether it occurred.
 
         The height is taken from the integral of the normal velocity instead.
         """
@@ -212,13 +214,13 @@ class _Engine:
         speeds = [np.asarray(self.motion.velocity(t, x)) for x in (before, after)]
         u = max(float(speeds[1][k]), 0.0)
         self.fastest = max(self.fastest, u)
-        # an impact on one constraint may throw the system off another it rests on
+        # an impact on one constraint may break contact with another
         reach = np.abs(before) + np.abs(after)
         rounding = np.asarray(self.motion.rounding(t, after, reach))[1]
         kept = np.abs(speeds[1] - speeds[0]) <= 500 * rounding
         self.contact = self.contact & kept
         self.t, self.x = t, after
-        # an impact is an attempt as well, or a run might never end
+        # an impact counts as an attempt too, so that every run ends
         self.steps += 1
         closed = np.asarray(self.motion.jets(t, after))[:, 0] <= self._tiny(after[None])
         closed[k] = False
@@ -256,7 +258,7 @@ class _Engine:
         self.rows.append((kind, k, float(t), before, after, self.contact))
 
     def _look_ahead(self, time):
-        """Go on from just after a `time` (s) to just before the next breakpoint."""
+        """Continue from just after a `time` (s) to just before the next breakpoint."""
         self.ahead, self.end = np.inf, self.t1
         if self.breaks:
             ahead = breakpoints.next_breakpoint(self.breaks, self.repeat, time)
@@ -266,7 +268,7 @@ class _Engine:
                 self.end = float(breakpoints.before(self.ahead, self.span))
 
     def _pass_breakpoint(self):
-        """Go on from the far side of a breakpoint; the row there says when it was."""
+        """Continue on the far side of a breakpoint; its log row records the time."""
         last, here, time = self.rows[-1] if self.rows else None, self.t, self.ahead
         self.x = self.x + (time - here) * self._rates()
         if last is not None and last[0] == RowKind.STEP and last[2] == here:
@@ -280,7 +282,9 @@ class _Engine:
         return np.asarray(self.motion.rates(self.t, self.x, self.contact))
 
     def _rescale(self, first):
-        """Measure errors by how far each component has moved, or will in a step."""
+        """Scale errors by the distance that each component has moved, or will move
+        in a step.
+        """
         if self.settings.absolute is not None:
             size = np.maximum(np.abs(self.x), self.extents + np.abs(self.origin))
             wanted = np.asarray(self.settings.absolute) / float(self.settings.tolerance)
@@ -296,7 +300,7 @@ class _Engine:
             moved = np.where(np.isfinite(there), np.abs(there - self.x), 0.0)
             scale = np.where(scale > 0, scale, moved)
         if not np.all(scale > 0):
-            # what would move another component by its scale in the whole run
+            # the rate that moves another component by its scale in the entire run
             slopes = np.asarray(self.motion.slopes(self.t, self.x, self.contact))
             seen = (slopes > 0) & (scale > 0)[:, None]
             most = np.where(

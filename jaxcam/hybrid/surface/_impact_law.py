@@ -12,7 +12,7 @@ from ._rounding import speed_rounding
 
 # rounding of a law that is evaluated through several coordinates
 _ROUNDING = 1e-6
-# a normal velocity this many times its rounding gives the law to a tenth of that
+# at this multiple of its rounding, a normal velocity gives the law to a tenth of that
 _KNOWN = 1e7
 # Newton steps from the state to the constraint
 _STEPS = 4
@@ -24,7 +24,7 @@ def restitutions(system: HybridSystem, t, x: Float[Array, " n"]) -> Float[Array,
     The state is moved onto the constraint, and its normal velocity made negative: the
     coefficient is minus the quotient of normal velocities after and before an impact
     (thesis, eq. 2.27). For a state at rest on the constraint the normal velocity is
-    only the rounding of its terms, so it is made larger than that; one where all are
+    only rounding error, so it is replaced by a larger value; by 1 where all terms are
     zero.
     """
     number = gaps(system, t, x).shape[0]

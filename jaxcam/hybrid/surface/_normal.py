@@ -141,8 +141,7 @@ def normal_directions(system, t, x) -> Float[Array, "m n"]:
     """Return the unit direction D of the impulse for each constraint.
 
     It is exact where the normal velocity is zero: R(x) - x = W v vanishes with v, so W
-    is found from its derivative in a direction that changes v; the gradient of v is
-    one.
+    is found from its derivative along the gradient of v, which changes v.
 
     Args:
         system: The system.
@@ -174,7 +173,7 @@ def normal_directions(system, t, x) -> Float[Array, "m n"]:
 def contact_multipliers(system, t, x, contact: Bool[Array, " m"]) -> Float[Array, " m"]:
     """Return q with F_s = F - sum q_k D_k over the constraints in contact.
 
-    With one constraint q = a. The constraint presses while q < 0 and lets go where q
+    With one constraint q = a. The constraint presses while q < 0 and releases where q
     rises through zero. Zero for constraints that are not in contact.
     """
     acceleration = normal_acceleration(system, t, x)

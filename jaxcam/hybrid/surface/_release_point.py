@@ -13,7 +13,7 @@ from ._normal import free_jet, gaps, normal_acceleration, normal_velocity
 class ReleasePoint(eqx.Module):
     """The time and state at which contact ends.
 
-    `holds`: 0 for a release, 1 where contact still holds, 2 where there is none.
+    `holds`: 0 for a release, 1 if contact still holds, 2 without contact.
     """
 
     time: Float[Array, ""]
@@ -21,7 +21,7 @@ class ReleasePoint(eqx.Module):
     state: Float[Array, " n"]
     """State there, shape `(n,)`."""
     holds: Float[Array, ""]
-    """0 for a release, 1 where contact still holds, 2 where there is none."""
+    """0 for a release, 1 if contact still holds, 2 without contact."""
 
 
 def contact_state(system: HybridSystem, times, guess) -> Float[Array, "times n"]:

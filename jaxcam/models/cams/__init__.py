@@ -1,4 +1,4 @@
-"""Shapes of cams: profiles, the programs and laws they are made from, contours."""
+"""Shapes of cams: profiles, motion programs and laws, contours."""
 
 from ._cam_contour import (
     CamContour as CamContour,

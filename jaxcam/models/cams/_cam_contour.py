@@ -1,4 +1,4 @@
-"""The shape of a cam that gives a follower its motion.
+"""Compute the shape of a cam from the motion of its follower.
 
 The cam turns counterclockwise about the origin of the fixed frame; a contour is given
 in the frame of the cam, which coincides with the fixed one at cam angle zero.
@@ -120,7 +120,7 @@ def flat_oscillating_contour(
         (point, arm), (rate, _) = jax.jvp(contact, (angle,), (jnp.ones_like(angle),))
         lift, slope, _ = _jet(profile, angle)
         # the face's own direction, seen from the cam, turns with slope - 1,
-        # and the contact point runs along it against the way that it turns
+        # and the contact point moves along it against its rotation
         along = rate[0] * jnp.cos(lift - angle) + rate[1] * jnp.sin(lift - angle)
         pressure = jnp.arctan(half_height / arm)
         return CamContour(point[0], point[1], along / (1 - slope), pressure, arm)
@@ -218,7 +218,7 @@ def _roller(profile, center, direction, length, roller_radius, cam_angles):
         point = pitch(angle)
         first, second = jax.jvp(rate, (angle,), unit)
         size = jnp.hypot(first[0], first[1])
-        # seen from the cam the follower goes round clockwise: left is outside
+        # in the frame of the cam the follower moves clockwise: left is outside
         outward = jnp.stack([-first[1], first[0]]) / size
         pitch_radius = size**3 / (first[1] * second[0] - first[0] * second[1])
         x, y = point - roller_radius * outward
@@ -233,7 +233,7 @@ def _roller(profile, center, direction, length, roller_radius, cam_angles):
 
 
 def _jet(profile, angle):
-    """Lift, slope and curvature of any profile at one angle."""
+    """Return lift, slope and curvature of any profile at one angle."""
     derivatives = getattr(profile, "derivatives", None)
     if derivatives is not None:
         return tuple(derivatives(angle)[..., k] for k in range(3))
@@ -241,7 +241,7 @@ def _jet(profile, angle):
 
 
 def profile_jet(profile, angle):
-    """Lift, slope and curvature of a profile by differentiation."""
+    """Return lift, slope and curvature of a profile by differentiation."""
     unit = (jnp.ones_like(angle),)
 
     def slope(a):

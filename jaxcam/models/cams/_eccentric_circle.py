@@ -1,4 +1,4 @@
-"""The thesis' cam: a circular disc that turns about a point off its centre."""
+"""Define the thesis' cam: a circular disc that turns about an eccentric point."""
 
 import equinox as eqx
 import jax
@@ -97,10 +97,10 @@ class EccentricCircle(CamProfile):
 
 @eqx.filter_jit
 def _series(circle: EccentricCircle):
-    """Mean, cosines and sines that are kept, and what the others add up to (rad)."""
+    """Return mean, cosines and sines that are kept, and the sum of the others (rad)."""
     keep = circle.harmonics
-    # four times the kept harmonics: what is folded back onto them by sampling is
-    # then far smaller than the first harmonic left out
+    # four times the kept harmonics: the aliasing error is then far smaller than the
+    # first omitted harmonic
     points = max(64, 4 * keep)
     angles = 2 * np.pi * np.arange(points) / points
     spectrum = jnp.fft.rfft(circle(jnp.asarray(angles, dtype=float))) / points

@@ -62,7 +62,7 @@ def _sum(angle, mean, cosines, sines):
     return mean + total
 
 
-# The derivative of a series is again a series. Saying so halves the work of gap,
+# The derivative of a series is again a series. A custom rule halves the work of gap,
 # velocity, acceleration and jerk together, against differentiating the recurrence.
 # Traced once for each number of harmonics, since a simulation asks for it many times.
 _series = saving_jvp(_sum)

@@ -73,6 +73,6 @@ MOTION_LAWS: dict[str, MotionLaw] = {
     )
 }
 """The laws that a [`jaxcam.models.Segment`][] may name (R. L. Norton, Cam Design and
-Manufacturing Handbook, 2002, chapters 2 to 4). "cubic" is the one cubic without
-velocity at both ends, 3u^2 - 2u^3; "modified sine" is a cycloidal law of four times the
+Manufacturing Handbook, 2002, chapters 2 to 4). "cubic" is 3u^2 - 2u^3, the only cubic
+with zero velocity at both ends; "modified sine" is a cycloidal law of four times the
 frequency in the first and last eighth, joined by a third of that."""

@@ -1,4 +1,4 @@
-"""A cam's motion program: what the follower does in each part of a turn."""
+"""Define motion programs of cams: the follower's motion in each part of a turn."""
 
 import math
 from collections.abc import Iterable
@@ -17,7 +17,7 @@ from ._profile import CamProfile
 
 _TURN = 2 * np.pi
 _CLOSED = 1e-9
-"""Parts of the turn, or of the largest rise, that rounding may leave open."""
+"""Closing error allowed for rounding, relative to the turn or to the largest rise."""
 
 
 class Segment(NamedTuple):
@@ -196,9 +196,7 @@ class MotionPieces(CamProfile):
         return value + self.amplitudes[piece] * wave
 
     def local(self, cam_angle):
-        """Return the piece in force at an angle, and the fraction of its segment
-        passed.
-        """
+        """Return the piece at an angle, and the fraction of its segment passed."""
         angle = jnp.mod(cam_angle, _TURN)
         # unrolled: an inner loop would keep a simulation's loop from fusing
         after = jnp.searchsorted(
@@ -215,7 +213,7 @@ class MotionPieces(CamProfile):
     def jet(self, piece, cam_angle) -> Float[Array, "... 4"]:
         """Return value and three derivatives of given pieces, continued to any angle.
 
-        A joint has one value on either side; the piece says which is meant.
+        A joint has a value on either side; the piece selects the side.
         """
         cam_angle = jnp.asarray(cam_angle, dtype=float)
         angle = jnp.where(cam_angle == _TURN, cam_angle, jnp.mod(cam_angle, _TURN))
@@ -246,7 +244,7 @@ def _law(law) -> MotionLaw:
 
 
 def _table(laws):
-    """For each piece: its segment, its start in it, polynomial, wave."""
+    """Tabulate for each piece its segment, its start in it, polynomial and wave."""
     pieces = [(i, piece) for i, law in enumerate(laws) for piece in law.pieces]
     powers = max(len(piece.polynomial) for _, piece in pieces)
     owner = np.array([i for i, _ in pieces])

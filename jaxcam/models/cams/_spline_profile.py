@@ -101,10 +101,10 @@ class PiecewiseProfile(CamProfile):
 
 @jax.jit
 def _quintic_pieces(widths, lifts):
-    # Unknown are slope and curvature at each point. With them and the lifts each piece
-    # is a quintic Hermite polynomial, and continuity of the third and fourth derivative
-    # at each point are as many linear equations. Scaled by the mean width so that the
-    # equations are well balanced for tables of any length.
+    # The unknowns are slope and curvature at each point. With them and the lifts each
+    # piece is a quintic Hermite polynomial, and continuity of the third and fourth
+    # derivative at each point are as many linear equations. Scaled by the mean width so
+    # that the equations are well balanced for tables of any length.
     points = widths.shape[0]
     scale = _TURN / points
     h = widths / scale
@@ -143,7 +143,9 @@ def _quintic_pieces(widths, lifts):
 
 
 def _checked_table(angles, lifts) -> int:
-    """Number of points to keep: all, or all but a repetition of the first."""
+    """Return the number of points to keep: all, or all but a repetition of the
+    first.
+    """
     if len(angles) < _FEWEST_POINTS:
         raise ValueError(
             f"Give at least {_FEWEST_POINTS} points of the cam profile; there are "

@@ -1,4 +1,4 @@
-"""Recordings compared with a model, flight by flight."""
+"""Compare recordings with a model, flight by flight."""
 
 from ._compare import compare as compare, compare_case as compare_case
 from ._comparison import (

@@ -1,9 +1,9 @@
 """Compare recordings with a model, flight by flight.
 
-A simulation from one initial state would soon be somewhere else: impacts magnify
-every error. Here each flight is started where the recording says it started, so that
-what remains is what the model lacks in that mode: in flight, on the surface, or
-in the impacts.
+A simulation from one initial state would soon diverge from the recording, because
+impacts magnify every error. Here each flight starts from its measured initial state, so
+that the residual shows the model discrepancy in that mode: in flight, on the surface,
+or in the impacts.
 """
 
 from collections.abc import Sequence
@@ -33,11 +33,11 @@ def compare(
 
     Args:
         system: The model. A `CamFollower` is compared at the measured angle of its cam,
-            whatever its own speed.
-        segments: The recording, cut into its parts.
+            regardless of its own speed.
+        segments: The segmented recording.
         observe: The channels as functions of the state: `{"height_m": 0}` is the first
-            component; a function of the state gives anything else. By default the
-            channel that was cut is the first component.
+            component; a function of the state gives other quantities. By default the
+            segmented channel is the first component.
         noise: Standard deviations of the channels; default measured.
         clock: Time of the model at each sample (s).
 
@@ -107,7 +107,7 @@ def compare_case(rig: Rig, case: Sequence[Segments]) -> Comparison:
 
 
 def _clock(system: HybridSystem, segments: Segments) -> Float[np.ndarray, " k"]:
-    """Time at which the model's cam is where the recorded one was."""
+    """Return the time at which the model's cam has the recorded angle."""
     if isinstance(system, CamFollower) and segments.drive is not None:
         speed, phase = float(system.speed), float(system.phase)
         return (segments.drive.angle - phase) / speed

@@ -1,4 +1,4 @@
-"""The result of a comparison with a model: by mode, in words and numbers."""
+"""Represent the result of a comparison with a model, by mode."""
 
 import dataclasses
 import math
@@ -27,7 +27,9 @@ class Residuals:
     turned: Float[np.ndarray, " k"]
     """Angle of the cam (rad), or empty."""
     value: Float[np.ndarray, " k"]
-    """The differences, in `unit`; `stderr`: what the noise alone would give."""
+    """The differences, in `unit`; `stderr`: their standard errors from the noise
+    alone.
+    """
     stderr: Float[np.ndarray, " k"]
     """Standard errors from the noise alone."""
     piece: Int[np.ndarray, " k"]
@@ -51,14 +53,17 @@ class Row:
     samples: int
     """Number of values compared."""
     rms: float
-    """In `unit`; `ratio`: what is left, in units of the noise: one where the model says
-    all that the sensors can see."""
+    """In `unit`; `ratio`: residual in units of the noise, 1 if the model explains
+    all that the sensors resolve.
+    """
     noise: float
-    """In `unit`; `ratio`: what is left, in units of the noise: one where the model says
-    all that the sensors can see."""
+    """In `unit`; `ratio`: residual in units of the noise, 1 if the model explains
+    all that the sensors resolve.
+    """
     ratio: float
-    """Residual in units of the noise: one where the model explains all that the sensors
-    resolve."""
+    """Residual in units of the noise: 1 if the model explains all that the sensors
+    resolve.
+    """
     worst_record: str
     """The middle of the 10 ms in which the mean difference is the most significant;
     `worst_score`: how many standard errors it is there. The phase is the angle of the
@@ -218,7 +223,7 @@ def _words(row: Row) -> str:
     channel = f"the {_plain_channel(row)}"
     start = _PLACES[row.mode].format(channel=channel, ratio=f"{row.ratio:.1f}")
     size = f" ({row.rms:.1e} {row.unit} rms over {row.count} {_plural(row)})"
-    # noise alone has a most significant place too; it is not worth a word
+    # noise alone has a most significant place too, which is not reported
     where = f", most clearly in {_place(row)}" if row.ratio > 1.15 else ""
     return start + size + where
 

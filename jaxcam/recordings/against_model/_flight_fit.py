@@ -1,4 +1,4 @@
-"""The state in which each flight began, through the model's own free flight.
+"""Fit the initial state of each flight with the model's free flight.
 
 All flights of a recording are fitted together, padded to the longest of them, in one
 compiled program that serves every recording of about that size.
@@ -54,9 +54,9 @@ def fit_flights(
 
     **Arguments:**
 
-    - `times` `(k,)`, `samples` `(c, k)`: of each flight, whose k is its own.
+    - `times` `(k,)`, `samples` `(c, k)`: of each flight; k may differ.
     - `clocks`: time of the model at each flight's first sample (s).
-    - `observe`: what each channel is of the state.
+    - `observe`: each channel as a function of the state.
     - `noise`: standard deviation of each channel.
     - `size`: number of components of the state.
     """
@@ -109,9 +109,8 @@ def state_at(
     rates: Float[np.ndarray, "b c"],
     size: int,
 ) -> Float[np.ndarray, "b n"]:
-    """States whose channels have these values and rates of change, by Newton.
-
-    Where they do not determine the state, the one nearest to zero.
+    """Find states whose channels have these values and rates of change, by Newton's
+    method. If they do not determine the state, it is the solution nearest to zero.
     """
     count = len(clock)
     clock, values, rates = padded(clock), padded(values), padded(rates)
@@ -121,7 +120,7 @@ def state_at(
 
 
 def observed(pick: int | Callable[[Array], Array], state: Array) -> Array:
-    """One channel of a state, a scalar."""
+    """Return one channel of a state, a scalar."""
     return state[pick] if isinstance(pick, int) else jnp.asarray(pick(state))
 
 
@@ -136,7 +135,7 @@ def _channels(picks, state):
 
 
 def _predict(system, picks, substeps, state, clock, time):
-    """Channels at each time of one flight, shape `(c, k)`, by classical Runge-Kutta."""
+    """Predict channels at each time of one flight, shape `(c, k)`, by Runge-Kutta."""
 
     def step(carry, t1):
         t0, x0 = carry
@@ -146,7 +145,7 @@ def _predict(system, picks, substeps, state, clock, time):
             t = clock + t0 + i * h
             return array_step(RK4, system.vector_field, t, x, h, unrolled=True)[0]
 
-        # unrolled where it can be: a loop in a loop costs more than the steps
+        # unrolled if possible: an inner loop costs more than the steps
         x1 = x0
         if substeps <= 2:
             for i in range(substeps):
@@ -195,7 +194,7 @@ def _fit(system, picks, substeps, guess, clock, time, values, mask, noise):
 
 
 def _inverse(matrix):
-    """Inverse of a normal matrix; components that nothing is known of stay."""
+    """Invert a normal matrix; undetermined components have zero rows."""
     scale = jnp.sqrt(jnp.maximum(jnp.diagonal(matrix), 1e-300))
     scales = jnp.outer(scale, scale)
     return jnp.linalg.pinv(matrix / scales, rtol=1e-12, hermitian=True) / scales

@@ -1,4 +1,4 @@
-"""Errors of a model in each mode: in flight, in contact, at impacts."""
+"""Compute residuals of a model in each mode: in flight, in contact, at impacts."""
 
 import equinox as eqx
 import jax
@@ -11,12 +11,12 @@ from ._comparison import Residuals
 from ._flight_fit import fit_flights, observed, rate_of, size_of, state_at
 
 
-# A shorter flight determines nothing but its initial state
+# A shorter flight determines only its initial state
 _LEAST_SAMPLES = 16
 
 
 def _rows(segments: Segments, flight: Flight) -> np.ndarray:
-    """Samples of a flight that are safely between its two ends."""
+    """Return the samples of a flight that are certainly between its two ends."""
     time = segments.recording.time
     margin = segments.recording.interval / 2
     rows = np.arange(flight.first, flight.last)
@@ -28,7 +28,9 @@ def _rows(segments: Segments, flight: Flight) -> np.ndarray:
 
 
 def in_flight(system, segments, observe, noise, clock):
-    """Residuals of each channel in flight, a state fitted to each, and notes on it."""
+    """Return the residuals of each channel in flight, with a fitted state, and
+    notes.
+    """
     recording = segments.recording
     pieces = [(i, _rows(segments, f)) for i, f in enumerate(segments.flights)]
     pieces = [(i, rows) for i, rows in pieces if len(rows) >= _LEAST_SAMPLES]
@@ -74,7 +76,8 @@ def in_flight(system, segments, observe, noise, clock):
                 np.concatenate(values),
                 np.full(len(every), sigma[column]),
                 piece,
-                # each channel pays for its share of the initial states
+                # each channel loses its share of degrees of freedom to the initial
+                # states
                 fitted=round(size * len(kept) / len(observe)),
             )
         )
@@ -82,7 +85,7 @@ def in_flight(system, segments, observe, noise, clock):
 
 
 def in_contact(system, segments, pick, clock) -> list[Residuals]:
-    """The channel in contact, minus what the model's surface makes of it."""
+    """Return the channel in contact minus its value on the model's surface."""
     time = segments.recording.time
     kept = [
         (i, np.flatnonzero((time >= part.settled) & (time < part.stop.time)))
@@ -169,7 +172,7 @@ def _distance(system, pick, clock, state) -> Float[np.ndarray, " k"]:
 
 @eqx.filter_jit
 def _off_surface(system, pick, clock, state):
-    """Gap in units of the channel, to first order, shape `(k,)`."""
+    """Return the gap in units of the channel, to first order, shape `(k,)`."""
 
     def one(clock, state):
         gap, slope = jax.value_and_grad(lambda x: _nearest(system, clock, x))(state)
@@ -186,7 +189,9 @@ def _nearest(system, clock, state):
 
 @eqx.filter_jit
 def _after_impact(system, pick, clock, state):
-    """Rate of the channel after the impact, and its derivative to the rate before."""
+    """Return the rate of the channel after the impact, and its derivative by the
+    rate before.
+    """
 
     def one(clock, state):
         def after(state):

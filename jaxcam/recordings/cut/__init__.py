@@ -1,4 +1,4 @@
-"""A recording cut into flights, contacts and impacts, on the surface it shows."""
+"""Segment recordings into flights, contacts and impacts, on an estimated surface."""
 
 from .._drive import Drive as Drive, read_drive as read_drive
 from ._fast_speed import (

@@ -1,9 +1,9 @@
-"""Bends of a cam: dents that low harmonics cannot follow, if they are certain.
+"""Estimate bends of a cam, significant dents that low harmonics cannot describe.
 
 A bend is a function of the cam's angle with the variances of a Gaussian process with a
-Matern kernel of order 5/2, so that it is zero where nothing is seen. Hops as low as the
-noise resemble one; but they are elsewhere at another speed of the cam. So a bend is
-accepted where it improves the prediction of one record from the others.
+Matern kernel of order 5/2, so that it is zero where there are no data. Flights as low
+as the noise resemble a bend, but their place changes with the cam speed. So a bend is
+accepted only if it improves the prediction of one record from the others.
 """
 
 from typing import NamedTuple
@@ -15,25 +15,25 @@ from jaxtyping import Array, Float
 
 # The highest harmonic of a bend: of a dent over a tenth of a radian it has 98 %
 _HIGHEST = 32
-# how many numbers a bend has
+# number of coefficients of a bend
 WAVES = 2 * _HIGHEST + 1
 # Lengths of correlation (rad) and sizes (in units of the noise) that are tried
 _LENGTHS = (0.1, 0.2, 0.4)
 _SIZES = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0)
-# Twice the log-likelihood that a bend must gain: by the numbers of a straight line, as
-# many samples as records have, and some more for where it may be
+# Gain of twice the log-likelihood that a bend must have: for the parameters of a
+# straight line and the number of samples, plus a term for its unknown place
 _SURE = 30.0
 
 
 def waves(turned: Float[Array, "*k"]) -> Float[Array, "*k waves"]:
-    """Contribution of each number of a bend to the contact angle."""
+    """Return the contribution of each coefficient of a bend to the contact angle."""
     orders = jnp.arange(_HIGHEST + 1, dtype=float)
     phases = jnp.multiply.outer(turned, orders)
     return jnp.concatenate([jnp.cos(phases), jnp.sin(phases[..., 1:])], axis=-1)
 
 
 def spread(length: float) -> Float[np.ndarray, " waves"]:
-    """Standard deviation of each number of a bend of variance one."""
+    """Return the standard deviation of each coefficient of a bend of variance 1."""
     orders = np.arange(_HIGHEST + 1)
     density = (1 + (orders * length) ** 2 / 5) ** -3.0
     density[1:] *= 2
@@ -42,7 +42,7 @@ def spread(length: float) -> Float[np.ndarray, " waves"]:
 
 
 class Seen(NamedTuple):
-    """Information of one record on the numbers of a surface, about some values.
+    """Information of one record on the coefficients of a surface, about some values.
 
     `normal` `(p, p)` and `target` `(p,)`, those of a bend last.
     """
@@ -57,10 +57,11 @@ def bend_sizes(
     pull: Float[np.ndarray, " q"],
     noise: float,
 ) -> Float[np.ndarray, " waves"]:
-    """Standard deviations of the numbers of a bend; zero where there is none for sure.
+    """Return standard deviations of the coefficients of a bend; zero without a
+    significant bend.
 
-    **Arguments:** what each record says; information and pull of the tolerances of the
-    numbers that are no bend, of which there are `q`; the noise.
+    **Arguments:** the information of each record; information and pull of the
+    tolerances of the `q` coefficients that are not part of a bend; the noise.
     """
     none = np.zeros(WAVES)
     if len(records) < 2:
@@ -79,7 +80,7 @@ def bend_sizes(
 
 
 def _evidence(normal, target, known, pull, sizes) -> float:
-    """Twice the logarithm of the marginal likelihood, less that without a bend."""
+    """Return twice the log marginal likelihood, less that without a bend."""
     count = len(known)
     low = normal[:count, :count] + np.diag(known)
     across = normal[:count, count:]
@@ -92,9 +93,10 @@ def _evidence(normal, target, known, pull, sizes) -> float:
 
 
 def _foretold(records, known, pull, sizes) -> float:
-    """Twice the log-likelihood that records gain by the bend that all the others show.
+    """Return the gain of twice the log-likelihood of records from the bend of all
+    others.
 
-    Beside the numbers that are no bend as all of them together have it.
+    The other coefficients are those of all records together.
     """
     count = len(known)
     normal, target = _total(records)
@@ -119,5 +121,5 @@ def _total(records: list[Seen]) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _scaled(normal, units) -> np.ndarray:
-    """Information in units of what is known beforehand, with that."""
+    """Return the information in units of the prior, including the prior."""
     return np.eye(len(units)) + normal * np.outer(units, units)

@@ -16,7 +16,8 @@ from ._motion import Motion
 # First sample of a stretch, and one past its last
 Span: TypeAlias = tuple[int, int]
 
-# Gaps, in units of the noise: below the one contact may be, above the other flight is
+# Gaps, in units of the noise: contact is possible below the first, flight is certain
+# above the second
 LOW, HIGH = 4.0, 6.0
 # Seconds
 SHORTEST_CONTACT = 0.005
@@ -31,10 +32,10 @@ SHORTEST_FLIGHT = 5
 def contact_stretches(motion: Motion) -> tuple[list[Span], list[Span]]:
     """Lasting stretches near the surface, with lower flights between them.
 
-    And those that may as well be slow impacts, or grazes.
+    It also returns those that may be slow impacts or grazes.
     """
     near = motion.gap < LOW * motion.noise
-    # one outlier in thousands of samples is no flight
+    # one outlier in thousands of samples is not a flight
     near = binary_closing(np.pad(near, 3, mode="edge"), np.ones(3))[3:-3]
     shortest = max(4, round(SHORTEST_CONTACT / motion.interval))
     long = [pair for pair in stretches(near) if pair[1] - pair[0] >= shortest]
@@ -58,7 +59,7 @@ def contact_stretches(motion: Motion) -> tuple[list[Span], list[Span]]:
 
 
 def stretches(mask: np.ndarray) -> list[tuple[int, int]]:
-    """Start and end (one past the last) of each run of true values."""
+    """Return start and end (one past the last) of each run of true values."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(int), [0]])))
     return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2])]
 
@@ -84,8 +85,8 @@ def _grazes(motion: Motion, first: int, last: int) -> bool:
 def _bounces(motion: Motion, first: int, last: int, end: int) -> bool:
     """Return whether a short stretch near the surface is a slow impact.
 
-    The flight after an impact is bent down from its first sample, or it would not
-    have come; the flight after a release opens as a cubic and is bent up.
+    The flight after an impact curves downwards from its first sample; the flight after
+    a release opens as a cubic and curves upwards.
     """
     flight = motion.gap[last:end]
     if (

@@ -1,4 +1,4 @@
-"""Flights, contacts and impacts of a motion, with the evidence for each boundary."""
+"""Find flights, contacts and impacts of a motion, with evidence for each boundary."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -23,26 +23,26 @@ from ._release import release_time
 from ._segments import Boundary, Contact, Flight, Impacts
 
 
-# Standard errors by which a motion must recede from a surface for an impact on it to be
-# refused; or go on into it, for there to have been more than one
+# Standard errors by which a motion must recede from a surface for an impact to be
+# rejected; or continue into it, for several impacts
 _SURE = 3.0
-# Samples of a flight before an impact that show how it curves down
+# Samples of a flight before an impact that show its curvature
 _LONG = 10
-# Gap of an impact at most: in units of the noise, and as a part of the largest gap. It
-# leaves room for a surface that is known by its tolerance only
+# Largest gap of an impact: in units of the noise, and as a fraction of the largest gap.
+# It allows for a surface known only within its tolerance
 _FAR_NOISE, _FAR_GAP = 20.0, 0.25
 
 
 def cut(
     sides: Sequence[Motion], restitution: float
 ) -> tuple[tuple[Flight, ...], tuple[Contact, ...], Impacts]:
-    """Flights, contacts and impacts of a motion within one surface or several.
+    """Segment a motion within one or several surfaces.
 
     **Arguments:**
 
-    - `sides`: the motion as each surface sees it, its gap positive; that of a surface
-        above the motion is `mirrored`, and that of a body that moves is the distance.
-    - `restitution`: expected, for impacts that are too low to be seen.
+    - `sides`: the motion relative to each surface, with a positive gap; it is
+      `mirrored` for a surface above the motion, and the distance for a moving body.
+    - `restitution`: expected value, for impacts too low to be observed.
     """
     motion = sides[0]
     resting, doubtful, marks = _places(sides)
@@ -56,7 +56,7 @@ def cut(
             for place, number in marks.items()
             if place in before and place in after
         }
-        # a velocity that jumps while the motion leaves the surface is no impact on it
+        # a velocity jump while the motion leaves the surface is not an impact on it
         long = {last for first, last in spans if last - first >= _LONG}
         wrong = [
             place
@@ -99,7 +99,7 @@ def cut(
     ]
     contacts = settled_alike(contacts, flights)
     impacts = [
-        # a speed of approach that noise makes negative is not known
+        # an approach speed made negative by noise is unknown
         ({**crossed[place], "side": marks.get(place, side.get(place, 0))}, number)
         for number, (_, place) in enumerate(spans)
         if place in crossed
@@ -110,7 +110,9 @@ def cut(
 
 
 def _places(sides: Sequence[Motion]):
-    """Contacts, doubtful contacts and impacts, each with the number of its side."""
+    """Return contacts, doubtful contacts and impacts, each with the number of its
+    side.
+    """
     # gaps may have different units
     nearest = np.argmin(np.stack([side.gap / side.noise for side in sides]), axis=0)
     resting: dict[Span, int] = {}
@@ -119,13 +121,13 @@ def _places(sides: Sequence[Motion]):
     for number, side in enumerate(sides):
         found, unsure = contact_stretches(side)
         for mark in impact_marks(side, found):
-            # next to a jump one way, windows show jumps the other way
+            # next to a jump, windows show jumps of the opposite sign
             near = side.gap[mark - 1 : mark + 1]
             if number in nearest[mark - 1 : mark + 1] and np.min(near) < _reach(side):
                 marks[mark] = number
         resting |= dict.fromkeys(found, number)
         doubtful |= dict.fromkeys(unsure, number)
-    # what is near the surface for long, without an impact, is no flight either
+    # long near-surface stretches without impacts count as contact
     doubtful = {
         pair: number
         for pair, number in doubtful.items()
@@ -137,7 +139,7 @@ def _places(sides: Sequence[Motion]):
 
 
 def _reach(side: Motion) -> float:
-    """Gap above which a jump in velocity is on no surface that is stated."""
+    """Return the gap above which a velocity jump belongs to no given surface."""
     return max(_FAR_NOISE * side.noise, _FAR_GAP * float(np.max(side.gap)))
 
 
@@ -147,7 +149,7 @@ def _leaves(found: dict) -> bool:
 
 
 def _spans(count: int, resting: list[Span], marks: list[int]) -> list[Span]:
-    """First sample and one past the last of each flight."""
+    """Return the first sample and one past the last of each flight."""
     spans = []
     begin = 0
     for first, last in [*resting, (count, count)]:
@@ -168,7 +170,7 @@ def _crossed(motion: Motion, first: int, place: int, last: int) -> dict:
         time, stderr = origin, 2 * motion.interval
     surface = float(np.interp(time, motion.time, motion.rate))
     approach, separation = surface - before.slope(time), after.slope(time) - surface
-    # the fits meet at a weighted mean of both, as seen from the surface
+    # the fits meet at a weighted mean of both, relative to the surface
     shares = np.array([separation, approach])
     shares = shares / np.sum(shares) if np.sum(shares) > 0 else np.full(2, 0.5)
     errors = np.array([before.value_stderr(time), after.value_stderr(time)])
@@ -206,7 +208,7 @@ def _landing(motion: Motion, place: int, before: LocalFit) -> Boundary:
     time = float(motion.time[place])
     slope = before.slope(time) - motion.rate[place]
     height = before.value(time) - motion.contact[place]
-    # how far before or after the threshold the flight meets the surface
+    # distance from the threshold to the impact on the surface
     shift = -height / slope if slope < 0 else 0.0
     limit = 10 * motion.interval
     time = time + float(np.clip(shift, -limit, limit))
@@ -235,9 +237,9 @@ def _release(motion: Motion, first: int, last: int, end: int) -> Boundary:
 
 
 def _not_before(landing: Boundary | None, release: Boundary, latest) -> Boundary:
-    """The release, unless the follower may still have been landing by then.
+    """Return the release, unless the follower may still have been landing by then.
 
-    A low flight that lands as the surface recedes rebounds too low to be seen. The
+    A low flight that lands on a receding surface rebounds too low to be observed. The
     flight begins at `latest` (s) in any case.
     """
     if landing is None or landing.kind != "landing":
@@ -258,7 +260,7 @@ def _flight(sides, span, boundaries, left: set[int]) -> Flight:
     start = start if first == span[0] else _end(motion, first, hidden)
     stop = stop if last == span[1] else _end(motion, last - 1, hidden)
     height = float(np.max(motion.gap[first:last]))
-    # the threshold is passed long after release: give those samples to the flight
+    # the threshold is passed long after release: these samples belong to the flight
     begin = int(np.searchsorted(motion.time, start.time))
     first = begin if span[0] in left and start is boundaries[span[0]] else first
     return Flight(start, stop, first, last, height)

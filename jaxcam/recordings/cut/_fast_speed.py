@@ -9,17 +9,16 @@ from scipy.signal import savgol_filter
 from .._recording import Recording
 
 
-# Time (s) over which a speed is measured, so that noise is none; share of the speeds
-# that are lower
+# Time (s) over which a speed is measured, so that noise is negligible; quantile of the
+# speeds
 _STRIDE, _SHARE = 5e-3, 0.95
 # Samples of a parabola that shows an acceleration
 _WINDOW = 51
 
 
 def fast_speed(recordings: Sequence[Recording], channel: str) -> float:
-    """A speed of a channel that one sample in twenty exceeds, in its units a second.
-
-    One where the channel stands still.
+    """Return the speed of a channel that one sample in twenty exceeds, in its units per
+    second; 1 for a channel at rest.
     """
     speeds = []
     for recording in recordings:
@@ -32,9 +31,8 @@ def fast_speed(recordings: Sequence[Recording], channel: str) -> float:
 
 
 def usual_acceleration(recordings: Sequence[Recording], channel: str) -> float:
-    """A size of a channel's second derivative that one sample in ten exceeds.
-
-    In its units a second squared; infinite where the records are too short to show it.
+    """Return the size of a channel's second derivative that one sample in ten exceeds,
+    in its units per second squared; infinite if the records are too short.
     """
     found = []
     for recording in recordings:

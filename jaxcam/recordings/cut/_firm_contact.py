@@ -1,8 +1,9 @@
-"""Samples in certain contact, by the acceleration: no surface has to be known.
+"""Find samples in certain contact by the acceleration, without a known surface.
 
-In flight it has the acceleration that its spring gives it, which the rig file states
-within its tolerances. What is held up by more is on the cam, if it is smooth: impacts
-are not. Where the spring hardly presses nothing can be said.
+In flight the follower has the acceleration due to its spring, which the rig file states
+within its tolerances. A follower with a larger smooth acceleration is on the cam; at
+impacts the motion is not smooth. Where the spring force is small, the test is
+inconclusive.
 """
 
 import equinox as eqx
@@ -17,12 +18,11 @@ from ._contact_stretches import stretches
 from ._hidden_hops import moved
 
 
-# Half of the window in which an acceleration is measured, and the least time that a
-# follower is to be held up for (s)
+# Half of the window in which an acceleration is measured, and the shortest contact (s)
 _HALF, _LASTS = 0.0125, 0.04
 # Standard errors of the noise, and standard deviations of the tolerances, that count
 _BEYOND, _SPREAD = 4.0, 3.0
-# Standard deviations of what noise leaves of a window up to which it is smooth
+# Standard deviations of the noise below which a window is smooth
 _SMOOTH = 4.0
 # Positions at which the free acceleration is tabulated
 _PLACES = 64
@@ -31,7 +31,7 @@ _PLACES = 64
 def firm_contact(
     recording: Recording, rig: Rig, speed: float, channel: str, noise: float
 ) -> Bool[np.ndarray, " k"]:
-    """Samples of a record that are on the cam beyond doubt.
+    """Return the samples of a record that are certainly on the cam.
 
     **Arguments:** `speed` of the cam (rad/s), for the rig's system; the channel of the
     follower and its noise.
@@ -63,7 +63,7 @@ def firm_contact(
 
 
 def _most(rig: Rig, speed: float, positions) -> Float[np.ndarray, " k"]:
-    """The largest acceleration of a free follower that the tolerances allow."""
+    """Return the largest acceleration of a free follower within the tolerances."""
     places = np.linspace(positions.min(), positions.max(), _PLACES)
     nominal = _free(rig, speed, places)
     change = [_free(one, speed, places) - nominal for one in moved(rig)]

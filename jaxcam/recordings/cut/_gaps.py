@@ -1,4 +1,4 @@
-"""A recording cut at every gap that it shows, whichever channels show it."""
+"""Segment a recording at all its gaps, from any channels."""
 
 from collections.abc import Sequence
 
@@ -23,18 +23,19 @@ def segment_gaps(
     drive: Drive | None = None,
     restitution: float = 0.5,
 ) -> Segments:
-    """Cut a recording at the impacts on each of its gaps, seen at every sample.
+    """Segment a recording at the impacts on each of its gaps, given at every sample.
 
-    Any number of bodies and surfaces: where one gap closes, all of the motion is cut.
+    There may be any number of bodies and surfaces; an impact on one gap cuts the motion
+    of all.
 
     **Arguments:**
 
-    - `recording`, and the `channel` that stands for its motion in tables.
+    - `recording`, and the `channel` that represents its motion in tables.
     - `gaps`: each positive where it is open.
-    - `tolerances`: how far each gap may be off by a constant, in its own units. Within
-        it, it is put to zero where the impacts are.
+    - `tolerances`: largest constant error of each gap, in its own units. Within it, the
+      gap is set to zero at the impacts.
     - `drive`: of the system, if it has one.
-    - `restitution`: expected, for impacts that are too low to be seen.
+    - `restitution`: expected value, for impacts too low to be observed.
 
     **Returns:** the parts; `impacts.side` is the gap that closed, and `before` and
     `after` are its rates of change.

@@ -1,8 +1,8 @@
 """Find flights that are lower than the encoder resolves.
 
 Just above the speed at which the valve floats, the follower lifts by a few times the
-noise once a turn. Samples of such a flight resemble contact. The rig file says where it
-may happen, whatever its tolerances hide: there the spring hardly presses.
+noise once a turn. Samples of such a flight resemble contact. The rig file determines,
+within its tolerances, the phases of small spring force at which it may happen.
 """
 
 import dataclasses
@@ -22,16 +22,16 @@ from .._rig import Quantity, Rig
 _GRID = 720
 # Standard deviations of the tolerances that count
 _SPREAD = 3.0
-# How much earlier (rad) than elsewhere a release may be
+# Largest advance (rad) of a release relative to the others
 _EARLY = 0.1
 
 
 def hop_phases(rig: Rig, speed: float) -> Bool[np.ndarray, " 720"]:
-    """Phases of the turn (of 720) at which the follower may be in a hidden flight.
+    """Return the phases of the turn (of 720) with a possible hidden flight.
 
-    From where the pressing acceleration, with three standard deviations of what the
-    tolerances say of it, allows a release, to where the next flight has landed and
-    its chatter has died out.
+    They extend from the phase at which the pressing acceleration, less three standard
+    deviations from the tolerances, allows a release, to the phase at which the chatter
+    of the next flight has ended.
 
     **Arguments:** `speed` of the cam (rad/s). Phase zero is the nominal cam's.
     """
@@ -52,7 +52,7 @@ def hop_phases(rig: Rig, speed: float) -> Bool[np.ndarray, " 720"]:
 
 
 def _hop(pull: np.ndarray, step: float, restitution: float) -> int:
-    """Steps from a release to the next contact, at most one turn."""
+    """Return the steps from a release to the next contact, at most one turn."""
     rate = np.cumsum(pull) * step
     landed = np.flatnonzero(np.cumsum(rate) <= 0)
     if len(landed) == 0:
@@ -63,7 +63,9 @@ def _hop(pull: np.ndarray, step: float, restitution: float) -> int:
 
 
 def moved(rig: Rig):
-    """The rig with each quantity off by the standard deviation of its tolerance."""
+    """Return the rig with each quantity shifted by the standard deviation of its
+    tolerance.
+    """
     for field in dataclasses.fields(rig):
         one = getattr(rig, field.name)
         if not isinstance(one, Quantity) or not one.tolerance:
@@ -72,7 +74,7 @@ def moved(rig: Rig):
 
 
 def _pull(rig: Rig, speed: float) -> Float[np.ndarray, " 720"]:
-    """Acceleration away from the cam (rad/s^2) that contact suppresses."""
+    """Return the acceleration away from the cam (rad/s^2) that contact suppresses."""
     system = rig.system(speed)
     times = jnp.asarray(2 * np.pi / speed / _GRID * np.arange(_GRID))
     return np.asarray(_along(system, times))
@@ -89,15 +91,14 @@ def _along(system, times):
 
 
 def may_hop(rig: Rig, drive: Drive) -> Bool[np.ndarray, " k"]:
-    """Samples of a record at which the follower may be in a hidden flight."""
+    """Return the samples of a record with a possible hidden flight."""
     phases = hop_phases(rig, drive.speed)
     return phases[np.round(drive.angle / (2 * np.pi) * _GRID).astype(int) % _GRID]
 
 
 def pressed(rig: Rig, drive: Drive) -> Bool[np.ndarray, " k"]:
-    """Samples from which the surface may be learnt, where they are near it.
-
-    Those without a possible hidden flight; all, where one may be anywhere.
+    """Return the samples usable to fit the surface, if they are near it: those without
+    a possible hidden flight; all, if hidden flights may be anywhere.
     """
     doubtful = may_hop(rig, drive)
     return ~doubtful | doubtful.all()
@@ -106,11 +107,10 @@ def pressed(rig: Rig, drive: Drive) -> Bool[np.ndarray, " k"]:
 def sure_contact(
     doubtful: Bool[np.ndarray, " k"], releases: Int[np.ndarray, " releases"]
 ) -> Bool[np.ndarray, " k"]:
-    """Samples at which contact is beyond doubt, where it is contact at all.
+    """Return the samples at which observed contact is certain. An uncertain stretch
+    with an observed release is certain, because its flight was observed too.
 
-    A stretch of doubt in which a release was seen is none: the flight was seen too.
-
-    **Arguments:** what `may_hop` says, and the samples at which releases were seen.
+    **Arguments:** the result of `may_hop`, and the samples of observed releases.
     """
     sure = ~doubtful
     edges = np.flatnonzero(np.diff(np.concatenate([[0], doubtful.astype(int), [0]])))
@@ -123,13 +123,12 @@ def sure_contact(
 def before_release(
     angle: Float[np.ndarray, " k"], first: int, releases: Int[np.ndarray, " releases"]
 ) -> Bool[np.ndarray, " k"]:
-    """Samples of a contact that the record cuts off at which it surely continues.
-
-    Those before the phase at which the follower was released elsewhere in the record: a
-    release just before the end is not seen.
+    """Return the samples of a contact cut off by the record's end at which it certainly
+    continues: those before the phase of release elsewhere in the record, because a
+    release just before the end is not observed.
 
     **Arguments:** the angle that the cam has turned (rad), the first sample of the
-    contact, and the samples at which releases were seen.
+    contact, and the samples of observed releases.
     """
     if not len(releases):
         return np.ones(len(angle), dtype=bool)

@@ -1,6 +1,6 @@
 """Find the ends of flights in impacts.
 
-A jump in velocity cuts a flight in two, however fast the impact is over.
+A jump in velocity separates two flights, however short the impact is.
 """
 
 import numpy as np
@@ -18,7 +18,7 @@ from ._motion import Motion
 
 
 def impact_marks(motion: Motion, resting) -> list[int]:
-    """Index of the first sample after each impact between two flights."""
+    """Return the index of the first sample after each impact between two flights."""
     kinks = find_kinks(motion.samples, motion.interval, motion.noise)
     marks = [int(kink) for kink in kinks]
     near = stretches(motion.gap < LOW * motion.noise)
@@ -38,7 +38,7 @@ def impact_marks(motion: Motion, resting) -> list[int]:
 
 
 def away(motion: Motion, marks: list[int], resting: list[Span]) -> list[int]:
-    """Marks that leave a flight on both sides."""
+    """Return the marks that leave a flight on both sides."""
     ends = [(-1, 0), (len(motion.time), len(motion.time) + 1)]
     kept: list[int] = []
     for mark in sorted(marks):
@@ -51,7 +51,7 @@ def away(motion: Motion, marks: list[int], resting: list[Span]) -> list[int]:
 
 
 def _hinge(motion: Motion, where, limits) -> tuple[int, float]:
-    """The best place of a slow impact, and the significance of its jump in velocity.
+    """Find the best place of a slow impact, and the significance of its velocity jump.
 
     Only the velocity jumps in an impact; the acceleration hardly changes. So one cubic
     and a hinge describe both sides, which finds jumps that two separate fits miss.

@@ -1,11 +1,11 @@
-"""Impacts without a model: places where the velocity of a smooth motion jumps up."""
+"""Find impacts without a model, as upward jumps in velocity of a smooth motion."""
 
 import numpy as np
 from jaxtyping import Float, Int
 from scipy.signal import find_peaks
 
 
-# Seconds on either side of a kink that it takes to see it
+# Seconds on either side of a kink that are needed to detect it
 WINDOW = 0.01
 
 
@@ -17,7 +17,7 @@ def find_kinks(
     window: float = WINDOW,
     threshold: float = 7.0,
 ) -> Int[np.ndarray, " kinks"]:
-    """Index of the first sample after each jump in velocity.
+    """Return the index of the first sample after each jump in velocity.
 
     Parabolas through the `window` (s) before and after each sample are compared; a
     kink is a local maximum of the jump in slope that exceeds `threshold` of its
@@ -31,7 +31,9 @@ def find_kinks(
 def jump_score(
     samples: Float[np.ndarray, " k"], interval: float, noise: float, window: float
 ) -> Float[np.ndarray, " k"]:
-    """Jump in slope just before each sample over its standard error, shape `(k,)`."""
+    """Return the jump in slope before each sample over its standard error, shape
+    `(k,)`.
+    """
     count = max(6, round(window / interval))
     score = np.zeros(len(samples))
     if len(samples) < 2 * count:

@@ -1,4 +1,4 @@
-"""One channel of a record, and the surface below it."""
+"""Represent one channel of a record and the surface below it."""
 
 import dataclasses
 
@@ -16,7 +16,7 @@ _FOLLOWED = 2.0
 
 @dataclasses.dataclass(frozen=True)
 class Motion:
-    """Samples of a motion, what they would be in contact, and the noise on them.
+    """Samples of a motion, their values in contact, and their noise.
 
     The motion is above the surface; `sense` is -1 where it was `mirrored` to be so.
     """
@@ -30,8 +30,9 @@ class Motion:
     sense: float = 1.0
 
     def mirrored(self, contact, rate) -> "Motion":
-        """The motion as a surface above it sees it, at `contact` and moving at `rate`,
-        both `(k,)` in the units of the samples."""
+        """Return the motion relative to a surface above it, at `contact` and moving
+        at `rate`, both `(k,)` in the units of the samples.
+        """
         return dataclasses.replace(
             self, samples=-self.samples, contact=-contact, rate=-rate, sense=-1.0
         )
@@ -41,7 +42,7 @@ class Motion:
         return self.samples - self.contact
 
     def fit(self, first: int, last: int, *, at_end: bool) -> LocalFit:
-        """A polynomial through one end of a flight, as far as a cubic follows it."""
+        """Fit a polynomial to one end of a flight, as far as a cubic follows it."""
         # the samples next to an impact may be from the other side of it
         inner = slice(first + 1, last - 1) if last - first > 6 else slice(first, last)
         count = max(4, round(_FIT_WINDOW / self.interval))

@@ -1,13 +1,13 @@
-"""Arrays of any length for compiled programs of few lengths."""
+"""Pad arrays to a few lengths for compiled programs."""
 
 import numpy as np
 
 
 def padded(array, block: int = 64) -> np.ndarray:
-    """An array made longer along its first axis by repeating its last entry.
+    """Extend an array along its first axis by repeating its last entry.
 
-    Lengths are rounded up to `block` times a power of four. A program is compiled
-    anew for each length, which takes far longer than running it on some more entries.
+    Lengths are rounded up to `block` times a power of four. A program is compiled again
+    for each length, which takes far longer than running it on additional entries.
     """
     array = np.asarray(array)
     length = block

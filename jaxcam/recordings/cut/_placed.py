@@ -1,4 +1,4 @@
-"""A surface put where the impacts on it are, within its tolerance."""
+"""Shift a surface to its impacts, within its tolerance."""
 
 import dataclasses
 
@@ -9,20 +9,20 @@ from ._motion import Motion
 from ._polynomial import crossing, fit_local
 
 
-# Impacts further from the usual place than this many of their errors do not count
+# Impacts further from the median place than this many standard errors do not count
 _OUTLIER = 5.0
 
 
 def placed(motion: Motion, tolerance: float) -> Motion:
-    """The motion with its surface moved to where its velocity jumps.
+    """Return the motion with its surface shifted to the jumps in velocity.
 
-    A surface that is off by many times the noise makes fast impacts short contacts, or
-    hides slow ones.
+    A surface error of many times the noise turns fast impacts into short contacts, or
+    hides slow impacts.
 
-    **Arguments:** `tolerance` is how far the surface may be from where it is stated, in
-    the units of the samples; it moves no further.
+    **Arguments:** `tolerance` is largest error of the given position, in the units of
+    the samples, and so the largest shift.
 
-    **Returns:** the same motion where no jump is within the tolerance.
+    **Returns:** the unchanged motion if no jump is within the tolerance.
     """
     time, samples = motion.time, motion.samples
     reach = max(6, round(WINDOW / motion.interval))

@@ -1,4 +1,4 @@
-"""Polynomials through one side of a boundary, with the errors of what they say."""
+"""Fit polynomials to one side of a boundary, with their errors."""
 
 import dataclasses
 import math
@@ -19,7 +19,7 @@ class LocalFit:
         return float(self._row(time) @ self.coefficients)
 
     def values(self, times: Float[np.ndarray, " k"]) -> Float[np.ndarray, " k"]:
-        """At many times at once."""
+        """Evaluate at many times."""
         return np.polynomial.polynomial.polyval(times - self.origin, self.coefficients)
 
     def slope(self, time: float) -> float:
@@ -47,16 +47,16 @@ def fit_local(
     noise: float,
     origin: float,
 ) -> LocalFit:
-    """Least squares, of the degree that so many samples can bear: one to three.
+    """Fit by least squares, with a degree from one to three by the number of samples.
 
     **Arguments:**
 
     - `noise`: standard deviation of a sample, which sets the covariance.
-    - `origin`: time at which the fit will be asked.
+    - `origin`: time at which the fit will be evaluated.
     """
     degree = 3 if len(time) >= 24 else 2 if len(time) >= 8 else 1
     degree = min(degree, len(time) - 1)
-    # scaled to about one, or the normal matrix is near singular
+    # scaled to about 1, otherwise the normal matrix is nearly singular
     scale = max(float(np.max(np.abs(time - origin))), np.finfo(float).tiny)
     powers = np.arange(degree + 1)
     design = ((time - origin) / scale)[:, None] ** powers
@@ -69,9 +69,9 @@ def fit_local(
 def crossing(
     before: LocalFit, after: LocalFit, time: float, reach: float
 ) -> tuple[float, float]:
-    """Return where two fits meet, and the standard error of that time (s), by Newton.
+    """Return the time at which two fits meet, and its standard error (s), by Newton.
 
-    The search goes no further than `reach` (s) from `time`, where both were fitted.
+    The search extends to `reach` (s) from `time`, where both were fitted.
     """
     earliest, latest = time - reach, time + reach
     for _ in range(5):
@@ -86,9 +86,10 @@ def crossing(
 
 
 def measured_noise(samples: Float[np.ndarray, " k"], order: int = 3) -> float:
-    """Standard deviation of white noise on a smooth signal, from its differences.
+    """Estimate the standard deviation of white noise on a smooth signal from
+    differences.
 
-    The few differences that stand out, as those across an impact do, are left out.
+    Outlying differences, such as those across an impact, are omitted.
 
     **Arguments:** the `order` of the differences, three by default.
     """
@@ -102,9 +103,9 @@ def measured_noise(samples: Float[np.ndarray, " k"], order: int = 3) -> float:
 
 
 def least_noise(samples: Float[np.ndarray, " k"]) -> float:
-    """A lower bound of `measured_noise` that few samples per period do not raise.
+    """Return a lower bound of `measured_noise`, also valid for few samples per period.
 
-    What differences of a low order show of the motion itself, those of a high order do
-    not; white noise is the same in all of them.
+    Differences of low order contain the motion itself, those of high order do not;
+    white noise is the same in all of them.
     """
     return min(measured_noise(samples, order) for order in range(3, 9))

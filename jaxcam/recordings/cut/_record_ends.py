@@ -10,15 +10,14 @@ from ._motion import Motion
 from ._segments import Contact, Flight
 
 
-# Samples of a flight that say where it goes on to
+# Samples of a flight for its extrapolation
 _LEAST = 12
 
 
 def clear_of_end(motion: Motion, span: Span) -> Span:
-    """The part of a flight that surely comes before an impact at the record's end.
-
-    And after one at its beginning. So near to an end an impact shows in too few samples
-    to be found; but the flight, followed on, says where it would be.
+    """Return the part of a flight certainly before an impact at the record's end, and
+    after an impact at its beginning. So near to an end an impact affects too few
+    samples to be detected, but extrapolation of the flight predicts it.
     """
     first, last = span
     count = len(motion.time)
@@ -45,7 +44,7 @@ def _near(motion: Motion, fit, rows):
 
 
 def settled_alike(contacts: list[Contact], flights: list[Flight]) -> list[Contact]:
-    """Contacts whose beginning was not seen settle as late as the others of a record.
+    """Give contacts with an unobserved start the settling time of the others.
 
     A record may begin in the middle of chatter.
     """

@@ -1,4 +1,4 @@
-"""Locate the release, which is slow, so that a threshold is always late."""
+"""Locate the release, which is slow, so that a threshold would always be late."""
 
 import numpy as np
 from jaxtyping import Float
@@ -11,17 +11,17 @@ def release_time(
     rate: Float[np.ndarray, " k"],
     noise: float,
 ) -> tuple[float, float]:
-    """Time of release and its standard error (s), from the gap around it.
+    """Return the time of release and its standard error (s), from the gap around it.
 
     At release the free body has the position, the velocity and the acceleration of the
     surface. It leaves along that parabola while the surface bends away, so the gap
     opens as a cubic whose size the surface itself gives. Each sample is tried as the
-    release; the best one wins, and the error is where the sum of squares has grown by
-    the noise.
+    release. The sample with the least sum of squares is used; the error is the distance
+    at which the sum has grown by the noise variance.
 
     **Arguments:**
 
-    - `time`, `gap`: samples from a little before release to well after it.
+    - `time`, `gap`: samples from shortly before release to well after it.
     - `contact`, `rate`: position and velocity of the surface at those times.
     - `noise`: standard deviation of a sample.
     """
@@ -34,7 +34,7 @@ def release_time(
         - contact[None, :]
     )
     misfit = gap[None, :] - np.where(past > 0, free, 0.0)
-    # the surface may be off by a constant
+    # the surface may have a constant error
     misfit = misfit - misfit.mean(1, keepdims=True)
     squares = np.sum(misfit**2, axis=1)[:-2] / noise**2
     best = int(np.argmin(squares))

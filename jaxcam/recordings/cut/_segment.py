@@ -1,4 +1,4 @@
-"""Recordings of a rig, or of any system, cut into flights, contacts and impacts."""
+"""Segment recordings of any system into flights, contacts and impacts."""
 
 import dataclasses
 from collections.abc import Callable, Sequence
@@ -19,7 +19,7 @@ from ._surface import Surface
 from ._surface_fit import fit_surface, refine_surface
 
 
-# times that the surface is refined by the contacts of a cut with the one before
+# number of refinements of the surface by the contacts of the previous segmentation
 _REFINED = 2
 
 
@@ -31,7 +31,7 @@ def segment_case(
     surface: Surface | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> tuple[Segments, ...]:
-    """Cut all recordings of a cam-follower rig, with one surface for all of them.
+    """Segment all recordings of a cam-follower rig, with one surface for all of them.
 
     Args:
         recordings: A `Case`, or any recordings of the same rig.
@@ -90,26 +90,25 @@ def segment(
     noise: float | None = None,
     restitution: float = 0.5,
 ) -> Segments:
-    """Cut a recording of a system with one constraint, or two that face each other.
+    """Segment a recording of a system with one constraint, or two facing constraints.
 
     Args:
         recording: The recording.
         channel: The channel of the motion.
         contact: Value of the channel in contact at each sample, shape `(k,)` or one
-            number; the motion is above it. `None` without `upper`: the whole record is
+            number; the motion is above it. `None` without `upper`: the entire record is
             one flight.
         contact_rate: Its rate of change; default from differences of `contact`.
-        upper: The same for a second surface that the motion is below, as the far one of
-            two stops.
+        upper: Value of the channel at a second surface above the motion, such as the
+            far one of two stops.
         upper_rate: Its rate of change.
         tolerance: Largest error of the stated position of each surface, in the units of
-            the channel; within it, the surface is placed where the impacts are.
+            the channel; within it, the surface is shifted to the impacts.
         noise: Standard deviation of a sample; default measured from the record.
         restitution: Expected coefficient, for impacts too low to be observed.
 
     Returns:
-        The parts. Every impact in `impacts` has a positive speed of approach to the
-            surface that it is on.
+        The parts. Every impact in `impacts` has a positive approach speed.
 
     Raises:
         ValueError: A surface has not one number per sample, or the upper one is not

@@ -1,4 +1,4 @@
-"""The parts of a recording: flights, contacts, and the boundaries between them."""
+"""Represent the parts of a recording: flights, contacts and their boundaries."""
 
 import dataclasses
 
@@ -15,15 +15,16 @@ class Boundary:
     """The boundary between one part and the next."""
 
     time: float
-    """Seconds; the error is not a number at the ends of the record."""
+    """Time (s) and its standard error, NaN at the ends of the record."""
     stderr: float
-    """Seconds; the error is not a number at the ends of the record."""
+    """Time (s) and its standard error, NaN at the ends of the record."""
     kind: str
-    """`"impact"` (flight to flight), `"several impacts"` (too close together to be told
-    apart), `"landing"` (flight to contact, with impacts too low to be seen),
-    `"release"` (contact to flight) or `"end of record"`."""
+    """`"impact"` (flight to flight), `"several impacts"` (too close together to be
+    distinguished), `"landing"` (flight to contact, with impacts too low to be
+    observed), `"release"` (contact to flight) or `"end of record"`.
+    """
     evidence: str
-    """Evidence for it, in words."""
+    """Evidence for it, as text."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -62,7 +63,7 @@ class Contact:
     last: int
     """Sample after the last one."""
     settled: float
-    """Time (s) at which the impacts have died out, estimated from the last observed
+    """Time (s) at which the impacts have decayed, estimated from the last observed
     flight: from there to `stop` the follower is in contact with the cam."""
 
     @property
@@ -103,7 +104,7 @@ class Impacts:
     flight: Int[np.ndarray, " k"]
     """Index of the flight that ends here; the next one begins here."""
     side: Int[np.ndarray, " k"]
-    """Surface that was hit: 0 the one below the motion, 1 the one above."""
+    """Surface that was hit: 0 below the motion, 1 above it."""
 
     @property
     def count(self) -> int:
@@ -128,7 +129,7 @@ class Impacts:
 
 @dataclasses.dataclass(frozen=True)
 class Segments:
-    """A recording cut into its parts.
+    """A segmented recording.
 
     Examples:
         >>> from jaxcam.models import BouncingBall
@@ -143,9 +144,9 @@ class Segments:
     """
 
     recording: Recording
-    """The recording that was cut."""
+    """The recording."""
     channel: str
-    """The channel that the parts were found in."""
+    """The segmented channel."""
     noise: float
     """Standard deviation of the channel's samples."""
     clock: Float[np.ndarray, " k"]
@@ -158,19 +159,19 @@ class Segments:
     impacts: Impacts
     """The impacts between two observed flights."""
     gap: Float[np.ndarray, " k"] | None = None
-    """Its distance from the nearest surface, `(k,)`, or `None` in free flight."""
+    """Distance from the nearest surface, `(k,)`, or `None` in free flight."""
     drive: Drive | None = None
     """Measured drive of a cam-follower, from which the gap was computed."""
     surface: Surface | None = None
     """Surface of a cam-follower's cam, from which the gap was computed."""
     sure: Bool[np.ndarray, " k"] | None = None
-    """Samples at which contact is no hidden flight, shape `(k,)`; `None`: all."""
+    """Samples at which a hidden flight is excluded, shape `(k,)`; `None`: all."""
 
     def resting(self, contact: Contact) -> Bool[np.ndarray, " k"]:
-        """Return the samples at which the follower is surely in settled contact."""
+        """Return the samples at which the follower is certainly in settled contact."""
         time = self.recording.time
         rows = (time >= contact.settled) & (time < contact.stop.time)
-        # a release that few samples tell of may be placed after the contact
+        # a release with few samples may be placed after the contact
         rows[contact.last :] = False
         return rows if self.sure is None else rows & self.sure
 

@@ -1,8 +1,8 @@
-"""The cam as the recordings show it: the nominal profile, corrected.
+"""Represent the real cam: the nominal profile, corrected by recordings.
 
 A real cam differs from the nominal one by millimetres, which is tens of times the
-noise of an encoder: with the nominal contact angle no contact could be told from a
-low flight.
+noise of an encoder: with the nominal contact angle contact could not be distinguished
+from a low flight.
 """
 
 import equinox as eqx
@@ -17,13 +17,13 @@ from ._bend import WAVES, waves
 from ._padding import padded
 
 
-# What remains of a cam besides its geometry: run-out, bearings, a bent shaft (rad)
+# Deviations of a cam from its geometry: run-out, bearings, a bent shaft (rad)
 _HARMONICS = (2, 3)
 _HARMONIC_SIZE = 2e-4
 # Where their sines and a bend begin among the amplitudes
 _ENDS = (len(_HARMONICS), 2 * len(_HARMONICS))
-# What the zero of the cam's angle may be off, and what a sensor that lags by half a
-# millisecond makes of it (rad)
+# Error of the zero of the cam's angle, including a sensor lag of half a millisecond
+# (rad)
 _PHASE_SIZE = 1e-2
 # Least tolerance given to a length (m): a rig file may state none.
 _LEAST_TOLERANCE = 2e-4
@@ -41,11 +41,13 @@ class Surface(eqx.Module):
     sines: Float[Array, " harmonics"]
     """Amplitudes of harmonics 2 and 3 on top of it (rad)."""
     bend: Float[Array, " waves"]
-    """Amplitudes of what the harmonics cannot follow, as a dent; zero without one."""
+    """Amplitudes of a bend, such as a dent, that the harmonics cannot describe; zero
+    without a bend.
+    """
     covariance: Float[Array, " p p"]
     """Covariance of radius, eccentricity, centre, phase and amplitudes."""
     sense: float = eqx.field(static=True)
-    """-1 for a clockwise cam; the angle given is counted as it turns."""
+    """-1 for a clockwise cam; the angle is counted in the sense of rotation."""
 
     def __call__(self, turned: Float[Array, "*k"]) -> Float[Array, "*k"]:
         order = jnp.asarray(_HARMONICS, dtype=float)
@@ -94,7 +96,9 @@ def nominal_surface(rig: Rig) -> Surface:
 
 
 def prior_sizes(rig: Rig) -> np.ndarray:
-    """Tolerance of each number of a surface but its bend, shape `(q,)`."""
+    """Return the tolerance of each coefficient of a surface without its bend, shape
+    `(q,)`.
+    """
     geometry = [
         np.hypot(rig.cam_radius.tolerance, rig.follower_half_height.tolerance),
         rig.cam_eccentricity.tolerance,
@@ -107,7 +111,7 @@ def prior_sizes(rig: Rig) -> np.ndarray:
 
 
 def vector_of(surface: Surface) -> np.ndarray:
-    """The numbers of a surface that are fitted, shape `(p,)`."""
+    """Return the fitted coefficients of a surface, shape `(p,)`."""
     p = surface.profile
     geometry = [p.radius + p.half_height, p.eccentricity, p.center_x, p.center_y]
     low = np.array([*geometry, surface.phase])
@@ -115,8 +119,8 @@ def vector_of(surface: Surface) -> np.ndarray:
 
 
 def with_vector(surface: Surface, vector) -> Surface:
-    """The same surface with other numbers."""
-    # only the sum of radius and half height is seen; the radius takes it
+    """Return the same surface with other coefficients."""
+    # only the sum of radius and half height is identifiable; the radius represents it
     radius = vector[0] - surface.profile.half_height
     cosines, sines, bend = jnp.split(vector[5:], _ENDS)
     return eqx.tree_at(
@@ -137,7 +141,9 @@ def with_vector(surface: Surface, vector) -> Surface:
 
 @eqx.filter_jit
 def linearise(surface, vector, turned):
-    """Contact angles `(k,)` and their derivatives `(k, p)` to the numbers."""
+    """Return contact angles `(k,)` and their derivatives `(k, p)` by the
+    coefficients.
+    """
     low, bend = vector[:-WAVES], vector[-WAVES:]
 
     def contact_angle(low):

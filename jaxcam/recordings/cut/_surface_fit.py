@@ -1,7 +1,7 @@
-"""The cam that the impacts and contacts of recordings show.
+"""Fit the profile of a cam to the impacts and contacts of recordings.
 
-They lie on the true profile, and correct the nominal one within the tolerances of the
-rig.
+Impacts and contacts lie on the true profile. They correct the nominal profile within
+the tolerances of the rig.
 """
 
 from collections.abc import Sequence
@@ -31,8 +31,7 @@ from ._surface import (
 )
 
 
-# Distance from the cam that a follower may have where its flights are hidden, in
-# units of the noise
+# Largest gap of a hidden flight, in units of the noise
 _NEAR = 3.0
 # Samples that are averaged, and the distance behind the cam that is accepted, in
 # units of the noise: 4.5 standard errors of the mean, which noise hardly reaches
@@ -53,8 +52,8 @@ def fit_surface(
     Impacts are found as jumps in velocity, without the profile, and each gives one
     point of it: where the motion before meets the motion after. The profile through
     those points then shows the contacts, which correct it further. Each parameter
-    stays near its nominal value by its tolerance. What results is good enough to cut
-    the recordings; `refine_surface` makes it as good as they allow.
+    stays near its nominal value by its tolerance. The result is accurate enough to
+    segment the recordings; `refine_surface` improves it to the accuracy of the data.
 
     Args:
         recordings: The recordings.
@@ -88,9 +87,9 @@ def refine_surface(surface: Surface, rig: Rig, segments: Sequence) -> Surface:
     """Fit the profile again, to the impacts and contacts in `Segments`.
 
     Contacts count from where the unobserved impacts have died out: before,
-    the follower is above the cam on average. It is near it, though, which counts for
-    one rough point, and it is never below: otherwise a part of the cam that is observed
-    there alone would be undetermined. A dent is followed where records agree on it.
+    the follower is above the cam on average. It is close to the cam, which counts as
+    one rough point, and never below it: otherwise a part of the cam observed only there
+    would be undetermined. A dent is included if records agree on it.
 
     Args:
         surface: The surface so far.
@@ -163,7 +162,7 @@ def _bend(surface: Surface, rig: Rig, turned, angle, error, ends: list[int]):
 
 
 def _impact_points(recording, drive, channel, noise, sure):
-    """Cam angle, follower angle and its error at each jump in velocity."""
+    """Return cam angle, follower angle and its error at each jump in velocity."""
     time, samples = recording.time, recording[channel]
     interval = recording.interval
     kinks = find_kinks(samples, interval, noise)
@@ -183,14 +182,14 @@ def _impact_points(recording, drive, channel, noise, sure):
         angle.append(0.5 * (before.value(moment) + after.value(moment)))
         error.append(before.value_stderr(moment) + after.value_stderr(moment))
     if len(kinks) == 0:
-        # no impact in the whole record: either all contact, or nothing to learn
+        # no impact in the record: either permanent contact, or no information
         rows = np.flatnonzero(sure)[::8]
         return drive.angle[rows], samples[rows], np.full(len(rows), 4 * noise)
     return np.array(turned), np.array(angle), np.array(error)
 
 
 def _with_contacts(surface, recording, drive, channel, band, noise, impacts, sure):
-    """Impact points and every eighth sample of stretches inside the band."""
+    """Return impact points and every eighth sample of stretches inside the band."""
     gap = recording[channel] - surface.angle(drive.angle)
     shortest = max(4, round(0.008 / recording.interval))
     inside = (np.abs(gap) < band) & sure
@@ -212,10 +211,10 @@ def _solve(
     equal: int | None = None,
     bend: np.ndarray | None = None,
 ) -> Surface:
-    """Gauss-Newton with the tolerances as prior and Huber weights on the points.
+    """Fit by Gauss-Newton with the tolerances as prior and Huber weights of the points.
 
-    The first `equal` points lie on the profile, the others on it or above. Numbers of a
-    bend are free with the standard deviations `bend`.
+    The first `equal` points lie on the profile, the others on it or above. Coefficients
+    of a bend have the prior standard deviations `bend`.
     """
     nominal = vector_of(nominal_surface(rig))
     sizes = np.append(prior_sizes(rig), np.zeros(WAVES) if bend is None else bend)
@@ -240,7 +239,9 @@ def _solve(
 
 
 def _weighted(surface, vector, turned, angle, error, equal: int | None = None):
-    """Misfits of points, their derivatives, both in units of the error, and weights."""
+    """Return misfits of points, their derivatives, both in units of the error, and
+    weights.
+    """
     fitted, jacobian = linearise(surface, vector, padded(turned))
     count = len(turned)
     misfit = (angle - np.asarray(fitted)[:count]) / error

@@ -1,4 +1,4 @@
-"""From files to recordings and rigs: numbers with units, faults by their names."""
+"""Read recordings and rigs from files, with units and precise error messages."""
 
 from .._recording import Case as Case
 from ._check import check_channels as check_channels, check_drive as check_drive

@@ -1,4 +1,4 @@
-"""Whole files in memory, none larger than fits there."""
+"""Read files into memory, with a size limit."""
 
 import gzip
 import io
@@ -12,7 +12,7 @@ LARGEST = 100_000_000
 """Bytes of a table once it is inflated: ten minutes of a rig at 5 kHz, or an hour at
 800 Hz. Reading takes about ten times as much memory."""
 MOST = 15_000_000
-"""Numbers in a table, whatever they take in the file."""
+"""Largest number of values in a table, regardless of the file's size."""
 _GZIP = b"\x1f\x8b"
 
 
@@ -20,8 +20,8 @@ def read_bytes(file: Path) -> bytes:
     """Return the content of a file, without decompression.
 
     Raises:
-        RecordingError: For something other than a file, or a larger one than `LARGEST`.
-        OSError: Where it cannot be read.
+        RecordingError: The path is not a file, or the file is larger than `LARGEST`.
+        OSError: The file cannot be read.
     """
     if file.is_dir():
         raise RecordingError(
@@ -30,7 +30,7 @@ def read_bytes(file: Path) -> bytes:
     if not file.exists():
         raise RecordingError(f"{file}: there is no such file; check the path.")
     if not file.is_file():
-        # a pipe may never end
+        # a pipe may be endless
         raise RecordingError(f"{file}: this is a pipe or a device; save it as a file.")
     with file.open("rb") as stream:
         raw = stream.read(LARGEST + 1)
@@ -40,10 +40,10 @@ def read_bytes(file: Path) -> bytes:
 
 
 def inflate_gzip(file: Path, raw: bytes) -> bytes:
-    """The content of a .gz file.
+    """Return the content of a .gz file.
 
-    **Raises:** `RecordingError` where it is none, damaged, or inflates to more than
-    `LARGEST`, whatever its own size.
+    **Raises:** `RecordingError` if it is not compressed, is damaged, or inflates to
+    more than `LARGEST`.
     """
     if not raw.startswith(_GZIP):
         raise RecordingError(

@@ -1,4 +1,4 @@
-"""Describe what is wrong with the numbers of a recording, in one sentence."""
+"""Check the numbers of a recording; each error message is one sentence."""
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -9,9 +9,9 @@ from .._recording import Recording
 
 # Encoders and clocks disagree by much less than this with the name of the file.
 _SPEED_TOLERANCE = 0.05
-# A follower is a lever that cannot pass the vertical; in degrees it always does.
+# The angle of the lever stays below the vertical; values in degrees exceed it.
 _FOLLOWER_RANGE = np.pi / 2
-# s; faster than any encoder or gyro is read
+# s; faster than the sampling of any encoder or gyro
 _SHORTEST = 1e-9
 
 _DEGREES = "multiply it by pi/180 or name the column `{}_deg`"
@@ -20,10 +20,10 @@ _DEGREES = "multiply it by pi/180 or name the column `{}_deg`"
 def find_gaps(
     name: str, time: Float[np.ndarray, " k"], gaps: str
 ) -> Int[np.ndarray, " pieces"]:
-    """Index of the first sample after each gap in time.
+    """Return the index of the first sample after each gap in time.
 
-    **Raises:** `RecordingError` where time does not increase, and for a gap unless
-    `gaps` is `"split"`.
+    **Raises:** `RecordingError` if time does not increase, and for a gap unless `gaps`
+    is `"split"`.
     """
     if gaps not in ("refuse", "split"):
         raise RecordingError(f'gaps is "refuse", "split" or "mend", not {gaps!r}.')
@@ -59,7 +59,7 @@ def find_gaps(
 
 
 def check_channels(recording: Recording) -> None:
-    """Check that the channels of a recording can be what their names say.
+    """Check that the channels of a recording are plausible for their names.
 
     Args:
         recording: The recording.
@@ -91,8 +91,8 @@ def check_drive(recording: Recording) -> None:
         recording: The recording.
 
     Raises:
-        RecordingError: The speed is another one; the message names the unit that the
-            numbers suggest.
+        RecordingError: The speeds differ; the message names the unit that the numbers
+            suggest.
     """
     angle = recording.channels.get("cam_angle_rad")
     nominal = recording.nominal_speed

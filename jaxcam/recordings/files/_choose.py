@@ -19,15 +19,15 @@ from ._units import si
 
 
 Columns: TypeAlias = Sequence[str] | Mapping[str, str | tuple[str, float]]
-"""Names of the columns in their order, `"-"` for one that is not read; or channels by
-the names that the file has for them, each with a factor where the unit at its end is
-not all: `{"Y1": ("height_mm", -0.8)}`."""
+"""Names of the columns in their order, `"-"` to skip one; or channels by their names
+in the file, with an optional factor: `{"Y1": ("height_mm", -0.8)}`.
+"""
 TIME = "time_s"
 
 
 @dataclasses.dataclass(frozen=True)
 class Chosen:
-    """Channels by their names, the time among them, and what was left out, in words."""
+    """Channels by name, including the time, and remarks on omitted data."""
 
     columns: dict[str, Float[np.ndarray, " k"]]
     notes: tuple[str, ...] = ()
@@ -42,17 +42,17 @@ def read_columns(
     split: str | None = None,
     only: bool = False,
 ) -> Chosen:
-    """The channels of a file in SI units, as `read_recordings` is asked for them.
+    """Return the channels of a file in SI units, for `read_recordings`.
 
-    **Arguments:** `needed` are channels that must be there (SI names); `only` these
-    are read.
+    **Arguments:** `needed` are required channels (SI names); with `only`, others are
+    not read.
 
-    **Raises:** `RecordingError`, one sentence that says what to do.
+    **Raises:** `RecordingError`, one sentence with the fix.
     """
     source, mapping = _opened(file, columns)
     picks = [(name, *mapping.get(name, (name, 1.0))) for name in source.columns]
     if mapping or only:
-        # others stay away, unless they are what is needed
+        # other columns are omitted unless needed
         wanted = set(needed)
         picks = [
             pick
@@ -75,7 +75,7 @@ def read_columns(
 
 
 def column_names(file: Path, columns: Columns | None) -> tuple[str, ...]:
-    """Names of the channels of a file, in SI units.
+    """Return the names of the channels of a file, in SI units.
 
     **Raises:** `RecordingError` for a file that cannot be read.
     """
@@ -86,7 +86,7 @@ def column_names(file: Path, columns: Columns | None) -> tuple[str, ...]:
 def _opened(
     file: Path, columns: Columns | None
 ) -> tuple[Source, dict[str, tuple[str, float]]]:
-    """A file, and what some of its columns are called instead."""
+    """Read a file, and the new names of some columns."""
     if columns is None:
         return _source(file, None), {}
     if isinstance(columns, Mapping):
@@ -96,7 +96,7 @@ def _opened(
 
 
 def require(file: Path, found: Mapping[str, object], needed: Sequence[str]) -> None:
-    """**Raises:** `RecordingError` for a channel that is not there."""
+    """Raise `RecordingError` for a missing channel."""
     missing = [name for name in needed if name not in found]
     if missing:
         raise RecordingError(
@@ -137,7 +137,7 @@ def _in_order(file: Path, names) -> list[str]:
 def _mapping(
     file: Path, source: Source, columns: Mapping
 ) -> dict[str, tuple[str, float]]:
-    """The channel and the factor of each column that is named."""
+    """Return the channel and the factor of each named column."""
     found: dict[str, tuple[str, float]] = {}
     for word, channel in columns.items():
         name, factor = channel if isinstance(channel, tuple) else (channel, 1.0)
@@ -151,7 +151,7 @@ def _mapping(
 
 
 def _timed(source: Source, found: dict, rate: float | None) -> dict:
-    """The columns with a time, made of a rate where the file has none."""
+    """Return the columns with a time, computed from a rate if the file has none."""
     if rate is not None and not (math.isfinite(rate) and rate > 0):
         raise RecordingError(
             f"{source.file}: the rate is {rate:g} samples a second; give a positive "
@@ -170,7 +170,7 @@ def _timed(source: Source, found: dict, rate: float | None) -> dict:
 
 
 def _without_missing(source: Source, found: dict) -> Chosen:
-    """Only the rows in which every channel has a number."""
+    """Return the rows in which every channel has a number."""
     whole = np.all([np.isfinite(numbers) for numbers in found.values()], axis=0)
     lost = int(np.sum(~whole))
     if not lost:

@@ -1,4 +1,4 @@
-"""Tables in workbooks of Excel."""
+"""Read tables from Excel workbooks."""
 
 import io
 import zipfile
@@ -14,15 +14,15 @@ from ._text import kept_lines
 
 
 def read_excel(file: Path, names: Sequence[str] | None = None) -> Source:
-    """The table on the one sheet of a workbook that has numbers; needs `openpyxl`.
+    """Read the only table of numbers in a workbook; needs `openpyxl`.
 
     **Arguments:** as for `read_table`.
 
-    **Raises:** `RecordingError` where that is missing, or for a file that is none.
+    **Raises:** `RecordingError` if that is missing, or the file is not a workbook.
     """
     raw = read_bytes(file)
     try:
-        # pandas reads workbooks by it, and names it only when it does
+        # pandas needs it to read workbooks, and reports it only then
         import openpyxl  # noqa: F401  # pyright: ignore
         import pandas as pd
     except ImportError:
@@ -36,7 +36,7 @@ def read_excel(file: Path, names: Sequence[str] | None = None) -> Source:
             io.BytesIO(raw), sheet_name=None, header=None, dtype=object
         )
     except Exception:
-        # a parser on a broken file raises whatever it stumbles over
+        # the parser may raise any exception for a broken file
         raise _none(file) from None
     full = {}
     for name, sheet in sheets.items():
@@ -62,7 +62,7 @@ def _cell(value: Any) -> str:
 
 
 def _refuse_bomb(file: Path, raw: bytes) -> None:
-    """**Raises:** `RecordingError` for no archive, or one that inflates too far."""
+    """Raise `RecordingError` for a file that is not an archive, or inflates too far."""
     try:
         with zipfile.ZipFile(io.BytesIO(raw)) as archive:
             size = sum(part.file_size for part in archive.infolist())

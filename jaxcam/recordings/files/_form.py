@@ -8,21 +8,20 @@ from ._heading import is_time, is_unit
 
 
 SEPARATORS = ("\t", ";", ",", " ")
-"""Between cells, the surest first; a space stands for any white space."""
+"""Separators of cells, the most specific first; a space stands for any white space."""
 COMMENTS = ("#", "%", "//")
-"""Beginnings of lines that are no rows."""
-# lines of a preamble, at most
+"""Beginnings of comment lines."""
+# largest number of lines of a preamble
 _PREAMBLE = 300
-# rows that must agree before they are believed to be the table
+# rows that must agree to be recognised as the table
 _ROWS = 5
 _NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eEdD][+-]?\d+)?|[+-]?(nan|inf)")
 
 
 class Form(NamedTuple):
-    """The form of a table: what separates its cells, and the lines of its parts.
+    """The form of a table: the separator of its cells, and the lines of its parts.
 
-    `names` and `units` are lines of their own, `None` where there is none; `first` is
-    the first row.
+    `names` and `units` are separate lines, or `None`; `first` is the first row.
     """
 
     separator: str
@@ -32,15 +31,14 @@ class Form(NamedTuple):
 
 
 def cells_of(line: str, separator: str) -> list[str]:
-    """The cells of a line, without blanks and quotes about them."""
+    """Return the cells of a line, without surrounding blanks and quotes."""
     parts = line.split() if separator == " " else line.split(separator)
     return [part.strip().strip('"').strip() for part in parts]
 
 
 def form_of(lines: Sequence[str]) -> Form | None:
-    """The form of a table, or `None` where no rows of numbers are found.
-
-    Rows that are broken count as rows, so that what is wrong with them is said.
+    """Return the form of a table, or `None` if no rows of numbers are found. Broken
+    rows count as rows, so that their error is reported.
     """
     found = []
     for rank, separator in enumerate(SEPARATORS):
@@ -69,7 +67,9 @@ def _first_row(lines: Sequence[str], separator: str) -> int | None:
 
 
 def _kind(line: str, separator: str) -> tuple[int, int]:
-    """Cells of a row and numbers among them; none where a cell is another word."""
+    """Return the number of cells and of numbers in a row; none if a cell is another
+    word.
+    """
     if line.startswith(COMMENTS):
         return 0, 0
     cells = cells_of(line, separator)
@@ -78,7 +78,7 @@ def _kind(line: str, separator: str) -> tuple[int, int]:
 
 
 def _headed(lines: Sequence[str], separator: str, first: int) -> Form:
-    """The form of a table whose whole rows begin at `first`."""
+    """Return the form of a table whose complete rows begin at `first`."""
     width = len(cells_of(lines[first], separator))
     heads = [k for k in range(first) if _is_head(lines[k], separator, width)]
     if not heads:
@@ -98,7 +98,7 @@ def _headed(lines: Sequence[str], separator: str, first: int) -> Form:
         cells = cells_of(lines[k], separator)
         if lines[k].startswith(COMMENTS) or not any(map(is_number, cells)):
             continue
-        # words next to a number are a note where spaces separate, or nothing does
+        # words next to a number are a note if the separator is a space or missing
         note = len(cells) != width and (separator == " " or len(cells) == 1)
         if not note:
             return Form(separator, names, units, k)
@@ -113,10 +113,8 @@ def _is_head(line: str, separator: str, width: int) -> bool:
 
 
 def _is_other(line: str, separator: str, width: int) -> bool:
-    """Return whether a line names the columns of rows that are cut in other places.
-
-    Where spaces separate, empty cells are lost; where commas do, decimal ones cut each
-    number in two.
+    """Return whether a line names the columns of rows with other separators. With
+    spaces, empty cells are lost; with commas, decimal commas split numbers.
     """
     count = len(cells_of(line, separator))
     lost = separator == " " and count > width
@@ -125,9 +123,7 @@ def _is_other(line: str, separator: str, width: int) -> bool:
 
 
 def _is_any_head(lines: Sequence[str], place: int, separator: str) -> bool:
-    """Return whether a line right above the rows has names, if not as many as they
-    need.
-    """
+    """Return whether the line above the rows has names, possibly of another number."""
     if place < 0 or separator == " ":
         return False
     count = len(cells_of(lines[place], separator))
@@ -135,7 +131,7 @@ def _is_any_head(lines: Sequence[str], place: int, separator: str) -> bool:
 
 
 def bare(line: str) -> str:
-    """A line without the mark of a comment before it."""
+    """Return a line without its comment mark."""
     for mark in COMMENTS:
         if line.startswith(mark):
             return line.lstrip(mark).lstrip(" ")

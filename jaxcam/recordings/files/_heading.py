@@ -1,9 +1,9 @@
-"""The heading of a column: its name, with the unit that stands in brackets after it."""
+"""Parse the heading of a column: its name, with the unit in brackets after it."""
 
 import re
 
 
-# as they are written -> as the end of a channel's name
+# unit as written -> end of a channel's name
 _ENDINGS = {
     "s": "s",
     "sec": "s",
@@ -43,11 +43,11 @@ _WITH_UNIT = re.compile(r"(.+?)\s*(?:\(([^()]*)\)|\[([^\[\]]*)\]|/\s*([^\s/]+(/s
 
 
 def channel_name(heading: str, unit: str = "") -> str:
-    """The name of a channel with its unit at the end: `time_s` of `Time (s)`.
+    """Return the name of a channel with its unit at the end: `time_s` for `Time (s)`.
 
-    A heading whose unit is unknown stays as it is.
+    A heading with an unknown unit is unchanged.
 
-    **Arguments:** the heading, and what stands below it in a line of units.
+    **Arguments:** the heading, and its cell in a line of units.
     """
     words = heading
     if not unit:
@@ -63,7 +63,7 @@ def channel_name(heading: str, unit: str = "") -> str:
 
 
 def is_unit(cell: str) -> bool:
-    """Return whether a cell may stand in a line of units."""
+    """Return whether a cell may be part of a line of units."""
     return cell in ("", "-", "1") or bool(_ending(cell))
 
 

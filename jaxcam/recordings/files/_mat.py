@@ -1,4 +1,4 @@
-"""Vectors of numbers from MATLAB files, those inside structures by dotted names."""
+"""Read vectors of numbers from MATLAB files, with dotted names inside structures."""
 
 import io
 import struct
@@ -24,15 +24,15 @@ _DEEPEST, _MOST_SERIES = 8, 300
 
 
 def read_mat(file: Path) -> Source:
-    """Vectors of a MATLAB file (up to version 7.2) by their names.
+    """Return the vectors of a MATLAB file (up to version 7.2) by name.
 
     A vector in structures has a dotted name, `run.left.angle_rad`, and its last word
-    alone where no other vector has it. Entries of an array of structures are numbered
-    from 1, and so are series that lie side by side in one array, along its longest
-    axis: `marker.3`. Anything else is ignored.
+    alone if it is unique. Entries of an array of structures are numbered from 1, and so
+    are series that lie side by side in one array, along its longest axis: `marker.3`.
+    Other data are ignored.
 
-    **Raises:** `RecordingError` for a file that is none, or holds no vectors of equal
-    length.
+    **Raises:** `RecordingError` if the file is not a MATLAB file, or holds no vectors
+    of equal length.
     """
     found = _loaded(file)
     vectors: dict[str, np.ndarray] = {}
@@ -64,7 +64,7 @@ def _is_time(name: str) -> bool:
 def _vectors(
     name: str, value: Any, depth: int
 ) -> Iterator[tuple[str, Float[np.ndarray, " k"]]]:
-    """Vectors in a variable, by dotted names."""
+    """Return the vectors in a variable, by dotted names."""
     fields = getattr(value, "_fieldnames", None)
     if fields is not None and depth:
         for field in fields:
@@ -90,7 +90,7 @@ def _vectors(
 
 
 def _loaded(file: Path) -> dict[str, Any]:
-    """The variables of a file. **Raises:** `RecordingError` where it is none."""
+    """Return the variables of a file. **Raises:** `RecordingError` if it is invalid."""
     from scipy.io import loadmat
 
     raw = read_bytes(file)
@@ -102,7 +102,7 @@ def _loaded(file: Path) -> dict[str, Any]:
     _refuse_bomb(file, raw)
     try:
         with warnings.catch_warnings():
-            # variables of the same name, and other oddities that loadmat only mentions
+            # variables of the same name, and other warnings of loadmat
             warnings.simplefilter("error")
             return loadmat(io.BytesIO(raw), squeeze_me=True, struct_as_record=False)
     except Exception:
@@ -113,7 +113,7 @@ def _loaded(file: Path) -> dict[str, Any]:
 
 
 def _refuse_bomb(file: Path, raw: bytes) -> None:
-    """Raise `RecordingError` where compressed variables are too large together."""
+    """Raise `RecordingError` if compressed variables are too large together."""
     order = ">" if raw[126:128] == b"MI" else "<"
     place, room = _HEADER, LARGEST
     while place + 8 <= len(raw) and room >= 0:

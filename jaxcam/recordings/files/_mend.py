@@ -1,4 +1,4 @@
-"""Recordings with faults that can be undone: dropped samples, slips of an encoder."""
+"""Repair faults of recordings: dropped samples and slips of an encoder."""
 
 import dataclasses
 
@@ -15,10 +15,10 @@ _BRIDGE = 4
 
 @dataclasses.dataclass(frozen=True)
 class Mended:
-    """Pieces of a recording without faults, and the repairs, in words.
+    """Pieces of a repaired recording, and the repairs as text.
 
-    Samples that were filled in are marked in `meta["filled"]` of each piece: they keep
-    the time even, and no fit uses them.
+    Interpolated samples are marked in `meta["filled"]` of each piece: they keep the
+    sampling uniform, and no fit uses them.
     """
 
     recordings: tuple[Recording, ...]
@@ -75,17 +75,17 @@ def _unslipped(
 ) -> Float[np.ndarray, " k"]:
     samples = recording.channels[name]
     steps = np.diff(samples)
-    # what the motion itself does between two samples, by the neighbours
+    # change of the motion between two samples, from the neighbours
     usual = np.median(steps)
     turns = np.round((steps - usual) / (2 * np.pi))
-    # across a gap at which the recording is split, the drive itself turns on
+    # across a gap at which the recording is split, the drive keeps turning
     turns[np.diff(recording.time) > (bridge + 1.5) * recording.interval] = 0
     places = np.flatnonzero(turns)
     if not len(places):
         return samples
     unslipped = samples - 2 * np.pi * np.concatenate([[0.0], np.cumsum(turns)])
     if np.ptp(samples) <= 2 * np.pi and np.ptp(unslipped) > 2 * np.pi:
-        # an angle that starts anew each turn is no fault
+        # an angle that is reset each turn is not a fault
         return unslipped
     first = recording.time[places[0] + 1]
     total = (
@@ -101,7 +101,7 @@ def _unslipped(
 def _count_saturated(recording: Recording, name: str, notes) -> None:
     size = np.abs(recording.channels[name])
     at_limit = size >= np.max(size) * (1 - 1e-9)
-    # one largest sample is no limit, many of the same size are
+    # many samples of the same largest value indicate saturation
     if np.sum(at_limit) > max(3, 0.002 * len(size)):
         notes.append(
             f"{recording.name}: `{name}` is saturated at {np.max(size):.4g} in "
@@ -142,9 +142,9 @@ def _bridged(recording: Recording, bridge: int, notes) -> list[Recording]:
 
 
 def _even(recording: Recording, rows, name: str, interval: float) -> Recording:
-    """One piece with the dropped samples put in by cubic interpolation."""
+    """Return one piece with the dropped samples replaced by cubic interpolation."""
     time = recording.time[rows]
-    # step by step: samples that come early or late do not add up to others
+    # step by step, so that jitter of the samples does not accumulate
     ticks = np.maximum(np.round(np.diff(time) / interval).astype(int), 1)
     places = np.concatenate([[0], np.cumsum(ticks)])
     count = places[-1] + 1

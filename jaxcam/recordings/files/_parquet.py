@@ -1,4 +1,4 @@
-"""Columns of numbers from Parquet files."""
+"""Read columns of numbers from Parquet files."""
 
 import io
 from pathlib import Path
@@ -10,9 +10,9 @@ from ._source import shown, Source
 
 
 def read_parquet(file: Path) -> Source:
-    """Columns of a Parquet file; needs the package `pyarrow`.
+    """Return the columns of a Parquet file; needs the package `pyarrow`.
 
-    **Raises:** `RecordingError` where that is missing, or for a file that is none.
+    **Raises:** `RecordingError` if that is missing, or the file is not a Parquet file.
     """
     raw = read_bytes(file)
     try:
@@ -27,14 +27,14 @@ def read_parquet(file: Path) -> Source:
         fits = about.num_rows * about.num_columns <= MOST
         table = parquet.read_table(io.BytesIO(raw)).to_pandas() if fits else None
     except Exception:
-        # a parser on a broken file raises whatever it stumbles over
+        # the parser may raise any exception for a broken file
         raise RecordingError(
             f"{file}: this is not a Parquet file; save the table again, or as CSV."
         ) from None
     if table is None:
         raise too_large(file)
     if table.index.name is not None:
-        # the index of a pandas table is a column like any other
+        # the index of a pandas table is an ordinary column
         table = table.reset_index()
     columns, headings = {}, {}
     for heading in table.columns:

@@ -1,4 +1,4 @@
-"""Tables of Qualisys Track Manager (.tsv): coordinates of markers in mm."""
+"""Read tables of Qualisys Track Manager (.tsv): coordinates of markers in mm."""
 
 import re
 from collections.abc import Sequence
@@ -10,9 +10,9 @@ import pandas as pd
 def qtm_heading(
     preamble: Sequence[str], width: int
 ) -> tuple[list[str], float | None] | None:
-    """Names of the columns and samples a second, or `None` for another program's file.
+    """Return column names and sampling rate, or `None` for another program's file.
 
-    **Arguments:** the lines above the numbers, and how many columns there are.
+    **Arguments:** the lines above the numbers, and the number of columns.
     """
     fields = {}
     for line in preamble:
@@ -23,14 +23,14 @@ def qtm_heading(
     markers = [re.sub(r"\W+", "_", name) for name in fields["MARKER_NAMES"]]
     axes = [f"{name}_{axis}_mm" for name in markers for axis in "xyz"]
     if width == len(axes) + 2:
-        # the option by which frame and time are written
+        # the option to write frame and time
         return ["frame", "time_s", *axes], None
     rate = fields["FREQUENCY"]
     return axes, float(rate[0].replace(",", ".")) if rate else None
 
 
 def without_lost(columns: dict[str, pd.Series]) -> dict[str, pd.Series]:
-    """Columns in which a marker that was not seen, written as 0 0 0, is empty."""
+    """Return columns in which a lost marker, written as 0 0 0, is empty."""
     found = dict(columns)
     for name in columns:
         if not name.endswith("_x_mm"):

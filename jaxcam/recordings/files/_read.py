@@ -1,4 +1,4 @@
-"""Recordings and cases from files."""
+"""Read recordings and cases from files."""
 
 import dataclasses
 import math
@@ -22,7 +22,7 @@ CAM_FOLLOWER = ("cam_angle_rad", "follower_angle_rad")
 """Channels that a recording of a cam-follower rig must contain."""
 SUFFIXES = (*TEXT, ".mat", ".parquet", ".xlsx", ".xlsm")
 """Suffixes of the files of a case."""
-# text of any kind, read where a folder has nothing else
+# text of any kind, read if a folder has no other files
 _LAST_RESORT = (".txt", ".dat", ".xls", ".txt.gz", ".dat.gz")
 
 
@@ -45,22 +45,23 @@ def read_recordings(
         file: The file; `..._150.7rpm.csv` in its name is the nominal speed.
         channels: Required columns (SI names).
         split: Column that numbers the runs in a file that holds several.
-        gaps: `"refuse"` a record with samples missing, `"split"` it in pieces, or
-            `"mend"` it: bridge short gaps, split at long ones and undo slips of an
-            encoder (see `mend`); what was done is in `meta["notes"]`.
-        columns: Names of the columns in their order, `"-"` for one that is not read, of
-            a file without a line of names; or a channel for each column whose name is
-            another, `{"Angle": "angle_deg", "Y1": ("height_m", -8e-4)}`, the second
-            with a factor. Only columns that are named or needed are read then, and rows
-            in which one of them is empty are left out.
+        gaps: `"refuse"` raises an error for a record with missing samples, `"split"`
+            cuts it into pieces, and `"mend"` repairs it: it bridges short gaps, splits
+            at long gaps and corrects slips of an encoder (see `mend`). The repairs are
+            listed in `meta["notes"]`.
+        columns: Names of the columns in their order, `"-"` to skip one, for
+            a file without a line of names; or a channel for each column with another
+            name, `{"Angle": "angle_deg", "Y1": ("height_m", -8e-4)}`, the second with a
+            factor. Then only named or required columns are read, and rows with an empty
+            cell in them are omitted.
         rate: Sampling rate of a file without a time column (Hz).
 
     Returns:
         A tuple of `Recording`, one for each run and piece.
 
     Raises:
-        RecordingError: The file cannot be used; the message is one sentence that says
-            what to do.
+        RecordingError: The file cannot be used; the message is one sentence with the
+            fix.
     """
     file = Path(file)
     chosen = read_columns(
@@ -115,8 +116,8 @@ def read_recording(
         A [`jaxcam.recordings.Recording`][].
 
     Raises:
-        RecordingError: The file cannot be used; the message is one sentence that says
-            what to do.
+        RecordingError: The file cannot be used; the message is one sentence with the
+            fix.
 
     Examples:
         >>> from pathlib import Path
@@ -142,26 +143,25 @@ def read_case(
     """Read all recordings in a folder, in the order of their names.
 
     Files are text (CSV of any kind, `.tsv`, `.lvm`, each plain or gz), `.mat`, `.xlsx`
-    or `.parquet`; where there are none of these, `.txt`, `.dat` and `.xls` are read.
+    or `.parquet`; if there are none of these, `.txt`, `.dat` and `.xls` are read.
 
     Args:
         folder: The folder.
-        channels: Required columns (SI names); `()` for anything but a cam-follower rig.
+        channels: Required columns (SI names); `()` for rigs other than a cam-follower.
         split: Column that numbers the runs in a file that holds several.
-        gaps: Treatment of a record with missing samples: `"refuse"` it, `"split"` it in
-            pieces, or `"mend"` it (see `mend`).
-        columns: Names of the columns in their order, `"-"` for one that is not read, of
-            files without a line of names; or a channel for each column whose name is
-            another, `{"Angle": "angle_deg", "Y1": ("height_m", -8e-4)}`, the second
-            with a factor. Rows in which one of those is empty are left out.
+        gaps: Treatment of a record with missing samples: `"refuse"` raises an error,
+            `"split"` cuts it into pieces, `"mend"` repairs it (see `mend`).
+        columns: Names of the columns in their order, `"-"` to skip one, for
+            files without a line of names; or a channel for each column with another
+            name, `{"Angle": "angle_deg", "Y1": ("height_m", -8e-4)}`, the second with a
+            factor. Rows with an empty cell in them are omitted.
         rate: Sampling rate of files without a time column (Hz).
 
     Returns:
         A case.
 
     Raises:
-        RecordingError: A file cannot be used; the message is one sentence that says
-            what to do.
+        RecordingError: A file cannot be used; the message is one sentence with the fix.
 
     Examples:
         >>> from jaxcam.data import DEMO_RIG
@@ -214,9 +214,9 @@ def _split(name, time, values, speed, file, breaks) -> list[Recording]:
 
 
 def _turning(label: str, mended: Mended) -> list[Recording]:
-    """The pieces, less those in which a cam turns too little to be followed.
+    """Return the pieces without those in which the cam turns too little.
 
-    **Raises:** `RecordingError` where none is left.
+    **Raises:** `RecordingError` if none is left.
     """
     pieces, notes = [], list(mended.notes)
     for piece in mended.recordings:
@@ -236,7 +236,7 @@ def _turning(label: str, mended: Mended) -> list[Recording]:
 
 
 def _noted(piece: Recording, notes: tuple[str, ...]) -> Recording:
-    """The piece with what was left out of its file said in its notes."""
+    """Add remarks on omitted data of the file to the notes of a piece."""
     if not notes:
         return piece
     said = (*notes, *piece.meta.get("notes", ()))
@@ -244,7 +244,7 @@ def _noted(piece: Recording, notes: tuple[str, ...]) -> Recording:
 
 
 def _tables(folder: Path, suffixes: tuple[str, ...]) -> list[Path]:
-    """Files that end so, in the order of their names."""
+    """Return files with these suffixes, in the order of their names."""
     every = (file for file in folder.iterdir() if file.is_file())
     return sorted(file for file in every if file.name.lower().endswith(suffixes))
 

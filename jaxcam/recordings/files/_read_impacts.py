@@ -1,4 +1,4 @@
-"""Tables of impacts: one row an impact, with the speeds before and after it."""
+"""Read tables of impacts: one row per impact, with the speeds before and after it."""
 
 import re
 from pathlib import Path
@@ -21,7 +21,7 @@ _MORE = ("mass1_kg", "mass2_kg", "time_s")
 def is_impact_table(file: str | Path, columns: Columns | None = None) -> bool:
     """Return whether the columns of a file are those of impacts, not of a recording.
 
-    **Raises:** `RecordingError` for a file that cannot be read.
+    **Raises:** `RecordingError` if the file cannot be read.
     """
     names = column_names(Path(file), columns)
     kinds = {found[1] for name in names if (found := _SPEED.fullmatch(name))}
@@ -32,10 +32,10 @@ def read_impacts(file: str | Path, *, columns: Columns | None = None) -> ImpactT
     r"""Read impacts from a file with one impact per row.
 
     Columns, each with its unit at the end (`_m_s`, `_mm_s`, `_rad_s`, ...): `before`
-    and `after`, the speeds of one body along the normal of something fixed; or
+    and `after`, the speeds of one body along the normal of a fixed surface; or
     `before1`, `after1`, `before2`, `after2`, the velocities of two bodies, with
-    `mass1_kg` and `mass2_kg` where they are known. `before_stderr` and `after_stderr`
-    are standard errors, `time_s` is the time; others are ignored.
+    `mass1_kg` and `mass2_kg` if known. `before_stderr` and `after_stderr` are standard
+    errors, `time_s` is the time; others are ignored.
 
     Args:
         file: The file.
@@ -128,10 +128,9 @@ def _bodies(file: Path, found: dict, columns: dict) -> Bodies:
 
 
 def _speeds(file: Path, before, after, signed: bool):
-    """Approach and separation speeds of relative velocities, or of magnitudes.
+    """Return approach and separation speeds of relative velocities, or of magnitudes.
 
-    **Raises:** `RecordingError` that names a row in which nothing approaches, or that
-    is passed through.
+    **Raises:** `RecordingError` that names a row without approach or without an impact.
     """
     if not signed and np.all(before >= 0) and np.all(after >= 0):
         approach, separation = before, after

@@ -11,7 +11,7 @@ from ._toml import known_keys, Section, shown_value
 
 
 LAYOUT_KEYS = ("columns", "rate")
-"""Keys of a rig file that are about files."""
+"""Keys of a rig file that describe files."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -23,7 +23,7 @@ class FileLayout:
 
 
 def read_layout(file: Path, tables: dict[str, Any]) -> FileLayout:
-    """`[columns]` and `rate` of a rig file.
+    """Read `[columns]` and `rate` of a rig file.
 
     An entry is the channel of a column, `Angle = "angle_deg"`, or also a factor:
     `Y1 = {channel = "height_m", factor = -8e-4}`.

@@ -1,4 +1,4 @@
-"""Reading a rig's file: every number with its unit, every mistake by its name."""
+"""Read the rig file of a cam-follower, with units and precise error messages."""
 
 import dataclasses
 from pathlib import Path
@@ -14,7 +14,7 @@ def read_rig(file: str | Path) -> Rig:
     """Read the rig described in a TOML file.
 
     A quantity is `{value = 0.045, tolerance = 0.002, unit = "m"}` or a bare number;
-    `unit` may be left out, and is refused where it is not the SI unit.
+    `unit` is optional and must be the SI unit.
 
     Args:
         file: The file.
@@ -86,12 +86,12 @@ def _sensors(section: Section) -> Sensors:
 def read_references(
     file: Path, tables: dict[str, Any], unit: str | None
 ) -> dict[str, float]:
-    """Constants of forms that the file states in `[references]`, by their names.
+    """Return the constants of forms in the table `[references]`, by name.
 
-    **Arguments:** the unit of the motion, of which the speeds have the rate; `None`
+    **Arguments:** the unit of the motion, whose rate is the unit of the speeds; `None`
     for any.
 
-    **Raises:** `RigError` for an unknown one, or a speed that is not positive.
+    **Raises:** `RigError` for an unknown name, or a speed that is not positive.
     """
     if "references" not in tables:
         return {}

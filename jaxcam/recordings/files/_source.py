@@ -1,4 +1,4 @@
-"""The columns of a file by their names, before anything is chosen."""
+"""Represent all columns of a file by name."""
 
 import dataclasses
 import difflib
@@ -13,10 +13,10 @@ from jaxtyping import Float
 from .._errors import RecordingError
 
 
-# What no sensor measures in any unit, microseconds since 1970 included; the square of a
-# square of it is still a number.
+# Limit of plausible values in any unit, including microseconds since 1970; its fourth
+# power is still finite.
 _LARGEST_NUMBER = 1e18
-# names that a sentence lists
+# largest number of names in a sentence
 _LISTED = 12
 
 
@@ -24,10 +24,10 @@ _LISTED = 12
 class Source:
     """Columns of a file, as text or as numbers.
 
-    - `columns`: by their names; text where a file is text.
-    - `headings`: other words for them, as the file has them.
+    - `columns`: by name; as text for a text file.
+    - `headings`: their headings in the file.
     - `rate`: samples per second, where the file states them outside the table.
-    - `notes`: what was left out, in words.
+    - `notes`: remarks on omitted data.
     """
 
     file: Path
@@ -37,7 +37,7 @@ class Source:
     notes: tuple[str, ...] = ()
 
     def name_of(self, word: str) -> str:
-        """The column that a word names. **Raises:** `RecordingError` for none."""
+        """Return the column of this name. **Raises:** `RecordingError` if missing."""
         if word in self.columns:
             return word
         if word in self.headings:
@@ -50,11 +50,11 @@ class Source:
         )
 
     def listed(self) -> str:
-        """The names there are, for a sentence."""
+        """Return the existing names, for a sentence."""
         return listed(self.columns)
 
     def numbers(self, name: str, missing: bool = False) -> Float[np.ndarray, " k"]:
-        """A column as numbers; an empty cell is NaN where some may be `missing`.
+        """Return a column as numbers; an empty cell is NaN if some may be `missing`.
 
         **Raises:** `RecordingError` that names the row and the fix.
         """
@@ -85,21 +85,21 @@ class Source:
 
 
 def listed(names: Iterable[str]) -> str:
-    """Names for a sentence, a few of them where there are many."""
+    """Return names for a sentence, only a few of many."""
     every = list(names)
     there = ", ".join(map(shown, every[:_LISTED])) or "none"
     return f"{there} and {len(every) - _LISTED} more" if len(every) > _LISTED else there
 
 
 def shown(text: str) -> str:
-    """A piece of a file between backquotes, short and without control characters."""
+    """Quote a piece of a file, short and without control characters."""
     text = text if len(text) <= 40 else f"{text[:40]}..."
     printable = "".join(c if c.isprintable() else "?" for c in text)
     return f"`{printable.replace('`', '?')}`"
 
 
 def _of_text(file: Path, name: str, column: pd.Series):
-    """Numbers of a column of text, NaN where it is none, and where it is empty."""
+    """Convert a column of text to numbers, NaN for other text, and flag empty cells."""
     column = column.str.strip().str.replace(r'^"(.*)"$', r"\1", regex=True)
     commas = column.str.contains(",", regex=False)
     if commas.any():

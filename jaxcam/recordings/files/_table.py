@@ -1,4 +1,4 @@
-"""From a text file to named columns, with one sentence for what is wrong."""
+"""Read named columns from a text file; errors are one sentence."""
 
 import csv
 import io
@@ -19,18 +19,18 @@ from ._text import Lines, read_lines
 
 SUFFIXES = (".csv", ".csv.gz", ".tsv", ".tsv.gz", ".lvm", ".lvm.gz")
 LEFT_OUT = "-"
-"""Name of a column that is not to be read."""
+"""Name of a skipped column."""
 
 
 def read_table(file: Path, names: Sequence[str] | None = None) -> Source:
-    """The columns of a text table, plain or gz, in the order of the file.
+    """Return the columns of a text table, plain or gz, in the order of the file.
 
     Cells are separated by tabs, semicolons, commas or spaces; numbers have a decimal
-    point or comma. Names are those of the line above the numbers, and units stand in
-    them or in a line below; lines before are passed over, and so are comments.
+    point or comma. Names are in the line above the numbers, and units in the names or
+    in a line below; earlier lines and comments are skipped.
 
     **Arguments:** `names` of the columns in their order, instead of those of the file;
-    `"-"` leaves one out.
+    `"-"` skips one.
 
     **Raises:** `RecordingError` for a file that is missing, empty, cut short, not a
     text table, or that names its columns badly.
@@ -41,7 +41,7 @@ def read_table(file: Path, names: Sequence[str] | None = None) -> Source:
 def table_of_lines(
     file: Path, found: Lines, names: Sequence[str] | None = None
 ) -> Source:
-    """The table in some lines. **Raises:** as `read_table` does."""
+    """Return the table in some lines. **Raises:** see `read_table`."""
     lines, whole, notes = found
     form = form_of(lines) or _as_it_seems(lines)
     separator = form.separator
@@ -83,7 +83,7 @@ def table_of_lines(
 
 
 def _without_last(titles: list[str], rows: list[str], separator: str):
-    """Names and rows without a last separator that only one of them has."""
+    """Return names and rows without a last separator that only one of them has."""
     count = len(cells_of(rows[0], separator))
     if count == len(titles) - 1 and not titles[-1]:
         return titles[:-1], rows
@@ -95,7 +95,7 @@ def _without_last(titles: list[str], rows: list[str], separator: str):
 
 
 def _as_it_seems(lines: list[str]) -> Form:
-    """The form of a table that is none, so that what is wrong can be said."""
+    """Return the apparent form of an invalid table, for an error message."""
     separator = next((mark for mark in ",;\t" if mark in lines[0]), "")
     if not separator:
         separator = " " if " " in lines[0].strip() else ","
@@ -103,7 +103,7 @@ def _as_it_seems(lines: list[str]) -> Form:
 
 
 def _titles(file: Path, lines: list[str], form: Form) -> list[str]:
-    """Names of the columns, their units at the end."""
+    """Return the names of the columns, with units at the end."""
     if form.names is None:
         count = len(cells_of(lines[form.first], form.separator))
         where = "the first line is numbers" if form.first == 0 else "no line does so"
@@ -126,7 +126,7 @@ def _titles(file: Path, lines: list[str], form: Form) -> list[str]:
 
 
 def _headings(lines: list[str], form: Form) -> dict[str, str]:
-    """The words of the file for the columns."""
+    """Return the headings of the columns in the file."""
     if form.names is None:
         return {}
     words = cells_of(bare(lines[form.names]), form.separator)
@@ -137,7 +137,7 @@ def _headings(lines: list[str], form: Form) -> dict[str, str]:
 
 
 def _kept(file: Path, titles: list[str], columns: Sequence[pd.Series]):
-    """Columns by their names, without those that are empty, or only number the rows."""
+    """Return columns by name, without empty columns and row numbers."""
     kept = {}
     for place, (title, column) in enumerate(zip(titles, columns)):
         if title == LEFT_OUT:
@@ -167,7 +167,7 @@ def _has_words(column: pd.Series) -> bool:
 
 
 def _refuse_cut_line(file, whole, rows, separator, width, named) -> None:
-    """A writer that was stopped leaves a last line with values or digits missing."""
+    """Reject a last line with missing values or digits, left by a stopped writer."""
     if separator == " ":
         counts = np.array([len(row.split()) for row in rows])
     else:
@@ -175,8 +175,8 @@ def _refuse_cut_line(file, whole, rows, separator, width, named) -> None:
     wrong = np.flatnonzero(counts != width)
     cut = len(wrong) > 0
     if not cut and not whole:
-        # All values are there. A number that is shorter than every other one in its
-        # column has lost digits: only a file with a fixed format can tell.
+        # No value is missing. A number shorter than all others in its column has lost
+        # digits, which shows only in a file with a fixed format.
         last = [len(_decimals(cells_of(row, separator)[-1])) for row in rows]
         cut = len(set(last[:-1])) == 1 and last[-1] < last[0]
     if cut and (len(wrong) == 0 or wrong[0] == len(rows) - 1):

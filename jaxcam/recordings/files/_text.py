@@ -1,4 +1,4 @@
-"""The lines of a text file, whichever program wrote it."""
+"""Read the lines of a text file from any program."""
 
 import csv
 import re
@@ -11,13 +11,14 @@ from ._form import is_number
 
 
 _UTF16 = b"\xff\xfe", b"\xfe\xff"
-# of workbooks of before 2007, which are often named like text
+# signature of workbooks before 2007, which often have the name of a text file
 _OLD_EXCEL = b"\xd0\xcf\x11\xe0"
 
 
 class Lines(NamedTuple):
-    """The lines of a file that are not blank; `whole` is whether the last one is known
-    to be, by a newline. `notes` say what was left out."""
+    """The lines of a file that are not blank; `whole` tells whether the last one is
+    known to be complete, by a newline. `notes` are remarks on omitted data.
+    """
 
     text: list[str]
     whole: bool = True
@@ -25,9 +26,9 @@ class Lines(NamedTuple):
 
 
 def read_lines(file: Path) -> Lines:
-    """The lines of a text file, plain or gz, as far as its first table goes.
+    """Return the lines of a text file, plain or gz, up to the end of its first table.
 
-    **Raises:** `RecordingError` for a file that is missing, empty, cut short or no
+    **Raises:** `RecordingError` for a file that is missing, empty, truncated or not
     text.
     """
     raw = read_bytes(file)
@@ -40,9 +41,10 @@ def read_lines(file: Path) -> Lines:
 
 
 def kept_lines(file: Path, every: list[str], whole: bool = True) -> Lines:
-    """The lines that are not blank; a second table, after a blank line, is left out.
+    """Return the lines that are not blank; a second table after a blank line is
+    omitted.
 
-    **Raises:** `RecordingError` where there is none.
+    **Raises:** `RecordingError` if there is none.
     """
     lines, notes, gap = [], (), False
     for number, line in enumerate(every):
@@ -82,7 +84,7 @@ def _decoded(file: Path, raw: bytes) -> str:
         )
     try:
         if raw.startswith(_UTF16):
-            # the text that Excel and LabVIEW call Unicode
+            # UTF-16, called Unicode by Excel and LabVIEW
             return raw.decode("utf-16")
         return raw.decode("utf-8-sig")
     except UnicodeDecodeError:
@@ -101,7 +103,7 @@ def _decoded(file: Path, raw: bytes) -> str:
 
 
 def _unquoted(lines: list[str]) -> list[str]:
-    """Lines whose cells stand in quotes, with tabs between the cells instead."""
+    """Convert lines of quoted cells to lines separated by tabs."""
     if '"' not in lines[-1] or any(line.count('"') % 2 for line in lines):
         return lines
     # between the quotes of the last line, which is one of numbers

@@ -1,4 +1,4 @@
-"""Tables of a TOML file: every number with its unit, every mistake by its name."""
+"""Read tables of a TOML file, with units and precise error messages."""
 
 import difflib
 import tomllib
@@ -9,13 +9,13 @@ from .._errors import RigError
 from .._rig import Quantity
 
 
-# bytes of a file; a rig takes two thousand
+# largest size in bytes; a rig file has about two thousand
 _LARGEST = 1_000_000
 
-# of a quantity in SI units, so that products of several are numbers
+# largest quantity in SI units, so that products stay finite
 _LARGEST_NUMBER = 1e30
 
-# letters of a text that are repeated
+# number of characters of a text repeated in messages
 _LONGEST = 200
 
 
@@ -37,7 +37,7 @@ def read_tables(file: Path) -> dict[str, Any]:
 
 
 class Section:
-    """One table of the file, which remembers the keys that were asked for.
+    """One table of the file, which records the keys that were read.
 
     `within` is the name of the table that it lies in.
     """
@@ -50,7 +50,7 @@ class Section:
             raise RigError(f"{file}: the table [{self.name}] is missing; add it.")
 
     def quantity(self, key: str, unit: str | None) -> Quantity:
-        """A number with its tolerance; a unit of `None` may be any."""
+        """Return a number with its tolerance; a unit of `None` allows any."""
         value, tolerance = self._parts(key, unit)
         return Quantity(self.as_number(key, value), self._tolerance(key, tolerance))
 
@@ -86,7 +86,7 @@ class Section:
         return value
 
     def done(self) -> None:
-        """**Raises:** `RigError` for an unknown key."""
+        """Raise `RigError` for an unknown key."""
         known_keys(self.file, self.name, self.table, self.read)
 
     def word(self, key: str) -> str:
@@ -115,7 +115,7 @@ class Section:
         return entry["value"], entry.get("tolerance")
 
     def as_number(self, key: str, value: Any) -> float:
-        """A number that may stand there. **Raises:** `RigError`."""
+        """Return a valid number. **Raises:** `RigError`."""
         number = isinstance(value, int | float) and not isinstance(value, bool)
         if not number or not abs(value) < _LARGEST_NUMBER:
             raise self.error(
@@ -130,7 +130,7 @@ class Section:
         return tolerance
 
     def error(self, key: str, what: str) -> RigError:
-        """Return a sentence that says what is wrong with a key, to be raised."""
+        """Return an error that describes the fault of a key, to be raised."""
         name = printable(key)
         return RigError(f"{self.file}: `{name}` in [{self.name}] {what}; correct it.")
 
@@ -147,14 +147,14 @@ def known_keys(file: Path, place: str, table: dict[str, Any], names) -> None:
 
 
 def printable(text: str) -> str:
-    """A text of somebody else's in a sentence: on one line, and not too long."""
+    """Shorten a foreign text for a sentence, on one line."""
     text = "".join(c if c.isprintable() else "?" for c in text)
     return text if len(text) <= _LONGEST else f"{text[:_LONGEST]}..."
 
 
 def shown_value(value: Any) -> str:
-    """A value of the file in a sentence."""
-    # of an integer of thousands of digits Python makes no text
+    """Return a value of the file for a sentence."""
+    # Python does not convert an integer of thousands of digits to text
     huge = isinstance(value, int) and abs(value) > _LARGEST_NUMBER
     text = "a huge integer" if huge else repr(value)
     text = text.replace("'", '"') if isinstance(value, str) else text

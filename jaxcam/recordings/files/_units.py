@@ -1,4 +1,4 @@
-"""Column names end in their unit; other than SI ones are converted."""
+"""Convert columns in non-SI units; the unit is the end of a column's name."""
 
 import math
 
@@ -34,9 +34,9 @@ _UNITS: dict[str, tuple[str, float]] = {
 
 
 def si(column: str) -> tuple[str, float]:
-    """The name of a column in SI units and the factor that takes it there.
+    """Return the name of a column in SI units and the conversion factor.
 
-    A column without a known unit at the end keeps its name and its numbers.
+    A column without a known unit keeps its name and its numbers.
     """
     for ending in sorted(_UNITS, key=len, reverse=True):
         if column.endswith(ending) and len(column) > len(ending):
@@ -62,7 +62,9 @@ _WRITTEN = {
 
 
 def unit_of(channel: str) -> str:
-    """The unit that ends the name of a channel: `m` of `height_m`, or nothing."""
+    """Return the unit at the end of a channel's name: `m` for `height_m`, or
+    nothing.
+    """
     for ending in sorted(_WRITTEN, key=len, reverse=True):
         if channel.endswith(ending):
             return _WRITTEN[ending]

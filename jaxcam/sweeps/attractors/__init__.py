@@ -1,4 +1,4 @@
-"""Attractors of motions, and their labels."""
+"""Find attractors of motions, and label them."""
 
 from ._attractors import (
     attractor_names as attractor_names,

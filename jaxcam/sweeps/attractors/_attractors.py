@@ -1,4 +1,4 @@
-"""Attractors of all the motions of a sweep, in an order of their own."""
+"""Find the attractors of all motions of a sweep, in a fixed order."""
 
 from typing import NamedTuple
 
@@ -10,7 +10,7 @@ from ._unique_rows import unique_rows
 
 
 NONE = {ESCAPED: -1, FAILED: -2, OUTSIDE: -3}
-"""Instead of the number of an attractor."""
+"""Codes in place of the number of an attractor."""
 
 
 class Attractors(NamedTuple):
@@ -21,7 +21,7 @@ class Attractors(NamedTuple):
     fingerprint: np.ndarray
     """(attractors, means) see `fingerprints`."""
     lane: np.ndarray
-    """(attractors,) the lane that stands for each."""
+    """(attractors,) the representative lane of each."""
 
     def __len__(self) -> int:
         return len(self.turns)
@@ -30,17 +30,17 @@ class Attractors(NamedTuple):
 def find_attractors(
     impacts, turns, fingerprint, cells, starts, same: float
 ) -> tuple[np.ndarray, Attractors]:
-    """Attractors, and the number of the one that each lane ends on.
+    """Find attractors, and the number of the attractor of each lane.
 
     Args:
         impacts: Labels, shape `(lanes,)`.
         turns: Labels, shape `(lanes,)`.
         fingerprint: Shape `(lanes, means)`.
-        cells: An iterable of pairs: indices of lanes that do not repeat, and the cells
+        cells: An iterable of pairs: indices of non-periodic lanes, and the cells
             `(lanes, keep)` that they visit.
-        starts: `(lanes, n)`; where several lanes end on an attractor, the one with the
-            smallest start stands for it.
-        same: Two orbits are one where their fingerprints differ by less.
+        starts: `(lanes, n)`; of several lanes on an attractor, that with the smallest
+            start represents it.
+        same: Two orbits are equal if their fingerprints differ by less.
 
     Returns:
         Numbers `(lanes,)`, -1 for motions that escaped, -2 for those that failed and -3
@@ -66,7 +66,7 @@ def find_attractors(
 
 
 def _ordered(group, impacts, turns, fingerprint, starts):
-    """Numbers that say nothing of the order in which motions were seen."""
+    """Return numbers that do not depend on the order of motions."""
     found = group >= 0
     used = np.unique(group[found])
     # the smallest start of each group; starts do not depend on their order
@@ -88,7 +88,9 @@ def _ordered(group, impacts, turns, fingerprint, starts):
 
 
 def attractor_names(impacts, turns) -> list[str]:
-    """P(1,1), P(6,6) a, P(6,6) b, ...: letters where several have one label."""
+    """Return names P(1,1), P(6,6) a, P(6,6) b, ...: letters distinguish equal
+    labels.
+    """
     plain = [label_name(int(m), int(n)) for m, n in zip(impacts, turns, strict=True)]
     made = []
     for i, word in enumerate(plain):
@@ -100,7 +102,7 @@ def attractor_names(impacts, turns) -> list[str]:
 
 
 def _letters(number: int) -> str:
-    """a, b, ..., z, aa, ab, ..."""
+    """Return a, b, ..., z, aa, ab, ..."""
     letters = ""
     number += 1
     while number:

@@ -1,4 +1,4 @@
-"""Fingerprints by which attractors are distinguished."""
+"""Compute fingerprints that distinguish attractors."""
 
 import numpy as np
 from scipy.sparse import coo_array
@@ -10,23 +10,23 @@ from ._unique_rows import unique_rows
 
 
 _WAVES = 8
-"""Waves whose averages tell orbits of one mean apart."""
+"""Number of waves whose averages distinguish orbits of equal mean."""
 
 
 def fingerprint_size(n: int) -> int:
-    """Numbers in a fingerprint of states with `n` components."""
+    """Return the length of a fingerprint of states with `n` components."""
     return n + _WAVES
 
 
 def fingerprints(states, turns, origin, scale) -> np.ndarray:
-    """Mean of each orbit, and of some waves over it.
+    """Compute the mean of each orbit, and of some waves over it.
 
-    They are the same from whichever point an orbit starts, vary smoothly with it, and
-    differ for different orbits, also for those that a symmetry turns into each other.
+    They do not depend on the starting point of an orbit, vary smoothly with it, and
+    differ for different orbits, including symmetric images of each other.
 
     Args:
         states: Shape `(lanes, keep, n)`; the last `turns` of them are one orbit, all of
-            them where `turns` is 0.
+            them if `turns` is 0.
         origin: Shape `(n,)`, in which states are of order one.
         scale: Shape `(n,)`, in which states are of order one.
 
@@ -35,7 +35,7 @@ def fingerprints(states, turns, origin, scale) -> np.ndarray:
     """
     z = (np.asarray(states) - origin) / scale
     lanes, keep, n = z.shape
-    # spread evenly over a box, without a pattern and without chance
+    # a deterministic, quasi-random distribution over a box
     number = np.arange(1, _WAVES + 1)[:, None]
     steps = np.exp(1 / np.arange(1.0, n + 2))
     spread = np.mod(number * steps, 1.0)
@@ -52,10 +52,10 @@ def fingerprints(states, turns, origin, scale) -> np.ndarray:
 
 
 def clusters(points, same: float) -> np.ndarray:
-    """Numbers of the groups into which points fall, shape `(k,)`.
+    """Return the numbers of the groups of points, shape `(k,)`.
 
-    Points closer than `same` in every component are in one group, and so are those that
-    a chain of such points joins; this does not depend on their order.
+    Points closer than `same` in every component are in one group, also by a chain of
+    such points, independent of their order.
     """
     points = np.asarray(points, dtype=float)
     if not len(points):
@@ -70,21 +70,21 @@ def clusters(points, same: float) -> np.ndarray:
 
 
 class SharedCells:
-    """Groups of motions that do not repeat: those that visit a common cell.
+    """Groups of non-periodic motions that visit common cells.
 
-    Chaotic motions have no point to be known by; but two that wander over one attractor
-    enter the same cells. Cells that a chain of motions joins are one group, in whatever
-    order the motions come.
+    Chaotic motions have no characteristic point, but two motions on one attractor enter
+    the same cells. Cells joined by a chain of motions are one group, independent of the
+    order of the motions.
     """
 
     def __init__(self):
         self._edges: list[np.ndarray] = []
 
     def add(self, cells) -> np.ndarray:
-        """Take motions with the cells they visit, shape `(lanes, keep)`.
+        """Add motions with the cells they visit, shape `(lanes, keep)`.
 
         Returns:
-            One cell of each, to ask for its group by at the end.
+            One cell of each motion, to look up its group at the end.
         """
         cells = np.asarray(cells)
         if not len(cells):
@@ -95,7 +95,7 @@ class SharedCells:
         return cells[:, 0]
 
     def groups(self, cells) -> np.ndarray:
-        """Number of the group of each cell."""
+        """Return the number of the group of each cell."""
         if not self._edges:
             return np.zeros(len(cells), dtype=int)
         known, group = _components(np.concatenate(self._edges))
@@ -103,7 +103,7 @@ class SharedCells:
 
 
 def cell_codes(states, origin, scale, fine: float) -> np.ndarray:
-    """A number for the cell that each state is in, shape `(lanes, keep)`.
+    """Return the number of the cell of each state, shape `(lanes, keep)`.
 
     **Arguments:** `fine`: extent of a cell in units of `scale`.
     """
@@ -119,7 +119,7 @@ def cell_codes(states, origin, scale, fine: float) -> np.ndarray:
 
 
 def _spanning(edges) -> np.ndarray:
-    """A smallest set of edges that joins the same cells."""
+    """Return a minimal set of edges that joins the same cells."""
     known, group = _components(edges)
     order = np.argsort(group, kind="stable")
     starts = np.searchsorted(group[order], group)
@@ -134,6 +134,6 @@ def _components(edges):
 
 
 def _graph(rows, columns, count: int):
-    # the same edge several times is one: true and true is true
+    # repeated edges merge
     joined = np.ones(len(rows), dtype=bool)
     return coo_array((joined, (rows, columns)), shape=(count, count))

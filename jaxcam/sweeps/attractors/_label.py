@@ -1,4 +1,4 @@
-"""Labels P(m, n): motions that repeat after n periods, with m impacts."""
+"""Determine labels P(m, n): motions that repeat after n periods, with m impacts."""
 
 from typing import NamedTuple
 
@@ -10,11 +10,13 @@ from ._unique_rows import unique_rows
 
 
 APERIODIC, ESCAPED, FAILED, OUTSIDE = 0, -1, -2, -3
-"""Codes in the place of a number of periods."""
+"""Codes in place of a number of periods."""
 STICKING, CONTACT, UNCOUNTED = -1, -2, -3
-"""Instead of a number of impacts: infinitely many, contact without end, not counted."""
+"""Codes in place of a number of impacts: infinitely many, permanent contact, not
+counted.
+"""
 
-# how steady the distances within an orbit must be
+# required steadiness of the distances within an orbit
 _STEADY = 0.9
 
 
@@ -43,7 +45,7 @@ def periods(states, period_tolerance: float = 1e-6, sizes=None) -> np.ndarray:
 
     Args:
         states: Samples, shape `(lanes, keep, n)`; periods up to `keep / 2` are
-            detected, so that each is seen twice.
+            detected, so that each occurs twice.
         period_tolerance: Allowed difference of two states, relative to `sizes`.
         sizes: Scale of each component, shape `(lanes, n)`; default its largest value.
 
@@ -60,7 +62,7 @@ def periods(states, period_tolerance: float = 1e-6, sizes=None) -> np.ndarray:
     for n in range(1, keep // 2 + 1):
         if not len(left):
             break
-        # most lanes are told apart by their last points
+        # most lanes are distinguished by their last points
         last = np.abs(states[left, -1] - states[left, -1 - n]) <= room[left, -1]
         likely = left[np.all(last, axis=1)]
         gone = np.abs(states[likely, n:] - states[likely, :-n])
@@ -74,7 +76,7 @@ def periods(states, period_tolerance: float = 1e-6, sizes=None) -> np.ndarray:
 
 
 def _still_nearing(states, n: int) -> np.ndarray:
-    """Return whether points that are not a period apart come closer to each other."""
+    """Return whether points one period apart still approach each other."""
     nearing = np.zeros(len(states), dtype=bool)
     for part in range(1, n):
         if n % part:
@@ -121,7 +123,7 @@ def label(
 
 
 def label_name(impacts: int, turns: int) -> str:
-    """The label in words: P(1,1), P(inf,1), contact, period 3, aperiodic, ..."""
+    """Return the label as text: P(1,1), P(inf,1), contact, period 3, aperiodic, ..."""
     words = {
         APERIODIC: "aperiodic",
         ESCAPED: "escaped",
@@ -138,7 +140,7 @@ def label_name(impacts: int, turns: int) -> str:
 
 
 def label_names(labels: Labels) -> np.ndarray:
-    """All labels in words, in the shape of the labels."""
+    """Return all labels as text, in the shape of the labels."""
     pairs = np.stack([labels.impacts, labels.turns], axis=-1)
     unique, back = unique_rows(pairs.reshape(-1, 2))
     words = np.array([label_name(int(m), int(n)) for m, n in unique], dtype=object)

@@ -1,4 +1,4 @@
-"""The same attractor in two pictures: on another grid, or at another parameter."""
+"""Match attractors between two grids or two parameter values."""
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
@@ -6,19 +6,18 @@ from scipy.spatial import KDTree
 
 
 def match_orbits(first, second, scale, most: float, labels=None) -> dict[int, int]:
-    """Pairs of orbits that are closest to each other, all distances together.
+    """Return pairs of orbits with the least sum of distances.
 
     Args:
-        first: Orbits, shapes `(k, points, n)` and `(l, points, n)`, filled up with NaN.
-        second: Orbits, shapes `(k, points, n)` and `(l, points, n)`, filled up with
-            NaN.
-        scale: Shape `(n,)`, in whose units distances are.
-        most: Orbits farther apart than this are no pair.
+        first: Orbits, shapes `(k, points, n)` and `(l, points, n)`, padded with NaN.
+        second: Orbits, shapes `(k, points, n)` and `(l, points, n)`, padded with NaN.
+        scale: Unit of the distances, shape `(n,)`.
+        most: Largest distance of a pair.
         labels: Of both, shapes `(k, 2)` and `(l, 2)`; with them, only orbits of one
             label are a pair.
 
     Returns:
-        For indices of `second` that have one, that of its partner in `first`.
+        For each matched index of `second`, that of its partner in `first`.
     """
     if not len(first) or not len(second):
         return {}
@@ -27,7 +26,7 @@ def match_orbits(first, second, scale, most: float, labels=None) -> dict[int, in
     if labels is not None:
         same = np.all(labels[1][:, None] == labels[0][None], axis=-1)
         cost = np.where(same, cost, far)
-    # a pair that is too far apart costs as much as none
+    # a pair that is too far apart costs as much as no pair
     rows, columns = linear_sum_assignment(np.minimum(cost, most))
     return {
         int(b): int(a) for b, a in zip(rows, columns, strict=True) if cost[b, a] < most

@@ -1,4 +1,4 @@
-"""Motions until they repeat, or until patience ends."""
+"""Run motions until they repeat, or to a limit."""
 
 import numpy as np
 

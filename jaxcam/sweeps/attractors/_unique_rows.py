@@ -1,10 +1,10 @@
-"""Rows of a table that differ."""
+"""Find the unique rows of a table."""
 
 import numpy as np
 
 
 def unique_rows(table) -> tuple[np.ndarray, np.ndarray]:
-    """The different rows of a table in order, and which of them each row is.
+    """Return the unique rows of a table in order, and the index of each row.
 
     **Arguments:** a table of numbers, shape `(rows, columns)`; without columns all rows
     are the same.

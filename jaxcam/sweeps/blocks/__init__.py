@@ -1,4 +1,4 @@
-"""Blocks of a sweep: where they run, and how they are kept."""
+"""Run the blocks of a sweep, and store them."""
 
 from ._checksums import checked as checked
 from ._cluster import cluster as cluster

@@ -16,10 +16,10 @@ from ._store import FORMAT, SWEEP, VERSION
 
 UNFINISHED = -1
 CHECKSUM = "checksum"
-# attributes with the checksums of what was made of all blocks together, and of the
-# coordinates: of one that is lost xarray would make 0, 1, 2, ...
+# attributes with the checksums of the combined results and of the coordinates: xarray
+# would replace a lost coordinate by 0, 1, 2, ...
 TOGETHER, AXES = "together", "axes"
-# what zarr and its codecs raise for chunks and descriptions that were damaged
+# exceptions of zarr and its codecs for damaged chunks and metadata
 UNREADABLE = (OSError, ValueError, RuntimeError, TypeError, LookupError, AttributeError)
 
 
@@ -46,7 +46,7 @@ def faults(group: zarr.Group) -> list[str]:
 
 
 def checksum(arrays: Mapping[str, np.ndarray]) -> int:
-    """CRC-32 of the arrays of a block, in the order of the layout."""
+    """Compute the CRC-32 of the arrays of a block, in the order of the layout."""
     value = 0
     for array in arrays.values():
         value = zlib.crc32(np.ascontiguousarray(array).tobytes(), value)
@@ -54,14 +54,14 @@ def checksum(arrays: Mapping[str, np.ndarray]) -> int:
 
 
 def open_store(path: str | Path) -> xarray.Dataset:
-    """The dataset on disk, read when it is used.
+    """Open the dataset on disk, which is read lazily.
 
     Raises:
-        ValueError: Where its description or a coordinate is damaged.
+        ValueError: The metadata or a coordinate is damaged.
     """
     try:
         with warnings.catch_warnings():
-            # a folder without a description; what it lacks is said by who needs it
+            # a folder without metadata; missing parts are reported when they are needed
             warnings.simplefilter("ignore", zarr.errors.ZarrUserWarning)
             dataset = xarray.open_dataset(
                 path, engine="zarr", consolidated=False, chunks=None, decode_times=False
@@ -90,10 +90,10 @@ def read_block(group: zarr.Group, block: int) -> dict[str, np.ndarray]:
 
 
 def checked(path: str | Path) -> xarray.Dataset:
-    """The dataset on disk, after a check of all its blocks.
+    """Open the dataset on disk after a check of all its blocks.
 
     Raises:
-        ValueError: That names the blocks that are missing or damaged.
+        ValueError: Blocks are missing or damaged; the message names them.
     """
     if stored_identity(Path(path)) is None:
         raise ValueError(f"{path} is not a stored sweep")
@@ -103,7 +103,7 @@ def checked(path: str | Path) -> xarray.Dataset:
         raise ValueError(
             f"{path}: block {bad[0]} {wrong[bad[0]]} ({len(bad)} of {len(wrong)} "
             f"blocks are wrong: {names_of(bad)}); run the sweep again with resume=True "
-            "to compute them anew"
+            "to recompute them"
         )
     dataset = open_store(path)
     _check_together(path, dataset)
@@ -111,8 +111,8 @@ def checked(path: str | Path) -> xarray.Dataset:
 
 
 def _check_together(path, dataset: xarray.Dataset) -> None:
-    """Raise `ValueError` where what was made of all blocks together is not whole."""
-    about = f"{path}: the blocks are whole; run the sweep again with resume=True"
+    """Raise `ValueError` if the combined results of all blocks are not intact."""
+    about = f"{path}: the blocks are intact; run the sweep again with resume=True"
     wanted = dataset.attrs.get(TOGETHER)
     if wanted is None:
         if json.loads(dataset.attrs[SWEEP])["sweep"] == "basins":
@@ -132,7 +132,7 @@ def checksums(dataset: xarray.Dataset, names) -> dict[str, int]:
 
 
 def _plain(values: np.ndarray) -> np.ndarray:
-    """Text as bytes, in whatever way it is kept in memory."""
+    """Convert text to bytes, independent of its representation in memory."""
     if values.dtype.kind in "biufc":
         return values
     return np.frombuffer("\n".join(map(str, values.ravel())).encode(), dtype=np.uint8)
@@ -145,7 +145,7 @@ def stored_identity(path: Path) -> dict | None:
         if attributes.get("format") != FORMAT or attributes.get("version") != VERSION:
             return None
         identity = json.loads(str(attributes[SWEEP]))
-        # the sizes of its blocks, without which nothing can be read
+        # the sizes of its blocks, which are needed to read it
         whole = int(attributes["units"]) > 0 and int(attributes["block"]) > 0  # pyright: ignore
         stored = all(isinstance(name, str) for name in attributes["stored"])  # pyright: ignore
     except (*UNREADABLE, RecursionError):
@@ -154,6 +154,6 @@ def stored_identity(path: Path) -> dict | None:
 
 
 def names_of(blocks: Sequence[int]) -> str:
-    """Numbers of blocks in words, not more than a line of them."""
+    """Return numbers of blocks as text, at most one line."""
     shown = ", ".join(map(str, blocks[:8]))
     return shown if len(blocks) <= 8 else f"{shown} and {len(blocks) - 8} more"

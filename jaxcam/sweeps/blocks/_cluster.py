@@ -1,4 +1,4 @@
-"""Dask as an executor, where one machine is too small."""
+"""Use Dask as an executor for sweeps too large for one machine."""
 
 import os
 from collections.abc import Iterator
@@ -15,8 +15,8 @@ def cluster(address: str, workers: int | None = None) -> Iterator[Executor]:
         jaxcam.sweeps.basins(system, grid, 100, executor=executor)
     ```
 
-    A worker that is lost is replaced, and its blocks are
-    computed again. Code that runs it must be guarded by `if __name__ == "__main__":`.
+    A lost worker is replaced, and its blocks are computed again. Code that runs it must
+    be guarded by `if __name__ == "__main__":`.
 
     Args:
         address: "local" for single-threaded processes on this machine, which end with

@@ -1,8 +1,8 @@
-"""A sweep on disk: a plain Zarr group, which xarray opens by itself.
+"""Store a sweep on disk as a plain Zarr group, which xarray can open.
 
-Besides the data it has `checksum(block)`: the CRC-32 of each finished block, -1 for one
-that is not done. It is written after the data, so that a block that was interrupted,
-lost or damaged since is known to be so.
+Besides the data it has `checksum(block)`: the CRC-32 of each finished block, -1 for an
+unfinished block. It is written after the data, so that interrupted, lost or damaged
+blocks are detected.
 """
 
 import shutil
@@ -34,7 +34,7 @@ class OnDisk:
     """Blocks in a Zarr group; with `resume` those of an earlier run are kept.
 
     Raises:
-        ValueError: Where there is something else at the path.
+        ValueError: There is something else at the path.
     """
 
     def __init__(self, path: str | Path, layout: StoreLayout, resume: bool):
@@ -73,13 +73,13 @@ class OnDisk:
         attributes = {k: v for k, v in self._group.attrs.items() if k != TOGETHER}
         extra = extra.assign_attrs(attributes)
         extra.to_zarr(self.path, mode="a", consolidated=False, zarr_format=3)
-        # last, so that what is half written is known to be so
+        # last, so that an incomplete block is detected
         group = zarr.open_group(str(self.path), mode="r+")
         group.attrs[TOGETHER] = checksums(extra, extra.variables)
 
     def _create(self) -> None:
         layout = self.layout
-        # next to its place until it is complete
+        # in a temporary file next to it until it is complete
         fresh = self.path.with_name(self.path.name + ".new")
         shutil.rmtree(fresh, ignore_errors=True)
         fresh.parent.mkdir(parents=True, exist_ok=True)
@@ -110,7 +110,7 @@ class OnDisk:
         fresh.rename(self.path)
 
     def _meet(self, resume: bool) -> None:
-        """Go on with what is at the path, if it is the same sweep."""
+        """Continue with the data at the path, if it is the same sweep."""
         identity = stored_identity(self.path)
         if identity is None:
             raise ValueError(f"{self.path} holds something else; choose another folder")
@@ -133,7 +133,7 @@ class OnDisk:
         self._check_description()
 
     def _check_description(self) -> None:
-        """Raise `ValueError` where blocks do not fit those that exist."""
+        """Raise `ValueError` if blocks do not fit the existing blocks."""
         layout = self.layout
         wanted = {
             name: ((layout.units, *v.tail), np.dtype(v.dtype))

@@ -1,6 +1,4 @@
-"""The identity of a sweep as plain JSON: kept with its results, compared on
-resuming.
-"""
+"""Describe the identity of a sweep as JSON, to compare it on resuming."""
 
 import dataclasses
 import hashlib
@@ -15,7 +13,7 @@ from ..sections import AbstractSection
 
 
 def about_section(section: AbstractSection) -> dict[str, Any]:
-    """The section, with every parameter of its system."""
+    """Describe the section, with every parameter of its system."""
     found: dict[str, Any] = {"section": type(section).__name__}
     for field in dataclasses.fields(section):
         value = getattr(section, field.name)
@@ -27,7 +25,7 @@ def about_section(section: AbstractSection) -> dict[str, Any]:
 
 
 def about_system(system) -> Any:
-    """Classes and numbers of a system, or of the parameters of a map."""
+    """Describe classes and numbers of a system, or of the parameters of a map."""
     if isinstance(system, eqx.Module):
         try:
             return system_to_json(system)["system"]  # pyright: ignore
@@ -37,7 +35,7 @@ def about_system(system) -> Any:
 
 
 def digest(array) -> dict[str, Any]:
-    """An array by its shape and a hash, for arrays too long to be listed."""
+    """Describe an array by its shape and a hash, if it is too long to be listed."""
     array = np.ascontiguousarray(np.asarray(array, dtype=float))
     return {
         "shape": list(array.shape),
@@ -55,7 +53,7 @@ def _plain(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [_plain(v) for v in value]
     if callable(value):
-        # no address: it would differ from run to run
+        # without the memory address, which differs between runs
         return getattr(value, "__qualname__", type(value).__name__)
     if dataclasses.is_dataclass(value):
         fields = dataclasses.fields(value)

@@ -1,4 +1,4 @@
-"""Blocks on an executor, stored as they finish."""
+"""Run blocks on an executor, and store each as it finishes."""
 
 import abc
 import os
@@ -24,7 +24,7 @@ from ._store import Memory, Store, StoreLayout
 
 
 Arrays = dict[str, np.ndarray]
-# what Dask raises after it has tried a block on several workers in vain
+# exception of Dask after a block has failed on several workers
 _LOST = ("KilledWorker", "FutureCancelledError")
 
 
@@ -106,7 +106,7 @@ def run_blocks(
     workers = 1 if job.chained else workers
     own = ThreadPoolExecutor(workers) if executor is None else nullcontext(executor)
     with own as pool:
-        # enough that no worker waits for the next block, few enough to stay small
+        # enough that no worker waits for the next block, but a small number
         width = 2 * (getattr(pool, "_max_workers", None) or _workers_of(pool))
         if job.chained:
             width = 1
@@ -151,7 +151,7 @@ def _take(store: Store, future: Future, block: int, todo) -> None:
 
 
 def _workers_of(pool) -> int:
-    """Workers of a pool that does not say: those of a Dask client, or the cores."""
+    """Return the number of workers of a Dask client, or of cores."""
     client = getattr(pool, "_client", None)
     if client is not None:
         return max(1, sum(client.nthreads().values()))

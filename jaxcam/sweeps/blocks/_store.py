@@ -9,7 +9,7 @@ import xarray
 
 
 SWEEP = "sweep"
-"""Name of the attribute with what the sweep is of."""
+"""Name of the attribute with the description of the sweep."""
 FORMAT, VERSION = "jaxcam sweep", 1
 
 
@@ -104,7 +104,7 @@ def ordered(layout: StoreLayout, arrays) -> dict[str, np.ndarray]:
 
 
 def template(layout: StoreLayout, arrays: Mapping[str, np.ndarray]) -> xarray.Dataset:
-    """Coordinates and attributes, and the arrays that there are."""
+    """Return coordinates, attributes and existing arrays."""
     data = {}
     for name, array in arrays.items():
         variable = layout.variables[name]

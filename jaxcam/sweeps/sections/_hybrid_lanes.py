@@ -1,4 +1,4 @@
-"""Lanes of a hybrid system: which can start, and where they start by themselves."""
+"""Check initial states of lanes of a hybrid system, and compute default starts."""
 
 import sys
 
@@ -17,11 +17,13 @@ from ._samples import BEHIND
 
 
 _WIDTHS = ((32, 16), (512, 48), (sys.maxsize, 1 << 16))
-"""Motions that advance together, for numbers of motions up to so many."""
+"""Numbers of motions that advance together, by upper limits of the total."""
 
 
 def chunk_rows(width: int) -> int:
-    """Attempts between two checks of the batch: few are wasted, and checks are rare."""
+    """Return the attempts between two checks of the batch, a compromise of waste and
+    checks.
+    """
     # few batch elements gain from fewer checks
     return 1024 if width < 16 else 64
 
@@ -29,9 +31,9 @@ def chunk_rows(width: int) -> int:
 def smallest_gaps(
     system: HybridSystem, t0, states, where=None, values=None, room: float = 0.0
 ):
-    """Smallest gap of each state at `t0`, shape `(lanes,)`.
+    """Return the smallest gap of each state at `t0`, shape `(lanes,)`.
 
-    `room` times what cannot be told from zero is added to each.
+    `room` times its resolution is added to each.
     """
     batched, shared = split_lanes(as_arrays(system), where, values)
     parts = jnp.asarray(t0, float), _rows(states), jnp.asarray(room, float)
@@ -49,7 +51,7 @@ def admissible(system: HybridSystem, t0, states, where=None, values=None):
 
 
 def lifted(system: HybridSystem, t0, states, where=None, values=None) -> np.ndarray:
-    """States behind a constraint at `t0`, put onto it; the others as they are."""
+    """Move states behind a constraint at `t0` onto it; the others are unchanged."""
     states = np.asarray(states, dtype=float)
     if np.all(smallest_gaps(system, t0, states, where, values) >= 0):
         return states
@@ -58,10 +60,11 @@ def lifted(system: HybridSystem, t0, states, where=None, values=None) -> np.ndar
 
 
 def state_in_contact(system: HybridSystem, t0, where=None, values=None) -> np.ndarray:
-    """The state in contact, without velocity relative to the constraint, at `t0`.
+    """Return the state in contact, without velocity relative to the constraint, at
+    `t0`.
 
     Raises:
-        ValueError: Where a state has not two components or there are several
+        ValueError: A state does not have two components, or there are several
             constraints.
     """
     names = system.state_names
@@ -79,10 +82,11 @@ def state_in_contact(system: HybridSystem, t0, where=None, values=None) -> np.nd
 
 
 def turn_lengths(system: HybridSystem, period, where=None, values=None) -> np.ndarray:
-    """Length of a period (s) in each lane, shape `(lanes,)`, or `(1,)` for all alike.
+    """Return the length of a period (s) in each lane, shape `(lanes,)`, or `(1,)` if
+    equal.
 
     Raises:
-        ValueError: For a system without a period of its own, if none is given.
+        ValueError: The system has no period and none is given.
     """
     length = system.period if period is None else period
     if length is None:
@@ -109,25 +113,25 @@ def run_lanes(run, system, t0, states, where, values, lanes: int, tails):
     Args:
         run: `run(states, values, width)` returns arrays with one row for each
             lane, the last of them the code.
-        lanes: Motions that advance together, at most.
+        lanes: Largest number of motions that advance together.
         tails: Shapes of a row of the arrays.
 
     Returns:
         The same arrays for all lanes; rows of lanes that cannot start, or failed, are
-            NaN or zero, and of the code `BEHIND` or why.
+            NaN or zero, with the code `BEHIND` or the reason.
     """
     states = np.asarray(states, dtype=float)
     values = None if values is None else np.asarray(values, dtype=float)
     ready = admissible(system, t0, states, where, values)
     count = len(states)
-    # few widths, as each is a program of its own; several motions for each slot, so
-    # that the last ones leave few slots empty
+    # few widths, as each needs a separate program; several motions per position, so
+    # that few positions are idle at the end
     width = 1 if count == 1 else next(w for most, w in _WIDTHS if count <= most)
     width = min(lanes, width)
     code = np.full(count, BEHIND)
     if not np.any(ready):
         return (*(np.full((count, *tail), np.nan) for tail in tails), code)
-    # lanes that cannot start, and those missing in a block, repeat one that can
+    # inadmissible lanes, and those missing in a block, repeat an admissible lane
     one = int(np.argmax(ready))
     index = np.full(max(count, width), one)
     index[:count] = np.where(ready, np.arange(count), one)

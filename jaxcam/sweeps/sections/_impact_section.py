@@ -82,7 +82,9 @@ class ImpactSection(AbstractSystemSection):
 
 
 class _Row(NamedTuple):
-    """The last `keep` impacts in a ring, and after them the state at the last stop."""
+    """Stores the last `keep` impacts in a ring buffer, and the state at the last
+    stop.
+    """
 
     keep: int
 
@@ -96,7 +98,7 @@ class _Row(NamedTuple):
 
 
 def _found(numbers, impacts, keep):
-    """States, times and whether a chatter was completed there; the last state."""
+    """Return states, times and flags of completed chatter; and the last state."""
     # the newest impact goes last; a ring that is not full starts with NaN
     order = (impacts[:, None] + np.arange(keep)) % keep
     rows = np.take_along_axis(numbers, order[..., None], axis=1)

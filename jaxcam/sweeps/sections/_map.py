@@ -1,4 +1,4 @@
-"""Plain maps, swept as if they were sections of a flow."""
+"""Sweep plain maps like sections of a flow."""
 
 from collections.abc import Callable
 from typing import Any
@@ -77,7 +77,7 @@ class Map(AbstractSection):
         )
 
     def starts(self, where=None, values=None) -> np.ndarray:
-        raise ValueError("a map has no start of its own; pass the states to start from")
+        raise ValueError("a map has no default start; pass the states to start from")
 
     def turn(self, where=None, values=None) -> np.ndarray:
         return np.ones(1)

@@ -1,4 +1,4 @@
-"""Any Poincare section, by single trajectories."""
+"""Sample any Poincare section by single trajectories."""
 
 from collections.abc import Callable
 
@@ -93,8 +93,6 @@ class PoincareSection(AbstractSystemSection):
 
 def return_times(samples: Samples) -> np.ndarray:
     """Return the times between consecutive points on a section.
-
-    s, or iterations of a map; NaN where a point is missing.
 
     Args:
         samples: Samples of a section.

@@ -22,16 +22,16 @@ class Samples(NamedTuple):
     contact: np.ndarray
     """Whether contact lasted throughout, shape `(lanes,)`."""
     code: np.ndarray
-    """0, or why there is no result: an index into `RESULTS`, or `BEHIND`; shape
+    """0, or the reason of a failure: an index into `RESULTS`, or `BEHIND`; shape
     `(lanes,)`."""
 
 
 BEHIND = -1
-"""Code of a start behind the constraint, or outside of where the map is defined."""
+"""Code of a start behind the constraint, or outside the domain of the map."""
 
 
 def with_lanes(old: Samples, which, new: Samples) -> Samples:
-    """The samples with those of some lanes replaced."""
+    """Return the samples with those of some lanes replaced."""
 
     def put(before, after):
         made = before.copy()
@@ -42,7 +42,7 @@ def with_lanes(old: Samples, which, new: Samples) -> Samples:
 
 
 def filled(samples: Samples, keep: int) -> Samples:
-    """The samples with as many places for each lane, empty ones behind the others."""
+    """Return the samples padded to an equal number for each lane."""
     missing = keep - samples.states.shape[1]
     if missing == 0:
         return samples

@@ -1,4 +1,4 @@
-"""Sections: the points at which a motion is sampled."""
+"""Define sections, the points at which a motion is sampled."""
 
 import abc
 from collections.abc import Callable
@@ -12,7 +12,7 @@ from ._samples import Samples
 
 
 class AbstractSection(eqx.Module):
-    """A way to sample many motions of one system.
+    """A sampling method for many motions of one system.
 
     A lane is one motion. Its samples depend on its start and its parameters alone, not
     on the other lanes; everything else in this package relies on that.
@@ -78,7 +78,7 @@ class AbstractSection(eqx.Module):
     ) -> np.ndarray:
         """Return the scale of each component in each lane.
 
-        Two states are equal where their difference is small compared with it. By
+        Two states are equal if their difference is small compared with it. By
         default the largest value among the start (`states`) and the samples.
 
         Returns:
@@ -91,9 +91,7 @@ class AbstractSection(eqx.Module):
 
     @abc.abstractmethod
     def lifted(self, states, where: Callable | None = None, values=None) -> np.ndarray:
-        """Return the states, moved out of the constraint where a parameter moved it
-        there.
-        """
+        """Return the states, moved out of a constraint that a parameter has shifted."""
 
     @abc.abstractmethod
     def names(self, n: int) -> tuple[tuple[str, str], ...]:
@@ -101,7 +99,7 @@ class AbstractSection(eqx.Module):
 
 
 def system_names(system, n: int) -> tuple[tuple[str, str], ...]:
-    """Names and units that the class of a system declares, x1, x2, ... without."""
+    """Return names and units declared by the class of a system; default x1, x2, ..."""
     names = tuple(getattr(system, "state_names", ()))
     units = tuple(getattr(system, "state_units", ()))
     made = [names[i] if i < len(names) else f"x{i + 1}" for i in range(n)]
@@ -110,8 +108,8 @@ def system_names(system, n: int) -> tuple[tuple[str, str], ...]:
 
 
 def component_coordinates(components) -> dict:
-    """Names and units of the components of a state, as coordinates of a dataset."""
-    # words of any length have a specification in Zarr, arrays of fixed ones have none
+    """Return names and units of the state components, as coordinates of a dataset."""
+    # Zarr specifies strings of variable length, but not of fixed length
     names = np.array([name for name, _ in components], dtype=object)
     units = np.array([unit for _, unit in components], dtype=object)
     return {

@@ -1,4 +1,4 @@
-"""The stroboscopic section: once a period of the forcing."""
+"""Define the stroboscopic section: once per forcing period."""
 
 import equinox as eqx
 import numpy as np
@@ -73,7 +73,7 @@ class Stroboscopic(AbstractSystemSection):
         )
 
     def _touching(self, samples, hits, code, where, values):
-        """In contact at the end, and no impact on the way there."""
+        """Return whether a motion ends in contact without any impact."""
         calm = (code == 0) & (hits.sum(axis=1) == 0)
         if not np.any(calm):
             return calm

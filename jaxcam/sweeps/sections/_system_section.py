@@ -13,7 +13,7 @@ class AbstractSystemSection(AbstractSection):
 
     system: AbstractVar[HybridSystem]
     t0: AbstractVar[float]
-    """S, where motions start."""
+    """Start time (s)."""
     period: AbstractVar[float | None]
     """Length of a period (s); None for the system's own forcing period."""
 

@@ -1,1 +1,1 @@
-"""Chapter 1: what chatter is, in two figures."""
+"""Chapter 1: an introduction to chatter in two figures."""

@@ -1,4 +1,4 @@
-"""Figure 1.3: sticking is there at 152.65 rpm and gone at 152.69 rpm."""
+"""Figure 1.3: sticking at 152.65 rpm, none at 152.69 rpm."""
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -16,7 +16,7 @@ _COMPLETE, _INTERRUPTED = 152.65, 152.69
 
 
 def both_sides(system: CamFollower) -> tuple[float, float]:
-    """Speeds (rpm) of Figure 1.3; the first is that of Figure 1.2 as well."""
+    """Return the speeds (rpm) of Figure 1.3; the first is also that of Figure 1.2."""
     complete = beside_interruption(system, _COMPLETE)
     return complete, beside_interruption(system, _INTERRUPTED)
 

@@ -1,4 +1,4 @@
-"""Figure 2.11: what the three maps do either side of their border collision."""
+"""Figure 2.11: attractors of the three maps on both sides of the border collision."""
 
 import jax.numpy as jnp
 import matplotlib.pyplot as plt

@@ -1,6 +1,6 @@
 """Figure 2.13 and (2.43): the Zeno ball, by events and by time-stepping.
 
-The thesis gives the formula; the ball is one of ours.
+The thesis gives the formula; the parameters of the ball are ours.
 """
 
 from functools import cache
@@ -40,7 +40,7 @@ class Zeno(NamedTuple):
 
 @cache
 def zeno() -> Zeno:
-    """Computed once, for the numbers and the drawing."""
+    """Compute the ball once, for the numbers and the drawing."""
     gravity, r = float(_BALL.gravity), float(_BALL.restitution)
     exact = 2 * _LAUNCH / (gravity * (1 - r))
     start, end = np.array([0.0, _LAUNCH]), 1.2 * exact
@@ -53,10 +53,10 @@ def zeno() -> Zeno:
 
 @cache
 def errors() -> tuple[np.ndarray, np.ndarray]:
-    """Lengths of steps (s) and errors of the accumulation time (s), by neighbours.
+    """Return step lengths (s) and errors of the accumulation time (s), averaged.
 
-    The error is a sawtooth of where in their steps the impacts fall, so one number of
-    steps says little.
+    The error is a sawtooth function of the place of the impacts in their steps, so it
+    is averaged over neighbouring numbers of steps.
     """
     found = zeno()
     start, end = np.array([0.0, _LAUNCH]), 1.2 * found.exact
@@ -108,7 +108,7 @@ def draw(system: CamFollower) -> Figure:
     axes[1].loglog(middle, mean, "o", color=FLIGHT, label="mean of five")
     level = np.exp(np.mean(np.log(mean / middle)))
     axes[1].loglog(middle, level * middle, "--", color="0.6", label="order one")
-    # labels of minor ticks run into each other over less than two decades
+    # over less than two decades the labels of minor ticks overlap
     axes[1].xaxis.set_minor_formatter(NullFormatter())
     axes[1].yaxis.set_minor_formatter(NullFormatter())
     axes[1].set_xlabel("length of a step (s)")

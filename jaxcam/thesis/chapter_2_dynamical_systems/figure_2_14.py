@@ -1,6 +1,6 @@
 """Figure 2.14 (d): a branch over the belt's speed, with both kinds of event.
 
-The figure is a sketch; the oscillator is one of ours.
+The figure is a sketch; the parameters of the oscillator are ours.
 """
 
 from functools import cache
@@ -24,7 +24,7 @@ BELT = BeltOscillator(*(jnp.asarray(v) for v in (1.0, 0.4, 0.0, 0.05, 0.9, 0.7))
 _BELTS = np.linspace(0.05, 1.5, 59)
 _SETTLE = 30
 DRAWN = 0.2, 0.7, 1.1, 1.4
-"""Speeds of the belt of which orbits are drawn, one between any two events."""
+"""Belt speeds of the drawn orbits, one between any two events."""
 
 
 class Belted(NamedTuple):
@@ -40,7 +40,7 @@ class Belted(NamedTuple):
 
 
 def belted(belt: float, state=(0.0, 0.0), turns: int = _SETTLE) -> Belted:
-    """The motion after some periods of the forcing."""
+    """Return the motion after some periods of the forcing."""
     system = eqx.tree_at(lambda s: s.belt, BELT, jnp.asarray(float(belt)))
     period = float(system.period)
     settled = simulate_filippov(system, state, 0.0, turns * period).final
@@ -56,7 +56,7 @@ def belted(belt: float, state=(0.0, 0.0), turns: int = _SETTLE) -> Belted:
 
 @cache
 def belt_branch() -> list[Belted]:
-    """Motions over the speed of the belt, downwards, each from the one before."""
+    """Compute motions over the belt speed, downwards, each from the previous one."""
     made, state = [], (0.0, 0.0)
     for belt in _BELTS[::-1]:
         made.append(belted(belt, state))
@@ -69,7 +69,7 @@ class SlidingEvent(NamedTuple):
 
     belt: float
     beyond: float
-    """Rate at which the field beyond the surface leaves it, where the orbit arrives."""
+    """Rate at which the field beyond the surface leaves it, at the orbit's arrival."""
 
 
 def _sticks(one: Belted) -> bool:
@@ -93,11 +93,11 @@ def _between(holds, first: Belted, second: Belted) -> float:
 
 @cache
 def sliding_events() -> dict[str, SlidingEvent]:
-    """The events of the branch, from a fast belt to a slow one, by bisection.
+    """Return the events of the branch, from a fast belt to a slow one, by bisection.
 
     Grazing-sliding: the motion touches the surface and begins to slide there.
-    Switching-sliding: where it begins to slide, it begins to cross first.
-    Crossing-sliding: the other crossing begins, or ceases, to slide before it leaves.
+    Switching-sliding: the motion begins to cross before it slides.
+    Crossing-sliding: the other crossing gains, or loses, a sliding segment.
     At the last two the field beyond the surface is tangent to it.
     """
     branch = belt_branch()
@@ -116,7 +116,9 @@ def sliding_events() -> dict[str, SlidingEvent]:
 
 
 def _rate_beyond(belt: float, name: str) -> float:
-    """At the switch of the event: from below for switching, from above for crossing."""
+    """Return the rate at the event: from below for switching, from above for
+    crossing.
+    """
     side = {"switching-sliding": -1, "crossing-sliding": 1}.get(name)
     if side is None or not np.isfinite(belt):
         return np.nan
@@ -128,7 +130,7 @@ def _rate_beyond(belt: float, name: str) -> float:
 
 
 def grazing_in_closed_form() -> float:
-    """Belt speed at which the motion without sticking just reaches the belt's.
+    """Return the belt speed that the motion without sticking just reaches.
 
     Below the belt friction is constant, so the motion is harmonic about it.
     """

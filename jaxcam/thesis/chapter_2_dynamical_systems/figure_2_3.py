@@ -1,4 +1,4 @@
-"""Figure 2.3: where the cobwebs of the logistic map end; formulas as printed."""
+"""Figure 2.3: attractors of the logistic map by cobwebs; formulas as printed."""
 
 import matplotlib.pyplot as plt
 import numpy as np

@@ -1,6 +1,6 @@
-"""Figure 2.8: the saddle, in closed form and found; its multipliers.
+"""Figure 2.8: the saddle, in closed form and numerically; its multipliers.
 
-The figure is a sketch of a flow; shown is the same for an impact oscillator.
+The figure is a sketch of a flow; this one shows an impact oscillator.
 """
 
 from functools import cache
@@ -22,13 +22,14 @@ from ..target import Rows, Target
 
 
 _OMEGA, _RESTITUTION = 2.8, 0.8
-"""The oscillator of Figure 2.8: forcing and restitution; its wall lies where a pair of
-orbits with one impact a turn exists."""
+"""The oscillator of Figure 2.8: forcing and restitution; its wall permits a pair of
+orbits with one impact per period.
+"""
 _LENGTH = 0.6
 
 
 class Strobe(eqx.Module):
-    """The map of one turn of an impact oscillator."""
+    """The map of one period of an impact oscillator."""
 
     system: ImpactOscillator
 
@@ -37,7 +38,7 @@ class Strobe(eqx.Module):
 
 
 class BackwardStrobe(eqx.Module):
-    """The inverse of that map: the motion with time running backwards."""
+    """The inverse of that map: the motion in reversed time."""
 
     system: ImpactOscillator
 
@@ -46,18 +47,18 @@ class BackwardStrobe(eqx.Module):
 
 
 class Manifolds(NamedTuple):
-    """A saddle of the stroboscopic map, and its manifolds, each to both sides."""
+    """A saddle of the stroboscopic map, and both sides of its manifolds."""
 
     saddle: Saddle
     exact: np.ndarray
-    """The same saddle, by the closed form of orbits with one impact a turn."""
+    """The same saddle, by the closed form of orbits with one impact per period."""
     unstable: list[np.ndarray]
     stable: list[np.ndarray]
 
 
 @cache
 def manifolds() -> Manifolds:
-    """The manifolds of the saddle that a fold of P(1,1) creates.
+    """Return the manifolds of the saddle that a fold of P(1,1) creates.
 
     With V the speed before the impact, (k^2 + m^2) V^2 + 2 k sigma V + sigma^2 -
     gamma^2 = 0 for orbits with one impact a turn; the saddle has the smaller V.

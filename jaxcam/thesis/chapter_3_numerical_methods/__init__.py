@@ -1,1 +1,1 @@
-"""Chapter 3: numerical methods, and the branches they follow."""
+"""Chapter 3: numerical methods and continued branches."""

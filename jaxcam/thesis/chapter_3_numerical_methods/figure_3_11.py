@@ -20,10 +20,11 @@ SPEED = 147.941373499943
 
 @remembered
 def periodic_run(system: CamFollower, turns: float = 2.0) -> Trajectory:
-    """The P(1,1) orbit of Figures 3.8 (a) and 3.11, from half a turn after an impact.
+    """Return the P(1,1) orbit of Figures 3.8 (a) and 3.11, from half a turn after an
+    impact.
 
     Raises:
-        ValueError: Where the rig has no such orbit.
+        ValueError: The rig has no such orbit.
     """
     start = first_orbit(system)
     if start is None:
@@ -31,7 +32,7 @@ def periodic_run(system: CamFollower, turns: float = 2.0) -> Trajectory:
     rig = at_rpm(system, SPEED)
     orbit = orbit_at(system, start, SPEED)
     period = float(rig.period)
-    # half a turn on it is in flight
+    # half a turn later it is in flight
     time = float(orbit.times[0]) + period / 2
     state = simulate(rig, orbit.states[0], time - period / 2, time).final
     return simulate(rig, state, time, time + turns * period)

@@ -23,12 +23,12 @@ if TYPE_CHECKING:
 
 
 _HITTING = 130.0, 154.0
-"""Rpm between which it is followed."""
+"""Bounds of the branch (rpm)."""
 
 
 @remembered
 def hitting_branch(system: CamFollower) -> "Branch":
-    """P(1,1), around its fold and past its flip."""
+    """Follow P(1,1) around its fold and past its flip."""
     import continuation
 
     start = continuation.periodic_orbits(

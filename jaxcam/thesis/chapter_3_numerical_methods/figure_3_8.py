@@ -1,4 +1,4 @@
-"""Figure 3.8: where the branch folds and doubles, and its multipliers between."""
+"""Figure 3.8: fold and flip of the branch, and its multipliers in between."""
 
 from typing import NamedTuple
 
@@ -33,11 +33,11 @@ from .figure_3_11 import periodic_run
 
 _RANGE = (138.0, 153.5)
 _NEAR_FOLD, _BEYOND = 12, 0.1
-"""Points below that, and how far the sum of the multipliers goes beyond the fold's."""
+"""Points below that, and the excess of the sum of multipliers beyond the fold's."""
 
 
 class SmoothBranch(NamedTuple):
-    """The P(1,1) branch of a rig, from the saddles behind its fold on."""
+    """The P(1,1) branch of a rig, including the saddles beyond its fold."""
 
     speed: np.ndarray
     """(k,) rpm."""
@@ -51,14 +51,14 @@ class SmoothBranch(NamedTuple):
 
 @remembered
 def smooth_branch(system: CamFollower, points: int = 16) -> SmoothBranch:
-    """Orbits, multipliers, fold and flip; NaN where the rig has no such orbit."""
+    """Compute orbits, multipliers, fold and flip; NaN if the rig has no such orbit."""
     start = first_orbit(system)
     speeds = np.linspace(*_RANGE, points)
     if start is None:
         lost = np.full(points, np.nan)
         return SmoothBranch(speeds, lost, np.full((points, 2), np.nan), np.nan, np.nan)
     angles, values = np.zeros(points), np.zeros((points, 2), dtype=complex)
-    # both ways from where the orbit is known, each from its neighbour
+    # in both directions from the known orbit, each from its neighbour
     middle = int(np.argmin(np.abs(speeds - SEARCH)))
     orbit = start
     for walk in (range(middle, points), range(middle - 1, -1, -1)):
@@ -80,9 +80,9 @@ def smooth_branch(system: CamFollower, points: int = 16) -> SmoothBranch:
 
 
 def _around_the_fold(system: CamFollower, orbit, rpm: float):
-    """Speed (rpm), angle and multipliers of orbits from `rpm` through the fold.
+    """Return speed (rpm), angle and multipliers of orbits from `rpm` through the fold.
 
-    Around it the sum of the multipliers continues, where the speed turns back.
+    Around the fold the sum of the multipliers is monotonic, the speed is not.
     """
     point = SpecialPoint(jnp.asarray(rpm_to_rad_s(rpm)), orbit)
     matrix = np.asarray(compiled_monodromy(at_rpm(system, rpm), orbit))

@@ -1,4 +1,4 @@
-"""Figure 3.9: where P(inf,1) begins and where its sticking time is zero."""
+"""Figure 3.9: the beginning of P(inf,1), and the zero of its sticking time."""
 
 from typing import TYPE_CHECKING
 
@@ -23,14 +23,16 @@ if TYPE_CHECKING:
 
 
 _LOWEST = 115.0
-"""Rpm down to which it is followed."""
+"""Lowest speed of the branch (rpm)."""
 _PAST = 0.01
-"""Rpm past the interruption at which the branch that sticks is left."""
+"""Distance beyond the interruption at which the sticking branch ends (rpm)."""
 
 
 @remembered
 def sticking_branch(system: CamFollower) -> "Branch":
-    """P(inf,1) from the beginning of impacts to the interruption of chattering."""
+    """Follow P(inf,1) from the beginning of impacts to the interruption of
+    chattering.
+    """
     import continuation
 
     rig = at_rpm(system, START_RPM)
@@ -47,7 +49,7 @@ def sticking_branch(system: CamFollower) -> "Branch":
 
 
 def sticking_along(branch: "Branch") -> list[tuple[float, float]]:
-    """Speed (rpm) and sticking time (s) of the orbits that stick."""
+    """Return speed (rpm) and sticking time (s) of the orbits that stick."""
     return [
         (float(rad_s_to_rpm(p.parameter)), float(p.observed["sticking time"]))
         for p in branch.points

@@ -1,4 +1,4 @@
-"""The rig's experiment of section 4.7, with a simulated rig."""
+"""Simulate the experiment of section 4.7."""
 
 import numpy as np
 
@@ -9,11 +9,11 @@ from ..remember import remembered
 
 
 DWELL = 60.0, 10.0
-"""S at each speed that are waited, and s that are stored (section 4.7)."""
+"""Waiting and storage time at each speed (s) (section 4.7)."""
 UP, DOWN = (120.0, 200.0), (200.0, 150.0)
-"""Rpm at which the speed begins and ends, on the way up and on the way down."""
+"""First and last speed (rpm) of the upward and the downward sweep."""
 _STEP = {"default": 0.5, "full": 0.1}
-"""Rpm between speeds; not printed."""
+"""Speed step (rpm); not printed."""
 
 
 def _speeds(ends: tuple[float, float], step: float) -> np.ndarray:
@@ -25,10 +25,10 @@ def _speeds(ends: tuple[float, float], step: float) -> np.ndarray:
 
 @remembered
 def experiment(system: CamFollower, size: str) -> tuple[sweeps.Diagram, sweeps.Diagram]:
-    """Both runs: up from contact, and down from where the first has ended.
+    """Simulate both sweeps: up from contact, and down from the end of the first.
 
-    The cam turns at each speed for a minute, and then for the ten seconds that are
-    stored, once per period; then the speed is another one and the motion continues.
+    At each speed the cam turns for a minute, and then for ten seconds whose motion is
+    stored once per period. The motion continues at the next speed.
     """
     step = _STEP[size]
     forward = sweeps.diagram(

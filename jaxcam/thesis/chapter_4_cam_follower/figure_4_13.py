@@ -1,4 +1,4 @@
-"""Figure 4.13: free motion of the follower, with the M = J/K that it was fitted to.
+"""Figure 4.13: free motion of the follower, with the fitted M = J/K.
 
 The recording behind the figure and the angle it starts from are not printed.
 """
@@ -24,13 +24,13 @@ _HANGING = (-1.55, 0.0)
 
 @eqx.filter_jit
 def _spring(system, angle):
-    """Torque of the spring at an angle, and its stiffness there."""
+    """Return the torque of the spring at an angle, and its stiffness there."""
     torque = jax.grad(system.potential_energy)
     return torque(angle), jax.grad(torque)(angle)
 
 
 def equilibrium(system: CamFollower) -> float:
-    """The angle (rad) below the cam at which the spring holds the free follower."""
+    """Return the equilibrium angle (rad) of the free follower, below the cam."""
     low, high = _HANGING
 
     def torque(angle):
@@ -41,7 +41,9 @@ def equilibrium(system: CamFollower) -> float:
 
 @eqx.filter_jit
 def fall_angles(system: CamFollower, times) -> jax.Array:
-    """The angle (rad) of the free follower, released at 0.75 rad, at `times` (s)."""
+    """Return the angle (rad) of the free follower, released at 0.75 rad, at `times`
+    (s).
+    """
     solution = diffrax.diffeqsolve(
         diffrax.ODETerm(lambda t, y, args: system.vector_field(t, y)),
         diffrax.Dopri8(),

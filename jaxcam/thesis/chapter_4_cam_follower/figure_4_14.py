@@ -13,11 +13,11 @@ from ..target import Rows, Target
 
 
 CONTACT_SPEED, DETACHMENT = 110.0, 125.0
-"""Speed of the figure, and where contact is first lost (section 5.2)."""
+"""Speed of the figure, and detachment speed (section 5.2)."""
 
 
 def constrained_run(system: CamFollower, rpm: float = CONTACT_SPEED) -> Trajectory:
-    """Two turns at a speed, from the orbit that is in contact where it can be."""
+    """Simulate two turns at a speed, from the orbit in contact if it exists."""
     rig = at_rpm(system, rpm)
     return simulate(rig, None, 0.0, 2 * float(rig.period))
 

@@ -1,6 +1,6 @@
 """Figure 4.16, simulated part: the impacts of a turn at four speeds.
 
-Heights are angles over the cam; their ratio shows what an impact leaves.
+Heights are angles over the cam; their ratio shows the loss in an impact.
 """
 
 import matplotlib.pyplot as plt

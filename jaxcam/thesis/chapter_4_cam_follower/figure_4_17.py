@@ -1,6 +1,6 @@
 """Figure 4.17: the events of the experiment of section 4.7.
 
-The way down ends at 150 rpm, so no lower speed can be found for P(1,1).
+The downward sweep ends at 150 rpm, so no lower speed can be found for P(1,1).
 """
 
 import matplotlib.pyplot as plt

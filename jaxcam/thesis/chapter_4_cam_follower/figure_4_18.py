@@ -1,8 +1,8 @@
-"""Figure 4.18: what the experiment of section 4.7 stores, forward and backward.
+"""Figure 4.18: data of the experiment of section 4.7, forward and backward.
 
-Printed are the ends that section 4.7.1 gives for the way up. On the way down the
-model, whose follower can rise without end, has orbits that no rig has room for, as
-the largest angle among the samples shows.
+The printed values are those of section 4.7.1 for the upward sweep. In the downward
+sweep the model, whose follower can rise without limit, has orbits that do not fit into
+a real rig, as the largest angle among the samples shows.
 """
 
 import matplotlib.pyplot as plt
@@ -16,7 +16,7 @@ from .experiment import DWELL, experiment, EXPERIMENT_NOTE, UP
 
 
 _WIDE = 1.0 - 1e-9
-"""Rpm that a label is met over, at least, to be listed."""
+"""Smallest range (rpm) of a listed label."""
 
 
 def compute(system: CamFollower, size: str) -> Rows:

@@ -1,7 +1,7 @@
-"""Figure 4.5: angles of the segments, and which derivative jumps where.
+"""Figure 4.5: angles of the segments, and the jumps of derivatives.
 
 "Jumps first" is the order of the first derivative that is not continuous at the
-segment's start. The thesis shows it in its plots, in no table.
+segment's start. The thesis shows it only in plots.
 """
 
 import numpy as np
@@ -26,7 +26,7 @@ PROGRAM = (
 
 
 def _program() -> MotionProgram:
-    """The program, with rises of one."""
+    """Return the program with unit rises."""
     return MotionProgram(
         [Segment(law, np.deg2rad(width), rise) for law, _, _, width, rise in PROGRAM]
     )

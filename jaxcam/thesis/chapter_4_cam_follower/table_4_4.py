@@ -1,7 +1,7 @@
 """Table 4.4: the parameters as printed, next to those of a rig.
 
 Raises:
-    ValueError: For a cam that is not an eccentric circle.
+    ValueError: The cam is not an eccentric circle.
 """
 
 from ...models import CamFollower, EccentricCircle

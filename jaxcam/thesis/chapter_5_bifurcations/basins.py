@@ -15,7 +15,7 @@ from ..target import Rows, Target
 
 
 _BOX = (0.33, -3.5), (0.6, 3.5)
-"""Corners of the states where none are printed."""
+"""Default corners of the states."""
 _SHAPE = {"default": 128, "full": 400}
 _TURNS, _KEEP, _RERUNS = 100, 48, 2
 
@@ -31,7 +31,7 @@ class Picture(NamedTuple):
 
     rpm: float
     labels: tuple[str, ...]
-    """Labels of its attractors, as printed; chaos is "aperiodic"."""
+    """Labels of its attractors as printed; chaos is "aperiodic"."""
     points: dict[str, tuple[float, float]]
     low: tuple[float, float] = _BOX[0]
     """Corners of the states."""
@@ -41,7 +41,7 @@ class Picture(NamedTuple):
 
 
 def basins_target(title: str, picture: Picture, note: str = "") -> Target:
-    """A figure of basins: the attractors next to the printed ones, and their states."""
+    """Create the target of a figure of basins, with computed and printed attractors."""
 
     @remembered
     def basins_of(system: CamFollower, size: str) -> sweeps.Basins:
@@ -72,7 +72,7 @@ def basins_target(title: str, picture: Picture, note: str = "") -> Target:
 
 
 def _draw(found: sweeps.Basins, picture: Picture) -> Figure:
-    """The basins, and the printed points with their letters."""
+    """Draw the basins, and the printed points with their letters."""
     figure, ax = plt.subplots(figsize=(7.2, 5.4))
     plotting.basin_picture(found, ax)
     for name, (x, y) in picture.points.items():

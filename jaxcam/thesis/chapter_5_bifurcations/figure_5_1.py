@@ -1,4 +1,4 @@
-"""Figure 5.1: where each orbit was met, upwards and downwards."""
+"""Figure 5.1: speed ranges of each orbit, upwards and downwards."""
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -15,7 +15,7 @@ from ..target import Rows, Target
 TURNS, KEEP = 300, 100
 """Cycles at each speed and how many are kept, as section 5.2 prints them."""
 _STEP = {"default": 0.25, "full": 0.1}
-"""Rpm between speeds of Figure 5.1 and its ends."""
+"""Speed step (rpm) of Figure 5.1, and its ends."""
 _ENDS = 120.0, 170.0
 _SAID = {
     (1, "contact", "to"): 125.0,
@@ -29,7 +29,7 @@ _SAID = {
 
 @remembered
 def both_ways(system: CamFollower, size: str) -> sweeps.Diagram:
-    """The diagram of Figure 5.1: upwards from contact, and back."""
+    """Compute the diagram of Figure 5.1: upwards from contact, and back."""
     low, high = _ENDS
     speeds = np.linspace(low, high, round((high - low) / _STEP[size]) + 1)
     return sweeps.diagram(

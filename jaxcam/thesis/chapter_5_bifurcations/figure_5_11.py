@@ -1,4 +1,4 @@
-"""Figure 5.11: where P(inf,1) ends, and the windows behind it."""
+"""Figure 5.11: the end of P(inf,1), and the periodic windows beyond it."""
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -15,13 +15,13 @@ from .figure_5_1 import KEEP, TURNS
 
 
 _ZOOM = 152.6, 153.2
-"""Rpm of Figure 5.11, and how many speeds."""
+"""Speeds (rpm) of Figure 5.11, and their number."""
 _ZOOMED = {"default": 401, "full": 2001}
 
 
 @remembered
 def onset(system: CamFollower, size: str) -> sweeps.Diagram:
-    """The diagram of Figure 5.11, each speed from contact at rest."""
+    """Compute the diagram of Figure 5.11, each speed from contact at rest."""
     low, high = (beside_interruption(system, rpm) for rpm in _ZOOM)
     speeds = np.linspace(low, high, _ZOOMED[size])
     return sweeps.diagram(
@@ -38,7 +38,7 @@ def compute(system: CamFollower, size: str) -> Rows:
     made = onset(system, size)
     speeds = np.asarray(rad_s_to_rpm(made.values))
     labels = made.labels[:, 0]
-    # a run that failed says nothing of its speed
+    # a failed run gives no information on its speed
     known = labels != "failed"
     other = known & (labels != "P(inf,1)")
     first = speeds[other].min() if np.any(other) else np.nan

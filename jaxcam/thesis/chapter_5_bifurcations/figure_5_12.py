@@ -1,4 +1,4 @@
-"""Figure 5.12: which orbits the random starts end on, and where."""
+"""Figure 5.12: orbits reached from random starts, and their speeds."""
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -13,7 +13,9 @@ from ..target import Rows, Target
 
 
 _MONTE_CARLO = 152.0, 160.0
-"""Figure 5.12: rpm, starts at each, cycles and how many are kept; how many speeds."""
+"""Figure 5.12: speeds (rpm), starts at each, cycles and kept cycles; number of
+speeds.
+"""
 _STARTS, _MC_TURNS, _MC_KEEP = 20, 100, 50
 _DRAWN = {"default": 161, "full": 801}
 BOX = (0.34, -3.0), (0.55, 3.0)
@@ -22,7 +24,7 @@ BOX = (0.34, -3.0), (0.55, 3.0)
 
 @remembered
 def drawn_diagram(system: CamFollower, size: str) -> sweeps.Diagram:
-    """The diagram of Figure 5.12, with starts drawn anew at each speed."""
+    """Compute the diagram of Figure 5.12, with new random starts at each speed."""
     speeds = np.linspace(*_MONTE_CARLO, _DRAWN[size])
     states = sweeps.monte_carlo(*BOX, _STARTS, 0, len(speeds))
     return sweeps.diagram(

@@ -1,4 +1,4 @@
-"""Figure 5.24: the sticking time falls to zero like a power near a root."""
+"""Figure 5.24: the sticking time falls to zero by a power law near a square root."""
 
 import equinox as eqx
 import jax
@@ -33,9 +33,10 @@ def _sticking(system, speeds):
 
 @remembered
 def sticking_times(system: CamFollower) -> tuple[np.ndarray, np.ndarray, float]:
-    """Speeds (rpm) up to the interruption, sticking times there (s), interruption.
+    """Return speeds (rpm) up to the interruption, sticking times (s), interruption.
 
-    Exact, however short; the distances to the interruption are even in logarithm.
+    Times are exact for any length; distances to the interruption are spaced
+    logarithmically.
     """
     end = float(rad_s_to_rpm(interruption(system).speed))
     speeds = end - np.geomspace(20.0, 1e-5, 120)

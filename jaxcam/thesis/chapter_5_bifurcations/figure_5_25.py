@@ -1,4 +1,4 @@
-"""Figure 5.25: the state that is deviated from, and the lobes around it."""
+"""Figure 5.25: the reference state, and the lobes around it."""
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -17,7 +17,7 @@ from .table_5_3 import lobes_of, M, map_rig
 
 @remembered
 def measured(system: CamFollower) -> tuple[Lobes, LocalMap]:
-    """The lobes of Figure 5.25 and the map fitted to them."""
+    """Return the lobes of Figure 5.25 and the map fitted to them."""
     lobes = lobes_of(system)
     return lobes, fit_local_map(lobes)
 

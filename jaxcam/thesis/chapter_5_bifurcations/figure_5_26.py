@@ -26,7 +26,7 @@ class LobeEvents(NamedTuple):
 
 
 def lobe_events(local: LocalMap, number: int) -> LobeEvents:
-    """Events of one lobe as the map moves sideways.
+    """Return the events of one lobe as the map is shifted.
 
     A fixed point of x -> Pi(x + s) at y = x + s belongs to the shift s = y - Pi(y):
     fold and flip are where the slope at y is 1 and -1.

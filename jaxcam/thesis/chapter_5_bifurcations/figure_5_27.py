@@ -1,6 +1,6 @@
-"""Figure 5.27: corners of the lobes, by (5.4) with Table 5.3 and as measured.
+"""Figure 5.27: corners of the lobes, by (5.4) with Table 5.3 and simulated.
 
-Distances from x_0, since the printed map is placed elsewhere (docs/chatter.md).
+Distances are from x_0, since the printed map has another offset (docs/chatter.md).
 """
 
 import jax.numpy as jnp

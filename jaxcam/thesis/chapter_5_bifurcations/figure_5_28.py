@@ -1,6 +1,6 @@
-"""Figure 5.28: how wide the attractors of map and motion are.
+"""Figure 5.28: widths of the attractors of map and motion.
 
-The thesis draws the map alone, over no scale of speeds.
+The thesis draws only the map, without a scale of speeds.
 """
 
 from typing import NamedTuple
@@ -22,7 +22,7 @@ from .figure_5_11 import onset
 
 
 _RANK = 37
-"""Number of the impact that the local theory starts from (docs/chatter.md)."""
+"""Number of the impact at which the local theory starts (docs/chatter.md)."""
 _AFTER = 0.05, 0.1, 0.15
 """Distances (rpm) from the interruption at which map and motion are compared."""
 _SHIFTS = 600
@@ -44,7 +44,9 @@ class Iterated(NamedTuple):
 
 @remembered
 def iterated(system: CamFollower, size: str) -> Iterated:
-    """The map along the direction in which motions leave the lobes, and the motion."""
+    """Iterate the map along the direction in which motions leave the lobes;
+    simulate.
+    """
     rig = interruption(system)
     composed = composed_map(rig, speed_of, _RANK)
     per_rpm = float(rpm_to_rad_s(1.0))

@@ -1,4 +1,4 @@
-"""Figure 5.8: chatter, complete and less so."""
+"""Figure 5.8: complete and incomplete chatter."""
 
 from ..releases import released_target
 

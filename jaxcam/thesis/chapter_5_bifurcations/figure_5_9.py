@@ -1,4 +1,4 @@
-"""Figure 5.9: impacts a turn, and whether chattering is complete."""
+"""Figure 5.9: impacts per turn, and completeness of chattering."""
 
 import equinox as eqx
 import jax
@@ -21,17 +21,21 @@ from .figure_5_1 import KEEP, TURNS
 
 
 _SPEEDS, _IMPACTS = (152.66, 152.882, 153.45), 1500
-"""Printed speeds (rpm), and impacts that are drawn at each."""
+"""Printed speeds (rpm), and the number of impacts drawn at each."""
 
 
 def impact_speeds(system: CamFollower) -> list[float]:
-    """Speeds (rpm) of Figure 5.9: one below the interruption, two above it."""
+    """Return the speeds (rpm) of Figure 5.9: one below the interruption, two above
+    it.
+    """
     return [beside_interruption(system, rpm) for rpm in _SPEEDS]
 
 
 @remembered
 def impacts_at(system: CamFollower) -> sweeps.Diagram:
-    """The impacts of Figure 5.9, from contact at rest, listed deep into chatter."""
+    """Return the impacts of Figure 5.9, from contact at rest, listed deep into
+    chatter.
+    """
     section = sweeps.ImpactSection(
         system, settings=Settings(tolerance=1e-9, chatter_depth=1e-4)
     )
@@ -46,7 +50,9 @@ def impacts_at(system: CamFollower) -> sweeps.Diagram:
 
 
 def rebound_speeds(system: CamFollower, number: int) -> np.ndarray:
-    """Normal velocity (rad/s) after each impact of one speed of Figure 5.9."""
+    """Return the normal velocity (rad/s) after each impact of one speed of Figure
+    5.9.
+    """
     made = impacts_at(system)
     rig = eqx.tree_at(speed_of, system, jnp.asarray(made.values[number]))
     times = made.dataset["time"].values[number, 0]

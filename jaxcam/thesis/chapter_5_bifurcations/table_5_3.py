@@ -22,20 +22,20 @@ _MAP_SPEED = 152.6
 """Speed at which Figure 5.25 is drawn (rpm), and its range of perturbations."""
 _PERCENT = 1.0
 _DOUBLED = 4
-"""Number of doublings of it for a rig whose lobes are elsewhere."""
+"""Number of doublings of the range for a rig with other lobes."""
 Q, M, DELTA_PI, DELTA_X = -0.62, -0.535, 2.243e-4, 1.022e-3
 CUBIC = (1695.91, -15119.51, 44927.06, -44486.71)
 ROOT, X_0, P_0, ALPHA, X_INF = 0.12089, 0.33964, 0.33667, 0.33715, 0.33717
 
 
 def map_rig(system: CamFollower) -> CamFollower:
-    """The rig at the speed of Figure 5.25, just below its interruption."""
+    """Return the rig at the speed of Figure 5.25, just below its interruption."""
     return at_rpm(system, beside_interruption(system, _MAP_SPEED))
 
 
 @remembered
 def lobes_of(system: CamFollower, most: int = 6) -> Lobes:
-    """The lobes of Figure 5.25, for this rig."""
+    """Return the lobes of Figure 5.25 for this rig."""
     system = map_rig(system)
     state = sticking_state(system)[0]
     span = _PERCENT / 100 * float(state[0])

@@ -16,7 +16,9 @@ _AHEAD = 6
 
 
 def local_impacts(system: CamFollower) -> tuple[ChatterSequence, int]:
-    """The sequence, and the impact of Table 6.2 in it, found by its rebound speed."""
+    """Return the sequence, and the index of the impact of Table 6.2, by its rebound
+    speed.
+    """
     found = sequence(system)
     return found, int(np.argmin(np.abs(np.log(found.speed / REBOUND_SPEED))))
 

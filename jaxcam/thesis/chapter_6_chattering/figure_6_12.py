@@ -1,4 +1,4 @@
-"""Figure 6.12: the jerk where the relative acceleration is zero."""
+"""Figure 6.12: the jerk at zero relative acceleration."""
 
 import jax
 import jax.numpy as jnp
@@ -20,7 +20,7 @@ from .table_6_2 import JERK
 
 @remembered
 def contact_derivatives(system: CamFollower):
-    """Time over a turn (s); relative acceleration and jerk in contact."""
+    """Return time over a turn (s), relative acceleration and jerk in contact."""
     found = sequence(system)
     rig = found.system.prepared()
     times = jnp.linspace(0.0, float(rig.period), 2001)

@@ -1,4 +1,4 @@
-"""Figure 6.14: prediction and simulation after D* has been moved."""
+"""Figure 6.14: prediction and simulation after a shift of D*."""
 
 import jax.numpy as jnp
 import numpy as np
@@ -14,7 +14,7 @@ from .rebuilt import composed_at, draw_rebuilt, lobe_rows, Rebuilt
 
 @remembered
 def rebuilt_state(system: CamFollower) -> Rebuilt:
-    """Figure 6.14: the rebound speed of D* is changed."""
+    """Compute Figure 6.14: the rebound speed of D* is changed."""
     rig, composed = composed_at(system, late=False)
     bar = float(composed.lambda_bar)
     lam = np.linspace(0.85 * bar, 0.40, 400)

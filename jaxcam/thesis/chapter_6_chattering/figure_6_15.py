@@ -1,7 +1,7 @@
 """Figure 6.15: prediction and simulation after the speed has been changed.
 
-Below the interruption the motion depends on the speed through release alone: the
-slopes there are those of Table 6.3, here from simulations.
+Below the interruption the motion depends on the speed through release only; the slopes
+are those of Table 6.3, here from simulations.
 """
 
 import jax.numpy as jnp
@@ -24,7 +24,7 @@ _CHANGE = 0.001 * 152.67
 
 @remembered
 def rebuilt_parameter(system: CamFollower) -> Rebuilt:
-    """Figure 6.15: the speed of the cam is changed (rpm)."""
+    """Compute Figure 6.15: the cam speed is changed (rpm)."""
     rig, composed = composed_at(system, late=True)
     change = np.linspace(-_CHANGE, _CHANGE, 401)
     rates = jnp.asarray(rpm_to_rad_s(change))

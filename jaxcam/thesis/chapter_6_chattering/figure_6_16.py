@@ -1,4 +1,4 @@
-"""Figure 6.16: a whole turn by the composed map, without any compensation."""
+"""Figure 6.16: a full turn by the composed map, without any compensation."""
 
 import equinox as eqx
 import jax
@@ -16,7 +16,9 @@ from .rebuilt import composed_at, draw_rebuilt, lobe_rows, Rebuilt
 
 @remembered
 def rebuilt_turn(system: CamFollower) -> Rebuilt:
-    """Figure 6.16: a whole turn, from a deviation (rad) along B to the next section."""
+    """Compute Figure 6.16: a full turn, from a deviation (rad) along B to the next
+    section.
+    """
     rig, composed = composed_at(system, late=True)
     change = np.linspace(-2e-5, 1e-4, 400)
     epsilon = jnp.asarray(change) / composed.vector[0]

@@ -1,4 +1,4 @@
-"""Figure 6.3: S^1 and S^2 end in impacts without speed; what follows others."""
+"""Figure 6.3: motions from S^1 and S^2 to grazing impacts, and neighbouring motions."""
 
 from typing import NamedTuple
 
@@ -23,8 +23,9 @@ from .manifold import manifold_of
 
 
 _UNDER = 1 - 1e-11
-"""A start this much slower impacts where rounding might miss the grazing; the speed
-of that impact goes with its root."""
+"""Reduction of the initial speed that turns the grazing into an impact above
+rounding; the impact speed grows with its square root.
+"""
 
 
 class Series(NamedTuple):
@@ -40,7 +41,9 @@ class Series(NamedTuple):
 
 @remembered
 def series(system: CamFollower) -> list[Series]:
-    """Motions from S^1 and to either side of it, from S^2, from C and from inside D."""
+    """Compute motions from S^1 and both sides of it, from S^2, from C and from
+    inside D.
+    """
     found = manifold_of(system, BRANCHES)
     rig, before, region = found.system, found.manifold.before, found.region
     starts = []
@@ -100,7 +103,7 @@ def draw(system: CamFollower) -> Figure:
         ax.plot(hit, np.zeros_like(hit), ".", color=IMPACT, ms=5)
         ax.axhline(0, color="0.4", lw=0.7)
         ax.set_title(one.name, fontsize=11)
-        # the grazing would not be visible next to the long flight after it
+        # the long flight after the grazing would hide it
         last = 1.25 * (one.until - start)
         near = drawn.time - start <= one.until - start
         top = 1.25 * np.nanmax(drawn.gap[near])

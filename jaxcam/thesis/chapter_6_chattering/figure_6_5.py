@@ -16,7 +16,7 @@ from ..target import Rows, Target
 
 
 def restitution_at(system: CamFollower) -> float:
-    """Restitution at the interruption."""
+    """Return the restitution at the interruption."""
     rig = interruption(system)
     return float(rig.restitution(rig.speed, jnp.zeros(())))  # pyright: ignore
 
@@ -47,7 +47,7 @@ def compute(system: CamFollower) -> Rows:
 
 
 def _largest(r) -> float:
-    """Return where the lambda-map stops being a number."""
+    """Return the value above which the lambda-map is NaN."""
     low, high = 0.34, 0.5
     for _ in range(60):
         middle = (low + high) / 2

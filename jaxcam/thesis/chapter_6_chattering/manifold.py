@@ -39,7 +39,7 @@ class Manifold(NamedTuple):
 
 @remembered
 def manifold_of(system: CamFollower, branches: int) -> Manifold:
-    """Grazing manifold and chattering region at the interruption."""
+    """Return grazing manifold and chattering region at the interruption."""
     rig = interruption(system)
     return Manifold(
         rig,
@@ -51,12 +51,14 @@ def manifold_of(system: CamFollower, branches: int) -> Manifold:
 
 @eqx.filter_jit
 def _onwards(system, time, speed):
-    """Rebound speed of the next impact."""
+    """Return the rebound speed of the next impact."""
     return jax.vmap(lambda t, u: impact_map(system, t, u)[1])(time, speed)
 
 
 def manifold_rows(system: CamFollower, branches: int) -> Rows:
-    """S^1 leads to impacts without speed, and C to lambda-bar at release."""
+    """Return rows that check S^1 (next impact without speed) and C (lambda-bar at
+    release).
+    """
     found = manifold_of(system, branches)
     before = found.manifold.before
     time, speed = np.asarray(before.time[0]), np.asarray(before.speed[0])
@@ -81,7 +83,7 @@ def manifold_rows(system: CamFollower, branches: int) -> Rows:
 
 
 def draw_manifold(found: Manifold, most: float | None) -> Figure:
-    """Both in the plane of time and rebound speed; `most`: highest speed drawn."""
+    """Draw both in the plane of time and rebound speed; `most`: highest speed drawn."""
     figure, ax = plt.subplots(figsize=(7.8, 5.2))
     period = float(found.system.period)
     plotting.chattering_picture(

@@ -1,4 +1,4 @@
-"""The orbit of 152.67 rpm and its marks: Figures 6.7, 6.9 and 6.10."""
+"""Draw the orbit of 152.67 rpm and its marks: Figures 6.7, 6.9 and 6.10."""
 
 from typing import Any
 
@@ -40,7 +40,7 @@ def compute_marks(system: CamFollower) -> Rows:
 
 
 def _marked(system: CamFollower):
-    """The curve with gap and rate, and the same of the marks; the period."""
+    """Return the curve with gap and rate, the same for the marks, and the period."""
     found, run = sequence(system), sticking_turn(system)
     period = float(found.system.period)
     release = float(found.frame.release) % period
@@ -66,7 +66,7 @@ def _cam_velocity(run, times):
 
 
 def draw_marks(system: CamFollower, close: bool = False) -> Figure:
-    """The orbit with its marks; `close`: around the end of its chattering."""
+    """Draw the orbit with its marks; `close`: around the end of its chattering."""
     drawn, gap, rate, times, gaps, rates, period = _marked(system)
     gap, gaps = 1e3 * gap, 1e3 * gaps
     figure = plt.figure(figsize=(9.6, 5.2))

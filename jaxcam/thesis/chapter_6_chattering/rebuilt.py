@@ -1,4 +1,4 @@
-"""The section after a deviation, predicted by the composed map and simulated."""
+"""Compute the section after a deviation by the composed map and by simulation."""
 
 from typing import NamedTuple
 
@@ -18,11 +18,11 @@ from .table_6_3 import D_STAR, nearest_impact
 
 
 _RANK = 37
-"""The late impact that the composed map starts from (docs/chatter.md)."""
+"""The late impact at which the composed map starts (docs/chatter.md)."""
 
 
 class Rebuilt(NamedTuple):
-    """Deviations, and what is at the section: predicted and simulated, `(k, 2)`."""
+    """Deviations, and the predicted and simulated state at the section, `(k, 2)`."""
 
     deviations: np.ndarray
     predicted: np.ndarray
@@ -31,7 +31,9 @@ class Rebuilt(NamedTuple):
 
 
 def composed_at(system: CamFollower, late: bool) -> tuple[CamFollower, ComposedMap]:
-    """The rig at its interruption, and the map from D*, or from a late impact."""
+    """Return the rig at its interruption, and the map from D*, or from a late
+    impact.
+    """
     rig = interruption(system)
     if late:
         return rig, composed_map(rig, speed_of, _RANK)
@@ -41,7 +43,7 @@ def composed_at(system: CamFollower, late: bool) -> tuple[CamFollower, ComposedM
 
 
 def error_of(found: Rebuilt) -> float:
-    """Median error of the predicted velocity over its range where it was simulated."""
+    """Return the median error of the predicted velocity over the simulated range."""
     velocity = found.simulated[:, 1]
     range_ = float(np.ptp(velocity))
     return float(np.median(np.abs(found.predicted[:, 1] - velocity))) / range_
@@ -62,7 +64,7 @@ def lobe_rows(found: Rebuilt) -> Rows:
 
 
 def draw_rebuilt(found: Rebuilt, label: str, scale: float = 1.0) -> Figure:
-    """Velocity and angle at the section, simulated and predicted."""
+    """Draw velocity and angle at the section, simulated and predicted."""
     figure, axes = plt.subplots(1, 2, figsize=(9.6, 4.0))
     base = np.asarray(found.composed.relative)
     for ax, k, name in ((axes[0], 1, "velocity (rad/s)"), (axes[1], 0, "angle (rad)")):

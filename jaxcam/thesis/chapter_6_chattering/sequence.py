@@ -28,7 +28,7 @@ class ChatterSequence(NamedTuple):
 
 @remembered
 def sequence(system: CamFollower) -> ChatterSequence:
-    """Impacts as far below the interruption as Table 6.1."""
+    """Return the impacts at the distance of Table 6.1 below the interruption."""
     rig = reference(system)
     orbit = accumulation_of(rig)
     impacts = impacts_from_release(rig, 40)
@@ -42,7 +42,9 @@ def sequence(system: CamFollower) -> ChatterSequence:
 
 
 def hops(found: ChatterSequence, start: int, count: int) -> np.ndarray:
-    """Times from release of impacts after one of the sequence, by the lambda-map."""
+    """Return times from release of the impacts after one of the sequence, by the
+    lambda-map.
+    """
     r, tau = float(found.frame.restitution), float(found.tau[start])
     lam = jnp.asarray(found.speed[start] / (found.frame.jerk * tau * tau))
     made = [tau]
@@ -55,7 +57,7 @@ def hops(found: ChatterSequence, start: int, count: int) -> np.ndarray:
 
 @remembered
 def sticking_turn(system: CamFollower) -> Trajectory:
-    """The orbit of Figures 6.7, 6.9 and 6.10: two turns from time zero."""
+    """Return the orbit of Figures 6.7, 6.9 and 6.10: two turns from time zero."""
     rig = reference(system)
     run = simulate(rig, None, 0.0, 12 * float(rig.period))
     period = float(rig.period)

@@ -1,7 +1,7 @@
-"""Table 6.1: where chattering ends just below its interruption.
+"""Table 6.1: the end of chattering just below its interruption.
 
-The relative coordinates of the two contact points are not compared: they are zero,
-and what is printed for them is the thesis' integration error.
+The relative coordinates of the two contact points are not compared: they are zero, and
+the printed values are the thesis' integration error.
 """
 
 import jax.numpy as jnp

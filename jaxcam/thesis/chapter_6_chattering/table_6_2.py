@@ -1,7 +1,7 @@
 """Table 6.2: the lambda-map from an impact to the accumulation point.
 
-The impact whose rebound speed is nearest to the printed one is taken; times are
-given from release, since the thesis counts them from an arbitrary turn.
+It uses the impact whose rebound speed is nearest to the printed value. Times are given
+from release, since the thesis counts them from an arbitrary turn.
 """
 
 import jax.numpy as jnp

@@ -1,4 +1,4 @@
-"""Table 6.3: what the speed of the cam does to the local map.
+"""Table 6.3: derivatives of the local map by the cam speed.
 
 The thesis estimates them from perturbed simulations. The dependence of lambda is
 given twice: with D* held, and with D* moving as the orbit does.
@@ -20,9 +20,8 @@ D_STAR = -0.00194
 
 
 def nearest_impact(rig: CamFollower, release: float, tau: float) -> int:
-    """Number of the impact after release that comes nearest to `tau` before the next.
-
-    Nearest by ratio.
+    """Return the number of the impact nearest (by ratio) to `tau` before the next
+    release.
     """
     impacts = impacts_from_release(rig, 40)
     found = np.asarray(impacts.time) - release - float(rig.period)

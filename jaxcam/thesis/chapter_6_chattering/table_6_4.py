@@ -1,8 +1,8 @@
 """Table 6.4: closing the loop at the interruption.
 
-The compensation 1/K_beta is compared with tau*^2, the factor that (6.104) lacks; D*
-is the impact where that fits best. The printed A starts a turn before at D* itself;
-here it starts at the end of the period, in flight.
+The compensation 1/K_beta is compared with tau*^2, the factor that (6.104) lacks; D* is
+the impact of the best agreement. The printed A starts at D* one turn earlier; here it
+starts at the end of the period, in flight.
 """
 
 import numpy as np
@@ -19,7 +19,7 @@ from .table_6_3 import nearest_impact
 START = (0.30697, 0.84867, 0.33665)
 REMAINING = 4.201e-6
 A = ((0.01597, 0.00301), (-0.04830, -0.00912))
-"""(6.107): velocity and time of D* by angle and velocity a turn before."""
+"""(6.107): velocity and time of D* by angle and velocity one turn earlier."""
 INVERSE_SCALE = 3.145e-10
 
 
