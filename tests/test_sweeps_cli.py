@@ -76,7 +76,7 @@ def test_basins_of_the_oscillator(tmp_path):
     [
         ("diagram pendulum --from 1 --to 2", "cam-follower, impact-oscillator"),
         ("diagram --from 130", "--from A --to B"),
-        ("diagram --from 150 --to 130", "wrong way round"),
+        ("diagram --from 150 --to 130", "higher value first"),
         ("diagram --from 130 --to 150 --points 0", "--points is 0"),
         ("diagram --from 130 --to 150 --turns 10", "--turns is 10"),
         ("diagram --from 130 --to 150 --direction on", "each, up"),
