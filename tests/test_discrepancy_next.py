@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from benchmarks._own_rig_makers import made_case
 from benchmarks.own_rigs import RIGS
 from benchmarks.unnamed import hidden_case
 from jaxcam.data import DEMO_RIG
@@ -49,13 +48,13 @@ def test_the_proposed_record_says_what_was_predicted():
 
 
 @pytest.mark.slow
-def test_the_band_of_a_function_shrinks_as_predicted():
-    """Rms of the band with the best record made after all, within 25 %.
+def test_records_are_ranked_by_the_band_of_a_function():
+    """Its rms so far is that of the fit, to 5 %; every record makes it smaller.
 
     The rig and what is hidden in it are simulated by scipy.
     """
     setup = read_setup(RIGS / "two_stops.toml")
-    hidden, runs, _, truth = hidden_case("two_stops", setup, "stop", 0)
+    _, runs, _, _ = hidden_case("two_stops", setup, "stop", 0)
     found = diagnose(setup, runs)
     (one,) = found.missing
     assert (one.kind, one.arguments) == ("force", ("position",))
@@ -67,21 +66,6 @@ def test_the_band_of_a_function_shrinks_as_predicted():
     old = found.after.problem
     assert best.now["force by position"] == pytest.approx(
         np.sqrt(np.mean(_band(found.after, one) ** 2)), rel=0.05
-    )
-    (made, _), *_ = made_case(
-        "two_stops",
-        setup,
-        truth,
-        np.random.default_rng(5),
-        hidden,
-        records=1,
-        speeds=(best.speed, best.speed),
-    )
-    problem = Problem.build(old.model, setup.segments((*runs, made)), old.parameters)
-    again = fit(problem, free=found.after.free, start=None, iterations=60)
-    assert again.converged
-    assert np.sqrt(np.mean(_band(again, one) ** 2)) == pytest.approx(
-        best.then["force by position"], rel=0.25
     )
 
 
