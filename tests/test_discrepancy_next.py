@@ -63,7 +63,6 @@ def test_records_are_ranked_by_the_band_of_a_function():
     assert factors == sorted(factors) and factors[-1] < 1
     best = proposed[0]
     assert list(best.now) == ["force by position"]
-    old = found.after.problem
     assert best.now["force by position"] == pytest.approx(
         np.sqrt(np.mean(_band(found.after, one) ** 2)), rel=0.05
     )
