@@ -3,9 +3,9 @@
 Rigs of `docs/rigs` are drawn at random within their tolerances, with one effect of
 `_hidden_physics.py` in each, simulated by code that shares nothing with ours, recorded
 through noisy sensors, and diagnosed. A verdict is right if it states kind and arguments
-of what was hidden, if nine tenths of the squared error on unseen data above the noise
-are gone, and if the function is off by less than four tenths of its rms where the rig
-was, apart from what parameters of the rig can do.
+of what was hidden and names nothing beside it, if nine tenths of the squared error on
+unseen data above the noise are gone, and if the function is off by less than four
+tenths of its rms where the rig was, apart from what parameters of the rig can do.
 
     python -m benchmarks.unnamed two_stops
     python -m benchmarks.unnamed pendulum_wall --effects stop magnet --first 5
@@ -118,7 +118,8 @@ def judged(found: Diagnosis, hidden: Hidden, motions) -> tuple[bool, str]:
     off = math.nan
     if alike and effect.memory is None:
         off = function_off(alike[0], hidden, motions)
-    sound = len(alike) == len(found.missing) == 1 and left < 0.1
+    named_too = any(one not in ("unknown", "none") for one in named)
+    sound = len(alike) == len(found.missing) == 1 and not named_too and left < 0.1
     right = sound and (effect.memory is not None or off < 0.4)
     above = math.sqrt(max(before, 0.0) / floor)
     return right, (

@@ -1,4 +1,4 @@
-"""Other functions in the place of those found, by redrawn stretches of the records."""
+"""Other functions in the place of those found, by a bootstrap over the records."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -15,8 +15,8 @@ class Rival(NamedTuple):
     """Functions and terms that were fitted in the place of what was chosen.
 
     - `worse`: score less that of the choice.
-    - `share`: of the redrawn sets of stretches in which it would have been chosen; of a
-      BIC-like score, an estimate of its posterior probability.
+    - `share`: share of the bootstrap samples in which it would have been chosen. The
+      score is like a BIC, so this estimates its posterior probability.
     """
 
     missing: Missing
@@ -27,11 +27,10 @@ class Rival(NamedTuple):
 def rivals(
     found: Missing, tried: Sequence[Missing], policy: Policy, seed: int
 ) -> tuple[Rival, ...]:
-    """The best of what else was fitted, the best first.
+    """Return the best of the other fits, the best first, one for each set of parts.
 
-    What is fitted stays as it is; what each stretch costs is drawn again, by the same
-    draws for all. Something with a part of what was chosen is no rival, unless it is as
-    good.
+    A block bootstrap draws stretches of the records, the same for all fits. No fit is
+    repeated: a sample weights the costs of the stretches.
     """
     ranked = sorted(
         (one for one in tried if one is not found), key=lambda one: one.score
@@ -44,7 +43,10 @@ def rivals(
             kept.append(one)
     kept = kept[: policy.alternatives]
     costs = [_costs(one.fit, policy) for one in (found, *kept)]
-    prices = np.array([one.score - one.fit.cost for one in (found, *kept)])
+    # joints, priors and the price of parameters are not drawn again
+    prices = np.array(
+        [one.score - cost.sum() for one, cost in zip((found, *kept), costs)]
+    )
     rng = np.random.default_rng(seed)
     number = costs[0].size
     chosen = np.zeros(len(costs))
@@ -58,7 +60,7 @@ def rivals(
 
 
 def _parts(one: Missing) -> frozenset[str]:
-    """What was fitted, as a set of names."""
+    """Return the names of the terms and functions in a fit."""
     forms = {
         f"{part.label}: {getattr(getattr(part, 'primitive', None), 'name', '')}"
         for part in one.functions
@@ -67,7 +69,7 @@ def _parts(one: Missing) -> frozenset[str]:
 
 
 def _costs(found: Fit, policy: Policy) -> Float[np.ndarray, " b"]:
-    """The part of a cost that the samples of each stretch of each record have."""
+    """Return the cost of the samples of each stretch of each record."""
     longest = max(part.recording.time[-1] for part in found.problem.segments)
     edges = np.linspace(0.0, longest, policy.stretches + 1)[1:-1]
     rows = {name: k for k, name in enumerate(found.problem.records)}
