@@ -5,6 +5,7 @@ what any number of forces would gain, without a program of their own.
 """
 
 from collections.abc import Sequence
+from functools import partial
 from typing import ClassVar, NamedTuple
 
 import equinox as eqx
@@ -24,6 +25,7 @@ from ...fitting.engine import (
     off_nominal,
     Point,
     prior_information,
+    program,
     runge_kutta,
 )
 from ...parameters import FloatScalar
@@ -97,10 +99,10 @@ def force_response(problem: Problem, point: Point, free: Sequence[str]) -> Respo
     stride = stride_of(problem)
     nodes = 2 * problem.pieces.angle.shape[-1] // stride + 1
     found = _linear(
-        problem.layout,
+        [problem.layout.about(values) for values in jnp.asarray(point.values)],
         problem.pieces,
         problem.weighted(None),
-        point,
+        point.states,
         jnp.asarray(columns.local),
         jnp.asarray(columns.scales),
         nodes,
@@ -202,13 +204,15 @@ def _onto(response: Response, forces: Float[np.ndarray, "r k l p"]) -> LinearPie
     )
 
 
-@eqx.filter_jit
+@partial(program, runs_often=False)
 def _linear(
-    layout, pieces, extras, point, columns, scales, nodes, stride
+    near, pieces, extras, states, columns, scales, nodes, stride
 ) -> LinearPieces:
-    def record(pieces, extras, values, states, columns, scales):
+    arrays, others = zip(*(eqx.partition(one, eqx.is_array) for one in near))
+
+    def record(arrays, pieces, extras, states, columns, scales):
         size = columns.shape[0]
-        near = layout.about(values).by(columns, scales)
+        near = eqx.combine(arrays, others[0]).by(columns, scales)
 
         def model_at(change, start, step):
             model = near.at(change[:size])
@@ -222,11 +226,11 @@ def _linear(
 
         return linear_pieces(model_at, pieces, extras, states, size + nodes)
 
-    values, states = point
-    return jax.vmap(record)(pieces, extras, values, states, columns, scales)
+    stacked = jax.tree.map(lambda *leaves: jnp.stack(leaves), *arrays)
+    return jax.vmap(record)(stacked, pieces, extras, states, columns, scales)
 
 
-@eqx.filter_jit
+@partial(program, runs_often=False)
 def _forces(layout, pieces, point, terms) -> Float[Array, "r k l p"]:
     """Acceleration by a unit of each strength, at the nodes of every piece."""
 

@@ -8,12 +8,12 @@ complement; the states follow backwards.
 
 from typing import NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ._linearise import Blocks
+from ._program import program
 
 
 # Fraction of the information that holds an unconstrained state in place
@@ -36,7 +36,7 @@ class Reduced(NamedTuple):
     `(r, k, n, m + 1 + n)`."""
 
 
-@eqx.filter_jit
+@program
 def eliminate_states(blocks: Blocks, least: float | Array = LEAST) -> Reduced:
     """Eliminate the states of every record by a block-tridiagonal Schur complement.
 
@@ -50,7 +50,7 @@ def eliminate_states(blocks: Blocks, least: float | Array = LEAST) -> Reduced:
     return jax.vmap(lambda one: _eliminate(one, least))(blocks)
 
 
-@eqx.filter_jit
+@program
 def state_steps(reduced: Reduced, change: Float[Array, "r m"]) -> Float[Array, "r k n"]:
     """Return the steps of the states that belong to a step of the parameters.
 

@@ -111,27 +111,7 @@ def linear_pieces(
     slope = jnp.einsum("knmca,knmc->ka", rows, weight * found.score)
     flown_cost = jnp.sum(jnp.where(part.known, found.cost, 0.0), axis=(1, 2, 3))
 
-    # contact depends on the parameters alone
-    def contact(guess, start, step, *inputs):
-        def predicted(change):
-            model = model_at(change, start, step)
-            return rested(model, guess, start, step, *inputs)
-
-        return _columns(predicted, origin)
-
-    rest_seen, rest_rows = jax.vmap(contact)(*rest_inputs(pieces, extras))
-    part = pieces.rested
-    found = score_all(sensors, part.value, rest_seen)
-    weight = jnp.where(part.known, extras.rest_weight[:, None, None, None], 0.0)
-    # if the surface cannot be found, it gives no information
-    rest_rows = jnp.where(part.known[..., None], rest_rows, 0.0)
-    pp = jnp.einsum(
-        "knmca,knmc,knmcb->ab", rest_rows, weight * found.information, rest_rows
-    )
-    p = jnp.einsum(
-        "knmca,knmc->a", rest_rows, weight * jnp.where(part.known, found.score, 0.0)
-    )
-    rested_cost = jnp.sum(jnp.where(part.known, found.cost, 0.0), axis=(1, 2, 3))
+    pp, p, rested_cost = _linear_contacts(model_at, pieces, extras, origin)
 
     # rows for the earlier state, the later state and what else varies
     def joint_of(before, state, t, *inputs):
@@ -171,6 +151,34 @@ def linear_pieces(
     )
 
 
+def _linear_contacts(model_at: Callable[..., Model], pieces: Pieces, extras, origin):
+    """Information, score and cost of the pieces in contact, by the parameters alone."""
+    width = len(origin)
+    if not len(pieces.rest_exists):
+        return jnp.zeros((width, width)), jnp.zeros(width), jnp.zeros(0)
+
+    def contact(guess, start, step, *inputs):
+        def predicted(change):
+            model = model_at(change, start, step)
+            return rested(model, guess, start, step, *inputs)
+
+        return _columns(predicted, origin)
+
+    seen, rows = jax.vmap(contact)(*rest_inputs(pieces, extras))
+    part = pieces.rested
+    sensors = tuple(model_at(origin, 0.0, 1.0).sensors.values())
+    found = score_all(sensors, part.value, seen)
+    weight = jnp.where(part.known, extras.rest_weight[:, None, None, None], 0.0)
+    # if the surface cannot be found, it gives no information
+    rows = jnp.where(part.known[..., None], rows, 0.0)
+    pp = jnp.einsum("knmca,knmc,knmcb->ab", rows, weight * found.information, rows)
+    p = jnp.einsum(
+        "knmca,knmc->a", rows, weight * jnp.where(part.known, found.score, 0.0)
+    )
+    cost = jnp.sum(jnp.where(part.known, found.cost, 0.0), axis=(1, 2, 3))
+    return pp, p, cost
+
+
 def _columns(function, *args):
     """Return value and Jacobian of a function of some vectors, its columns side by
     side.
@@ -198,6 +206,13 @@ def rested(model: Model, guess, start, step, angle, rate, place):
     nodes = rest(model, guess, start, step, angle, rate)
     along = start + jnp.arange(angle.shape[0], dtype=float) * step, angle, rate
     return samples(model, nodes, start, step, place, [one[:-1] for one in along])
+
+
+def rested_all(model: Model, pieces: Pieces, extras: Extras):
+    """Samples of all pieces in contact of one record, shape `(kc, n, m, c)`."""
+    if not len(pieces.rest_exists):
+        return jnp.zeros(pieces.rested.value.shape)
+    return jax.vmap(lambda *a: rested(model, *a))(*rest_inputs(pieces, extras))
 
 
 def flight_inputs(pieces: Pieces):

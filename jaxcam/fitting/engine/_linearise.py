@@ -18,12 +18,12 @@ from ._linear import (
     joint_inputs,
     linear_pieces,
     LinearPieces,
-    rest_inputs,
-    rested,
+    rested_all,
     tied,
 )
 from ._model import Model
 from ._pieces import Pieces
+from ._program import program
 
 
 class Point(NamedTuple):
@@ -59,7 +59,7 @@ class Layout(eqx.Module):
             leaves[place] = values[column]
         return self.ready(jax.tree.unflatten(tree, leaves))
 
-    @eqx.filter_jit
+    @program
     def about(self, values: Float[Array, " q"]) -> "Expansion":
         """Return the model near some values."""
         origin = self.at(values)
@@ -175,7 +175,7 @@ def assemble(
     return each_record(record, columns.shape[0])
 
 
-@eqx.filter_jit
+@program
 def assemble_one(near, pieces, extras, states, columns, scales, row):
     """Apply `assemble` to one record; its number is not part of the program."""
     one = pieces, extras, states, columns, scales
@@ -191,16 +191,19 @@ def assemble_one(near, pieces, extras, states, columns, scales, row):
     return chained(found), costs
 
 
-@eqx.filter_jit
+@program
 def predict(layout: Layout, pieces: Pieces, extras: Extras, point: Point):
     """Predict samples in flight and in contact, and the joints, of all records."""
+    return _predicted(layout, pieces, extras, point)
 
+
+def _predicted(layout, pieces, extras, point):
     def record(pieces, extras, values, states):
         model = layout.at(values)
         end, seen = jax.vmap(lambda *a: flown(model, *a))(
             states, *flight_inputs(pieces)
         )
-        resting = jax.vmap(lambda *a: rested(model, *a))(*rest_inputs(pieces, extras))
+        resting = rested_all(model, pieces, extras)
         before = jnp.concatenate([states[:1], end[:-1]])
         joints = jax.vmap(lambda *a: joint(model, pieces.reach, *a))(
             before, states, *joint_inputs(pieces)
@@ -213,7 +216,7 @@ def predict(layout: Layout, pieces: Pieces, extras: Extras, point: Point):
 @eqx.filter_jit
 def cost_of(layout: Layout, pieces: Pieces, extras: Extras, point: Point) -> Costs:
     """Return costs without derivatives; can be differentiated in reverse mode."""
-    seen, resting, off = predict(layout, pieces, extras, point)
+    seen, resting, off = _predicted(layout, pieces, extras, point)
     sensors = tuple(layout.model.sensors.values())
 
     def total(part, predicted):

@@ -14,6 +14,7 @@ from ._linear import Extras, flight_inputs, flown
 from ._linearise import Layout, Point
 from ._model import filtered_channels
 from ._pieces import FLIGHT, IMPACT, Pieces
+from ._program import program
 from ._sharpness import states_only
 
 
@@ -123,7 +124,7 @@ def _step(blocks, damping):
     return unit * jnp.einsum("rkab,rkb->rka", inverse, jnp.nan_to_num(unit * blocks.s))
 
 
-@eqx.filter_jit
+@program
 def _ends(layout: Layout, pieces: Pieces, point: Point):
     """Each piece's state at its end, and that state after an impact there."""
 

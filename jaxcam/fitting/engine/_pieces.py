@@ -20,6 +20,8 @@ _PIECE = 100
 # A flight with fewer samples than this gives no information by itself; between two
 # impacts, this many determine its velocity and link the flights before and after it
 _LEAST, _TIED = 8, 3
+# The number of samples in a step is rounded up to a multiple of this
+_SHARED = 4
 # what precedes a piece
 FREE, FLIGHT, IMPACT = 0, 1, 2
 # Half-width (samples) of the search for the time of an impact about the recorded one
@@ -185,7 +187,8 @@ def gather(
             f"record in which the motion leaves the surface."
         )
     width = 64 * -(-max(len(flown) for flown, _ in cuts) // 64)
-    resting = 32 * -(-max(1, *(len(rested) for _, rested in cuts)) // 32)
+    # none without a contact: its part of a program is then not compiled
+    resting = 32 * -(-max(len(rested) for _, rested in cuts) // 32)
     most = max(_most_in_a_step(part, cut, steps) for part, cut in zip(segments, cuts))
     both = [
         [
@@ -237,8 +240,10 @@ def gather(
 
 
 def _most_in_a_step(part: Segments, cut, steps: int) -> int:
+    # rounded up, so that similar records share a program
     length = max((s.stop - s.start for side in cut for s in side), default=0.0)
-    return int(np.ceil(length / steps / part.recording.interval - 1e-9)) + 1
+    most = int(np.ceil(length / steps / part.recording.interval - 1e-9)) + 1
+    return _SHARED * -(-most // _SHARED)
 
 
 def _samples(part: Segments, cut: list[Span], channels, size, steps, most):

@@ -2,10 +2,12 @@
 
 from typing import NamedTuple
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from ...hybrid import HybridSystem
 from ...hybrid.runge_kutta import array_step, RK4
 from ._model import augmented_field, filtered_channels, Model
 
@@ -95,32 +97,46 @@ def contact_state(system, t, guess):
     **Returns:** two tuples of one array `(n,)`, as `jax.jvp` takes them.
     """
 
-    def conditions(t, x):
+    def conditions(system, t, x):
         def gap(t, x):
-            return _nearest(system, t, x)
+            return least_gap(system, t, x)
 
         value, speed = jax.jvp(
             gap, (t, x), (jnp.ones_like(t), system.vector_field(t, x))
         )
         return jnp.stack([value, speed])
 
+    # the search and the slopes at the root need no derivatives: the residuals below
+    # carry them all
+    fixed, when = _constant(system), jax.lax.stop_gradient(t)
+
     def newton(_, carried):
         def twice(t, x):
-            found = conditions(t, x)
+            found = conditions(fixed, t, x)
             return found, found
 
         x, *_ = carried
-        (by_time, slopes), found = jax.jacfwd(twice, (0, 1), has_aux=True)(t, x)
+        (by_time, slopes), found = jax.jacfwd(twice, (0, 1), has_aux=True)(when, x)
         return x - _least(slopes, found), by_time, slopes
 
     nothing = jnp.zeros(2), jnp.zeros((2, guess.shape[0]))
-    found = jax.lax.fori_loop(0, _NEWTON, newton, (guess, *nothing))
-    # slopes at the root need no derivatives: the residuals below carry them all
-    root, by_time, slopes = jax.lax.stop_gradient(found)
-    x = root - _least(slopes, conditions(t, root))
+    begin = jax.lax.stop_gradient(guess), *nothing
+    root, by_time, slopes = jax.lax.fori_loop(0, _NEWTON, newton, begin)
+    x = root - _least(slopes, conditions(system, t, root))
     rate = -_least(slopes, by_time)
-    _, changing = jax.jvp(conditions, (t, x), (jnp.ones_like(t), rate))
+    _, changing = jax.jvp(
+        lambda t, x: conditions(system, t, x), (t, x), (jnp.ones_like(t), rate)
+    )
     return (x,), (rate - _least(slopes, changing),)
+
+
+def _constant(tree):
+    """The same numbers without derivatives: a loop over them is not differentiated."""
+
+    def fixed(leaf):
+        return jax.lax.stop_gradient(leaf) if eqx.is_inexact_array(leaf) else leaf
+
+    return jax.tree.map(fixed, tree)
 
 
 def _least(slopes, residual):
@@ -210,13 +226,13 @@ def impact_joint(model: Model, end, state, t, angle, rate, reach) -> Joint:
 
     flights = jnp.stack([end, state])
 
-    def gap(t, x):
-        return _nearest(system, t, x[:size])
-
-    def moved(shift):
+    def moved(model, system, flights, shift):
         """Return both flights at another time: states, their rates, gaps and their
         rates.
         """
+
+        def gap(t, x):
+            return least_gap(system, t, x[:size])
 
         def move(x):
             x = runge_kutta(model, system, t, x, shift)[0]
@@ -231,14 +247,15 @@ def impact_joint(model: Model, end, state, t, angle, rate, reach) -> Joint:
         slope = jnp.where(slope == 0, jnp.inf, slope)
         return -(gaps[1] - gaps[0]) / jax.lax.stop_gradient(slope)
 
+    # the search needs no derivatives: its last step, from a fixed start, carries them
+    fixed = _constant((model, system, flights))
+
     def newton(_, shift):
-        _, _, gaps, speeds = moved(shift)
+        _, _, gaps, speeds = moved(*fixed, shift)
         return jnp.clip(shift + step(gaps, speeds), -reach, reach)
 
     shift = jax.lax.fori_loop(0, _NEWTON, newton, jnp.zeros_like(t))
-    shift = jax.lax.stop_gradient(shift)
-    # the last step, from a fixed start, carries the derivatives of the event
-    states, fields, gaps, speeds = moved(shift)
+    states, fields, gaps, speeds = moved(model, system, flights, shift)
     last = jnp.clip(shift + step(gaps, speeds), -reach, reach) - shift
     before, after = states + last * fields
     shift = shift + last
@@ -246,11 +263,19 @@ def impact_joint(model: Model, end, state, t, angle, rate, reach) -> Joint:
     if landed.ndim == 2:
         landed = landed[jnp.argmin(system.gap(t + shift, before[:size]))]
     landed = jnp.concatenate([landed, before[size:]])
-    return Joint(after - landed, _nearest(system, t + shift, before[:size]))
+    return Joint(after - landed, least_gap(system, t + shift, before[:size]))
 
 
-def _nearest(system, t, x):
-    return jnp.min(jnp.atleast_1d(system.gap(t, x)))
+def least_gap(system: HybridSystem, t, x) -> Float[Array, ""]:
+    """Return the smallest gap.
+
+    Not by `min`: its derivative compares values for equality, which differ where a
+    program computes one of them twice.
+    """
+    first, *others = jnp.atleast_1d(system.gap(t, x))
+    for other in others:
+        first = jnp.where(other < first, other, first)
+    return first
 
 
 def _raw(model: Model, state, field):

@@ -1,6 +1,7 @@
 """Reject an invalid problem before fitting; each message is a sentence."""
 
-import equinox as eqx
+from functools import partial
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -8,6 +9,7 @@ import numpy as np
 from ._linearise import Layout, Point
 from ._model import augmented_field, Model
 from ._pieces import Pieces
+from ._program import program
 
 
 def refuse_not_finite(layout: Layout, segments, pieces: Pieces, point: Point) -> None:
@@ -24,7 +26,7 @@ def refuse_not_finite(layout: Layout, segments, pieces: Pieces, point: Point) ->
         )
 
 
-@eqx.filter_jit
+@partial(program, runs_often=False)
 def _rates(layout: Layout, point: Point, pieces: Pieces):
     """Return the rate of change at the initial state of each piece."""
 

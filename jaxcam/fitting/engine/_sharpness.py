@@ -1,5 +1,7 @@
 """Choose the accuracy of the joints between pieces, from drive and samples."""
 
+from functools import partial
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -9,7 +11,8 @@ from ._linear import Extras, Sharpness
 from ._linearise import assemble, Layout, Point
 from ._model import filtered_channels
 from ._pieces import IMPACT, Pieces
-from ._predict import fly
+from ._predict import fly, least_gap
+from ._program import program
 
 
 # A joint within a flight is this much sharper than its samples determine the state
@@ -138,7 +141,7 @@ def _variances(ss, before):
     return np.abs(found)
 
 
-@eqx.filter_jit
+@partial(program, runs_often=False)
 def _drive_in_flight(layout: Layout, pieces: Pieces, point: Point):
     """Return the error of each piece's initial state, `(r, k, n)`, due to the drive.
 
@@ -165,7 +168,7 @@ def _drive_in_flight(layout: Layout, pieces: Pieces, point: Point):
     return jax.vmap(one)(*arrays)
 
 
-@eqx.filter_jit
+@partial(program, runs_often=False)
 def _drive_slopes(layout: Layout, pieces: Pieces, point: Point):
     """Return the slope of the gap, `(r, k, n)`, and errors of an impact due to the
     drive.
@@ -178,14 +181,14 @@ def _drive_slopes(layout: Layout, pieces: Pieces, point: Point):
         def landed(drive):
             system = model.driven(t, drive[0], drive[1])
             x = system.impact(t, state[:size])
-            gap = jnp.min(jnp.atleast_1d(system.gap(t, state[:size])))
+            gap = least_gap(system, t, state[:size])
             if x.ndim == 2:
                 x = x[jnp.argmin(system.gap(t, state[:size]))]
             return jnp.concatenate([x, state[size:], gap[None]])
 
         def gap_of(x):
             system = model.driven(t, angle, rate)
-            return jnp.min(jnp.atleast_1d(system.gap(t, x[:size])))
+            return least_gap(system, t, x[:size])
 
         jacobian = jax.jacfwd(landed)(jnp.stack([angle, rate]))
         spread = jnp.sqrt(jacobian**2 @ error**2)

@@ -1,6 +1,5 @@
 """Check that the steps of pieces are short enough for the model and its sensors."""
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -10,6 +9,7 @@ from ._linearise import Layout, Point
 from ._model import Input, Model
 from ._pieces import Pieces
 from ._predict import fly
+from ._program import program
 
 
 # Change (in units of the noise) that halving the steps may make
@@ -60,7 +60,7 @@ def fine_enough(
     return bool(np.max(np.where(pieces.exists[..., None], change, 0.0)) < part_of_error)
 
 
-@eqx.filter_jit
+@program
 def _ends(layout: Layout, point: Point, start, step, angle, rate):
     def one(values, *piece):
         model = layout.at(values)
