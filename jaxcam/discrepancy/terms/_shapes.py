@@ -144,8 +144,8 @@ class ForceOfVelocity(Polynomial):
 
 class ForceOfTime(Polynomial):
     name: ClassVar[str] = "force_of_time"
-    sentence: ClassVar[str] = "a force that changes in the course of a record"
-    region: ClassVar[str] = "in flight, by time of the record"
+    sentence: ClassVar[str] = "a force that varies during a recording"
+    region: ClassVar[str] = "in flight, by time in the recording"
     variable: ClassVar[Variable] = Variable.TIME
     count: ClassVar[int] = 5
 
@@ -169,8 +169,8 @@ class FrictionOfAngle(Polynomial):
 
 class ForceOfPhase(Harmonics):
     name: ClassVar[str] = "force_of_phase"
-    sentence: ClassVar[str] = "a force in step with the drive"
-    region: ClassVar[str] = "in flight, by phase of the drive"
+    sentence: ClassVar[str] = "a force that depends on the drive phase"
+    region: ClassVar[str] = "in flight, by drive phase"
     variable: ClassVar[Variable] = Variable.PHASE
     count: ClassVar[int] = 8
 
@@ -180,9 +180,9 @@ class ForceOfPhase(Harmonics):
 
 class SurfaceOfPhase(Harmonics):
     name: ClassVar[str] = "surface_of_phase"
-    sentence: ClassVar[str] = "a surface that is not where the model has it"
+    sentence: ClassVar[str] = "a surface that deviates from that of the model"
     where: ClassVar[str] = Where.CONTACT
-    region: ClassVar[str] = "at impacts and rests, by phase of the drive"
+    region: ClassVar[str] = "at impacts and in contact, by drive phase"
     quantity: ClassVar[str] = "surface"
     variable: ClassVar[Variable] = Variable.PHASE
     count: ClassVar[int] = 8
@@ -210,9 +210,9 @@ class BounceOfSpeed(Polynomial):
 
 class BounceOfTime(Polynomial):
     name: ClassVar[str] = "bounce_of_time"
-    sentence: ClassVar[str] = "a restitution that changes in the course of a record"
+    sentence: ClassVar[str] = "a restitution that varies during a recording"
     where: ClassVar[str] = Where.IMPACT
-    region: ClassVar[str] = "at impacts, by time of the record"
+    region: ClassVar[str] = "at impacts, by time in the recording"
     quantity: ClassVar[str] = "bounce"
     variable: ClassVar[Variable] = Variable.TIME
     count: ClassVar[int] = 3
@@ -226,9 +226,9 @@ class BounceOfTime(Polynomial):
 
 class BounceOfPhase(Harmonics):
     name: ClassVar[str] = "bounce_of_phase"
-    sentence: ClassVar[str] = "a restitution that depends on where the drive is"
+    sentence: ClassVar[str] = "a restitution that depends on the drive phase"
     where: ClassVar[str] = Where.IMPACT
-    region: ClassVar[str] = "at impacts, by phase of the drive"
+    region: ClassVar[str] = "at impacts, by drive phase"
     quantity: ClassVar[str] = "bounce"
     variable: ClassVar[Variable] = Variable.PHASE
     count: ClassVar[int] = 4
@@ -242,7 +242,7 @@ class BounceOfPhase(Harmonics):
 
 class SensorOfPosition(Polynomial):
     name: ClassVar[str] = "sensor_of_position"
-    sentence: ClassVar[str] = "a sensor that is wrong by where it is"
+    sentence: ClassVar[str] = "a sensor error that depends on the position"
     where: ClassVar[str] = Where.SENSOR
     region: ClassVar[str] = "in the measured motion, by position"
     quantity: ClassVar[str] = "sensor"
@@ -257,9 +257,9 @@ class SensorOfPosition(Polynomial):
 
 class SensorOfTime(Polynomial):
     name: ClassVar[str] = "sensor_of_time"
-    sentence: ClassVar[str] = "a sensor that drifts in the course of a record"
+    sentence: ClassVar[str] = "a sensor error that drifts during a recording"
     where: ClassVar[str] = Where.SENSOR
-    region: ClassVar[str] = "in the measured motion, by time of the record"
+    region: ClassVar[str] = "in the measured motion, by time in the recording"
     quantity: ClassVar[str] = "sensor"
     variable: ClassVar[Variable] = Variable.TIME
     count: ClassVar[int] = 4
@@ -272,9 +272,9 @@ class SensorOfTime(Polynomial):
 
 class SensorOfPhase(Harmonics):
     name: ClassVar[str] = "sensor_of_phase"
-    sentence: ClassVar[str] = "a sensor that is wrong in step with the drive"
+    sentence: ClassVar[str] = "a sensor error that depends on the drive phase"
     where: ClassVar[str] = Where.SENSOR
-    region: ClassVar[str] = "in the measured motion, by phase of the drive"
+    region: ClassVar[str] = "in the measured motion, by drive phase"
     quantity: ClassVar[str] = "sensor"
     variable: ClassVar[Variable] = Variable.PHASE
     count: ClassVar[int] = 6
