@@ -1,7 +1,7 @@
 """Forces, restitutions and surfaces as free functions of one variable.
 
-A shape is no verdict. Where no named term explains what is left, the shape says where
-it is and its shape.
+A shape is not a verdict. If no named term explains the residual, a shape shows where it
+is and how it varies.
 """
 
 import abc
@@ -19,7 +19,7 @@ from ._term import Motion, Term, terms_of
 from ._where import Where
 
 
-# Just inside the ends, where the angle of a Chebyshev polynomial can be differentiated
+# Just inside the ends, so that the angle of a Chebyshev polynomial is differentiable
 _END = 1 - 1e-12
 
 
@@ -44,8 +44,8 @@ def _numbers(values):
 class Shape(Term):
     """A sum of functions of one variable, each with a coefficient.
 
-    `quantity` is what the sum is, `unit` that of the coefficients, `count` how many of
-    them there are, `size` a change that matters.
+    `quantity` is the quantity that the sum describes, `unit` the unit of the
+    coefficients, `count` their number, and `size` a significant change.
     """
 
     listed: ClassVar[bool] = False
@@ -58,15 +58,15 @@ class Shape(Term):
 
     @abc.abstractmethod
     def basis(self, quantity) -> Array:
-        """The functions at one value of the quantity, shape `(k,)`."""
+        """Return the functions at one value of the variable, shape `(k,)`."""
 
     @property
     @abc.abstractmethod
     def ends(self) -> tuple[float, float]:
-        """Least and largest value of the variable."""
+        """Return the smallest and largest value of the variable."""
 
     def value(self, quantity):
-        """The sum of the functions."""
+        """Return the sum of the functions."""
         return jnp.stack(self.coefficients) @ self.basis(quantity)
 
     def numbers(self) -> tuple[Array, ...]:
@@ -85,7 +85,7 @@ class Shape(Term):
 
 
 class Polynomial(Shape):
-    """Chebyshev polynomials between two ends, `first` is the lowest degree."""
+    """Return Chebyshev polynomials between two ends; `first` is the lowest degree."""
 
     low: Array = eqx.field(converter=_number)
     high: Array = eqx.field(converter=_number)
@@ -105,7 +105,9 @@ class Polynomial(Shape):
 
 
 class Harmonics(Shape):
-    """Cosines, then sines, of multiples of the phase, `first` is the lowest order."""
+    """Return cosines, then sines, of multiples of the phase; `first` is the lowest
+    order.
+    """
 
     first: int = eqx.field(default=1, static=True)
 
@@ -293,10 +295,11 @@ def shapes(
     turned: bool = True,
     references: References = References(),
 ) -> tuple[Shape, ...]:
-    """All shapes, over the ranges that some recordings visit.
+    """Return all shapes, over the ranges that the recordings visit.
 
-    **Arguments:** least and largest position, velocity and approach speed, length of
-    the records (s), whether there is a drive with a phase, and the constants of forms.
+    **Arguments:** smallest and largest position, velocity and approach speed, the
+    duration of the recordings (s), whether there is a drive with a phase, and the
+    constants of forms.
     """
 
     def zeros(kind: type[Shape]) -> list[float]:
@@ -310,7 +313,7 @@ def shapes(
         FrictionOfAngle(zeros(FrictionOfAngle), *positions, first=0, slip=slip),
         BounceOfSpeed(zeros(BounceOfSpeed), *approach),
         BounceOfTime(zeros(BounceOfTime), 0.0, duration),
-        # a constant is an offset, a part in proportion to the position a gain
+        # a constant is an offset, a part proportional to the position is a gain
         SensorOfPosition(zeros(SensorOfPosition), *positions, first=2),
         SensorOfTime(zeros(SensorOfTime), 0.0, duration),
     ]
