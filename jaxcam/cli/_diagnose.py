@@ -67,7 +67,7 @@ def diagnose(
     if propose and isinstance(nominal, Setup) and nominal.drive_channel is None:
         raise ValueError(
             "--next proposes speeds of a drive, and this rig has none that turns; "
-            "leave it out, and give records that you simulated to "
+            "leave it out, and give recordings that you simulated to "
             "jaxcam.discrepancy.compare_experiments."
         )
     output = Output(json_file, out)
@@ -110,7 +110,7 @@ def _kept_fits(out: Path | None, resume: bool) -> Path | None:
 
 def _outlook(found, nominal, predict: bool, propose: bool, seed: int, report):
     """Predict bifurcation speeds with and without the found terms, and the next
-    record.
+    recording.
     """
     from .. import discrepancy
     from ._outlook import Outlook
@@ -124,7 +124,7 @@ def _outlook(found, nominal, predict: bool, propose: bool, seed: int, report):
         )
         outlook = Outlook(predicted)
     if propose and any(one.element is not None for one in found.missing):
-        report("proposing no record, as a force with a memory was found", None)
+        report("proposing no recording, as a force with a memory was found", None)
     elif propose:
         proposed = discrepancy.next_experiments(
             found, nominal, seed=seed, progress=report

@@ -59,14 +59,14 @@ _MISSING = (
     "other. What the parameters of the rig can do as well may be in them instead."
 )
 _UNSEEN = (
-    "Residuals on a record that no parameter has seen, one flight ahead: the textbook "
-    "model refitted to the other records (above), and with what was found (below). The "
-    "band is +-2 standard deviations of the noise."
+    "Residuals on a recording that no parameter has seen, one flight ahead: the "
+    "textbook model refitted to the other recordings (above), and with what was "
+    "found (below). The band is +-2 standard deviations of the noise."
 )
 _MAPS = (
-    "Mean residual of each record by {}, in standard errors, before (left) and after "
-    "(right); flights, and contacts below where there are any. Beyond the colours' "
-    "ends is what chance would show in one of a hundred such maps."
+    "Mean residual of each recording by {}, in standard errors, before (left) and "
+    "after (right); flights, and contacts below where there are any. Beyond the "
+    "colours' ends is what chance would show in one of a hundred such maps."
 )
 _SHAPES = (
     "Estimated corrections as free functions, of the textbook model (grey) and of the "
@@ -108,7 +108,7 @@ def _unseen(plt, found: Diagnosis):
 
 
 def _improvement(pair: tuple[Residuals, Residuals]) -> float:
-    """Return the ratio of the mean squares of a record before and after."""
+    """Return the ratio of the mean squares of a recording before and after."""
     before, after = (float(np.mean(part.value**2)) for part in pair)
     return before / max(after, 1e-300)
 
@@ -153,7 +153,7 @@ def _maps(plt, found: Diagnosis):
 
 
 def _sides(parts: Sequence[Residuals]) -> tuple[bool, ...]:
-    """Return flight, and contact if the record has any."""
+    """Return flight, and contact if the recording has any."""
     return (False, True) if any(np.any(part.resting) for part in parts) else (False,)
 
 

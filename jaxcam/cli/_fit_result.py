@@ -28,7 +28,9 @@ class Result:
 
     @property
     def quality(self) -> list[dict[str, Any]]:
-        """Return the residual of each record and channel, compared with the noise."""
+        """Return the residual of each recording and channel, compared with the
+        noise.
+        """
         return [
             {"record": part.record, "channel": part.channel, "rms": part.rms}
             | {"noise": part.noise, "ratio": part.rms / part.noise}
@@ -42,8 +44,8 @@ class Result:
         ratio = sum(q["ratio"] for q in quality) / len(quality)
         return (
             f"{self.after.message} {self.problem.samples} samples of "
-            f"{len(self.problem.records)} records are left with {ratio:.3f} times the "
-            "noise of the sensors."
+            f"{len(self.problem.records)} recordings are left with {ratio:.3f} times "
+            "the noise of the sensors."
         )
 
     def to_json(self, about: Mapping[str, Any]) -> dict[str, Any]:
@@ -66,7 +68,7 @@ class Result:
         drive, model = self.segments[0].drive, self.after.model(0)
         for one in self.problem.parameters:
             if one.known is not None:
-                # conditions of the first record only
+                # conditions of the first recording only
                 usual = one.where(self.problem.model)
                 model = eqx.tree_at(one.where, model, usual)
         system = model.system

@@ -32,7 +32,7 @@ def impact_laws(segments: Sequence[Segments]) -> dict[str, RestitutionFit]:
 
 
 def _on(part: Segments, side: int) -> Segments:
-    """Return a record with the impacts on one of its gaps only."""
+    """Return a recording with the impacts on one of its gaps only."""
     keep = part.impacts.side == side
     columns = {
         field.name: getattr(part.impacts, field.name)[keep]

@@ -40,10 +40,10 @@ class Outlook:
         if self.experiments:
             yield Rows(
                 "What to record next",
-                ("one more record at", "errors become", "of"),
+                ("one more recording at", "errors become", "of"),
                 [(one.name, f"{one.factor:.0%}", _asked(one)) for one in self.shown],
-                "Standard errors with this record in addition to the others, from the "
-                "sensitivities of the model that was found.",
+                "Standard errors with this recording in addition to the others, from "
+                "the sensitivities of the model that was found.",
             )
 
     @property

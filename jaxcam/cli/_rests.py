@@ -24,8 +24,8 @@ class Intervals(NamedTuple):
 
     - `begins`, `ends`: angle of the cam (rad) at either end of each, not wrapped.
     - `turns`: number of turns of the cam that were examined.
-    - `share`: fraction of the time in contact, including intervals cut by the record's
-      ends.
+    - `share`: fraction of the time in contact, including intervals cut by the
+      recording's ends.
     """
 
     begins: Float[np.ndarray, " k"]

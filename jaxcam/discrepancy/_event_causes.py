@@ -112,7 +112,8 @@ class _Goal:
     policy: Policy
 
     def left(self, speeds, pull: float) -> Float[np.ndarray, " m"]:
-        """Return the residuals of the speeds and of the parameter, in standard errors.
+        """Return the residuals of the speeds and of the parameter, in standard
+        errors.
         """
         off = ((speeds - self.observed) / self.errors)[np.isfinite(self.observed)]
         return np.append(

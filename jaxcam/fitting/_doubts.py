@@ -11,7 +11,7 @@ from .engine import Costs, FLIGHT, IMPACT, Point, Problem, Weights
 # Cost of a sample, or of a component of a joint, that noise does not explain: it is 1
 # on average, and a piece of thousands of samples is within a few per cent of that
 _PIECE, _JOINT, _MEAN = 4.0, 9.0, 9.0
-# Fraction of the pieces that must be below it: a bad record among many is an outlier
+# Fraction of the pieces that must be below it: a bad recording among many is an outlier
 _USUAL = 0.75
 # Tolerance for reaching a bound, relative to the parameter's scale
 _ON_BOUND = 1e-9
@@ -68,8 +68,8 @@ def not_finite(problem: Problem, point: Point, cost: float, costs: Costs) -> str
 def far_from_data(problem: Problem, costs: Costs, weights: Weights | None) -> str:
     """Return a sentence if the cost is far above the noise, otherwise the empty string.
 
-    The test uses the upper quartile over the pieces, so that one bad record among many
-    does not count, and the mean, so that no part may be very far off.
+    The test uses the upper quartile over the pieces, so that one bad recording among
+    many does not count, and the mean, so that no part may be very far off.
     """
     pieces = problem.pieces
     weights = weights or problem.everything()

@@ -28,7 +28,7 @@ from .engine import (
 
 @dataclasses.dataclass(frozen=True)
 class Estimate:
-    """A fitted number and its standard error; of a record where each has its own.
+    """A fitted number and its standard error; of a recording where each has its own.
 
     The error is infinite where the data do not constrain the value; the fit then says
     so and has not converged.
@@ -43,11 +43,11 @@ class Estimate:
     unit: str = ""
     """Unit."""
     record: str | None = None
-    """Name of the record, where each has its own value."""
+    """Name of the recording, where each has its own value."""
 
     @property
     def label(self) -> str:
-        """The name, with `@record` where each record has its own."""
+        """The name, with `@record` where each recording has its own."""
         return self.name if self.record is None else f"{self.name}@{self.record}"
 
     @property
@@ -104,7 +104,9 @@ class Fit:
 
     def _table(self) -> ShortTable:
         """Outcome of the fit, and its estimates."""
-        count = f"{self.problem.samples} samples, {len(self.problem.records)} records"
+        count = (
+            f"{self.problem.samples} samples, {len(self.problem.records)} recordings"
+        )
         trusted = "converged" if self.converged else "not to be trusted"
         rows = [
             (one.label, f"{one.value:.7g}", f"{one.stderr:.2g}", one.unit)
@@ -179,7 +181,7 @@ class Fit:
         free.
 
         Args:
-            names: Names as in `estimates`, with `@record` where each record has its
+            names: Names as in `estimates`, with `@record` where each recording has its
                 own.
             level: Probability that the region holds the truth.
 
@@ -200,7 +202,7 @@ class Fit:
         return most_correlated([e.label for e in self.estimates], self.correlation)
 
     def model(self, record: int | str = 0) -> Model:
-        """Return the model with the fitted parameters, of one record where they
+        """Return the model with the fitted parameters, of one recording where they
         differ.
         """
         names = self.problem.records

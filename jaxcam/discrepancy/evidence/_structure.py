@@ -1,4 +1,5 @@
-"""Analyse the residuals of a fit: shapes with a significant gain, and their location.
+"""Analyse the residuals of a fit: shapes with a significant gain, and their
+location.
 """
 
 import dataclasses

@@ -26,7 +26,8 @@ class VisitedStates(NamedTuple):
     duration: float
 
     def ranges(self, policy: Policy):
-        """Return the ends of position, velocity and approach speed, and the duration.
+        """Return the ends of position, velocity and approach speed, and the
+        duration.
         """
         tail = policy.velocity_tail
         return (

@@ -1,4 +1,5 @@
-"""List other explanations, the best first, each with the reason why it was not named.
+"""List other explanations, the best first, each with the reason why it was not
+named.
 """
 
 import math
@@ -90,7 +91,8 @@ def _why_not(rival: Rival, policy: Policy) -> str:
 
 
 def _additions(trials: Trials, choice: Choice) -> Iterator[Alternative]:
-    """Return each further term in addition to the chosen ones, with its predicted gain.
+    """Return each further term in addition to the chosen ones, with its predicted
+    gain.
     """
     best, price = choice.best, math.log(trials.problem.samples)
     blocks = trials.blocks(best)

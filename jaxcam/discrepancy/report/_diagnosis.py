@@ -100,7 +100,8 @@ class Effect:
 
 @dataclasses.dataclass(frozen=True, repr=False)
 class Diagnosis:
-    """The result of [`jaxcam.discrepancy.diagnose`][]: which physics the model lacks.
+    """The result of [`jaxcam.discrepancy.diagnose`][]: which physics the model
+    lacks.
     """
 
     case: str

@@ -55,8 +55,7 @@ def missing_effects(
     choice: Choice,
     divided: Shares,
 ) -> list[Effect]:
-    """Return the unnamed effect (all functions together) and the named terms.
-    """
+    """Return the unnamed effect (all functions together) and the named terms."""
     fitted, held, policy = missing.fit, choice.held.total, trials.policy
     blocks = blocks_of(fitted.problem, fitted.point, names=fitted.free)
     labels = [one.label for one in missing.functions]

@@ -46,7 +46,7 @@ _WORDS = {
     "wave": "oscillates with the {x}, with a wavelength of {wavelength}",
     "forward": "acts only while the {x} is positive",
     "falling": "opposes the motion near rest and fades with the {x}, over about "
-               "{decay}",
+    "{decay}",
     "harmonic 1": "varies once per turn",
     "harmonic 2": "varies twice per turn",
     "harmonic 3": "varies three times per turn",
@@ -62,8 +62,7 @@ _THINGS = {
 }
 # typical causes of a sensor error
 _FAULTS = {
-    Variable.POSITION: "as from a scale with uneven graduation or an eccentric "
-                       "encoder",
+    Variable.POSITION: "as from a scale with uneven graduation or an eccentric encoder",
     Variable.PHASE: "as from a disturbance synchronous with the drive",
     Variable.TIME: "as from a sensor that drifts",
 }

@@ -308,7 +308,8 @@ def _as_before(fresh, one) -> bool:
 
 
 def _recentred(problem: Problem, fresh, functions, point: Point) -> Point:
-    """Return the point for functions about other parameters of their hidden elements.
+    """Return the point for functions about other parameters of their hidden
+    elements.
     """
     for one, before in zip(fresh, functions):
         if one is not before and isinstance(one, Hidden):

@@ -136,7 +136,8 @@ class FreeSearch:
         return next(term for term in self.terms if term.name == name)
 
     def _done(self, best: Missing, lead: Lead, first: Lead) -> bool:
-        """Return whether the data are explained so well that a lead need not be tried.
+        """Return whether the data are explained so well that a lead need not be
+        tried.
         """
         close = lead.gain > self.policy.rivalling * first.gain
         return heat_of(best.fit) < self.policy.as_noise and not close

@@ -8,7 +8,8 @@ from ._blocks import Blocks
 
 
 def gain(information, score, rows) -> float:
-    """Return the increase in twice the log-likelihood when some parameters are freed.
+    """Return the increase in twice the log-likelihood when some parameters are
+    freed.
     """
     if not len(rows):
         return 0.0

@@ -172,7 +172,8 @@ def force_blocks(problem: Problem, response: Response, terms: Sequence[Term]) ->
 def forces_at_nodes(
     problem: Problem, response: Response, terms: Sequence[Term]
 ) -> Float[np.ndarray, "r k l p"]:
-    """Return the acceleration per unit of each strength of some terms, at every node.
+    """Return the acceleration per unit of each strength of some terms, at every
+    node.
     """
     terms = tuple(terms)
     every = _forces(problem.layout, problem.pieces, response.point, terms)
@@ -234,7 +235,8 @@ def _linear(
 
 @eqx.filter_jit
 def _forces(layout, pieces, point, terms) -> Float[Array, "r k l p"]:
-    """Return the acceleration per unit of each strength, at the nodes of every piece.
+    """Return the acceleration per unit of each strength, at the nodes of every
+    piece.
     """
 
     def piece(model, state, start, step, angle, rate):

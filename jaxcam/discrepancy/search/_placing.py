@@ -18,7 +18,8 @@ _TOGETHER = 36
 
 
 class Placing(NamedTuple):
-    """The values of a term's inner parameters with the largest gain, and this `gain`.
+    """The values of a term's inner parameters with the largest gain, and this
+    `gain`.
     """
 
     gain: float

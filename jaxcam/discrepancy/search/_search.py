@@ -13,8 +13,7 @@ from ._vibration_scan import Periodogram
 
 
 class Search:
-    """The search over subsets and its order, which is not by largest gain alone.
-    """
+    """The search over subsets and its order, which is not by largest gain alone."""
 
     def __init__(self, trials: Trials):
         self.trials, self.policy = trials, trials.policy
@@ -131,7 +130,8 @@ class Search:
         return other if other.bic < best.bic else best
 
     def _swapped(self, best: Trial) -> Trial:
-        """Return the subsets with one term exchanged that the quadratic model favours.
+        """Return the subsets with one term exchanged that the quadratic model
+        favours.
         """
         for _ in range(self.policy.most_terms):
             if not best.names:

@@ -145,7 +145,8 @@ def system_question(
 
 
 def _drives(recordings: Sequence[Segments], channel: str | None) -> dict[str, Any]:
-    """Return the problem with the recordings of a drive and the noise of its encoder.
+    """Return the problem with the recordings of a drive and the noise of its
+    encoder.
     """
     if channel is None:
         return {}

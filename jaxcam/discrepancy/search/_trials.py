@@ -22,7 +22,8 @@ from ._vibration_scan import Periodogram, periodogram
 
 @dataclasses.dataclass(frozen=True)
 class Trial:
-    """A fitted subset of terms; `cut` if only the number of iterations ended the fit.
+    """A fitted subset of terms; `cut` if only the number of iterations ended the
+    fit.
     """
 
     names: frozenset[str]
@@ -278,7 +279,8 @@ class Trials:
         return True
 
     def _seeded(self, names: frozenset[str], start: Trial, place: Point) -> Point:
-        """Return a starting point; terms that the other fit lacks have zero strength.
+        """Return a starting point; terms that the other fit lacks have zero
+        strength.
         """
         values = np.array(place.values)
         everything = self.problem.names
@@ -295,7 +297,8 @@ class Trials:
 
 
 def _order(trial: Trial) -> tuple[float, bool]:
-    """Sort key of fits: the smaller cost is better; among equals, an optimum is better.
+    """Sort key of fits: the smaller cost is better; among equals, an optimum is
+    better.
     """
     return trial.bic, not trial.fit.optimal
 

@@ -120,7 +120,8 @@ class Resonator(HiddenElement):
         return self.by_state * hidden[0] + self.by_rate * hidden[1]
 
     def transfer(self, frequency):
-        """Return the ratio of force and deflection at some frequencies (Hz), complex.
+        """Return the ratio of force and deflection at some frequencies (Hz),
+        complex.
         """
         s = 2j * jnp.pi * frequency
         w = 2 * jnp.pi * self.frequency

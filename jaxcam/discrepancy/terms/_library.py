@@ -84,7 +84,8 @@ class CoulombFriction(Term):
 
 
 def _share_of(push, friction):
-    """Return a push in units of the friction; a large number if there is no friction.
+    """Return a push in units of the friction; a large number if there is no
+    friction.
     """
     some = friction > 0
     return jnp.where(some, push / jnp.where(some, friction, 1.0), _MANY)

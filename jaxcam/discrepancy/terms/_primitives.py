@@ -57,7 +57,8 @@ class Primitive(NamedTuple):
         return 1 + len(self.starts)
 
     def value(self, place: Place, numbers, direction):
-        """Return the complete form, including the jump if the motion has a direction.
+        """Return the complete form, including the jump if the motion has a
+        direction.
         """
         smooth = self.function(place, numbers)
         turned = smooth * direction if self.odd else smooth

@@ -51,7 +51,8 @@ def more_faults(model: Model, parameters: Sequence[Parameter]) -> list[Parameter
 
 
 def own_faults(model: Model, parameters: Sequence[Parameter]) -> list[str]:
-    """Return the names of the parameters that are gain, offset or lag of that sensor.
+    """Return the names of the parameters that are gain, offset or lag of that
+    sensor.
     """
     sensor = model.sensors[watching(model)]
     fields = [getattr(sensor, field) for field in _FAULTS]

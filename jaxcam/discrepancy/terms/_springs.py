@@ -1,4 +1,5 @@
-"""Forces that depend on position: constant, linear, with a knee, and one-sided stops.
+"""Forces that depend on position: constant, linear, with a knee, and one-sided
+stops.
 """
 
 from typing import ClassVar

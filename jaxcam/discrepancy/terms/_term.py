@@ -219,7 +219,8 @@ class Term(eqx.Module):
         return ()
 
     def prepared(self) -> "Term":
-        """Return the term with all quantities precomputed that it needs at every step.
+        """Return the term with all quantities precomputed that it needs at every
+        step.
         """
         return self
 

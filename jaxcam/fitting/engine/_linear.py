@@ -1,4 +1,4 @@
-"""Linearise each piece and joint of one record about a point."""
+"""Linearise each piece and joint of one recording about a point."""
 
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -15,7 +15,9 @@ from ._predict import flight_joint, fly, impact_joint, rest, samples
 
 
 class Sharpness(NamedTuple):
-    """Standard errors of the joints of one record, and of the usual piece's state."""
+    """Standard errors of the joints of one recording, and of the usual piece's
+    state.
+    """
 
     flight: Float[Array, "k n"]
     impact: Float[Array, "k n"]
@@ -37,7 +39,7 @@ class Extras(NamedTuple):
 
 
 class LinearPieces(NamedTuple):
-    """Pieces and joints of one record, before summation.
+    """Pieces and joints of one recording, before summation.
 
     The first `n` of `a = n + m` columns are the state at the beginning of the piece,
     the others the parameters.
@@ -76,7 +78,7 @@ class LinearPieces(NamedTuple):
 def linear_pieces(
     model_at: Callable[..., Model], pieces: Pieces, extras: Extras, states, width: int
 ) -> LinearPieces:
-    """Linearise one record about its states.
+    """Linearise one recording about its states.
 
     Args:
         model_at: `model_at(change, start, step)` is the model of a piece that begins at

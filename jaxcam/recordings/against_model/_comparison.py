@@ -23,7 +23,7 @@ class Residuals:
     unit: str
     """Unit of the differences."""
     time: Float[np.ndarray, " k"]
-    """Seconds of the record; `turned`: angle of the cam (rad), or nothing."""
+    """Seconds of the recording; `turned`: angle of the cam (rad), or nothing."""
     turned: Float[np.ndarray, " k"]
     """Angle of the cam (rad), or empty."""
     value: Float[np.ndarray, " k"]

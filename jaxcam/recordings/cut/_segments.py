@@ -15,9 +15,9 @@ class Boundary:
     """The boundary between one part and the next."""
 
     time: float
-    """Time (s) and its standard error, NaN at the ends of the record."""
+    """Time (s) and its standard error, NaN at the ends of the recording."""
     stderr: float
-    """Time (s) and its standard error, NaN at the ends of the record."""
+    """Time (s) and its standard error, NaN at the ends of the recording."""
     kind: str
     """`"impact"` (flight to flight), `"several impacts"` (too close together to be
     distinguished), `"landing"` (flight to contact, with impacts too low to be
@@ -150,8 +150,9 @@ class Segments:
     noise: float
     """Standard deviation of the channel's samples."""
     clock: Float[np.ndarray, " k"]
-    """Time of the model at each sample (s): record time, or that of a drive at constant
-    speed."""
+    """Time of the model at each sample (s): recording time, or that of a drive at
+    constant speed.
+    """
     flights: tuple[Flight, ...]
     """The flights."""
     contacts: tuple[Contact, ...]
@@ -193,7 +194,7 @@ def _counted(number: int, noun: str) -> str:
 
 
 def no_impacts() -> Impacts:
-    """Impacts of a record that has none."""
+    """Impacts of a recording that has none."""
     none = np.zeros(0)
     fields = [field.name for field in dataclasses.fields(Impacts)]
     number = none.astype(int)

@@ -45,7 +45,7 @@ def read_recordings(
         file: The file; `..._150.7rpm.csv` in its name is the nominal speed.
         channels: Required columns (SI names).
         split: Column that numbers the runs in a file that holds several.
-        gaps: `"refuse"` raises an error for a record with missing samples, `"split"`
+        gaps: `"refuse"` raises an error for a recording with missing samples, `"split"`
             cuts it into pieces, and `"mend"` repairs it: it bridges short gaps, splits
             at long gaps and corrects slips of an encoder (see `mend`). The repairs are
             listed in `meta["notes"]`.
@@ -149,7 +149,7 @@ def read_case(
         folder: The folder.
         channels: Required columns (SI names); `()` for rigs other than a cam-follower.
         split: Column that numbers the runs in a file that holds several.
-        gaps: Treatment of a record with missing samples: `"refuse"` raises an error,
+        gaps: Treatment of a recording with missing samples: `"refuse"` raises an error,
             `"split"` cuts it into pieces, `"mend"` repairs it (see `mend`).
         columns: Names of the columns in their order, `"-"` to skip one, for
             files without a line of names; or a channel for each column with another
