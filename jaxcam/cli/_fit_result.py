@@ -39,13 +39,13 @@ class Result:
 
     @property
     def sentence(self) -> str:
-        """Say how well the fit explains its samples."""
+        """Describe how well the fit explains its samples."""
         quality = self.quality
         ratio = sum(q["ratio"] for q in quality) / len(quality)
         return (
-            f"{self.after.message} {self.problem.samples} samples of "
-            f"{len(self.problem.records)} recordings are left with {ratio:.3f} times "
-            "the noise of the sensors."
+            f"{self.after.message} The rms residual of {self.problem.samples} samples "
+            f"of {len(self.problem.records)} recordings is {ratio:.3f} times the "
+            "sensor noise."
         )
 
     def to_json(self, about: Mapping[str, Any]) -> dict[str, Any]:
@@ -98,8 +98,8 @@ def fitted(
         model, parameters = nominal.model, nominal.parameters
         if not parameters:
             raise ValueError(
-                "There is nothing to fit; give at least one entry of [parameters] in "
-                "the rig file a `tolerance`."
+                "There is nothing to fit; state a `tolerance` for at least one entry "
+                "of [parameters] in the rig file."
             )
         segments = nominal.segments(runs, progress=cutting)
     else:
