@@ -208,8 +208,8 @@ def test_the_command(tmp_path):
     assert law["law"] == "falling" and law["delta_bic"]["falling"] < -10
     for words, said in (
         ([*names, "--out", str(tmp_path / "out")], "leave out --out"),
-        (["--columns", "a=b,c"], "pairs only"),
-        (["--columns", "v1=x*0"], "pairs only"),
+        (["--columns", "a=b,c"], "only pairs"),
+        (["--columns", "v1=x*0"], "only pairs"),
         (["--rate", "0"], "--rate is 0"),
         ([], "`time_s` is missing"),
     ):
