@@ -162,7 +162,7 @@ def test_momentum_of_two_bodies(tmp_path):
         (
             "before1_m_s,after1_m_s,before2_m_s,after2_m_s,mass1_kg\n1,0,0,1,2\n"
             "1,0,0,1,2\n",
-            "mass of one body only",
+            "mass of only one body",
         ),
         (
             "before1_m_s,after1_m_s,before2_m_s,after2_m_s,mass1_kg,mass2_kg\n"

@@ -195,7 +195,7 @@ def test_tracks_of_a_video(tmp_path):
     np.testing.assert_allclose(run["height_m"], [-8e-3, -9.6e-3, -1.28e-2])
     assert "from line 7 on there is another table" in run.meta["notes"][0]
     spaced = MTRACK.replace("\t", " ")
-    with pytest.raises(RecordingError, match="where spaces separate, empty cells"):
+    with pytest.raises(RecordingError, match="with spaces as separators, empty cells"):
         read_recordings(written(tmp_path, spaced, "b.tsv"), columns=HEIGHT)
 
 

@@ -1,5 +1,4 @@
-"""Fractions of the initial states that converge to each attractor, as a wall is moved.
-"""
+"""Fractions of the initial states that converge to each attractor, as a wall is moved."""
 
 import matplotlib.pyplot as plt
 import numpy as np

@@ -1,7 +1,8 @@
 """Draw the gallery: `python docs/gallery/make.py [NAME ...]`, all figures by default.
 
-Each script in this folder makes one `figure`; the first sentence of its docstring is the
-caption. This program writes a light and a dark picture of each, and `docs/gallery.md`.
+Each script in this folder makes one `figure`; the first sentence of its docstring is
+the caption. This program writes a light and a dark picture of each, and
+`docs/gallery.md`.
 """
 
 import ast
@@ -40,9 +41,9 @@ hide:
 
 # Gallery
 
-Each figure links to the short script that draws it. Run a script unchanged, or change the
-system in it. The command `python docs/gallery/make.py` draws all figures in a light version
-and, with [`jaxcam.plotting.on_dark`][], in a dark one.
+Each figure links to the short script that draws it. Run a script unchanged, or change
+the system in it. The command `python docs/gallery/make.py` draws all figures in a light
+version and, with [`jaxcam.plotting.on_dark`][], in a dark one.
 
 <div class="grid cards" markdown>
 
