@@ -1,4 +1,6 @@
-"""Fractions of the initial states that converge to each attractor, as a wall is moved."""
+"""Fractions of the initial states that converge to each attractor, as a wall is
+moved.
+"""
 
 import matplotlib.pyplot as plt
 import numpy as np

@@ -224,7 +224,7 @@ def _turning(label: str, mended: Mended) -> list[Recording]:
         cam = piece.channels.get("cam_angle_rad")
         if cam is not None and np.ptp(cam) < np.pi:
             notes.append(
-                (f"{piece.name} has less than half a turn of the cam; it is omitted.")
+                f"{piece.name} has less than half a turn of the cam; it is omitted."
             )
         else:
             pieces.append(piece)
