@@ -326,7 +326,9 @@ class Policy:
 
     @property
     def beyond(self) -> float:
-        """Standard errors above the threshold at which detection has chance `sure`."""
+        """Standard errors above the threshold at which detection has the probability
+        `sure`.
+        """
         return float(norm.ppf(self.sure))
 
     @property

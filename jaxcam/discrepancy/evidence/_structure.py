@@ -65,19 +65,19 @@ class Structure:
     unit: str = ""
     """Unit of `value`."""
     variable: str = ""
-    """The shape, where there is one; `quantity` is what its value is."""
+    """Argument of the shape, if there is one."""
     grid: Float[np.ndarray, " k"] = dataclasses.field(
         default_factory=lambda: np.zeros(0)
     )
-    """The shape, where there is one; `quantity` is what its value is."""
+    """Values of the argument at which the shape is given."""
     value: Float[np.ndarray, " k"] = dataclasses.field(
         default_factory=lambda: np.zeros(0)
     )
-    """The shape, where there is one; `quantity` is what its value is."""
+    """The shape at these values, in `unit`."""
     stderr: Float[np.ndarray, " k"] = dataclasses.field(
         default_factory=lambda: np.zeros(0)
     )
-    """The shape, where there is one; `quantity` is what its value is."""
+    """Standard errors of `value`."""
 
     predicted_gain: float = math.inf
     """Increase in the log-likelihood of one half of the recordings with the estimate
@@ -88,7 +88,7 @@ class Structure:
     """An unlisted term, a free function, a vibration, or residuals that are correlated
     in time."""
     quantity: str = ""
-    """The quantity whose value is given."""
+    """The quantity that `value` describes."""
 
     @property
     def significant(self) -> bool:

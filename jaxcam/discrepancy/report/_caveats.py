@@ -28,12 +28,12 @@ class Reason(enum.StrEnum):
 
 @dataclasses.dataclass(frozen=True)
 class Caveat:
-    """One reservation about a verdict."""
+    """A caveat about a verdict."""
 
     reason: Reason
     """A `Reason`."""
     sentence: str
-    """The reservation in words, also by `str`."""
+    """The caveat in words; `str` returns it as well."""
     terms: tuple[str, ...] = ()
     """Names of the terms concerned, if any."""
 

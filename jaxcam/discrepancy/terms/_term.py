@@ -214,7 +214,7 @@ class Term(eqx.Module):
     def starts(self) -> tuple[Mapping[str, float], ...]:
         """Return values of its inner numbers from which a fit may start.
 
-        None for a frequency, which a scan finds.
+        There are none for a frequency, which a scan finds.
         """
         return ()
 
