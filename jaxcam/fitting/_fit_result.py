@@ -68,31 +68,27 @@ class Fit:
     """
 
     problem: Problem
-    """Parameters and states at the optimum."""
+    """The fitted problem."""
     point: Point
     """Parameters and states at the optimum."""
     free: tuple[str, ...]
     """Names of the parameters that were free."""
     estimates: tuple[Estimate, ...]
-    """One for each free number, in the order of `covariance`."""
+    """One estimate for each free number, in the order of `covariance`."""
     covariance: Float[np.ndarray, "g g"]
-    """Covariance from the Fisher information, prior knowledge included."""
+    """Covariance from the Fisher information, including prior knowledge."""
     cost: float
-    """Minus twice the log-likelihood (less a constant) with the prior; `costs`: of each
-    piece, without it."""
+    """Minus twice the log-likelihood (up to a constant), including the prior."""
     costs: Costs
     """Cost of each piece, without the prior."""
     optimal: bool
-    """Whether the iteration met its tolerance at an optimum, after how many steps, and
-    how it ended in words."""
+    """Whether the iteration met its tolerance at an optimum."""
     iterations: int
-    """Whether the iteration met its tolerance at an optimum, after how many steps, and
-    how it ended in words."""
+    """Number of iterations."""
     ended: str
-    """Whether the iteration met its tolerance at an optimum, after how many steps, and
-    how it ended in words."""
+    """The reason why the iteration ended, in words."""
     weights: Weights | None = None
-    """Weight of each piece of the data; `None` where all count alike."""
+    """Weight of each piece of the data; `None` if all have the same weight."""
     unconstrained: tuple[Unconstrained, ...] = ()
     """Combinations of parameters that the data do not constrain."""
 
@@ -183,7 +179,7 @@ class Fit:
         Args:
             names: Names as in `estimates`, with `@record` where each recording has its
                 own.
-            level: Probability that the region holds the truth.
+            level: Probability that the region contains the true values.
 
         Returns:
             An `Ellipse`.

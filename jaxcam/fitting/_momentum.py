@@ -24,9 +24,9 @@ class MomentumBalance:
     stderr: float
     """Standard error of `change`."""
     ratio: float
-    """Mass of the second body over that of the first, such that momentum is kept."""
+    """Ratio of the second mass to the first for which momentum is conserved."""
     ratio_stderr: float
-    """Mass of the second body over that of the first, such that momentum is kept."""
+    """Standard error of `ratio`."""
     stated: float
     """The same ratio of the stated masses, or NaN."""
 

@@ -24,9 +24,9 @@ class Drive:
     rate: Float[np.ndarray, " k"]
     """Its rate of change (rad/s)."""
     speed: float
-    """The straight line `speed * time + phase` through the angle."""
+    """Slope (rad/s) of the straight line `speed * time + phase` through the angle."""
     phase: float
-    """The straight line `speed * time + phase` through the angle."""
+    """Value (rad) of this line at time zero."""
     noise: float
     """Standard deviation of the raw samples about the smoothed angle (rad)."""
     window: int

@@ -54,17 +54,11 @@ class LinearPieces(NamedTuple):
     p: Float[Array, " m"]
     """Slope of the cost of these samples, shape `(m,)`."""
     later: Float[Array, "k e n"]
-    """Rows of each joint for the state after it, for the columns of the piece before
-    it, and for what else varies, in units of the joint's error. `tied`: how far the
-    joint is off."""
+    """Rows of each joint for the state after it, in units of the joint's error."""
     earlier: Float[Array, "k e a"]
-    """Rows of each joint for the state after it, for the columns of the piece before
-    it, and for what else varies, in units of the joint's error. `tied`: how far the
-    joint is off."""
+    """Rows of each joint for the state before it, in the same units."""
     direct: Float[Array, "k e m"]
-    """Rows of each joint for the state after it, for the columns of the piece before
-    it, and for what else varies, in units of the joint's error. `tied`: how far the
-    joint is off."""
+    """Rows of each joint for all other variables, in the same units."""
     tied: Float[Array, "k e"]
     """Distance at each joint, in units of its error."""
     flown_cost: Float[Array, " k"]

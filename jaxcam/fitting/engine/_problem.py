@@ -122,7 +122,8 @@ class Problem:
     def build(
         model: Model, segments: Sequence[Segments], parameters: Sequence[Parameter]
     ) -> "Problem":
-        """Cut the recordings into pieces and find a start state for each of them.
+        """Divide the recordings into pieces and estimate an initial state for each of
+        them.
 
         Args:
             model: A system with its sensors, at nominal parameters.
