@@ -56,7 +56,7 @@ class LinearPieces(NamedTuple):
     later: Float[Array, "k e n"]
     """Rows of each joint for the state after it, in units of the joint's error."""
     earlier: Float[Array, "k e a"]
-    """Rows of each joint for the state before it, in the same units."""
+    """Rows of each joint for the columns of the piece before it, in the same units."""
     direct: Float[Array, "k e m"]
     """Rows of each joint for all other variables, in the same units."""
     tied: Float[Array, "k e"]
