@@ -150,10 +150,10 @@ def test_momentum_of_two_bodies(tmp_path):
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("before_m_s,after_m_s\n0,0.5\n1,0.8\n", "in row 1 nothing approaches"),
-        ("before_m_s,after_m_s\n-1,-0.5\n1,-0.8\n", "in row 1 the motion goes on"),
+        ("before_m_s,after_m_s\n0,0.5\n1,0.8\n", "in row 1 there is no approach"),
+        ("before_m_s,after_m_s\n-1,-0.5\n1,-0.8\n", "in row 1 the bodies pass through"),
         ("before_m_s,after_rad_s\n1,0.5\n1,0.8\n", "one unit"),
-        ("before_m_s,after_m_s\n1,x\n1,0.8\n", "`x` where a number"),
+        ("before_m_s,after_m_s\n1,x\n1,0.8\n", "`x` instead of a number"),
         ("before_m_s,other_m_s\n1,1\n1,0.8\n", "columns before_m_s and after_m_s"),
         (
             "before_m_s,after_m_s,after_stderr_m_s\n1,1,0\n1,1,1\n",

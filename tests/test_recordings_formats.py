@@ -259,7 +259,7 @@ def test_a_workbook(tmp_path):
     with pytest.raises(RecordingError, match="no table"):
         read_recordings(workbook(tmp_path, a=[["by hand"]]))
     rows[3] = [0.01, "lost"]
-    with pytest.raises(RecordingError, match="`lost` where a number .* row 2"):
+    with pytest.raises(RecordingError, match="`lost` instead of a number .* row 2"):
         read_recordings(workbook(tmp_path, a=rows))
     with pytest.raises(RecordingError, match="not a workbook"):
         read_recordings(written(tmp_path, b"PK\3\4 broken", "b.xlsx"))
@@ -290,10 +290,10 @@ HOSTILE = {
     "header.csv": ("time_s,angle_rad\n", "0 rows"),
     "one_row.csv": ("time_s,angle_rad\n0,1\n", "1 rows"),
     "words.csv": ("Lorem ipsum dolor\nsit amet\nconsectetur\n", "row 1"),
-    "nan.csv": (GOOD.replace("-1.500", "NaN"), "`NaN` where a number"),
-    "inf.csv": (GOOD.replace("-1.500", "inf"), "`inf` where a number"),
-    "hole.csv": (GOOD.replace("-1.500", ""), "nothing where a number"),
-    "word.csv": (GOOD.replace("-1.500", "off"), "`off` where a number"),
+    "nan.csv": (GOOD.replace("-1.500", "NaN"), "`NaN` instead of a number"),
+    "inf.csv": (GOOD.replace("-1.500", "inf"), "`inf` instead of a number"),
+    "hole.csv": (GOOD.replace("-1.500", ""), "nothing instead of a number"),
+    "word.csv": (GOOD.replace("-1.500", "off"), "`off` instead of a number"),
     "first_word.csv": (GOOD.replace("0.500", "off"), "in row 1"),
     "first_words.csv": (GOOD.replace("0.00,0.500", "x,y"), "in row 1"),
     "error.csv": (GOOD.replace("-1.500", "#DIV/0!"), "`#DIV/0!`"),
@@ -303,12 +303,12 @@ HOSTILE = {
     "percent.csv": (GOOD.replace("-1.500", "15%"), "`15%`"),
     "unit.csv": (GOOD.replace("-1.500", "1.5 rad"), "`1.5 rad`"),
     "huge.csv": (GOOD.replace("-1.500", "1e30"), "no sensor measures"),
-    "overflow.csv": (GOOD.replace("-1.500", "1e999"), "where a number"),
+    "overflow.csv": (GOOD.replace("-1.500", "1e999"), "instead of a number"),
     "more.csv": (GOOD.replace("-1.500", "1,5"), "row 3 has 3 values"),
     "less.csv": (GOOD.replace("0.02,-1.500", "0.02"), "row 3 has 1 values"),
-    "cut.csv": (GOOD[:-4], "cut short"),
-    "cut_more.csv": (GOOD[:-7], "cut short"),
-    "cut.csv.gz": (gzip.compress(GOOD.encode())[:-9], "cut short"),
+    "cut.csv": (GOOD[:-4], "truncated"),
+    "cut_more.csv": (GOOD[:-7], "truncated"),
+    "cut.csv.gz": (gzip.compress(GOOD.encode())[:-9], "truncated"),
     "damaged.csv.gz": (gzip.compress(GOOD.encode())[:20] + b"x" * 30, "damaged"),
     "plain.csv.gz": (GOOD, "not compressed"),
     "renamed.csv": (gzip.compress(GOOD.encode()), "not a text file"),
@@ -326,7 +326,7 @@ HOSTILE = {
     "other_time.mat": (matlab(time_s=TIME[:3], angle_rad=ANGLE), "`angle_rad` is"),
     "cut.mat": (matlab(time_s=TIME, a_rad=ANGLE)[:150], "not a MATLAB file"),
     "headless.csv": (table(",", head=""), "--columns"),
-    "headless.tsv": (table("\t", head=""), "there are 2"),
+    "headless.tsv": (table("\t", head=""), "name all 2 columns"),
     "noted.csv": ("Rig 3\n" + table(head=""), "no line does so"),
     "twice.csv": (GOOD.replace("angle_rad", "time_s"), "appears twice"),
     "same_unit.csv": ("time_s,time_ms\n0,0\n1,1000\n", "two columns give `time_s`"),
@@ -351,12 +351,12 @@ HOSTILE = {
     ),
     "gap.csv": (GOOD.replace("0.05", "0.50"), "a gap in time"),
     "dead.csv": ("time_s,angle_rad\n0,1\n1,1\n2,1\n", "1 throughout"),
-    "summary.csv": (GOOD + "Mean,0.7\n", "`Mean` where a number"),
-    "header_twice.csv": (GOOD + GOOD, "where a number"),
+    "summary.csv": (GOOD + "Mean,0.7\n", "`Mean` instead of a number"),
+    "header_twice.csv": (GOOD + GOOD, "instead of a number"),
     "markdown.csv": ("|time_s|angle_rad|\n|---|---|\n|0|1|\n|1|2|\n", "row 1"),
     "json.csv": ('{"time_s": [0, 1], "angle_rad": [1, 2]}\n', "0 rows"),
     "html.csv": ("<table><tr><td>time_s</td></tr>\n<tr><td>0</td></tr>\n", "1 rows"),
-    "nul.csv": (GOOD.replace("-1.500", "1\0"), "where a number"),
+    "nul.csv": (GOOD.replace("-1.500", "1\0"), "instead of a number"),
     "space_holes.csv": (
         "time_s angle_rad f_N\n0 1 2\n1 2\n2 3 4\n",
         "save it with tabs",
