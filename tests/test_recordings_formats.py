@@ -227,7 +227,7 @@ def test_vectors_inside_structures(tmp_path):
     assert is_the_table(run)
     np.testing.assert_allclose(run["force_N"], 2 * ANGLE)
     np.testing.assert_allclose(run["height_m"], -1e-3 * ANGLE)
-    with pytest.raises(RecordingError, match="columns have names of their own"):
+    with pytest.raises(RecordingError, match="columns already have names"):
         read_recordings(tmp_path / "run.mat", columns=["time_s"])
     several = np.array([({"x": k * ANGLE},) for k in (1, 2)], dtype=[("log", object)])
     savemat(tmp_path / "several.mat", {"runs": several})
@@ -384,5 +384,5 @@ def test_a_rate_that_is_none(tmp_path, rate):
     file = written(tmp_path, GOOD)
     with pytest.raises(RecordingError, match="give a positive number"):
         read_recordings(file, columns=["-", "angle_rad"], rate=rate)
-    with pytest.raises(RecordingError, match="a time of its own"):
+    with pytest.raises(RecordingError, match="already has the time column"):
         read_recordings(file, rate=100.0)

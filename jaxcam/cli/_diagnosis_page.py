@@ -54,9 +54,7 @@ def _title(found: Diagnosis) -> str:
     if found.verdict == Verdict.NONE:
         return "nothing is missing"
     named = [effect.name for effect in found.effects if effect.term]
-    return listed(
-        [*named, "something that has no name" if named else "unknown physics"]
-    )
+    return listed([*named, "unknown physics" if named else "unknown physics"])
 
 
 def _effects(found: Diagnosis) -> list[str]:
@@ -86,7 +84,7 @@ def _effects(found: Diagnosis) -> list[str]:
         )
         for effect in found.effects
     ]
-    return ["<h2>What is missing</h2>", table_html(headings, rows, text=(0, 1, 2))]
+    return ["<h2>Missing physics</h2>", table_html(headings, rows, text=(0, 1, 2))]
 
 
 def _before_and_after(found: Diagnosis) -> list[str]:

@@ -41,7 +41,7 @@ class MomentumBalance:
         ratio = f"{self.ratio:.4g} +- {self.ratio_stderr:.1g}"
         if np.isnan(self.stated):
             return f"If momentum is kept, the second mass is {ratio} times the first."
-        change = f"{self.change:+.2%} +- {self.stderr:.1%} of what is exchanged"
+        change = f"{self.change:+.2%} +- {self.stderr:.1%} of the exchanged momentum"
         if self.kept:
             return f"Momentum is kept: both together change by {change}."
         return (

@@ -96,8 +96,8 @@ def train(
     own = [p.name for p in problem.parameters if p.per_record or p.known is not None]
     if own:
         raise ValueError(
-            "`train` takes recordings that share every number, and each has a value "
-            f"of its own of {own[0]!r}; leave it out."
+            f"`train` requires parameters that all recordings share, and {own[0]!r} "
+            "has a separate value in each; leave it out."
         )
     values = where(problem.model)
     arrays, rest = eqx.partition(values, eqx.is_inexact_array)

@@ -87,7 +87,7 @@ def _why_not(rival: Rival, policy: Policy) -> str:
     found = rival.missing.fit
     if found.cost > policy.near * found.problem.samples:
         return "its fit did not come near the data"
-    return f"would be chosen in {rival.share:.0%} of the redrawn sets of stretches"
+    return f"would be chosen in {rival.share:.0%} of the bootstrap samples"
 
 
 def _additions(trials: Trials, choice: Choice) -> Iterator[Alternative]:

@@ -112,7 +112,7 @@ def poor_prediction(held: HeldOut) -> Caveat:
 
 
 def small_remainder(choice: Choice, share: float) -> Caveat:
-    """Caveat: a named effect leaves a small residual of its own."""
+    """Caveat: a named effect leaves a small residual."""
     first = choice.unexplained[0]
     return Caveat(
         Reason.SMALL_REMAINDER,

@@ -54,7 +54,7 @@ def summary_of(
     acts = f"it acts like {what.sentence}, {what.region}."
     explained = sum(effect.share or 0.0 for effect in named)
     if not explained:
-        return f"Something is missing that is none of the known effects: {acts}"
+        return f"The missing physics is none of the known effects: {acts}"
     return (
         f"{percent(explained)} of the misfit is explained by {' and '.join(parts)}. "
         f"The rest ({percent(1 - explained)}) is none of the known effects: {acts}"
@@ -77,7 +77,7 @@ def summary_of_functions(
     named = [effect.sentence for effect in effects if effect.term]
     beside = f" beside {listed(named)}" if named else ""
     words = " and ".join(one.words for one in functions)
-    found = f"Something is missing that has no name{beside}: {words}."
+    found = f"An unnamed effect is missing{beside}: {words}."
     if held.after < held.before:
         factor, unit = scaled(unit, held.before * floor)
         before, after = (factor * floor * one for one in (held.before, held.after))

@@ -39,7 +39,7 @@ class Parameter:
     upper: float = math.inf
     """Upper bound."""
     per_record: bool = False
-    """Whether every recording has a value of its own."""
+    """Whether every recording has a separate value."""
     unit: str = ""
     """For tables."""
     known: tuple[float, ...] | None = None

@@ -172,8 +172,8 @@ class PublishedFit:
                 f"{sign * direction[k]:+.2f} {self.names[k]}" for k in main
             )
             sentences.append(
-                f"The data give {100 * part:.2g} % of what is known of the combination "
-                f"{words} (in units of the tolerances)."
+                f"The data give {100 * part:.2g} % of the information on the "
+                f"combination {words} (in units of the tolerances)."
             )
         return sentences
 
