@@ -54,7 +54,7 @@ def _title(found: Diagnosis) -> str:
     if found.verdict == Verdict.NONE:
         return "nothing is missing"
     named = [effect.name for effect in found.effects if effect.term]
-    return listed([*named, "unknown physics" if named else "unknown physics"])
+    return listed([*named, "unknown physics"])
 
 
 def _effects(found: Diagnosis) -> list[str]:

@@ -54,7 +54,7 @@ def summary_of(
     acts = f"it acts like {what.sentence}, {what.region}."
     explained = sum(effect.share or 0.0 for effect in named)
     if not explained:
-        return f"The missing physics is none of the known effects: {acts}"
+        return f"The missing effect is none of the known ones: {acts}"
     return (
         f"{percent(explained)} of the misfit is explained by {' and '.join(parts)}. "
         f"The rest ({percent(1 - explained)}) is none of the known effects: {acts}"
@@ -69,13 +69,13 @@ def summary_of_functions(
     floor: float,
     unit: str,
 ) -> str:
-    """Summarise functions without a name, the named terms, and the gain of the fit.
+    """Summarise unnamed functions, the named terms, and the gain of the fit.
 
     **Arguments:** the functions, all effects, the held-out data, the remaining residual
     in units of the noise, the noise and its unit.
     """
     named = [effect.sentence for effect in effects if effect.term]
-    beside = f" beside {listed(named)}" if named else ""
+    beside = f" in addition to {listed(named)}" if named else ""
     words = " and ".join(one.words for one in functions)
     found = f"An unnamed effect is missing{beside}: {words}."
     if held.after < held.before:
