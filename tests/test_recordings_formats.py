@@ -112,7 +112,7 @@ def test_encodings_of_other_programs(tmp_path, how):
 
 def test_a_file_without_a_line_of_names(tmp_path):
     file = written(tmp_path, table(head=""))
-    with pytest.raises(RecordingError, match="name all 2 columns.*--columns time_s,angle_rad"):
+    with pytest.raises(RecordingError, match="all 2 columns.*--columns time_s"):
         read_recordings(file)
     (run,) = read_recordings(file, columns=["time_s", "angle_rad"])
     assert is_the_table(run)
