@@ -1,4 +1,4 @@
-"""Accelerations, gaps and contact forces of a problem, in numpy alone."""
+"""Compute accelerations, gaps and contact forces of a problem with numpy only."""
 
 import itertools
 
@@ -8,7 +8,7 @@ from ._attack_systems import Problem
 
 
 class Dynamics:
-    """The functions of one problem; `y` holds positions, then velocities."""
+    """The functions of one problem; `y` contains positions, then velocities."""
 
     def __init__(self, problem: Problem):
         self.problem = problem
@@ -19,7 +19,7 @@ class Dynamics:
         self.coupling = problem.normals @ self.across
 
     def acceleration(self, t, y):
-        """Of the coordinates, in free flight."""
+        """Accelerations of the coordinates in free flight."""
         p, d = self.problem, self.d
         q, v = y[:d], y[d:]
         away = (t - p.kick_time) / p.kick_width
@@ -65,7 +65,7 @@ class Dynamics:
         return self.problem.normals @ self.acceleration(t, y) - self.walls(t)[2]
 
     def pressure(self, t, y, held):
-        """Contact forces at the gaps `held`: positive while they press."""
+        """Contact forces at the gaps `held`; positive if compressive."""
         rows = list(held)
         return np.linalg.solve(
             self.coupling[np.ix_(rows, rows)], -self.pull(t, y)[rows]
@@ -96,7 +96,7 @@ class Dynamics:
         return rate, jerk, n @ rate[self.d :] - bend, n @ jerk - rise
 
     def restitution(self, k, velocity):
-        """Of gap `k`, hit with a normal velocity below zero."""
+        """Coefficient of restitution of gap `k` at a negative normal velocity."""
         p = self.problem
         return p.restitution[k] * np.exp(p.softening[k] * velocity)
 
@@ -108,10 +108,10 @@ class Dynamics:
         return after
 
     def held_of(self, t, y, closed):
-        """Which of the gaps `closed`, all without normal velocity, stay in contact.
+        """Which of the gaps `closed`, all with zero normal velocity, stay in contact.
 
-        The set whose contact forces press while the other gaps are pulled open; `None`
-        where no set does so beyond rounding.
+        It is the set with compressive contact forces for which the other gaps open;
+        `None` if there is no such set beyond rounding.
         """
         closed = tuple(sorted(closed))
         for size in range(len(closed), -1, -1):

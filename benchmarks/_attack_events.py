@@ -1,4 +1,4 @@
-"""Events of two runs side by side: which belong together, and which are alone."""
+"""Match the events of two runs."""
 
 from typing import NamedTuple
 
@@ -8,8 +8,8 @@ import numpy as np
 class Events(NamedTuple):
     """Impacts and contacts of a run, in time units of the problem.
 
-    Impacts of a sequence that ends in contact are listed as far as the run follows
-    them: `sequences` are the times (first, last) in which the others lie.
+    The impacts of a sequence that ends in contact are listed as far as the run resolves
+    them: `sequences` are the time intervals (first, last) of the others.
     """
 
     # (k, 2): time, constraint
@@ -27,7 +27,7 @@ class Mismatch(NamedTuple):
 
 
 def outside(impacts: np.ndarray, sequences, room: float) -> np.ndarray:
-    """The impacts that lie in none of the sequences, which are open at their start."""
+    """The impacts outside all sequences, which exclude their start."""
     keep = np.ones(len(impacts), bool)
     for first, last in sequences:
         keep &= ~((impacts[:, 0] > first + room) & (impacts[:, 0] <= last + room))
@@ -35,7 +35,7 @@ def outside(impacts: np.ndarray, sequences, room: float) -> np.ndarray:
 
 
 def listed(events: Events, other: Events, room: float) -> np.ndarray:
-    """The impacts of a run that the other has to have, too."""
+    """The impacts of a run that the other run must also have."""
     both = [*events.sequences, *other.sequences]
     return outside(events.impacts, both, room)
 

@@ -1,8 +1,9 @@
-"""Impacts in ever shorter succession, one by one, to the contact that they end in.
+"""Follow impacts in ever shorter succession, one by one, until contact.
 
-Hops too low for an integrator are followed with Taylor series of the full state, to the
-third power of their length; gaps and normal velocities are carried by themselves, so
-that the rounding of positions does not matter. A hop of length s errs by about s^4.
+Flights too low for an integrator are followed with Taylor series of the full state, to
+the third power of their length; gaps and normal velocities are integrated separately,
+so that the rounding of positions does not matter. A flight of duration s has an error
+of about s^4.
 """
 
 from typing import NamedTuple
@@ -22,7 +23,7 @@ _MOST = 30_000
 
 
 class Rest(NamedTuple):
-    """Where a sequence of low hops ends."""
+    """The end of a sequence of low flights."""
 
     time: float
     state: np.ndarray
@@ -34,7 +35,7 @@ class Rest(NamedTuple):
 
 
 def is_low(dynamics, t, y, k, rebound, held) -> bool:
-    """Whether the hop after an impact at gap `k` is low enough to be followed here."""
+    """Whether the flight after an impact at gap `k` is low enough for this method."""
     _, _, pull, rise = dynamics.jets(t, y, held)
     a, j = pull[k], rise[k]
     low = a < 0 and rebound * rebound <= 2 * LOW * -a
@@ -101,7 +102,7 @@ def follow(dynamics, t, y, k, rebound, held) -> Rest:
 
 
 def _landing(gap, speed, pull, rise):
-    """When g + v s + a s^2/2 + j s^3/6 next falls to zero; infinity if it does not."""
+    """The next zero of g + v s + a s^2/2 + j s^3/6; infinity if there is none."""
     if gap <= 0:
         if speed < 0 or (speed == 0 and pull < 0):
             return 0.0

@@ -33,7 +33,7 @@ class Run(NamedTuple):
 
 
 def simulated(problem: Problem, sampled: bool = True, **options) -> Run:
-    """Run jaxcam, and put what it finds in units of the problem."""
+    """Run jaxcam, and convert the result to units of the problem."""
     system, state, t0, t1 = stated(problem)
     found = jaxcam.simulate(system, state, t0, t1, **options)
     d = problem.mass.size
@@ -74,5 +74,5 @@ def simulated(problem: Problem, sampled: bool = True, **options) -> Run:
 
 
 def depths(speeds, pulls) -> np.ndarray:
-    """How far a gap moves while `pulls` take away the normal velocities `speeds`."""
+    """The distance over which `pulls` stop the normal velocities `speeds`."""
     return speeds**2 / (2 * np.maximum(np.abs(pulls), _LEAST_PULL))

@@ -1,8 +1,8 @@
-"""The first thing that happens within one step of an integrator, found on a fine grid.
+"""Find the first event within one step of an integrator, on a fine grid.
 
-Between two points of the grid a gap is taken to turn at most once. A turn from falling
-to rising is found as the root of the normal velocity, so a dip below zero between two
-points is not missed.
+A gap is assumed to have at most one extremum between two grid points. A minimum is
+found as a root of the normal velocity, so a dip below zero between two points is not
+missed.
 """
 
 from typing import NamedTuple
@@ -31,7 +31,7 @@ def first_event(dynamics, dense, begin, end, held, fresh, blind) -> Event | None
 
     **Arguments:** `dense(times)`, states in columns; the gaps `held` in contact; the
     gaps `fresh` that have left their surface at `begin` itself by an impact; the gaps
-    `blind` that a release has opened and that are not yet clear of the surface.
+    `blind` that opened by a release and are still near the surface.
     """
     times = np.linspace(begin, end, _PARTS + 1)
     states = dense(times)
@@ -56,7 +56,7 @@ def first_event(dynamics, dense, begin, end, held, fresh, blind) -> Event | None
 
 
 def _closing(dynamics, dense, times, gaps, speeds, k, fresh):
-    """The first root of gap `k`; the one that a fresh flight begins at is left out."""
+    """The first root of gap `k`, without the one at the start of a new flight."""
 
     def gap(t):
         return dynamics.gaps(np.array([t]), dense(np.array([t])))[0][0, k]
@@ -83,7 +83,7 @@ def _closing(dynamics, dense, times, gaps, speeds, k, fresh):
 
 
 def _letting_go(dynamics, dense, times, held, k):
-    """Where the contact force at gap `k` first vanishes."""
+    """The first zero of the contact force at gap `k`."""
     place = list(held).index(k)
 
     def force(t):
@@ -107,9 +107,9 @@ def _letting_go(dynamics, dense, times, held, k):
 
 
 def _root(function, a, b):
-    """Where a function falls through zero in [a, b]; an end that rounding puts there.
+    """The downward zero of a function in [a, b]; an end, if rounding places it there.
 
-    Many points at once are rounded otherwise than one, so a sign is looked at again.
+    Evaluation of many points at once rounds differently, so the sign is checked again.
     """
     if function(a) <= 0:
         return a
@@ -117,7 +117,7 @@ def _root(function, a, b):
 
 
 def _turns_low(values) -> bool:
-    """Whether a minimum is so near zero that it may lie below between the points."""
+    """Whether a minimum is so near zero that it may be negative between the points."""
     if len(values) < 3:
         return False
     before, middle, after = values[:-2], values[1:-1], values[2:]

@@ -1,8 +1,8 @@
-"""Random piecewise-smooth systems: what is drawn, and its statement for jaxcam.
+"""Generate random piecewise-smooth systems, and state them for jaxcam.
 
-A problem is drawn in units of its own, in which lengths and times are near one; its
-statement for jaxcam is in a length unit of 1e-6 to 1e6 m and a time unit of 1e-3 to
-1e3 s, and begins at a time of up to 1e4 s.
+A problem is generated in its own units, in which lengths and times are near one. Its
+statement for jaxcam has a length unit of 1e-6 to 1e6 m, a time unit of 1e-3 to 1e3 s,
+and a start time of up to 1e4 s.
 """
 
 import dataclasses
@@ -66,7 +66,7 @@ class Problem:
 
     @property
     def conservative(self) -> bool:
-        """Whether nothing but time-independent and dissipative forces act."""
+        """Whether only time-independent and dissipative forces act."""
         return not (self.kicked or np.any(self.drive) or np.any(self.wall))
 
     def in_plain_units(self) -> "Problem":
@@ -75,7 +75,7 @@ class Problem:
 
 
 def draw(seed: int) -> Problem:
-    """The problem of a seed; its shape goes round `SHAPES`."""
+    """The problem of a seed; its shape is taken cyclically from `SHAPES`."""
     rng = np.random.default_rng([24, seed])
     d, m = SHAPES[seed % len(SHAPES)]
 
@@ -135,7 +135,7 @@ def draw(seed: int) -> Problem:
 
 
 def _started(problem: Problem, rng) -> Problem:
-    """The problem with a start that no gap forbids."""
+    """The problem with an admissible initial state."""
     d, m = problem.mass.size, problem.offset.size
     kind = rng.choice(STARTS, p=[0.6, 0.15, 0.25])
     scale = 1.0
@@ -181,7 +181,7 @@ def settled(problem: Problem, state, closed, t: float) -> np.ndarray:
 
 
 class Attacked(jaxcam.HybridSystem):
-    """`Problem` as a reader of the package would state it, in SI units."""
+    """`Problem` as a user would state it, in SI units."""
 
     mass: jax.Array
     stiffness: jax.Array

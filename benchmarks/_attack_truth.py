@@ -1,6 +1,6 @@
-"""Motions with impacts, contacts and releases by an event loop of its own on DOP853.
+"""Simulate impacts, contacts and releases with an independent event loop on DOP853.
 
-Nothing of jaxcam is used. Events are roots on the dense output of each step
+It does not use jaxcam. Events are roots on the dense output of each step
 (`_attack_search`), impact laws are applied to the state there, contact is integrated
 with its contact forces, and sequences of impacts are followed hop by hop
 (`_attack_rest`).
@@ -32,7 +32,7 @@ class Impact(NamedTuple):
 
 
 class Truth(NamedTuple):
-    """A motion, as far as it is known."""
+    """A motion, up to the time at which it is known."""
 
     impacts: list[Impact]
     # [start, end, constraint]; the end of one that lasts is infinite
@@ -149,7 +149,7 @@ class _Loop:
         self.t, self.y, self.fresh = solver.t, solver.y, set()
 
     def _arm(self, dense, a, b):
-        """Gaps clear of the surface are judged again; False where one comes back."""
+        """Check gaps that are clear of the surface again; False if one returns."""
         gaps, speeds = self.dynamics.closing(b, dense(b))
         self.unarmed = {k for k in self.unarmed if gaps[k] < CLEAR}
         if any(speeds[k] < 0 or gaps[k] < -CLEAR for k in self.unarmed):
@@ -169,7 +169,7 @@ class _Loop:
                 self.reason = "two releases at once"
 
     def _impact(self, k):
-        """An impact, those that follow in no time, and the rest of a sequence."""
+        """An impact, simultaneous ones, and the rest of a sequence."""
         dynamics, t = self.dynamics, self.t
         gap, speeds = dynamics.closing(t, self.y)
         if speeds[k] > -_GRAZE:
@@ -226,7 +226,7 @@ class _Loop:
         self.sequences.append((begin, self.t, frozenset(rest.held)))
 
     def _settle(self, closed, already=()):
-        """Contact at closed gaps without normal velocity."""
+        """Contact at closed gaps with zero normal velocity."""
         self.y = settled(self.problem, self.y, closed, self.t)
         held = self.dynamics.held_of(self.t, self.y, closed)
         if held is None:

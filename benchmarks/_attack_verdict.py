@@ -1,11 +1,11 @@
-"""Whether jaxcam's run of a problem is the true motion, as far as that is known.
+"""Decide whether jaxcam's run of a problem agrees with the reference motion.
 
-The true motion is run three times: as stated, and twice from a start moved by about
-1e-8, at a time moved alike. How far these come apart says by how much any run may be
-wrong, and where their events differ the comparison ends: a graze, or growth beyond
-1e-5, is nobody's error. Damping may shrink the move before it grows again, but an error
-made in between grows in full: it is taken as 1e-8, some hundred steps of the
-default tolerance, times the growth since the smallest distance so far.
+The reference motion is computed three times: as stated, and twice with initial state
+and time shifted by about 1e-8. The differences between them give the permitted error of
+a run. The comparison ends where their events differ: grazing, or growth beyond 1e-5, is
+not an error. Damping may reduce the shift before it grows again, but an error made in
+between grows in full. It is assumed to be 1e-8, about a hundred steps of the default
+tolerance, times the growth since the smallest distance so far.
 """
 
 import dataclasses
@@ -41,7 +41,7 @@ _TIMES, _HITS = 3, 20
 
 
 class Verdict(NamedTuple):
-    """What came of one problem."""
+    """The result of one problem."""
 
     # in order: "agrees", "grazes", and "refuses" as docs/limits.md says; not in order:
     # "DISAGREES" and "MISBLAMES"
@@ -53,7 +53,7 @@ class Verdict(NamedTuple):
 
 
 class Known(NamedTuple):
-    """The true motion, up to where it is compared, and what may be wrong there."""
+    """The reference motion, the end of the comparison, and the permitted errors."""
 
     truth: Truth
     end: float
@@ -62,12 +62,12 @@ class Known(NamedTuple):
     allowed: np.ndarray
 
     def room(self, t: float) -> float:
-        """By how much a run may be wrong at a time."""
+        """The permitted error of a run at a time."""
         return float(self.allowed[np.searchsorted(self.times, t, side="right") - 1])
 
 
 def know(problem: Problem) -> Known:
-    """The true motion, and how far it is known."""
+    """The reference motion, and the time up to which it is known."""
     truth = motion(problem, problem.state, 0.0, problem.span)
     if not truth.pieces:
         return Known(truth, 0.0, np.zeros(1), np.array([_FLOOR]))
@@ -152,7 +152,7 @@ def judge(problem: Problem, known: Known, **options) -> Verdict:
 
 
 def _moved(problem, shift, rng) -> np.ndarray:
-    """The start moved by some 1e-8, still on the surfaces that it was on."""
+    """The initial state shifted by about 1e-8, on the same surfaces."""
     state = problem.state + _MOVED * rng.normal(size=problem.state.size)
     closed = np.flatnonzero(gaps_of(problem, 0.0, problem.state) < 1e-9)
     if problem.resting:
@@ -211,7 +211,7 @@ def _differ(known: Known, run: Run, end: float) -> Mismatch | None:
 
 
 def _grazes(known: Known, run: Run, mismatch: Mismatch) -> bool:
-    """Whether the impact that only one has is within the tolerance of a graze."""
+    """Whether an impact that only one run has is grazing within the tolerance."""
     room = known.room(min(mismatch.time, known.end))
     hits = [i for i in known.truth.impacts if abs(i.time - mismatch.time) <= 1e-6]
     speeds, pulls = ([i[k] for i in hits] for k in (2, 3))
@@ -223,9 +223,9 @@ def _grazes(known: Known, run: Run, mismatch: Mismatch) -> bool:
 
 
 def _accumulates(run: Run) -> bool:
-    """Whether impacts on two gaps at least crowd before the end of a run.
+    """Whether impacts on at least two gaps accumulate before the end of a run.
 
-    A few of them in no time, as in a corner, are no accumulation.
+    A few simultaneous impacts, as in a corner, are not an accumulation.
     """
     late = run.events.impacts[run.events.impacts[:, 0] >= run.end - _NEAR]
     crowded = 0
@@ -236,7 +236,9 @@ def _accumulates(run: Run) -> bool:
 
 
 def _invariant(problem: Problem, run: Run) -> str:
-    """What no motion may do, however chaotic it is; an empty string if all holds."""
+    """A violated condition that holds for every motion; an empty string if none is
+    violated.
+    """
     if not np.all(np.isfinite(run.states)):
         return "a state is not finite"
     d = problem.mass.size
@@ -273,7 +275,7 @@ def _energy(problem: Problem, states) -> np.ndarray:
 
 
 def _situation(known: Known, run: Run) -> str:
-    """What the true motion does where the run stopped."""
+    """The event of the reference motion at the time where the run stopped."""
     t, truth, near = run.end, known.truth, 1e-3
     for first, last, which in truth.sequences:
         if first - near <= t <= last + near:

@@ -1,6 +1,6 @@
-"""Physics without a name, to be hidden in the rigs of `_own_rig_makers.py`.
+"""Unnamed physics for the rigs of `_own_rig_makers.py`.
 
-Each effect is stated in shares of what the rig does without it: `u` is the first
+Each effect is stated relative to the motion of the rig without it: `u` is the first
 coordinate, from -1 to 1 over its range, `w` its velocity in units of its largest one,
 `phi` the drive's angle, `t` the share of the record that has passed, and `s` the
 approach speed in units of the largest one.
@@ -13,7 +13,7 @@ import numpy as np
 
 
 class Effect(NamedTuple):
-    """Something that a textbook model leaves out.
+    """An effect that a textbook model lacks.
 
     - `kind` and `arguments`, as a verdict states them.
     - `value(u, w, phi, t, s)`: for a force, in units of the rig's own acceleration; for
@@ -43,13 +43,15 @@ def _spring_and_damper(own, u, rate, hertz):
 
 
 def _hysteresis(own, u, rate, hertz):
-    """Bouc and Wen's law; yields within a quarter of the range."""
+    """The law of Bouc and Wen; it yields within a quarter of the range."""
     z = own[0]
     return (4 * rate - 2 * (abs(rate) * z * abs(z) + rate * z * z),)
 
 
 def _resonance(own, u, rate, hertz):
-    """A lightly damped oscillator of 3.7 times that rate, driven by the deflection."""
+    """A lightly damped oscillator with 3.7 times that frequency, driven by the
+    deflection.
+    """
     w = 2 * np.pi * 3.7 * hertz
     return (own[1], w * w * (u - own[0]) - 0.08 * w * own[1])
 
@@ -183,7 +185,7 @@ EFFECTS = {
 
 
 class Scales(NamedTuple):
-    """The motion of a rig without an effect, which effects are stated in."""
+    """The motion of a rig without an effect, which defines the units of effects."""
 
     middle: float
     reach: float
@@ -202,7 +204,9 @@ class Hidden(NamedTuple):
     scales: Scales
 
     def at(self, x, v, phi, t, s=0.0):
-        """The value that a verdict should state, apart from what the rig may do."""
+        """The value that a verdict should state, without the part that the rig
+        parameters can represent.
+        """
         scales, effect = self.scales, self.effect
         unit = {"force": scales.acceleration, "resonance": scales.acceleration}
         unit |= {"surface": scales.noise, "sensor": scales.noise}

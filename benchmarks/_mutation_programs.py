@@ -1,4 +1,5 @@
-"""A digest of the programs that jaxcam makes of a few systems, without compiling them.
+"""Compute a hash of the programs that jaxcam generates for some systems, without
+compiling them.
 
 A change of the source that changes no program changes nothing for these systems.
 """
@@ -26,7 +27,7 @@ _CHAIN |= dict(restitution=0.6, stiffness=1.0, damping=0.1)
 
 
 def digest() -> str:
-    """Of runs forward and in reverse, with samples between the steps."""
+    """Hash the programs of forward and reverse runs, with samples between the steps."""
     walls = parameters(gravity=9.81, width=1.0, restitution=0.8)
     cases = (
         (BouncingBall(amplitude=0.02, frequency=31.0), 2),

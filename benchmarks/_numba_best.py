@@ -1,4 +1,4 @@
-"""A1: the best scalar loop found, compiled with numba.
+"""A1: the fastest scalar loop found, compiled with numba.
 
 * Steps of order 8: the tableau is `diffrax.Dopri8`'s, so that both sides of the
   comparison use one method. The free follower is q'' = f(q), so stage velocities drop

@@ -1,4 +1,5 @@
-"""Lyapunov exponents of the forced oscillator, one lane after the other, in numba.
+"""Lyapunov exponents of the forced oscillator in numba, one batch element after the
+other.
 
 Dormand and Prince's pair of order 5 with step control on the state and its two
 deviations together, impacts by Newton's method on the length of the step, saltation

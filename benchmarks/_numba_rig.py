@@ -1,6 +1,6 @@
-"""A cam-follower rig with everything that a model may lack: a scalar loop in numba.
+"""Simulate a cam-follower rig with all effects that a model may lack, in numba.
 
-It shares nothing with `jaxcam.hybrid`: Runge-Kutta steps between samples, impacts by
+It shares no code with `jaxcam.hybrid`: Runge-Kutta steps between samples, impacts by
 bisection, contact as the surface itself until the free acceleration lifts off.
 """
 
@@ -19,7 +19,7 @@ _ROUNDING = 1e-13
 
 @dataclasses.dataclass(frozen=True)
 class Hidden:
-    """What is at work beside the textbook's physics; units as in `jaxcam.discrepancy`.
+    """Effects in addition to the textbook physics; units as in `jaxcam.discrepancy`.
 
     The last ones are in no list of names: `imbalance` (rad/s^2) the weight of the arm,
     `fading` (1/s) a restitution that falls with time, `step` (rad/s^2) a force in half

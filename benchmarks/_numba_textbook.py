@@ -1,4 +1,4 @@
-"""A0: the scalar loop one finds in textbooks, compiled with numba.
+"""A0: the usual scalar loop of textbooks, compiled with numba.
 
 Adaptive Dormand-Prince 5(4), first same as last, Newton's iteration on the length of
 the step at an impact, and the cam and the spring as printed, (4.9) and (4.23), with
@@ -40,7 +40,7 @@ def _spring(q):
 
 @njit(inline="always")
 def _spring_slope(q):
-    """Derivative of the angular acceleration by the angle."""
+    """Derivative of the angular acceleration with respect to the angle."""
     s, c = math.sin(q), math.cos(q)
     stretch = SPRING_X * s / c + HALF_HEIGHT / c - SPRING_REACH
     first = (SPRING_X + HALF_HEIGHT * s) / (c * c)
@@ -57,7 +57,9 @@ def _contact(theta):
 
 @njit(inline="always")
 def _contact_derivatives(theta):
-    """First three derivatives of (4.23) by the cam angle, through p = x^2 + y^2."""
+    """First three derivatives of (4.23) with respect to the cam angle, through p = x^2
+    + y^2.
+    """
     s, c = math.sin(theta), math.cos(theta)
     p = X0 * X0 + Y0 * Y0 + ECC * ECC + 2 * ECC * (X0 * c + Y0 * s)
     p1 = 2 * ECC * (Y0 * c - X0 * s)

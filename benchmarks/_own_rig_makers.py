@@ -1,6 +1,6 @@
-"""Recordings of the rigs in `docs/rigs`, by a simulator that shares nothing with ours.
+"""Simulate recordings of the rigs in `docs/rigs`, without code of the package.
 
-Each rig is written down again as plain functions of numbers, and flown by scipy's
+Each rig is defined again as plain functions of numbers, and integrated by scipy's
 DOP853 from impact to impact.
 """
 
@@ -23,7 +23,7 @@ _CHATTER = 2e-3
 
 
 class Maker(NamedTuple):
-    """How a rig moves.
+    """The motion of a rig.
 
     - `field(p, x, phi, w, u)`: rate of change of the state, of the drive's angle and
         rate, or an input.
@@ -43,7 +43,7 @@ class Maker(NamedTuple):
 
 
 class Accumulates(Exception):
-    """Impacts come ever closer together: not what these rigs are tested with."""
+    """Impacts accumulate, which the tests of these rigs exclude."""
 
 
 def _two_stops(p, x, phi, w, u):
@@ -151,7 +151,7 @@ def made_case(
     records: int = 4,
     speeds: tuple[float, float] | None = None,
 ) -> list[tuple[Recording, Motion]]:
-    """Recordings with an effect hidden in them, and the motions that they show.
+    """Recordings with a hidden effect, and the underlying motions.
 
     `speeds`: least and largest, in the place of the rig's own.
     """
@@ -227,7 +227,7 @@ def _measured(maker, setup, motion, rng, hidden) -> dict[str, np.ndarray]:
 
 
 class _Flight:
-    """A rig with what is hidden in it, on the way from impact to impact.
+    """A rig with its hidden effect, integrated from impact to impact.
 
     `begin` is when the record begins. The states of an effect come after the rig's own.
     """

@@ -1,12 +1,12 @@
-"""The rival of the fit: scipy's least squares around `solve_ivp`, impacts included.
+"""The baseline for the fit: scipy's least squares around `solve_ivp`, with impacts.
 
-As one would write it: a record is cut into windows of about a turn, each with a
-state of its own in the middle of a long flight; flights are `solve_ivp` with a
-terminal event, restarted at impacts; chatter ends at rest and rest at release.
-Parameters and states are freed together, by finite differences. It is given what helps
-it: a sparse pattern, so that all states cost two columns of differences, steps well
-above the error of the integration, the drive as its encoder says, and the tolerances as
-a prior. It does not ask that one window begins where the last one ended.
+As one would write it: a record is cut into windows of about a turn, each with a state
+of its own in the middle of a long flight; flights are `solve_ivp` with a terminal
+event, restarted at impacts; chatter ends at rest and rest at release. Parameters and
+states are freed together, by finite differences. It has several advantages: a sparse
+pattern, so that all states cost two columns of differences, steps well above the error
+of the integration, the drive as its encoder says, and the tolerances as a prior. It
+does not require that a window begins at the end of the previous one.
 """
 
 import dataclasses
@@ -93,7 +93,7 @@ def predict(window: Window, state, values, rate: float, half: float) -> np.ndarr
         return angle, speed * slope
 
     def pull(t, x):
-        """How fast the follower falls back on the cam (rad/s^2)."""
+        """Acceleration of the follower towards the cam (rad/s^2)."""
         h = 1e-5
         bend = (surface(t + h)[1] - surface(t - h)[1]) / (2 * h)
         return bend - acceleration(x)
@@ -158,7 +158,7 @@ def predict(window: Window, state, values, rate: float, half: float) -> np.ndarr
 
 @dataclasses.dataclass(frozen=True)
 class Rival:
-    """What it took: CPU in all, and of one iteration (a step and its differences)."""
+    """CPU time in total, and of one iteration (a step and its differences)."""
 
     seconds: float
     iterations: int

@@ -1,4 +1,4 @@
-"""Timing several callables fairly: one pinned core, interleaved runs, minimum CPU time.
+"""Time several callables: one pinned core, interleaved runs, minimum CPU time.
 
 Other work on the machine only ever adds time, so the minimum over interleaved runs is
 the steadiest estimate. CPU time counts every thread of the process; on one pinned core

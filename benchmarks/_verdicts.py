@@ -1,4 +1,4 @@
-"""Hidden cases, and verdicts on them that outlive an interrupted run."""
+"""Hidden cases, and verdicts on them that survive an interrupted run."""
 
 import json
 import math
@@ -42,7 +42,7 @@ class Kept:
         self._known = {key(one): one for one in map(json.loads, lines)}
 
     def get(self, case, judge: Callable, said: Callable[[dict], str]) -> dict:
-        """The verdict on a case, from `judge()` where it is not known; then said."""
+        """The verdict on a case, stored or from `judge()`; it is printed."""
         if case not in self._known:
             one = judge()
             self._known[self._key(one)] = one

@@ -1,4 +1,4 @@
-"""Random systems with impacts, simulated and compared with an event loop of scipy.
+"""Simulate random systems with impacts, and compare them with a scipy event loop.
 
     python -m benchmarks.attack --systems 1000
     python -m benchmarks.attack --seed 17
@@ -6,9 +6,9 @@
 Systems of one to three coordinates and one to three gaps: springs, damping, gyroscopic
 coupling, harmonic and narrow forces, moving walls, oblique normals, restitution that
 falls with speed, rest and release, in length units of 1e-6 to 1e6, time units of 1e-3
-to 1e3 s, from times of up to 1e4 s. Prints every system that does not agree, with the
-seed that repeats it, and a table. Exit code 1 where one disagrees, or is refused for
-another reason than docs/limits.md has for a system that is in order.
+to 1e3 s, from times of up to 1e4 s. It prints every system that disagrees, with its
+seed, and a table. The exit code is 1 if one disagrees, or is rejected for a reason that
+is not in docs/limits.md.
 """
 
 import argparse

@@ -1,9 +1,9 @@
-"""Cost of a point on a branch: ours, one by one and in a batch, and AUTO-07p's.
+"""Measure the cost of a point on a branch: jaxcam, alone and in a batch, and AUTO-07p.
 
     python -m benchmarks.continuation
 
 One pinned core, float64, minimum CPU time of interleaved runs after one that compiles.
-AUTO-07p (`auto`, Debian package auto-07p) is run beside it where it is installed.
+AUTO-07p (`auto`, Debian package auto-07p) is run for comparison if it is installed.
 """
 
 import os
@@ -77,7 +77,7 @@ RL0=-3.0, RL1=3.0
 
 
 def singles() -> None:
-    """Milliseconds a point, special points and their location included."""
+    """Milliseconds per point, including the location of special points."""
     equilibria = continuation.Equilibrium(cusp, {"a": 2.0, "b": -1.0})
     points = continuation.FixedPoint(henon, {"a": 0.0, "b": 0.5})
     one = continuation.branch(equilibria, [-1.5], a, (-3, 3), direction=-1)

@@ -1,16 +1,16 @@
-"""Do the 95 % intervals hold the truth in 95 % of all cases?
+"""Measure how often the 95 % intervals contain the true values.
 
 Rigs drawn at random from the box of tolerances, simulated by a scalar Runge-Kutta loop
 that shares nothing with the fit, recorded through noisy encoders at three noise levels,
-cut, and fitted. Prints, for each level and parameter: the share of intervals with the
-truth in them, the mean error in standard errors (bias), and the spread of the errors in
-standard errors; and what the residuals are left with. What the data do not see is left
-to the tolerances, so that only another rig is another case there: many rigs tell more
+cut, and fitted. Prints, for each level and parameter: the share of intervals that
+contain the true value, the mean error (bias) and the spread of the errors in standard
+errors; and the residuals. Parameters that the data do not determine depend on the
+tolerances, so only another rig is an independent case: many rigs are more informative
 than many draws of the noise.
 
-The bias has two parts: which rigs were drawn, which a linear model without noise has
-too, and the rest, which is the fit's own. Both are printed with their errors, from the
-scatter between rigs: fits of one rig are not independent.
+The bias has two parts: one from the choice of rigs, which a linear model without noise
+also has, and the rest, which is due to the fit. Both are printed with their errors,
+from the scatter between rigs: fits of one rig are not independent.
 
 `--mirror` fits every rig together with the one on the other side of the nominal values,
 and every draw of the noise with its negative. Each is as likely as the other, so the
@@ -18,10 +18,10 @@ mean error is what it was, while all that is linear in tolerances and noise canc
 bias is then known several times better than from as many independent fits.
 
 `--truth normal` draws the rigs from the Gaussian by which the fit knows a tolerance;
-the difference to `box` is what the shape of the box does. `--profile` asks of some
-parameters whether the interval of the profile likelihood holds the truth. The last line
-is the share of cases in which all parameters together are inside the 95 % ellipsoid,
-and inside the region that the cost itself bounds.
+the difference to `box` is what the shape of the box does. `--profile` checks for some
+parameters whether the interval of the profile likelihood contains the true value. The
+last line is the share of cases in which all parameters together are inside the 95 %
+ellipsoid, and inside the region that the cost itself bounds.
 
     python benchmarks/coverage.py --rigs 20 --draws 5
     python benchmarks/coverage.py --rigs 100 --draws 1 --levels 1
@@ -72,7 +72,7 @@ def both_sides(rng, mirror: bool):
 
 
 def random_rig(nominal, rng, shape: str = "box") -> RealRig:
-    """A rig anywhere in the tolerances, without the hinge's friction."""
+    """A random rig within the tolerances, without friction of the hinge."""
 
     def draw(quantity):
         if shape == "normal":

@@ -1,4 +1,4 @@
-"""Time of a fit, beside scipy's least squares around solve_ivp with differences.
+"""Measure the time of a fit, compared with scipy's least squares around solve_ivp.
 
 Both start at the nominal rig and fit the same ten parameters to the same records, with
 impacts, chatter and rest (`_scipy_fit.py`). The rival is run on a few turns until it

@@ -1,4 +1,4 @@
-"""Cases like those that a user brings: is what was hidden named, and nothing else?
+"""Count right verdicts on random cases: is only the hidden effect named?
 
 Rigs anywhere in the box of tolerances, six records of four seconds at random speeds,
 made by a scalar loop (`_numba_rig`) that shares nothing with the diagnosis. Of twenty
@@ -48,7 +48,7 @@ UNITS = {
 
 @dataclasses.dataclass(frozen=True)
 class Case:
-    """What is hidden, by the number in `Hidden`, and the records."""
+    """The hidden effects, by their number in `Hidden`, and the recordings."""
 
     names: tuple[str, ...]
     level: float
@@ -57,7 +57,7 @@ class Case:
 
 
 def draw(nominal, number: int) -> Case:
-    """A case that follows from its number alone."""
+    """A case, determined by its number."""
     rng = np.random.default_rng([2026, number])
     many = rng.choice([0, 1, 2], p=[0.15, 0.65, 0.2])
     names = tuple(str(name) for name in rng.choice(list(UNITS), many, replace=False))
@@ -73,7 +73,7 @@ def draw(nominal, number: int) -> Case:
 
 
 def judged(nominal, number: int) -> dict:
-    """The verdict on one case beside the truth."""
+    """The verdict on one case, with the truth."""
     case = draw(nominal, number)
     begun, cpu = time.time(), time.process_time()
     found = diagnose(nominal, case.records)
@@ -92,7 +92,7 @@ def judged(nominal, number: int) -> dict:
 
 
 def _sizes(case: Case, found: Diagnosis) -> dict:
-    """Of each term that is there and was named: true strength, strength, error."""
+    """True strength, strength and error of each named true term."""
     sizes = {}
     for effect in found.effects:
         if effect.name in case.names:

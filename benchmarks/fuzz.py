@@ -1,4 +1,4 @@
-"""Hostile files and command lines, for as long as is wanted.
+"""Test hostile files and command lines for a given time.
 
     python -m benchmarks.fuzz --minutes 20
     python -m benchmarks.fuzz --minutes 2 --only tables --seed 7

@@ -1,4 +1,4 @@
-"""What each pass of `jaxcam.hybrid.lowering` gains: the same motions without it.
+"""Measure the gain of each pass of `jaxcam.hybrid.lowering`.
 
     python -m benchmarks.lowering
 

@@ -1,4 +1,4 @@
-"""Lyapunov spectra of many parameter values beside a scalar numba loop, in one run.
+"""Compare the speed of Lyapunov spectra with that of a scalar numba loop.
 
     python -m benchmarks.lyapunov                 # 1000 values, 2000 turns
     python -m benchmarks.lyapunov --lanes 128 --turns 200
@@ -28,7 +28,7 @@ FAST = Settings(tolerance=1e-9, chatter_depth=1.0)
 
 
 def main(lanes: int = 1000, turns: int = 2000, repeats: int = 3) -> None:
-    """Print both speeds, and how far the exponents agree."""
+    """Print both speeds, and the agreement of the exponents."""
     omega = np.linspace(3.2, 3.9, lanes)
     system = ImpactOscillator(restitution=R, wall=WALL, damping=DAMPING)
 

@@ -1,4 +1,4 @@
-"""Do the tests of the event loop notice when a line of it is changed?
+"""Test whether the tests of the event loop detect a changed line.
 
     python -m benchmarks.mutation --mutants 300 --workers 2 --report mutants.jsonl
     python -m benchmarks.mutation --again mutants.jsonl --tests tests/test_motion_*.py

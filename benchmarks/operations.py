@@ -1,4 +1,4 @@
-"""What an attempt at a step is made of: operations on scalars, by what they are for.
+"""Count the scalar operations of an attempt at a step, by purpose.
 
     python -m benchmarks.operations
 

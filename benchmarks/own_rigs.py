@@ -1,8 +1,8 @@
-"""Rigs of a user's own with a known answer: are intervals and verdicts right?
+"""Test intervals and verdicts on user-defined rigs with known answers.
 
-Rigs of `docs/rigs` are drawn at random within their tolerances, simulated with nothing
-missing by code that shares nothing with ours, recorded through noisy sensors, and
-fitted: in how many cases does the 95 % interval of each parameter hold the truth? With
+Rigs of `docs/rigs` are drawn at random within their tolerances, simulated without
+missing physics by independent code, recorded through noisy sensors, and fitted: in how
+many cases does the 95 % interval of each parameter contain the true value? With
 `--diagnose` each case is diagnosed as well: how many verdicts are not `none`?
 
     python -m benchmarks.own_rigs two_stops --cases 100

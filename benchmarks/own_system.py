@@ -1,9 +1,10 @@
-"""A system of the reader's own beside a scalar numba loop written for it.
+"""Compare the speed of a user-defined system with that of a scalar numba loop.
 
     python -m benchmarks.own_system
 
-A forced pendulum that leans on a wall, described as in the README, from a grid of
-states. One pinned core, minimum CPU time of interleaved runs, tolerance 1e-9.
+The system is a forced pendulum that leans on a wall, described as in the README, with a
+grid of initial states. One pinned core, minimum CPU time of interleaved runs, tolerance
+1e-9.
 """
 
 from benchmarks import _timing

@@ -1,4 +1,4 @@
-"""How often is an effect named, by its strength, and how often where there is none?
+"""Measure how often an effect is named, by its strength, and how often falsely.
 
 Rigs drawn at random from the box of tolerances, one effect or none, three records of
 two seconds at random speeds, made by a scalar loop (`_numba_rig`) that shares nothing

@@ -1,7 +1,7 @@
-"""The score of the sealed cases: the verdicts of docs/sealed against the keys.
+"""Score the sealed cases: compare the verdicts of docs/sealed with the keys.
 
 The keys were published after the verdicts, with the SHA-256 announced before; the
-script refuses any other file. Prints a line of a table a case, and the score.
+script refuses any other file. It prints one table row per case, and the score.
 
     python -m benchmarks.sealed KEYS.json [--verdicts docs/sealed/verdicts.json]
 """
@@ -61,7 +61,8 @@ def right(truth: dict, verdict: dict) -> bool:
 
 
 def strengths(truth: dict, verdict: dict) -> list[tuple[str, float, float, float]]:
-    """Parameter, true value, found value and standard error, of what both name.
+    """Parameter, true value, found value and standard error of the effects that both
+    name.
 
     The keys do not tell the phase of a vibration.
     """

@@ -1,9 +1,9 @@
-"""Verdicts on cases whose keys are not known, in one file.
+"""Diagnose cases with unknown keys, and collect the verdicts in one file.
 
 A case is a folder with `rig.txt`, one word, and one CSV a record; a rig is a file of
-`docs/rigs`, or of `--rigs` for a cam-follower. Every verdict is kept as soon as it is
-there, so several of these commands may share the work, and one that was stopped goes
-on. The last one writes the file.
+`docs/rigs`, or of `--rigs` for a cam-follower. Every verdict is stored immediately, so
+several of these commands may share the work, and a stopped one can be resumed. The last
+one writes the file.
 
     python -m benchmarks.sealed_verdicts CASES --rigs RIGS --keep KEPT --out set2.json
 """

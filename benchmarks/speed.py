@@ -1,4 +1,4 @@
-"""Speed of the event loop beside scalar numba loops and scipy, in one run.
+"""Compare the speed of the event loop with scalar numba loops and scipy.
 
     python -m benchmarks.speed            # all parts, a table each
 
@@ -43,7 +43,7 @@ def ours(workload, block: int, settings=FAST):
 
 
 def batches(repeats: int, side: int) -> None:
-    """W1 and W2 on every side, and how far the samples agree."""
+    """W1 and W2 with every program, and the agreement of the samples."""
     for workload, block in (
         (_workloads.sweep(), 64),
         (_workloads.grid(side=side), 256),

@@ -1,4 +1,4 @@
-"""Sweeps beside the bare event loop: speed kept, steps wasted, memory, two cores.
+"""Compare sweeps with the bare event loop: speed, wasted steps, memory, two cores.
 
     python -m benchmarks.sweeps                      # all parts
     python -m benchmarks.sweeps --side 64 --largest 10000 --no-cluster
@@ -58,7 +58,7 @@ def swept_to(work):
 
 
 def kept(repeats: int, side: int) -> None:
-    """How much of the bare loop's speed is left, and how many steps are wasted."""
+    """Relative speed of the sweep, and the number of wasted steps."""
     system, grid, turns = rig(), states_at_145(side), 30
     states, lanes = grid.states(), side * side
     sweep = _workloads.sweep()
@@ -172,8 +172,8 @@ if __name__ == "__main__":
 def two_cores(side: int, repeats: int, on_cluster: bool) -> None:
     """Wall time on one core and on two, in a process that is not pinned.
 
-    XLA makes as many threads as it finds cores when it starts. The first line is what
-    the machine itself gives at the time; in brackets is each pair of runs.
+    XLA makes as many threads as it finds cores when it starts. The first line is the
+    speed-up of the machine itself; each pair of runs is in brackets.
     """
     with tempfile.TemporaryDirectory() as folder:
         script = Path(folder) / "two_cores.py"

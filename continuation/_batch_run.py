@@ -22,7 +22,7 @@ REASONS = (
     "the parameter is at its bound",
     "the step was halved down to the smallest and the corrector still failed, or the "
     "branch turned too sharply",
-    "as many points as were asked for",
+    "the requested number of points was reached",
     "the start is no solution, and Newton's method finds none near it",
 )
 

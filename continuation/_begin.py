@@ -65,7 +65,7 @@ def leave(
 def _oriented(
     problem: AbstractProblem, context: Context, at: Corrected, direction: int
 ) -> Corrected:
-    """Return the same point with its tangent in the direction asked for."""
+    """Return the same point with its tangent in the requested direction."""
     _, sizes, rows = np.linalg.svd(at.jacobian * at.scale[None, :])
     n = sizes.size
     null = rows[n:] if n == 0 else rows[np.append(sizes, 0) <= 1e-9 * sizes[0]]

@@ -44,7 +44,7 @@ def deflate(
     most: int = 16,
     max_iterations: int = 100,
 ) -> tuple[np.ndarray, ...]:
-    """Find further solutions besides the known ones, at the problem's parameters.
+    """Find solutions in addition to the known ones, at the parameters of the problem.
 
     Each solution found is divided out (Farrell, Birkisson and Funke, SIAM J. Sci.
     Comput. 37, 2015), so that Newton's method from the same guesses must end elsewhere

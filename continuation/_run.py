@@ -26,8 +26,8 @@ _HALVINGS = 2
 # the remainder of the square root in which they grow apart
 HALF = 1e-4
 JOINS = (
-    "the branch joins the orbits of half the period, at a flip of theirs; it goes on "
-    "as the same orbits half a period later"
+    "the branch rejoins the orbits of half the period at their flip; beyond it, it "
+    "repeats the same orbits, shifted by half a period"
 )
 
 

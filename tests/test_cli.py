@@ -181,7 +181,7 @@ def test_interrupted_run_says_so(monkeypatch):
         ("demo --case FOLDER/nowhere", "no such folder"),
         ("demo --case FOLDER", "no recording"),
         ("demo --case EMPTY --rig RIG", "empty"),
-        ("demo --case CUT --rig RIG", "cut short"),
+        ("demo --case CUT --rig RIG", "truncated"),
         ("demo --case DEGREES --rig RIG", "degrees"),
         ("demo --case GAPS --rig RIG", "--gaps split"),
         ("demo --case WHOLE", "--rig"),

@@ -155,7 +155,7 @@ def test_doubled_orbits_end_where_they_join_their_parent_again():
     left, right = trunk.of_kind("flip")
     for flip, other in ((left, right), (right, left)):
         (doubled,) = continuation.switch(flip, mu, (-1.0, 1.0))
-        assert doubled.reason.startswith("the branch joins the orbits of half the peri")
+        assert doubled.reason.startswith("the branch rejoins the orbits of half the")
         last = doubled.points[-1]
         assert last.parameter == pytest.approx(other.parameter, abs=1e-9)
         assert abs(last.state[0]) < 1e-9

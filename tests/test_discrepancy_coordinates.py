@@ -122,7 +122,7 @@ def test_a_field_without_coordinates_is_refused():
         def impact(self, t, state):
             return state
 
-    with pytest.raises(ValueError, match="has no coordinate.*State positions"):
+    with pytest.raises(ValueError, match="has no coordinate.*must contain positions"):
         coordinates(Decay(), np.ones(2))
 
 

@@ -171,7 +171,7 @@ def test_the_gain_of_a_placed_term_minds_the_signs_of_its_strengths():
 
 def test_a_place_is_looked_for_on_the_first_coordinate():
     elsewhere = dataclasses.replace(TERMS["stop_above"], coordinate=1)
-    with pytest.raises(ValueError, match="'stop_above' has places to start from"):
+    with pytest.raises(ValueError, match="'stop_above' defines `starts`"):
         by_listing((elsewhere,))
     terms, unlisted = by_listing(tuple(TERMS.values()))
     assert len(terms) == len(TERMS) and not unlisted

@@ -31,7 +31,7 @@ def _changed(runs, change):
         (lambda x: -x, "wrong sign"),
         (np.rad2deg, "degrees"),
         (lambda x: 0.0 * x + 0.3, "throughout"),
-        (lambda x: x + 0.9, "belong to this record"),
+        (lambda x: x + 0.9, "belong to this recording"),
     ],
 )
 def test_a_wrong_channel_is_named(runs, change, words):

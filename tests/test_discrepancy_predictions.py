@@ -74,5 +74,5 @@ def test_what_four_speeds_cannot_decide_is_refused():
     with pytest.raises(ValueError, match="four speeds and four errors"):
         event_causes(rig, [1.0, 2.0], [0.1, 0.1], terms, where, 0.1)
     several = [term for term in terms if len(term.strengths()) > 1]
-    with pytest.raises(ValueError, match="only terms of one strength"):
+    with pytest.raises(ValueError, match="only terms with one strength"):
         event_causes(rig, [1.0] * 4, [0.1] * 4, several, where, 0.1)

@@ -72,7 +72,7 @@ def test_interrupted_and_resumed(tmp_path):
 
     def stop(sentence, fraction):
         calls.append(sentence)
-        if sentence.startswith("redrawing"):
+        if sentence.startswith("drawing bootstrap"):
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):

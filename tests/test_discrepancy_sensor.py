@@ -121,8 +121,8 @@ def test_an_error_by_position_is_said_to_be_one_of_the_scale():
     wave = next(one for one in family.primitives if one.name == "wave")
     text, words = formula_of(family, wave, np.array([1e-3, 2.0, 0.5]), "sensor")
     assert text.startswith("0.001*cos(")
-    assert words.startswith("an error of the sensor that comes and goes")
-    assert "encoder off centre" in words
+    assert words.startswith("a sensor error that oscillates")
+    assert "eccentric encoder" in words
 
 
 def _nothing(time, turned, position):

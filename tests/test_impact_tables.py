@@ -150,10 +150,10 @@ def test_momentum_of_two_bodies(tmp_path):
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("before_m_s,after_m_s\n0,0.5\n1,0.8\n", "in row 1 nothing approaches"),
-        ("before_m_s,after_m_s\n-1,-0.5\n1,-0.8\n", "in row 1 the motion goes on"),
+        ("before_m_s,after_m_s\n0,0.5\n1,0.8\n", "in row 1 there is no approach"),
+        ("before_m_s,after_m_s\n-1,-0.5\n1,-0.8\n", "in row 1 the bodies pass through"),
         ("before_m_s,after_rad_s\n1,0.5\n1,0.8\n", "one unit"),
-        ("before_m_s,after_m_s\n1,x\n1,0.8\n", "`x` where a number"),
+        ("before_m_s,after_m_s\n1,x\n1,0.8\n", "`x` instead of a number"),
         ("before_m_s,other_m_s\n1,1\n1,0.8\n", "columns before_m_s and after_m_s"),
         (
             "before_m_s,after_m_s,after_stderr_m_s\n1,1,0\n1,1,1\n",
@@ -162,7 +162,7 @@ def test_momentum_of_two_bodies(tmp_path):
         (
             "before1_m_s,after1_m_s,before2_m_s,after2_m_s,mass1_kg\n1,0,0,1,2\n"
             "1,0,0,1,2\n",
-            "mass of one body only",
+            "mass of only one body",
         ),
         (
             "before1_m_s,after1_m_s,before2_m_s,after2_m_s,mass1_kg,mass2_kg\n"
@@ -208,8 +208,8 @@ def test_the_command(tmp_path):
     assert law["law"] == "falling" and law["delta_bic"]["falling"] < -10
     for words, said in (
         ([*names, "--out", str(tmp_path / "out")], "leave out --out"),
-        (["--columns", "a=b,c"], "pairs only"),
-        (["--columns", "v1=x*0"], "pairs only"),
+        (["--columns", "a=b,c"], "only pairs"),
+        (["--columns", "v1=x*0"], "only pairs"),
         (["--rate", "0"], "--rate is 0"),
         ([], "`time_s` is missing"),
     ):

@@ -316,7 +316,7 @@ def test_compare_recording_with_several_simulations_and_without_a_cam(recording)
     assert above.get_ylabel() == "height (m)"
     assert below.get_xlabel() == "time (s)"
     assert line(above, "recorded").get_xdata()[0] == 1.0
-    with pytest.raises(ValueError, match="sample it at `recording.time`"):
+    with pytest.raises(ValueError, match="sample them at `recording.time`"):
         plotting.compare_recording(fall, np.zeros(3), channel="height_m")
 
 

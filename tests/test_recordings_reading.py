@@ -128,7 +128,7 @@ def test_truncated_gz(tmp_path_factory, lost):
     raw = gzip.compress(text(columns()).encode())
     file = tmp_path_factory.mktemp("cut") / "run1_150.0rpm.csv.gz"
     file.write_bytes(raw[:-lost])
-    assert "cut short" in refusal(file)
+    assert "truncated" in refusal(file)
 
 
 @hypothesis.given(st.integers(2, 25))
@@ -227,5 +227,5 @@ def test_cases(tmp_path):
     with pytest.raises(RecordingError, match="this is a file"):
         read_case(written(tmp_path, text(columns())))
     (tmp_path / "cases" / "case1").mkdir(parents=True)
-    with pytest.raises(RecordingError, match=r"name one of its folders \(case1\)"):
+    with pytest.raises(RecordingError, match=r"give one of its folders \(case1\)"):
         read_case(tmp_path / "cases")

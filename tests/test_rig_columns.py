@@ -73,8 +73,8 @@ def test_constants_of_a_record_that_is_not_there(tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ("rate = 200", "rate = 0", "`rate` is 0, and must be a positive"),
-        ("rate = 200", 'rate = "fast"', "must be a positive number"),
+        ("rate = 200", "rate = 0", "`rate` is 0; give a positive"),
+        ("rate = 200", 'rate = "fast"', "give a positive number"),
         ("-0.8", "0", "`factor` in [columns.Y1] is zero"),
         ("factor", "scale", "unknown key `scale`"),
         ('channel = "height_mm", ', "", "has no `channel`"),

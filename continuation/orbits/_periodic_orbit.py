@@ -262,7 +262,7 @@ def _with_impacts_of(system, turn, number, t0, settings):
         )
     why = refuse(equations, u, system)
     if why is not None:
-        return None, f"what it converged to is no orbit: {why}"
+        return None, f"the limit of the iteration is not an orbit: {why}"
     state, time, length = _at(equations, u, system, t0)
     return _confirmed(system, state, time, length, settings)
 

@@ -1,5 +1,6 @@
-"""Basins of attraction over the position of a wall: fractions of the initial states
-that end on each attractor."""
+"""Fractions of the initial states that converge to each attractor, as a wall is
+moved.
+"""
 
 import matplotlib.pyplot as plt
 import numpy as np

@@ -1,5 +1,6 @@
-"""From impact to impact near the release point chatter is a map of one number; left of
-its unstable fixed point the chatter completes, right of it a last impact is lost."""
+"""Near the release point, chatter is a one-dimensional map from impact to impact: left
+of its unstable fixed point the chatter is complete, right of it the last impact is
+lost."""
 
 from jaxcam.plotting import lambda_cobweb
 

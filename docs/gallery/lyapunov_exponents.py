@@ -1,5 +1,5 @@
-"""Two Lyapunov exponents of a chaotic impact oscillator as they are averaged; one is
-positive, and bands are their standard errors."""
+"""Running averages of the two Lyapunov exponents of a chaotic impact oscillator: one is
+positive, and the bands are standard errors."""
 
 import variational
 from jaxcam.models import ImpactOscillator

@@ -1,7 +1,7 @@
-"""Draw the gallery: `python docs/gallery/make.py [NAME ...]`, all pictures by default.
+"""Draw the gallery: `python docs/gallery/make.py [NAME ...]`, all figures by default.
 
-Each script beside this file makes one `figure`; the first sentence of its docstring
-says what is seen. Here it becomes a light and a dark picture, and a part of
+Each script in this folder makes one `figure`; the first sentence of its docstring is
+the caption. This program writes a light and a dark picture of each, and
 `docs/gallery.md`.
 """
 
@@ -41,9 +41,9 @@ hide:
 
 # Gallery
 
-Each picture is made by a short script; a picture leads to its code. Run a script as it
-is, or change the system in it. All of them are drawn by `python docs/gallery/make.py`,
-in a light version and, by [`jaxcam.plotting.on_dark`][], in a dark one.
+Each figure links to the short script that draws it. Run a script unchanged, or change
+the system in it. The command `python docs/gallery/make.py` draws all figures in a light
+version and, with [`jaxcam.plotting.on_dark`][], in a dark one.
 
 <div class="grid cards" markdown>
 

@@ -1,5 +1,5 @@
 """The force that a model lacks, identified from a recording: a polynomial of the
-velocity is fitted together with the spring, here to a swing with air drag."""
+velocity is fitted together with the spring, in this case to a swing with air drag."""
 
 import jax
 import jax.numpy as jnp

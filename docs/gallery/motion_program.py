@@ -1,5 +1,5 @@
-"""A cam's program as handbooks draw it: a rise of modified sine, a dwell, and a return
-of constant acceleration, whose acceleration jumps."""
+"""A cam program as in handbooks: a modified-sine rise, a dwell, and a return with
+constant acceleration, whose acceleration jumps."""
 
 import numpy as np
 

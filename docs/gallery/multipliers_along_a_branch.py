@@ -1,5 +1,5 @@
 """The two Floquet multipliers along a branch: they enter the unit circle through +1 at
-a fold, follow the circle of radius r, and leave through –1 at a flip."""
+a fold, follow a circle of radius r, and leave through –1 at a flip."""
 
 import matplotlib.pyplot as plt
 import numpy as np

@@ -1,5 +1,5 @@
-"""Beyond a grazing bifurcation periods add up: towards the grazing at zero, windows of
-period 3, 4, 5, ... follow each other, with chaos between them."""
+"""Period adding beyond a grazing bifurcation: towards the grazing at zero, windows of
+period 3, 4, 5, ... follow each other, with chaos in between."""
 
 import matplotlib.pyplot as plt
 import numpy as np

@@ -1,5 +1,5 @@
-"""Each impact against the one before it, in a chaotic motion: phases lie on a few thin
-curves, so that one impact nearly determines the time of the next."""
+"""Phase of each impact against that of the previous one in a chaotic motion: the points
+lie on a few thin curves, so one impact nearly determines the time of the next."""
 
 import jaxcam
 from jaxcam.models import ImpactOscillator

@@ -1,5 +1,5 @@
-"""A small circle of initial states becomes an ellipse at an impact: dots are simulated,
-the line is the saltation matrix."""
+"""A small circle of initial states becomes an ellipse at an impact: the dots are
+simulated, and the line follows from the saltation matrix."""
 
 import jax
 import jax.numpy as jnp

@@ -1,5 +1,5 @@
-"""The follower of a cam at 140 rpm: it leaves the cam, chatter follows, and it stays in
-contact until the next cycle."""
+"""The follower of a cam at 140 rpm: it leaves the cam, chatters, and stays in contact
+until the next cycle."""
 
 import equinox as eqx
 import jax.numpy as jnp

@@ -1,5 +1,5 @@
-"""A mass between two walls: both gaps over time, each by its name, and the impacts on
-either side."""
+"""A mass between two walls: the two named gaps over time, and the impacts on either
+side."""
 
 from typing import ClassVar
 

@@ -1,5 +1,5 @@
-"""The force between a valve and its cam, at three speeds: where it would have to be
-negative the spring is too weak, and the valve floats."""
+"""The contact force between a valve and its cam at three speeds: where it would have to
+be tensile, the spring is too weak and the valve floats."""
 
 import equinox as eqx
 import jax.numpy as jnp

@@ -1,5 +1,5 @@
 """Infinitely many impacts in finite time: each step of the staircase is an impact, and
-the steps accumulate where the ball comes to rest."""
+the steps accumulate at the time at which the ball comes to rest."""
 
 import matplotlib.pyplot as plt
 import numpy as np

@@ -29,7 +29,7 @@ def basins(
     json_file: JsonFile = None,
     out: Annotated[
         Path | None,
-        typer.Option(metavar="DIR", help="Write the basins and their figure there."),
+        typer.Option(metavar="DIR", help="Write the basins and their figure to DIR."),
     ] = None,
     resume: Resume = False,
 ) -> None:
@@ -79,7 +79,7 @@ def basins(
     shares = made.shares
     output.print(_table(shares))
     listed = ", ".join(f"{name} {share.share:.2%}" for name, share in shares.items())
-    sentence = f"{system}: of {_count(made)} states that can start, {listed}."
+    sentence = f"{system}: of {_count(made)} admissible initial states, {listed}."
     output.print(sentence)
     output.print_figures(figures)
     output.write_json(

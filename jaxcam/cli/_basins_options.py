@@ -33,13 +33,16 @@ class Cells:
         int, typer.Option(metavar="N", help="Forcing periods per run.")
     ] = 100
     keep: Annotated[
-        int, typer.Option(metavar="N", help="Periods at the end that are compared.")
+        int, typer.Option(metavar="N", help="Final periods that are compared.")
     ] = 24
     reruns: Annotated[
         int,
         typer.Option(
             metavar="N",
-            help="Extensions of non-periodic runs, each to twice as many periods.",
+            help=(
+                "Number of times a non-periodic run is extended to twice the number "
+                "of periods."
+            ),
         ),
     ] = 1
 
@@ -57,11 +60,11 @@ class Cells:
         check_size("--shape and --keep", *(max(1, k) for k in cells), self.keep)
 
     def corners(self, system: str) -> tuple[tuple[float, ...], tuple[float, ...]]:
-        """Return the lowest and highest state; default those of the system."""
+        """Return the lowest and highest state; the default depends on the system."""
         box = _BOXES.get(system)
         if box is None and (self.low is None or self.high is None):
             raise ValueError(
-                f"{system} needs the corners of the grid: --low A,B --high A,B."
+                f"{system} has no default grid; give its corners: --low A,B --high A,B."
             )
         low, high = box or ((), ())
         if self.low is not None:

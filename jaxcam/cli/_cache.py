@@ -1,4 +1,4 @@
-"""Keep compiled programs on disk, so that a second run starts at once."""
+"""Keep compiled programs on disk, so that a second run starts immediately."""
 
 import os
 import warnings
@@ -7,8 +7,8 @@ import warnings
 def keep_compiled_programs() -> None:
     """Turn on JAX's compilation cache, in the user's cache folder.
 
-    A folder named by `JAX_COMPILATION_CACHE_DIR` is left as it is. If no folder is
-    writable there is no cache, and everything is compiled again.
+    A folder named by `JAX_COMPILATION_CACHE_DIR` takes precedence. If no folder is
+    writable, there is no cache, and everything is compiled again.
     """
     import jax
 
@@ -21,7 +21,7 @@ def keep_compiled_programs() -> None:
         except (OSError, RuntimeError):
             return
         jax.config.update("jax_compilation_cache_dir", str(folder))
-    # the many small programs between the large ones add up to seconds
+    # the many small programs take seconds in total
     jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
     jax.config.update("jax_persistent_cache_min_entry_size_bytes", -1)
     # an entry that cannot be read or written is compiled again, and nothing is lost

@@ -58,5 +58,7 @@ def _rig_file(folder: Path, rig: Path | None) -> Path:
         return rig
     file = folder / "rig.toml"
     if not file.is_file():
-        raise ValueError(f"{folder}: there is no rig.toml in it; name one with --rig.")
+        raise ValueError(
+            f"{folder} contains no rig.toml; give the rig file with --rig."
+        )
     return file

@@ -22,7 +22,7 @@ def numbers(
         found = ()
     if not found or (finite and not all(map(math.isfinite, found))):
         raise ValueError(
-            f"{option} is {text!r}; give numbers with commas between them, such as "
+            f"{option} is {text!r}; give numbers separated by commas, such as "
             f"{example}."
         )
     return found
@@ -39,7 +39,7 @@ def check_finite(option: str, value: float | None) -> None:
 
 
 def check_size(options: str, *counts: int) -> None:
-    """Reject a sweep that would not fit into memory, before it starts."""
+    """Reject a sweep that would not fit into memory."""
     if math.prod(counts) > _MOST:
         raise ValueError(
             f"{options} are {' times '.join(f'{float(c):.6g}' for c in counts)} "

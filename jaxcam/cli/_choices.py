@@ -30,7 +30,7 @@ SOLVERS = {
 }
 ENGINES = ("loop", "diffeqsolve")
 CAM = "cam-follower"
-# longer lists are cut
+# longer lists are shortened
 _LISTED = 20
 
 
@@ -47,7 +47,9 @@ def choose(option: str, name: str, known: Iterable[str]) -> str:
 
 
 def ready(name: str) -> Ready:
-    """Return the default start; for a user's system release, and ten periods."""
+    """Return the default start; for a user's system, the release point and ten
+    periods.
+    """
     return SYSTEMS.get(name, Ready(name, None, 10.0, 0.0))
 
 

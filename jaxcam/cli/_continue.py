@@ -28,7 +28,7 @@ def continue_(
     json_file: JsonFile = None,
     out: Annotated[
         Path | None,
-        typer.Option(metavar="DIR", help="Write the branch and its figure there."),
+        typer.Option(metavar="DIR", help="Write the branch and its figure to DIR."),
     ] = None,
     resume: Resume = False,
 ) -> None:
@@ -117,7 +117,7 @@ def _refuse_interrupted(path: Path) -> None:
         try:
             points = continuation.load_branch(file).points if file.is_file() else ()
         except ValueError:
-            # no branch, so nothing is lost
+            # not a branch, so it may be overwritten
             continue
         if points and points[-1].kind != "end":
             raise ValueError(

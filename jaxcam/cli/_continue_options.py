@@ -35,7 +35,8 @@ class BranchRange:
     at: Annotated[
         float | None,
         typer.Option(
-            metavar="P", help="Its value at the start; default: the system's."
+            metavar="P",
+            help=("Value of the parameter at the start; default: that of the system."),
         ),
     ] = None
 
@@ -59,7 +60,7 @@ class BranchRange:
         known = {k: v for k, v in parameters(model).items() if not isinstance(v, list)}
         if name not in known:
             raise ValueError(
-                f"--parameter {name}: there is no such parameter; the parameters are "
+                f"--parameter {name} does not exist; the parameters are "
                 f"{', '.join(known)}."
             )
         value = known[name] / axis.unit if self.at is None else self.at
@@ -80,13 +81,15 @@ class Following:
         str | None,
         typer.Option(
             metavar="A,B",
-            help="Guess of the orbit's state at time zero, such as 0.3,0. Default: "
-            "the orbit that the motion settles on.",
+            help=(
+                "Guess of the state of the orbit at time zero, such as 0.3,0. "
+                "Default: the orbit to which the motion converges."
+            ),
         ),
     ] = None
     periods: Annotated[
         int | None,
-        typer.Option(metavar="N", help="Forcing periods until the orbit repeats."),
+        typer.Option(metavar="N", help="Period of the orbit, in forcing periods."),
     ] = None
     direction: Annotated[
         str, typer.Option(metavar="NAME", help=f"One of {', '.join(DIRECTIONS)}.")

@@ -26,22 +26,26 @@ def demo(
         ),
     ] = "refuse",
     out: Annotated[
-        Path, typer.Option(metavar="DIR", help="Write report and figures there.")
+        Path,
+        typer.Option(metavar="DIR", help=("Write the report and its figures to DIR.")),
     ] = Path("jaxcam-demo"),
     json_file: JsonFile = None,
     diagnose: Annotated[
         bool,
-        typer.Option(help="Diagnose the model; takes a minute or two at first."),
+        typer.Option(
+            help=("Diagnose the model; the first run takes one or two minutes.")
+        ),
     ] = True,
     branches: Annotated[
-        bool, typer.Option(help="Follow two branches of orbits of the thesis' rig.")
+        bool,
+        typer.Option(help=("Follow two branches of orbits of the rig of the thesis.")),
     ] = True,
 ) -> None:
     """
-    Compare recordings with a model, diagnose it, and continue two orbits.
+    Compare recordings with a model, diagnose the model, and continue two orbits.
 
-    By default, it uses the simulated recordings that ship with the package. The report
-    is DIR/index.html, with the figures in it, and DIR/result.json; the diagnosis is in
+    By default, the simulated recordings that ship with the package are used. The report
+    is DIR/index.html, including figures, and DIR/result.json; the diagnosis is in
     DIR/diagnosis.
 
     \b
@@ -68,8 +72,8 @@ def demo(
     runs, nominal = read(DEMO_RIG if case is None else case, rig, Files(gaps))
     if not isinstance(nominal, Rig):
         raise ValueError(
-            f"{case}: the demonstration is that of a cam-follower; use jaxcam fit or "
-            f"jaxcam diagnose for a rig of your own."
+            f"{case} is not a cam-follower rig, which jaxcam demo requires; use "
+            "jaxcam fit or jaxcam diagnose for a rig of your own."
         )
     output = Output(json_file, out)
     with (
@@ -92,7 +96,7 @@ def demo(
 
 
 def _diagnosed(folder: Path, nominal, found, report):
-    """Diagnose the model's discrepancy, with a report of its own."""
+    """Diagnose the model discrepancy, and write a separate report."""
     from .. import discrepancy
     from ._diagnose_files import write_diagnosis
 

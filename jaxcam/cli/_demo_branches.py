@@ -1,4 +1,4 @@
-"""Two branches of the thesis' rig for `jaxcam demo`: P(1,1) and P(inf,1)."""
+"""Two branches of the rig of the thesis for `jaxcam demo`: P(1,1) and P(inf,1)."""
 
 import dataclasses
 from pathlib import Path
@@ -20,23 +20,24 @@ class Branches:
     caption: str
 
 
-HEADINGS = ("orbit", "what happens", "at (rpm)", "size of the largest multiplier")
+HEADINGS = ("orbit", "event", "at (rpm)", "largest multiplier (modulus)")
 _CAPTION = (
-    "Path following for the rig of the thesis: follower angle once per cycle against "
-    "the speed of the cam. Stable orbits solid, unstable ones dashed. P(1,1) has one "
-    "impact per cycle; P(inf,1) chatters, sticks and is released again."
+    "Continuation for the rig of the thesis: follower angle once per cycle against "
+    "cam speed. Stable orbits are solid, unstable ones dashed. P(1,1) has one impact "
+    "per cycle; P(inf,1) chatters, sticks and is released."
 )
 
 
 def _interrupted(point) -> bool:
-    """Find the interruption of the orbit that sticks."""
-    return point.kind == "interruption of chattering"
+    """Find the interruption of chatter of the sticking orbit."""
+    return point.kind == "interruption of chatter"
 
 
 def follow_branches(folder: Path) -> Branches:
     """Follow both branches and draw them.
 
-    Runs in a process of its own, parallel to other work: it compiles for half a minute.
+    It runs in a separate process, parallel to other work, because it compiles for half
+    a minute.
     """
     import equinox as eqx
     import jax.numpy as jnp
@@ -79,7 +80,7 @@ def follow_branches(folder: Path) -> Branches:
     figure = branch_diagram(
         branches,
         x_label=("speed", "rpm"),
-        y_label=("angle of the follower", "rad"),
+        y_label=("follower angle", "rad"),
         x_scale=float(rad_s_to_rpm(1.0)),
     )
     file = save_figure(figure, folder / "branches.png")

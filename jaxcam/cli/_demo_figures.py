@@ -43,7 +43,8 @@ def draw(
         keep(
             figure,
             f"recording_{name}",
-            f"{name}: recorded, and each flight simulated from its own start.",
+            f"{name}: recorded motion, and each flight simulated from its measured "
+            "initial state.",
         )
     if comparison.residuals:
         for against in ("time", "phase"):
@@ -51,8 +52,8 @@ def draw(
             keep(
                 figure,
                 f"residual_by_mode_{against}",
-                f"Recording minus model by mode, against {_AGAINST[against]}. The "
-                "band is +-2 standard deviations of the noise.",
+                f"Recording minus model by mode, over {_AGAINST[against]}. The band "
+                "is +-2 standard deviations of the noise.",
             )
     for motion in _slowest_and_fastest(simulated):
         rpm = float(rad_s_to_rpm(motion.system.speed))  # pyright: ignore
@@ -60,17 +61,17 @@ def draw(
         keep(
             plotting.time_history(motion, between=last(motion, 4.0)),
             f"time_history_{rpm:.1f}rpm",
-            f"The nominal rig at {at}: simulated motion, last cycles.",
+            f"The nominal rig at {at}: the last cycles of the simulated motion.",
         )
         keep(
             plotting.phase_portrait(motion, between=last(motion, 12.0)),
             f"phase_portrait_{rpm:.1f}rpm",
-            f"The nominal rig at {at}: velocity against angle.",
+            f"The nominal rig at {at}: velocity over angle.",
         )
     return found
 
 
-_AGAINST = {"time": "time", "phase": "the angle of the cam in its turn"}
+_AGAINST = {"time": "time", "phase": "the cam angle in one turn"}
 
 
 def _slowest_and_fastest(simulated: Sequence[Trajectory]) -> list[Trajectory]:

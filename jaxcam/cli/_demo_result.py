@@ -34,8 +34,8 @@ class DemoResult:
 
 
 def compared(runs, nominal: Rig, folder: Path, report) -> DemoResult:
-    """Segment the runs, simulate their flights and the complete model, and draw
-    both.
+    """Segment the runs, simulate their flights and the complete model, and draw the
+    results.
     """
     segments = segment_case(
         tuple(runs),
@@ -108,22 +108,22 @@ def print_result(output: Output, found: DemoResult) -> None:
 
 
 def _next_steps(found) -> list[tuple[str, str]]:
-    """Suggest the next commands, with their purpose."""
+    """Return the suggested next commands, with their purpose."""
     rpm = found[0].rpm if found else 140.0
     return [
         (
             f"jaxcam simulate cam-follower --speed {rpm:.1f} --turns 40 "
             f"--out ./jaxcam-{rpm:.1f}rpm",
-            "The motion of the first run with the parameters of Table 4.4.",
+            "Motion of the first run with the parameters of Table 4.4.",
         ),
         (
             f"jaxcam simulate cam-follower --speed {rpm:.1f} --set restitution.r=0.5",
-            "The same with another coefficient of restitution.",
+            "The same motion with another coefficient of restitution.",
         ),
         (
             "jaxcam simulate --system DIR/diagnosis/model.json --speed 140",
-            "The motion of the rig with the missing physics added; DIR is the folder "
-            "of this page.",
+            "Motion of the rig with the missing physics added; DIR is the folder of "
+            "this page.",
         ),
         (
             "jaxcam continue --preset calibrated --from 130 --to 154 --at 145 "
@@ -132,13 +132,13 @@ def _next_steps(found) -> list[tuple[str, str]]:
         ),
         (
             "jaxcam new-rig cart",
-            "A system of your own: edit cart.py, which has its equations, and "
-            "cart.toml, which says what is known and measured.",
+            "A system of your own: edit cart.py, which contains its equations, and "
+            "cart.toml, which states known parameters and sensors.",
         ),
         (
             "jaxcam simulate --rig cart.toml --state 0,0.8 --t1 3 --out ./cart-run",
-            "Its motion. For a driven system, jaxcam diagram and jaxcam continue go on "
-            "from there.",
+            "Its motion. For a driven system, continue with jaxcam diagram and "
+            "jaxcam continue.",
         ),
         (
             "jaxcam diagnose CASE --rig cart.toml --out ./report",

@@ -30,19 +30,22 @@ def diagnose(
     resume: Resume = False,
     json_file: Annotated[
         Path | None,
-        typer.Option("--json", metavar="FILE", help="The verdict; - prints it."),
+        typer.Option(
+            "--json", metavar="FILE", help=("Write the verdict to FILE; - prints it.")
+        ),
     ] = None,
     out: Annotated[
         Path | None,
         typer.Option(
-            metavar="DIR", help="Write verdict.json, model.json and index.html here."
+            metavar="DIR",
+            help=("Write verdict.json, model.json and index.html to DIR."),
         ),
     ] = None,
 ) -> None:
     """
-    Find out from recordings which physics a model lacks.
+    Determine from recordings which physics a model lacks.
 
-    For a cam-follower, or for any system in a Python file; see jaxcam new-rig.
+    It works for a cam-follower and for any system in a Python file; see jaxcam new-rig.
 
     \b
     Examples:
@@ -66,8 +69,8 @@ def diagnose(
     runs, nominal = read(case, rig, files, system)
     if propose and isinstance(nominal, Setup) and nominal.drive_channel is None:
         raise ValueError(
-            "--next proposes speeds of a drive, and this rig has none that turns; "
-            "leave it out, and give records that you simulated to "
+            "--next proposes drive speeds, and this rig has no rotating drive; leave "
+            "it out, and pass simulated recordings to "
             "jaxcam.discrepancy.compare_experiments."
         )
     output = Output(json_file, out)
@@ -89,28 +92,28 @@ def diagnose(
 
 
 def _kept_fits(out: Path | None, resume: bool) -> Path | None:
-    """Return the folder of the fits that a stopped run leaves.
+    """Return the folder that stores the fits of a stopped run.
 
     Raises:
-        ValueError: There is nothing to resume, or the folder holds a stopped run.
+        ValueError: There is nothing to resume, or the folder contains a stopped run.
     """
     keep = None if out is None else out / "fits"
     if resume and (keep is None or not keep.is_dir()):
         raise ValueError(
-            "--resume: there is nothing to resume; give --out the folder of a run "
-            "that was stopped, or leave --resume out to start again."
+            "--resume: there is nothing to resume; give the folder of a stopped run "
+            "as --out, or leave --resume out to start again."
         )
     if keep is not None and not resume and any(keep.glob("*.npz")):
         raise ValueError(
-            f"{keep} holds the fits of a run that was stopped; add --resume to go on "
-            f"with it, or give another folder to --out."
+            f"{keep} contains the fits of a stopped run; add --resume to continue it, "
+            "or give another folder as --out."
         )
     return keep
 
 
 def _outlook(found, nominal, predict: bool, propose: bool, seed: int, report):
     """Predict bifurcation speeds with and without the found terms, and the next
-    record.
+    recording.
     """
     from .. import discrepancy
     from ._outlook import Outlook
@@ -124,7 +127,7 @@ def _outlook(found, nominal, predict: bool, propose: bool, seed: int, report):
         )
         outlook = Outlook(predicted)
     if propose and any(one.element is not None for one in found.missing):
-        report("proposing no record, as a force with a memory was found", None)
+        report("no recording is proposed, because a force with memory was found", None)
     elif propose:
         proposed = discrepancy.next_experiments(
             found, nominal, seed=seed, progress=report
@@ -149,6 +152,6 @@ def _print(output, found, notes, outlook) -> None:
         output.print(f"Report: {output.folder / 'index.html'}")
         model = output.folder / "model.json"
         if model.is_file():
-            output.print(f"Model: {model}, for --system of other commands")
+            output.print(f"Model: {model} (use it as --system in other commands)")
         else:
-            output.print("The system has a field that cannot be saved as a model.json.")
+            output.print("The system has a field that cannot be saved in model.json.")

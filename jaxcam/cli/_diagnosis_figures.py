@@ -54,26 +54,27 @@ def draw(folder: Path, found: Diagnosis) -> list[tuple[Path, str]]:
 
 
 _MISSING = (
-    "What has no name, as it was fitted together with the rig, with twice the standard "
-    "error. Of two arguments, the function along the first at several values of the "
-    "other. What the parameters of the rig can do as well may be in them instead."
+    "Unnamed functions, fitted together with the rig, with bands of twice the "
+    "standard error. A function of two arguments is shown over the first one, at "
+    "several values of the second. A part that the rig parameters can represent may "
+    "be contained in them instead."
 )
 _UNSEEN = (
-    "Residuals on a record that no parameter has seen, one flight ahead: the textbook "
-    "model refitted to the other records (above), and with what was found (below). The "
-    "band is +-2 standard deviations of the noise."
+    "Residuals of a held-out recording, predicted one flight ahead: the textbook "
+    "model refitted to the other recordings (top), and the model with the missing "
+    "effects (bottom). The band is +-2 standard deviations of the noise."
 )
 _MAPS = (
-    "Mean residual of each record by {}, in standard errors, before (left) and after "
-    "(right); flights, and contacts below where there are any. Beyond the colours' "
-    "ends is what chance would show in one of a hundred such maps."
+    "Mean residual of each recording over {}, in standard errors, before (left) and "
+    "after (right): flights at the top, contacts (if any) at the bottom. In pure "
+    "noise, one of a hundred such maps would exceed the range of the colours."
 )
 _SHAPES = (
-    "Estimated corrections as free functions, of the textbook model (grey) and of the "
-    "model found (colour), with twice the standard error. A correction whose band "
-    "contains zero is not needed."
+    "Estimated corrections of the textbook model (grey) and of the model with the "
+    "missing effects (colour), as free functions with bands of twice the standard "
+    "error. A correction whose band contains zero is not needed."
 )
-_RANKING = "BIC of other explanations above that of the verdict (logarithmic scale)."
+_RANKING = "BIC of other explanations minus that of the verdict (logarithmic scale)."
 
 
 def _unseen(plt, found: Diagnosis):
@@ -84,7 +85,7 @@ def _unseen(plt, found: Diagnosis):
     both = max(zip(before, after), key=_improvement)
     factor, _ = shown_in(both[0])
     for axis, part, label in zip(
-        axes, both, ("textbook model, refitted", "with what was found")
+        axes, both, ("textbook model, refitted", "with the missing effects")
     ):
         for resting in _sides(before):
             keep = part.resting == resting
@@ -108,7 +109,7 @@ def _unseen(plt, found: Diagnosis):
 
 
 def _improvement(pair: tuple[Residuals, Residuals]) -> float:
-    """Return the ratio of the mean squares of a record before and after."""
+    """Return the ratio of the mean squares of a recording before and after."""
     before, after = (float(np.mean(part.value**2)) for part in pair)
     return before / max(after, 1e-300)
 
@@ -153,7 +154,7 @@ def _maps(plt, found: Diagnosis):
 
 
 def _sides(parts: Sequence[Residuals]) -> tuple[bool, ...]:
-    """Return flight, and contact if the record has any."""
+    """Return flight, and contact if the recording has any."""
     return (False, True) if any(np.any(part.resting) for part in parts) else (False,)
 
 
@@ -254,8 +255,9 @@ def _ranking(plt, found: Diagnosis):
     axis.set_yticks(range(len(names)), names)
     axis.set_ylim(-0.6, len(names) - 0.4)
     axis.set_xscale("log")
-    # from the same value in every report, so that a single bar has a scale too
+    # the axis starts at the same value in every report, so that single bars are
+    # comparable
     axis.set_xlim(0.05, max(1e2, 4 * max(delta for _, delta in pairs)))
     axis.invert_yaxis()
-    axis.set_xlabel("BIC above that of the verdict (–)")
+    axis.set_xlabel("BIC minus that of the verdict (–)")
     return figure

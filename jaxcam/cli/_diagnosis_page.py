@@ -54,9 +54,7 @@ def _title(found: Diagnosis) -> str:
     if found.verdict == Verdict.NONE:
         return "nothing is missing"
     named = [effect.name for effect in found.effects if effect.term]
-    return listed(
-        [*named, "something that has no name" if named else "unknown physics"]
-    )
+    return listed([*named, "unknown physics"])
 
 
 def _effects(found: Diagnosis) -> list[str]:
@@ -86,21 +84,22 @@ def _effects(found: Diagnosis) -> list[str]:
         )
         for effect in found.effects
     ]
-    return ["<h2>What is missing</h2>", table_html(headings, rows, text=(0, 1, 2))]
+    return ["<h2>Missing physics</h2>", table_html(headings, rows, text=(0, 1, 2))]
 
 
 def _before_and_after(found: Diagnosis) -> list[str]:
     # the unit of the figures
     factor, unit = scaled(found.unit, REACH * found.noise_floor)
     parts = [
-        "<h2>Before and after, on held-out flights</h2>",
-        f"<p>{factor * found.heldout_before:.3g} {unit} before, "
-        f"{factor * found.heldout_after:.3g} after; noise and rounding of the sensor "
-        f"are {factor * found.noise_floor:.3g}.</p>",
+        "<h2>Error on held-out flights</h2>",
+        f"<p>The error is {factor * found.heldout_before:.3g} {unit} with the "
+        f"textbook model and {factor * found.heldout_after:.3g} with the missing "
+        "effects; the noise and rounding of the sensor are "
+        f"{factor * found.noise_floor:.3g}.</p>",
     ]
     if found.misfit:
-        where = listed(f"{s:.0%} {_PARTS[part]}" for part, s in found.misfit.items())
-        parts.append(f"<p>The misfit of the textbook model is {where}.</p>")
+        where = listed(f"{s:.0%} is {_PARTS[part]}" for part, s in found.misfit.items())
+        parts.append(f"<p>Of the misfit of the textbook model, {where}.</p>")
     return parts
 
 
@@ -124,8 +123,8 @@ def _alternatives(found: Diagnosis) -> list[str]:
     ]
     return [
         "<h2>Other explanations</h2>",
-        table_html(("terms", "BIC", "why it is not named"), rows, text=(0, 2)),
-        '<p class="note">BIC above that of the verdict.</p>',
+        table_html(("terms", "BIC", "reason for rejection"), rows, text=(0, 2)),
+        '<p class="note">BIC minus that of the verdict.</p>',
     ]
 
 
@@ -142,23 +141,23 @@ def _left_over(found: Diagnosis) -> list[str]:
     ]
     headings = ("form", "where", "gain", "threshold", "left")
     return [
-        "<h2>Is anything left over?</h2>",
+        "<h2>Remaining structure in the residuals</h2>",
         table_html(headings, rows, text=(0, 1)),
-        '<p class="note">Growth of twice the log-likelihood if the model were allowed '
-        "each of these free functions, and what chance and the number of their "
-        "coefficients ask for.</p>",
+        '<p class="note">Gain in twice the log-likelihood if each of these free '
+        "functions were added to the model, and the required gain, which follows "
+        "from the error rate and the number of coefficients.</p>",
     ]
 
 
 def _parameters(found: Diagnosis) -> list[str]:
     rows = [(name, f"{a:+.2f}", f"{b:+.2f}") for name, (a, b) in found.pulls.items()]
-    headings = ("parameter", "textbook", "with what was found")
+    headings = ("parameter", "textbook", "with the missing effects")
     return [
         "<h2>Parameters of the rig</h2>",
         table_html(headings, rows, text=(0,)),
-        '<p class="note">Distance from the rig file in units of the tolerance stated '
-        "there. A parameter that moves far in the first column and not in the second "
-        "was hiding what is missing.</p>",
+        '<p class="note">Deviation from the rig file, in units of the tolerance '
+        "stated there. A parameter that deviates in the first column but not in the "
+        "second compensated for the missing physics.</p>",
     ]
 
 
@@ -171,5 +170,5 @@ def _limits(found: Diagnosis) -> list[str]:
         )
         for name, one in found.limits.items()
     ]
-    headings = ("parameter", "least strength", "would hide in")
+    headings = ("parameter", "smallest strength", "absorbed by")
     return ["<h2>Detection limits</h2>", table_html(headings, rows, text=(0, 2))]

@@ -30,7 +30,7 @@ def diagram(
     json_file: JsonFile = None,
     out: Annotated[
         Path | None,
-        typer.Option(metavar="DIR", help="Write the samples and the figure there."),
+        typer.Option(metavar="DIR", help="Write the samples and the figure to DIR."),
     ] = None,
     resume: Resume = False,
 ) -> None:
@@ -123,7 +123,7 @@ def _sentence(system: str, made, axis: Axis, sweep: Sweep) -> str:
     return (
         f"{system}: {total} samples, {axis.name} from {low:g} to {high:g}; "
         f"{len(made.ranges())} ranges of labels"
-        + (f", {failed} motions failed or could not start." if failed else ".")
+        + (f", {failed} runs failed or could not start." if failed else ".")
     )
 
 
@@ -131,7 +131,7 @@ def _table(ranges, axis: Axis):
     """Tabulate the labels in the order of the parameter, at most a screenful."""
     from rich.table import Table
 
-    table = Table(title=f"what motions settle on, by {axis.name}")
+    table = Table(title=f"attractors, by {axis.name}")
     for column in ("way", "from", "to", "label"):
         table.add_column(column)
     words = {0: "each", 1: "up", -1: "down"}

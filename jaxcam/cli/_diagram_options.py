@@ -32,14 +32,16 @@ class Sweep:
         int, typer.Option(metavar="N", help="Forcing periods at each value.")
     ] = 300
     keep: Annotated[
-        int, typer.Option(metavar="N", help="Periods at the end that are drawn.")
+        int, typer.Option(metavar="N", help="Final periods that are drawn.")
     ] = 100
     direction: Annotated[
         str,
         typer.Option(
             metavar="NAME",
-            help="up, down or both, each from the last final state; or each value "
-            "from the same start.",
+            help=(
+                "up, down or both: each value starts from the final state of the "
+                "previous one; each: every value starts from the same state."
+            ),
         ),
     ] = "both"
     dwell: Annotated[
@@ -97,18 +99,29 @@ class Starts:
     starts: Annotated[
         int | None,
         typer.Option(
-            metavar="N", help="Or N random starts per value, from --low to --high."
+            metavar="N",
+            help=("Or N random initial states per value, between --low and --high."),
         ),
     ] = None
     corner: Annotated[
         str | None,
-        typer.Option("--low", metavar="A,B", help="Lower corner of random starts."),
+        typer.Option(
+            "--low",
+            metavar="A,B",
+            help=("Lower corner of the region of random initial states."),
+        ),
     ] = None
     opposite: Annotated[
         str | None,
-        typer.Option("--high", metavar="A,B", help="Upper corner of random starts."),
+        typer.Option(
+            "--high",
+            metavar="A,B",
+            help=("Upper corner of the region of random initial states."),
+        ),
     ] = None
-    seed: Annotated[int, typer.Option(metavar="N", help="Seed of random starts.")] = 0
+    seed: Annotated[
+        int, typer.Option(metavar="N", help=("Seed of the random initial states."))
+    ] = 0
 
     def check(self, sweep: Sweep) -> None:
         """
@@ -122,7 +135,7 @@ class Starts:
         check_size("--points, --starts and --keep", *counts)
         if self.starts is not None and (self.corner is None or self.opposite is None):
             raise ValueError(
-                "--starts needs the box to draw them from: --low A,B --high A,B."
+                "--starts needs the region of initial states: --low A,B --high A,B."
             )
         if self.starts is not None and self.state is not None:
             raise ValueError("Give --state or --starts, not both.")
@@ -134,7 +147,7 @@ class Starts:
 
     @property
     def box(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
-        """Return the corners of the box from which random starts are drawn."""
+        """Return the corners of the region of random initial states."""
         low = numbers("--low", str(self.corner), "0.34,-2")
         return low, numbers("--high", str(self.opposite), "0.5,3")
 

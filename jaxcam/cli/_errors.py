@@ -1,4 +1,4 @@
-"""Turn exceptions into one sentence on standard error and an exit code."""
+"""Convert exceptions to one sentence on standard error and an exit code."""
 
 import functools
 from collections.abc import Callable

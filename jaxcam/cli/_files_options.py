@@ -25,13 +25,13 @@ class Files:
     ] = None
     rate: Annotated[
         float | None,
-        typer.Option(metavar="HZ", help="Samples per second, for files without time."),
+        typer.Option(
+            metavar="HZ", help=("Samples per second, for files without a time column.")
+        ),
     ] = None
     split: Annotated[
         str | None,
-        typer.Option(
-            metavar="COLUMN", help="The column that numbers the runs in a file."
-        ),
+        typer.Option(metavar="COLUMN", help="Column with the number of the run."),
     ] = None
 
     def check(self) -> None:
@@ -49,11 +49,11 @@ class Files:
 
     @property
     def how(self) -> Literal["mend", "refuse", "split"]:
-        """Return `gaps` as readers take it."""
+        """Return `gaps` in the form of the readers."""
         return self.gaps  # pyright: ignore
 
     def named(self) -> list[str] | dict[str, tuple[str, float]] | None:
-        """Return `--columns` as readers take it.
+        """Return `--columns` in the form of the readers.
 
         Raises:
             ValueError: Names and pairs are mixed, or a factor is not a number.
@@ -66,9 +66,9 @@ class Files:
             return parts
         if len(pairs) < len(parts) or not all(_is_pair(one) for one in pairs):
             raise ValueError(
-                f"--columns is {self.columns[:100]!r}; give names with commas between "
-                f"them, such as time_s,angle_rad, or pairs only, such as "
-                f"t=time_s,Y1=height_m*-8e-4."
+                f"--columns is {self.columns[:100]!r}; give names separated by "
+                "commas, such as time_s,angle_rad, or only pairs, such as "
+                "t=time_s,Y1=height_m*-8e-4."
             )
         found = {}
         for pair in pairs:

@@ -27,18 +27,22 @@ def fit(
         typer.Option(
             "--json",
             metavar="FILE",
-            help="Write the fitted system and its errors, for --system; - to print.",
+            help=(
+                "Write the fitted system and its errors, for use as --system; - "
+                "prints them."
+            ),
         ),
     ] = None,
     out: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Write figures there.")
+        Path | None, typer.Option(metavar="DIR", help="Write the figures to DIR.")
     ] = None,
 ) -> None:
     """
     Fit the parameters of a rig to recordings.
 
-    For a cam-follower, or for any system in a Python file; see jaxcam new-rig. A file
-    with one impact per row, before_m_s and after_m_s, gives a restitution law.
+    It works for a cam-follower and for any system in a Python file; see jaxcam new-rig.
+    From a file with one impact per row (columns before_m_s and after_m_s) it fits a
+    restitution law.
 
     \b
     Examples:
@@ -58,8 +62,8 @@ def fit(
     if rig is None and system is None and is_table(case, files):
         if out is not None or bootstrap:
             raise ValueError(
-                f"{case} is a table of impacts, without figures and bootstrap; "
-                f"leave out --out and --bootstrap."
+                f"{case} is a table of impacts, for which there are no figures and no "
+                "bootstrap; leave out --out and --bootstrap."
             )
         fit_impacts(case, files, json_file)
         return

@@ -56,7 +56,7 @@ def correlation_table(found: Fit) -> Table:
 
 
 def draw(folder: Path, before: Fit, after: Fit) -> list[Path]:
-    """Draw residuals of each record before and after the fit, over time and drive
+    """Draw residuals of each recording before and after the fit, over time and drive
     angle.
     """
     import matplotlib.pyplot as plt

@@ -28,7 +28,9 @@ class Result:
 
     @property
     def quality(self) -> list[dict[str, Any]]:
-        """Return the residual of each record and channel, compared with the noise."""
+        """Return the residual of each recording and channel, compared with the
+        noise.
+        """
         return [
             {"record": part.record, "channel": part.channel, "rms": part.rms}
             | {"noise": part.noise, "ratio": part.rms / part.noise}
@@ -37,13 +39,13 @@ class Result:
 
     @property
     def sentence(self) -> str:
-        """Say how well the fit explains its samples."""
+        """Describe how well the fit explains its samples."""
         quality = self.quality
         ratio = sum(q["ratio"] for q in quality) / len(quality)
         return (
-            f"{self.after.message} {self.problem.samples} samples of "
-            f"{len(self.problem.records)} records are left with {ratio:.3f} times the "
-            "noise of the sensors."
+            f"{self.after.message} The rms residual of {self.problem.samples} samples "
+            f"of {len(self.problem.records)} recordings is {ratio:.3f} times the "
+            "sensor noise."
         )
 
     def to_json(self, about: Mapping[str, Any]) -> dict[str, Any]:
@@ -66,7 +68,7 @@ class Result:
         drive, model = self.segments[0].drive, self.after.model(0)
         for one in self.problem.parameters:
             if one.known is not None:
-                # conditions of the first record only
+                # conditions of the first recording only
                 usual = one.where(self.problem.model)
                 model = eqx.tree_at(one.where, model, usual)
         system = model.system
@@ -96,8 +98,8 @@ def fitted(
         model, parameters = nominal.model, nominal.parameters
         if not parameters:
             raise ValueError(
-                "There is nothing to fit; give at least one entry of [parameters] in "
-                "the rig file a `tolerance`."
+                "There is nothing to fit; state a `tolerance` for at least one entry "
+                "of [parameters] in the rig file."
             )
         segments = nominal.segments(runs, progress=cutting)
     else:

@@ -10,8 +10,8 @@ from typing import Any, get_type_hints
 def grouped(command: Callable[..., Any]) -> Callable[..., Any]:
     """Convert a command whose parameters may be dataclasses into one for typer.
 
-    Typer sees the fields of each dataclass in its place, as options of their own, and
-    the command is given the dataclass with their values.
+    Typer sees the fields of each dataclass as separate options, and the command
+    receives the dataclass with their values.
     """
     kinds = get_type_hints(command, include_extras=True)
     groups = {name: kind for name, kind in kinds.items() if _is_group(kind)}

@@ -14,8 +14,8 @@ def impact_laws(segments: Sequence[Segments]) -> dict[str, RestitutionFit]:
     """Fit restitution laws for each gap that has enough impacts.
 
     Returns:
-        Laws as of `restitution_laws`; if there are several gaps, the names begin with
-            the number of the gap.
+        The laws from `restitution_laws`; if there are several gaps, the names begin
+            with the number of the gap.
     """
     sides = np.unique(np.concatenate([part.impacts.side for part in segments]))
     found = {}
@@ -32,7 +32,7 @@ def impact_laws(segments: Sequence[Segments]) -> dict[str, RestitutionFit]:
 
 
 def _on(part: Segments, side: int) -> Segments:
-    """Return a record with the impacts on one of its gaps only."""
+    """Return a recording with the impacts on one of its gaps only."""
     keep = part.impacts.side == side
     columns = {
         field.name: getattr(part.impacts, field.name)[keep]

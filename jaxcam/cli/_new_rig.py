@@ -18,7 +18,10 @@ _FILE, _CLASS = "cart", "Cart"
 
 def new_rig(
     name: Annotated[
-        Path, typer.Argument(metavar="NAME", help="Writes NAME.py and NAME.toml.")
+        Path,
+        typer.Argument(
+            metavar="NAME", help=("Name of the rig; NAME.py and NAME.toml are written.")
+        ),
     ],
 ) -> None:
     """
@@ -34,7 +37,7 @@ def new_rig(
             f"letter, such as two_stops."
         )
     if not name.parent.is_dir():
-        raise ValueError(f"{name.parent}: there is no such folder; make it first.")
+        raise ValueError(f"{name.parent}: there is no such folder; create it first.")
     files = {name.parent / f"{name.name}{kind}": kind for kind in (".py", ".toml")}
     for file in files:
         if file.exists():
@@ -47,7 +50,7 @@ def new_rig(
     typer.echo(f"Written: {code}, the system, and {rig}, its rig file. Edit both.")
     typer.echo(f"Try it: jaxcam simulate --rig {rig} --state 0,0.8 --t1 3")
     typer.echo(
-        f"With a folder of recordings: jaxcam fit CASE --rig {rig}, then jaxcam "
+        f"With a folder CASE of recordings: jaxcam fit CASE --rig {rig}, then jaxcam "
         f"diagnose CASE --rig {rig} --out DIR"
     )
 

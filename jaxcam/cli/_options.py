@@ -13,7 +13,9 @@ _SHIPPED = {"demo": DEMO_RIG, "pendulum": PENDULUM}
 
 
 def _shipped(case: Path) -> Path:
-    """Return the folder; the word for shipped recordings yields that of the package."""
+    """Return the folder; a word for shipped recordings yields their folder in the
+    package.
+    """
     return case if case.exists() else _SHIPPED.get(str(case), case)
 
 
@@ -30,7 +32,10 @@ SavedSystem: TypeAlias = Annotated[
 ]
 Preset: TypeAlias = Annotated[
     str | None,
-    typer.Option(metavar="NAME", help="The cam-follower: table-4.4 or calibrated."),
+    typer.Option(
+        metavar="NAME",
+        help=("Parameters of the cam-follower: table-4.4 or calibrated."),
+    ),
 ]
 Assignments: TypeAlias = Annotated[
     list[str] | None,
@@ -56,7 +61,11 @@ Highest: TypeAlias = Annotated[
     ),
 ]
 Workers: TypeAlias = Annotated[
-    int | None, typer.Option(metavar="N", help="Threads, or local processes.")
+    int | None,
+    typer.Option(
+        metavar="N",
+        help=("Number of threads, or of local processes with --cluster local."),
+    ),
 ]
 Cluster: TypeAlias = Annotated[
     str | None,
@@ -66,17 +75,21 @@ Cluster: TypeAlias = Annotated[
 ]
 JsonFile: TypeAlias = Annotated[
     Path | None,
-    typer.Option("--json", metavar="FILE", help="Write the result; - to print it."),
+    typer.Option(
+        "--json", metavar="FILE", help=("Write the result to FILE; - prints it.")
+    ),
 ]
 Resume: TypeAlias = Annotated[
-    bool, typer.Option("--resume", help="Continue what a stopped run left in DIR.")
+    bool, typer.Option("--resume", help="Continue the stopped run in DIR.")
 ]
 Case: TypeAlias = Annotated[
     Path,
     typer.Argument(
         metavar="CASE",
-        help="A folder of recordings, or one file; of those shipped, demo (simulated) "
-        "or pendulum (real).",
+        help=(
+            "A folder of recordings, or one file; or a shipped case: demo "
+            "(simulated) or pendulum (real)."
+        ),
         callback=_shipped,
     ),
 ]

@@ -22,7 +22,7 @@ class Rows(NamedTuple):
 
 @dataclasses.dataclass(frozen=True)
 class Outlook:
-    """Bifurcation speeds and proposed experiments, the best first."""
+    """Bifurcation speeds, and proposed experiments with the best first."""
 
     speeds: tuple[Prediction, ...] = ()
     experiments: tuple[Experiment, ...] = ()
@@ -32,18 +32,18 @@ class Outlook:
         if self.speeds:
             yield Rows(
                 "What changes",
-                ("what happens", "textbook (rpm)", "with what was found (rpm)"),
+                ("what happens", "textbook (rpm)", "with the missing effects (rpm)"),
                 [(one.name, _rpm(one.before), _rpm(one.after)) for one in self.speeds],
                 "Cam speeds at which the motion of this rig changes; the standard "
                 "errors follow from those of the fit.",
             )
         if self.experiments:
             yield Rows(
-                "What to record next",
-                ("one more record at", "errors become", "of"),
+                "Recommended next recording",
+                ("one more recording at", "errors become", "of"),
                 [(one.name, f"{one.factor:.0%}", _asked(one)) for one in self.shown],
-                "Standard errors with this record in addition to the others, from the "
-                "sensitivities of the model that was found.",
+                "Standard errors with this recording in addition to the others, from "
+                "the sensitivities of the diagnosed model.",
             )
 
     @property

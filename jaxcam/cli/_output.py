@@ -17,7 +17,7 @@ from ._lock import hold
 class Output:
     """Terminal, `--json FILE` and `--out DIR` of one command.
 
-    Paths that cannot be written are reported before the work begins.
+    Unwritable paths are reported before the work begins.
 
     Raises:
         ValueError: A path has the wrong kind.

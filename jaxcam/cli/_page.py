@@ -1,4 +1,4 @@
-"""The report of `jaxcam demo`: one HTML file with everything in it."""
+"""The report of `jaxcam demo`: one self-contained HTML file."""
 
 import base64
 import dataclasses
@@ -61,7 +61,7 @@ def _lacks(summary: str | None) -> list[str]:
     if summary is None:
         return []
     return [
-        "<h2>What the model lacks</h2>",
+        "<h2>Model discrepancy</h2>",
         *(f'<p class="sentence">{escape(s)}</p>' for s in sentences(summary)),
         '<p class="note"><a href="diagnosis/index.html">Details of the diagnosis</a>: '
         "the fit before and after, other explanations, and detection limits."
@@ -74,7 +74,7 @@ def _branches(found: Branches | None) -> list[str]:
     if found is None:
         return []
     return [
-        "<h2>Orbits of the thesis' rig</h2>",
+        "<h2>Orbits of the rig of the thesis</h2>",
         figure_html(found.figure, found.caption),
         table_html(HEADINGS_OF_BRANCHES, found.rows, text=(0, 1)),
     ]
@@ -98,10 +98,11 @@ def page(report: Report) -> str:
         table_html(
             HEADINGS, [row for one in report.rests for row in rest_rows(one)], (0, 1)
         ),
-        '<p class="note">Simulated: the rig as its file states it, at the mean speed '
-        "of the run, after twenty cycles. Angles are cam angles; ± is the spread "
-        "between contacts. If the two differ entirely, the rig may follow another "
-        "attractor that coexists at the same speed.</p>",
+        '<p class="note">The simulated rig has the parameters of its file and the '
+        "mean speed of the run, and starts twenty cycles earlier. Angles are cam "
+        "angles; ± is the spread between contacts. If simulation and recording "
+        "differ completely, the rig may be on another attractor that coexists at the "
+        "same speed.</p>",
         "<h2>Figures</h2>",
         *(figure_html(file, caption) for file, caption in report.figures),
         "<h2>The runs</h2>",

@@ -14,7 +14,7 @@ from rich.progress import (
 
 
 COMPILING = "compiling (the first run of a system takes longest)"
-"""The first words of commands that compile before they compute."""
+"""First message of commands that compile before they compute."""
 
 
 @contextmanager

@@ -1,4 +1,4 @@
-"""`jaxcam reproduce`: printed values of the thesis next to computed ones."""
+"""`jaxcam reproduce`: compare printed values of the thesis with computed ones."""
 
 import time
 from pathlib import Path
@@ -11,7 +11,7 @@ from ._options import JsonFile, Resume
 
 
 _PRESETS = ("calibrated", "table-4.4")
-"""The rigs; the first is the default."""
+"""Preset of the rig; the first is the default."""
 _SIZES = ("default", "full")
 _ALL = "all"
 
@@ -21,7 +21,7 @@ def reproduce(
         str | None,
         typer.Argument(
             metavar="[TARGET]",
-            help="Such as table-5.2 or figure-4.5; default: all.",
+            help="A table or figure, such as table-5.2 or figure-4.5; default: all.",
         ),
     ] = None,
     preset: Annotated[
@@ -31,7 +31,7 @@ def reproduce(
         str,
         typer.Option(
             metavar="NAME",
-            help="full: diagrams and basins at the published resolution; or default.",
+            help="default, or full: diagrams and basins at the published resolution.",
         ),
     ] = _SIZES[0],
     list_: Annotated[
@@ -42,7 +42,7 @@ def reproduce(
         Path | None,
         typer.Option(
             metavar="DIR",
-            help="Write numbers and figures there; for all targets also a page.",
+            help="Write numbers and figures to DIR; for all targets also a page.",
         ),
     ] = None,
     resume: Resume = False,

@@ -1,4 +1,4 @@
-"""The page of `jaxcam reproduce`: one HTML file with every table and figure in it."""
+"""The page of `jaxcam reproduce`: one HTML file with all tables and figures."""
 
 import math
 import os
@@ -22,11 +22,11 @@ td.text { white-space: normal; min-width: 8rem; }
 """Style of this page, in addition to that of all pages."""
 _CHAPTERS = {
     "1": "Introduction",
-    "2": "Dynamical systems, smooth and not",
+    "2": "Smooth and nonsmooth dynamical systems",
     "3": "Numerical methods",
     "4": "The cam-follower and its rig",
     "5": "Numerical bifurcation analysis",
-    "6": "Chattering and its interruption",
+    "6": "Chatter and its interruption",
 }
 
 
@@ -59,7 +59,7 @@ def write_page(
 
 
 def _page(folder, records, settings, of) -> str:
-    title = "The thesis' tables and figures, printed and computed"
+    title = "Tables and figures of the thesis, printed and computed"
     failed = [record.name for record in records if record.error is not None]
     minutes = sum(record.seconds for record in records) / 60
     sentence = f"{len(records)} of {of} targets, {minutes:.1f} minutes of computing"
@@ -69,8 +69,8 @@ def _page(folder, records, settings, of) -> str:
         f'<p class="sentence">{escape(sentence)}</p>',
         f'<p class="note">jaxcam {escape(settings.version)}, rig '
         f"{escape(settings.preset)}, sizes {escape(settings.size)}. A relative "
-        "difference is divided by the size of the printed value. Where nothing is "
-        "printed, the thesis shows a drawing and gives no number.</p>",
+        "difference is divided by the size of the printed value. Where no printed "
+        "value is shown, the thesis has a drawing without a number.</p>",
     ]
     for chapter, words in _CHAPTERS.items():
         own = [r for r in records if r.name.partition("-")[2].startswith(chapter)]

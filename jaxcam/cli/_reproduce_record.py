@@ -15,7 +15,7 @@ from ._output import to_text
 from ._source_mark import source_mark
 
 
-# exceptions of a file that is not a record, deeply nested brackets included
+# exceptions for a file that is not a record, including deeply nested brackets
 _BROKEN = (OSError, ValueError, TypeError, LookupError, AttributeError, RecursionError)
 
 

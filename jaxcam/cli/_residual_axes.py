@@ -27,7 +27,7 @@ def residual_label(part: Residuals) -> str:
 
 
 def title_of(part: Residuals, parts: Sequence[Residuals]) -> str:
-    """Return the name of the record, and of the channel if there are several."""
+    """Return the name of the recording, and of the channel if there are several."""
     several = len({one.channel for one in parts}) > 1
     return f"{part.record}, {part.channel}" if several else part.record
 

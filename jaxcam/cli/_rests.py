@@ -15,7 +15,7 @@ from ..models import rad_s_to_rpm
 from ..recordings import Rig, Segments
 
 
-# cam turns before the recording begins, for transients to decay
+# cam turns simulated before the recording begins, so that transients decay
 _SETTLE = 20.0
 
 
@@ -24,8 +24,8 @@ class Intervals(NamedTuple):
 
     - `begins`, `ends`: angle of the cam (rad) at either end of each, not wrapped.
     - `turns`: number of turns of the cam that were examined.
-    - `share`: fraction of the time in contact, including intervals cut by the record's
-      ends.
+    - `share`: fraction of the time in contact, including intervals truncated by the
+      ends of the recording.
     """
 
     begins: Float[np.ndarray, " k"]

@@ -7,14 +7,14 @@ from typing import Any
 from ..hybrid import HybridSystem
 
 
-# origin of a saved system of the user: FILE.py:CLASS
+# source of a user's saved system: FILE.py:CLASS
 _SOURCE = "source"
 
 
 def as_saved(system: HybridSystem, about: dict[str, Any]) -> dict[str, Any]:
     """Return a system as data, with the file of a system outside the package.
 
-    A system that cannot be saved yields `about`, and `not_saved` with the reason.
+    A system that cannot be saved yields `about`, and the reason as `not_saved`.
     """
     from ..discrepancy.terms import WithTerms
     from ..fitting.own_systems import system_source

@@ -22,7 +22,7 @@ def simulate(
     run: RunOptions = RunOptions(),
     json_file: JsonFile = None,
     out: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Write figures there.")
+        Path | None, typer.Option(metavar="DIR", help="Write the figures to DIR.")
     ] = None,
 ) -> None:
     """

@@ -30,11 +30,13 @@ class RunOptions:
         float | None,
         typer.Option(
             metavar="N",
-            help="Or the length in forcing periods (cam cycles); default 10.",
+            help=(
+                "Duration in forcing periods (cam cycles), instead of --t1; default 10."
+            ),
         ),
     ] = None
     tolerance: Annotated[
-        float, typer.Option(metavar="E", help="Error allowed per step.")
+        float, typer.Option(metavar="E", help="Error tolerance per step.")
     ] = 1e-10
     solver: Annotated[
         str, typer.Option(metavar="NAME", help=f"One of {', '.join(SOLVERS)}.")
@@ -43,7 +45,10 @@ class RunOptions:
         str | None,
         typer.Option(
             metavar="NAME",
-            help="loop, or diffeqsolve (one call per flight; implicit solvers too).",
+            help=(
+                "loop, or diffeqsolve (one call per flight; also supports implicit "
+                "solvers)."
+            ),
         ),
     ] = None
 
@@ -88,7 +93,7 @@ class RunOptions:
         if turns is None:
             return self.t0 + usual.duration
         if model.period is None:
-            raise ValueError(f"{name} has no forcing to count turns of; give --t1.")
+            raise ValueError(f"{name} has no forcing period; give --t1.")
         if not turns > 0:
             raise ValueError(f"--turns is {turns:g}; give a positive number.")
         # a speed of zero would give an infinite period, which the system reports

@@ -20,7 +20,7 @@ class Source:
     rig: Annotated[
         Path | None,
         typer.Option(
-            metavar="FILE", help="Rig file with nominal values; see jaxcam new-rig."
+            metavar="FILE", help="A rig file with nominal values; see jaxcam new-rig."
         ),
     ] = None
 
@@ -46,8 +46,8 @@ class Source:
             return stated_system(self.saved, system_class(str(self.saved)), {})
         if named is not None and not coded:
             raise ValueError(
-                f"{named} holds the values of its system; leave out --rig, or give "
-                f"--system FILE.py:CLASS."
+                f"{named} contains the values of its system; leave out --rig, or give "
+                "--system FILE.py:CLASS."
             )
         if coded or is_setup(self.rig):
             return read_setup(self.rig, named).model.system

@@ -16,8 +16,8 @@ _BENEATH = ("jax", "jaxlib", "diffrax", "equinox", "numpy", "scipy", "matplotlib
 def source_mark() -> str:
     """Hash all source files of the project and the versions of its dependencies.
 
-    It changes with a comment, too: an unnecessary computation costs minutes, a result
-    of outdated code costs trust.
+    It also changes with a comment: an unnecessary computation costs only minutes,
+    whereas a result of outdated code would be misleading.
     """
     folders = [folder for name in _PACKAGES for folder in _folders(name)]
     versions = [f"{name} {_version(name)}" for name in _BENEATH]

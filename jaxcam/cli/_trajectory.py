@@ -12,7 +12,7 @@ from ..models import CamFollower, rad_s_to_rpm
 from ._parameters import parameters
 
 
-# rows shown at either end of a table
+# number of rows shown at either end of a table
 _ENDS = 6
 # largest numbers of periods that stay readable in a time history and a phase portrait
 _HISTORY, _PORTRAIT = 6.0, 40.0

@@ -231,7 +231,7 @@ def measure(samples: np.ndarray, noise: float, counts: int, rng) -> np.ndarray:
 def recording_text(truth: Truth, rng, *, sensors: Sequence[float]) -> str:
     """Return a recording as CSV; `sensors` are noise and counts of cam and follower."""
     cam_noise, cam_counts, noise, counts = sensors
-    # as an encoder that is zeroed once a turn before the record begins
+    # as an encoder that is zeroed once a turn before the recording begins
     turned = truth.turned - 2 * np.pi * np.floor(truth.turned[0] / (2 * np.pi))
     columns = zip(
         truth.time,

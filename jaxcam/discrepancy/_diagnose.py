@@ -37,7 +37,7 @@ def diagnose(
     keep: Path | None = None,
     policy: Policy = Policy(),
 ) -> Diagnosis:
-    """Diagnose the physics that a model leaves out, from recordings.
+    """Diagnose from recordings which physics a model lacks.
 
     A diagnosis takes minutes; the notebooks show one.
 
@@ -57,7 +57,7 @@ def diagnose(
         case: Name of the case.
         seed: Seed of the block bootstrap.
         progress: Called with a sentence and a fraction, or `None`.
-        keep: Folder in which fits are stored until the diagnosis is done; an
+        keep: Folder in which fits are stored until the diagnosis is complete; an
             interrupted diagnosis continues from there.
         policy: Settings that decide a verdict, and limit the time of a search.
 

@@ -1,7 +1,7 @@
 """Find the physics that would move predicted event speeds to the observed ones.
 
-This serves a rig without recordings whose bifurcation speeds are known. The strength of
-each term and one parameter of the rig are fitted to these speeds.
+It needs no recordings, only the bifurcation speeds of a rig. The strength of each term
+and one parameter of the rig are fitted to these speeds.
 """
 
 import dataclasses
@@ -32,13 +32,15 @@ class EventCause:
     unit: str
     """Unit of the strength."""
     beside: float
-    """Value of the rig's parameter that was fitted together with it."""
+    """Value of the rig parameter that was fitted together with the strength."""
     speeds: Float[np.ndarray, "4"]
     """Shape `(4,)`, rad/s, valve float, fold and flip of P(1,1), interruption of
-    chattering; NaN where there is none."""
+    chatter; NaN if there is none.
+    """
     misfit: float
-    """Sum of the squares of the speeds' residuals, and of the pull on the parameter, in
-    the errors of each."""
+    """Sum of the squared residuals of the speeds and of the deviation of the parameter,
+    each in units of its standard error.
+    """
 
 
 def event_causes(
@@ -54,24 +56,23 @@ def event_causes(
 ) -> tuple[EventCause, ...]:
     """Rank terms by their fit to the observed event speeds of a rig.
 
-    Each term is tried alone. A few numbers hardly distinguish between terms with
-    separate strengths: terms within a few units of misfit of the first are equally
-    good.
+    Each term is tried alone. A few speeds hardly distinguish between terms: terms whose
+    misfit is within a few units of the smallest are equally good.
 
     Args:
         rig: The rig.
-        observed: Valve float, fold and flip of P(1,1) and interruption of chattering
-            (rad/s), NaN where one was not observed.
-        errors: Standard error of each.
-        terms: Candidate terms, each of one strength.
-        where: Picks a parameter of the rig that is fitted together with each term, such
-            as `lambda rig: rig.restitution.intercept`.
+        observed: Valve float, fold and flip of P(1,1) and interruption of chatter
+            (rad/s); NaN for a speed that was not observed.
+        errors: Standard error of each speed.
+        terms: Candidate terms, each with one strength.
+        where: Selects the parameter of the rig that is fitted together with each term,
+            such as `lambda rig: rig.restitution.intercept`.
         tolerance: Tolerance of this parameter.
         policy: Settings that limit the search of strengths.
-        progress: Called with the fraction of the terms done.
+        progress: Called with the fraction of terms completed.
 
     Returns:
-        Explanations, best first, including that without a term.
+        Explanations, the best first, including the one without a term.
 
     Raises:
         ValueError: A term has several strengths, or `observed` is not four speeds.
@@ -85,13 +86,13 @@ def event_causes(
         if len(term.strengths()) != 1:
             raise ValueError(
                 f"The term {term.name!r} has {len(term.strengths())} strengths; only "
-                f"terms of one strength can be distinguished by so few numbers."
+                "terms with one strength can be distinguished by so few speeds."
             )
     goal = _Goal(np.asarray(observed), np.asarray(errors), where, tolerance, policy)
     paths, here = [], None
     for term in terms or (None,):
         system = WithTerms(rig, () if term is None else (term,))
-        # with zero strength every system is the same rig
+        # at zero strength all systems are the same rig
         paths.append(_Path(goal, jax.tree.map(jnp.asarray, system), here))
         here = paths[0].here
     found = [_none(paths[0])]
@@ -111,7 +112,9 @@ class _Goal:
     policy: Policy
 
     def left(self, speeds, pull: float) -> Float[np.ndarray, " m"]:
-        """Return the residuals of the speeds and of the parameter, in their errors."""
+        """Return the residuals of the speeds and of the parameter, in standard
+        errors.
+        """
         off = ((speeds - self.observed) / self.errors)[np.isfinite(self.observed)]
         return np.append(
             np.where(np.isfinite(off), off, self.policy.absent_errors), pull
@@ -119,7 +122,7 @@ class _Goal:
 
 
 class _Path:
-    """The four speeds of a rig along small steps of strength and parameter."""
+    """The four speeds of a rig, followed in small steps of strength and parameter."""
 
     def __init__(self, goal: _Goal, system: WithTerms, here: EventSpeeds | None):
         self.goal, self.system = goal, system

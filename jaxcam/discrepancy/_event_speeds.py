@@ -1,7 +1,7 @@
 """Compute the speeds at which the motion of a cam-follower changes.
 
 These are the speeds of detachment (valve float), of the fold and the flip of the orbit
-with one impact per turn, and of the interruption of complete chattering.
+with one impact per cycle, and of the interruption of complete chatter.
 """
 
 import dataclasses
@@ -35,9 +35,11 @@ EVENTS = (
 
 @dataclasses.dataclass(frozen=True)
 class EventSpeeds:
-    """The four speeds (rad/s) of one system, and starts to find those of neighbours.
+    """The four speeds (rad/s) of one system, and the solutions from which those of
+    similar systems are found.
 
-    `values`: shape `(4,)`, in the order of `EVENTS`; NaN where one was not found.
+    `values`: shape `(4,)`, in the order of `EVENTS`; NaN for a speed that was not
+    found.
     """
 
     values: np.ndarray
@@ -73,10 +75,10 @@ class EventSpeeds:
 
 
 def event_speeds(system: WithTerms, policy: Policy = Policy()) -> EventSpeeds:
-    """Find the four speeds of a rig, independent of its present speed.
+    """Find the four speeds of a rig; its present speed has no effect.
 
-    The base is a [`jaxcam.models.CamFollower`][]; terms must not depend on time other
-    than through the phase of the cam. The policy gives the search range of orbits.
+    The base is a [`jaxcam.models.CamFollower`][]; terms may depend on time only through
+    the phase of the cam. The policy gives the range in which orbits are sought.
     """
     lift = _float_of(system)
     if lift is None:
@@ -104,7 +106,7 @@ def _at(system, speed):
 
 
 def _float_of(system: WithTerms) -> SpecialPoint | None:
-    """Return the valve-float speed, searched from that of the base."""
+    """Return the valve-float speed; the search starts from that of the base."""
     base = float_speed(system.base)  # pyright: ignore
     if not (np.isfinite(base.speed) and base.speed > 0):
         return None

@@ -1,21 +1,21 @@
-"""Room for compiled programs: a process may have only so many memory mappings."""
+"""Limit the memory mappings that compiled programs take."""
 
 from pathlib import Path
 
 import jax
 
 
-# What one diagnosis takes at most, as far as was seen
+# Largest number of mappings observed in one diagnosis
 _NEEDED = 30_000
 _USED, _LIMIT = Path("/proc/self/maps"), Path("/proc/sys/vm/max_map_count")
 
 
 def make_room(used: Path = _USED, limit: Path = _LIMIT) -> bool:
-    """Drop compiled programs where there is no room for those of one more diagnosis.
+    """Drop compiled programs if another diagnosis might exceed the limit.
 
-    Each of them takes some of the memory mappings that Linux allows a process; beyond
-    the limit the compiler fails with "Cannot allocate memory". On other systems nothing
-    is done.
+    Each program takes some of the memory mappings that Linux allows a process; beyond
+    the limit the compiler fails with "Cannot allocate memory". On other systems this
+    does nothing.
 
     **Returns:** whether programs were dropped.
     """

@@ -1,4 +1,4 @@
-"""Recommend the most informative next record."""
+"""Recommend the most informative next recording."""
 
 import dataclasses
 import math
@@ -28,7 +28,7 @@ from .terms import FreeFunction, Term, WithTerms
 
 @dataclasses.dataclass(frozen=True)
 class Experiment:
-    """The expected information of one more record.
+    """The expected information of one more recording.
 
     Examples:
         >>> from jaxcam.discrepancy import Experiment
@@ -37,14 +37,15 @@ class Experiment:
     """
 
     name: str
-    """Name of the record."""
+    """Name of the recording."""
     now: Mapping[str, float]
-    """Standard errors of the parameters in question without the record; of a function,
-    the rms of its band."""
+    """Standard errors of the selected parameters without the recording; for a function,
+    the rms of its error band.
+    """
     then: Mapping[str, float]
-    """The same with the record."""
+    """The same with the recording."""
     speed: float | None = None
-    """Speed of the cam (rad/s), where there is one."""
+    """Speed of the cam (rad/s), if there is one."""
 
     @property
     def factor(self) -> float:
@@ -60,49 +61,49 @@ def compare_experiments(
     *,
     progress: Callable[[str, float | None], None] | None = None,
 ) -> tuple[Experiment, ...]:
-    """Rank proposed records by their expected information, best first.
+    """Rank proposed recordings by their expected information, the best first.
 
-    The ranking needs only sensitivities: the Fisher information of each record is added
-    to that of the records of the diagnosis.
+    The ranking needs only sensitivities: the Fisher information of each proposed
+    recording is added to that of the diagnosed recordings.
 
     Args:
-        found: The diagnosis of the records so far.
-        records: Records simulated with the diagnosed system (`found.system()`) by
+        found: The diagnosis of the recordings made so far.
+        records: Recordings simulated with the diagnosed system (`found.system()`) by
             [`jaxcam.recordings.record`][], and segmented.
-        asked: Names of parameters; default the strengths of the named terms, and the
-            bands of functions without a name. Terms whose BIC is not much worse stay
-            free, so that the best record also distinguishes them. If nothing is
-            missing, all terms, one at a time.
+        asked: Names of the parameters to be determined. The default is the strengths of
+            the named terms and the bands of unnamed functions; terms whose BIC is not
+            much worse stay free, so that the best recording also distinguishes them. If
+            nothing is missing, it is all terms, one at a time.
         progress: Called with a sentence and a fraction, or `None`.
 
     Returns:
         The experiments, best first.
 
     Raises:
-        ValueError: A name is not a parameter, or a force with its own state was found,
-            whose excitation is known only for the existing records.
+        ValueError: A name is not a parameter, or a force with an internal state was
+            found, whose excitation is known only for the existing recordings.
     """
     _refuse_hidden(found)
     report = progress or (lambda sentence, fraction: None)
     fit = found.after
     for name in asked or ():
         fit.problem.parameter(name)
-    report("preparing the proposed records", None)
+    report("preparing the proposed recordings", None)
     parameters = [_of_others(one, len(records)) for one in fit.problem.parameters]
     problem = Problem.build(fit.problem.model, records, parameters)
     values = np.repeat(np.asarray(fit.point.values)[:1], len(problem.segments), axis=0)
     point = problem.start._replace(values=jnp.asarray(values))
-    # parameters of single records give no information on another record
+    # parameters of one recording say nothing about another recording
     names = [p.name for p in parameters if p.known is None and not p.per_record]
-    report("computing the information of the records so far", None)
+    report("computing the information of the existing recordings", None)
     known = blocks_of(fit.problem, fit.point, names=names)
-    report("computing the information of the proposed records", None)
+    report("computing the information of the proposed recordings", None)
     more = blocks_of(problem, point, names=names)
     questions = _questions(found, asked)
     names = [part.recording.name for part in problem.segments]
     made = []
     for k, name in enumerate(names):
-        report("comparing the proposed records", k / len(names))
+        report("comparing the proposed recordings", k / len(names))
         made.append(
             Experiment(
                 name,
@@ -120,14 +121,14 @@ def compare_experiments(
 def _refuse_hidden(found: Diagnosis) -> None:
     if any(one.element is not None for one in found.missing):
         raise ValueError(
-            "Experiments are not compared where a force with a state of its own was "
-            "found; simulate them with `found.system()` and look at the motion."
+            "Experiments cannot be compared if a force with an internal state was "
+            "found; simulate them with `found.system()` and compare the motions."
         )
 
 
 def _of_others(parameter: Parameter, records: int) -> Parameter:
-    """Return a parameter with known values per record, for others: as in the first
-    record.
+    """Return a parameter whose value is known per recording, with the value of the
+    first recording for new ones.
     """
     if parameter.known is None:
         return parameter
@@ -147,11 +148,11 @@ def next_experiments(
     """Recommend the speeds at which to run a driven rig next, best first.
 
     Args:
-        found: The diagnosis of the records so far.
+        found: The diagnosis of the recordings made so far.
         rig: As given to `diagnose`.
-        speeds: Available speeds of the drive (rad/s); default some within and slightly
-            beyond the range of the records.
-        duration: Duration of a record (s); default that of the existing records.
+        speeds: Available speeds of the drive (rad/s); by default, several within and
+            slightly beyond the recorded range.
+        duration: Duration of a recording (s); default that of the existing recordings.
         asked: As in [`jaxcam.discrepancy.compare_experiments`][].
         seed: Seed of the simulated noise.
         progress: Called with a sentence and a fraction, or `None`.
@@ -161,7 +162,7 @@ def next_experiments(
 
     Raises:
         ValueError: The drive of the rig does not turn.
-        RecordingError: There is no flight at any of the speeds.
+        RecordingError: No flight occurs at any of the speeds.
     """
     parts = found.after.problem.segments
     drives = [part.drive for part in parts if part.drive is not None]
@@ -170,8 +171,8 @@ def next_experiments(
     turning = model.drive
     if not drives or not isinstance(turning, Turning):
         raise ValueError(
-            "The next experiment is proposed for a rig with a drive; simulate the "
-            "experiments that you can make and give them to `compare_experiments`."
+            "The next experiment is proposed only for a rig with a drive; simulate "
+            "the possible experiments and pass them to `compare_experiments`."
         )
     if speeds is None:
         known = [drive.speed for drive in drives]
@@ -213,12 +214,12 @@ def next_experiments(
                 name=_named(rig, float(speed)),
             )
         )
-    report("cutting the simulated records", None)
+    report("segmenting the simulated recordings", None)
     flying = [part for part in _cut(rig, made) if part.flights]
     if not flying:
         raise RecordingError(
-            "Nothing would leave its constraint at any of these speeds; give `speeds` "
-            "at which it flies."
+            "No flight occurs at any of these speeds; give `speeds` at which the "
+            "body leaves its constraint."
         )
     return compare_experiments(found, flying, asked, progress=progress)
 
@@ -241,7 +242,7 @@ def _cut(rig: Rig | Setup, made: Sequence[Recording]) -> Sequence[Segments]:
 
 
 def _named(rig: Rig | Setup, speed: float) -> str:
-    """Name a record by its speed, by convention in rpm for a cam."""
+    """Name a recording by its speed, in rpm for a cam."""
     if isinstance(rig, Rig):
         return f"{speed * 30 / math.pi:.1f} rpm"
     return f"{speed / (2 * math.pi):.4g} Hz"
@@ -252,8 +253,9 @@ def _terms(found: Diagnosis) -> tuple[Term, ...]:
 
 
 class _Question(NamedTuple):
-    """What is asked for: `slopes` `(k, p)` of k values to parameters `own`, of all
-    that are `free`."""
+    """Target quantities: `slopes` `(k, p)` of k values with respect to the parameters
+    `own`, a subset of `free`.
+    """
 
     free: list[str]
     own: list[str]
@@ -265,7 +267,7 @@ def _of_parameter(free: Iterable[str], name: str) -> _Question:
 
 
 def _questions(found: Diagnosis, asked) -> dict[str, _Question]:
-    """What is asked for, by parameters and functions."""
+    """Return the target quantities, as parameters and functions."""
     own = {
         term.name: [one.name for one in term.strengths() if not one.inner]
         for term in _terms(found)
@@ -298,7 +300,9 @@ def _questions(found: Diagnosis, asked) -> dict[str, _Question]:
 
 
 def _stderr(known: Blocks, more, question: _Question) -> float:
-    """Standard error of what is asked for where some parameters are free."""
+    """Return the standard errors of the target quantities when some parameters are
+    free.
+    """
     information, score = known.total()
     if more is not None:
         information = information + more

@@ -25,9 +25,9 @@ _DEFINITE = 1e-12
 class Prediction:
     """A predicted speed of the cam (rad/s) at which the motion changes.
 
-    `before` and `after`: predictions of the refitted textbook model, and with the
-    missing effects, with standard errors from those of the fits; NaN if there is no
-    such speed.
+    `before` and `after` are the predictions of the refitted textbook model without and
+    with the missing effects. Their standard errors follow from those of the fits. They
+    are NaN if there is no such speed.
 
     Examples:
         >>> from jaxcam.discrepancy import Prediction
@@ -39,8 +39,9 @@ class Prediction:
     name: str
     """The change, such as "fold"."""
     before: Value
-    """Prediction of the refitted textbook model, with its standard error; NaN where
-    there is no such speed."""
+    """Prediction of the refitted textbook model, with its standard error; NaN if there
+    is no such speed.
+    """
     after: Value
     """Prediction with the missing effects."""
 
@@ -54,15 +55,16 @@ def predictions(
     """Predict the speeds at which the motion of a cam-follower rig changes, by both
     models.
 
-    Valve float, the fold and the flip of P(1,1), and the interruption of complete
-    chattering. Their errors come from rigs drawn from the errors of the fits. The named
-    terms are part of the second model, except those with an independent frequency,
-    whose motion is not periodic with the cam.
+    These are the speeds of valve float, of the fold and the flip of P(1,1), and of the
+    interruption of complete chatter. Their errors are estimated from random rigs drawn
+    according to the errors of the fits. The named terms are part of the second model,
+    except those with an independent frequency, whose motion is not periodic with the
+    cam.
 
     Args:
         found: The diagnosis.
-        seed: Seed of the rigs that are drawn.
-        progress: Called with the fraction of the rigs done.
+        seed: Seed of the random rigs.
+        progress: Called with the fraction of rigs completed.
 
     Returns:
         The predictions; none for a system other than a cam-follower.
@@ -114,7 +116,7 @@ def _spread(drawn: np.ndarray) -> float:
 def _system(fit: Fit, values: np.ndarray, names, present: bool) -> WithTerms:
     """Return the rig with some parameters; absent terms have zero strength.
 
-    Both models have the same structure, so that one program serves them.
+    Both models have the same structure, so one compiled program serves both.
     """
     model = fit.problem.layout.at(jnp.asarray(values))
     system = model.system

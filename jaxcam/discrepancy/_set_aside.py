@@ -1,7 +1,7 @@
-"""Find and set aside a record that is inconsistent with the others.
+"""Find and exclude a recording that is inconsistent with the others.
 
-A misread record (another gain, another rig, a wrong unit) is explained by no physics
-that the others share, and would hide what is missing in all of them.
+No physics shared with the others explains a misread recording (another gain, another
+rig, a wrong unit), and it would hide the physics that is missing in all of them.
 """
 
 import dataclasses
@@ -13,11 +13,12 @@ from .report import Caveat, Diagnosis, Reason
 
 
 def odd_record(found: Diagnosis) -> str | None:
-    """Return the record that a diagnosis leaves unexplained while it explains all
+    """Return the recording that a diagnosis leaves unexplained while it explains all
     others.
 
-    It is one of at least `policy.records_apart`; its cost per sample is not `near` the
-    data, and exceeds that of every other record by a factor of `policy.odd`.
+    There must be at least `policy.records_apart` recordings. The cost per sample of
+    this one is not `near` the data and exceeds that of every other one by a factor of
+    `policy.odd`.
     """
     policy, costs = found.policy, cost_by_record(found.after)
     if len(costs) < policy.records_apart:
@@ -29,7 +30,7 @@ def odd_record(found: Diagnosis) -> str | None:
 
 
 def cost_by_record(found: Fit) -> dict[str, float]:
-    """Return the cost per sample of each record; 1 if only noise remains."""
+    """Return the cost per sample of each recording; 1 if only noise remains."""
     problem, costs = found.problem, found.costs
     exists = np.asarray(problem.pieces.exists)
     flown = np.where(exists, np.asarray(costs.flown) + np.asarray(costs.joints), 0.0)
@@ -43,19 +44,20 @@ def cost_by_record(found: Fit) -> dict[str, float]:
 
 
 def set_aside(found: Diagnosis, again: Diagnosis, name: str) -> Diagnosis:
-    """Return the diagnosis of the other records, if it explains them better.
+    """Return the diagnosis of the other recordings, if it explains them better.
 
-    **Arguments:** the diagnosis of all records, that without the odd record, and its
-    name.
+    **Arguments:** the diagnosis of all recordings, the one without the inconsistent
+    recording, and its name.
     """
     costs = cost_by_record(found.after)
     better = max(cost_by_record(again.after).values()) < costs[name] / found.policy.odd
     chosen = again if better else found
-    done = "is set aside" if better else "is explained by nothing that was tried"
+    done = "is excluded" if better else "is not explained by any term that was tried"
     sentence = (
-        f"The record {name} {done}: it misses the model of all records by "
-        f"{np.sqrt(costs[name]):.2g} times the noise, every other one by less than "
-        f"{np.sqrt(sorted(costs.values())[-2]):.2g}. Check how it was made and read."
+        f"The recording {name} {done}: its residual from the model of all recordings "
+        f"is {np.sqrt(costs[name]):.2g} times the noise, that of every other one at "
+        f"most {np.sqrt(sorted(costs.values())[-2]):.2g} times. Check how it was made "
+        "and read."
     )
     caveat = Caveat(Reason.SET_ASIDE, sentence)
     return dataclasses.replace(chosen, caveats=(caveat, *chosen.caveats))

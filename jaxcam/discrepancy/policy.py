@@ -40,7 +40,7 @@ def _number(group: Group, default: Any, says: str) -> Any:
 
 
 class Setting(NamedTuple):
-    """One number of a policy: its name, value, group, and what it is."""
+    """One setting of a policy: its name, value, group and meaning."""
 
     name: str
     value: Any
@@ -53,13 +53,14 @@ class Policy:
     """Settings that decide a verdict, limit a search, and choose the content of a
     report.
 
-    Pass another one to `diagnose(..., policy=Policy(false_alarms=0.05))`. Numbers
-    without a unit are ratios or counts; a cost is minus twice the log-likelihood, a
-    cost per sample is one where only noise is left. [Discrepancy](../discrepancy.md)
-    has the table of all fields, and `settings` gives each with its meaning.
+    To change a setting, pass `diagnose(..., policy=Policy(false_alarms=0.05))`. Numbers
+    without a unit are ratios or counts. A cost is minus twice the log-likelihood; a
+    cost per sample of one means that the residuals are pure noise.
+    [Discrepancy](../discrepancy.md) has the table of all fields, and `settings` yields
+    each with its meaning.
 
     Raises:
-        ValueError: A number is out of its range.
+        ValueError: A number is out of range.
 
     Examples:
         >>> from jaxcam.discrepancy import Policy
@@ -67,217 +68,244 @@ class Policy:
         0.05
     """
 
-    # what decides a verdict
+    # settings that decide a verdict
     false_alarms: float = _decides(
         0.01,
-        "chance that any term is named where nothing is missing; shared out over the "
-        "terms and over the frequencies of a scan (Bonferroni)",
+        "probability that any term is named although nothing is missing; divided among "
+        "the terms and the frequencies of a scan (Bonferroni)",
     )
     sure: float = _decides(
         0.9,
-        "share of the bootstrap samples that must keep a named term, and chance that "
-        "an effect at its detection limit is named",
+        "share of the bootstrap samples that must retain a named term, and probability "
+        "that an effect at its detection limit is named",
     )
-    most_terms: int = _decides(3, "terms that are named at most")
+    most_terms: int = _decides(3, "maximum number of named terms")
     form_error: float = _decides(
         0.15,
-        "relative error of a term's form that still counts as that term; its square is "
-        "the share of the explained cost that may be left over",
+        "maximum relative error of the functional form of a named term; its square is "
+        "the share of the explained cost that may remain",
     )
     corner_share: float = _decides(
         3e-4,
-        "share of what is explained that the smoothed corner of dry friction may "
-        "leave; a term beside it that explains less is not named",
+        "share of the explained cost that the smoothing of dry friction at zero "
+        "velocity may leave; next to a friction term, a term that explains less is not "
+        "named",
     )
     near: float = _decides(
-        4.0, "cost per sample below which a fit that has not converged is near the data"
+        4.0, "cost per sample below which an unconverged fit counts as near the data"
     )
     explains: float = _decides(
         0.5,
-        "share of the textbook model's cost that the best subset leaves at most, if "
-        "none comes near the data",
+        "maximum share of the textbook model's cost that the best subset may leave if "
+        "no fit is near the data",
     )
     alike: float = _decides(
         1e-8,
-        "share of its information that a parameter must keep next to the free ones",
+        "minimum share of the information on a parameter that must remain when the "
+        "other parameters are free",
     )
     untold: float = _decides(
-        1e-3, "share of the information of all records that one half must hold"
+        1e-3,
+        "minimum share of the information on a term that one half of the recordings "
+        "must contain to estimate it",
     )
-    stretches: int = _decides(4, "bootstrap blocks per record at most")
+    stretches: int = _decides(4, "maximum number of bootstrap blocks per recording")
     stretch_pieces: int = _decides(
-        8, "pieces of flight per block at least, redrawn or held out"
+        8, "minimum number of flight pieces per bootstrap or held-out block"
     )
-    folds: int = _decides(3, "parts of the data, each predicted by the others")
+    folds: int = _decides(3, "number of parts of the data in the cross-validation")
     fewest_periods: float = _decides(
-        4.0, "periods in the longest record, at the lowest frequency of a vibration"
+        4.0, "minimum periods of a vibration in the longest recording"
     )
-    period_samples: float = _decides(
-        20.0, "samples per period, at the highest frequency of a vibration"
-    )
+    period_samples: float = _decides(20.0, "minimum samples per period of a vibration")
     period_steps: float = _decides(
-        2.5, "steps of a flight per period, at the highest frequency of a vibration"
+        2.5, "minimum integration steps per period of a vibration"
     )
     residual_lags: int = _decides(
-        20, "lags (samples) over which residuals are asked for correlation"
+        20, "lags (samples) of the autocorrelation of the residuals"
     )
     residual_stretches: int = _decides(
-        4, "stretches per record in that test; the worst one does not count"
+        4, "sections per recording in that test; the worst is not counted"
     )
     velocity_tail: float = _decides(
         0.005, "share of the velocities beyond each end of a free function of velocity"
     )
     drive_wander: float = _decides(
-        0.75, "multiple of the drive's rate below which its wandering is no ripple"
+        0.75,
+        "multiple of the drive's frequency below which its variations are wandering",
     )
     drive_degree: int = _decides(
-        5, "degree of the polynomial that takes up the ends of a drive's record"
+        5, "degree of the polynomial for the wandering near the ends"
     )
     drive_orders: tuple[float, ...] = _decides(
         (1.25, 1.4, 1.6, 1.75, 2.25, 2.4, 2.6, 2.75),
-        "multiples of the drive's rate, no harmonics, at which leakage is measured",
+        "non-harmonic multiples of the drive's frequency at which leakage is measured",
     )
 
     odd: float = _decides(
         10.0,
-        "ratio of a record's cost per sample to that of every other one, above which "
-        "it is set aside",
+        "ratio of the cost per sample of one recording to that of any other above "
+        "which the recording is excluded",
     )
-    records_apart: int = _decides(4, "records at least, for one to be set aside")
+    records_apart: int = _decides(
+        4, "minimum number of recordings for one to be excluded"
+    )
     noisier: float = _decides(
-        1.2,
-        "ratio of the noise that recordings show to that which is stated, above which "
-        "the former counts",
+        1.2, "ratio of measured to stated noise above which the former is used"
     )
 
-    # what bounds the search
-    quick_iterations: int = _bounds(15, "iterations of the first fit of a subset")
-    iterations: int = _bounds(60, "iterations of a fit that may win")
-    heldout_iterations: int = _bounds(15, "iterations of a fit to some of the records")
-    state_iterations: int = _bounds(12, "steps of Newton's method on states alone")
-    state_gain: float = _bounds(1e-3, "fall of the cost below which they end")
-    kept: int = _bounds(3, "subsets of each size that are built upon")
-    tried: int = _bounds(6, "subsets of each size above one that are fitted")
+    # settings that limit the search
+    quick_iterations: int = _bounds(
+        15, "maximum iterations in the first fit of a subset"
+    )
+    iterations: int = _bounds(60, "maximum iterations in the fit of a leading subset")
+    heldout_iterations: int = _bounds(
+        15, "maximum iterations in a fit to a part of the recordings"
+    )
+    state_iterations: int = _bounds(
+        12, "maximum Newton steps when only states are fitted"
+    )
+    state_gain: float = _bounds(
+        1e-3, "reduction of the cost below which these steps end"
+    )
+    kept: int = _bounds(3, "number of subsets of each size that are extended")
+    tried: int = _bounds(6, "number of subsets fitted at each size above one")
     leads: float = _bounds(
-        50.0, "BIC within which a subset may lead to a better one than the best"
+        50.0, "difference in BIC up to which a subset may lead to a better one"
     )
     helped: float = _bounds(
-        0.7, "share of the cost that a term leaves at most, for the search to go on"
+        0.7, "maximum share of the cost that a term may leave for the search to go on"
     )
     clear: float = _bounds(
         10.0,
-        "multiple of what a term is asked for beyond which its loss is not refined",
+        "multiple of the required gain beyond which the loss without a term is not "
+        "computed more accurately",
     )
     astray: float = _bounds(
-        3.0, "prior standard errors beyond which a fit starts again from nominal"
+        3.0, "prior standard errors beyond which a fit is restarted from nominal"
     )
     hopeless: float = _bounds(
-        2.0, "multiple of the least cost beyond which a fit is not refined"
+        2.0, "multiple of the smallest cost above which a fit is not refined"
     )
     explained: float = _bounds(
-        1.2, "cost per sample below which a fit explains the data and is not given up"
+        1.2, "cost per sample below which a fit is never stopped early"
     )
-    crawl_steps: int = _bounds(2, "steps by which a crawling fit is judged")
-    crawl_attempts: int = _bounds(4, "attempts that these steps took at least")
+    crawl_steps: int = _bounds(
+        2, "number of last steps by which slow convergence is detected"
+    )
+    crawl_attempts: int = _bounds(4, "minimum number of attempts in these steps")
     crawl_gain: float = _bounds(
-        0.01, "share of the cost to be explained that they gained at most"
+        0.01, "maximum share of the remaining cost gained in these steps"
     )
-    late: int = _bounds(8, "attempts after which a fit must have beaten another one")
+    late: int = _bounds(
+        8, "attempts after which a fit must be better than the subset it extends"
+    )
     functions: int = _bounds(
-        2, "free functions at most, where what is missing has no name; 0 for none"
+        2, "maximum number of free functions for unknown physics; 0: none"
     )
     elements: int = _bounds(
         0,
-        "elements with a state of their own (resonance, relaxation, hysteresis) that "
-        "are tried there, one at most; 0 for none",
+        "maximum number of elements with an internal state (resonance, relaxation, "
+        "hysteresis), 0 or 1",
     )
     function_lengths: tuple[float, ...] = _bounds(
         (0.05, 0.1, 0.2, 0.4, 0.8, 1.6),
-        "lengths of correlation tried for a free function: shares of the range of its "
-        "argument, radians of a phase",
+        "correlation lengths of a free function, as shares of the range of its "
+        "argument, or in radians of a phase",
     )
     function_sizes: tuple[float, ...] = _bounds(
         (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 300.0, 1e3, 3e3, 1e4, 1e5, 1e6),
-        "sizes tried for it, in units of what the data tell of it",
+        "amplitudes of a free function, in mean standard errors of its coefficients",
     )
     promising: float = _bounds(
-        0.5, "share of the best promise that a free function must make to be fitted"
+        0.5, "minimum gain of a free function that is fitted, relative to the largest"
     )
     rivalling: float = _bounds(
-        0.9, "that share where another one explains the data already"
+        0.9, "the same minimum if another function already explains the data"
     )
-    followed: int = _bounds(3, "free functions and terms that are fitted at each turn")
-    heats: int = _bounds(4, "fits of a free function while its prior settles")
+    followed: int = _bounds(
+        3, "maximum number of free functions and terms fitted per stage"
+    )
+    heats: int = _bounds(
+        4, "maximum number of fits of a free function until its prior converges"
+    )
     recentred: int = _bounds(
-        12, "further fits while the numbers of a hidden element settle"
+        12, "additional fits until the parameters of an element converge"
     )
     heated: float = _bounds(
-        1.5, "ratio of costs per sample below which its prior has settled"
+        1.5, "ratio of consecutive costs below which the prior has converged"
     )
-    bootstrap: int = _bounds(200, "bootstrap samples of blocks, and of drive records")
-    frequency_grid: int = _bounds(4, "frequencies per resolution cell of a scan")
+    bootstrap: int = _bounds(
+        200, "number of bootstrap samples, of blocks and of drive signals"
+    )
+    frequency_grid: int = _bounds(
+        4, "number of frequencies per resolution cell of a scan"
+    )
     cause_strengths: tuple[float, float, int] = _bounds(
         (0.1, 1.5, 24),
-        "strengths tried for event speeds: the first in sizes, their ratio, how many",
+        "strengths tried in a fit to event speeds: the first, the ratio of consecutive "
+        "ones, and their number",
     )
     cause_worse: float = _bounds(
-        4.0, "multiple of the least misfit at which larger strengths are not tried"
+        4.0, "multiple of the smallest misfit above which this series ends"
     )
-    cause_difference: float = _bounds(1e-3, "relative step of differences in that fit")
-    cause_fits: int = _bounds(40, "evaluations of event speeds in that fit")
+    cause_difference: float = _bounds(
+        1e-3, "relative step of the finite differences in that fit"
+    )
+    cause_fits: int = _bounds(40, "maximum number of evaluations in that fit")
     trace_stride: float = _bounds(
-        0.1, "stride of the sum of multipliers along a branch of orbits"
+        0.1, "step in the trace of the monodromy matrix along a branch"
     )
     orbit_speeds: tuple[float, ...] = _bounds(
         (1.18, 1.14, 1.22, 1.1, 1.26, 1.32, 1.4),
-        "multiples of the detachment speed at which P(1,1) is looked for",
+        "multiples of the detachment speed at which P(1,1) is sought",
     )
     chatter_speeds: tuple[float, float] = _bounds(
         (1.1, 1.4),
-        "multiples of the detachment speed between which chattering is interrupted",
+        "multiples of the detachment speed that bracket the interruption of chatter",
     )
-    drawn_rigs: int = _bounds(12, "rigs drawn for the errors of predictions")
-    next_speeds: int = _bounds(7, "speeds of the next record that are tried")
-    next_beyond: float = _bounds(0.05, "how far beyond the recorded speeds they go")
-    next_settle: float = _bounds(6.0, "time (s) a simulated rig takes to settle")
+    drawn_rigs: int = _bounds(12, "number of random rigs for the errors of predictions")
+    next_speeds: int = _bounds(7, "number of speeds compared for the next recording")
+    next_beyond: float = _bounds(
+        0.05, "relative extension of the recorded speed range at either end"
+    )
+    next_settle: float = _bounds(6.0, "settling time (s) of a simulated rig")
 
-    # what a report shows
+    # settings of the report
     ripple_errors: float = _shows(
-        3.0, "standard errors beyond which a record shows the ripple"
+        3.0, "standard errors above which a recording shows ripple"
     )
     shown_chance: float = _shows(
-        1e-3, "chance below which a record shows an effect that was named"
+        1e-3, "significance level at which a recording shows a named effect"
     )
     as_noise: float = _shows(
-        1.2, "rms of residuals over noise up to which a caveat is not needed"
+        1.2, "ratio of rms residual to noise above which a caveat is added"
     )
     tie: float = _shows(
         10.0,
-        "BIC within which another subset is called as good (very strong evidence "
-        "beyond it: Kass and Raftery 1995)",
+        "difference in BIC up to which another subset is reported as equally good "
+        "(above it, evidence is very strong: Kass and Raftery 1995)",
     )
     moved_errors: float = _shows(
-        3.0, "standard errors beyond which a summary tells that a parameter has moved"
+        3.0, "standard errors above which the summary reports a moved parameter"
     )
     rival: float = _shows(
-        30.0, "BIC within which the next experiment is to tell another term apart"
+        30.0, "difference in BIC up to which the next experiment tests another term"
     )
     absent_errors: float = _shows(
-        10.0, "standard errors that an event speed counts which no longer exists"
+        10.0, "residual of an event that no longer exists, in standard errors"
     )
     cost_errors: float = _bounds(
-        3.0, "standard deviations beyond which a cost is more than noise makes it"
+        3.0, "standard deviations above which an excess of cost is not noise"
     )
     nearby: float = _shows(
-        0.03, "how far from a place data are near it, as a share of the range"
+        0.03, "distance at which data are near a point, as a share of the range"
     )
     visited: float = _shows(
-        0.1,
-        "share of an even density of data that a place must have for a function to be "
-        "shown there",
+        0.1, "minimum density of data where a function is shown, relative to uniform"
     )
-    shape_points: int = _shows(48, "points at which a free function is shown")
-    alternatives: int = _shows(8, "alternatives that are listed")
+    shape_points: int = _shows(48, "number of points at which a free function is shown")
+    alternatives: int = _shows(8, "maximum number of alternatives listed")
 
     def __post_init__(self):
         for name in ("false_alarms", "sure", "explains", "form_error"):
@@ -298,7 +326,9 @@ class Policy:
 
     @property
     def beyond(self) -> float:
-        """Standard errors above the threshold at which detection has chance `sure`."""
+        """Standard errors above the threshold at which detection has the probability
+        `sure`.
+        """
         return float(norm.ppf(self.sure))
 
     @property

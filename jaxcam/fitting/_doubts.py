@@ -11,7 +11,7 @@ from .engine import Costs, FLIGHT, IMPACT, Point, Problem, Weights
 # Cost of a sample, or of a component of a joint, that noise does not explain: it is 1
 # on average, and a piece of thousands of samples is within a few per cent of that
 _PIECE, _JOINT, _MEAN = 4.0, 9.0, 9.0
-# Fraction of the pieces that must be below it: a bad record among many is an outlier
+# Fraction of the pieces that must be below it: a bad recording among many is an outlier
 _USUAL = 0.75
 # Tolerance for reaching a bound, relative to the parameter's scale
 _ON_BOUND = 1e-9
@@ -68,8 +68,8 @@ def not_finite(problem: Problem, point: Point, cost: float, costs: Costs) -> str
 def far_from_data(problem: Problem, costs: Costs, weights: Weights | None) -> str:
     """Return a sentence if the cost is far above the noise, otherwise the empty string.
 
-    The test uses the upper quartile over the pieces, so that one bad record among many
-    does not count, and the mean, so that no part may be very far off.
+    The test uses the upper quartile over the pieces, so that one bad recording among
+    many does not count, and the mean, so that no part may be very far off.
     """
     pieces = problem.pieces
     weights = weights or problem.everything()
@@ -80,7 +80,7 @@ def far_from_data(problem: Problem, costs: Costs, weights: Weights | None) -> st
     joints, kind = np.asarray(costs.joints), np.asarray(pieces.joint)
     flown, rested = np.asarray(costs.flown), np.nan_to_num(np.asarray(costs.rested))
     size = problem.start.states.shape[-1]
-    one = "cost a sample is"
+    one = "cost per sample is"
     parts = (
         ("flight", one, flown / np.maximum(counts, 1), used & (counts > 0), _PIECE),
         ("contact", one, rested / np.maximum(rests, 1), resting, _PIECE),
@@ -99,9 +99,9 @@ def far_from_data(problem: Problem, costs: Costs, weights: Weights | None) -> st
         level = float(np.quantile(cost[rows], _USUAL))
         if not level <= most:
             return (
-                f"The fit is far from the data in {name}: the {what} {level:.3g} and "
-                f"more in a quarter of them where noise makes it 1; the model, the "
-                f"start or the stated noise is wrong."
+                f"The fit is far from the data in {name}: the {what} at least "
+                f"{level:.3g} in a quarter of them, whereas noise gives 1; the model, "
+                "the initial values or the stated noise are wrong."
             )
     total = np.where(used, flown + joints, 0.0)
     rest = np.sum(np.where(resting, rested, 0.0))
@@ -111,9 +111,9 @@ def far_from_data(problem: Problem, costs: Costs, weights: Weights | None) -> st
         r, k = np.unravel_index(np.argmax(total), total.shape)
         when = float(np.asarray(pieces.flown.start)[r, k])
         return (
-            f"The fit is far from the data: the cost a sample is {mean:.3g} where "
-            f"noise makes it 1, most of it in {problem.records[r]} near {when:.4g} s; "
-            f"look at the residuals there."
+            f"The fit is far from the data: the cost per sample is {mean:.3g}, "
+            f"whereas noise gives 1; most of it is in {problem.records[r]} near "
+            f"{when:.4g} s, so check the residuals there."
         )
     return ""
 

@@ -21,11 +21,11 @@ class Ellipse:
     """
 
     names: tuple[str, ...]
-    """`(d,)`, the order of everything else."""
+    """Names of the `d` parameters, in the order of all other fields."""
     centre: Float[np.ndarray, " d"]
-    """`(d,)` and `(d, d)`, in the units of the parameters."""
+    """Centre, in the units of the parameters, shape `(d,)`."""
     covariance: Float[np.ndarray, "d d"]
-    """`(d,)` and `(d, d)`, in the units of the parameters."""
+    """Covariance, in the units of the parameters, shape `(d, d)`."""
     level: float
     """Probability that the region contains the true values."""
 

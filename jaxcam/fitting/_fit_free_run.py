@@ -64,7 +64,8 @@ def fit_free_run(
             parameter serves all of them.
         parameters: Parameters to fit; bounds and scales count, tolerances do not.
         start: Values of some parameters to start from; default those of the model.
-        samples: Number of samples that the initial state of a recording is found from.
+        samples: Number of samples from which the initial state of a recording is
+            estimated.
 
     Returns:
         A `FreeRunFit`.

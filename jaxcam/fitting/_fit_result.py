@@ -28,7 +28,7 @@ from .engine import (
 
 @dataclasses.dataclass(frozen=True)
 class Estimate:
-    """A fitted number and its standard error; of a record where each has its own.
+    """A fitted number and its standard error; of a recording where each has its own.
 
     The error is infinite where the data do not constrain the value; the fit then says
     so and has not converged.
@@ -43,11 +43,11 @@ class Estimate:
     unit: str = ""
     """Unit."""
     record: str | None = None
-    """Name of the record, where each has its own value."""
+    """Name of the recording, where each has its own value."""
 
     @property
     def label(self) -> str:
-        """The name, with `@record` where each record has its own."""
+        """The name, with `@record` where each recording has its own."""
         return self.name if self.record is None else f"{self.name}@{self.record}"
 
     @property
@@ -68,31 +68,27 @@ class Fit:
     """
 
     problem: Problem
-    """Parameters and states at the optimum."""
+    """The fitted problem."""
     point: Point
     """Parameters and states at the optimum."""
     free: tuple[str, ...]
     """Names of the parameters that were free."""
     estimates: tuple[Estimate, ...]
-    """One for each free number, in the order of `covariance`."""
+    """One estimate for each free number, in the order of `covariance`."""
     covariance: Float[np.ndarray, "g g"]
-    """Covariance from the Fisher information, prior knowledge included."""
+    """Covariance from the Fisher information, including prior knowledge."""
     cost: float
-    """Minus twice the log-likelihood (less a constant) with the prior; `costs`: of each
-    piece, without it."""
+    """Minus twice the log-likelihood (up to a constant), including the prior."""
     costs: Costs
     """Cost of each piece, without the prior."""
     optimal: bool
-    """Whether the iteration met its tolerance at an optimum, after how many steps, and
-    how it ended in words."""
+    """Whether the iteration met its tolerance at an optimum."""
     iterations: int
-    """Whether the iteration met its tolerance at an optimum, after how many steps, and
-    how it ended in words."""
+    """Number of iterations."""
     ended: str
-    """Whether the iteration met its tolerance at an optimum, after how many steps, and
-    how it ended in words."""
+    """The reason why the iteration ended, in words."""
     weights: Weights | None = None
-    """Weight of each piece of the data; `None` where all count alike."""
+    """Weight of each piece of the data; `None` if all have the same weight."""
     unconstrained: tuple[Unconstrained, ...] = ()
     """Combinations of parameters that the data do not constrain."""
 
@@ -104,7 +100,9 @@ class Fit:
 
     def _table(self) -> ShortTable:
         """Outcome of the fit, and its estimates."""
-        count = f"{self.problem.samples} samples, {len(self.problem.records)} records"
+        count = (
+            f"{self.problem.samples} samples, {len(self.problem.records)} recordings"
+        )
         trusted = "converged" if self.converged else "not to be trusted"
         rows = [
             (one.label, f"{one.value:.7g}", f"{one.stderr:.2g}", one.unit)
@@ -179,9 +177,9 @@ class Fit:
         free.
 
         Args:
-            names: Names as in `estimates`, with `@record` where each record has its
+            names: Names as in `estimates`, with `@record` where each recording has its
                 own.
-            level: Probability that the region holds the truth.
+            level: Probability that the region contains the true values.
 
         Returns:
             An `Ellipse`.
@@ -200,7 +198,7 @@ class Fit:
         return most_correlated([e.label for e in self.estimates], self.correlation)
 
     def model(self, record: int | str = 0) -> Model:
-        """Return the model with the fitted parameters, of one record where they
+        """Return the model with the fitted parameters, of one recording where they
         differ.
         """
         names = self.problem.records

@@ -52,8 +52,9 @@ class FreeRun:
     state: Float[np.ndarray, " n"]
     """Initial state."""
     samples: int
-    """Number of samples that the initial state was found from; they do not count in the
-    error."""
+    """Number of samples from which the initial state was estimated; they do not count
+    in the error.
+    """
 
     @property
     def rmse(self) -> dict[str, float]:
@@ -64,7 +65,7 @@ class FreeRun:
         }
 
     def residual(self, channel: str) -> Float[np.ndarray, " k"]:
-        """Return measured less simulated samples."""
+        """Return the measured minus the simulated samples."""
         return self.measured[channel] - self.simulated[channel]
 
 
@@ -74,14 +75,14 @@ def free_run(
     """Simulate a complete recording from its first samples and its input.
 
     The state at the first sample is the one whose motion fits the first `samples` best.
-    From there on nothing but the measured input is used, held between samples, so that
-    errors accumulate over the recording. This is how benchmarks of identification judge
-    a model; a fit judges it piece by piece.
+    From there on only the measured input is used, held between samples, so that errors
+    accumulate over the recording. Benchmarks of identification test a model in this
+    way, whereas a fit tests it piece by piece.
 
     Args:
         model: A system with its sensors and its input, such as `found.model()`.
         recording: An evenly sampled recording; its `constants` are those of the system.
-        samples: Number of samples that the initial state is found from.
+        samples: Number of samples from which the initial state is estimated.
 
     Returns:
         A `FreeRun`.

@@ -19,7 +19,7 @@ _LEAST = 4
 _MISREAD = 6.0
 # Probability that a constant restitution appears to depend on the speed
 _CHANCE = 0.01
-# If more than this fraction is far off, nothing is set aside
+# If more than this fraction are outliers, none is excluded
 _MAJORITY = 0.7
 # standard deviations in the median of the size of a Gaussian number
 _MAD = 1.4826

@@ -24,9 +24,9 @@ class MomentumBalance:
     stderr: float
     """Standard error of `change`."""
     ratio: float
-    """Mass of the second body over that of the first, such that momentum is kept."""
+    """Ratio of the second mass to the first for which momentum is conserved."""
     ratio_stderr: float
-    """Mass of the second body over that of the first, such that momentum is kept."""
+    """Standard error of `ratio`."""
     stated: float
     """The same ratio of the stated masses, or NaN."""
 
@@ -41,7 +41,7 @@ class MomentumBalance:
         ratio = f"{self.ratio:.4g} +- {self.ratio_stderr:.1g}"
         if np.isnan(self.stated):
             return f"If momentum is kept, the second mass is {ratio} times the first."
-        change = f"{self.change:+.2%} +- {self.stderr:.1%} of what is exchanged"
+        change = f"{self.change:+.2%} +- {self.stderr:.1%} of the exchanged momentum"
         if self.kept:
             return f"Momentum is kept: both together change by {change}."
         return (

@@ -81,7 +81,7 @@ def profile(
 
     Raises:
         KeyError: The parameter was not fitted.
-        ValueError: The parameter differs from record to record.
+        ValueError: The parameter differs from recording to recording.
 
     Examples:
         >>> from jaxcam.fitting import profile
@@ -151,7 +151,7 @@ def excess_cost(
 
     Raises:
         KeyError: A parameter was not fitted.
-        ValueError: A parameter differs from record to record.
+        ValueError: A parameter differs from recording to recording.
 
     Examples:
         >>> from jaxcam.fitting import excess_cost
@@ -173,8 +173,8 @@ def excess_cost(
 def _require_shared(found: Fit, name: str) -> None:
     if found[name].record is not None:
         raise ValueError(
-            f"{name!r} has a value for each record; profile a parameter that all "
-            f"records share."
+            f"{name!r} has a value for each recording; profile a parameter that all "
+            "recordings share."
         )
 
 

@@ -207,7 +207,7 @@ def _parameter(name: str, one: _Stated) -> Parameter:
 def _records(
     file: Path, tables, system: HybridSystem, taken: set[str]
 ) -> dict[str, dict[str, float]]:
-    """Read the constants of records, by patterns of their names.
+    """Read the constants of recordings, by patterns of their names.
 
     **Arguments:** `taken` are the numbers that are fitted or measured by a channel.
     """
@@ -224,7 +224,7 @@ def _records(
             if name in taken:
                 raise inner.error(
                     name,
-                    "is fitted or measured, and cannot be known of a record as well",
+                    "is fitted or measured, and cannot be known of a recording as well",
                 )
             values[name] = inner.quantity(key, None).value
         found[pattern] = values

@@ -1,4 +1,4 @@
-"""Residuals of a fit: data minus model by record, mode, time and phase."""
+"""Residuals of a fit: data minus model by recording, mode, time and phase."""
 
 import dataclasses
 
@@ -11,7 +11,7 @@ from .engine import predict
 
 @dataclasses.dataclass(frozen=True)
 class Residuals:
-    """Data minus model of one channel of one record, in units of the channel.
+    """Data minus model of one channel of one recording, in units of the channel.
 
     The example continues that of [`jaxcam.fitting.fit`][].
 
@@ -22,7 +22,7 @@ class Residuals:
     """
 
     record: str
-    """Name of the record."""
+    """Name of the recording."""
     channel: str
     """The channel."""
     time: Float[np.ndarray, " k"]
@@ -58,7 +58,7 @@ class Residuals:
 
 
 def residuals(found: Fit) -> list[Residuals]:
-    """Return the residuals of each record and channel, sorted by time.
+    """Return the residuals of each recording and channel, sorted by time.
 
     Saturated samples are left out. The example continues that of
     [`jaxcam.fitting.fit`][].

@@ -39,17 +39,17 @@ class RestitutionFit:
     law: eqx.Module
     """The fitted law, a Module for `CamFollower(restitution=...)`."""
     names: tuple[str, ...]
-    """Its parameters."""
+    """Names of its parameters."""
     values: Float[np.ndarray, " p"]
-    """Its parameters."""
+    """Their values."""
     stderr: Float[np.ndarray, " p"]
-    """Its parameters."""
+    """Their standard errors."""
     cost: float
-    """Sum of squares (of Huber's kind) in standard errors, and impacts less parameters;
-    their ratio is 1 if the law explains all impacts."""
+    """Sum of squared residuals in standard errors, with the loss function of Huber."""
     freedom: int
-    """Sum of squares (of Huber's kind) in standard errors, and impacts less parameters;
-    their ratio is 1 if the law explains all impacts."""
+    """Number of impacts minus number of parameters; `cost / freedom` is 1 if the
+    law explains all impacts.
+    """
 
     def sentence(self) -> str:
         """Return the law in words."""

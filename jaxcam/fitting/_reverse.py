@@ -91,13 +91,13 @@ def train(
         A `Trained`.
 
     Raises:
-        ValueError: A number of the problem differs from record to record.
+        ValueError: A number of the problem differs from recording to recording.
     """
     own = [p.name for p in problem.parameters if p.per_record or p.known is not None]
     if own:
         raise ValueError(
-            f"`train` takes records that share every number, and each has a value of "
-            f"its own of {own[0]!r}; leave it out."
+            f"`train` requires parameters that all recordings share, and {own[0]!r} "
+            "has a separate value in each; leave it out."
         )
     values = where(problem.model)
     arrays, rest = eqx.partition(values, eqx.is_inexact_array)

@@ -58,8 +58,8 @@ class Linearised:
     def step(self, names: Iterable[str]) -> dict[str, tuple[float, float]]:
         """Return the change of each freed parameter, and its standard error.
 
-        It is exact for a quadratic likelihood. Parameters that differ from record to
-        record are named `name@record`.
+        It is exact for a quadratic likelihood. Parameters that differ from recording to
+        recording are named `name@record`.
         """
         rows = self._rows(names)
         inverse = invert_information(self._block(rows))

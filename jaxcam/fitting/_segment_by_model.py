@@ -31,8 +31,8 @@ def segment_by_model(
     """Cut recordings at every gap of a model's system, as measured by its channels.
 
     A gap is computed from the measured components of the state, and set to zero where
-    its velocity jumps, as far as the tolerances of the parameters allow.
-    Without a gap the whole record is one flight.
+    its velocity jumps, as far as the tolerances of the parameters allow. Without a gap
+    the whole recording is one flight.
 
     Args:
         model: The model. Components of the state are measured by sensors whose

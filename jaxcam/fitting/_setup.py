@@ -36,8 +36,9 @@ class Setup:
     of `jaxcam.recordings.References`, in the units of the motion; the others follow its
     speeds."""
     records: Mapping[str, Mapping[str, float]] = dataclasses.field(default_factory=dict)
-    """Known constants of single records, by patterns of their names:
-    `{"run3*": {"mass": 0.31}}`; of several matches, the last counts."""
+    """Known constants of single recordings, by patterns of their names: `{"run3*":
+    {"mass": 0.31}}`; of several matches, the last counts.
+    """
     files: FileLayout = FileLayout()
     """Names of the columns of recordings, and their sampling rate."""
 
@@ -63,7 +64,7 @@ class Setup:
         that the rig states.
 
         Raises:
-            RecordingError: As for `read_case`; or constants belong to a record that
+            RecordingError: As for `read_case`; or constants belong to a recording that
                 does not exist.
         """
         case = read_case(
@@ -77,10 +78,10 @@ class Setup:
         return self.known_of(case)
 
     def known_of(self, case: Case) -> Case:
-        """Return the case with the constants that the rig states for each record.
+        """Return the case with the constants that the rig states for each recording.
 
         Raises:
-            RecordingError: Constants belong to a record that does not exist.
+            RecordingError: Constants belong to a recording that does not exist.
         """
         for pattern in self.records:
             if not any(_fits(run.name, pattern) for run in case):
@@ -143,7 +144,7 @@ class Setup:
 
 
 def _fits(name: str, pattern: str) -> bool:
-    """Return whether a name denotes a record or a piece of it: `run3_piece2` by
+    """Return whether a name denotes a recording or a piece of it: `run3_piece2` by
     `run3`.
     """
     whole = re.sub(r"_piece\d+$", "", name)

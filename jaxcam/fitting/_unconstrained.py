@@ -22,7 +22,7 @@ class Unconstrained:
     """A combination of parameters that can change without changing the data."""
 
     names: tuple[str, ...]
-    """Names of the parameters, `name@record` where each record has its own."""
+    """Names of the parameters, `name@record` where each recording has its own."""
     shares: Float[np.ndarray, " k"]
     """Change of each parameter, in its own unit, the largest of them by its scale."""
 

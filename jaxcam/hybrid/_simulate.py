@@ -211,7 +211,7 @@ def _assemble(system, t0, state, contact, log: Log) -> Parts:
 
 @jax.jit
 def _code(carried: LoopState):
-    """Index into `RESULTS`; a run that goes on has used up its budget."""
+    """Index into `RESULTS`; an unfinished run has used up its budget."""
     return carried.status.astype(jnp.int32)
 
 

@@ -65,8 +65,9 @@ class CamFollower(AbstractCamDriven):
     rad/s.
     """
     rotation: str = eqx.field(default="clockwise", static=True)
-    """"clockwise" or "counterclockwise". The thesis' tables need a cam that turns
-    clockwise, although its Table 4.3 counts angles the other way."""
+    """"clockwise" or "counterclockwise". The tables of the thesis require a cam that
+    turns clockwise, although its Table 4.3 counts angles the other way.
+    """
 
     def __check_init__(self):
         if self.rotation not in _SENSE:

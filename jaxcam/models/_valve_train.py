@@ -45,7 +45,7 @@ class ValveTrain(AbstractCamDriven):
     speed: jax.Array = parameter()
     """Speed of the cam (rad/s), half that of a four-stroke engine's crank."""
     mass: jax.Array = parameter()
-    """Mass that moves with the valve (kg), including a third of the spring's."""
+    """Mass that moves with the valve (kg), including a third of the spring mass."""
     stiffness: jax.Array = parameter()
     """Stiffness of the valve spring (N/m)."""
     preload: jax.Array = parameter()

@@ -125,8 +125,8 @@ def _fitting(recording: Recording, values: ArrayLike) -> np.ndarray:
     array = np.asarray(values, dtype=float)
     if array.shape != recording.time.shape:
         raise ValueError(
-            f"{recording.name} has {len(recording)} samples and what is to be drawn "
-            f"with it has shape {array.shape}; sample it at `recording.time`."
+            f"{recording.name} has {len(recording)} samples, but the simulated "
+            f"samples have shape {array.shape}; sample them at `recording.time`."
         )
     return array
 

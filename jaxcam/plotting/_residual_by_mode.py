@@ -192,7 +192,7 @@ def _draw_shares(
 
 
 def _name_records(figure: Figure, colours: dict[str, str]) -> None:
-    # the titles are above the axes, so the records are named above them all
+    # the titles are above the axes, so the recordings are named above them all
     dots = [
         Line2D([], [], marker="o", linestyle="", color=colour, label=name)
         for name, colour in colours.items()

@@ -24,9 +24,9 @@ class Drive:
     rate: Float[np.ndarray, " k"]
     """Its rate of change (rad/s)."""
     speed: float
-    """The straight line `speed * time + phase` through the angle."""
+    """Slope (rad/s) of the straight line `speed * time + phase` through the angle."""
     phase: float
-    """The straight line `speed * time + phase` through the angle."""
+    """Value (rad) of this line at time zero."""
     noise: float
     """Standard deviation of the raw samples about the smoothed angle (rad)."""
     window: int
@@ -46,7 +46,7 @@ class Drive:
 def read_drive(recording: Recording, channel: str = "cam_angle_rad") -> Drive:
     """Smooth the encoder of a drive with local parabolas over 50 ms.
 
-    **Raises:** `RecordingError` for a shorter record, or a drive at rest.
+    **Raises:** `RecordingError` for a shorter recording, or a drive at rest.
     """
     raw = recording[channel]
     if np.any(np.abs(np.diff(raw)) > np.pi):
@@ -57,7 +57,7 @@ def read_drive(recording: Recording, channel: str = "cam_angle_rad") -> Drive:
     if count < 5 or count > len(raw):
         raise RecordingError(
             f"{recording.name}: {len(raw)} samples {recording.interval:.3g} s apart "
-            f"are too few to follow the drive; give a record that is longer than "
+            "are too few to follow the drive; give a recording that is longer than "
             f"{_WINDOW:g} s and sampled above {4 / _WINDOW:g} Hz."
         )
     angle = np.asarray(savgol_filter(raw, count, 2))
@@ -66,8 +66,8 @@ def read_drive(recording: Recording, channel: str = "cam_angle_rad") -> Drive:
     speed, phase = np.polyfit(recording.time, raw, 1)
     if abs(angle[-1] - angle[0]) < np.pi:
         raise RecordingError(
-            f"{recording.name}: the drive turns by {abs(angle[-1] - angle[0]):.2g} rad "
-            f"only; give a record of at least half a turn."
+            f"{recording.name}: the drive turns by {abs(angle[-1] - angle[0]):.2g} "
+            "rad only; give a recording of at least half a turn."
         )
     noise = float(np.std(raw - angle))
     return Drive(angle, rate, float(speed), float(phase), noise, count)

@@ -114,7 +114,7 @@ def record(
     Args:
         system: The system; a driven one may be a `Wandering`.
         sensors: A `jaxcam.fitting.Sensor` for each channel.
-        duration: Length of the record (s).
+        duration: Length of the recording (s).
         rng: Random number generator of the noise.
         state: Initial state, `(n,)`; `None` for the release point.
         settle: Time to wait before (s).

@@ -1,4 +1,4 @@
-"""Assess a verdict: bootstrap, held-out records, residual structure, limits."""
+"""Assess a verdict: bootstrap, held-out data, residual structure, detection limits."""
 
 from ._choice import Choice as Choice, choose as choose, Outside as Outside
 from ._held_out import HeldOut as HeldOut, rms_of as rms_of

@@ -1,7 +1,7 @@
-"""Parameters of a rig that a fit finds outside the tolerances stated for them.
+"""Find parameters whose fitted values are outside their stated tolerances.
 
-The tolerance says where a parameter can be. What the data put beyond it is something
-that acts like the parameter, or a rig file that is wrong.
+An excess over the tolerance is an effect that acts like the parameter, or an error in
+the rig file.
 """
 
 import math
@@ -18,7 +18,8 @@ from ..search import Trial, Trials
 class Beyond(NamedTuple):
     """A parameter outside its tolerance.
 
-    - `value`, `stderr`, `unit`: of the fit; `low`, `high`: the ends of the tolerance.
+    - `value`, `stderr`, `unit`: result of the fit; `low`, `high`: ends of the
+      tolerance.
     - `excess`: distance beyond the nearer end, positive.
     - `chance`: share of the bootstrap distribution that is beyond it.
     """
@@ -34,10 +35,11 @@ class Beyond(NamedTuple):
 
 
 def beyond_tolerance(trials: Trials, best: Trial, deviation) -> list[Beyond]:
-    """The rig's parameters that are surely outside their tolerances, furthest first.
+    """Return the rig parameters that are significantly outside their tolerances, the
+    furthest first.
 
-    **Arguments:** the fit of the terms that are named, and the standard deviations of
-    its parameters over the bootstrap samples, by name.
+    **Arguments:** the fit with the named terms, and the standard deviations of its
+    parameters over the bootstrap samples, by name.
     """
     found = []
     for name in trials.rig:
@@ -62,10 +64,10 @@ def beyond_tolerance(trials: Trials, best: Trial, deviation) -> list[Beyond]:
 
 
 def acting_alike(trials: Trials, best: Trial, name: str) -> Iterator[str]:
-    """Terms that the data cannot tell from a parameter of the rig.
+    """Yield the terms that the data cannot distinguish from a parameter of the rig.
 
-    A term is alike where next to nothing of its information is left once that parameter
-    is free, though most of it is left beside all the other ones.
+    A term is indistinguishable if almost none of its information remains when that
+    parameter is free, although most of it remains when all other parameters are free.
     """
     blocks = trials.blocks(best)
     information = np.sum(blocks.information, axis=0)
@@ -85,7 +87,7 @@ def acting_alike(trials: Trials, best: Trial, name: str) -> Iterator[str]:
 
 
 def _left(information, row: int, free) -> float:
-    """Information of one number beside others."""
+    """Return the information on one parameter when others are free."""
     free = free[np.diag(information)[free] > 0]
     inside = invert_information(information[np.ix_(free, free)])
     across = information[row, free]

@@ -1,4 +1,4 @@
-"""The subset that is named, once it has been doubted."""
+"""Choose the terms to be named from the result of a search."""
 
 import dataclasses
 from typing import NamedTuple
@@ -26,8 +26,8 @@ from ._visited_states import visited_states
 class Outside(NamedTuple):
     """A parameter outside its tolerance, and the term named in its place.
 
-    `term` is empty where no term acts like the parameter; `lost` is the growth of the
-    cost where neither the term nor the excess is allowed.
+    `term` is empty if no term acts like the parameter; `lost` is the increase in the
+    cost if neither the term nor the excess is allowed.
     """
 
     parameter: Beyond
@@ -39,17 +39,17 @@ class Outside(NamedTuple):
 class Choice:
     """The result of a search, and the evidence for it.
 
-    - `found`: the best subset; `best`: the part of it that is named; `before`: no term,
-        the parameters of the rig held within their tolerances.
-    - `inclusion`, `deviation`: of the bootstrap, by term and by parameter.
+    - `found`: the best subset; `best`: the part of it that is named; `before`: the fit
+        without terms, with the rig parameters held within their tolerances.
+    - `inclusion`, `deviation`: results of the bootstrap, by term and by parameter.
     - `doubtful`: terms that were dropped, with the share of the bootstrap samples that
-        keep them; `needed`: those that are named all the same.
-    - `masked`: terms that were dropped, with their shares of what is explained, because
-        the corner of another one leaves as much.
-    - `beyond`: parameters of the rig that are outside their tolerances.
-    - `missing`: functions without a name that explain more than terms that have one;
-        `needs`: how much they are needed, by their labels; `rivals`: other functions
-        that were fitted in their place.
+        retain them; `needed`: those that are named nevertheless.
+    - `masked`: terms that were dropped, with their shares of the explained cost,
+        because the smoothed corner of another term leaves as much.
+    - `beyond`: rig parameters that are outside their tolerances.
+    - `missing`: unnamed functions that explain more than named terms;
+        `needs`: their bootstrap results, by label; `rivals`: other functions that were
+        fitted in their place.
     - `left_before`, `left_after`: structures in the residuals of `before` and `best`.
     """
 
@@ -71,32 +71,32 @@ class Choice:
 
     @property
     def unexplained(self) -> list[Structure]:
-        """Structures that are left over for sure, largest excess first."""
+        """Return the significant remaining structures, the largest excess first."""
         return [one for one in self.left_after if one.significant]
 
 
 def choose(question: Question, trials: Trials, seed: int) -> Choice:
-    """Search, drop what hangs on a few blocks, and look at what remains.
+    """Search, drop terms that depend on a few blocks, and test the residuals.
 
-    A term in doubt is named where nothing remains with it and much is without it,
-    if it improves the prediction of held-out records.
+    A term in doubt is named if no structure remains with it but much remains without
+    it, provided that it improves the prediction of held-out data.
     """
     found = Search(trials).run()
-    trials.progress("redrawing stretches of the records", None)
+    trials.progress("drawing bootstrap samples", None)
     found, masked = unmasked(trials, found)
     best, inclusion, deviation, doubtful = sure(trials, found, seed)
     before = trials.known[frozenset()]
-    trials.progress("looking at what is left over", None)
+    trials.progress("testing the residuals", None)
     left_before = _left(question, trials, before)
     left_after = _left(question, trials, best) if best.names else left_before
     held, needed = None, []
     if doubtful and any(one.significant for one in left_after):
-        # that something is there is sure; what explains all of it is what it is
+        # a discrepancy is certain, and the term explains all of it
         with_all = _left(question, trials, found)
         if not any(one.significant for one in with_all):
             whole = held_out(trials, before, found)
-            # a term must improve the prediction of held-out data; more is not asked of
-            # it than of a shape
+            # a term must improve held-out prediction; its threshold is not above that
+            # of a shape
             if whole.after < whole.before or trials.foretells(best, found):
                 best, left_after, held = found, with_all, whole
                 needed, doubtful = doubtful, []
@@ -111,7 +111,7 @@ def choose(question: Question, trials: Trials, seed: int) -> Choice:
         )
     after = best.fit if missing is None else missing.fit
     if after is not before.fit:
-        # the textbook model has its parameters where the rig file allows them
+        # the parameters of the textbook model are within their tolerances
         before = dataclasses.replace(before, fit=_bounded(trials, before.fit, after))
     if missing is not None:
         nameless = Trial(
@@ -139,16 +139,17 @@ def choose(question: Question, trials: Trials, seed: int) -> Choice:
 
 
 def _instead(trials: Trials, best: Trial, deviation) -> tuple[list[Outside], Trial]:
-    """Parameters outside their tolerances, and terms named in their place.
+    """Find parameters outside their tolerances, and terms named in their place.
 
-    **Returns:** these, and the fit with the terms.
+    **Returns:** these parameters and terms, and the fit with the terms.
     """
     found = []
     for one in beyond_tolerance(trials, best, deviation):
         outside = Outside(one)
         for name in acting_alike(trials, best, one.name):
             trial = trials.attempt(best.names | {name}, best, trials.policy.iterations)
-            # the term takes up the excess: the parameter is back in its tolerance
+            # the term represents the excess: the parameter is within its tolerance
+            # again
             if trial is None or not one.low <= trial.fit[one.name].value <= one.high:
                 continue
             lost = _bounded(trials, best.fit, trial.fit).cost - trial.fit.cost
@@ -159,17 +160,18 @@ def _instead(trials: Trials, best: Trial, deviation) -> tuple[list[Outside], Tri
 
 
 def _bounded(trials: Trials, less: Fit, best: Fit) -> Fit:
-    """A fit with the parameters of the rig held within their tolerances."""
+    """Fit with the rig parameters held within their tolerances."""
     return within_tolerances(less, best, trials.rig, trials.policy)
 
 
 def _without_a_name(
     question: Question, trials: Trials, best: Trial, left: list[Structure], seed: int
 ) -> tuple[Missing | None, Needs | None, tuple[Rival, ...]]:
-    """Functions that explain what the named terms leave over, by their evidence.
+    """Return the functions that explain the residual of the named terms, by their
+    evidence.
 
-    What is left after a named term but is small beside what that explains is none, and
-    what the bootstrap samples can do without is not needed.
+    A residual that is small compared with the part explained by a named term does not
+    count. A function that the bootstrap samples do not retain is not needed.
     """
     policy, bare = trials.policy, trials.known[frozenset()].fit.cost
     small = policy.small * (bare - best.fit.cost)

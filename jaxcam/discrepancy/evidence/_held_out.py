@@ -1,4 +1,4 @@
-"""Stretches of records that no parameter has seen, predicted by two models."""
+"""Predict held-out sections of the recordings with two models."""
 
 import dataclasses
 import math
@@ -14,12 +14,12 @@ from ..search import given_up, Trial, Trials, with_states
 
 
 class HeldOut(NamedTuple):
-    """Two models on stretches of the records that their parameters have not seen.
+    """Predictions of two models on held-out sections of the recordings.
 
     - `before`, `after`: rms of the residuals in units of the noise, without and with
         the terms.
-    - `gained`: growth of the log-likelihood, by record.
-    - `residuals`: of both models.
+    - `gained`: increase in the log-likelihood, by recording.
+    - `residuals`: residuals of both models.
     """
 
     before: float
@@ -29,15 +29,15 @@ class HeldOut(NamedTuple):
 
     @property
     def total(self) -> float:
-        """Growth of the log-likelihood of all records."""
+        """Increase in the log-likelihood of all recordings."""
         return sum(self.gained.values())
 
 
 def held_out(trials: Trials, before: Trial, after: Trial) -> HeldOut:
-    """Predict what the parameters of two models have not seen.
+    """Predict held-out data with two models.
 
-    Every record is cut into short stretches, which are dealt out to a few parts (two
-    for a record alone), each predicted with what the others say.
+    Every recording is divided into short sections, which are distributed over a few
+    parts (two for a single recording). Each part is predicted from the others.
     """
     problem = trials.problem
     unseen_parts: tuple[list[Residuals], list[Residuals]] = ([], [])
@@ -48,7 +48,7 @@ def held_out(trials: Trials, before: Trial, after: Trial) -> HeldOut:
         costs = []
         for which, trial in enumerate((before, after)):
             done = (2 * fold + which) / (2 * len(folds))
-            trials.progress("predicting stretches not seen", done)
+            trials.progress("predicting held-out data", done)
             own = trial.fit.problem
             known = fit(
                 own,
@@ -79,7 +79,7 @@ def held_out(trials: Trials, before: Trial, after: Trial) -> HeldOut:
 
 
 def _by_record(test: Fit, unseen: Weights) -> Float[np.ndarray, " r"]:
-    """Cost of what was not seen; a joint counts where both its pieces do."""
+    """Return the cost of the held-out data; a joint counts if both its pieces do."""
     flown, joints, rested = (np.asarray(part) for part in test.costs)
     before = np.concatenate([unseen.flown[:, :1], unseen.flown[:, :-1]], axis=1)
     shared = np.minimum(unseen.flown, before)
@@ -88,22 +88,22 @@ def _by_record(test: Fit, unseen: Weights) -> Float[np.ndarray, " r"]:
 
 
 def rms_of(fitted: Fit) -> float:
-    """Rms of the residuals of a fit on its own records, in units of the noise."""
+    """Return the rms residual of a fit on its own recordings, in units of the noise."""
     square, count = _square(residuals(fitted))
     return math.sqrt(square / max(count, 1))
 
 
 def _square(parts: list[Residuals]) -> tuple[float, int]:
-    """Sum of the squares in units of the noise, and the number of samples."""
+    """Return the sum of squares in units of the noise, and the number of samples."""
     square = sum(float(np.sum((part.value / part.noise) ** 2)) for part in parts)
     return square, sum(len(part.value) for part in parts)
 
 
 def folds_of(problem: Problem, policy: Policy) -> list[tuple[Weights, Weights]]:
-    """Weights of what is seen and what is not, for each part of the data.
+    """Return weights of the fitted and the held-out data, for each part.
 
-    Every record is cut into short stretches that are dealt out in turn, so that a place
-    that is visited a few times is in each part.
+    Every recording is divided into short sections that are distributed in turn, so that
+    each part contains every region that is visited several times.
     """
     count = policy.folds if len(problem.records) > 1 else 2
     every = problem.everything()
@@ -126,7 +126,7 @@ def folds_of(problem: Problem, policy: Policy) -> list[tuple[Weights, Weights]]:
 
 
 def _parts(test: Fit, unseen) -> list[Residuals]:
-    """Residuals of the pieces that count."""
+    """Return the residuals of the pieces that count."""
     found = []
     problem = test.problem
     for part in residuals(test):

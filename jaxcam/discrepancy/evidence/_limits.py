@@ -1,4 +1,4 @@
-"""Detection limits: the least strength of each term that would be named."""
+"""Detection limits: the smallest strength at which each term would be named."""
 
 import math
 from typing import NamedTuple
@@ -9,9 +9,9 @@ from ..search import newton_step, Trial, Trials
 
 
 class Limit(NamedTuple):
-    """The least strength that would be named, its standard error and its unit.
+    """The smallest strength that would be named, its standard error and its unit.
 
-    `hidden` is the parameter of the rig that would take up most of it.
+    `hidden` is the rig parameter that would absorb most of it.
     """
 
     size: float
@@ -21,7 +21,8 @@ class Limit(NamedTuple):
 
 
 def limits(trials: Trials, trial: Trial) -> dict[str, Limit]:
-    """Least strength of each term, beside those of a trial, that would be named.
+    """Return the smallest strength at which each term would be named in addition to
+    those of a trial.
 
     **Returns:** limits by the name of the parameter.
     """
@@ -31,7 +32,7 @@ def limits(trials: Trials, trial: Trial) -> dict[str, Limit]:
     rig = blocks.rows(trials.rig)
     found = {}
     for term in trials.terms:
-        # the least strength of one with an edge of its own hangs on the edge
+        # the limit of a term with an inner parameter depends on that parameter
         if term.name in trial.names or term.starts():
             continue
         for one in term.strengths():
@@ -42,7 +43,8 @@ def limits(trials: Trials, trial: Trial) -> dict[str, Limit]:
             _, covariance = newton_step(information, score, rows)
             place = np.searchsorted(rows, row[0])
             stderr = math.sqrt(abs(covariance[place, place]))
-            # without the term, the rig moves by what its columns have in common with it
+            # without the term, the rig parameters shift by the projection of the term
+            # on them
             across = np.zeros(len(blocks.names))
             across[rig] = information[rig, row[0]]
             taken, spread = newton_step(information, across, rig)

@@ -1,17 +1,18 @@
-"""Terms that are no more than what a smoothed corner of another one leaves."""
+"""Drop terms that only compensate for the smoothed corner of another term."""
 
 from ..search import Trial, Trials
 
 
 def unmasked(trials: Trials, best: Trial) -> tuple[Trial, list[tuple[str, float]]]:
-    """A subset without the terms that the integration of a corner explains as well.
+    """Return a subset without the terms that the error of a smoothed corner also
+    explains.
 
-    Dry friction jumps where the speed changes sign. Its form is smooth, and steps do
-    not end there, so that a small share of what it explains may be left over; many
-    samples make this share significant, and some other term takes it up.
+    Dry friction jumps when the velocity changes sign. Its form is smoothed, and steps
+    do not end there, so a small share of the explained cost may remain. With many
+    samples this share is significant, and another term may represent it.
 
-    **Returns:** the fit, and the terms that were dropped, each with the share of what
-    is explained that it had.
+    **Returns:** the fit, and the dropped terms, each with its share of the explained
+    cost.
     """
     dropped: list[tuple[str, float]] = []
     bare = trials.known[frozenset()]

@@ -1,4 +1,4 @@
-"""Assess a named term by a block bootstrap of the records."""
+"""Assess a named term by a block bootstrap of the recordings."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -15,13 +15,14 @@ from ..search import blocks_of, gain, newton_step, Trial, Trials, values_of
 def sure(
     trials: Trials, best: Trial, seed: int = 0
 ) -> tuple[Trial, dict[str, float], dict[str, float], list[tuple[str, float]]]:
-    """The part of a subset that does not hang on a few stretches of the records.
+    """Return the part of a subset that does not depend on a few blocks of the
+    recordings.
 
-    A term whose strength might be zero is dropped first, then the one that fewest of
-    the bootstrap samples need.
+    A term whose strength might be zero is dropped first, then the one that the fewest
+    bootstrap samples need.
 
-    **Returns:** the fit, what `redrawn` says of it, and the terms that were dropped
-    with the part of the bootstrap samples that would have kept them.
+    **Returns:** the fit, its result of `redrawn`, and the dropped terms with the share
+    of the bootstrap samples that would have retained them.
     """
     doubtful: list[tuple[str, float]] = []
     while True:
@@ -39,7 +40,9 @@ def sure(
 
 
 def _size(trials: Trials, best: Trial, name: str, deviation) -> float:
-    """Strengths of a term beside what redrawing does to them; below one, maybe zero."""
+    """Return the strengths of a term relative to their bootstrap deviation; below one,
+    they may be zero.
+    """
     own = [one.name for one in trials.term(name).strengths() if not one.inner]
     found = [best.fit[one] for one in own]
     errors = [max(one.stderr, deviation[one.name]) for one in found]
@@ -48,11 +51,11 @@ def _size(trials: Trials, best: Trial, name: str, deviation) -> float:
 
 
 class Needs(NamedTuple):
-    """The parts of a model that are needed, by the bootstrap samples and by all data.
+    """Need for the parts of a model, in the bootstrap samples and in all data.
 
-    - `inclusion`: share of the bootstrap samples that would keep a part.
-    - `deviation`: of each free parameter, over the bootstrap samples.
-    - `lost`: what all data lose without a part, less its price.
+    - `inclusion`: share of the bootstrap samples that would retain a part.
+    - `deviation`: standard deviation of each free parameter over the bootstrap samples.
+    - `lost`: loss in all data without a part, minus the penalty for its parameters.
     """
 
     inclusion: dict[str, float]
@@ -63,10 +66,10 @@ class Needs(NamedTuple):
 def redrawn(
     trials: Trials, best: Trial, seed: int = 0
 ) -> tuple[dict[str, float], dict[str, float]]:
-    """Draw stretches of the records again, a second or so each.
+    """Run the block bootstrap for the terms of a fit.
 
-    **Returns:** of each term, in which part of the bootstrap samples it would be kept,
-    because a fit without it is worse by BIC; and the standard deviation of each
+    **Returns:** for each term, the share of the bootstrap samples that would retain it,
+    because a fit without it has a larger BIC; and the standard deviation of each
     parameter.
     """
     own = {
@@ -88,12 +91,13 @@ def needs(
     seed: int = 0,
     names: Sequence[str] | None = None,
 ) -> Needs:
-    """Draw stretches of the records again, and see which parts they need.
+    """Run the block bootstrap for given parts of a model.
 
-    **Arguments:** the problem and a fit; the parameters of each part, and what a part
-    must gain to be kept; the policy, a seed, and the parameters to look at (all).
+    **Arguments:** the problem and a fit; the parameters of each part, and the gain
+    required to retain it; the policy, a seed, and the parameters to assess (default:
+    all).
     """
-    # what ties one stretch to the next is in neither, so they must hold many ties
+    # joints between blocks belong to neither, so blocks must be long
     pieces = max(len(flown) for flown, _ in problem.spans)
     slices = min(policy.stretches, max(1, pieces // policy.stretch_pieces))
     blocks = blocks_of(problem, found.point, slices, names)
@@ -127,7 +131,7 @@ def needs(
 
 
 def _inside(found: Fit) -> list[str]:
-    """Free parameters but those that press against a bound, where they stay."""
+    """Return the free parameters, except those at a bound, which stay there."""
     values = np.asarray(found.point.values)
     kept = []
     for name in found.free:
@@ -139,7 +143,9 @@ def _inside(found: Fit) -> list[str]:
 
 
 def _lost(information, score, value, free, gone, top: float) -> float:
-    """Return the loss when some strengths are zero and all else is fitted again."""
+    """Return the loss when some strengths are zero and all other parameters are
+    refitted.
+    """
     step = np.zeros(len(value))
     step[gone] = -value[gone]
     lost = step @ information @ step - 2 * step @ score

@@ -1,10 +1,10 @@
-"""Whether the drive ripples with its own angle, from its encoder alone.
+"""Detect ripple of the drive speed in its encoder signal.
 
 `w (1 + eps cos(phi - psi))` shifts the angle by `eps sin(phi - psi)` to first order. A
-real drive also wanders slowly: everything slower than three quarters of its rate is
-fitted freely (cosines of the record's length) and no ripple. What the wandering leaks
-to the harmonic is judged by what is seen beside it, at rates that no drive has a reason
-to prefer.
+real drive also wanders slowly: variations slower than three quarters of its rotation
+frequency are fitted freely (by cosines over the length of the recording) and are not
+ripple. The leakage of the wandering into the harmonic is estimated from the spectrum at
+non-harmonic multiples of the rotation frequency.
 """
 
 import dataclasses
@@ -18,7 +18,7 @@ from ...recordings import Recording
 from ..policy import Policy
 
 
-# A divisor that may be zero is at least this
+# Lower limit of a divisor that may be zero
 _TINY = 1e-300
 
 
@@ -35,7 +35,7 @@ class Ripple:
     psi_stderr: float
     """Standard error of `psi`."""
     gain: float
-    """Gain of twice the log-likelihood, beyond the leakage of slow wander."""
+    """Gain in twice the log-likelihood, beyond the leakage of the wandering."""
     p_value: float
     """Probability of such a gain without ripple."""
     count: int
@@ -43,17 +43,17 @@ class Ripple:
     dispersion: float
     """Scatter of the samples about the ripple, relative to the noise."""
     per_record: dict[str, tuple[float, float]]
-    """Amplitude and its standard error, by record."""
+    """Amplitude and its standard error, by recording."""
     heldout_gain: float
-    """Gain of the log-likelihood on held-out records."""
+    """Gain in the log-likelihood of held-out recordings."""
     inclusion: float
     """Share of the bootstrap samples in which it is significant."""
 
     def significant(self, tests: int, policy: Policy) -> bool:
-        """Return whether it exceeds chance, in one of `tests` tests, and the BIC's
-        threshold.
+        """Return whether it is significant, as one of `tests` tests, and exceeds the
+        threshold of the BIC.
 
-        As for any named term, it must also do so in most of the bootstrap samples.
+        As for any named term, this must also hold in most bootstrap samples.
         """
         chance = chi2.isf(policy.false_alarms / tests, 2)
         asked = max(2 * math.log(self.count), chance)
@@ -70,7 +70,7 @@ def ripple_of(
     channel: str = "cam_angle_rad",
     policy: Policy = Policy(),
 ) -> Ripple:
-    """Fit one ripple to the drives of all records.
+    """Fit one ripple to the drive signals of all recordings.
 
     Args:
         recordings: The recordings.
@@ -119,7 +119,9 @@ def ripple_of(
 
 
 def _held_out(wave, variance) -> float:
-    """Log-likelihood gained on each record with the ripple of all the others."""
+    """Return the gain in the log-likelihood of each recording with the ripple of all
+    others.
+    """
     total = 0.0
     for k in range(len(wave)):
         rest = np.arange(len(wave)) != k
@@ -132,7 +134,7 @@ def _held_out(wave, variance) -> float:
 
 
 def _inclusion(wave, variance, asked: float, repetitions: int) -> float:
-    """Part of the bootstrap samples of records in which the ripple is worth it."""
+    """Return the share of the bootstrap samples in which the ripple is significant."""
     rng = np.random.default_rng(0)
     drawn = rng.integers(0, len(wave), (repetitions, len(wave)))
     weight = 1 / variance[drawn]
@@ -143,7 +145,9 @@ def _inclusion(wave, variance, asked: float, repetitions: int) -> float:
 def _amplitudes(
     recording: Recording, channel: str, orders, noise: float, policy: Policy
 ):
-    """Complex amplitude eps e^{i psi} of each multiple of the rate, and its error."""
+    """Return the complex amplitude eps e^{i psi} of each multiple of the rotation
+    frequency, and its error.
+    """
     angle = recording[channel]
     if np.any(np.abs(np.diff(angle)) > np.pi):
         angle = np.unwrap(angle)
@@ -156,14 +160,15 @@ def _amplitudes(
     length = time[-1] * (1 + 1 / len(time))
     slow = np.arange(1, int(2 * length * policy.drive_wander * rate) + 1)
     wander = np.cos(np.pi * np.outer(time / length, slow))
-    # cosines are flat at both ends, where a drive need not be
+    # cosines have zero slope at both ends; a drive need not
     ends = np.polynomial.legendre.legvander(2 * time / length - 1, policy.drive_degree)
     columns = [*ends.T, *wander.T]
     found, errors = np.zeros(len(orders), dtype=complex), np.zeros(len(orders))
     fixed, _ = np.linalg.qr(np.stack(columns, axis=1))
     rest = angle - turned
     rest = rest - fixed @ (fixed.T @ rest)
-    # the first harmonic is fitted beside the others, which it may leak into
+    # the first harmonic is fitted together with each of the others, into which it may
+    # leak
     for k, order in enumerate(orders):
         pick = (order,) if order == 1 else (order, 1.0)
         waves = [f(o * turned) for o in pick for f in (np.sin, np.cos)]

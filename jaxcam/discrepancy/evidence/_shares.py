@@ -1,4 +1,4 @@
-"""Shares of the misfit: of what explains it, and of the parts of a motion it is in."""
+"""Shares of the misfit, by effect and by part of the motion."""
 
 import math
 from collections.abc import Mapping
@@ -12,9 +12,9 @@ from ..policy import Policy
 
 
 class Shares(NamedTuple):
-    """Shares of what the textbook model leaves unexplained; together they are one.
+    """Shares of the misfit of the textbook model; their sum is one.
 
-    - `of`: the share of each named term or function, by its label.
+    - `of`: the share of each named term or function, by label.
     - `left`: the share that nothing explains.
     """
 
@@ -29,14 +29,13 @@ def shares(
     left: float,
     policy: Policy = Policy(),
 ) -> Shares:
-    """Divide the misfit of a model among what explains it.
+    """Divide the misfit of a model among the effects that explain it.
 
-    What all parts explain together is the fall of the cost from `before` to `after`; it
-    is divided in proportion to what is lost without each of them.
+    The part explained by all effects together is the reduction of the cost from
+    `before` to `after`; it is divided in proportion to the loss without each of them.
 
-    **Arguments:** fits without and with what was found; growth of the cost without each
-    part; what a further function would still gain (0 where nothing is left over); the
-    policy.
+    **Arguments:** fits without and with the effects; the increase in the cost without
+    each effect; the gain of a further function (0 if no structure remains); the policy.
     """
     samples = after.problem.samples
     surplus = after.cost - samples - policy.cost_errors * math.sqrt(2 * samples)
@@ -57,10 +56,10 @@ def shares(
 
 
 def misfit_by_part(found: Fit, policy: Policy = Policy()) -> dict[str, float]:
-    """Shares of a misfit that are in flights, impacts and contacts, by their names.
+    """Return the shares of a misfit in flights, impacts and contacts, by name.
 
-    The misfit of a part is its cost above what noise makes of it: one a sample, and one
-    a component of a joint. Empty where no part has more than chance explains.
+    The misfit of a part is its cost in excess of that of noise: one per sample, and one
+    per component of a joint. The result is empty if no part has a significant misfit.
     """
     pieces, costs = found.problem.pieces, found.costs
     exists = np.asarray(pieces.exists)
@@ -69,7 +68,7 @@ def misfit_by_part(found: Fit, policy: Policy = Policy()) -> dict[str, float]:
     inside, met = exists & (joint == FLIGHT), exists & (joint == IMPACT)
     flown = int(np.sum(np.asarray(pieces.flown.known)))
     rested = int(np.sum(np.asarray(pieces.rested.known)))
-    # the state of a piece takes up as many samples as it has components
+    # the fitted state of a piece absorbs as many samples as it has components
     parts = {
         "flight": (
             float(np.sum(np.asarray(costs.flown)[exists]) + np.sum(joints[inside])),

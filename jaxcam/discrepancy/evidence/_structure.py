@@ -1,4 +1,6 @@
-"""Analyse the residual of a fit: shapes that would still gain, and their location."""
+"""Analyse the residuals of a fit: shapes with a significant gain, and their
+location.
+"""
 
 import dataclasses
 import enum
@@ -29,7 +31,7 @@ from ..terms import Shape, shapes, Term, terms_of, Where
 from ._visited_states import visited_states, VisitedStates
 
 
-# A standard error that may be zero is at least this
+# Lower limit of standard errors that may be zero
 _TINY = 1e-300
 
 
@@ -44,7 +46,7 @@ class Form(enum.StrEnum):
 
 @dataclasses.dataclass(frozen=True)
 class Structure:
-    """A structure by which the residuals may differ from noise."""
+    """A possible structure of the residuals that distinguishes them from noise."""
 
     name: str
     """Name of the structure."""
@@ -55,36 +57,38 @@ class Structure:
     region: str
     """Part of the motion, in words."""
     gain: float
-    """Gain of twice the log-likelihood."""
+    """Gain in twice the log-likelihood."""
     threshold: float
-    """Gain that chance and the number of parameters demand."""
+    """Required gain, from the error rate and the number of parameters."""
     count: int
     """Number of parameters."""
     unit: str = ""
     """Unit of `value`."""
     variable: str = ""
-    """The shape, where there is one; `quantity` is what its value is."""
+    """Argument of the shape, if there is one."""
     grid: Float[np.ndarray, " k"] = dataclasses.field(
         default_factory=lambda: np.zeros(0)
     )
-    """The shape, where there is one; `quantity` is what its value is."""
+    """Values of the argument at which the shape is given."""
     value: Float[np.ndarray, " k"] = dataclasses.field(
         default_factory=lambda: np.zeros(0)
     )
-    """The shape, where there is one; `quantity` is what its value is."""
+    """The shape at these values, in `unit`."""
     stderr: Float[np.ndarray, " k"] = dataclasses.field(
         default_factory=lambda: np.zeros(0)
     )
-    """The shape, where there is one; `quantity` is what its value is."""
+    """Standard errors of `value`."""
 
     predicted_gain: float = math.inf
-    """Growth in half of the records with what the other half says, where `gain` is
-    above its threshold; negative for what differs from record to record."""
+    """Increase in the log-likelihood of one half of the recordings with the estimate
+    from the other half, if `gain` is above its threshold; negative for an effect that
+    differs from recording to recording.
+    """
     form: Form = Form.FUNCTION
     """An unlisted term, a free function, a vibration, or residuals that are correlated
     in time."""
     quantity: str = ""
-    """The quantity whose value is given."""
+    """The quantity that `value` describes."""
 
     @property
     def significant(self) -> bool:
@@ -113,10 +117,11 @@ def structures(
     unit: str,
     policy: Policy,
 ) -> list[Structure]:
-    """Everything that the residuals of a fit are asked for, largest excess first.
+    """Test the residuals of a fit for structures, and return them with the largest
+    excess first.
 
-    **Arguments:** the fit, what a force would gain beside it, terms that describe but
-    are no verdicts, the periodogram of what is left, whether there is a drive, the
+    **Arguments:** the fit, the response to a force about it, terms that describe but
+    are not verdicts, the periodogram of the residuals, whether there is a drive, the
     constants of forms, the unit of the motion, and the policy.
     """
     problem, seen = found.problem, visited_states(found.problem)
@@ -129,7 +134,7 @@ def structures(
             )
         ),
     )
-    # a force needs no program of its own
+    # a force needs no separate program
     forces = [t for t in more if t.acts == (Where.FLIGHT,) and t.coordinate == 0]
     others = [t for t in more if not any(t is force for force in forces)]
     wide = extended(problem, others, found.point)
@@ -164,7 +169,7 @@ def structures(
                 )
             )
     made += [_vibration(scan, problem, tests, policy), _coloured(found, tests, policy)]
-    # a shape says more than that there is one
+    # a fitted shape contains more than its gain
     return sorted(
         made,
         key=lambda one: (
@@ -203,14 +208,16 @@ def _threshold(
 ) -> float:
     chance = policy.false_alarms / tests / looks
     least = max(count * math.log(samples), float(chi2.isf(chance, count)))
-    # as sure as a term that is named
+    # as certain as a named term
     return (math.sqrt(least) + policy.beyond) ** 2
 
 
 def _function(
     term: Shape, coefficients, covariance, scale, seen: VisitedStates, policy: Policy
 ) -> dict[str, Any]:
-    """The function where there are data; elsewhere its polynomials mean nothing."""
+    """Return the function where there are data; elsewhere its polynomials are
+    meaningless.
+    """
     grid = np.linspace(*term.ends, policy.shape_points)
     grid = grid[seen.near(term.variable, grid, policy)]
     if not len(grid):
@@ -235,12 +242,12 @@ def _vibration(
     count = 2 * scan.records + 1
     seen = math.inf
     if scan.records > 1:
-        # a frequency that one record suggests must be seen in the others
+        # a frequency found in one recording must also appear in the others
         chance = chi2.isf(policy.false_alarms, 2 * (scan.records - 1))
         seen = scan.elsewhere - float(chance)
     return Structure(
         "resonance",
-        f"a force at {frequency:.4g} Hz with a phase of its own in each record",
+        f"a force at {frequency:.4g} Hz with a separate phase in each recording",
         "flight",
         f"in flight, at {frequency:.4g} Hz",
         grown,
@@ -252,7 +259,7 @@ def _vibration(
 
 
 def _coloured(found: Fit, tests: int, policy: Policy) -> Structure:
-    """Whether residuals that are close in time are alike, not in one stretch alone."""
+    """Test whether residuals are autocorrelated, in more than one section."""
     totals, counts, cost = [], [], 0.0
     for part in residuals(found):
         value = part.value / part.noise
@@ -273,13 +280,14 @@ def _coloured(found: Fit, tests: int, policy: Policy) -> Structure:
     score = float(total) / math.sqrt(max(int(count), 1))
     bic = math.log(found.problem.samples)
     chance = float(norm.isf(policy.false_alarms / tests)) ** 2
-    # as the gain of one parameter, with the smoothness that states take out ignored
+    # as the gain of one parameter, neglecting the smooth part that the fitted states
+    # absorb
     return Structure(
         "coloured_residuals",
-        "a smooth motion of a form that no shape has",
+        "a smooth deviation that no shape describes",
         "flight",
-        "in flight and at rest",
-        # no motion gains more than what is left over
+        "in flight and in contact",
+        # no gain can exceed the residual cost
         min(max(score, 0.0) ** 2, cost),
         (math.sqrt(max(chance, bic)) + policy.beyond) ** 2,
         1,

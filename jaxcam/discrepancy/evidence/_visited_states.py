@@ -1,4 +1,4 @@
-"""Where the motion of some recordings has been: a function is known only there."""
+"""Ranges of the recorded motion, to which free functions are restricted."""
 
 from typing import NamedTuple
 
@@ -10,14 +10,14 @@ from ..policy import Policy
 from ..terms import Variable
 
 
-# Approach speed at the end of a range in which there is no impact
+# Upper end of the range of approach speeds if there is no impact
 _SLOWEST = 1e-3
 
 
 class VisitedStates(NamedTuple):
-    """Values that the recordings show of each variable, and how long they are (s).
+    """Values of each variable in the recordings, and their duration (s).
 
-    Positions are those of the state: offset and gain of the sensor are taken out.
+    Positions are those of the state: offset and gain of the sensor are removed.
     """
 
     position: Float[np.ndarray, " _"]
@@ -26,7 +26,9 @@ class VisitedStates(NamedTuple):
     duration: float
 
     def ranges(self, policy: Policy):
-        """Ends of position, velocity and approach speed, and the duration."""
+        """Return the ends of position, velocity and approach speed, and the
+        duration.
+        """
         tail = policy.velocity_tail
         return (
             (float(self.position.min()), float(self.position.max())),
@@ -41,10 +43,10 @@ class VisitedStates(NamedTuple):
     def near(
         self, variable: str, grid: Float[np.ndarray, " k"], policy: Policy
     ) -> Bool[np.ndarray, " k"]:
-        """Which points of a grid have enough data near them.
+        """Return which points of a grid have enough data near them.
 
-        Enough is a share `policy.visited` of what they would have if the data were
-        spread evenly, and two values at least. Phase and time are always visited.
+        The minimum is a share `policy.visited` of the number for a uniform
+        distribution, and at least two values. Phase and time are always visited.
         """
         values = {
             Variable.POSITION: self.position,
@@ -62,7 +64,7 @@ class VisitedStates(NamedTuple):
 
 
 def visited_states(problem: Problem) -> VisitedStates:
-    """Where the recordings of a problem have been."""
+    """Return the states visited by the recordings of a problem."""
     states = np.asarray(problem.start.states)[np.asarray(problem.pieces.exists)]
     place, rate = problem.model.system.coordinates[0]  # pyright: ignore
     sensors = problem.model.sensors

@@ -1,4 +1,4 @@
-"""A verdict as data and in words."""
+"""Report a verdict as data and in words."""
 
 from ._caveats import Caveat as Caveat, Reason as Reason
 from ._diagnosis import (

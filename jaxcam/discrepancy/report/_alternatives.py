@@ -1,4 +1,6 @@
-"""Other explanations, the best first, each with the reason why it was not named."""
+"""List other explanations, the best first, each with the reason why it was not
+named.
+"""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -11,10 +13,11 @@ from ._missing import named_function
 
 
 def fitted_alternatives(trials: Trials, choice: Choice) -> list[Trial]:
-    """Other subsets that were fitted, the best first.
+    """Return the other fitted subsets, the best first.
 
-    A subset that contains the one chosen is the same explanation with more in it; one
-    that lacks what stands in the place of an impossible parameter is none.
+    A subset that contains the chosen one is not another explanation. A subset without
+    the term that replaces a parameter outside its tolerance is not an explanation at
+    all.
     """
     best = choice.best
     needed = {one.term for one in choice.beyond if one.term}
@@ -27,10 +30,10 @@ def fitted_alternatives(trials: Trials, choice: Choice) -> list[Trial]:
 
 
 def alternatives_of(trials: Trials, choice: Choice) -> tuple[Alternative, ...]:
-    """Everything that was considered in the place of what was chosen, ranked by BIC.
+    """Return all alternatives to the chosen explanation, ranked by BIC.
 
-    Subsets that were fitted, each term in addition to those chosen, and single terms
-    that promised too little to be fitted.
+    These are fitted subsets, each term in addition to the chosen ones, and single terms
+    whose predicted gain was too small for a fit.
     """
     best = choice.best
     found = [
@@ -41,7 +44,7 @@ def alternatives_of(trials: Trials, choice: Choice) -> tuple[Alternative, ...]:
     found += _additions(trials, choice)
     found.sort(key=lambda one: one.delta_bic)
     most = trials.policy.alternatives
-    # a single term is never left out for the many subsets that contain it
+    # a single term is always listed, however many subsets contain it
     singles = [one for one in found[most:] if len(one.terms) == 1]
     return (*found[:most], *singles)
 
@@ -49,7 +52,7 @@ def alternatives_of(trials: Trials, choice: Choice) -> tuple[Alternative, ...]:
 def alternatives_to_functions(
     trials: Trials, missing: Missing, rivals: Sequence[Rival]
 ) -> tuple[Alternative, ...]:
-    """Other functions and forms of them, then what named terms alone explain."""
+    """Return other functions and forms, then the fit with named terms alone."""
     policy = trials.policy
     found = [
         Alternative(
@@ -74,7 +77,7 @@ def alternatives_to_functions(
 
 
 def rival_name(rival: Rival) -> str:
-    """The functions and terms of a rival."""
+    """Return the functions and terms of another explanation."""
     one = rival.missing
     functions = [named_function(one.fit, part) for part in one.functions]
     return " + ".join([*functions, *sorted(one.names)]) or "none"
@@ -84,11 +87,13 @@ def _why_not(rival: Rival, policy: Policy) -> str:
     found = rival.missing.fit
     if found.cost > policy.near * found.problem.samples:
         return "its fit did not come near the data"
-    return f"would be chosen in {rival.share:.0%} of the redrawn sets of stretches"
+    return f"would be chosen in {rival.share:.0%} of the bootstrap samples"
 
 
 def _additions(trials: Trials, choice: Choice) -> Iterator[Alternative]:
-    """Each further term next to those chosen, by what its score promises."""
+    """Return each further term in addition to the chosen ones, with its predicted
+    gain.
+    """
     best, price = choice.best, math.log(trials.problem.samples)
     blocks = trials.blocks(best)
     information, score = blocks.total()
@@ -110,24 +115,24 @@ def _additions(trials: Trials, choice: Choice) -> Iterator[Alternative]:
         asked = trials.threshold(term.name)
         reason = (
             f"would gain {max(gain, 0.0):.3g} in twice the log-likelihood, where "
-            f"{asked:.3g} are asked for"
+            f"{asked:.3g} is required"
         )
         if term.name in dropped:
-            reason += "; it is in doubt, as a caveat says"
+            reason += "; it is in doubt, see the caveat"
         delta = trials.count([term.name]) * price - gain
         terms = tuple(sorted(names))
         yield Alternative("+".join(terms), delta, terms, reason)
 
 
 def _worse(trials: Trials, choice: Choice, trial: Trial) -> str:
-    """Reason why a subset that was fitted is not the one named."""
+    """Return the reason why a fitted subset is not the named one."""
     best, samples = choice.best, trials.problem.samples
     if not trials.settled(trial):
         return "its fit did not come near the data"
     if abs(trial.bic - best.bic) < trials.policy.tie:
-        return "explains as much: the records cannot tell them apart"
+        return "explains as much: these recordings cannot distinguish between them"
     if trial.bic < best.bic:
-        return "fits better, but not all of its terms are sure"
+        return "fits better, but not all of its terms are certain"
     return (
         f"explains less: its cost per sample is {trial.fit.cost / samples:.4g}, that "
         f"of the choice {best.fit.cost / samples:.4g}"

@@ -1,4 +1,4 @@
-"""Caveats that a reader must know before relying on a verdict."""
+"""Caveats that qualify a verdict."""
 
 import dataclasses
 import enum
@@ -28,12 +28,12 @@ class Reason(enum.StrEnum):
 
 @dataclasses.dataclass(frozen=True)
 class Caveat:
-    """One reservation about a verdict."""
+    """A caveat about a verdict."""
 
     reason: Reason
     """A `Reason`."""
     sentence: str
-    """The reservation in words, also by `str`."""
+    """The caveat in words; `str` returns it as well."""
     terms: tuple[str, ...] = ()
     """Names of the terms concerned, if any."""
 
@@ -44,9 +44,9 @@ class Caveat:
 def caveats_of(
     trials: Trials, choice: Choice, ties: list[Trial], named: bool
 ) -> Iterator[Caveat]:
-    """All but that of the verdict itself.
+    """Return all caveats except the one about the verdict itself.
 
-    **Arguments:** the trials, what was chosen, other subsets that are as good, and
+    **Arguments:** the trials, the choice, other subsets that are equally good, and
     whether anything is named.
     """
     for name, share in choice.doubtful:
@@ -67,9 +67,9 @@ def caveats_of(
     if apart:
         yield Caveat(
             Reason.NOT_SHARED,
-            f"Something that differs from record to record is left over "
-            f"({apart[0].sentence}): it is no physics that they share; look at how "
-            f"they were recorded.",
+            "A discrepancy that differs from recording to recording remains "
+            f"({apart[0].sentence}). It is not physics that the recordings share; "
+            "check how they were made.",
         )
     held = choice.held
     if held.after > trials.policy.as_noise:
@@ -77,13 +77,13 @@ def caveats_of(
 
 
 def noisier_than_stated(question: Question) -> Iterator[Caveat]:
-    """Caveats for channels whose stated noise is too small."""
+    """Return caveats for channels whose stated noise is too small."""
     for one in question.noisier:
         yield Caveat(
             Reason.NOISIER,
             f"The recordings show a noise of {one.seen:.3g} in `{one.channel}`, "
-            f"{one.seen / one.stated:.2g} times what is stated ({one.stated:.3g}); the "
-            f"larger figure was used.",
+            f"{one.seen / one.stated:.2g} times the stated noise ({one.stated:.3g}); "
+            "the larger value was used.",
         )
 
 
@@ -93,49 +93,52 @@ def above_noise(held: HeldOut, named: bool) -> Caveat:
         return poor_prediction(held)
     return Caveat(
         Reason.ABOVE_NOISE,
-        f"On held-out data the model still misses by {held.after:.2g} times the noise "
-        f"of the sensors (the textbook model: {held.before:.2g}): it is not complete, "
-        f"or the noise is larger than stated.",
+        f"On held-out data the residual of the model is {held.after:.2g} times the "
+        f"sensor noise (that of the textbook model: {held.before:.2g}): the model is "
+        "incomplete, or the noise is larger than stated.",
     )
 
 
 def poor_prediction(held: HeldOut) -> Caveat:
-    """Caveat: a part of the records does not determine what the others need."""
+    """Caveat: a part of the recordings does not determine the parameters that the
+    others need.
+    """
     return Caveat(
         Reason.POOR_PREDICTION,
-        "A part of the records does not pin the parameters down well enough to "
-        f"predict the others: it misses by {held.after:.2g} times the noise, the "
-        f"textbook model by {held.before:.2g}. Record at more speeds.",
+        "A part of the recordings does not determine the parameters well enough to "
+        f"predict the others: the residual is {held.after:.2g} times the noise, that "
+        f"of the textbook model {held.before:.2g} times. Record at more speeds.",
     )
 
 
 def small_remainder(choice: Choice, share: float) -> Caveat:
-    """Caveat: a named effect leaves a small share of what it explains."""
+    """Caveat: a named effect leaves a small residual."""
     first = choice.unexplained[0]
     return Caveat(
         Reason.SMALL_REMAINDER,
-        f"Something small is left over ({first.sentence}, {first.place}): {share:.1%} "
-        f"of what was explained. The effect may have a slightly different form.",
+        f"A small discrepancy remains ({first.sentence}, {first.place}): {share:.1%} "
+        "of the explained misfit. The effect may have a slightly different form.",
         tuple(sorted(choice.best.names)),
     )
 
 
 def functions_fall_short(left: float) -> Caveat:
-    """Caveat: functions without a name do not explain the records to the noise."""
+    """Caveat: unnamed functions do not explain the recordings down to the noise."""
     return Caveat(
         Reason.FAR_FROM_DATA,
-        f"With these functions the fit still misses by {left:.2g} times the noise: "
-        f"they are a part of what is missing, and their form is rough.",
+        f"With these functions the residual of the fit is still {left:.2g} times the "
+        "noise: they are a part of the missing physics, and their form is "
+        "approximate.",
     )
 
 
 def functions_tie(name: str, rival: Rival) -> Caveat:
-    """That another function, or another form, explains about as much."""
+    """Caveat: another function, or another form, explains about as much."""
     return Caveat(
         Reason.TIE,
-        f"These records do not tell it from {name}, which would be chosen in "
-        f"{rival.share:.0%} of the redrawn sets of stretches. Record motions that "
-        f"visit more of the states between which the two differ.",
+        f"These recordings do not distinguish it from {name}, which would be chosen "
+        f"in {rival.share:.0%} of the bootstrap samples. Record motions that visit "
+        "more of the states at which the two differ.",
         tuple(sorted(rival.missing.names)),
     )
 
@@ -143,8 +146,8 @@ def functions_tie(name: str, rival: Rival) -> Caveat:
 def _in_doubt(trials: Trials, name: str, share: float) -> Caveat:
     return Caveat(
         Reason.IN_DOUBT,
-        f"A term for {name.replace('_', ' ')} gains something, but "
-        f"{_against(trials, share)}; record more before you believe it.",
+        f"A term for {name.replace('_', ' ')} improves the fit, but "
+        f"{_against(trials, share)}; record more data before relying on it.",
         (name,),
     )
 
@@ -159,13 +162,14 @@ def _beyond(outside: Outside) -> Caveat:
         return Caveat(
             Reason.BEYOND_TOLERANCE,
             f"The fitted {label} is {said}, outside its tolerance ({ends}): correct "
-            f"the rig file if it may be so, or look for something that acts like it.",
+            "the rig file if this value is possible, or look for an effect that acts "
+            "like it.",
         )
     return Caveat(
         Reason.BEYOND_TOLERANCE,
-        f"The records show the sum of {label} and {name.replace('_', ' ')}, {said}. "
-        f"The tolerance allows {ends}; what is beyond it is named, and its strength is "
-        f"known only as well as the tolerance.",
+        f"The recordings determine only the sum of {label} and "
+        f"{name.replace('_', ' ')}, {said}. The tolerance allows {ends}; the excess "
+        "is named, and its strength is only as accurate as the tolerance.",
         (name,),
     )
 
@@ -173,9 +177,9 @@ def _beyond(outside: Outside) -> Caveat:
 def _masked(choice: Choice, name: str, share: float) -> Caveat:
     return Caveat(
         Reason.MASKED,
-        f"A term for {name.replace('_', ' ')} would explain {share:.1g} of what "
-        f"{listed(sorted(choice.best.names))} explains: no more than the numerical "
-        f"form of dry friction, whose corner is smoothed, may leave over.",
+        f"A term for {name.replace('_', ' ')} would explain {share:.1g} of the misfit "
+        f"that {listed(sorted(choice.best.names))} explains: no more than the "
+        "smoothing of dry friction at zero velocity may leave.",
         (name,),
     )
 
@@ -183,8 +187,9 @@ def _masked(choice: Choice, name: str, share: float) -> Caveat:
 def _named_in_doubt(trials: Trials, name: str, share: float) -> Caveat:
     return Caveat(
         Reason.NAMED_IN_DOUBT,
-        f"The term for {name.replace('_', ' ')} is named because nothing is left over "
-        f"with it, but {_against(trials, share)}; record more to know its strength.",
+        f"The term for {name.replace('_', ' ')} is named because no discrepancy "
+        f"remains with it, but {_against(trials, share)}; record more data to "
+        "determine its strength.",
         (name,),
     )
 
@@ -194,19 +199,19 @@ def _against(trials: Trials, share: float) -> str:
     samples.
     """
     if share >= trials.policy.sure:
-        return "its strength varies so much between stretches that it might be zero"
-    return f"it gains in {share:.0%} of the redrawn sets of stretches only"
+        return "its strength varies so much between blocks that it might be zero"
+    return f"it improves the fit in only {share:.0%} of the bootstrap samples"
 
 
 def _far(trials: Trials) -> Caveat:
-    """Caveat: no fit comes near the data; the distance of the best one."""
+    """Caveat: no fit comes near the data; state the distance of the best one."""
     least = min(trials.known.values(), key=lambda trial: trial.fit.cost)
     named = listed(sorted(least.names)) if least.names else "none of them"
     return Caveat(
         Reason.FAR_FROM_DATA,
-        f"No subset of the known effects comes near these records: the best fit, with "
-        f"{named}, misses by {rms_of(least.fit):.2g} times the noise. What is said of "
-        f"shape and place is rough.",
+        "No subset of the known effects comes near these recordings: the residual of "
+        f"the best fit, with {named}, is {rms_of(least.fit):.2g} times the noise. "
+        "Statements about shape and location are approximate.",
         tuple(sorted(least.names)),
     )
 
@@ -216,8 +221,8 @@ def _tie(best: Trial, other: Trial) -> Caveat:
     written = ("+".join(names) or "none").replace("_", " ")
     return Caveat(
         Reason.TIE,
-        f"These records cannot tell {listed(sorted(best.names))} from {written}: the "
-        f"BIC differs by {other.bic - best.bic:.1f} only. Record larger and smaller "
-        f"bounces, and speeds further apart.",
+        f"These recordings cannot distinguish {listed(sorted(best.names))} from "
+        f"{written}: the BIC differs by only {other.bic - best.bic:.1f}. Record "
+        "larger and smaller bounces, and speeds further apart.",
         names,
     )

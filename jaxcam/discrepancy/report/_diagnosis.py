@@ -1,4 +1,4 @@
-"""The result of a diagnosis: verdict, evidence, and how it is written."""
+"""The result of a diagnosis: verdict and evidence, as text and as data."""
 
 import dataclasses
 import enum
@@ -32,16 +32,16 @@ class Verdict(enum.StrEnum):
 
 
 class Alternative(NamedTuple):
-    """Another subset of terms, or other functions, and its BIC less the least one.
+    """Another subset of terms, or other functions, with its difference in BIC.
 
-    `name` puts the names of its `terms` together, or is `"none"`, or states functions
-    by a formula or by their arguments; `reason` says why it was not named.
+    `name` joins the names of its `terms`, or is `"none"`, or gives functions by a
+    formula or by their arguments; `reason` says why it was not named.
     """
 
     name: str
     """The names of its `terms` joined, or `"none"`."""
     delta_bic: float
-    """BIC less that of the chosen subset."""
+    """BIC minus that of the chosen subset."""
     terms: tuple[str, ...]
     """Names of its terms."""
     reason: str = ""
@@ -63,9 +63,9 @@ class Effect:
     region: str
     """Part of the motion, in words."""
     records: tuple[str, ...]
-    """Records in which it is significant."""
+    """Recordings in which it is significant."""
     delta_bic: float
-    """BIC with it less that without it."""
+    """BIC with it minus BIC without it."""
     heldout_gain_nats: float
     """Gain of the log-likelihood on held-out data."""
     inclusion: float | None
@@ -74,8 +74,9 @@ class Effect:
     term: bool = True
     """Whether it is a named term; otherwise it is unknown."""
     share: float | None = None
-    """Part of the misfit that it explains; of what is unknown, the part that nothing
-    explains. `None` for the drive, which is judged by its own channel."""
+    """Share of the misfit that it explains; for an unknown effect, the share that
+    nothing explains. `None` for the drive, which is diagnosed from its own channel.
+    """
 
     def to_json(self) -> dict[str, Any]:
         return {
@@ -99,8 +100,8 @@ class Effect:
 
 @dataclasses.dataclass(frozen=True, repr=False)
 class Diagnosis:
-    """The result of [`jaxcam.discrepancy.diagnose`][]: which physics the model left
-    out.
+    """The result of [`jaxcam.discrepancy.diagnose`][]: which physics the model
+    lacks.
     """
 
     case: str
@@ -110,7 +111,7 @@ class Diagnosis:
     effects: tuple[Effect, ...]
     """The missing effects."""
     alternatives: tuple[Alternative, ...]
-    """Other subsets of terms, best first."""
+    """Other subsets of terms, the best first."""
     heldout_before: float
     """Rms of the held-out residuals of the textbook model (`unit`), one flight ahead.
     """
@@ -140,19 +141,22 @@ class Diagnosis:
     """Deviation of each parameter from nominal without the effects and with them, in
     tolerances."""
     limits: dict[str, Value]
-    """Detection limits: least strength of each term that would have been named."""
+    """Detection limits: the smallest strength at which each term would have been named.
+    """
     hides: dict[str, str]
     """The parameter that would absorb most of each term."""
     caveats: tuple[Caveat, ...]
-    """Reservations, each a reason with its sentence."""
+    """Caveats, each a reason with its sentence."""
     policy: Policy = Policy()
     """The settings of the diagnosis."""
     missing: tuple[MissingFunction, ...] = ()
-    """Effects without a name, as functions fitted with the rig; `after` is the model
-    with them."""
+    """Unnamed effects, as functions fitted together with the rig; `after` is the model
+    with them.
+    """
     misfit: dict[str, float] = dataclasses.field(default_factory=dict)
-    """Shares of what the textbook model leaves unexplained that are in `"flight"`, at
-    an `"impact"` and in `"contact"`; empty where it is noise."""
+    """Shares of the misfit of the textbook model in `"flight"`, at an `"impact"` and in
+    `"contact"`; empty if the misfit is noise.
+    """
 
     def __repr__(self) -> str:
         return self._table().text()
@@ -191,9 +195,9 @@ class Diagnosis:
     def system(self, record: int | str = 0) -> HybridSystem:
         """Return the system with the named terms and no others.
 
-        A drive turns at the speed of that record. Faults of sensors are not part of it.
-        A force with a state of its own is a part of it with that state: the system is
-        then a `WithHidden`, whose additional components no impact changes.
+        The drive turns at the speed of the given recording. Sensor faults are not
+        included. A force with an internal state is included with that state: the system
+        is then a `WithHidden`, whose additional components do not change at impacts.
         """
         model = self.model(record)
         system = model.system

@@ -18,9 +18,9 @@ from ._missing import MissingFunction, sentence_of
 def term_effects(
     trials: Trials, choice: Choice, share: Mapping[str, float]
 ) -> list[Effect]:
-    """The terms that are named, in the order of their names.
+    """Return the named terms, in the order of their names.
 
-    **Arguments:** `share`, the part of what is missing that each of them explains.
+    **Arguments:** `share`: the share of the misfit that each of them explains.
     """
     best, blocks = choice.best, trials.blocks(choice.best)
     instead = {one.term: one.lost for one in choice.beyond if one.term}
@@ -55,9 +55,7 @@ def missing_effects(
     choice: Choice,
     divided: Shares,
 ) -> list[Effect]:
-    """Return the effects without a name, all functions together, and the named
-    terms.
-    """
+    """Return the unnamed effect (all functions together) and the named terms."""
     fitted, held, policy = missing.fit, choice.held.total, trials.policy
     blocks = blocks_of(fitted.problem, fitted.point, names=fitted.free)
     labels = [one.label for one in missing.functions]
@@ -96,7 +94,7 @@ def missing_effects(
 
 
 def coefficients(found: Fit, slot: str) -> list[str]:
-    """Names of the coefficients of a free function that was fitted."""
+    """Return the names of the coefficients of a fitted free function."""
     return [name for name in found.free if name.startswith(f"{slot}_")]
 
 
@@ -135,7 +133,7 @@ def _of_term(
 
 
 def _seen_in(blocks: Blocks, found: Fit, names, policy: Policy) -> tuple[str, ...]:
-    """Records in which the effect is more than chance."""
+    """Return the recordings in which the effect is significant."""
     rows = blocks.rows(names)
     value = values_of(found, blocks)[rows]
     seen = []
@@ -147,7 +145,7 @@ def _seen_in(blocks: Blocks, found: Fit, names, policy: Policy) -> tuple[str, ..
 
 
 def drive_effect(ripple: Ripple, policy: Policy) -> Effect:
-    """A ripple of the drive."""
+    """Return the ripple of the drive as an effect."""
     term = DriveRipple()
     seen = tuple(
         name
@@ -171,10 +169,10 @@ def drive_effect(ripple: Ripple, policy: Policy) -> Effect:
 
 
 def unknown_effect(trials: Trials, choice: Choice, share: float) -> Effect:
-    """Return the effect of the residual structure that has no name.
+    """Return the unnamed effect of a residual structure.
 
     Args:
-        share: Part of the misfit that nothing explains.
+        share: Share of the misfit that nothing explains.
     """
     first, problem = choice.unexplained[0], trials.problem
     return Effect(

@@ -1,4 +1,4 @@
-"""A form and its numbers as a formula, and as an engineer would say it."""
+"""Write a parametric form as a formula and in words."""
 
 import math
 from collections.abc import Mapping
@@ -9,8 +9,8 @@ from ..terms import Factor, Family, Primitive, Variable, Where
 from ._words import quantity
 
 
-# In terms of the argument x: `size` of the form, `slope` and `bend` of it by x, places
-# `a` and `b` on its axis, lengths along it, and numbers of a phase.
+# In terms of the argument x: `size` of the form, its `slope` and `bend`, positions `a`
+# and `b` on the axis, lengths along it, and parameters of a phase.
 _FORMULAS = {
     "straight": "{slope}*({x} - {low})",
     "above": "{slope}*max({x} - {a}, 0)",
@@ -34,36 +34,37 @@ _FORMULAS = {
 }
 _WORDS = {
     "straight": "grows with the {x}",
-    "above": "acts above {x} {a} only, and grows from there",
-    "below": "acts below {x} {a} only, and grows from there",
+    "above": "acts only above {x} {a}, and grows from there",
+    "below": "acts only below {x} {a}, and grows from there",
     "step": "sets in at {x} {a}",
-    "window": "acts between {x} {a} and {b} only",
-    "bump": "is felt around {x} {a} only, over some {width}",
+    "window": "acts only between {x} {a} and {b}",
+    "bump": "acts only around {x} {a}, over about {width}",
     "square": "grows with the square of the {x} from {middle}",
     "cube": "grows with the cube of the {x} from {middle}",
-    "exponential": "grows exponentially with the {x}, e-fold over {reach}",
+    "exponential": "grows exponentially with the {x}, by a factor e over {reach}",
     "power": "grows as the {x} to the power {power}",
-    "wave": "comes and goes with the {x}, once in {wavelength}",
-    "forward": "acts while the {x} is positive only",
-    "falling": "opposes the motion at rest and fades with the {x}, over some {decay}",
-    "harmonic 1": "comes and goes once a turn",
-    "harmonic 2": "comes and goes twice a turn",
-    "harmonic 3": "comes and goes three times a turn",
-    "half turn": "acts in one half of each turn, from {x} {turn} on",
-    "arc": "acts in a part of each turn only, around {x} {turn}, over +-{half}",
-    "bump in turn": "is felt around {x} {turn} of each turn only, over some {half}",
+    "wave": "oscillates with the {x}, with a wavelength of {wavelength}",
+    "forward": "acts only while the {x} is positive",
+    "falling": "opposes the motion near rest and fades with the {x}, over about "
+    "{decay}",
+    "harmonic 1": "varies once per turn",
+    "harmonic 2": "varies twice per turn",
+    "harmonic 3": "varies three times per turn",
+    "half turn": "acts in one half of each turn, from {x} {turn}",
+    "arc": "acts only in a part of each turn, around {x} {turn}, over +-{half}",
+    "bump in turn": "acts only around {x} {turn} in each turn, over about {half}",
 }
 _THINGS = {
     "force": "a force",
     "restitution": "a restitution",
     "surface": "a surface",
-    "sensor": "an error of the sensor",
+    "sensor": "a sensor error",
 }
-# what an engineer knows an error of a sensor by
+# typical causes of a sensor error
 _FAULTS = {
-    Variable.POSITION: "as of a scale with uneven graduation or an encoder off centre",
-    Variable.PHASE: "as of something picked up in step with the drive",
-    Variable.TIME: "as of a sensor that drifts",
+    Variable.POSITION: "as from a scale with uneven graduation or an eccentric encoder",
+    Variable.PHASE: "as from a disturbance synchronous with the drive",
+    Variable.TIME: "as from a sensor that drifts",
 }
 _FACTORS = {
     Factor.VELOCITY: ("velocity", "damping"),
@@ -74,10 +75,10 @@ _FACTORS = {
 def formula_of(
     family: Family, primitive: Primitive, numbers: np.ndarray, kind: str
 ) -> tuple[str, str]:
-    """The formula of a function, and a sentence about it.
+    """Return the formula of a function, and a sentence about it.
 
-    **Arguments:** its family and form, the numbers of the form, and the kind of thing
-    that it is (`"force"`, `"restitution"`, `"surface"` or `"sensor"`).
+    **Arguments:** its family and form, the parameters of the form, and its kind
+    (`"force"`, `"restitution"`, `"surface"` or `"sensor"`).
     """
     values = _values(family, numbers)
     text = _FORMULAS[primitive.name].format(**values)
@@ -97,7 +98,7 @@ def formula_of(
 
 
 def _values(family: Family, numbers: np.ndarray) -> Mapping[str, str]:
-    """Whatever a formula may show, in the units of the argument."""
+    """Return all values that a formula may contain, in the units of the argument."""
     low, width = family.low, family.high - family.low
     size, first, second = (*map(float, numbers), 0.0, 0.0)[:3]
     x = "speed" if family.argument is Variable.APPROACH else str(family.argument)
@@ -126,7 +127,7 @@ def _values(family: Family, numbers: np.ndarray) -> Mapping[str, str]:
 
 
 def _mechanism(family: Family, primitive: Primitive, numbers, values) -> str:
-    """The mechanism that an engineer knows by such a function."""
+    """Return the mechanism that typically has such a function."""
     if family.where is Where.SENSOR and family.argument in _FAULTS:
         return f"; {_FAULTS[family.argument]}"
     if family.where is not Where.FLIGHT:

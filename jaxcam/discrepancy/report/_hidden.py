@@ -1,4 +1,4 @@
-"""A hidden element as a table, a formula and a sentence."""
+"""Report a hidden element as a table, a formula and a sentence."""
 
 import math
 
@@ -12,19 +12,20 @@ from ..terms import HiddenElement, Hysteresis, Relaxation, Resonator
 from ._words import quantity
 
 
-# A resonance is shown from a tenth of its frequency to ten times that, and the memory
-# of a relaxation for five of its times
+# A resonance is shown from a tenth of its frequency to ten times that, a relaxation for
+# five of its time constants
 _DECADE, _TIMES = 10.0, 5.0
-# Steps of a branch of a hysteresis between two points of its table
+# Integration steps of a hysteresis between two points of its table
 _STEPS = 20
 
 
 def hidden_table(found: Fit, hidden: Hidden, points: int):
-    """Table of an element's effect over its one argument, with standard errors.
+    """Tabulate the effect of an element over its argument, with standard errors.
 
-    A resonance: the magnitude of the force for a deflection of one, by frequency (Hz).
-    A relaxation: what is left of the force so long after a deflection by one (s). A
-    hysteresis: the force so far beyond a reversal, from where it had slipped.
+    For a resonance, this is the magnitude of the force for a unit deflection over
+    frequency (Hz). For a relaxation, it is the force over the time (s) after a unit
+    deflection. For a hysteresis, it is the force over the distance from a reversal,
+    starting from full slip.
 
     **Returns:** the argument, values and errors, each `(points,)`, and the element.
     """
@@ -76,12 +77,12 @@ def _curve(element, along):
 
 
 def hidden_unit(element: HiddenElement, unit: str) -> str:
-    """Unit of the table, by that of the coordinate."""
+    """Return the unit of the table, given that of the coordinate."""
     return f"{unit}/s^2" if isinstance(element, Hysteresis) else "1/s^2"
 
 
 def hidden_formula(element: HiddenElement) -> str:
-    """Equations of the hidden state z, then the force."""
+    """Return the equations of the hidden state z, then the force."""
     e = element
     force = f"{_n(e.by_state)}*z"  # pyright: ignore
     if isinstance(e, Resonator):
@@ -116,24 +117,24 @@ def _n(value) -> str:
 
 
 def hidden_words(found: Fit, hidden: Hidden, element: HiddenElement, unit: str) -> str:
-    """Description of the element for an engineer."""
+    """Describe the element in words."""
     first = hidden.kind.numbers[0]
     value = float(getattr(element, first.name))
     error = first.error(value, found[hidden.changes[0]].stderr)
     said = f"{value:.4g} +- {error:.1g}"
     if isinstance(element, Resonator):
         return (
-            f"a resonance at {said} Hz with {100 * float(element.ratio):.2g} % damping "
-            f"that is driven by the motion, impacts included, as the surge of a spring "
-            f"would be"
+            f"a resonance at {said} Hz with {100 * float(element.ratio):.2g} % "
+            "damping driven by the motion, impacts included, like the surge of a "
+            "spring"
         )
     if isinstance(element, Relaxation):
         return (
-            f"a force with a memory: it holds against a deflection and relaxes over "
-            f"{said} s, as rubber, or a spring and a dashpot in a row, would"
+            f"a force with memory: it resists a deflection and relaxes over {said} s, "
+            "like rubber, or a spring and a dashpot in series"
         )
     return (
-        f"a force with a memory: from each reversal it is elastic over some "
-        f"{quantity(said, unit)} and then slips (hysteresis), as a joint or a wire "
-        f"rope would"
+        "a force with memory: from each reversal it is elastic over about "
+        f"{quantity(said, unit)} and then slips (hysteresis), like a bolted joint or "
+        "a wire rope"
     )

@@ -1,4 +1,4 @@
-"""Physics without a name, as a table, in words, and as a part of the verdict."""
+"""Report unnamed physics as a table, in words, and as a part of the verdict."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -36,30 +36,31 @@ _VERBS = {
     "force": "a force",
     "restitution": "a restitution",
     "surface": "a surface",
-    "sensor": "an error of the sensor",
+    "sensor": "a sensor error",
 }
 _ARGUMENT_NAMES = {Variable.APPROACH: "speed"}
 
 
 @dataclasses.dataclass(frozen=True)
 class MissingFunction:
-    """A missing force without a name: a function that was fitted together with the rig.
+    """An unnamed missing effect: a function that was fitted together with the rig.
 
-    - `kind`: `"force"`, what is to be added to the acceleration; `"restitution"`, what
-        the coefficient is to be multiplied with; `"surface"` and `"sensor"`, what is to
-        be added to the surface and to what the sensor of the first coordinate shows;
-        `"resonance"`, a force by an oscillator that the motion drives.
-    - `arguments`: what it depends on, each with its `grid`: `"position"`,
-        `"velocity"`, `"phase"`, `"time"` or `"speed"` (of approach); `"frequency"`
-        (Hz), at which a resonance answers a deflection of one with a force of that
-        size; `"memory"`, of a force with a state of its own: for how long (s) it
-        remembers a deflection of one, or, for a hysteresis, how far the motion has come
-        since it turned round.
-    - `value`, `stderr`: in `unit`, at the points of the grid, `(n,)` or `(n, m)`.
-    - `words`: description for an engineer. `records` in which it was searched for.
-    - `formula`: of what the value is, where a form with a few numbers explains as much.
-    - `element`: of a resonance or a force with a memory, what a simulation needs.
-    - `numbers`: names of the fitted parameters that any other function is made of.
+    - `kind`: `"force"` is added to the acceleration; `"restitution"` multiplies the
+        coefficient of restitution; `"surface"` is added to the surface, and `"sensor"`
+        to the reading of the sensor of the first coordinate; `"resonance"` is the force
+        of an oscillator that the motion drives.
+    - `arguments`: the variables on which it depends, each with its `grid`:
+        `"position"`, `"velocity"`, `"phase"`, `"time"` or `"speed"` (of approach); for
+        a resonance `"frequency"` (Hz), where the value is the magnitude of the force
+        for a unit deflection; for another force with an internal state `"memory"`, the
+        time (s) since a unit deflection, or, for a hysteresis, the distance from the
+        last reversal.
+    - `value`, `stderr`: value and standard error in `unit` at the points of the grid,
+      `(n,)` or `(n, m)`.
+    - `words`: a description. `records`: the recordings in which it was sought.
+    - `formula`: the formula of the value, if a parametric form explains as much.
+    - `element`: for a resonance or a force with memory, the element for a simulation.
+    - `numbers`: for any other function, the names of its fitted parameters.
     """
 
     kind: str
@@ -76,7 +77,7 @@ class MissingFunction:
 
     @property
     def slot(self) -> str:
-        """The label of its parameters in the fit; empty for a force with a memory."""
+        """The label of its parameters in the fit; empty for a force with memory."""
         return self.numbers[0].rpartition("_")[0] if self.numbers else ""
 
     def to_json(self) -> dict[str, Any]:
@@ -99,10 +100,10 @@ def missing_functions(
     positions: tuple[float, float],
     points: int,
 ) -> tuple[MissingFunction, ...]:
-    """The functions that were found, each with its errors.
+    """Return the functions found, each with its errors.
 
-    **Arguments:** what was found, and the ranges of the motion, for the tables of
-    functions of two arguments, and the number of points of each grid.
+    **Arguments:** the functions found, the ranges of the motion (for the tables of
+    functions of two arguments), and the number of points of each grid.
     """
     return tuple(
         _hidden(missing.fit, one, points)
@@ -171,7 +172,7 @@ def _one(found: Fit, one: Free, velocities, positions, points: int) -> MissingFu
 
 
 def named_function(found: Fit, one: Free | Hidden) -> str:
-    """A function that was fitted, by its formula or by what it depends on."""
+    """Return the name of a fitted function: its formula, or its arguments."""
     if isinstance(one, Hidden):
         return one.label
     kind = _KINDS[one.family.where]
@@ -184,7 +185,9 @@ def named_function(found: Fit, one: Free | Hidden) -> str:
 def slopes_of_function(
     found: Fit, one: MissingFunction, points: int = 100
 ) -> Float[np.ndarray, "points p"]:
-    """Derivatives of a function's values, without its factor, to its numbers."""
+    """Return the derivatives of a function, without its factor, with respect to its
+    parameters.
+    """
     (term,) = (
         term
         for term in terms_of(found.model())
@@ -203,7 +206,9 @@ def slopes_of_function(
 
 
 def _curve(one: Free, along, numbers):
-    """The function without its factor, and its derivatives to its numbers."""
+    """Return the function without its factor, and its derivatives with respect to its
+    parameters.
+    """
     family = one.family
     direction = np.tanh(along / family.slip) if family.jumps else np.zeros(len(along))
     free = free_term(family, one.slot, one.primitive)
@@ -224,7 +229,7 @@ def _unit(family: Family) -> str:
 
 
 def _words(family: Family, kind: str, along, value, error) -> str:
-    """Describe a function, and where it is largest compared with its error."""
+    """Describe a function, and the point where it is largest relative to its error."""
     of = " and ".join(family.arguments)
     if family.factor is Factor.VELOCITY:
         what = f"damping that depends on the {family.argument}"
@@ -234,20 +239,20 @@ def _words(family: Family, kind: str, along, value, error) -> str:
         what = f"a stiffness that depends on the {family.argument}"
     else:
         what = f"{_VERBS[kind]} that depends on the {of}"
-    # what the rig's own parameters might do as well says nothing of a place
+    # a part that the rig parameters can represent has no location
     degree = 0 if family.periodic or family.argument is Variable.TIME else 1
     level = value - np.polyval(np.polyfit(along, value, degree), along)
     sure = np.abs(level) > 2 * error
     k = int(np.argmax(np.where(sure, np.abs(level), -1.0)))
     if not np.any(sure):
-        return f"{what}; no place of it is clear"
+        return f"{what}; its location is unclear"
     usual = "a constant" if degree == 0 else "a straight line"
     return (
-        f"{what}; it is furthest from {usual} at {family.argument} {along[k]:.3g}, by "
-        f"{level[k]:.2g} +- {error[k]:.1g}"
+        f"{what}; it differs most from {usual} at {family.argument} {along[k]:.3g}, "
+        f"by {level[k]:.2g} +- {error[k]:.1g}"
     )
 
 
 def sentence_of(functions: Sequence[MissingFunction]) -> str:
-    """All of them in one phrase."""
+    """Describe all functions in one phrase."""
     return " and ".join(one.words.split(";")[0] for one in functions)

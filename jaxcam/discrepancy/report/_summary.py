@@ -1,4 +1,4 @@
-"""One or two sentences that a mechanical engineer would write."""
+"""Summarise a verdict in one or two sentences."""
 
 from collections.abc import Mapping, Sequence
 
@@ -12,7 +12,7 @@ from ._missing import MissingFunction
 from ._words import listed, number, percent, quantity
 
 
-# A standard error that may be zero is at least this
+# Lower limit of standard errors that may be zero
 _TINY = 1e-300
 
 
@@ -25,7 +25,7 @@ def summary_of(
     least: Mapping[str, Limit],
     policy: Policy,
 ) -> str:
-    """The summary of a verdict.
+    """Return the summary of a verdict.
 
     **Arguments:** the verdict, its effects (the unknown first), the evidence, the fit
     without terms within the tolerances of the rig, the names of the rig's parameters,
@@ -54,10 +54,10 @@ def summary_of(
     acts = f"it acts like {what.sentence}, {what.region}."
     explained = sum(effect.share or 0.0 for effect in named)
     if not explained:
-        return f"Something is missing that is none of the known effects: {acts}"
+        return f"The missing effect is none of the known ones: {acts}"
     return (
-        f"{percent(explained)} of what is missing is {' and '.join(parts)}. What is "
-        f"left ({percent(1 - explained)}) is none of the known effects: {acts}"
+        f"{percent(explained)} of the misfit is explained by {' and '.join(parts)}. "
+        f"The rest ({percent(1 - explained)}) is none of the known effects: {acts}"
     )
 
 
@@ -69,26 +69,27 @@ def summary_of_functions(
     floor: float,
     unit: str,
 ) -> str:
-    """Summarise functions without a name, the named terms, and the gain of the fit.
+    """Summarise unnamed functions, the named terms, and the gain of the fit.
 
-    **Arguments:** the functions, all effects, stretches that were not seen, what is
-    left in units of the noise, the noise and its unit.
+    **Arguments:** the functions, all effects, the held-out data, the remaining residual
+    in units of the noise, the noise and its unit.
     """
     named = [effect.sentence for effect in effects if effect.term]
-    beside = f" beside {listed(named)}" if named else ""
+    beside = f" in addition to {listed(named)}" if named else ""
     words = " and ".join(one.words for one in functions)
-    found = f"Something is missing that has no name{beside}: {words}."
+    found = f"An unnamed effect is missing{beside}: {words}."
     if held.after < held.before:
         factor, unit = scaled(unit, held.before * floor)
         before, after = (factor * floor * one for one in (held.before, held.after))
         return (
-            f"{found} Fitted with the rig it lowers the error on unseen flights from "
-            f"{before:.3g} to {quantity(f'{after:.3g}', unit)}, where the noise is "
-            f"{factor * floor:.3g}."
+            f"{found} Fitted together with the rig, it reduces the error on held-out "
+            f"flights from {before:.3g} to {quantity(f'{after:.3g}', unit)}, where "
+            f"the noise is {factor * floor:.3g}."
         )
     return (
-        f"{found} Fitted with the rig it explains the records to {left:.3g} times the "
-        f"noise; a part of them does not tell enough of it to predict the others."
+        f"{found} Fitted together with the rig, it explains the recordings to within "
+        f"{left:.3g} times the noise; a part of the recordings does not determine it "
+        "well enough to predict the others."
     )
 
 
@@ -101,26 +102,26 @@ def _nothing(choice: Choice, least: Mapping[str, Limit], policy: Policy) -> str:
         break
     if fitted > policy.as_noise:
         return (
-            "Nothing that the records share is missing. They are not explained "
-            "down to the noise of the sensors, though: what is left is "
-            f"{fitted:.2g} times that, and differs from record to record.{tail}"
+            "No physics that the recordings share is missing. However, they are not "
+            f"explained down to the sensor noise: the residual is {fitted:.2g} times "
+            f"the noise and differs from recording to recording.{tail}"
         )
     if unseen > policy.as_noise:
         tail = (
-            f"{tail} A part of the records does not pin the parameters down well "
-            f"enough to predict the others, though: it misses by {unseen:.2g} "
-            "times the noise."
+            f"{tail} However, a part of the recordings does not determine the "
+            "parameters well enough to predict the others: the residual is "
+            f"{unseen:.2g} times the noise."
         )
     return (
-        "Nothing is missing: with its parameters fitted within their tolerances "
-        f"the model explains all records down to the noise of the sensors.{tail}"
+        "Nothing is missing: with its parameters fitted within their tolerances, the "
+        f"model explains all recordings down to the sensor noise.{tail}"
     )
 
 
 def _moved(best: Trial, within: Fit, rig: Sequence[str], policy: Policy) -> str:
-    """The parameter that went furthest to make up for what was missing.
+    """Return a sentence on the parameter that compensated most for the missing physics.
 
-    Compared is a fit without the terms within the tolerances of the rig.
+    The comparison is with a fit without the terms, within the tolerances of the rig.
     """
     if not best.names:
         return ""

@@ -1,4 +1,4 @@
-"""The verdict in the words of a mechanical engineer."""
+"""Format numbers for the sentences of a verdict."""
 
 
 def listed(names) -> str:
@@ -11,17 +11,17 @@ def listed(names) -> str:
 
 
 def quantity(text: str, unit: str) -> str:
-    """A number with its unit; `-` is that of a ratio."""
+    """Return a number with its unit; the unit `-` of a ratio is omitted."""
     return text if unit in ("", "-") else f"{text} {unit}"
 
 
 def number(value: float, stderr: float, unit: str) -> str:
-    """A number with its standard error and unit."""
+    """Return a number with its standard error and unit."""
     return quantity(f"{value:.4g} +- {stderr:.1g}", unit)
 
 
 def percent(share: float) -> str:
-    """A share as an engineer writes it: never more digits than it has."""
+    """Return a share in per cent, with significant digits only."""
     if 0 < share < 0.01:
         return "less than 1 %"
     if 0.99 < share < 1:

@@ -1,4 +1,4 @@
-"""The diagnosis of a choice: verdict, effects, alternatives, caveats, numbers."""
+"""Write the diagnosis of a choice: verdict, effects, alternatives, caveats, numbers."""
 
 from collections.abc import Iterator, Mapping
 
@@ -50,7 +50,7 @@ def diagnosis_of(
     choice: Choice,
     ripple: Ripple | None,
 ) -> Diagnosis:
-    """Put into words and numbers what was chosen, and why."""
+    """Report the choice and its evidence in words and numbers."""
     policy, held, best = trials.policy, choice.held, choice.best
     if choice.missing is not None and choice.needs is not None:
         return _of_functions(
@@ -103,7 +103,9 @@ def diagnosis_of(
 
 
 def _shares_of(trials: Trials, choice: Choice) -> Shares:
-    """Shares of the misfit that each named term explains, and the unexplained share."""
+    """Return the share of the misfit that each named term explains, and the unexplained
+    share.
+    """
     best, before = choice.best, choice.before
     instead = {one.term: one.lost for one in choice.beyond if one.term}
     lost = {
@@ -126,7 +128,7 @@ def _of_functions(
     needs: Needs,
     ripple: Ripple | None,
 ) -> Diagnosis:
-    """The diagnosis where functions without a name were found."""
+    """Return the diagnosis if unnamed functions were found."""
     policy, held, found = trials.policy, choice.held, missing.fit
     positions, velocities, _, _ = visited_states(question.problem).ranges(policy)
     functions = missing_functions(missing, velocities, positions, policy.shape_points)
@@ -167,8 +169,9 @@ def _of_functions(
 
 
 def _doubts_of(choice: Choice, missing: Missing, policy: Policy) -> Iterator[Caveat]:
-    """Caveats: the functions do not explain all the data, or not the held-out data, or
-    other functions explain as much."""
+    """Return caveats: the functions do not explain all data or the held-out data, or
+    other functions explain as much.
+    """
     left, held = rms_of(missing.fit), choice.held
     for rival in choice.rivals:
         if rival.share > 1 - policy.sure:
@@ -180,7 +183,7 @@ def _doubts_of(choice: Choice, missing: Missing, policy: Policy) -> Iterator[Cav
 
 
 def _verdict(choice: Choice, named: bool, small: float) -> tuple[Verdict, list[Caveat]]:
-    """The verdict, and a caveat where a named effect leaves a small share."""
+    """Return the verdict, and a caveat if a named effect leaves a small residual."""
     if not choice.unexplained:
         return (Verdict.EFFECT if named else Verdict.NONE), []
     left = max(one.gain for one in choice.unexplained)
@@ -193,7 +196,7 @@ def _verdict(choice: Choice, named: bool, small: float) -> tuple[Verdict, list[C
 def _rig_values(
     question: Question, fitted: Fit, deviation: Mapping[str, float]
 ) -> dict[str, Value]:
-    """Fitted parameters of the system, as they are reported."""
+    """Return the fitted parameters of the system, as reported."""
     found = {}
     for one in fitted.estimates:
         if one.name not in question.rig:

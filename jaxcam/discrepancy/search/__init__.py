@@ -1,4 +1,4 @@
-"""Fits of subsets of terms, and what a quadratic likelihood about a fit promises."""
+"""Fit subsets of terms, and predict gains from a quadratic likelihood about a fit."""
 
 from ._blocks import (
     Blocks as Blocks,

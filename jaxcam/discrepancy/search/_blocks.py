@@ -1,4 +1,4 @@
-"""Linearise the records about a point, block by block."""
+"""Linearise the recordings about a point, block by block."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -22,10 +22,10 @@ from ...fitting.engine import (
 class Blocks:
     """The likelihood about a point as a quadratic function, block by block.
 
-    A block is a stretch of one record. In units of the parameters' scales, the states
-    eliminated: `information` `(b, g, g)`, `score` `(b, g)`; `prior` `(g,)` and
-    `pull` `(g,)` are what the tolerances add to both. `owner` `(g,)` is the number of
-    the record that a parameter is of, zero where all share it.
+    A block is a section of one recording. `information` `(b, g, g)` and `score` `(b,
+    g)` are in units of the parameter scales, with the states eliminated; `prior` `(g,)`
+    and `pull` `(g,)` are the contributions of the tolerances to both. `owner` `(g,)` is
+    the number of the recording to which a parameter belongs, zero if all share it.
     """
 
     names: tuple[str, ...]
@@ -43,7 +43,9 @@ class Blocks:
         return np.array([k for k, n in enumerate(self.names) if n in wanted], dtype=int)
 
     def total(self, weight=None):
-        """Information and score of all blocks, weighted, with the tolerances."""
+        """Return weighted information and score of all blocks, including the
+        tolerances.
+        """
         weight = np.ones(len(self.record)) if weight is None else weight
         information = np.einsum("b,bij->ij", weight, self.information)
         score = np.einsum("b,bi->i", weight, self.score)
@@ -53,7 +55,9 @@ class Blocks:
 def blocks_of(
     problem: Problem, point: Point, slices: int = 1, names: Sequence[str] | None = None
 ) -> Blocks:
-    """Score and information of parameters about a point, in slices of each record."""
+    """Return score and information of parameters about a point, in sections of each
+    recording.
+    """
     columns = free_columns(problem, names)
     local, scales = jnp.asarray(columns.local), jnp.asarray(columns.scales)
     longest = max(part.recording.time[-1] for part in problem.segments)
@@ -73,7 +77,7 @@ def blocks_of(
         )
         found = eliminate_states(found)
         for r, (name, place) in enumerate(zip(problem.records, columns.place)):
-            # a parameter with a value for each record has a row for each
+            # a parameter with separate values has a row for each recording
             used = np.flatnonzero(place >= 0)
             rows = place[used]
             whole, right = np.zeros((size, size)), np.zeros(size)
@@ -101,7 +105,7 @@ def blocks_of(
 
 
 def values_of(found: Fit, blocks: Blocks) -> np.ndarray:
-    """Values of the parameters of some blocks at a fit, in their scales."""
+    """Return the parameter values of some blocks at a fit, in their scales."""
     all_names = found.problem.names
     columns = [all_names.index(name) for name in blocks.names]
     return np.asarray(found.point.values)[blocks.owner, columns] / blocks.scale

@@ -1,4 +1,4 @@
-"""A problem with more terms, and one with states fitted to other data."""
+"""Add terms to a problem, and fit states to other data."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -29,10 +29,10 @@ def extended(
     at: Point,
     parameters: Sequence[Parameter] = (),
 ) -> Problem:
-    """The same data with more terms in the system, all without effect so far.
+    """Return the problem with more terms in the system, all with zero strength.
 
-    **Arguments:** a problem whose system is a `WithTerms`, the terms to add, the point
-    to start from, and parameters that are to be added as well.
+    **Arguments:** a problem whose system is a `WithTerms`, the terms to add, the
+    starting point, and further parameters to add.
     """
     system = problem.model.system
     assert isinstance(system, WithTerms)
@@ -66,10 +66,10 @@ def extended(
 
 
 def with_states(problem: Problem, found: Fit, weights: Weights, policy: Policy) -> Fit:
-    """The parameters of a fit and states fitted to other data, as in a test of them.
+    """Return the parameters of a fit with states fitted to other data, for a test.
 
-    The same programs as those of the fit itself are used: all parameters are free with
-    a scale of zero.
+    The programs of the fit itself are reused: all parameters are free, with a scale of
+    zero.
     """
     columns = free_columns(problem, found.free)
     local = jnp.asarray(columns.local)

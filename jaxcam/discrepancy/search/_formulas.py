@@ -1,7 +1,7 @@
-"""Forms with a few numbers in the place of free functions, fitted to the recordings.
+"""Replace free functions by parametric forms, fitted to the recordings.
 
-Where a form may start from, the curve says; whether it stays, the evidence of a fit of
-whole trajectories does.
+The curve gives the starting values of a form; the evidence of a fit to whole
+trajectories decides whether the form is kept.
 """
 
 import dataclasses
@@ -18,17 +18,17 @@ from ._roughness import beside, Roughness
 from ._slots import emptied, Free, free_term
 
 
-# Points at which a form and the sines that stand for it are compared
+# Points at which a form is compared with the sines that represent it
 _GRID = 400
 
 
 def formulated(
     fits: FreeFits, found: Missing, small: float, progress
 ) -> tuple[Missing, list[Missing]]:
-    """The functions of a fit as forms, where these explain as much.
+    """Replace the functions of a fit by forms that explain as much.
 
-    **Arguments:** `small`, by how much less evidence a form may have: an edge that the
-    steps of a flight cross costs them a little of their accuracy.
+    **Arguments:** `small`: the allowed loss of evidence, because integration steps
+    across an edge are less accurate.
 
     **Returns:** the fit, and all fits with forms.
     """
@@ -53,7 +53,7 @@ def formulated(
 
 
 def _sound(trial: Missing, one: Free) -> bool:
-    """Whether a fit with a form came to an end, with its places among the data."""
+    """Return whether a fit with a form has ended with its positions within the data."""
     (form,) = (f for f in trial.functions if f.slot == one.slot)
     assert isinstance(form, Free) and form.primitive is not None
     numbers = [trial.fit[name].value for name in form.coefficients]
@@ -61,7 +61,7 @@ def _sound(trial: Missing, one: Free) -> bool:
 
 
 def _enough(fits: FreeFits, found: Missing, trial: Missing) -> bool:
-    """Whether a form leaves noise alone, by better evidence than the curve."""
+    """Return whether a form leaves only noise, with better evidence than the curve."""
     samples = found.problem.samples
     surplus = fits.policy.cost_errors * math.sqrt(2 * samples)
     return trial.score < found.score and trial.fit.cost < samples + surplus
@@ -70,7 +70,7 @@ def _enough(fits: FreeFits, found: Missing, trial: Missing) -> bool:
 def _fitted(
     fits: FreeFits, found: Missing, one: Free, primitive: Primitive, numbers
 ) -> Missing:
-    """A fit with a form in the place of a function, from some of its numbers."""
+    """Fit a form in place of a function, starting from given parameters."""
     problem = found.problem
     size = Roughness(size=abs(float(numbers[0])))
     form = dataclasses.replace(one, primitive=primitive, roughness=size)
@@ -85,7 +85,8 @@ def _fitted(
 def _promising(
     fits: FreeFits, found: Missing, one: Free
 ) -> list[tuple[Primitive, np.ndarray]]:
-    """Forms that resemble a function most where the data tell it, with their numbers.
+    """Return the forms most similar to a function where the data determine it, with
+    their parameters.
 
     By the quadratic likelihood about the fit: a form with size s and sines b has the
     cost of `s b` there.
@@ -117,7 +118,9 @@ def _promising(
 
 
 def _sines_of(family: Family, primitive: Primitive, starts, count: int) -> np.ndarray:
-    """Coefficients of the sums of sines nearest to a form of size one, `(k, count)`."""
+    """Return the coefficients `(k, count)` of the sums of sines nearest to forms of
+    size one.
+    """
     along = np.linspace(family.low, family.high, _GRID)
     basis = free_basis(family, along, count)
     direction = np.tanh(along / family.slip) if family.jumps else np.zeros(_GRID)

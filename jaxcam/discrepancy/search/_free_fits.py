@@ -1,4 +1,4 @@
-"""Fits with free functions, as rough as their evidence says."""
+"""Fit free functions with the smoothness that has the most evidence."""
 
 import dataclasses
 import math
@@ -19,16 +19,17 @@ from ._roughness import occam, roughness
 from ._slots import filled, Free, Part
 
 
-# The numbers of a hidden element have settled where they move by less of their reach
+# Change, as a share of the allowed step, below which element parameters have converged
 _SETTLED = 0.02
 
 
 class Missing(NamedTuple):
     """The result: `functions` and `names` of terms, fitted together with the rig.
 
-    - `score`: minus twice the logarithm of the evidence (the BIC where there is no
+    - `score`: minus twice the logarithm of the evidence (the BIC if there is no
         function).
-    - `problem`: with room for the functions; that of `fit` holds their priors.
+    - `problem`: the problem with slots for the functions; that of `fit` contains their
+      priors.
     """
 
     functions: tuple[Part, ...]
@@ -39,7 +40,7 @@ class Missing(NamedTuple):
 
 
 class Subset(NamedTuple):
-    """A subset to fit: functions and names of terms in a problem."""
+    """A subset to fit: functions, and names of terms, in a problem."""
 
     problem: Problem
     functions: tuple[Part, ...]
@@ -49,18 +50,20 @@ class Subset(NamedTuple):
 class FreeFits:
     """Fits of subsets with free functions.
 
-    While a model is far from the data, with a cost per sample of T, likelihoods are
-    divided by T, so that parameters of the rig do not leave their tolerances to make up
-    for what has not been found yet.
+    While a model is far from the data, with a cost per sample of T, the log-likelihood
+    is divided by T, so that rig parameters do not leave their tolerances to compensate
+    for effects not yet found.
 
-    **Arguments:** names of the rig's own parameters, terms that may be named, policy.
+    **Arguments:** names of the rig parameters, candidate terms, policy.
     """
 
     def __init__(self, rig: Sequence[str], terms: Sequence[Term], policy: Policy):
         self.rig, self.terms, self.policy = tuple(rig), tuple(terms), policy
 
     def free(self, found: Missing | Subset) -> list[str]:
-        """Names of the parameters that are free: of the rig, terms and functions."""
+        """Return the names of the free parameters: those of the rig, terms and
+        functions.
+        """
         names = list(self.rig)
         for term in self.terms:
             if term.name in found.names:
@@ -72,10 +75,10 @@ class FreeFits:
     def fitted(
         self, subset: Subset, start: Point, iterations: int | None = None
     ) -> Missing:
-        """A subset fitted, with the roughness that its functions turn out to have."""
+        """Fit a subset, including the smoothness of its functions."""
         policy, functions = self.policy, subset.functions
         heat, point, found = 1.0, start, None
-        # the numbers of a hidden element move step by step
+        # the parameters of a hidden element converge step by step
         hidden = any(isinstance(one, Hidden) for one in functions)
         turns = policy.heats + (policy.recentred if hidden else 0)
         for turn in range(turns):
@@ -107,7 +110,9 @@ class FreeFits:
         return Missing(functions, subset.names, found, score, subset.problem)
 
     def _stop(self, samples: int, heat: float) -> Callable[[Sequence[float]], bool]:
-        """Ends a fit that is given up, or whose steps no longer change a choice."""
+        """Return whether to stop a fit: it has failed, or its steps no longer affect a
+        choice.
+        """
         gives_up = given_up(samples, self.policy)
 
         def stop(costs: Sequence[float]) -> bool:
@@ -118,10 +123,10 @@ class FreeFits:
         return stop
 
     def quadratic(self, subset: Subset, point: Point, heat: float, one: Free):
-        """The likelihood about a point for one function, without its own prior.
+        """Return the likelihood about a point for one function, without its own prior.
 
         **Returns:** information and score, with the coefficients of that function in
-        their own units, the rows of all free parameters, and its own.
+        their own units, the rows of all free parameters, and the rows of the function.
         """
         bare = heated(filled(subset.problem, subset.functions, prior=False), heat)
         free = self.free(subset)
@@ -133,8 +138,9 @@ class FreeFits:
         return information, score, blocks.rows(free), blocks.rows(one.coefficients)
 
     def _rougher(self, subset, functions, point, heat) -> tuple[Part, ...]:
-        """The functions with the roughness that a fit of them suggests, and hidden
-        elements with the numbers that it suggests."""
+        """Return the functions with the smoothness, and the hidden elements with the
+        parameters, that a fit suggests.
+        """
         found = []
         for one in functions:
             if isinstance(one, Hidden):
@@ -153,9 +159,10 @@ class FreeFits:
         return tuple(found)
 
     def needed_parts(self, found: Missing, one: Hidden) -> tuple[int, ...]:
-        """Which parts of an element's force by the motion itself earn their number.
+        """Return the direct parts of an element's force that are worth a parameter.
 
-        By the quadratic likelihood about the fit, the least needed one first.
+        They are removed one by one, the least significant first, by the quadratic
+        likelihood about the fit.
         """
         heat = heat_of(found.fit)
         problem = heated(filled(found.problem, found.functions), heat)
@@ -185,7 +192,7 @@ class FreeFits:
         return tuple(kept)
 
     def parts(self, found: Missing | Subset) -> dict[str, list[str]]:
-        """The parameters of each term and function, by its label."""
+        """Return the parameters of each term and function, by its label."""
         own = {
             t.name: [one.name for one in t.strengths()]
             for t in self.terms
@@ -212,7 +219,7 @@ class FreeFits:
         return prices
 
     def score(self, subset: Subset, found: Fit) -> float:
-        """Minus twice the logarithm of the evidence, up to a constant."""
+        """Return minus twice the logarithm of the evidence, up to a constant."""
         count = sum(len(t.strengths()) for t in self.terms if t.name in subset.names)
         samples = found.problem.samples
         price = count * math.log(samples)
@@ -223,7 +230,7 @@ class FreeFits:
     def _freedom(
         self, subset: Missing | Subset, found: Fit, functions: Sequence[Any]
     ) -> float:
-        """The share of some sums of sines in the logarithm of the evidence."""
+        """Return the contribution of sums of sines to the logarithm of the evidence."""
         if not functions:
             return 0.0
         heat = heat_of(found)
@@ -247,7 +254,7 @@ class FreeFits:
 
 
 def _known(information, blocks, one: Part) -> None:
-    """Add what the roughness of a function says of its coefficients."""
+    """Add the prior of the coefficients of a function."""
     if isinstance(one, Free) and one.smooth:
         rows = blocks.rows(one.coefficients)
         spread = np.where(one.spread > 0, one.spread, one.roughness.size)
@@ -255,12 +262,12 @@ def _known(information, blocks, one: Part) -> None:
 
 
 def heat_of(found: Fit) -> float:
-    """Cost per sample, one at least."""
+    """Return the cost per sample, at least one."""
     return max(1.0, found.cost / found.problem.samples)
 
 
 def heated(problem: Problem, heat: float) -> Problem:
-    """The problem with what is known beforehand as strong as the data are trusted."""
+    """Return the problem with its priors scaled like the weight of the data."""
     return dataclasses.replace(
         problem,
         parameters=tuple(
@@ -273,7 +280,9 @@ def heated(problem: Problem, heat: float) -> Problem:
 
 
 def unscaled(blocks, names, heat: float):
-    """Information and score with some parameters in their own units, by the heat."""
+    """Return information and score with some parameters in their own units, divided by
+    the heat.
+    """
     information, score = (x / heat for x in blocks.total())
     unit = np.ones(len(blocks.names))
     own = blocks.rows(names)
@@ -282,7 +291,9 @@ def unscaled(blocks, names, heat: float):
 
 
 def _alike(fresh: Sequence[Part], functions: Sequence[Part]) -> bool:
-    """Whether the roughness of functions, and what elements are, has settled."""
+    """Return whether the smoothness of functions and the parameters of elements have
+    converged.
+    """
     return all(_as_before(a, b) for a, b in zip(fresh, functions))
 
 
@@ -297,7 +308,9 @@ def _as_before(fresh, one) -> bool:
 
 
 def _recentred(problem: Problem, fresh, functions, point: Point) -> Point:
-    """The point for functions about other numbers of their hidden elements."""
+    """Return the point for functions about other parameters of their hidden
+    elements.
+    """
     for one, before in zip(fresh, functions):
         if one is not before and isinstance(one, Hidden):
             point = point._replace(values=started(problem, point.values, one))

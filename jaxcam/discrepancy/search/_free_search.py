@@ -1,7 +1,7 @@
-"""Functions without a name beside the terms that have one, by their evidence.
+"""Search for unnamed functions in addition to named terms, by their evidence.
 
-What is missing is looked for in single pieces of flight first, which no impact and no
-other flight can spoil, and then in whole records.
+The search first uses single pieces of flight, which are independent of impacts and
+other flights, and then whole recordings.
 """
 
 import dataclasses
@@ -34,11 +34,11 @@ from ._slots import (
 
 
 class FreeSearch:
-    """Adds functions and terms one by one, as long as the evidence grows.
+    """Adds functions and terms one by one, as long as the evidence increases.
 
-    **Arguments:** the problem, names of the rig's own parameters, terms that may be
-    named, families of functions, the policy, `progress(sentence, fraction)`, and the
-    cost of the model without any of them.
+    **Arguments:** the problem, names of the rig parameters, candidate terms, families
+    of functions, the policy, `progress(sentence, fraction)`, and the cost of the model
+    without any of them.
     """
 
     def __init__(
@@ -56,13 +56,13 @@ class FreeSearch:
         self.terms = [t for t in terms if not any(s.inner for s in t.strengths())]
         self.fits = FreeFits(rig, self.terms, policy)
         self.families = tuple(families)
-        # whole records fitted with other functions, or other forms of them
+        # fits of whole recordings with other functions, or other forms of them
         self.tried: list[Missing] = []
         impacting = any(family.where is not Where.FLIGHT for family in families)
         unit = self.families[0].motion_unit
         self.driven = driven_by(problem, unit) if policy.elements else None
         self.problem = roomy(problem, self.families[0], impacting, self.driven)
-        # what any sensor may do is no function without a name
+        # gain, offset and lag of a sensor are not unnamed functions
         faults = own_faults(self.problem.model, self.problem.parameters)
         self.leads = Leads(
             self.fits, self.families, self.driven, faults, policy, progress
@@ -72,7 +72,7 @@ class FreeSearch:
         )
 
     def run(self) -> Missing | None:
-        """The functions and terms found, or `None` where nothing is worth it."""
+        """Return the functions and terms found, or `None` if none is significant."""
         found = self._grown(self._bare(self.apart, self.problem.start), True)
         most = self.policy.iterations
         found = self.fits.fitted(self._tight(found), found.fit.point, most)
@@ -99,11 +99,11 @@ class FreeSearch:
         return Subset(self.problem, found.functions, found.names)
 
     def _grown(self, found: Missing, apart: bool) -> Missing:
-        """One function or term after the other."""
+        """Add one function or term after the other."""
         problem = self.apart if apart else self.problem
         while len(found.functions) + len(found.names) < self.policy.most_terms:
             if apart and heat_of(found.fit) < self.policy.as_noise:
-                # single pieces know little of what is small
+                # single pieces contain little information on small effects
                 break
             leads = self._leads(problem, found, apart)
             best = found
@@ -124,7 +124,7 @@ class FreeSearch:
         return found
 
     def _shows_apart(self, lead: Lead) -> bool:
-        """Whether pieces that are tied to none show what a lead adds."""
+        """Return whether disconnected pieces show the effect of a lead."""
         if lead.promise is not None:
             return True
         if lead.family is not None:
@@ -136,7 +136,9 @@ class FreeSearch:
         return next(term for term in self.terms if term.name == name)
 
     def _done(self, best: Missing, lead: Lead, first: Lead) -> bool:
-        """Whether what explains the data leaves a lead without a chance."""
+        """Return whether the data are explained so well that a lead need not be
+        tried.
+        """
         close = lead.gain > self.policy.rivalling * first.gain
         return heat_of(best.fit) < self.policy.as_noise and not close
 
@@ -145,14 +147,14 @@ class FreeSearch:
         return self.policy.small * max(self.cost - found.fit.cost, 0.0)
 
     def _least(self) -> float:
-        """Growth of twice the logarithm of the evidence that is asked for."""
+        """Return the required increase in twice the logarithm of the evidence."""
         tests = len(self.families) + len(self.terms) + len(KINDS)
         chance = self.policy.false_alarms / tests
         least = max(float(chi2.isf(chance, 1)), math.log(self.problem.samples))
         return (math.sqrt(least) + self.policy.beyond) ** 2
 
     def _leads(self, problem: Problem, found: Missing, apart: bool) -> list[Lead]:
-        """The candidates that promise enough to be fitted, the best first."""
+        """Return the candidates with a sufficient predicted gain, the best first."""
         leads = self.leads.ranked(problem, found, apart)
         if not leads:
             return []
@@ -178,7 +180,7 @@ class FreeSearch:
             assert lead.name is not None
             names = names | {lead.name}
         if self._shows_apart(lead):
-            # what acts in flight is next to linear where impacts tie nothing
+            # a force is almost linear if impacts do not connect the pieces
             first = self.fits.fitted(Subset(self.apart, functions, names), point)
             point, functions = first.fit.point, first.functions
             if problem is self.apart:
@@ -190,9 +192,9 @@ class FreeSearch:
         return trial
 
     def _swapped(self, found: Missing) -> Missing:
-        """Terms in the place of what was found first, where they explain more.
+        """Replace earlier functions by terms that explain more.
 
-        Early on, far from the data, a function may make up for two things.
+        Far from the data, a function may represent two effects.
         """
         for out in (*found.functions, *sorted(found.names)):
             rest, point = self._without(found, out)
@@ -209,9 +211,9 @@ class FreeSearch:
         return found
 
     def _rival(self, found: Missing, out: Part | str) -> str | None:
-        """The term that would do most in the place of something, if it would do.
+        """Return the best term to replace a function, if it is good enough.
 
-        By the quadratic likelihood about the fit.
+        This uses the quadratic likelihood about the fit.
         """
         names = [t.name for t in self.terms if t.name not in found.names]
         problem = filled(self.problem, found.functions)
@@ -240,7 +242,7 @@ class FreeSearch:
         return name if left < allowed + self._small(found) else None
 
     def without(self, found: Missing, label: str) -> Missing:
-        """The fit without the function or term of a label."""
+        """Return the fit without the function or term of a label."""
         labels = {one.label: one for one in found.functions}
         return self.fits.fitted(*self._without(found, labels.get(label, label)))
 
@@ -261,7 +263,7 @@ class FreeSearch:
         return Subset(self.problem, functions, names), point
 
     def _pruned(self, found: Missing) -> Missing:
-        """Without what the rest can do without."""
+        """Return the fit without the functions and terms that are not needed."""
         for one in (*found.functions, *sorted(found.names)):
             if len(found.functions) + len(found.names) < 2:
                 break

@@ -8,7 +8,9 @@ from ._blocks import Blocks
 
 
 def gain(information, score, rows) -> float:
-    """Growth of twice the log-likelihood when some parameters are freed."""
+    """Return the increase in twice the log-likelihood when some parameters are
+    freed.
+    """
     if not len(rows):
         return 0.0
     step, _ = newton_step(information, score, rows)
@@ -16,10 +18,11 @@ def gain(information, score, rows) -> float:
 
 
 def added_gain(information, score, free, new, alike: float) -> float:
-    """Growth of twice the log-likelihood when `new` are freed beside `free`.
+    """Return the increase in twice the log-likelihood when `new` are freed in addition
+    to `free`.
 
-    Combinations that the free ones imitate to within `alike` of their information gain
-    nothing, as rounding would decide what.
+    Combinations that the free parameters represent to within `alike` of their
+    information have no gain, because it would be a rounding error.
     """
     new = np.setdiff1d(new, free)
     if not len(new):
@@ -38,12 +41,13 @@ def added_gain(information, score, free, new, alike: float) -> float:
 
 
 def predicted_gain(blocks: Blocks, free, new, policy: Policy) -> float:
-    """Gain in twice the log-likelihood of records with what others say of `new`.
+    """Return the gain in twice the log-likelihood of recordings when `new` is estimated
+    from others.
 
-    They are dealt out to two halves, each predicts the other, and the sum is
-    returned; the `free` parameters are fitted to either half. What differs from record
-    to record, as the faults of a film do, gains where it is fitted and loses here.
-    Infinite for one record, which can predict nothing.
+    The recordings are divided into two halves, each predicts the other, and the sum is
+    returned; the `free` parameters are fitted to either half. An effect that differs
+    from recording to recording, such as the faults of a film, gains in the fit and
+    loses here. The gain is infinite for one recording, which cannot be predicted.
     """
     names = list(dict.fromkeys(blocks.record))
     if len(names) < 2:
@@ -56,7 +60,7 @@ def predicted_gain(blocks: Blocks, free, new, policy: Policy) -> float:
     scale = 1 / np.sqrt(np.where(own > 0, own, np.inf))
     values, vectors = np.linalg.eigh(rest * np.outer(scale, scale))
     seen = values > policy.alike
-    # combinations that can be told from the free ones, each known to one unit
+    # combinations distinguishable from the free parameters, each with unit information
     basis = scale[:, None] * vectors[:, seen] / np.sqrt(values[seen])
     total = 0.0
     for half in (names[::2], names[1::2]):
@@ -71,7 +75,9 @@ def predicted_gain(blocks: Blocks, free, new, policy: Policy) -> float:
 
 
 def _beside(information, score, free, new, basis):
-    """Information and score of combinations of `new`, the free ones eliminated."""
+    """Return information and score of combinations of `new`, with the free parameters
+    eliminated.
+    """
     free = free[np.diag(information)[free] > 0]
     inverse = invert_information(information[np.ix_(free, free)])
     across = basis.T @ information[np.ix_(new, free)]
@@ -83,9 +89,10 @@ def _beside(information, score, free, new, basis):
 
 
 def newton_step(information, score, rows):
-    """Steps of some parameters to their optimum, and their covariance.
+    """Return the steps of some parameters to their optimum, and their covariance.
 
-    What the data do not see at all stays where it is, with an infinite variance.
+    A parameter on which the data have no information does not move and has an infinite
+    variance.
     """
     step = np.zeros(len(rows))
     covariance = np.diag(np.full(len(rows), np.inf))

@@ -1,7 +1,7 @@
-"""Stop a fit early: it makes little progress far from the data, or is late.
+"""Stop a fit that makes little progress far from the data, or is late.
 
-Without the right term a fit may find no end of small steps, in a valley that leads
-nowhere; the right one needs a few large ones.
+Without the right term a fit may take very many small steps along a valley of the cost;
+with the right term it needs a few large steps.
 """
 
 import math
@@ -16,13 +16,15 @@ def given_up(
     beaten: float = math.inf,
     decides: float = -math.inf,
 ) -> Callable[[Sequence[float]], bool]:
-    """Return the callback that tells `jaxcam.fitting.fit` to stop.
+    """Return the callback by which `jaxcam.fitting.fit` is stopped.
 
-    A fit is late where it has not beaten a cost after so many attempts; it crawls where
-    it explains little and its last steps took many attempts and gained next to nothing.
+    A fit is late if its cost is not below a given one after a number of attempts. It
+    crawls if it explains little and its last steps took many attempts and gained very
+    little.
 
-    **Arguments:** the number of samples; the policy; the cost that a fit has to beat;
-    and one below which it is not given up for crawling, as its value decides something.
+    **Arguments:** the number of samples; the policy; the cost that a fit must fall
+    below; and the cost below which a crawling fit is not stopped, because its value
+    affects a decision.
     """
 
     def stop(costs: Sequence[float]) -> bool:
@@ -33,9 +35,10 @@ def given_up(
 
 
 def crawls(costs: Sequence[float], samples: int, policy: Policy) -> bool:
-    """Whether a fit explains so little, and so slowly, that it leads nowhere.
+    """Return whether a fit crawls: it explains little and gains very slowly.
 
-    **Arguments:** the cost at the start and after each attempt; the number of samples.
+    **Arguments:** the costs at the start and after each attempt; the number of samples;
+    the policy.
     """
     left = costs[-1] - policy.explained * samples
     steps = list(dict.fromkeys(costs))

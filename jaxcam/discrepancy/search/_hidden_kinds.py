@@ -1,4 +1,4 @@
-"""Kinds of hidden elements, with the numbers that are fitted and their signals."""
+"""Kinds of hidden elements, with their fitted parameters and their signals."""
 
 import dataclasses
 import math
@@ -18,9 +18,10 @@ from ._hidden_signals import (
 
 @dataclasses.dataclass(frozen=True)
 class Number:
-    """A number of an element: its name, bounds, and how far one fit may move it.
+    """A parameter of an element: its name, its bounds, and its largest change in one
+    fit.
 
-    It is fitted as its logarithm where `logarithm`.
+    If `logarithm` is true, its logarithm is fitted.
     """
 
     name: str
@@ -34,20 +35,20 @@ class Number:
         return min(max(new, self.low), self.high)
 
     def near(self, value: float, change):
-        """The number after a small change, which can be differentiated."""
+        """Return the parameter after a small change, which can be differentiated."""
         return value * jnp.exp(change) if self.logarithm else value + change
 
     def change(self, old: float, new: float) -> float:
         return math.log(new / old) if self.logarithm else new - old
 
     def span(self, value: float, reach: float) -> tuple[float, float]:
-        """Least and largest change, within the reach and the bounds."""
+        """Return the smallest and largest change, within the reach and the bounds."""
         ends = (self.moved(value, sign * reach) for sign in (-1.0, 1.0))
         low, high = (self.change(value, end) for end in ends)
         return low, high
 
     def error(self, value: float, stderr: float) -> float:
-        """Standard error of the number, from that of its change."""
+        """Return the standard error of the parameter, from that of its change."""
         return value * stderr if self.logarithm else stderr
 
 
@@ -55,8 +56,9 @@ class Number:
 class Kind:
     """A kind of element.
 
-    - `name`: of it in sentences; `numbers`, and `outputs`: names of its strengths.
-    - `signals(driven, cells)`: for each of some numbers, outputs `(r, n, o)` and free
+    - `name`: its name in sentences; `numbers`: its parameters; `outputs`: names of its
+      strengths.
+    - `signals(driven, cells)`: for each set of parameters, outputs `(r, n, o)` and free
         motions `(r, n, s)`.
     """
 
@@ -70,7 +72,9 @@ class Kind:
     ]
 
     def reach(self, number: Number, values: Sequence[float]) -> float:
-        """How far one fit may move a number: a share of the width of a resonance."""
+        """Return the largest change of a parameter in one fit: a share of the width of
+        a resonance.
+        """
         if self is RESONANCE and number.name == "frequency":
             return number.reach * values[1]
         return number.reach

@@ -1,4 +1,4 @@
-"""Which hidden elements promise enough to be fitted; fits without needless parts."""
+"""Select hidden elements worth fitting, and remove parts that are not needed."""
 
 import dataclasses
 import math
@@ -19,10 +19,11 @@ from ._vibration_scan import periodogram
 def worthwhile(
     problem: Problem, response: Response, driven: Driven, policy: Policy, heat: float
 ) -> list[tuple[float, Promise]]:
-    """What elements with a state of their own gain, less the price of their numbers.
+    """Return the predicted gains of hidden elements, minus the penalty for their
+    parameters.
 
-    A resonance that does less than a force at one frequency with any phase in each
-    record is none that the motion drives.
+    A resonance that gains less than a force at one frequency with a separate phase in
+    each recording is rejected, because such a force is not driven by the motion.
     """
     found = []
     for one in promises(problem, response, driven, policy):
@@ -38,7 +39,9 @@ def worthwhile(
 
 
 def simplified(fits: FreeFits, problem: Problem, found: Missing, progress) -> Missing:
-    """Without parts of a hidden element's force that the rig can do as well."""
+    """Return the fit without direct parts of the force that the rig parameters can
+    represent.
+    """
     for one in found.functions:
         if not isinstance(one, Hidden):
             continue

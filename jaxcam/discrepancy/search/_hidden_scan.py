@@ -1,7 +1,7 @@
-"""What hidden elements would gain, for numbers of them on a grid.
+"""Predict the gains of hidden elements, for parameters on a grid.
 
-A force that is a sum of known signals enters the likelihood as a vibration does: with
-states and free parameters eliminated, for many cells of the grid at once.
+A force that is a sum of known signals enters the likelihood like a vibration: states
+and free parameters are eliminated, for many grid cells at once.
 """
 
 import math
@@ -24,25 +24,26 @@ from ._local_force import forces_at_nodes, Response
 from ._vibration_scan import scanned_frequencies
 
 
-# Damping ratios of the grid; frequencies are as far apart as each of them makes a
-# resonance wide
+# Damping ratios of the grid; the spacing of the frequencies is proportional to the
+# width of a resonance wide
 _RATIOS = (0.02, 0.1)
-# Ratio of neighbouring times of a relaxation
+# Ratio of adjacent time constants of a relaxation
 _TIMES = 1.25
-# Limits of a hysteresis, in shares of the range of positions, and its other numbers
+# Limits of a hysteresis, as shares of the range of positions, and its other parameters
 _LIMITS = tuple(np.geomspace(0.03, 1.5, 12).tolist())
 _SHAPES = ((0.5, 1.0), (1.0, 1.0), (0.5, 2.0), (1.0, 2.0))
-# Forces at nodes, in numbers, that are worked out at once
+# Number of force values at nodes that are computed at once
 _AT_ONCE = 8_000_000
-# Parts of a diagonal that keep a matrix definite against rounding
+# Relative increase of a diagonal that keeps a matrix positive definite
 _STATES, _FORCES = 1e-13, 1e-9
 _TINY = 1e-300
 
 
 class Promise(NamedTuple):
-    """What an element promises: twice the log-likelihood, and where a fit may start.
+    """The predicted gain of an element in twice the log-likelihood, and the start of
+    its fit.
 
-    `direct`: strengths of the parts of the force by the motion itself.
+    `direct`: strengths of the direct parts of the force.
     """
 
     gain: float
@@ -53,9 +54,9 @@ class Promise(NamedTuple):
 def promises(
     problem: Problem, response: Response, driven: Driven, policy: Policy
 ) -> Iterator[Promise]:
-    """The best cell of each kind of element.
+    """Return the best cell of each kind of element.
 
-    **Arguments:** a problem with room for one, and its `Response` about a fit.
+    **Arguments:** a problem with a slot for an element, and its `Response` about a fit.
     """
     chain = _Chain(problem, response, driven)
     for kind, cells in _grids(problem, driven, policy):
@@ -83,7 +84,7 @@ def promises(
 
 
 def _grids(problem: Problem, driven: Driven, policy: Policy):
-    """Kinds of elements, each with the numbers that are tried."""
+    """Return the kinds of elements, each with the parameters that are tried."""
     frequency = scanned_frequencies(problem, policy)
     if len(frequency):
         low, high = frequency[0], frequency[-1]
@@ -95,7 +96,7 @@ def _grids(problem: Problem, driven: Driven, policy: Policy):
                 for f in np.exp(np.arange(math.log(low), math.log(high), ratio))
             ],
         )
-        # a relaxation is told from damping and from stiffness in the same range
+        # the same range distinguishes a relaxation from damping and from stiffness
         longest = 1 / (2 * math.pi * low)
         shortest = 1 / (2 * math.pi * high)
         count = max(2, math.ceil(math.log(longest / shortest) / math.log(_TIMES)))
@@ -107,9 +108,9 @@ def _grids(problem: Problem, driven: Driven, policy: Policy):
 
 
 class _Chain:
-    """The pieces of all records, ready for forces that are given at their nodes.
+    """The pieces of all recordings, prepared for forces given at their nodes.
 
-    The parts of a force by the motion itself stand with the free parameters.
+    The direct parts of a force are among the free parameters.
 
     **Arguments:** the problem, its `Response` about a fit, and the position that drives
     elements.
@@ -122,7 +123,9 @@ class _Chain:
         self.size = len(response.prior) + DIRECT
 
     def gains(self, kind: Kind, cells: Sequence[Sequence[float]]):
-        """Gains of some cells, and strengths, starts and direct parts of each."""
+        """Return the gains of some cells, with strengths, starts and direct parts of
+        each.
+        """
         columns = list(_columns(kind, cells, self.driven, self.response))
         shared = len(kind.outputs)
         information = np.zeros((self.size, self.size))
@@ -165,7 +168,7 @@ class _Chain:
         matrix = matrix + _FORCES * np.eye(matrix.shape[-1])
         solved = np.linalg.solve(matrix, (left * scale)[..., None])[..., 0]
         gains = np.sum(left * scale * solved, axis=-1)
-        # the parts by the motion itself gain as well
+        # the direct parts contribute to the gain
         base = score @ inside @ score
         few = invert_information(information[:free, :free])
         few = np.where(np.isfinite(few), few, 0.0)
@@ -180,7 +183,9 @@ class _Chain:
 
 
 def _columns(kind: Kind, cells, driven: Driven, response: Response):
-    """For each record, forces of unit strengths at its nodes, `(k, l, cells, p)`."""
+    """Return, for each recording, the forces of unit strengths at its nodes, `(k, l,
+    cells, p)`.
+    """
     each = kind.signals(driven, cells)
     times = response.time
     whole = np.empty((*times.shape, len(cells), len(kind.outputs) + kind.starts))
@@ -191,7 +196,8 @@ def _columns(kind: Kind, cells, driven: Driven, response: Response):
 
 
 class _Sums:
-    """Of one record: information and score of parameters, and of forces in cells.
+    """Information and score of the parameters and of the forces in cells, for one
+    recording.
 
     `pp`, `p` of the parameters; `pf` `(m, cells, p)` couples them to the forces; `f`
     `(cells, p)` is their score and `ff` `(cells, p, p)` their information.
@@ -205,7 +211,7 @@ class _Sums:
         self.ff = np.zeros((cells, width, width))
 
     def add(self, direct, pushed, off, sign=1.0):
-        """Rows for the parameters and the forces, and what they are to explain."""
+        """Return the rows for the parameters and the forces, and the residuals."""
         self.pp += sign * direct.T @ direct
         self.p += sign * direct.T @ off
         self.pf += sign * (direct.T @ pushed).reshape(-1, *self.shape)
@@ -213,14 +219,14 @@ class _Sums:
         self.ff += sign * self.products(pushed, pushed)
 
     def products(self, left, right):
-        """For each cell, the products of its columns."""
+        """Return the products of the columns of each cell."""
         left = left.reshape(-1, *self.shape).transpose(1, 2, 0)
         right = right.reshape(-1, *self.shape).transpose(1, 0, 2)
         return left @ right
 
 
 def _summed(response: Response, r: int, direct, columns, cells: int) -> _Sums:
-    """The states of one record eliminated, from its first piece to its last."""
+    """Eliminate the states of one recording, from the first piece to the last."""
     found: Any = jax.tree.map(lambda part: part[r], response.pieces)
     n, m = found.later.shape[-1], response.place.shape[1]
     d = direct.shape[-1]
@@ -231,7 +237,7 @@ def _summed(response: Response, r: int, direct, columns, cells: int) -> _Sums:
         forces = columns[k].reshape(columns.shape[1], -1)
         inner, slope = found.information[k], found.slope[k]
         l = slice(n + m, None)
-        # state and parameters, parts by the motion, and the forces
+        # state and parameters, direct parts, and forces
         side = inner[:, l] @ direct[k]
         known = np.block(
             [
@@ -272,7 +278,9 @@ def _summed(response: Response, r: int, direct, columns, cells: int) -> _Sums:
 
 
 def _halved(blocks, coupling):
-    """Blocks of one piece, and its coupling to the next, over the root of the first."""
+    """Return the blocks of one piece and its coupling to the next, divided by the
+    square root of the first.
+    """
     scale = 1 / np.sqrt(np.maximum(np.diag(blocks[0]), _TINY))
     scaled = blocks[0] * np.outer(scale, scale)
     root = np.linalg.inv(np.linalg.cholesky(scaled + _STATES * np.eye(len(scale))))

@@ -1,4 +1,4 @@
-"""Signals of hidden elements that a measured position drives, record by record."""
+"""Signals of hidden elements driven by a measured position, for each recording."""
 
 import dataclasses
 import math
@@ -11,19 +11,20 @@ from scipy.signal import lfilter, savgol_filter
 from ...fitting import Problem
 
 
-# Samples of the polynomials of second degree that smooth a flight: beyond them nothing
-# is late, and what is faster than they follow is far above what steps resolve
+# Window (samples) of the quadratic polynomials that smooth a flight. They cause no
+# delay, and they suppress only frequencies far above those that steps resolve
 _WINDOW = 9
-# Samples are padded to a multiple of this, so that similar records share a program
+# Samples are padded to a multiple of this, so that similar recordings share a program
 _STRIDE = 2048
 
 
 @dataclasses.dataclass(frozen=True)
 class Driven:
-    """The measured position of each record at equal times.
+    """The measured position of each recording at equidistant times.
 
-    `position` `(r, n)`, the last one repeated where a record is shorter than others;
-    `begin`, `interval` `(r,)`; `spread`: of all positions from their `middle`;
+    `position` `(r, n)`, the last value repeated if a recording is shorter than others;
+    `begin`, `interval` `(r,)`; `spread`: largest distance of the positions from their
+    `middle`;
     `motion_unit`: of the position.
     """
 
@@ -36,9 +37,9 @@ class Driven:
 
 
 def driven_by(problem: Problem, motion_unit: str = "") -> Driven | None:
-    """The position of the first coordinate as it was measured, smoothed in each flight.
+    """Return the measured position of the first coordinate, smoothed in each flight.
 
-    `None` where no sensor shows it.
+    `None` if no sensor measures it.
     """
     place = problem.model.system.coordinates[0][0]  # pyright: ignore
     channels = [n for n, s in problem.model.sensors.items() if s.observe == place]
@@ -61,7 +62,9 @@ def driven_by(problem: Problem, motion_unit: str = "") -> Driven | None:
 
 
 def _smooth(part, channel: str) -> Float[np.ndarray, " n"]:
-    """One record at equal times; no polynomial goes on through an impact."""
+    """Return one recording at equidistant times; no polynomial extends across an
+    impact.
+    """
     record = part.recording
     time, interval = record.time, record.interval
     values = np.asarray(record[channel], dtype=float)
@@ -81,9 +84,10 @@ def _smooth(part, channel: str) -> Float[np.ndarray, " n"]:
 def resonance_signals(driven: Driven, frequency: float, ratio: float):
     """Outputs z and z' of `z'' + 2 D w z' + w^2 z = q`, and its free motions.
 
-    Exact for a position that is straight between samples; it begins at rest.
+    The result is exact for a position that is linear between samples; the element
+    starts at rest.
 
-    **Returns:** arrays `(r, n, 2)` both.
+    **Returns:** two arrays `(r, n, 2)`.
     """
     w = 2 * math.pi * frequency
     root = math.sqrt(1 - ratio**2)
@@ -110,7 +114,7 @@ def relaxation_signals(driven: Driven, time: float):
 
 
 def _first_order(position, pole: complex, interval: float):
-    """`y' = pole y + q` from where it is at rest."""
+    """Solve `y' = pole y + q` from the state of rest."""
     x = pole * interval
     end = np.exp(x)
     last = (end - 1 - x) / (x * pole)
@@ -122,17 +126,18 @@ def _first_order(position, pole: complex, interval: float):
     return found
 
 
-# Start of a hysteresis beside its middle, for the difference that it makes
+# Initial state of a hysteresis, to compute the effect of a change of it
 _BESIDE = 1e-3
 
 
 def hysteresis_signals(
     driven: Driven, limits: Any, sharings: Any, powers: Any
 ) -> tuple[Float[np.ndarray, "k r n 1"], Float[np.ndarray, "k r n 1"]]:
-    """Hysteresis of Bouc and Wen for several `(k,)` numbers of it at once.
+    """Compute the hysteresis of Bouc and Wen for several `(k,)` sets of parameters at
+    once.
 
-    **Returns:** its state, from zero, and by how much it differs from that for a start
-    beside it, in units of that.
+    **Returns:** its state, starting from zero, and the derivative with respect to the
+    initial state.
     """
     limits, sharings, powers = (
         np.asarray(x, dtype=float)[:, None] for x in (limits, sharings, powers)
@@ -165,7 +170,7 @@ def hysteresis_signals(
 def at_times(
     driven: Driven, signals: Float[np.ndarray, "r n s"], time
 ) -> Float[np.ndarray, "r k l s"]:
-    """Signals at some times `(r, k, l)`, by straight lines."""
+    """Interpolate signals linearly at some times `(r, k, l)`."""
     found = []
     for signal, at, begin, interval in zip(
         signals, time, driven.begin, driven.interval

@@ -1,4 +1,4 @@
-"""Hidden elements in a problem: which one, with which numbers, and its signals."""
+"""Hidden elements in a problem: their kind, parameters and signals."""
 
 import dataclasses
 import functools
@@ -26,19 +26,20 @@ from ._hidden_kinds import Kind
 from ._hidden_signals import Driven
 
 
-# Step of the numbers of an element, for the derivatives of its force to them
+# Step of the parameters of an element, for the derivatives of its force
 _STEP = 1e-3
-# A free motion may be so many times as large as the usual force
+# Largest free motion, in multiples of the usual force
 _LARGEST_START = 5.0
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Hidden:
-    """A hidden element that is fitted, about some numbers of it.
+    """A fitted hidden element, linearised about its parameters.
 
-    - `numbers`, `strengths`, `starts` `(r, s)`: about which its force is linear.
-    - `direct`: which parts of the force by the motion itself are fitted.
-    - `cells`: how many numbers were tried until these were found.
+    - `numbers`, `strengths`, `starts` `(r, s)`: values about which its force is
+      linearised.
+    - `direct`: the direct parts of the force that are fitted.
+    - `cells`: number of grid cells in the scan that found it.
     """
 
     kind: Kind
@@ -50,7 +51,7 @@ class Hidden:
     cells: int = 1
     slot: str = HiddenForce.label
 
-    # it has no roughness
+    # it has no smoothness parameter
     smooth: ClassVar[bool] = False
 
     @property
@@ -63,12 +64,12 @@ class Hidden:
 
     @property
     def outputs(self) -> list[str]:
-        """Names of the parameters that are strengths of its outputs."""
+        """Return the names of the parameters that are strengths of its outputs."""
         return [f"{self.slot}_shared_{k}" for k in range(len(self.kind.outputs))]
 
     @property
     def changes(self) -> list[str]:
-        """Names of the parameters that are changes of its numbers."""
+        """Return the names of the parameters that are changes of its parameters."""
         first = len(self.kind.outputs)
         return [
             f"{self.slot}_shared_{first + k}" for k in range(len(self.kind.numbers))
@@ -84,7 +85,7 @@ class Hidden:
 
     @property
     def coefficients(self) -> list[str]:
-        """Names of the parameters that are its own."""
+        """Return the names of its own parameters."""
         return [
             *self.outputs,
             *self.changes,
@@ -93,20 +94,22 @@ class Hidden:
         ]
 
     def price(self, samples: int) -> float:
-        """What its numbers, and that some of them were looked for, must gain."""
+        """Return the gain required for its parameters and for the grid scan."""
         shared = len(self.outputs) + len(self.changes) + len(self.direct)
         count = shared + self.starts.size
         return count * math.log(samples) + 2 * math.log(self.cells)
 
     def moved_from(self, other: "Hidden") -> float:
-        """How far its numbers are from those of another one, in their reaches."""
+        """Return the distance of its parameters from those of another element, in their
+        reaches.
+        """
         return max(
             abs(number.change(a, b)) / self.kind.reach(number, other.numbers)
             for number, a, b in zip(self.kind.numbers, other.numbers, self.numbers)
         )
 
     def force(self, numbers: Sequence[float]) -> Float[np.ndarray, "r n"]:
-        """Its force for other numbers and the same strengths."""
+        """Return its force for other parameters and the same strengths."""
         return self._sum(*self.kind.signals(self.driven, [numbers])[0])
 
     def _sum(self, outputs, free) -> Float[np.ndarray, "r n"]:
@@ -115,8 +118,9 @@ class Hidden:
 
     @functools.cached_property
     def table(self) -> Float[np.ndarray, "r n s"]:
-        """Its signals: outputs, derivatives of the force to its numbers, free
-        motions."""
+        """Return its signals: outputs, derivatives of the force with respect to its
+        parameters, free motions.
+        """
         cells = [list(self.numbers)]
         for k, number in enumerate(self.kind.numbers):
             for sign in (-1, 1):
@@ -135,11 +139,13 @@ class Hidden:
         return table
 
     def element(self, point: Point, names: Sequence[str]) -> HiddenElement:
-        """What was found, for a simulation."""
+        """Return the element for a simulation."""
         return self.element_at(point.values[0], names)
 
     def element_at(self, values, names: Sequence[str]) -> HiddenElement:
-        """The element with parameters `(q,)` at some values; can be differentiated."""
+        """Return the element for given values of the parameters `(q,)`; can be
+        differentiated.
+        """
 
         def at(name):
             return values[names.index(name)]
@@ -174,7 +180,7 @@ def _moved(hidden: Hidden, changes: Sequence[float]) -> tuple[float, ...]:
 
 
 def with_hidden(problem: Problem, hidden: Hidden) -> Problem:
-    """The problem with the signals of an element in its place."""
+    """Return the problem with the signals of an element in its slot."""
     table = hidden.table
     place = hidden_place(problem)
     width = len(hidden.outputs)
@@ -220,15 +226,15 @@ def with_hidden(problem: Problem, hidden: Hidden) -> Problem:
 
 
 def hidden_place(problem: Problem) -> int:
-    """Which of the terms of a problem is the hidden force."""
+    """Return the index of the hidden force among the terms of a problem."""
     for place, term in enumerate(terms_of(problem.model)):
         if isinstance(term, HiddenForce):
             return place
-    raise ValueError("There is no room for a hidden element.")
+    raise ValueError("There is no slot for a hidden element.")
 
 
 def started(problem: Problem, values, hidden: Hidden, direct=None) -> Array:
-    """Values of parameters with those of an element as it says they are."""
+    """Return parameter values with those of an element set."""
     new = np.array(values)
     names = problem.names
     for name, value in zip(hidden.outputs, hidden.strengths):
@@ -244,7 +250,7 @@ def started(problem: Problem, values, hidden: Hidden, direct=None) -> Array:
 
 
 def recentred(problem: Problem, hidden: Hidden, point: Point) -> Hidden:
-    """The element about where a fit has moved it."""
+    """Return the element linearised about the result of a fit."""
     values, names = np.asarray(point.values), problem.names
 
     def at(name):

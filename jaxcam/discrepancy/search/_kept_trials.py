@@ -1,4 +1,4 @@
-"""Fits of a diagnosis on disk, from which one that was interrupted continues."""
+"""Store the fits of a diagnosis, so that an interrupted one can be resumed."""
 
 import hashlib
 import os
@@ -17,7 +17,7 @@ from ...fitting.engine import Point
 from ..policy import Policy
 
 
-# what numpy raises for files that are not its own, or were
+# exceptions of numpy for files that are foreign or damaged
 _BROKEN = (
     OSError,
     ValueError,
@@ -31,7 +31,9 @@ _BROKEN = (
 
 
 class Ended(NamedTuple):
-    """The end of a fit, whether at an optimum, and after how many iterations."""
+    """The end of a fit: the point, whether it is an optimum, and the number of
+    iterations.
+    """
 
     point: Point
     converged: bool
@@ -41,10 +43,11 @@ class Ended(NamedTuple):
 class KeptTrials:
     """The results of the fits of each subset of terms, one small file per subset.
 
-    A file counts only for the same recordings, parameters, rig and policy; one that was
-    cut off while it was written, or that belongs to another problem, is passed over.
+    A file is used only for the same recordings, parameters, rig and policy; an
+    incomplete file or one of another problem is ignored.
 
-    **Arguments:** the folder, made when something is kept, the problem and the policy.
+    **Arguments:** the folder, which is created with the first file, the problem and the
+    policy.
     """
 
     def __init__(self, folder: Path, problem: Problem, policy: Policy = Policy()):
@@ -68,7 +71,7 @@ class KeptTrials:
         return Ended(point, converged, iterations)
 
     def put(self, names: Iterable[str], ended: Ended) -> None:
-        """Keep where a fit ended; the file is whole or absent."""
+        """Store the end of a fit; the file is complete or absent."""
         self.folder.mkdir(parents=True, exist_ok=True)
         file = self._file(names)
         part = file.with_suffix(f".{os.getpid()}.part")
@@ -84,7 +87,7 @@ class KeptTrials:
         os.replace(part, file)
 
     def clear(self) -> None:
-        """Forget everything, once the diagnosis is done."""
+        """Delete all files when the diagnosis is complete."""
         shutil.rmtree(self.folder, ignore_errors=True)
 
     def _file(self, names: Iterable[str]) -> Path:
@@ -92,7 +95,7 @@ class KeptTrials:
 
 
 def _mark_of(problem: Problem, policy: Policy) -> str:
-    """A hash of a problem and of how it is searched."""
+    """Return a hash of a problem and its policy."""
     found = hashlib.sha256(repr((problem.names, policy)).encode())
     found.update(np.asarray(problem.start.values).tobytes())
     for part in problem.segments:

@@ -1,4 +1,4 @@
-"""What promises most beside a fit: functions, terms, and forces with a state."""
+"""Rank additions to a fit: functions, terms, and forces with an internal state."""
 
 import math
 from collections.abc import Callable, Iterator, Sequence
@@ -22,7 +22,7 @@ from ._slots import filled, Free, free_term, slots_of
 
 
 class Lead(NamedTuple):
-    """One more function or term, and how much it promises."""
+    """One more function or term, with its predicted gain."""
 
     gain: float
     name: str | None = None
@@ -39,11 +39,11 @@ class Lead(NamedTuple):
 
 
 class Leads:
-    """Ranks what may be added to a fit, by a quadratic likelihood about it.
+    """Ranks possible additions to a fit by a quadratic likelihood about it.
 
-    **Arguments:** how subsets are fitted, families of functions, what drives a force
-    with a state of its own (if such are looked for), names of the faults that any
-    sensor may have, the policy, and `progress(sentence, fraction)`.
+    **Arguments:** the fits of subsets, families of functions, the position that drives
+    a force with an internal state (if such forces are sought), names of the possible
+    sensor errors, the policy, and `progress(sentence, fraction)`.
     """
 
     def __init__(
@@ -59,9 +59,10 @@ class Leads:
         self.faults, self.policy, self.progress = tuple(faults), policy, progress
 
     def ranked(self, problem: Problem, found: Missing, apart: bool) -> list[Lead]:
-        """All candidates, the most promising first; `apart` without what impacts
-        say."""
-        self.progress("looking for functions of what is left over", None)
+        """Return all candidates, the largest gain first; with `apart`, impacts are not
+        used.
+        """
+        self.progress("searching the residuals for functions", None)
         problem = heated(filled(problem, found.functions), heat_of(found.fit))
         leads = [
             *self._in_flight(problem, found),
@@ -71,7 +72,7 @@ class Leads:
         return sorted(leads, key=lambda lead: -lead.gain)
 
     def _slot(self, problem: Problem, found: Missing, where: Where) -> str | None:
-        """Where one more function has room."""
+        """Return the free slots for one more function."""
         used = {one.slot for one in found.functions}
         if len(used) >= self.policy.functions:
             return None
@@ -86,10 +87,10 @@ class Leads:
             return
         response = force_response(problem, found.fit.point, self.fits.free(found))
         for family in forces:
-            # one at a time: all of them at once would take gigabytes
+            # one at a time: all at once would take gigabytes
             yield self._force(problem, found, family, response, slot or "")
         if hidden and self.driven is not None:
-            self.progress("looking for forces with a state of their own", None)
+            self.progress("searching for forces with an internal state", None)
             heat = heat_of(found.fit)
             for grown, one in worthwhile(
                 problem, response, self.driven, self.policy, heat
@@ -97,7 +98,7 @@ class Leads:
                 yield Lead(grown, promise=one)
 
     def _has_room(self, found: Missing) -> bool:
-        """For one force with a state of its own."""
+        """Return the lead for one force with an internal state."""
         slots = {one.slot for one in found.functions}
         one = any(isinstance(f, Hidden) for f in found.functions)
         return len(slots) < self.policy.functions and not one
@@ -123,9 +124,9 @@ class Leads:
     def _elsewhere(
         self, problem: Problem, found: Missing, apart: bool
     ) -> Iterator[Lead]:
-        """Functions of the surface, of sensors and of impacts."""
+        """Return the leads for functions of the surface, of sensors and of impacts."""
         free, heat = self.fits.free(found), heat_of(found.fit)
-        # impacts say nothing where they tie nothing
+        # impacts contain no information if they do not connect the pieces
         places = {Where.CONTACT, Where.SENSOR, *([] if apart else [Where.IMPACT])}
         for family in self.families:
             slot = self._slot(problem, found, family.where)
@@ -160,6 +161,6 @@ class Leads:
 
 
 def shows_apart(family: Family) -> bool:
-    """Whether pieces that are tied to none show a function."""
+    """Return whether disconnected pieces show a function."""
     drifts = family.where is Where.SENSOR and family.argument is Variable.TIME
     return family.where is not Where.IMPACT and not drifts

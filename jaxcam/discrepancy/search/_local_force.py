@@ -1,7 +1,8 @@
-"""A force that is free at every node of every piece of flight, and what data say of it.
+"""Linearise the recordings about a force that is free at every node of every flight.
 
-Whatever acts in flight is, to first order, a sum of these. So one linearisation tells
-what any number of forces would gain, without a program of their own.
+To first order, every effect in flight is a sum of such forces. One linearisation
+therefore predicts the gains of any number of forces, without compiling a program for
+each.
 """
 
 from collections.abc import Sequence
@@ -33,12 +34,13 @@ from ..terms import Motion, Term, WithTerms
 from ._blocks import Blocks
 
 
-# Nodes of a force in a piece, less one: a step has two, or fewer where steps are short
+# Number of nodes of a force in a piece, minus one: two per step, or fewer if steps are
+# short
 _NODES = 20
 
 
 class LocalForce(Term):
-    """A force given at times `start + k spacing`, linear between them."""
+    """A force given at times `start + k spacing`, linear in between."""
 
     name: ClassVar[str] = "local_force"
     sentence: ClassVar[str] = "a force at one time"
@@ -54,15 +56,17 @@ class LocalForce(Term):
 
 
 class Response(NamedTuple):
-    """The response of the pieces of all records to a force at their nodes.
+    """The response of the pieces of all recordings to a force at their nodes.
 
-    - `point`: about which; `free`: names of the parameters that are free.
-    - `pieces`: `LinearPieces` with `n` columns for the state, `m` for the parameters
-        and then `l` for the force at the nodes, of each record.
-    - `place` `(r, m)`: which of the `g` free numbers each parameter of a record is.
-    - `time` `(r, k, l)`: of the nodes. `exists` `(r, k)`.
-    - `names`, `scale`, `prior`, `pull`, `owner` `(g,)`: of the free numbers, what their
-        tolerances add to information and score, and of which record they are.
+    - `point`: the point of linearisation; `free`: names of the free parameters.
+    - `pieces`: `LinearPieces` of each recording, with `n` columns for the state, `m`
+        for the parameters and `l` for the force at the nodes.
+    - `place` `(r, m)`: index among the `g` free parameters of each parameter of a
+      recording.
+    - `time` `(r, k, l)`: times of the nodes. `exists` `(r, k)`.
+    - `names`, `scale`, `prior`, `pull`, `owner` `(g,)`: names and scales of the free
+        parameters, the contributions of their tolerances to information and score, and
+        the recording to which they belong.
     """
 
     point: Point
@@ -79,10 +83,10 @@ class Response(NamedTuple):
 
 
 def stride_of(problem: Problem) -> int:
-    """Half steps from one node of a force to the next.
+    """Return the number of half steps between nodes of a force.
 
-    Steps may be shorter than anything that a force is asked for: they follow a measured
-    input, or errors that add up over a flight of many pieces.
+    Steps may be shorter than the time scale of a force requires: they follow a measured
+    input, or errors that accumulate over a flight of many pieces.
     """
     halves = 2 * problem.pieces.angle.shape[-1]
     stride = max(1, halves // _NODES)
@@ -92,8 +96,8 @@ def stride_of(problem: Problem) -> int:
 def force_response(problem: Problem, point: Point, free: Sequence[str]) -> Response:
     """Linearise about a point, with some parameters free and a force at every node.
 
-    The nodes are where the steps of the flights evaluate their field, or every
-    `stride` of these.
+    The nodes are the times at which the steps of the flights evaluate their field, or
+    every `stride`-th of them.
     """
     columns = free_columns(problem, free)
     stride = stride_of(problem)
@@ -127,11 +131,12 @@ def force_response(problem: Problem, point: Point, free: Sequence[str]) -> Respo
 
 
 def force_blocks(problem: Problem, response: Response, terms: Sequence[Term]) -> Blocks:
-    """Score and information of the free parameters and of terms that act in flight.
+    """Return score and information of the free parameters and of terms that act in
+    flight.
 
-    **Arguments:** terms that are not in the problem, linear in their strengths, and
-    that push the first coordinate; the rows of their strengths come after those of the
-    free parameters, in order.
+    **Arguments:** terms that are not in the problem, are linear in their strengths, and
+    act on the first coordinate; the rows of their strengths follow those of the free
+    parameters, in order.
     """
     strengths = [p for k, term in enumerate(terms) for p in term.parameters(k)]
     scale = np.array([p.scale for p in strengths], dtype=float)
@@ -169,14 +174,16 @@ def force_blocks(problem: Problem, response: Response, terms: Sequence[Term]) ->
 def forces_at_nodes(
     problem: Problem, response: Response, terms: Sequence[Term]
 ) -> Float[np.ndarray, "r k l p"]:
-    """Acceleration by a unit of each strength of some terms, at every node."""
+    """Return the acceleration per unit of each strength of some terms, at every
+    node.
+    """
     terms = tuple(terms)
     every = _forces(problem.layout, problem.pieces, response.point, terms)
     return np.asarray(every)[:, :, :: stride_of(problem)]
 
 
 def _onto(response: Response, forces: Float[np.ndarray, "r k l p"]) -> LinearPieces:
-    """The pieces with a few forces in the place of one at every node."""
+    """Return the pieces with a few forces instead of one at every node."""
     found = response.pieces
     keep = found.information.shape[-1] - forces.shape[-2]
     m = response.place.shape[1]
@@ -187,7 +194,7 @@ def _onto(response: Response, forces: Float[np.ndarray, "r k l p"]) -> LinearPie
     half = onto(found.information, forces)
     information = onto(np.swapaxes(half, -1, -2), forces)
     slope = onto(found.slope[:, :, None, :], forces)[:, :, 0]
-    # a joint is pushed by the piece before it
+    # a joint is affected by the piece before it
     before = np.concatenate([np.zeros_like(forces[:, :1]), forces[:, :-1]], axis=1)
     direct = np.zeros((*found.direct.shape[:-1], m + forces.shape[-1]))
     direct[..., :m] = found.direct[..., :m]
@@ -232,7 +239,9 @@ def _linear(
 
 @partial(program, runs_often=False)
 def _forces(layout, pieces, point, terms) -> Float[Array, "r k l p"]:
-    """Acceleration by a unit of each strength, at the nodes of every piece."""
+    """Return the acceleration per unit of each strength, at the nodes of every
+    piece.
+    """
 
     def piece(model, state, start, step, angle, rate):
         size = state.shape[0] - len(filtered_channels(model))
@@ -261,7 +270,9 @@ def _forces(layout, pieces, point, terms) -> Float[Array, "r k l p"]:
 
 
 def _slopes(terms, system, t, state):
-    """Derivatives of the terms' accelerations to their strengths, shape `(p,)`."""
+    """Return the derivatives of the accelerations with respect to the strengths, shape
+    `(p,)`.
+    """
     motion = system.motion(t, state, field=system.base.vector_field(t, state))
 
     def total(terms):

@@ -1,4 +1,4 @@
-"""A model of one's own with terms of the library in it, for a fit of one's own."""
+"""Add terms of the library to a model."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -23,11 +23,10 @@ def with_terms(
     Args:
         model: The model of the bare system.
         parameters: Its parameters.
-        terms: Names from `library(extended=True)`, or terms of your own, which push the
-            first coordinate. Strengths are zero to begin with.
-        recordings: Recordings from which the terms take their scales: the middle and
-            the ends of the positions, the speeds within which dry friction changes
-            sign.
+        terms: Names from `library(extended=True)`, or terms of your own that act on the
+            first coordinate. Their strengths are initially zero.
+        recordings: Recordings from which the terms take their scales: the mean and the
+            range of the positions, and the speed over which dry friction changes sign.
 
     Returns:
         The model with the terms in its system, and all parameters.

@@ -1,4 +1,4 @@
-"""A system and what picks its numbers, once it is inside a `WithTerms`."""
+"""Select parameters of a system inside a `WithTerms`."""
 
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
@@ -14,9 +14,9 @@ from ..terms import Term
 
 @dataclasses.dataclass(frozen=True)
 class OfBase:
-    """What picks a field out of the system that a `WithTerms` holds.
+    """A function that selects a field of the base of a `WithTerms`.
 
-    Equal for equal picks, so that diagnoses of one rig share compiled programs.
+    Equal functions compare equal, so that diagnoses of one rig share compiled programs.
     """
 
     pick: Callable
@@ -26,7 +26,7 @@ class OfBase:
 
 
 def of_base(drive: Turning | Input | None) -> Turning | Input | None:
-    """The drive of the system that a `WithTerms` holds."""
+    """Return the drive of the base of a `WithTerms`."""
     if isinstance(drive, Input):
         return Input(drive.channel, OfBase(drive.value))
     if drive is not None:
@@ -35,7 +35,7 @@ def of_base(drive: Turning | Input | None) -> Turning | Input | None:
 
 
 def within(parameter: Parameter) -> Parameter:
-    """The same parameter of the system that a `WithTerms` holds."""
+    """Return the same parameter of the base of a `WithTerms`."""
 
     def where(model):
         return parameter.where(Model(model.system.base, model.sensors, model.drive))
@@ -44,7 +44,7 @@ def within(parameter: Parameter) -> Parameter:
 
 
 def channel_of(sensors: Mapping[str, Sensor], place: int) -> str:
-    """The channel that shows a component of the state, or the first one."""
+    """Return the channel that measures a component of the state, or the first one."""
     for name, sensor in sensors.items():
         if isinstance(sensor.observe, int) and sensor.observe == place:
             return name
@@ -54,7 +54,7 @@ def channel_of(sensors: Mapping[str, Sensor], place: int) -> str:
 def usual_state(
     system, sensors: Mapping[str, Sensor], runs: Sequence[Recording]
 ) -> Float[np.ndarray, " n"]:
-    """The middle of what is measured of a state, zero for what is not."""
+    """Return the mean of the measured components of a state, zero for the others."""
     picks = {name: sensor.observe for name, sensor in sensors.items()}
     state = np.zeros(size_of(system, picks))
     for name, pick in picks.items():
@@ -65,5 +65,5 @@ def usual_state(
 
 
 def measured_in(unit: str, terms: Sequence[Term]) -> tuple[Term, ...]:
-    """The terms with the unit of the coordinate in their own."""
+    """Return the terms with the unit of the coordinate."""
     return tuple(dataclasses.replace(term, motion_unit=unit or "1") for term in terms)

@@ -1,4 +1,4 @@
-"""Where a term with an edge, a knee or a speed of its own would gain most."""
+"""Find the edge, knee or speed at which a term would gain most."""
 
 import dataclasses
 from collections.abc import Mapping
@@ -13,12 +13,14 @@ from ..terms import Term
 from ._local_force import force_blocks, Response
 
 
-# Strengths that are looked at in one go
+# Number of strengths evaluated at once
 _TOGETHER = 36
 
 
 class Placing(NamedTuple):
-    """The values of a term's inner numbers that gain most, and the `gain` there."""
+    """The values of a term's inner parameters with the largest gain, and this
+    `gain`.
+    """
 
     gain: float
     inner: Mapping[str, float]
@@ -27,12 +29,12 @@ class Placing(NamedTuple):
 def placing(
     problem: Problem, response: Response, term: Term, policy: Policy
 ) -> Placing:
-    """The best of the starts of a term that pushes the first coordinate.
+    """Return the best of the starts of a term that acts on the first coordinate.
 
-    By the quadratic likelihood about a fit, with strengths of the sign that physics
-    demands.
+    This uses the quadratic likelihood about a fit, with strengths of the permitted
+    sign.
 
-    **Arguments:** the problem, what a force at any time would gain beside the fit.
+    **Arguments:** the problem, and the response to a force at any time, about the fit.
     """
     strengths = term.strengths()
     linear = np.array([k for k, one in enumerate(strengths) if not one.inner])
@@ -44,7 +46,7 @@ def placing(
     best = Placing(0.0, starts[0])
     for first in range(0, len(starts), together):
         some = starts[first : first + together]
-        # as many each time, so that one program serves
+        # the same number each time, so that one program serves
         filled = [*some, *[some[-1]] * (together - len(some))]
         copies = [dataclasses.replace(term, **start) for start in filled]
         blocks = force_blocks(problem, response, copies)
@@ -59,9 +61,10 @@ def placing(
 
 
 def _beside(information, score, free, new):
-    """Information and score of some strengths, the free parameters eliminated.
+    """Return information and score of some strengths, with the free parameters
+    eliminated.
 
-    In units in which their own information is one.
+    They are in units in which the information on each strength is one.
     """
     free = free[np.diag(information)[free] > 0]
     inside = invert_information(information[np.ix_(free, free)])
@@ -74,9 +77,9 @@ def _beside(information, score, free, new):
 
 
 def _signed_gain(rest, left, low, high, alike: float) -> float:
-    """Growth of twice the log-likelihood by strengths on the right side of zero.
+    """Return the gain in twice the log-likelihood with strengths of the permitted sign.
 
-    Those that want to be on the other side stay at zero.
+    Strengths whose optimum has the other sign stay at zero.
     """
     open_ = [k for k in range(len(left)) if rest[k, k] > alike]
     while len(open_):

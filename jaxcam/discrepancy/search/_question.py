@@ -1,4 +1,4 @@
-"""The question: recordings, and a system with terms inside it."""
+"""The problem of a diagnosis: recordings, and a system with terms."""
 
 import dataclasses
 import math
@@ -19,7 +19,7 @@ Report = Callable[[str, float | None], None]
 
 
 class Shown(NamedTuple):
-    """The report of a fitted parameter: divided by a constant, with another name."""
+    """Report of a fitted parameter: divided by a constant, with another name."""
 
     name: str
     divisor: float
@@ -28,16 +28,16 @@ class Shown(NamedTuple):
 
 @dataclasses.dataclass(frozen=True)
 class Question:
-    """A problem whose system holds the terms, and what a report needs of the system.
+    """A problem whose system contains the terms, with the data that a report needs.
 
-    - `rig`: names of the system's own parameters.
-    - `terms`: those that may be named; `unlisted` only describe what is unknown.
-    - `turned`: whether there is a drive with a phase.
-    - `unit`: of the motion. `references`: constants of the forms of shapes.
-    - `drives`: recordings of a drive in the channel `drive_channel`, whose noise is
+    - `rig`: names of the parameters of the system.
+    - `terms`: candidate terms; `unlisted` terms only describe an unknown effect.
+    - `turned`: whether the system has a drive with a phase.
+    - `unit`: unit of the motion. `references`: constants of the shapes.
+    - `drives`: recordings of a drive in the channel `drive_channel`, with the noise
         `drive_noise`.
-    - `shown`: parameters that are reported in another way.
-    - `noisier`: channels whose recordings show more noise than was stated for them.
+    - `shown`: parameters that are reported in another form.
+    - `noisier`: channels with more noise than stated.
     """
 
     problem: Problem
@@ -55,7 +55,7 @@ class Question:
 
 
 class Noisier(NamedTuple):
-    """A channel whose noise is `seen` to be larger than what was `stated`."""
+    """A channel whose measured noise `seen` exceeds the `stated` noise."""
 
     channel: str
     stated: float
@@ -65,9 +65,9 @@ class Noisier(NamedTuple):
 def with_seen_noise(
     sensors: Mapping[str, Sensor], recordings: Sequence[Recording], policy: Policy
 ) -> tuple[dict[str, Sensor], tuple[Noisier, ...]]:
-    """Sensors with the noise that the recordings show, where more was not stated.
+    """Return the sensors with the measured noise, if it exceeds the stated noise.
 
-    A noise that is stated too small would make physics of every fault of a sensor.
+    If the stated noise were too small, every fault of a sensor would look like physics.
     """
     found, noisier = dict(sensors), []
     for name, sensor in sensors.items():
@@ -85,13 +85,13 @@ def with_seen_noise(
 def refuse_one(runs: Sequence[Recording | Segments]) -> None:
     if len(runs) < 2:
         raise RecordingError(
-            f"There is {len(runs)} recording; give at least two of the same rig at "
-            f"different speeds, so that one can be predicted from the other."
+            f"There is only {len(runs)} recording; give at least two of the same rig "
+            "at different speeds, so that one can be predicted from the other."
         )
 
 
 def by_listing(terms: tuple[Term, ...]):
-    """Terms that may be named, and those that only describe."""
+    """Return the terms that may be named, and those that only describe."""
     for term in terms:
         if term.strengths() and not term.acts and not isinstance(term, SensorTerm):
             raise ValueError(
@@ -100,9 +100,9 @@ def by_listing(terms: tuple[Term, ...]):
             )
         if term.starts() and (term.coordinate or term.acts != (Where.FLIGHT,)):
             raise ValueError(
-                f"The term {term.name!r} has places to start from, which are looked "
-                f"for on the first coordinate in flight; let it act there and nowhere "
-                f"else, or leave `starts` out."
+                f"The term {term.name!r} defines `starts`, which require a force on "
+                "the first coordinate in flight; let it act only there, or leave "
+                "`starts` out."
             )
     return (
         tuple(term for term in terms if term.listed),
@@ -111,7 +111,9 @@ def by_listing(terms: tuple[Term, ...]):
 
 
 def term_parameters(terms: Sequence[Term], segments, policy: Policy) -> list[Parameter]:
-    """Parameters of the terms; a frequency is one only with periods in a record."""
+    """Return the parameters of the terms; a frequency needs enough periods in a
+    recording.
+    """
     longest = max(part.recording.duration for part in segments)
     least = policy.fewest_periods / longest
     found = []

@@ -1,4 +1,4 @@
-"""The question of a cam-follower rig."""
+"""The problem of a cam-follower rig."""
 
 from collections.abc import Sequence
 
@@ -23,7 +23,7 @@ from ._visited_by import visited_by
 
 
 _FOLLOWER = "follower_angle_rad"
-# Angles at which the nominal cam is looked up, to check the sign of a recording
+# Number of angles of the nominal cam used to check the sign of a recording
 _ANGLES = 64
 
 
@@ -34,7 +34,8 @@ def rig_question(
     report: Report,
     policy: Policy,
 ) -> Question:
-    """The question of a cam-follower rig, which states its sensors and tolerances.
+    """Return the problem of a cam-follower rig, which states its sensors and
+    tolerances.
 
     **Raises:** `RecordingError` for recordings that cannot be those of the rig.
     """
@@ -60,7 +61,7 @@ def rig_question(
     problem = Problem.build(
         model, cut, parameters + term_parameters(terms, cut, policy)
     )
-    # the recordings tell only the ratio of stiffness and inertia
+    # the recordings determine only the ratio of stiffness and inertia
     stiffness = Shown("K/J", rig.inertia.value, "1/(m^2 s^2)")
     return Question(
         problem,
@@ -78,9 +79,9 @@ def rig_question(
 
 
 def _check(rig: Rig, runs: Sequence[Recording]) -> None:
-    """Records that cannot be those of the rig.
+    """Reject recordings that cannot be those of the rig.
 
-    **Raises:** `RecordingError` that says what is wrong with which.
+    **Raises:** `RecordingError`, which states the recording and its fault.
     """
     surface = rig.system(1.0)
     angles = np.asarray(surface.contact_angle(np.linspace(0, 2 * np.pi, _ANGLES)))
@@ -90,7 +91,7 @@ def _check(rig: Rig, runs: Sequence[Recording]) -> None:
         check_drive(run)
         samples = run[_FOLLOWER]
         least = float(np.min(samples))
-        # the follower cannot be below the cam, by more than tolerances explain
+        # the follower cannot be below the cam by more than the tolerances
         room = (high - low) / 2
         if least >= low - room and least <= high:
             continue
@@ -101,7 +102,8 @@ def _check(rig: Rig, runs: Sequence[Recording]) -> None:
                 f"multiply the column by -1."
             )
         raise RecordingError(
-            f"{run.name}: `{_FOLLOWER}` goes down to {least:.3g} rad where the cam of "
-            f"this rig is between {low:.3g} and {high:.3g} rad; check that the column "
-            f"and the rig file belong to this record, and that it is in radians."
+            f"{run.name}: the smallest value of `{_FOLLOWER}` is {least:.3g} rad, "
+            f"whereas the cam of this rig is between {low:.3g} and {high:.3g} rad; "
+            "check that the column and the rig file belong to this recording, and "
+            "that the unit is rad."
         )

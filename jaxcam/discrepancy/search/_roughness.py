@@ -1,4 +1,4 @@
-"""Choose the roughness of a free function by its marginal likelihood."""
+"""Choose the prior of a free function by its marginal likelihood."""
 
 import math
 from typing import NamedTuple
@@ -12,10 +12,11 @@ from ..terms import Family
 
 
 class Roughness(NamedTuple):
-    """The prior that suits a function best.
+    """The prior of a function with the largest marginal likelihood.
 
-    - `gain`: twice the logarithm of the marginal likelihood, less that of no function.
-    - `length`: of correlation. `size`: standard deviation of the function.
+    - `gain`: twice the logarithm of the marginal likelihood, minus that without the
+      function.
+    - `length`: correlation length. `size`: standard deviation of the function.
     """
 
     gain: float = 0.0
@@ -32,15 +33,15 @@ def roughness(
     value: Float[np.ndarray, " k"],
     policy: Policy,
 ) -> Roughness:
-    """The prior of a function, from the quadratic likelihood about a point.
+    """Return the prior of a function, from the quadratic likelihood about a point.
 
     With the `free` parameters eliminated, coefficients c of a Gaussian prior with
     variances V have the marginal likelihood of Rasmussen and Williams, Gaussian
-    Processes for Machine Learning 2006, eq. 2.30, written for information and score.
+    Processes for Machine Learning 2006, eq. 2.30, in terms of information and score.
 
     **Arguments:** information and score without the prior of the coefficients; rows of
-    the free parameters, and of the function's coefficients, its jump last; their values
-    at the point; the policy. The gain is that over the likelihood there.
+    the free parameters, and of the coefficients of the function, the jump last; their
+    values at the point; the policy. The gain is relative to the likelihood there.
     """
     inside, pull = beside(information, score, free, own, policy.alike)
     count = len(own) - 1
@@ -70,10 +71,10 @@ def occam(
 
 
 def beside(information, score, free, own, alike: float):
-    """Information and score of some rows, the free ones eliminated.
+    """Return information and score of some rows, with the free parameters eliminated.
 
-    Combinations that the free ones imitate to within `alike` of their information have
-    neither, as rounding would decide what.
+    Combinations that the free parameters represent to within `alike` of their
+    information have neither, because the values would be rounding errors.
     """
     free = np.setdiff1d(free, own)
     free = free[np.diag(information)[free] > 0]

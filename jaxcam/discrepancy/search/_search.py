@@ -1,4 +1,4 @@
-"""The best subset of a few terms, each judged by a fit of whole trajectories."""
+"""Search for the best subset of terms by fits of whole trajectories."""
 
 import itertools
 import math
@@ -13,18 +13,16 @@ from ._vibration_scan import Periodogram
 
 
 class Search:
-    """The search over subsets: in which order they are tried, not by greatest gain
-    alone.
-    """
+    """The search over subsets and its order, which is not by largest gain alone."""
 
     def __init__(self, trials: Trials):
         self.trials, self.policy = trials, trials.policy
 
     def run(self) -> Trial:
-        """The best subset; empty where no term is worth its parameters.
+        """Return the best subset; it is empty if no term is worth its parameters.
 
-        It is empty too where the best one ends far from the data and explains too
-        little of what is off: the least-bad fit is not evidence.
+        It is also empty if the best fit is far from the data and explains too little of
+        the misfit: the least-bad fit is not evidence.
         """
         bare = self.trials.attempt(frozenset(), None, self.policy.iterations)
         assert bare is not None
@@ -56,9 +54,9 @@ class Search:
         return self._sound(bare)
 
     def _sound(self, bare: Trial) -> Trial:
-        """The best subset whose fit can be judged, where the best of all cannot.
+        """Return the best subset with a completed fit, if the best of all has none.
 
-        A candidate on which fits do not end must not hide one on which they do.
+        A candidate whose fit fails must not hide one whose fit succeeds.
         """
         sound = [one for one in self.trials.known.values() if self.trials.settled(one)]
         best = min(sound, key=_bic, default=bare)
@@ -67,15 +65,17 @@ class Search:
         return self._swapped(self._smallest(best))
 
     def _leads(self, before: Trial, best: Trial) -> bool:
-        """Whether to look for more; far from the data only where terms help a lot."""
+        """Return whether to continue the search; far from the data only if terms help a
+        lot.
+        """
         part = best.fit.cost / before.fit.cost
         return self.trials.settled(best) or part < self.policy.helped
 
     def _settles(self, start: Trial, trial: Trial | None) -> bool:
-        """Whether a subset explains what the one that promised it could not.
+        """Return whether a subset explains the data although the smaller one did not.
 
-        What the other one promises of further subsets is then worth little; this one's
-        own quadratic model tells which of them are as good, and these are fitted.
+        The predictions of the smaller subset are then unreliable; the quadratic model
+        of this subset determines which others are equally good, and these are fitted.
         """
         enough = self.policy.explained * self.trials.problem.samples
         if trial is None or not trial.fit.cost < enough < start.fit.cost:
@@ -87,12 +87,14 @@ class Search:
     def _promised(
         self, kept: Sequence[Trial], best: Trial
     ) -> dict[frozenset[str], tuple[float, Trial]]:
-        """Subsets with one term more than those kept: the BIC promised, and by whom."""
+        """Return the subsets with one more term than those kept: the predicted BIC, and
+        the subset that predicts it.
+        """
         promised: dict[frozenset[str], tuple[float, Trial]] = {}
-        # what the best subset lacks, its own scores know best
+        # scores at the best subset are most reliable
         own = self._promises(best, self.trials.scan(best.names))
         for trial in kept:
-            # where the best one lacks nothing, only its equals can lead further
+            # if the best one lacks nothing, only equally good ones can lead further
             if not own and trial.bic > best.bic + self.policy.leads:
                 continue
             for names, bic in self._promises(
@@ -105,9 +107,9 @@ class Search:
         return promised
 
     def _smallest(self, best: Trial) -> Trial:
-        """Terms that the others can do without, by the error rate too, are dropped."""
+        """Drop terms that are not needed, by the error rate as well as BIC."""
         for name in sorted(best.names):
-            # the same place with one term less: a fit of its own may have gone astray
+            # start here with one term less: its own fit may have failed
             self.trials.attempt(best.names - {name}, best, self.policy.iterations)
         for size in range(len(best.names)):
             enough = []
@@ -128,7 +130,9 @@ class Search:
         return other if other.bic < best.bic else best
 
     def _swapped(self, best: Trial) -> Trial:
-        """Subsets with one term exchanged, as far as the quadratic model favours it."""
+        """Return the subsets with one term exchanged that the quadratic model
+        favours.
+        """
         for _ in range(self.policy.most_terms):
             if not best.names:
                 return best
@@ -145,8 +149,9 @@ class Search:
         return best
 
     def _exchanges(self, best: Trial, worse: float = 0.0) -> list[frozenset[str]]:
-        """Subsets that the quadratic model about the best fit finds as good, or `worse`
-        by that much BIC at most."""
+        """Return the subsets whose BIC, by the quadratic model about the best fit, is
+        larger by at most `worse`.
+        """
         blocks = self.trials.blocks(best)
         information, score = blocks.total()
         free = blocks.rows(self.trials.parameters(best.names))
@@ -170,12 +175,12 @@ class Search:
                 change = change + extra * math.log(self.trials.problem.samples)
                 if change < worse:
                     found.append((change, (best.names - {out}) | {term.name}))
-        # the most promising ones; of equals, the first
+        # the most promising ones; among equals, the first
         found.sort(key=lambda one: one[0])
         return [names for _, names in found[: self.policy.tried]]
 
     def _promises(self, trial: Trial, scan: Periodogram) -> dict[frozenset[str], float]:
-        """Return the BIC that each further term promises, by its score."""
+        """Return the predicted BIC with each further term, from its score."""
         blocks = self.trials.blocks(trial)
         information, score = blocks.total()
         free = blocks.rows(self.trials.parameters(trial.names))
@@ -202,11 +207,11 @@ class Search:
         return found
 
     def _least_of_vibrations(self, trial: Trial) -> float:
-        """What a vibration must promise to be fitted.
+        """Return the predicted gain that a vibration must have to be fitted.
 
-        Far from the data whatever is missing has some of its motion at any frequency; a
-        vibration that is there alone explains most of what is left, and its fits take
-        longest.
+        Far from the data, any missing physics has components at all frequencies, and
+        fits of a vibration take longest. A vibration must therefore explain most of the
+        residual.
         """
         samples = self.trials.problem.samples
         if trial.fit.cost < self.policy.near * samples:

@@ -1,4 +1,4 @@
-"""Free functions in a problem: which family each one is, and how rough it may be."""
+"""Free functions in a problem: their families, priors and slots."""
 
 import dataclasses
 import math
@@ -29,7 +29,7 @@ from ._roughness import Roughness
 
 # Sines of a function, and one more coefficient for its jump
 _SINES = {Where.FLIGHT: 20, Where.IMPACT: 10, Where.CONTACT: 24, Where.SENSOR: 20}
-# Functions of each kind that a problem has room for
+# Number of slots for functions of each kind in a problem
 _ROOM = ((Where.FLIGHT, "force_a"), (Where.FLIGHT, "force_b"))
 _ROOM_OF_SENSOR = ((Where.SENSOR, "sensor_a"),)
 _ROOM_OF_IMPACTS = ((Where.IMPACT, "restitution_a"), (Where.CONTACT, "surface_a"))
@@ -37,9 +37,9 @@ _ROOM_OF_IMPACTS = ((Where.IMPACT, "restitution_a"), (Where.CONTACT, "surface_a"
 
 @dataclasses.dataclass(frozen=True)
 class Free:
-    """A free function that is fitted: its family, its roughness, and its slot.
+    """A fitted free function: its family, its prior, and its slot.
 
-    With a `primitive` it has that form, and no roughness.
+    With a `primitive` it has that form, and no smoothness prior.
     """
 
     family: Family
@@ -57,44 +57,47 @@ class Free:
 
     @property
     def smooth(self) -> bool:
-        """Whether it has a prior by its roughness."""
+        """Return whether it has a smoothness prior."""
         return self.primitive is None
 
     def price(self, samples: int) -> float:
-        """What its numbers must gain, without what its roughness costs."""
+        """Return the gain required for its parameters, without the Occam factor of its
+        prior.
+        """
         count = 0 if self.primitive is None else self.primitive.count
         return count * math.log(samples)
 
     @property
     def coefficients(self) -> list[str]:
-        """Names of the parameters that are its own."""
+        """Return the names of its own parameters."""
         sines = _SINES[self.family.where] + 1
         count = self.primitive.count if self.primitive else sines
         return [f"{self.slot}_{k}" for k in range(count)]
 
     @property
     def spread(self) -> np.ndarray:
-        """Prior standard errors of the coefficients of a sum of sines, or a change of
-        those of a form that matters."""
+        """Return prior standard errors of the coefficients of a sum of sines, or
+        significant changes of the parameters of a form.
+        """
         if self.primitive is None:
             return spread_of(self.family, self.roughness)
         return np.array([self.roughness.size, *self.primitive.scales])
 
 
-# what may be put into a problem that has room for it
+# functions and elements for the slots of a problem
 Part: TypeAlias = Free | Hidden
 
 
 def roomy(
     problem: Problem, family: Family, impacting: bool, driven: Driven | None
 ) -> Problem:
-    """The problem with room for free functions and a hidden element, all without
-    effect, and with the faults that any sensor may have.
+    """Return the problem with slots for free functions and a hidden element, all
+    without effect, and with the possible errors of any sensor.
 
-    One program serves whatever is put into the slots.
+    One compiled program serves all contents of the slots.
 
-    **Arguments:** any family, which fills the slots to begin with; the position that
-    drives a hidden element, if it is measured.
+    **Arguments:** any family, which fills the slots initially; the position that drives
+    a hidden element, if it is measured.
     """
     room = (*_ROOM, *(_ROOM_OF_IMPACTS if impacting else ()), *_ROOM_OF_SENSOR)
     empty: list[Term] = [
@@ -110,13 +113,13 @@ def roomy(
 
 
 def _with_splines(model: Model) -> Model:
-    """The model with the splines of its functions, the rest of it as it is."""
+    """Return the model with the splines of its functions precomputed."""
     terms = tuple(term.prepared() for term in terms_of(model))
     return eqx.tree_at(terms_of, model, terms)
 
 
 def slots_of(problem: Problem, where: Where) -> list[str]:
-    """Labels of the slots for functions that act somewhere."""
+    """Return the labels of the slots for functions that act at a given place."""
     return [
         term.label
         for term in terms_of(problem.model)
@@ -127,19 +130,21 @@ def slots_of(problem: Problem, where: Where) -> list[str]:
 def free_term(
     family: Family, label: str, primitive: Primitive | None = None
 ) -> FreeFunction:
-    """A function of a family that is zero, with some form."""
+    """Return a zero function of a family, with a given form."""
     zero = [0.0] * (_SINES[family.where] + 1)
     return FREE[family.where].of(family, label, zero, primitive)
 
 
 def spread_of(family: Family, roughness: Roughness) -> np.ndarray:
-    """Prior standard errors of the coefficients of a function, its jump last."""
+    """Return the prior standard errors of the coefficients of a function, the jump
+    last.
+    """
     variances = family.variances(_SINES[family.where], roughness.length)
     return roughness.size * np.sqrt(np.append(variances, float(family.jumps)))
 
 
 def filled(problem: Problem, functions: Sequence[Part], prior: bool = True) -> Problem:
-    """The problem with some functions in their slots, `prior` by their roughness."""
+    """Return the problem with functions in their slots and the corresponding priors."""
     for one in functions:
         if isinstance(one, Hidden):
             problem = with_hidden(problem, one)
@@ -153,7 +158,7 @@ def filled(problem: Problem, functions: Sequence[Part], prior: bool = True) -> P
             new = eqx.tree_at(lambda t: t.coefficients, fresh, old.coefficients)
             return eqx.tree_at(lambda m: terms_of(m)[place], model, new)
 
-        # what has no effect needs some prior, so that it stays where it is
+        # an unused slot needs a prior, so that it does not move
         spread = np.where(one.spread > 0, one.spread, one.roughness.size)
         smooth = prior and one.primitive is None
         scales = dict(zip(one.coefficients, map(float, spread)))
@@ -178,7 +183,7 @@ def filled(problem: Problem, functions: Sequence[Part], prior: bool = True) -> P
 
 
 def emptied(problem: Problem, values, slot: str):
-    """Values of parameters with those in a slot at zero."""
+    """Return parameter values with those of a slot set to zero."""
     parameters = terms_of(problem.model)[_place(problem, slot)].parameters(0)
     rows = [problem.names.index(p.name) for p in parameters if p.known is None]
     return jnp.asarray(values).at[:, jnp.asarray(rows)].set(0.0)

@@ -1,4 +1,4 @@
-"""The question of any system, as its setup states it."""
+"""The problem of any system, as its setup states it."""
 
 import dataclasses
 from collections.abc import Mapping, Sequence
@@ -33,8 +33,8 @@ from ._question import (
 from ._visited_by import visited_by
 
 
-# Share of the usual change of the speed in a step within which dry friction changes
-# sign: its impulse is then integrated well enough
+# Slip speed as a share of the usual change of speed in a step; the impulse of dry
+# friction is then integrated accurately enough
 _RESOLVED = 0.3
 
 
@@ -45,7 +45,8 @@ def setup_question(
     report: Report,
     policy: Policy,
 ) -> Question:
-    """The question of a rig of any system, which states its sensors and tolerances.
+    """Return the problem of a rig with any system, which states its sensors and
+    tolerances.
 
     **Raises:** `RecordingError` for recordings that cannot be those of the rig.
     """
@@ -81,12 +82,13 @@ def system_question(
     stated: Mapping[str, float] | None = None,
     drive_channel: str | None = None,
 ) -> Question:
-    """The question of any system; terms act on its first coordinate and first gap.
+    """Return the problem of any system; terms act on its first coordinate and first
+    gap.
 
-    **Arguments:** as for `diagnose`; `stated` constants of the forms, by name; the
-    channel of a turning drive, to look for a ripple in it.
+    **Arguments:** as for `diagnose`; the `stated` constants of the forms, by name; the
+    channel of a turning drive, which is searched for ripple.
 
-    **Raises:** `ValueError` for recordings that are not cut, or without sensors.
+    **Raises:** `ValueError` for recordings that are not segmented, or without sensors.
     """
     if not sensors:
         raise ValueError(
@@ -96,8 +98,8 @@ def system_question(
     for part in recordings:
         if not isinstance(part, Segments):
             raise ValueError(
-                "Cut the recordings first: `jaxcam.recordings.segment(recording, "
-                "channel)` for each of them."
+                "Segment the recordings first: call "
+                "`jaxcam.recordings.segment(recording, channel)` for each of them."
             )
     runs = [part.recording for part in recordings]
     sensors, noisier = with_seen_noise(sensors, runs, policy)
@@ -143,7 +145,9 @@ def system_question(
 
 
 def _drives(recordings: Sequence[Segments], channel: str | None) -> dict[str, Any]:
-    """Return the questions about a drive, with the noise of its encoder."""
+    """Return the problem with the recordings of a drive and the noise of its
+    encoder.
+    """
     if channel is None:
         return {}
     runs = tuple(part.recording for part in recordings)
@@ -152,10 +156,10 @@ def _drives(recordings: Sequence[Segments], channel: str | None) -> dict[str, An
 
 
 def _resolved_slip(problem: Problem, channel: str) -> float:
-    """A speed within which the steps of a flight resolve a change of its sign.
+    """Return the smallest slip speed that the steps of a flight resolve.
 
-    Where a body stops, a force that changes sign over a slip speed is too small for a
-    while: a slip speed is to be as low as the steps allow.
+    When a body stops, a friction force that changes sign over a slip speed is
+    temporarily too small. The slip speed is therefore as low as the steps allow.
     """
     pieces = problem.pieces
     step = float(np.median(np.asarray(pieces.flown.step)[np.asarray(pieces.exists)]))
@@ -164,7 +168,7 @@ def _resolved_slip(problem: Problem, channel: str) -> float:
 
 
 def _with_terms(problem: Problem, terms: Sequence[Term]) -> Problem:
-    """The same problem with other constants in the forms of its terms."""
+    """Return the same problem with other constants in its terms."""
 
     def put(model: Model) -> Model:
         fresh = jax.tree.map(jnp.asarray, tuple(terms))

@@ -1,4 +1,4 @@
-"""Fits with subsets of terms, and what each of them says of the terms it lacks."""
+"""Fit subsets of terms, and predict the gain of further terms from each fit."""
 
 import dataclasses
 import math
@@ -22,7 +22,9 @@ from ._vibration_scan import Periodogram, periodogram
 
 @dataclasses.dataclass(frozen=True)
 class Trial:
-    """A subset of terms, fitted; `cut` where only the number of iterations ended it."""
+    """A fitted subset of terms; `cut` if only the number of iterations ended the
+    fit.
+    """
 
     names: frozenset[str]
     fit: Fit
@@ -32,11 +34,11 @@ class Trial:
 
 
 class Trials:
-    """All that was tried on one problem, and what follows from it.
+    """All fits of one problem, and the predictions from them.
 
-    **Arguments:** the problem, the names of the parameters of the rig (free in every
-    fit), the terms that may be named, `progress(sentence, fraction)`, and where fits
-    are kept for a run that is interrupted.
+    **Arguments:** the problem, the names of the rig parameters (free in every fit), the
+    candidate terms, `progress(sentence, fraction)`, and the store of fits for an
+    interrupted run.
     """
 
     def __init__(
@@ -60,18 +62,18 @@ class Trials:
 
     @property
     def least_cost(self) -> float:
-        """Of all fits so far; infinite without any."""
+        """Smallest cost of all fits so far; infinite if there is none."""
         return min((trial.fit.cost for trial in self.known.values()), default=math.inf)
 
     def hopeless(self, cost: float) -> bool:
-        """Whether a cost is so far above the least one that it is not refined."""
+        """Return whether a cost is too far above the smallest one to be refined."""
         return cost > self.policy.hopeless * self.least_cost
 
     def term(self, name: str) -> Term:
         return next(term for term in self.terms if term.name == name)
 
     def parameters(self, names: Iterable[str]) -> list[str]:
-        """Parameters of the rig and of some terms."""
+        """Return the parameters of the rig and of some terms."""
         found = list(self.rig)
         for term in self.terms:
             if term.name in names:
@@ -82,13 +84,15 @@ class Trials:
         return len(self.parameters(names)) - len(self.rig)
 
     def threshold(self, name: str) -> float:
-        """Gain that a term must have: the more demanding of BIC and error rate."""
+        """Return the required gain of a term: the larger of those by BIC and by error
+        rate.
+        """
         term = self.term(name)
         number, chance = self.count([name]), self.policy.false_alarms / len(self.terms)
         if term.starts():
             chance /= len(term.starts())
         elif any(one.inner for one in term.strengths()):
-            # as many chances as there are frequencies
+            # one test per distinguishable frequency
             chance /= self.scan(frozenset()).cells
         level = float(chi2.isf(chance, number))
         return max(number * math.log(self.problem.samples), level)
@@ -96,9 +100,9 @@ class Trials:
     def attempt(
         self, names: frozenset[str], start: Trial | None, iterations: int | None = None
     ) -> Trial | None:
-        """Fit a subset from where another one ended; the best fit of it so far.
+        """Fit a subset, starting from another fit; return its best fit so far.
 
-        **Arguments:** iterations at most; by default those of a first look.
+        **Arguments:** the maximum number of iterations; by default that of a first fit.
         """
         iterations = iterations or self.policy.quick_iterations
         found = self._left(names) or self._fitted(names, start, iterations)
@@ -114,7 +118,7 @@ class Trials:
             if self._kept is not None:
                 ended = Ended(found.point, found.optimal, found.iterations)
                 self._kept.put(names, ended)
-            # what was said about the fit before holds no more
+            # predictions from the earlier fit are no longer valid
             for derived in (self._scans, self._responses, self._linear):
                 derived.pop(names, None)
             for key in [key for key in self._placed if key[0] == names]:
@@ -122,7 +126,7 @@ class Trials:
         return self.known[names]
 
     def _left(self, names: frozenset[str]) -> Fit | None:
-        """The fit of a subset that an interrupted run left, as it was."""
+        """Return the fit of a subset stored by an interrupted run."""
         if self._kept is None or names in self.known:
             return None
         ended = self._kept.get(names)
@@ -137,10 +141,10 @@ class Trials:
     def _fitted(
         self, names: frozenset[str], start: Trial | None, iterations: int
     ) -> Fit:
-        """A fit from one place, and from another one where that led nowhere.
+        """Fit from one starting point, and from another one if that fails.
 
-        A fit without the right term may end far from the rig, in a valley that leads
-        nowhere. Then the nominal parameters are a better place to start from.
+        A fit without the right term may end far from the rig in a long valley of the
+        cost. The nominal parameters are then a better starting point.
         """
         free = self.parameters(names)
         if start is None:
@@ -152,9 +156,9 @@ class Trials:
         astray = not self._sound(start.fit)
         first, second = (nominal, ended) if astray else (ended, nominal)
         grown = names > start.names
-        # single terms decide which pairs are tried, so they have their time
+        # single terms decide which pairs are tried, so they get more iterations
         beaten = start.fit.cost if grown and len(names) > 1 else math.inf
-        # what is lost without a term must be known where it decides whether to keep it
+        # the loss without a term must be accurate if it decides whether to keep it
         decides = -math.inf
         if names < start.names:
             threshold = sum(self.threshold(name) for name in start.names - names)
@@ -163,7 +167,7 @@ class Trials:
         if self._sound(found) or self.hopeless(found.cost):
             return found
         if astray and grown and found.cost < start.fit.cost:
-            # the nominal rig led further than the smaller subset went
+            # restarting from nominal won
             return found
         again = self._fit(free, second, iterations, found.cost, decides)
         return min(found, again, key=_cost)
@@ -182,21 +186,21 @@ class Trials:
         )
 
     def finished(self, trial: Trial) -> Trial:
-        """A subset that may win is fitted to the end."""
+        """Complete the fit of a leading subset."""
         if not trial.cut:
             return trial
         return self.attempt(trial.names, trial, self.policy.iterations) or trial
 
     def settled(self, trial: Trial) -> bool:
-        """Whether the quadratic model about a fit holds.
+        """Return whether the quadratic model about a fit is valid.
 
-        It does at an optimum, and elsewhere near the data.
+        It is valid at an optimum, and elsewhere near the data.
         """
         close = trial.fit.cost < self.policy.near * self.problem.samples
         return trial.fit.optimal or close
 
     def without(self, best: Trial, name: str) -> Trial:
-        """The fit of a subset with one term less."""
+        """Return the fit of a subset with one term less."""
         rest = best.names - {name}
         known = self.known.get(rest) or self.attempt(rest, best, self.policy.iterations)
         assert known is not None
@@ -208,9 +212,10 @@ class Trials:
         return self._linear[trial.names]
 
     def foretells(self, less: Trial, more: Trial) -> bool:
-        """Whether the terms that a fit has more than another hold across the records.
+        """Return whether the additional terms of a fit are consistent across
+        recordings.
 
-        Either half of them is asked what the strengths found in the other half gain.
+        The strengths estimated from either half are tested on the other half.
         """
         blocks = self.blocks(less)
         added = [
@@ -223,7 +228,7 @@ class Trials:
         return predicted_gain(blocks, free, blocks.rows(added), self.policy) > 0
 
     def response(self, names: frozenset[str]) -> Response:
-        """Return the gain of a force at any time, in addition to a fit."""
+        """Return the response to a force at any time, about a fit."""
         if names not in self._responses:
             point = self.known[names].fit.point
             free = self.parameters(names)
@@ -231,38 +236,38 @@ class Trials:
         return self._responses[names]
 
     def scan(self, names: frozenset[str]) -> Periodogram:
-        """Periodogram of what a fit leaves over."""
+        """Return the periodogram of the residual of a fit."""
         if names not in self._scans:
-            self.progress("looking for vibrations", None)
+            self.progress("searching for vibrations", None)
             self._scans[names] = periodogram(
                 self.problem, self.response(names), self.policy
             )
         return self._scans[names]
 
     def placed(self, names: frozenset[str], term: Term) -> Placing:
-        """Where a term with starts of its own would gain most beside a fit."""
+        """Return the start at which a term would gain most in addition to a fit."""
         key = names, term.name
         if key not in self._placed:
-            self.progress(f"looking where {term.sentence} would be", None)
+            self.progress(f"searching for the position of {term.sentence}", None)
             self._placed[key] = placing(
                 self.problem, self.response(names), term, self.policy
             )
         return self._placed[key]
 
     def _inner(self, term: Term, name: str, start: Trial) -> float:
-        """Value from which an inner number of a new term starts."""
+        """Return the initial value of an inner parameter of a new term."""
         if term.starts():
             return self.placed(start.names, term).inner[name]
         return self._frequency(start)
 
     def _frequency(self, start: Trial) -> float:
-        """The best known frequency to start from."""
+        """Return the best known initial frequency."""
         known = self._scans.get(start.names) or next(iter(self._scans.values()), None)
         scan = known or self.scan(start.names)
         return scan.best[0]
 
     def _sound(self, found: Fit) -> bool:
-        """Whether a fit ended, and within a few tolerances of what the rig is."""
+        """Return whether a fit converged within a few tolerances of the nominal rig."""
         if not found.optimal:
             return False
         start = np.asarray(self.problem.start.values)[0]
@@ -274,7 +279,9 @@ class Trials:
         return True
 
     def _seeded(self, names: frozenset[str], start: Trial, place: Point) -> Point:
-        """A place to start from; terms that another fit lacks are without effect."""
+        """Return a starting point; terms that the other fit lacks have zero
+        strength.
+        """
         values = np.array(place.values)
         everything = self.problem.names
         for term in self.terms:
@@ -290,7 +297,9 @@ class Trials:
 
 
 def _order(trial: Trial) -> tuple[float, bool]:
-    """The better of two fits of a subset is smaller; of equals, one at an optimum."""
+    """Sort key of fits: the smaller cost is better; among equals, an optimum is
+    better.
+    """
     return trial.bic, not trial.fit.optimal
 
 

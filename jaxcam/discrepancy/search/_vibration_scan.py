@@ -1,9 +1,9 @@
-"""At which frequency the flights are shaken: what a force at each would gain.
+"""Scan frequencies for a vibration: predict the gain of a force at each.
 
-A vibration too weak to be seen in the samples of a flight still decides how fast it
-ends, and so the impact and the next flight. So the scan uses the whole likelihood,
-impacts included, with the states and the free parameters eliminated: exactly the gain
-that a fit with that frequency promises.
+A vibration too weak to be visible in the samples of a flight still affects the approach
+speed, and so the impact and the next flight. The scan therefore uses the complete
+likelihood, including impacts, with the states and the free parameters eliminated. This
+is the predicted gain of a fit with that frequency.
 """
 
 import dataclasses
@@ -19,21 +19,20 @@ from ..policy import Policy
 from ._local_force import Response, stride_of
 
 
-# Parts of a diagonal that keep a matrix definite against rounding
+# Relative increase of a diagonal that keeps a matrix positive definite
 _STATES, _SHAKEN = 1e-13, 1e-9
-# Divisors that may be zero are at least this
+# Lower limit of divisors that may be zero
 _TINY = 1e-300
 
 
 @dataclasses.dataclass(frozen=True)
 class Periodogram:
-    """Growth of twice the log-likelihood at each `frequency` (Hz), shape `(k,)`.
+    """Gain in twice the log-likelihood at each `frequency` (Hz), shape `(k,)`.
 
-    `gain` with one phase for all records, `separate` with a phase for each record.
-    `records` is their number, `cells` that of frequencies that can be distinguished (of
-    which each has a few neighbours on the grid);
-    `elsewhere` is what the highest separate peak gains without the record that it gains
-    most in.
+    `gain` is for one phase in all recordings, `separate` for a separate phase in each
+    recording. `records` is their number, `cells` the number of distinguishable
+    frequencies (each has several grid points); `elsewhere` is the gain of the highest
+    separate peak without the recording in which it gains most.
     """
 
     frequency: Float[np.ndarray, " k"]
@@ -92,7 +91,9 @@ def periodogram(problem: Problem, response: Response, policy: Policy) -> Periodo
 
 
 def scanned_frequencies(problem: Problem, policy: Policy) -> Float[np.ndarray, " k"]:
-    """From a few periods in the longest record to a few steps of a flight a period."""
+    """Return frequencies from a few periods in the longest recording to a few steps per
+    period.
+    """
     length = max(part.recording.duration for part in problem.segments)
     interval = max(part.recording.interval for part in problem.segments)
     exists = np.asarray(problem.pieces.exists)
@@ -104,10 +105,10 @@ def scanned_frequencies(problem: Problem, policy: Policy) -> Float[np.ndarray, "
 
 
 class _Sums:
-    """Of one record, what its pieces add up to for a force `exp(i w t)` at each rate.
+    """Sums over the pieces of one recording for a force `exp(i w t)` at each frequency.
 
-    `pp`, `p` of the parameters; `pf` couples them to the force; `f` is its score,
-    `ff` the sum of squares of its rows and `fc` that of their absolute squares.
+    `pp`, `p` belong to the parameters; `pf` couples them to the force; `f` is its
+    score, `ff` the sum of squares of its rows and `fc` that of their absolute squares.
     """
 
     def __init__(self, pp, p, rates: int):
@@ -117,7 +118,9 @@ class _Sums:
         self.fc = np.zeros(rates)
 
     def add_piece(self, inner, slope, waves, shaken):
-        """Information `inner` and score of parameters, then nodes of one piece."""
+        """Information `inner` and score of the parameters, then of the nodes of one
+        piece.
+        """
         m = len(self.p)
         self.pp += inner[:m, :m]
         self.p += slope[:m]
@@ -127,7 +130,7 @@ class _Sums:
         self.fc += np.sum(np.real(np.conj(waves) * shaken[m:]), axis=0)
 
     def add_rows(self, direct, pushed, off, sign=1.0):
-        """Rows for the parameters and the force, and what they are to explain."""
+        """Return the rows for the parameters and the force, and the residuals."""
         self.pp += sign * direct.T @ direct
         self.p += sign * direct.T @ off
         self.pf += sign * direct.T @ pushed
@@ -137,7 +140,7 @@ class _Sums:
 
 
 def _summed(response: Response, r: int, rate) -> _Sums:
-    """The states of one record eliminated, from its first piece to its last."""
+    """Eliminate the states of one recording, from the first piece to the last."""
     found: Any = jax.tree.map(lambda part: part[r], response.pieces)
     n, m = found.later.shape[-1], response.place.shape[1]
     p, l = slice(n, n + m), slice(n + m, None)
@@ -148,7 +151,8 @@ def _summed(response: Response, r: int, rate) -> _Sums:
         waves = _waves(response.time[r, k], rate)
         shaken = inner[:, l] @ waves
         sums.add_piece(inner[n:, n:], slope[n:], waves, shaken[n:])
-        # information of the state: with itself, parameters, what is off, and the force
+        # information of the state: with itself, the parameters, the residuals and the
+        # force
         here = [inner[:n, :n], inner[:n, p], slope[:n], shaken[:n]]
         if before:
             later, earlier, off = found.later[k], found.earlier[k], -found.tied[k]
@@ -171,7 +175,9 @@ def _summed(response: Response, r: int, rate) -> _Sums:
 
 
 def _halved(blocks, coupling):
-    """Blocks of one piece, and its coupling to the next, over the root of the first."""
+    """Return the blocks of one piece and its coupling to the next, divided by the
+    square root of the first.
+    """
     scale = 1 / np.sqrt(np.maximum(np.diag(blocks[0]), _TINY))
     scaled = blocks[0] * np.outer(scale, scale)
     root = np.linalg.inv(np.linalg.cholesky(scaled + _STATES * np.eye(len(scale))))
@@ -180,7 +186,7 @@ def _halved(blocks, coupling):
 
 
 def _waves(time, rate) -> Complex[np.ndarray, "l w"]:
-    """`exp(i w t)` at evenly spaced times."""
+    """Return `exp(i w t)` at equidistant times."""
     found = np.empty((len(time), len(rate)), dtype=complex)
     found[0] = np.exp(1j * rate * time[0])
     turn = np.exp(1j * rate * (time[1] - time[0]))
@@ -190,7 +196,9 @@ def _waves(time, rate) -> Complex[np.ndarray, "l w"]:
 
 
 def _gain(inside, score, parts) -> Float[np.ndarray, " w"]:
-    """Gain of a cosine and a sine for each part, the parameters eliminated."""
+    """Return the gain of a cosine and a sine for each part, with the parameters
+    eliminated.
+    """
     across, scores, own = [], [], []
     for pf, f, ff, fc in parts:
         across += [pf.real, pf.imag]

@@ -1,4 +1,4 @@
-"""What recordings visit, as one channel shows it."""
+"""Range of the motion in recordings, measured by one channel."""
 
 import math
 from collections.abc import Sequence
@@ -14,9 +14,10 @@ from ..terms import Visited
 def visited_by(
     runs: Sequence[Recording], channel: str, sensor: Sensor, slip: float
 ) -> Visited:
-    """Positions, speeds and accelerations of a coordinate that a channel shows.
+    """Return positions, speeds and accelerations of a coordinate that a channel
+    measures.
 
-    **Arguments:** `slip`, the speed within which dry friction changes sign.
+    **Arguments:** `slip`: the speed over which dry friction changes sign.
     """
     samples = np.concatenate([run[channel] for run in runs])
     offset, gain = float(sensor.offset), float(sensor.gain)
@@ -25,6 +26,7 @@ def visited_by(
     fast = fast_speed(runs, channel) / abs(gain)
     push = usual_acceleration(runs, channel) / abs(gain)
     if not (math.isfinite(push) and push > 0):
-        # records too short to show one: as if the range were crossed at that speed
+        # recordings too short for an acceleration: assume the range is crossed at that
+        # speed
         push = fast**2 / max(high - low, 1e-300)
     return Visited(low, high, fast, push, slip)

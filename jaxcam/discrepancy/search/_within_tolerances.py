@@ -13,15 +13,16 @@ from ._given_up import given_up
 def within_tolerances(
     before: Fit, best: Fit, rig: Sequence[str], policy: Policy
 ) -> Fit:
-    """The fit without terms, its parameters of the rig held within their tolerances.
+    """Return the fit without terms, with the rig parameters held within their
+    tolerances.
 
-    Where physics is missing the data outweigh what is known of the rig, and a fit ends
-    at lengths that no maker would deliver. A report compares with the rig as it may be.
+    If physics is missing, the data outweigh the known rig parameters, and a fit ends at
+    unrealistic values. A report therefore compares with a rig within its tolerances.
 
-    **Arguments:** fits without and with the terms, and the names of the parameters of
-    the rig, and the policy. The value of the better fit is allowed in any case.
+    **Arguments:** fits without and with the terms, the names of the rig parameters, and
+    the policy. The values of the better fit are allowed in any case.
 
-    **Returns:** `before` itself where it is within the tolerances.
+    **Returns:** `before` itself if it is within the tolerances.
     """
     problem = before.problem
     bounded = {name: _bounded(problem, best, name) for name in rig}
@@ -44,7 +45,7 @@ def within_tolerances(
 
 
 def _bounded(problem, best: Fit, name: str) -> Parameter:
-    """The parameter with its tolerance as bounds."""
+    """Return the parameter with its tolerance as bounds."""
     parameter = problem.parameter(name)
     place = problem.names.index(name)
     nominal = parameter.nominal

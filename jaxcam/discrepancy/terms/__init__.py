@@ -1,7 +1,7 @@
 """Physics that a model may lack, and systems that have it.
 
-A `Term` has a strength; a `Shape` is a free function that says where something is
-missing and its shape.
+A `Term` has a strength; a `Shape` is a free function that shows where something is
+missing and how it varies.
 """
 
 from ._coordinates import coordinates as coordinates

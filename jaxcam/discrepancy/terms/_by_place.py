@@ -1,4 +1,4 @@
-"""Friction that has a scale of speed or position of its own."""
+"""Friction with its own scale of speed or position."""
 
 from typing import ClassVar
 
@@ -9,14 +9,14 @@ from ._scaled import ScaledTerm
 from ._term import Motion, strength
 
 
-# Speeds of Stribeck's curve that are tried, as shares of the fast ones
+# Stribeck speeds that are tried, as shares of the highest speed
 _SHARES = tuple(np.geomspace(0.02, 0.6, 9).tolist())
 
 
 class StribeckCurve(ScaledTerm):
     """Dry friction that is larger near standstill, `-se exp(-(v / vs)^2) sign(v)`.
 
-    The speed `vs` is fitted with the strength.
+    The speed `vs` is fitted together with the strength.
     """
 
     name: ClassVar[str] = "stribeck_curve"
@@ -45,13 +45,13 @@ class StribeckCurve(ScaledTerm):
 
 
 class UnevenFriction(ScaledTerm):
-    """Dry friction that differs along the way, `-(u1 p + u2 p^2) sign(v)`.
+    """Dry friction that varies with position, `-(u1 p + u2 p^2) sign(v)`.
 
-    The place `p` is from -1 to 1 over the positions that were visited.
+    The variable `p` runs from -1 to 1 over the positions visited.
     """
 
     name: ClassVar[str] = "uneven_friction"
-    sentence: ClassVar[str] = "dry friction that differs along the way"
+    sentence: ClassVar[str] = "dry friction that varies with position"
     region: ClassVar[str] = "in flight, by position"
     source: ClassVar[str] = "Armstrong-Helouvry 1991, chapter 4"
     corner: ClassVar[bool] = True

@@ -1,4 +1,4 @@
-"""Tell which components of a state are coordinates, and which are velocities."""
+"""Determine which components of a state are coordinates and which are velocities."""
 
 import jax
 import jax.numpy as jnp
@@ -8,22 +8,23 @@ from jaxtyping import Float
 from ...hybrid import HybridSystem
 
 
-# Points at which the field is evaluated, drawn about a state of the recordings
+# Number of points at which the field is evaluated, drawn at random near a recorded
+# state
 _LOOKS = 3
 
 
 def coordinates(
     system: HybridSystem, state: Float[np.ndarray, " n"]
 ) -> tuple[tuple[int, int], ...]:
-    """For each coordinate of a system, its component of the state and its velocity's.
+    """Return, for each coordinate of a system, its component of the state and that of
+    its velocity.
 
-    A component is a coordinate where its rate of change is another component, apart
-    from a function of time (as where velocities are those in space and positions are
-    not).
+    A component is a coordinate if its rate of change is another component, apart from a
+    function of time (as for relative positions with absolute velocities).
 
     **Arguments:** a state near which the field is defined, shape `(n,)`.
 
-    **Raises:** `ValueError` where there is no coordinate.
+    **Raises:** `ValueError` if there is no coordinate.
     """
     state = np.asarray(state, dtype=float)
     size = np.maximum(np.abs(state), 1e-3)
@@ -44,6 +45,7 @@ def coordinates(
     if not found:
         raise ValueError(
             f"{type(system).__name__} has no coordinate: no component of its state is "
-            f"the rate of change of another one. State positions and velocities."
+            "the rate of change of another one. The state must contain positions and "
+            "velocities."
         )
     return tuple(found)

@@ -1,4 +1,4 @@
-"""Families of free functions: what they depend on, and where they act."""
+"""Families of free functions, by their arguments and by the place where they act."""
 
 import dataclasses
 import enum
@@ -20,8 +20,8 @@ from ._shapes import Variable
 from ._where import Where
 
 
-# The domain of the sines is longer than that of the data by this share on either side,
-# as they all vanish at its ends
+# The domain of the sines exceeds that of the data by this share on either side, because
+# all sines vanish at its ends
 _MARGIN = 0.15
 
 
@@ -36,14 +36,14 @@ class Factor(enum.StrEnum):
 
 @dataclasses.dataclass(frozen=True)
 class Family:
-    """All functions of one argument, times a factor, that act in one place.
+    """All functions of one argument, times a factor, that act in the same place.
 
     - `where`: flight (a force), impact (a factor on the restitution), contact (a
-        surface) or sensor (what it shows besides). `argument` between `low` and `high`;
-        `factor` of a force.
-    - `middle`: of the positions, which a deflection is measured from. `slip`: speed
-        below which a direction is smoothed.
-    - `motion_unit`: of the coordinate.
+        surface) or sensor (an addition to its reading). `argument` between `low` and
+        `high`; `factor` of a force.
+    - `middle`: position from which a deflection is measured. `slip`: speed below which
+        the sign of the velocity is smoothed.
+    - `motion_unit`: unit of the coordinate.
     """
 
     where: Where
@@ -69,7 +69,7 @@ class Family:
 
     @property
     def arguments(self) -> tuple[str, ...]:
-        """Names of what the function depends on, the factor included."""
+        """Names of all arguments, including the factor."""
         names = [str(self.argument)]
         if self.factor in (Factor.VELOCITY, Factor.DIRECTION):
             names.append("velocity")
@@ -88,18 +88,18 @@ class Family:
 
     @property
     def primitives(self) -> tuple[Primitive, ...]:
-        """Forms that a function of this family may turn out to have."""
+        """Parametric forms that may replace a function of this family."""
         if self.periodic:
             return OF_PHASE
         if self.where is Where.SENSOR and self.argument is not Variable.TIME:
-            # a gain or a lag is no form without a name
+            # a gain or a lag has a name
             return tuple(one for one in ON_A_LINE if one is not STRAIGHT)
         if self.argument in (Variable.TIME, Variable.APPROACH):
             return (*ON_A_LINE, *FROM_ZERO)
         return (*ON_A_LINE, *OF_SPEED) if self.jumps else ON_A_LINE
 
     def waves(self, count: int) -> tuple[Array, Array]:
-        """Rates and shifts of `count` sines of the argument, each `(count,)`."""
+        """Return rates and shifts of `count` sines of the argument, each `(count,)`."""
         if self.periodic:
             half = count // 2
             orders = np.arange(1.0, half + 1)
@@ -112,13 +112,13 @@ class Family:
         return jnp.asarray(rates), jnp.asarray(shifts)
 
     def variances(self, count: int, length: float) -> Float[np.ndarray, " count"]:
-        """Variances of the coefficients of a function of variance one.
+        """Return the variances of the coefficients of a function of variance one.
 
-        `length`: of its correlation, a share of the range (of a radian, for a phase).
+        `length`: correlation length, as a share of the range (in radians for a phase).
         """
         rates = np.asarray(self.waves(count)[0])
         unit = 1.0 if self.periodic else self.high - self.low
-        # spectral density of a Matern kernel of order 3/2, for one dimension
+        # spectral density of a Matern kernel of order 3/2 in one dimension
         density = (1 + (rates * unit * length) ** 2 / 3) ** -2.0
         mean = 1.0 if self.periodic else 0.5
         return density / (mean * np.sum(density))
@@ -145,11 +145,11 @@ def families(
     slip: float,
     motion_unit: str,
 ) -> tuple[Family, ...]:
-    """All families over the ranges that some recordings visit.
+    """Return all families over the ranges that the recordings visit.
 
-    **Arguments:** least and largest position, velocity and approach speed, the length
-    of the records (s), whether there is a drive with a phase and whether there are
-    impacts, the slip speed, and the unit of the motion.
+    **Arguments:** smallest and largest position, velocity and approach speed, the
+    duration of the recordings (s), whether there is a drive with a phase and whether
+    there are impacts, the slip speed, and the unit of the motion.
     """
     ranges = {
         Variable.POSITION: positions,
@@ -190,7 +190,7 @@ def families(
 
 
 _TIMELESS = (Variable.POSITION, Variable.VELOCITY)
-# a function of the argument alone can do as much
+# a function of the argument alone is equivalent
 _DOUBLED = {
     (Variable.POSITION, Factor.DEFLECTION),
     (Variable.VELOCITY, Factor.VELOCITY),

@@ -1,9 +1,9 @@
-"""Free functions of one argument, times a factor, that are fitted with their roughness.
+"""Free functions of one argument, times a factor, fitted with a Gaussian process prior.
 
 A function is a sum of sines whose coefficients have the variances of a Gaussian process
 with a Matern kernel (Solin and Sarkka, Statistics and Computing 2020, eq. 55-59), or of
-harmonics of the drive's phase with the same spectrum. So it is linear in what is
-fitted, and its smoothness is one number.
+harmonics of the drive's phase with the same spectrum. It is therefore linear in the
+fitted coefficients, and its smoothness is one number.
 """
 
 from typing import Any, ClassVar
@@ -21,11 +21,11 @@ from ._term import Motion, Term, terms_of
 from ._where import Where
 
 
-# Knots of the spline that stands for a function: two to the edge of a form, which is
-# smooth over a hundredth of the range
+# Knots of the spline that represents a function: two per edge of a form, which is
+# smoothed over a hundredth of the range
 _KNOTS = 256
 _ARGUMENTS = (Variable.POSITION, Variable.VELOCITY, Variable.PHASE, Variable.TIME)
-"""Arguments in the order of the weights that pick one of them."""
+"""Arguments, in the order of the weights that select one of them."""
 _FACTORS = (Factor.ONE, Factor.VELOCITY, Factor.DIRECTION, Factor.DEFLECTION)
 
 
@@ -38,18 +38,18 @@ def _numbers(values) -> tuple[Array, ...]:
 
 
 class FreeFunction(Term):
-    """A function of some family; which one, its arrays say.
+    """A function of any family, selected by the values of its arrays.
 
-    It is a sum of sines, or the `form` of that number (less one) in `PRIMITIVES`, whose
-    numbers are then the first of its coefficients. All functions of one class are one
+    It is a sum of sines, or the form number `form - 1` in `PRIMITIVES`, whose
+    parameters are then the first coefficients. All functions of one class share one
     compiled program.
 
-    **Arguments:** `label` of the parameters; `coefficients` of the sines and of a
-    jump; `rates`, `shifts` of the sines; `low`, `high` of the argument; `picks` and
-    `factors`, weights of what may be the argument and the factor; `middle`, `slip`.
+    **Arguments:** `label` of the parameters; `coefficients` of the sines and of a jump;
+    `rates`, `shifts` of the sines; `low`, `high` of the argument; `picks` and
+    `factors`, weights that select the argument and the factor; `middle`, `slip`.
     """
 
-    sentence: ClassVar[str] = "a function without a name"
+    sentence: ClassVar[str] = "an unnamed function"
     listed: ClassVar[bool] = False
     label: str = eqx.field(static=True)
     coefficients: tuple[Array, ...] = eqx.field(converter=_numbers)
@@ -69,11 +69,12 @@ class FreeFunction(Term):
     jump: Float[Array, ""] | None = None
 
     def prepared(self):
-        """The function as a cubic spline: no step has to work it out.
+        """Return the function with a precomputed cubic spline, which is cheap to
+        evaluate.
 
-        A sine on equal knots is interpolated by B-splines whose coefficients are its
-        values there over `(2 + cos(rate * spacing)) / 3`. The values of a form are
-        taken as they are, which smooths its edges over a knot.
+        A sine is interpolated at equidistant knots by B-splines whose coefficients are
+        its values there divided by `(2 + cos(rate * spacing)) / 3`. The values of a
+        form are the coefficients themselves, which smooths its edges over one knot.
         """
         spacing = (self.high - self.low) / (_KNOTS - 3)
         knots = self.low + spacing * (jnp.arange(_KNOTS, dtype=float) - 1.0)
@@ -106,16 +107,16 @@ class FreeFunction(Term):
         coefficients,
         primitive: Primitive | None = None,
     ):
-        """A member of a family by the coefficients of its sines, then of its jump.
+        """Return a member of a family, from the coefficients of its sines and its jump.
 
-        With a `primitive`, the first of them are its numbers.
+        With a `primitive`, the first of them are its parameters.
         """
         rates, shifts = family.waves(len(coefficients) - 1)
 
         def chosen(options, one):
             return jnp.array([float(option is one) for option in options])
 
-        # a restitution sees the approach speed where a force sees the velocity
+        # the argument is the approach speed for a restitution, the velocity for a force
         argument = family.argument
         if argument is Variable.APPROACH:
             argument = Variable.VELOCITY
@@ -139,14 +140,14 @@ class FreeFunction(Term):
         )
 
     def place(self, argument) -> Place:
-        """Return an argument in the scalings that a form uses."""
+        """Return an argument in the scales that a form uses."""
         width = self.high - self.low
         return Place(argument, (argument - self.low) / width, argument / width)
 
     def at(self, argument, direction: Any = 0.0):
-        """The function without its factor, that of the ends beyond them.
+        """Return the function without its factor; beyond the ends it is constant.
 
-        **Arguments:** its argument, and the direction of the motion.
+        **Arguments:** the argument, and the direction of motion.
         """
         if self.table is None:
             return self.prepared().at(argument, direction)
@@ -154,7 +155,7 @@ class FreeFunction(Term):
         return self._spline(argument) * turned + self.jump * direction
 
     def _spline(self, argument):
-        """The spline at an argument."""
+        """Evaluate the spline."""
         assert self.table is not None
         width = self.high - self.low
         along = argument - self.low

@@ -1,7 +1,7 @@
-"""Elements with a state of their own that a coordinate drives: what pushes back later.
+"""Elements with an internal state, driven by a coordinate.
 
-The position of a coordinate is continuous through impacts, and so is the state of an
-element that it drives.
+The position of a coordinate is continuous at impacts, and so is the state of an element
+that it drives.
 """
 
 import abc
@@ -23,11 +23,12 @@ def _field(default: float = 0.0):
 
 
 class HiddenElement(eqx.Module):
-    """A hidden state and the force that it gives, per unit of mass.
+    """A hidden state and the force that it exerts, per unit of mass.
 
-    Besides, the force has parts by the deflection of the coordinate from `middle` and
-    by its velocity, and a constant: `stiffness`, `damping`, `constant`. A transfer
-    function has them where a resonance does not explain all of it.
+    In addition the force has a constant part, a part proportional to the deflection of
+    the coordinate from `middle`, and a part proportional to its velocity: `constant`,
+    `stiffness`, `damping`. A transfer function needs them if a resonance alone does not
+    represent it.
     """
 
     names: ClassVar[tuple[str, ...]]
@@ -48,10 +49,10 @@ class HiddenElement(eqx.Module):
 
     @abc.abstractmethod
     def scales(self) -> tuple[FloatScalar, ...]:
-        """Return the numbers that must be positive."""
+        """Return the parameters that must be positive."""
 
     def check(self) -> None:
-        """Check the numbers of the element.
+        """Check the parameters of the element.
 
         Raises:
             ValueError: A frequency, time, limit or power is not positive.
@@ -68,7 +69,7 @@ class HiddenElement(eqx.Module):
 
     @abc.abstractmethod
     def push(self, hidden: Float[Array, " h"]) -> Array:
-        """Return the acceleration by the hidden state alone."""
+        """Return the acceleration due to the hidden state alone."""
 
     def force(self, position, velocity, hidden: Float[Array, " h"]) -> Array:
         """Return the acceleration of the coordinate."""
@@ -119,7 +120,9 @@ class Resonator(HiddenElement):
         return self.by_state * hidden[0] + self.by_rate * hidden[1]
 
     def transfer(self, frequency):
-        """Return force over deflection at some frequencies (Hz), complex."""
+        """Return the ratio of force and deflection at some frequencies (Hz),
+        complex.
+        """
         s = 2j * jnp.pi * frequency
         w = 2 * jnp.pi * self.frequency
         below = s**2 + 2 * self.ratio * w * s + w**2
@@ -128,7 +131,7 @@ class Resonator(HiddenElement):
 
 
 class Relaxation(HiddenElement):
-    """A spring and a dashpot in a row (Maxwell): `z' = v - z / time`, force `k z`."""
+    """A spring and a dashpot in series (Maxwell): `z' = v - z / time`, force `k z`."""
 
     names: ClassVar[tuple[str, ...]] = ("hidden",)
     """Names of the components of the hidden state."""
@@ -172,7 +175,7 @@ class Hysteresis(HiddenElement):
     limit: FloatScalar = _field(1.0)
     """Largest hidden state, in the unit of the coordinate."""
     sharing: FloatScalar = _field(0.5)
-    """Share d of the loading term; the rest is that of unloading."""
+    """Share d of the loading term; the rest is the share of the unloading term."""
     power: FloatScalar = _field(1.0)
     """Sharpness n of the transition."""
     by_state: FloatScalar = _field()
@@ -197,7 +200,7 @@ class Hysteresis(HiddenElement):
         return velocity * self.slope(velocity, hidden)
 
     def slope(self, direction, hidden):
-        """Return `dz / dq` for a motion in some direction."""
+        """Return `dz / dq` for motion in a given direction."""
         size = jnp.maximum(jnp.abs(hidden) / self.limit, 1e-12)
         turned = jnp.sign(direction * hidden)
         return 1 - (self.sharing * turned + 1 - self.sharing) * size**self.power

@@ -1,8 +1,8 @@
-"""A force with a state of its own, as signals of time in each record.
+"""A force with an internal state, as signals of time in each recording.
 
 The measured position drives a hidden element through a known filter, so that its force
-is a sum of known signals. What is fitted are their strengths; the numbers of the filter
-are fitted through the derivatives of the force to them.
+is a sum of known signals. The fit determines their strengths; the parameters of the
+filter are fitted through the derivatives of the force with respect to them.
 """
 
 from typing import ClassVar
@@ -16,12 +16,12 @@ from ...fitting import Parameter
 from ._term import Motion, Term, terms_of
 
 
-# signals that all records share strengths of: outputs of the element, then the
-# derivatives of its force to its numbers
+# signals with the same strengths in all recordings: outputs of the element, then the
+# derivatives of its force with respect to its parameters
 SHARED = 5
-# signals of the free motion of the element, with strengths of their own in each record
+# signals of the free motion of the element, with separate strengths in each recording
 STARTS = 2
-# parts of the force by the motion itself: constant, by deflection, by velocity
+# direct parts of the force: constant, by deflection, by velocity
 DIRECT = 3
 
 
@@ -30,7 +30,7 @@ def _numbers(values) -> tuple[Array, ...]:
 
 
 class ByMotion(Term):
-    """A constant, a stiffness about some place and a damping."""
+    """A constant force, a stiffness about some position and a damping."""
 
     name: ClassVar[str] = "by_motion"
     sentence: ClassVar[str] = "a force that is linear in the motion"
@@ -58,15 +58,15 @@ class ByMotion(Term):
 
 
 class HiddenForce(Term):
-    """A force that is a sum of signals, which differ from record to record.
+    """A force that is a sum of signals, which differ from recording to recording.
 
     **Arguments:** strengths `shared`, `starts` and `direct`; the number of the
-    `record`; `table` of the signals `(r, n, SHARED + STARTS)` at the times
-    `begin + k interval` of each record; the `middle` of the positions.
+    `record`; a `table` of the signals `(r, n, SHARED + STARTS)` at the times `begin + k
+    interval` of each recording; the `middle` of the positions.
     """
 
     name: ClassVar[str] = "hidden_force"
-    sentence: ClassVar[str] = "a force with a state of its own"
+    sentence: ClassVar[str] = "a force with an internal state"
     listed: ClassVar[bool] = False
     label: ClassVar[str] = "hidden"
     shared: tuple[Array, ...] = eqx.field(converter=_numbers)
@@ -80,7 +80,9 @@ class HiddenForce(Term):
 
     @classmethod
     def empty(cls, records: int, samples: int) -> "HiddenForce":
-        """Without effect, with room for so many samples of so many records."""
+        """Return a force without effect, with room for the given numbers of recordings
+        and samples.
+        """
         return cls(
             [0.0] * SHARED,
             [0.0] * STARTS,

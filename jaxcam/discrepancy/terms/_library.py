@@ -1,4 +1,4 @@
-"""The library: what the dynamics of machines most often leaves out."""
+"""The library: effects that models of machines most often omit."""
 
 import math
 from collections.abc import Mapping
@@ -34,12 +34,12 @@ from ._with_terms import WithTerms
 
 
 def _reference(default: float):
-    """A constant of a form: not fitted, and left out of files by earlier versions."""
+    """A constant of a form: it is not fitted, and files of earlier versions omit it."""
     return eqx.field(default=default, static=True, metadata={"spare": True})
 
 
-# Share of dry friction up to which a push is balanced exactly; over which share that
-# fades away beyond it; a push that is far beyond
+# Share of dry friction up to which a push is balanced exactly; width over which the
+# balance then fades; a push far beyond both
 _HELD, _FADE, _MANY = 0.99, 0.5, 1e3
 
 
@@ -60,8 +60,8 @@ class CoulombFriction(Term):
     """Dry friction, `-fc sign(v)`, which holds a body that is pushed by less than `fc`.
 
     The sign is `tanh(v / slip)`, so that it can be integrated; `slip` (rad/s) is far
-    below the speeds that friction is told from. Where friction holds, it is moved so
-    that it balances the push at rest: the body does not creep.
+    below the speeds that determine the friction. While friction holds the body, the
+    `tanh` is shifted so that it balances the push at rest, and the body does not creep.
     """
 
     name: ClassVar[str] = "coulomb_friction"
@@ -77,14 +77,16 @@ class CoulombFriction(Term):
     def acceleration(self, motion: Motion):
         share = _share_of(motion.pushed, self.fc)
         size = jnp.abs(share)
-        # what is pushed by more than its friction changes direction evenly
+        # a body pushed by more than its friction reverses smoothly
         held = jnp.where(size < 1, size, jnp.clip((1 + _FADE - size) / _FADE, 0.0, 1.0))
         balance = jnp.sign(share) * jnp.arctanh(jnp.minimum(held, _HELD))
         return -self.fc * jnp.tanh(motion.velocity / self.slip + balance)
 
 
 def _share_of(push, friction):
-    """A push in units of the friction; many of them where there is none."""
+    """Return a push in units of the friction; a large number if there is no
+    friction.
+    """
     some = friction > 0
     return jnp.where(some, push / jnp.where(some, friction, 1.0), _MANY)
 
@@ -93,7 +95,7 @@ class QuadraticDrag(Term):
     """Drag of a turbulent fluid, `-c2 |v| v`."""
 
     name: ClassVar[str] = "quadratic_drag"
-    sentence: ClassVar[str] = "quadratic drag, as of moving air or oil"
+    sentence: ClassVar[str] = "quadratic drag, as from moving air or oil"
     region: ClassVar[str] = "in flight, at large speeds"
     source: ClassVar[str] = "Batchelor, An Introduction to Fluid Dynamics, 5.11"
     c2: float = strength("1/[q]", 0.1, lower=0.0)
@@ -103,7 +105,7 @@ class QuadraticDrag(Term):
 
 
 class NonlinearSpring(Term):
-    """A spring that hardens (or softens) away from its middle, `-k3 (q - q0)^3`."""
+    """A spring that hardens (or softens) away from its centre, `-k3 (q - q0)^3`."""
 
     name: ClassVar[str] = "nonlinear_spring"
     sentence: ClassVar[str] = "a cubic part of the spring force"
@@ -122,7 +124,7 @@ class RestitutionVelocity(Term):
     name: ClassVar[str] = "restitution_velocity"
     sentence: ClassVar[str] = "a restitution that depends on the approach speed"
     where: ClassVar[str] = Where.IMPACT
-    region: ClassVar[str] = "at impacts, by their approach speed"
+    region: ClassVar[str] = "at impacts, by approach speed"
     source: ClassVar[str] = "Goldsmith, Impact, 1960, chapter 8; Johnson 1985, 11.5"
     rb: float = strength("-", 0.02, lower=0.0)
     reference: float = _reference(References.impact_speed)
@@ -136,9 +138,9 @@ class CamProfileError(Term):
     """A cam that is out of round, by `run cos(2 phi + lead)`."""
 
     name: ClassVar[str] = "cam_profile_error"
-    sentence: ClassVar[str] = "an error of the surface, twice a turn"
+    sentence: ClassVar[str] = "an error of the surface, twice per turn"
     where: ClassVar[str] = Where.CONTACT
-    region: ClassVar[str] = "at impacts and rests, by the angle of the drive"
+    region: ClassVar[str] = "at impacts and in contact, by drive angle"
     source: ClassVar[str] = "Norton, Cam Design and Manufacturing Handbook, chapter 12"
     run: float = strength("[q]", 1e-4)
     lead: float = _reference(References.profile_lead)
@@ -150,12 +152,12 @@ class CamProfileError(Term):
 class ExternalVibration(Term):
     """A foundation that shakes, `ext sin(2 pi fe t + phase)`.
 
-    Fitted as the amplitudes of sine and cosine, in which it is linear.
+    The amplitudes of sine and cosine are fitted, in which it is linear.
     """
 
     name: ClassVar[str] = "external_vibration"
-    sentence: ClassVar[str] = "an external vibration at a frequency of its own"
-    region: ClassVar[str] = "in flight, periodic in time and not with the cam"
+    sentence: ClassVar[str] = "an external vibration at its own frequency"
+    region: ClassVar[str] = "in flight, periodic in time but not with the cam"
     source: ClassVar[str] = "Den Hartog, Mechanical Vibrations, 1956, section 2.9"
     ext_sin: float = strength("[q]/s^2", 0.1)
     ext_cos: float = strength("[q]/s^2", 0.1)
@@ -181,14 +183,14 @@ class ExternalVibration(Term):
 class DriveRipple(Term):
     """A drive whose speed varies with its own angle, `w (1 + eps cos(phi - psi))`.
 
-    Found in the channel of the drive itself; the motion is computed from that channel
-    in any case.
+    It is found in the channel of the drive itself; the motion is computed from that
+    channel in any case.
     """
 
     name: ClassVar[str] = "drive_ripple"
-    sentence: ClassVar[str] = "a ripple of the drive's speed, once a turn"
+    sentence: ClassVar[str] = "a ripple of the drive speed, once per turn"
     where: ClassVar[str] = Where.DRIVE
-    region: ClassVar[str] = "in the drive's own angle, by that angle"
+    region: ClassVar[str] = "in the drive angle, by drive angle"
     source: ClassVar[str] = "Norton, Cam Design and Manufacturing Handbook, chapter 10"
 
 
@@ -213,11 +215,11 @@ class StribeckFriction(Term):
 
 
 class AsymmetricFriction(Term):
-    """Dry friction that differs with the direction: a force against one of them."""
+    """Dry friction that acts in one direction only."""
 
     name: ClassVar[str] = "asymmetric_friction"
     sentence: ClassVar[str] = "friction that acts in one direction only"
-    region: ClassVar[str] = "in flight, on the way up"
+    region: ClassVar[str] = "in flight, at positive velocities"
     source: ClassVar[str] = "Armstrong-Helouvry 1991, Control of Machines with Friction"
     listed: ClassVar[bool] = False
     corner: ClassVar[bool] = True
@@ -232,7 +234,7 @@ class GravityImbalance(Term):
     """The weight of an arm whose centre of mass is off its hinge, `-g cos(q)`."""
 
     name: ClassVar[str] = "gravity_imbalance"
-    sentence: ClassVar[str] = "the weight of an arm that is not balanced"
+    sentence: ClassVar[str] = "the weight of an unbalanced arm"
     region: ClassVar[str] = "in flight, by position"
     source: ClassVar[str] = "Meriam and Kraige, Dynamics, chapter 6"
     listed: ClassVar[bool] = False
@@ -246,9 +248,9 @@ class SpeedDependentBounce(Term):
     """Restitution that varies with the speed of the drive, by `br` per rad/s."""
 
     name: ClassVar[str] = "restitution_drive_speed"
-    sentence: ClassVar[str] = "a restitution that depends on the speed of the drive"
+    sentence: ClassVar[str] = "a restitution that depends on the drive speed"
     where: ClassVar[str] = Where.IMPACT
-    region: ClassVar[str] = "at impacts, by the speed of the drive"
+    region: ClassVar[str] = "at impacts, by drive speed"
     source: ClassVar[str] = "Chong 2016, section 4.6.1 (Figure 4.15)"
     listed: ClassVar[bool] = False
     br: float = strength("s/rad", 1e-3)
@@ -284,15 +286,15 @@ def library(
 
     Args:
         turned: Whether the system has a drive; without one there are no profile errors.
-        references: Constants of the forms, which belong to a rig (`rig.references`):
-            the centre of a nonlinear spring, the speed at which a restitution is
-            stated.
+        references: Constants of the forms, which belong to a rig (`rig.references`),
+            such as the centre of a nonlinear spring or the speed at which a restitution
+            is stated.
         clocked: Whether any event has a known time, as with a drive (the default) or a
             measured input. Otherwise a lag is only a shift of the time origin.
-        extended: Whether to add terms that most rigs have as parameters already, or
-            that take longer to find: forces by position with an edge, friction that
-            differs by direction, speed or place, a restitution as a power. Their
-            constants come from the recordings.
+        extended: Whether to add terms that most rigs already have as parameters, or
+            that take longer to search: position-dependent forces with an edge, friction
+            that depends on direction, speed or position, and a power law of
+            restitution. Their constants come from the recordings.
 
     Returns:
         A tuple of [`jaxcam.discrepancy.Term`][].
@@ -328,7 +330,7 @@ def library(
 
 
 def saved_classes() -> tuple[type, ...]:
-    """Return the classes that a saved system with terms may name, for `load_system`.
+    """Return the term classes that `load_system` needs to load a saved system.
 
     Returns:
         A tuple of classes.

@@ -1,4 +1,4 @@
-"""Friction that differs with the direction of the motion."""
+"""Friction that depends on the direction of motion."""
 
 from typing import ClassVar
 
@@ -12,13 +12,13 @@ _SOURCE = "Armstrong-Helouvry 1991, Control of Machines with Friction"
 
 
 class DampingForwards(ScaledTerm):
-    """Viscous damping of motion in the positive direction alone, `-cf max(v, 0)`.
+    """Viscous damping of motion in the positive direction only, `-cf max(v, 0)`.
 
-    Next to damping both ways it is how much more there is in this direction.
+    In addition to damping in both directions, it is the excess in this direction.
     """
 
     name: ClassVar[str] = "damping_forwards"
-    sentence: ClassVar[str] = "viscous damping that is larger on the way up"
+    sentence: ClassVar[str] = "viscous damping that is larger at positive velocities"
     region: ClassVar[str] = "in flight, at positive velocities"
     source: ClassVar[str] = _SOURCE
     cf: float = strength("1/s", 0.1, lower=0.0)
@@ -31,10 +31,10 @@ class DampingForwards(ScaledTerm):
 
 
 class DampingBackwards(ScaledTerm):
-    """Viscous damping of motion in the negative direction alone, `cb max(-v, 0)`."""
+    """Viscous damping of motion in the negative direction only, `cb max(-v, 0)`."""
 
     name: ClassVar[str] = "damping_backwards"
-    sentence: ClassVar[str] = "viscous damping that is larger on the way down"
+    sentence: ClassVar[str] = "viscous damping that is larger at negative velocities"
     region: ClassVar[str] = "in flight, at negative velocities"
     source: ClassVar[str] = _SOURCE
     cb: float = strength("1/s", 0.1, lower=0.0)
@@ -47,10 +47,10 @@ class DampingBackwards(ScaledTerm):
 
 
 class FrictionForwards(ScaledTerm):
-    """Dry friction of motion in the positive direction alone, `-ff` for `v > 0`."""
+    """Dry friction of motion in the positive direction only, `-ff` for `v > 0`."""
 
     name: ClassVar[str] = "friction_forwards"
-    sentence: ClassVar[str] = "dry friction that is larger on the way up"
+    sentence: ClassVar[str] = "dry friction that is larger at positive velocities"
     region: ClassVar[str] = "in flight, at positive velocities"
     source: ClassVar[str] = _SOURCE
     corner: ClassVar[bool] = True
@@ -65,10 +65,10 @@ class FrictionForwards(ScaledTerm):
 
 
 class FrictionBackwards(ScaledTerm):
-    """Dry friction of motion in the negative direction alone, `fb` for `v < 0`."""
+    """Dry friction of motion in the negative direction only, `fb` for `v < 0`."""
 
     name: ClassVar[str] = "friction_backwards"
-    sentence: ClassVar[str] = "dry friction that is larger on the way down"
+    sentence: ClassVar[str] = "dry friction that is larger at negative velocities"
     region: ClassVar[str] = "in flight, at negative velocities"
     source: ClassVar[str] = _SOURCE
     corner: ClassVar[bool] = True

@@ -9,21 +9,21 @@ from ._term import Motion, strength
 from ._where import Where
 
 
-# Approach speeds below this share of the fast ones count as that
+# Lower limit of the approach speed, as a share of the highest speed
 _SLOWEST = 1e-3
 
 
 class RestitutionPower(ScaledTerm):
     """Restitution as a power of the approach speed, `r0 (v / v0)^-rp`.
 
-    It falls with the speed for a positive `rp`, as of plastic impacts, and rises for a
-    negative one; `v0` is the fast speed of the recordings.
+    It decreases with the speed for a positive `rp`, as in plastic impacts, and
+    increases for a negative one; `v0` is the highest usual speed of the recordings.
     """
 
     name: ClassVar[str] = "restitution_power"
     sentence: ClassVar[str] = "a restitution that is a power of the approach speed"
     where: ClassVar[str] = Where.IMPACT
-    region: ClassVar[str] = "at impacts, by their approach speed"
+    region: ClassVar[str] = "at impacts, by approach speed"
     source: ClassVar[str] = "Johnson, Contact Mechanics, 1985, section 11.5"
     rp: float = strength("-", 0.05)
 

@@ -1,7 +1,7 @@
-"""Forms that a free function may turn out to have, each with a few numbers.
+"""Parametric forms that may replace a free function.
 
-A form is a function of `u`, its argument as a share of the range that was visited, or
-of a phase; the first number is its size. Edges are smoothed over a hundredth of the
+A form is a function of `u`, the argument as a share of the range visited, or of a
+phase; its first parameter is its size. Edges are smoothed over a hundredth of the
 range, so that a fit can move them.
 """
 
@@ -13,15 +13,15 @@ import numpy as np
 
 
 _EDGE = 0.01
-# A share of the range, in the place of zero, of which a power has derivatives
+# Smallest argument of a power, as a share of the range, so that its derivatives exist
 _LEAST = 1e-6
 
 
 class Place(NamedTuple):
-    """The arguments at which a form is evaluated.
+    """The argument at which a form is evaluated.
 
-    `x`: the argument; `u`: its share of the range, and `v`: the argument itself in
-    ranges.
+    `x`: the argument; `u`: its position in the range, from 0 to 1; `v`: the argument
+    divided by the range.
     """
 
     x: Any
@@ -30,13 +30,14 @@ class Place(NamedTuple):
 
 
 class Primitive(NamedTuple):
-    """A form: its `name`, `function(place, numbers)`, and what the numbers may be.
+    """A form: its `name`, `function(place, numbers)`, and the values of its parameters.
 
-    - `starts`: for each number but the first, values from which a fit may start.
-    - `scales`: for each number but the first, a change that matters.
-    - `jump`: of the form where the velocity changes sign, in halves of its size.
-    - `odd`: whether the form is multiplied with the direction of the motion.
-    - `places`: which numbers are places, as shares of the range.
+    - `starts`: for each parameter but the first, values from which a fit may start.
+    - `scales`: for each parameter but the first, a significant change.
+    - `jump`: jump of the form at a change of sign of the velocity, in halves of its
+      size.
+    - `odd`: whether the form is multiplied by the direction of motion.
+    - `places`: the parameters that are positions, as shares of the range.
     """
 
     name: str
@@ -48,7 +49,7 @@ class Primitive(NamedTuple):
     places: tuple[int, ...] = ()
 
     def within(self, numbers) -> bool:
-        """Whether the places are where the argument has been."""
+        """Return whether the positions lie in the range of the argument."""
         return all(0.0 <= float(numbers[k]) <= 1.0 for k in self.places)
 
     @property
@@ -56,7 +57,9 @@ class Primitive(NamedTuple):
         return 1 + len(self.starts)
 
     def value(self, place: Place, numbers, direction):
-        """The whole form: with its jump, where the motion has a direction."""
+        """Return the complete form, including the jump if the motion has a
+        direction.
+        """
         smooth = self.function(place, numbers)
         turned = smooth * direction if self.odd else smooth
         return turned + self.jump * numbers[0] * direction
@@ -179,4 +182,4 @@ OF_SPEED = (FORWARD, FALLING)
 OF_PHASE = (*HARMONICS, HALF_TURN, ARC, BUMP_IN_TURN)
 
 PRIMITIVES = (*ON_A_LINE, *OF_SPEED, *OF_PHASE, *FROM_ZERO)
-"""All forms, in the order of their numbers in a compiled program."""
+"""All forms, in the order of their indices in a compiled program."""

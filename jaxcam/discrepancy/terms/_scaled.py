@@ -1,4 +1,4 @@
-"""Terms whose forms have places of their own, scaled from what recordings visit."""
+"""Terms whose constants are scaled from the recorded motion."""
 
 import dataclasses
 from typing import ClassVar
@@ -12,11 +12,11 @@ from ._visited import Visited
 class ScaledTerm(Term):
     """A term whose constants come from the recordings: ranges, speeds, accelerations.
 
-    Subclasses say the size of each strength in `_sizes`, and the ends of each inner
-    one in `_ends`.
+    Subclasses give the size of each strength in `_sizes`, and the bounds of each inner
+    parameter in `_ends`.
     """
 
-    # plain numbers, as a saved system holds them
+    # plain numbers, as stored in a saved system
     ranges: tuple[float, ...] = eqx.field(
         default=tuple(Visited()), static=True, kw_only=True, metadata={"spare": True}
     )
@@ -30,7 +30,7 @@ class ScaledTerm(Term):
     def scaled(self, visited: Visited) -> "ScaledTerm":
         found = dataclasses.replace(self, ranges=tuple(visited))
         starts = found.starts()
-        # somewhere in the range, until a fit says where
+        # a position in the range, until it is fitted
         inner = starts[len(starts) // 2] if starts else {}
         return dataclasses.replace(found, **inner)
 
@@ -47,13 +47,13 @@ class ScaledTerm(Term):
         )
 
     def _declared(self) -> tuple[Strength, ...]:
-        """The strengths as their fields state them."""
+        """Return the strengths as their fields state them."""
         return super().strengths()
 
     def _sizes(self) -> dict[str, float]:
-        """Changes of the strengths that matter."""
+        """Return significant changes of the strengths."""
         return {}
 
     def _ends(self) -> dict[str, tuple[float, float]]:
-        """Least and largest value of inner numbers."""
+        """Return the smallest and largest value of each inner parameter."""
         return {}

@@ -10,7 +10,9 @@ from ._with_terms import drive_at
 
 
 def watched(model: Model) -> Model:
-    """The model, whose sensor shows what its terms add to it."""
+    """Return the model with a sensor whose reading includes the sensor errors of its
+    terms.
+    """
     if not any(Where.SENSOR in term.acts for term in terms_of(model)):
         return model
     name = watching(model)
@@ -19,18 +21,22 @@ def watched(model: Model) -> Model:
 
 
 def watching(model: Model) -> str:
-    """The first channel that shows the first coordinate, or the first of all."""
+    """Return the first channel that measures the first coordinate, or the first
+    channel.
+    """
     place, _ = model.system.coordinates[0]  # pyright: ignore
     shown = [name for name, one in model.sensors.items() if one.observe == place]
     return next(iter(shown or model.sensors))
 
 
-# What may be wrong with any sensor
+# Possible errors of any sensor
 _FAULTS = ("gain", "offset", "lag")
 
 
 def more_faults(model: Model, parameters: Sequence[Parameter]) -> list[Parameter]:
-    """Gain, offset and lag of that sensor as parameters, where they are none yet."""
+    """Return gain, offset and lag of that sensor as parameters, unless they already
+    are.
+    """
     known = set(own_faults(model, parameters))
     taken = [one.where(model) for one in parameters if one.name in known]
     sensor = model.sensors[watching(model)]
@@ -45,7 +51,9 @@ def more_faults(model: Model, parameters: Sequence[Parameter]) -> list[Parameter
 
 
 def own_faults(model: Model, parameters: Sequence[Parameter]) -> list[str]:
-    """Names of the parameters that are gain, offset or lag of that sensor."""
+    """Return the names of the parameters that are gain, offset or lag of that
+    sensor.
+    """
     sensor = model.sensors[watching(model)]
     fields = [getattr(sensor, field) for field in _FAULTS]
     return [

@@ -1,4 +1,4 @@
-"""Faults of the sensor of the motion that have a name."""
+"""Named errors of the motion sensor."""
 
 from typing import ClassVar
 
@@ -6,7 +6,7 @@ from ._term import SensorTerm, strength
 
 
 class SensorLag(SensorTerm):
-    """A channel of the motion that is late."""
+    """A delay of a channel of the motion."""
 
     name: ClassVar[str] = "sensor_lag"
     sentence: ClassVar[str] = "a lag of the sensor"
@@ -17,7 +17,7 @@ class SensorLag(SensorTerm):
 
 
 class SensorGain(SensorTerm):
-    """A sensor that shows too much or too little, in proportion."""
+    """A wrong gain of the sensor."""
 
     name: ClassVar[str] = "sensor_gain"
     sentence: ClassVar[str] = "a wrong gain of the sensor"
@@ -29,7 +29,7 @@ class SensorGain(SensorTerm):
 
 
 class SensorOffset(SensorTerm):
-    """A sensor whose zero is off."""
+    """A wrong zero of the sensor."""
 
     name: ClassVar[str] = "sensor_offset"
     sentence: ClassVar[str] = "a wrong zero of the sensor"

@@ -1,7 +1,7 @@
 """Forces, restitutions and surfaces as free functions of one variable.
 
-A shape is no verdict. Where no named term explains what is left, the shape says where
-it is and its shape.
+A shape is not a verdict. If no named term explains the residual, a shape shows where it
+is and how it varies.
 """
 
 import abc
@@ -19,7 +19,7 @@ from ._term import Motion, Term, terms_of
 from ._where import Where
 
 
-# Just inside the ends, where the angle of a Chebyshev polynomial can be differentiated
+# Just inside the ends, so that the angle of a Chebyshev polynomial is differentiable
 _END = 1 - 1e-12
 
 
@@ -44,8 +44,8 @@ def _numbers(values):
 class Shape(Term):
     """A sum of functions of one variable, each with a coefficient.
 
-    `quantity` is what the sum is, `unit` that of the coefficients, `count` how many of
-    them there are, `size` a change that matters.
+    `quantity` is the quantity that the sum describes, `unit` the unit of the
+    coefficients, `count` their number, and `size` a significant change.
     """
 
     listed: ClassVar[bool] = False
@@ -58,15 +58,15 @@ class Shape(Term):
 
     @abc.abstractmethod
     def basis(self, quantity) -> Array:
-        """The functions at one value of the quantity, shape `(k,)`."""
+        """Return the functions at one value of the variable, shape `(k,)`."""
 
     @property
     @abc.abstractmethod
     def ends(self) -> tuple[float, float]:
-        """Least and largest value of the variable."""
+        """Return the smallest and largest value of the variable."""
 
     def value(self, quantity):
-        """The sum of the functions."""
+        """Return the sum of the functions."""
         return jnp.stack(self.coefficients) @ self.basis(quantity)
 
     def numbers(self) -> tuple[Array, ...]:
@@ -85,7 +85,7 @@ class Shape(Term):
 
 
 class Polynomial(Shape):
-    """Chebyshev polynomials between two ends, `first` is the lowest degree."""
+    """Return Chebyshev polynomials between two ends; `first` is the lowest degree."""
 
     low: Array = eqx.field(converter=_number)
     high: Array = eqx.field(converter=_number)
@@ -105,7 +105,9 @@ class Polynomial(Shape):
 
 
 class Harmonics(Shape):
-    """Cosines, then sines, of multiples of the phase, `first` is the lowest order."""
+    """Return cosines, then sines, of multiples of the phase; `first` is the lowest
+    order.
+    """
 
     first: int = eqx.field(default=1, static=True)
 
@@ -144,8 +146,8 @@ class ForceOfVelocity(Polynomial):
 
 class ForceOfTime(Polynomial):
     name: ClassVar[str] = "force_of_time"
-    sentence: ClassVar[str] = "a force that changes in the course of a record"
-    region: ClassVar[str] = "in flight, by time of the record"
+    sentence: ClassVar[str] = "a force that varies during a recording"
+    region: ClassVar[str] = "in flight, by time in the recording"
     variable: ClassVar[Variable] = Variable.TIME
     count: ClassVar[int] = 5
 
@@ -169,8 +171,8 @@ class FrictionOfAngle(Polynomial):
 
 class ForceOfPhase(Harmonics):
     name: ClassVar[str] = "force_of_phase"
-    sentence: ClassVar[str] = "a force in step with the drive"
-    region: ClassVar[str] = "in flight, by phase of the drive"
+    sentence: ClassVar[str] = "a force that depends on the drive phase"
+    region: ClassVar[str] = "in flight, by drive phase"
     variable: ClassVar[Variable] = Variable.PHASE
     count: ClassVar[int] = 8
 
@@ -180,9 +182,9 @@ class ForceOfPhase(Harmonics):
 
 class SurfaceOfPhase(Harmonics):
     name: ClassVar[str] = "surface_of_phase"
-    sentence: ClassVar[str] = "a surface that is not where the model has it"
+    sentence: ClassVar[str] = "a surface that deviates from that of the model"
     where: ClassVar[str] = Where.CONTACT
-    region: ClassVar[str] = "at impacts and rests, by phase of the drive"
+    region: ClassVar[str] = "at impacts and in contact, by drive phase"
     quantity: ClassVar[str] = "surface"
     variable: ClassVar[Variable] = Variable.PHASE
     count: ClassVar[int] = 8
@@ -210,9 +212,9 @@ class BounceOfSpeed(Polynomial):
 
 class BounceOfTime(Polynomial):
     name: ClassVar[str] = "bounce_of_time"
-    sentence: ClassVar[str] = "a restitution that changes in the course of a record"
+    sentence: ClassVar[str] = "a restitution that varies during a recording"
     where: ClassVar[str] = Where.IMPACT
-    region: ClassVar[str] = "at impacts, by time of the record"
+    region: ClassVar[str] = "at impacts, by time in the recording"
     quantity: ClassVar[str] = "bounce"
     variable: ClassVar[Variable] = Variable.TIME
     count: ClassVar[int] = 3
@@ -226,9 +228,9 @@ class BounceOfTime(Polynomial):
 
 class BounceOfPhase(Harmonics):
     name: ClassVar[str] = "bounce_of_phase"
-    sentence: ClassVar[str] = "a restitution that depends on where the drive is"
+    sentence: ClassVar[str] = "a restitution that depends on the drive phase"
     where: ClassVar[str] = Where.IMPACT
-    region: ClassVar[str] = "at impacts, by phase of the drive"
+    region: ClassVar[str] = "at impacts, by drive phase"
     quantity: ClassVar[str] = "bounce"
     variable: ClassVar[Variable] = Variable.PHASE
     count: ClassVar[int] = 4
@@ -242,7 +244,7 @@ class BounceOfPhase(Harmonics):
 
 class SensorOfPosition(Polynomial):
     name: ClassVar[str] = "sensor_of_position"
-    sentence: ClassVar[str] = "a sensor that is wrong by where it is"
+    sentence: ClassVar[str] = "a sensor error that depends on the position"
     where: ClassVar[str] = Where.SENSOR
     region: ClassVar[str] = "in the measured motion, by position"
     quantity: ClassVar[str] = "sensor"
@@ -257,9 +259,9 @@ class SensorOfPosition(Polynomial):
 
 class SensorOfTime(Polynomial):
     name: ClassVar[str] = "sensor_of_time"
-    sentence: ClassVar[str] = "a sensor that drifts in the course of a record"
+    sentence: ClassVar[str] = "a sensor error that drifts during a recording"
     where: ClassVar[str] = Where.SENSOR
-    region: ClassVar[str] = "in the measured motion, by time of the record"
+    region: ClassVar[str] = "in the measured motion, by time in the recording"
     quantity: ClassVar[str] = "sensor"
     variable: ClassVar[Variable] = Variable.TIME
     count: ClassVar[int] = 4
@@ -272,9 +274,9 @@ class SensorOfTime(Polynomial):
 
 class SensorOfPhase(Harmonics):
     name: ClassVar[str] = "sensor_of_phase"
-    sentence: ClassVar[str] = "a sensor that is wrong in step with the drive"
+    sentence: ClassVar[str] = "a sensor error that depends on the drive phase"
     where: ClassVar[str] = Where.SENSOR
-    region: ClassVar[str] = "in the measured motion, by phase of the drive"
+    region: ClassVar[str] = "in the measured motion, by drive phase"
     quantity: ClassVar[str] = "sensor"
     variable: ClassVar[Variable] = Variable.PHASE
     count: ClassVar[int] = 6
@@ -293,10 +295,11 @@ def shapes(
     turned: bool = True,
     references: References = References(),
 ) -> tuple[Shape, ...]:
-    """All shapes, over the ranges that some recordings visit.
+    """Return all shapes, over the ranges that the recordings visit.
 
-    **Arguments:** least and largest position, velocity and approach speed, length of
-    the records (s), whether there is a drive with a phase, and the constants of forms.
+    **Arguments:** smallest and largest position, velocity and approach speed, the
+    duration of the recordings (s), whether there is a drive with a phase, and the
+    constants of forms.
     """
 
     def zeros(kind: type[Shape]) -> list[float]:
@@ -310,7 +313,7 @@ def shapes(
         FrictionOfAngle(zeros(FrictionOfAngle), *positions, first=0, slip=slip),
         BounceOfSpeed(zeros(BounceOfSpeed), *approach),
         BounceOfTime(zeros(BounceOfTime), 0.0, duration),
-        # a constant is an offset, a part in proportion to the position a gain
+        # a constant is an offset, a part proportional to the position is a gain
         SensorOfPosition(zeros(SensorOfPosition), *positions, first=2),
         SensorOfTime(zeros(SensorOfTime), 0.0, duration),
     ]

@@ -1,4 +1,6 @@
-"""Forces by position: constant, linear, with a knee, and one-sided stops."""
+"""Forces that depend on position: constant, linear, with a knee, and one-sided
+stops.
+"""
 
 from typing import ClassVar
 
@@ -9,14 +11,14 @@ from ._scaled import ScaledTerm
 from ._term import Motion, strength
 
 
-# Places of a knee or an edge that are tried, as shares of the positions visited
+# Positions of a knee or an edge that are tried, as shares of the range visited
 _SHARES = tuple(np.linspace(0.02, 0.98, 33).tolist())
-# Depth within which dry friction of a stop begins, in halves of the range
+# Depth over which the dry friction of a stop sets in, in halves of the range
 _BEGINS = 0.02
 
 
 class ConstantForce(ScaledTerm):
-    """A force that is always the same, as weight is, `f0`."""
+    """A constant force such as weight, `f0`."""
 
     name: ClassVar[str] = "constant_force"
     sentence: ClassVar[str] = "a constant force"
@@ -31,10 +33,10 @@ class ConstantForce(ScaledTerm):
 
 
 class LinearSpring(ScaledTerm):
-    """A spring about the middle of the positions visited, `-k1 (q - middle)`."""
+    """A spring about the mean position, `-k1 (q - middle)`."""
 
     name: ClassVar[str] = "linear_spring"
-    sentence: ClassVar[str] = "a force in proportion to the deflection, a spring"
+    sentence: ClassVar[str] = "a force proportional to the deflection"
     region: ClassVar[str] = "in flight, by position"
     source: ClassVar[str] = "Hooke 1678"
     k1: float = strength("1/s^2", 1.0, lower=0.0)
@@ -49,7 +51,7 @@ class LinearSpring(ScaledTerm):
 class _WithEdge(ScaledTerm):
     """A force that begins at a position.
 
-    Strengths that are `viscous` are times a velocity, those that are `dry` forces.
+    `viscous` strengths multiply a velocity; `dry` strengths are forces.
     """
 
     viscous: ClassVar[tuple[str, ...]] = ()
@@ -61,7 +63,7 @@ class _WithEdge(ScaledTerm):
 
     @property
     def _edge(self) -> str:
-        """Name of the inner number."""
+        """Name of the inner parameter."""
         return next(one.name for one in self._declared() if one.inner)
 
     def _stiff(self) -> float:
@@ -79,7 +81,7 @@ class _WithEdge(ScaledTerm):
 
 
 class BilinearSpring(_WithEdge):
-    """A stiffness that is another one beyond a knee, `-kb max(q - knee, 0)`."""
+    """A stiffness that changes at a knee, `-kb max(q - knee, 0)`."""
 
     name: ClassVar[str] = "bilinear_spring"
     sentence: ClassVar[str] = "a stiffness that changes at a position"
@@ -93,12 +95,11 @@ class BilinearSpring(_WithEdge):
 
 
 class StopAbove(_WithEdge):
-    """Something that is touched above an edge: it pushes back and takes energy out.
+    """An elastic stop above an edge, with losses.
 
-    Of the depth `d = max(q - edge_a, 0)`, the acceleration is
-    `-d (ka + da v + la sign(v)) - ra sign(v)`: stiffness, damping as of a fluid, a loss
-    that does not depend on the speed, as of rubber, and dry friction of what is moved
-    along, which begins within a hundredth of the range.
+    At a depth `d = max(q - edge_a, 0)` the acceleration is `-d (ka + da v + la sign(v))
+    - ra sign(v)`: stiffness, viscous damping, a rate-independent loss as in rubber, and
+    dry friction, which sets in within a hundredth of the range.
     """
 
     name: ClassVar[str] = "stop_above"
@@ -120,9 +121,9 @@ class StopAbove(_WithEdge):
 
 
 class StopBelow(_WithEdge):
-    """The same below an edge, of the depth `d = max(edge_b - q, 0)`.
+    """An elastic stop below an edge, with the depth `d = max(edge_b - q, 0)`.
 
-    See `StopAbove`; its numbers are `kd`, `dd`, `ld` and `rd`.
+    See `StopAbove`; its parameters are `kd`, `dd`, `ld` and `rd`.
     """
 
     name: ClassVar[str] = "stop_below"
@@ -144,7 +145,7 @@ class StopBelow(_WithEdge):
 
 
 def _reaction(term: ScaledTerm, depth, velocity, stiffness, damping, loss, friction):
-    """Force of a stop at a depth and a velocity into it."""
+    """Return the force of a stop at a depth and a velocity into it."""
     turned = jnp.tanh(velocity / term.visited.slip)
     touching = 1 - jnp.exp(-depth / (_BEGINS * term.visited.half))
     elastic = depth * (stiffness + damping * velocity + loss * turned)

@@ -1,4 +1,4 @@
-"""A piece of physics that a model may lack, as a term with a strength."""
+"""A physical effect that a model may lack, as a term with a strength."""
 
 import dataclasses
 import math
@@ -24,12 +24,12 @@ _METHODS = {
 
 
 class Motion(NamedTuple):
-    """The motion as a term sees it.
+    """The motion at which a term is evaluated.
 
-    `position` and `velocity` are those of the term's `coordinate`. `phase` is the angle
-    that the drive has turned (rad), or time itself without a drive; `rate` the drive's
-    speed (rad/s), or one. `state` `(n,)` is zero where a term acts on a surface.
-    `pushed` is the acceleration of the position without any terms.
+    `position` and `velocity` are those of the term's `coordinate`. `phase` is the drive
+    angle (rad), or time without a drive; `rate` is the drive speed (rad/s), or one.
+    `state` `(n,)` is zero for a term that acts on a surface. `pushed` is the
+    acceleration of the position without any terms.
     """
 
     t: Any
@@ -39,20 +39,20 @@ class Motion(NamedTuple):
     velocity: Any
     """Velocity of the term's coordinate."""
     phase: Any
-    """Angle that the drive has turned (rad), or time without a drive."""
+    """Drive angle (rad), or time without a drive."""
     rate: Any = 1.0
     """Speed of the drive (rad/s), or one."""
     state: Any = None
-    """Whole state `(n,)`; zero where a term acts on a surface."""
+    """State `(n,)`; zero for a term that acts on a surface."""
     pushed: Any = 0.0
     """Acceleration of the position without any terms."""
 
 
 MOTION = "[q]"
-"""Stands in units for that of the coordinate that a term acts on."""
+"""Placeholder in units for the unit of the coordinate on which a term acts."""
 
 
-# where a term acts is left out of files that do not say it
+# files that do not state where a term acts have the default
 _SPARE = {"spare": True}
 
 
@@ -65,17 +65,17 @@ def strength(
     default: float = 0.0,
     inner: bool = False,
 ):
-    """Declare a field of a term that is fitted.
+    """Declare a fitted field of a term.
 
     Args:
-        unit: Unit for tables; `[q]` in it stands for the unit of the coordinate.
-        size: A change that matters; it does not influence the result.
-        lower: Lower bound, as for signs that physics demands.
+        unit: Unit for tables; `[q]` in it is replaced by the unit of the coordinate.
+        size: A significant change; it does not influence the result.
+        lower: Lower bound, for example for a sign that physics requires.
         upper: Upper bound.
         default: Value of a new term.
-        inner: Whether it has no effect while the strengths are zero, as an edge or a
-            frequency. It is fitted from the best of the term's `starts`, or, without
-            any, is a frequency (Hz) that a scan finds.
+        inner: Whether it has no effect while the strengths are zero, like an edge or a
+            frequency. The fit starts from the best of the term's `starts`; without
+            `starts` it is a frequency (Hz) that a scan finds.
 
     Returns:
         A field.
@@ -102,33 +102,33 @@ def strength(
 
 @dataclasses.dataclass(frozen=True)
 class Strength:
-    """One fitted number of a term, as `strength` declares it."""
+    """One fitted parameter of a term, as `strength` declares it."""
 
     name: str
     """Name of the field."""
     unit: str
     """Unit."""
     size: float
-    """A change that matters."""
+    """A significant change."""
     lower: float = -math.inf
     """Lower bound."""
     upper: float = math.inf
     """Upper bound."""
     inner: bool = False
-    """Whether it is a frequency, without effect while the strengths are zero."""
+    """Whether it has no effect while the strengths are zero."""
 
 
 class Term(eqx.Module):
-    """A physical effect that a model may lack. Subclass it, and declare strengths by
+    """A physical effect that a model may lack. Subclass it, and declare strengths with
     `strength`.
 
-    With all strengths zero a term changes nothing. It acts in flight, on the surface,
-    in impacts or on the sensor of the first coordinate where a subclass overrides
-    `acceleration`, `contact`, `restitution` or `sensed`; `acts` follows from these
-    methods.
+    A term with zero strengths has no effect. It acts in flight, on the surface, at
+    impacts or on the sensor of the first coordinate if a subclass overrides
+    `acceleration`, `contact`, `restitution` or `sensed`, respectively; `acts` follows
+    from these methods.
 
     Raises:
-        TypeError: A subclass declares another `acts` than it overrides.
+        TypeError: A subclass declares `acts` that differ from the methods it overrides.
 
     Examples:
         >>> from jaxcam.discrepancy import Term, strength
@@ -144,7 +144,7 @@ class Term(eqx.Module):
     name: ClassVar[str] = ""
     """Name of the term."""
     sentence: ClassVar[str] = ""
-    """The effect in words that continue "the model lacks"."""
+    """The effect, in words that continue "the model lacks"."""
     where: ClassVar[str] = Where.FLIGHT
     """A [`Where`][jaxcam.discrepancy.terms.Where] or its name; default the first of
     `acts`."""
@@ -153,14 +153,15 @@ class Term(eqx.Module):
     source: ClassVar[str] = ""
     """Literature."""
     listed: ClassVar[bool] = True
-    """False for a term that describes a shape but is not a verdict by itself."""
+    """False for a term that only describes an unknown effect and is never a verdict."""
     corner: ClassVar[bool] = False
-    """Whether its force jumps, as dry friction does, and is smoothed."""
+    """Whether its force jumps, like dry friction, and is smoothed."""
     acts: ClassVar[tuple[str, ...]] = ()
     """Places at which it acts."""
     coordinate: int = eqx.field(default=0, static=True, kw_only=True, metadata=_SPARE)
-    """Index of the coordinate that is pushed and whose position and velocity the term
-    uses."""
+    """Index of the coordinate on which the force acts and whose position and velocity
+    the term uses.
+    """
     constraint: int = eqx.field(default=0, static=True, kw_only=True, metadata=_SPARE)
     """Index of the gap whose surface or restitution is changed."""
     motion_unit: str = eqx.field(
@@ -189,8 +190,8 @@ class Term(eqx.Module):
         return 0.0
 
     def contact(self, motion: Motion):
-        """Return the added height of the surface, in units of the gap; of time and
-        phase.
+        """Return the added height of the surface, in units of the gap, as a function of
+        time and phase.
         """
         del motion
         return 0.0
@@ -201,28 +202,30 @@ class Term(eqx.Module):
         return 1.0
 
     def sensed(self, motion: Motion):
-        """Return what the sensor of the first coordinate adds, in its unit."""
+        """Return the error of the sensor of the first coordinate, in its unit."""
         del motion
         return 0.0
 
     def scaled(self, visited: Visited) -> "Term":
-        """Return the term with the constants of its form that recordings suggest."""
+        """Return the term with constants taken from the recordings."""
         del visited
         return self
 
     def starts(self) -> tuple[Mapping[str, float], ...]:
         """Return values of its inner numbers from which a fit may start.
 
-        None for a frequency, which a scan finds.
+        There are none for a frequency, which a scan finds.
         """
         return ()
 
     def prepared(self) -> "Term":
-        """Return the term with everything precomputed that it needs at every step."""
+        """Return the term with all quantities precomputed that it needs at every
+        step.
+        """
         return self
 
     def strengths(self) -> tuple[Strength, ...]:
-        """Return the fitted numbers, in the order of the fields."""
+        """Return the fitted parameters, in the order of the fields."""
         found = []
         for field in dataclasses.fields(self):
             one = field.metadata.get("strength")
@@ -240,11 +243,11 @@ class Term(eqx.Module):
         return unit.replace(MOTION, self.motion_unit)
 
     def reported(self, values: Mapping[str, Value]) -> dict[str, Value]:
-        """Return the reported strengths, by name; here the strengths."""
+        """Return the reported values, by name; by default the strengths."""
         return dict(values)
 
     def parameters(self, place: int) -> list[Parameter]:
-        """Return the parameters of a fit, for the term at some place of a
+        """Return the parameters of a fit, for the term at a given index in a
         `WithTerms`.
         """
         return [
@@ -261,7 +264,7 @@ class Term(eqx.Module):
 
 
 class SensorTerm(Term):
-    """A fault of the motion's sensor: it acts on a field of that sensor."""
+    """An error of the motion sensor; it acts on a field of that sensor."""
 
     where: ClassVar[str] = Where.SENSOR
     """The sensor."""

@@ -1,4 +1,4 @@
-"""A number with its error."""
+"""A number with its standard error."""
 
 import dataclasses
 

@@ -6,9 +6,9 @@ from typing import NamedTuple
 class Visited(NamedTuple):
     """Range of a coordinate, in its unit, and of its velocity.
 
-    `low`, `high`: least and largest position; `fast`: a speed that is rarely exceeded;
-    `push`: the usual acceleration; `slip`: speed within which dry friction changes
-    sign.
+    `low`, `high`: smallest and largest position; `fast`: a speed that is rarely
+    exceeded;
+    `push`: the usual acceleration; `slip`: speed over which dry friction changes sign.
     """
 
     low: float = -1.0
@@ -23,6 +23,6 @@ class Visited(NamedTuple):
 
     @property
     def half(self) -> float:
-        """Half of the range of positions, positive."""
+        """Half of the range of positions; always positive."""
         half = (self.high - self.low) / 2
         return half if half > 0 else 1.0

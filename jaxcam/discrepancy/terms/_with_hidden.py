@@ -1,4 +1,4 @@
-"""A system with an element that has a state of its own."""
+"""A system with an element that has an internal state."""
 
 import equinox as eqx
 import jax
@@ -9,10 +9,11 @@ from ._hidden_elements import HiddenElement
 
 
 class WithHidden(HybridSystem):
-    """A system whose coordinate drives a hidden element, which pushes it.
+    """A system with a hidden element that a coordinate drives and whose force acts on
+    that coordinate.
 
-    The state is that of the base and then that of the element, which impacts leave as
-    it is.
+    The state is that of the base followed by that of the element, which does not change
+    at impacts.
     """
 
     base: HybridSystem
@@ -22,12 +23,13 @@ class WithHidden(HybridSystem):
     coordinate: tuple[int, int] = eqx.field(
         default=(0, 1), static=True, metadata={"spare": True}
     )
-    """Components of the base's state that are the coordinate, which drives the element
-    and is pushed by it, and its velocity."""
+    """Components of the base state that are the coordinate (which drives the element
+    and on which its force acts) and its velocity.
+    """
 
     @property
     def _size(self) -> int:
-        """Number of components of the element."""
+        """Number of state components of the element."""
         return len(self.element.names)
 
     @property
@@ -52,7 +54,7 @@ class WithHidden(HybridSystem):
 
     @property
     def speed(self):
-        """Speed of the drive (rad/s), where the base has one."""
+        """Speed of the drive (rad/s), if the base has one."""
         return self.base.speed  # pyright: ignore
 
     def prepared(self) -> "WithHidden":

@@ -1,4 +1,4 @@
-"""A system with the physics that it may lack."""
+"""A system with terms for the physics that it may lack."""
 
 import equinox as eqx
 import jax
@@ -13,19 +13,20 @@ from ._where import Where
 class WithTerms(HybridSystem):
     """A system and terms added to it.
 
-    The gap of a term's `constraint` becomes that of the base less the term's `contact`,
-    and the restitution coefficient there that of the base times its `restitution`.
+    The `contact` of a term is subtracted from the gap of its `constraint`, and its
+    `restitution` multiplies the coefficient of restitution there.
     """
 
     base: HybridSystem
     """The system."""
     terms: tuple[Term, ...] = ()
-    """Terms added to it; without effect while strengths are zero."""
+    """Terms added to it; they have no effect while their strengths are zero."""
     coordinates: tuple[tuple[int, int], ...] = eqx.field(
         default=((0, 1),), static=True, metadata={"spare": True}
     )
-    """For each coordinate, which component of the state it is and which its velocity. A
-    term pushes that of its `coordinate`."""
+    """For each coordinate, the state components of the coordinate and of its velocity.
+    The force of a term acts on its `coordinate`.
+    """
 
     @property
     def state_names(self) -> tuple[str, ...]:  # pyright: ignore
@@ -45,7 +46,7 @@ class WithTerms(HybridSystem):
 
     @property
     def speed(self):
-        """Speed of the drive (rad/s), where the base has one."""
+        """Speed of the drive (rad/s), if the base has one."""
         return self.base.speed  # pyright: ignore
 
     def prepared(self) -> "WithTerms":
@@ -57,10 +58,10 @@ class WithTerms(HybridSystem):
         self.base.check()
 
     def motion(self, t, state, coordinate: int = 0, field=None) -> Motion:
-        """Return the state as the terms of a coordinate see it.
+        """Return the motion at which the terms of a coordinate are evaluated.
 
         Args:
-            field: Rate of change of the state, if it is known.
+            field: Rate of change of the state, if known.
         """
         place, rate = self.coordinates[coordinate]
         velocity = state[rate] if field is None else field[place]
@@ -99,7 +100,9 @@ class WithTerms(HybridSystem):
         )
 
     def _landed(self, t, state, number: int):
-        """The state after an impact on one constraint, with terms that act there."""
+        """Return the state after an impact on one constraint, with the terms that act
+        there.
+        """
 
         def law(x):
             after = self.base.impact(t, x)
@@ -108,7 +111,7 @@ class WithTerms(HybridSystem):
         speed, push = self._normal(t, state, number)
         seen = state
         if self._acting(Where.CONTACT, number):
-            # the base knows nothing of the surface's additional rate
+            # the base does not include the additional velocity of the surface
             _, rate = jax.jvp(
                 lambda t: self._raised(t, number), (t,), (jnp.ones_like(t),)
             )
@@ -125,8 +128,9 @@ class WithTerms(HybridSystem):
                 motion = self.motion(t, state, term.coordinate, field)
                 factor = factor * term.restitution(jnp.abs(speed), motion)
             if len(self.coordinates) > 1:
-                # along the impulse, which is shared out between the bodies: what the
-                # law takes from a normal velocity of one, in units of its own change
+                # along the impulse, which is distributed among the bodies: the change
+                # of state by the law for unit normal velocity, divided by its change of
+                # normal velocity
                 _, kept = jax.jvp(law, (seen,), (push,))
                 taken = push - kept
                 push = taken / self._along(t, state, number, taken)
@@ -134,7 +138,9 @@ class WithTerms(HybridSystem):
         return after
 
     def _normal(self, t, state, number: int):
-        """Normal velocity of the base, and the change of state that adds one to it."""
+        """Return the normal velocity of the base, and the change of state that
+        increases it by one.
+        """
         slopes = self._slopes(t, state, number)
         one = jnp.ones_like(t)
         _, rate = jax.jvp(lambda t: self._gap_of(t, state, number), (t,), (one,))
@@ -145,19 +151,19 @@ class WithTerms(HybridSystem):
         size = sum(slope**2 for slope in slopes)
         push = jnp.zeros_like(state)
         for (_, place), slope in zip(self.coordinates, slopes):
-            # where nothing moves the gap there is no impact either
+            # without motion of the gap there is no impact
             push = push.at[place].set(slope / jnp.where(size > 0, size, 1.0))
         return speed, push
 
     def _along(self, t, state, number: int, change):
-        """The change of normal velocity that a change of state makes."""
+        """Return the change of normal velocity due to a change of state."""
         slopes = self._slopes(t, state, number)
         return sum(
             slope * change[place] for (_, place), slope in zip(self.coordinates, slopes)
         )
 
     def _slopes(self, t, state, number: int):
-        """Slope of the gap by each coordinate."""
+        """Return the derivatives of the gap with respect to the coordinates."""
         found = []
         for place, _ in self.coordinates:
             along = jnp.zeros_like(state).at[place].set(1.0)
@@ -177,7 +183,7 @@ class WithTerms(HybridSystem):
         return total
 
     def _numbers(self, where: Where) -> list[int]:
-        """Constraints on which terms act."""
+        """Return the constraints on which terms act."""
         return sorted({term.constraint for term in self._acting(where)})
 
     def _acting(self, where: Where, number: int | None = None) -> list[Term]:
@@ -189,7 +195,7 @@ class WithTerms(HybridSystem):
 
 
 def drive_at(base, t):
-    """Angle (rad) and rate (rad/s) of the drive; time where there is no drive."""
+    """Return angle (rad) and speed (rad/s) of the drive; time if there is no drive."""
     if hasattr(base, "speed") and hasattr(base, "phase"):
         return base.speed * t + base.phase, base.speed
     if base.period is not None:
@@ -209,5 +215,5 @@ _BASE_DRIVE = Turning(_speed, _phase)
 
 
 def base_drive() -> Turning:
-    """The measured drive of a base with fields `speed` and `phase`."""
+    """Return the measured drive of a base with fields `speed` and `phase`."""
     return _BASE_DRIVE

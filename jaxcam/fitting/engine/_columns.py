@@ -18,16 +18,17 @@ from ._sharpness import shared_width
 class Columns:
     """The free numbers of a fit.
 
-    `local` `(r, m)`: which parameter each column of a record's equations is;
-    `place` `(r, m)`: its index among the free numbers, -1 for padding.
+    `local` `(r, m)`: which parameter each column of a recording's equations is; `place`
+    `(r, m)`: its index among the free numbers, -1 for padding.
     """
 
     parameter: Int[np.ndarray, " g"]
     """Index of the parameter of each free number, shape `(g,)`."""
     record: Int[np.ndarray, " g"]
-    """Index of its record, -1 for all, shape `(g,)`."""
+    """Index of its recording, -1 for all, shape `(g,)`."""
     local: Int[np.ndarray, "r m"]
-    """Index of the parameter of each column of a record's equations, shape `(r, m)`."""
+    """Index of the parameter of each column of a recording's equations, shape `(r, m)`.
+    """
     place: Int[np.ndarray, "r m"]
     """Index of the column among the free numbers, -1 for padding, shape `(r, m)`."""
     scale: Float[np.ndarray, " g"]
@@ -58,8 +59,8 @@ def free_columns(problem: Problem, free: Iterable[str] | None) -> Columns:
     for name in wanted:
         if problem.parameter(name).known is not None:
             raise ValueError(
-                f"The parameter {name!r} is known for each record; leave it out of the "
-                f"`constants` of the recordings to fit it."
+                f"The parameter {name!r} is known for each recording; leave it out of "
+                "the `constants` of the recordings to fit it."
             )
     records = len(problem.segments)
     picked = [k for k, p in enumerate(problem.parameters) if p.name in wanted]
@@ -99,7 +100,7 @@ def held_firmer(columns: Columns, blocks: Blocks):
 
 
 def gathered(columns: Columns, found):
-    """Sum over the records, with each number in its place."""
+    """Sum over the recordings, with each number in its place."""
     size = len(columns.scale)
     information, score = np.zeros((size + 1, size + 1)), np.zeros(size + 1)
     for r, place in enumerate(columns.place):

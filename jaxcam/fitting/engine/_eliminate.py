@@ -1,6 +1,6 @@
 """Solve the normal equations of a chain of pieces: first the states, then the rest.
 
-The states of a record couple to their neighbours alone, so that they are eliminated
+The states of a recording couple to their neighbours alone, so that they are eliminated
 from the first to the last with matrices of the size of one state (block-tridiagonal
 elimination). What is left is the reduced information of the parameters, the Schur
 complement; the states follow backwards.
@@ -28,9 +28,9 @@ class Reduced(NamedTuple):
     """
 
     information: Float[Array, "r m m"]
-    """Information of the parameters of each record, shape `(r, m, m)`."""
+    """Information of the parameters of each recording, shape `(r, m, m)`."""
     score: Float[Array, "r m"]
-    """Score of the parameters of each record, shape `(r, m)`."""
+    """Score of the parameters of each recording, shape `(r, m)`."""
     gain: Float[Array, "r k n c"]
     """Gives each state from the parameters, a constant, and the state after it, shape
     `(r, k, n, m + 1 + n)`."""
@@ -38,7 +38,7 @@ class Reduced(NamedTuple):
 
 @program
 def eliminate_states(blocks: Blocks, least: float | Array = LEAST) -> Reduced:
-    """Eliminate the states of every record by a block-tridiagonal Schur complement.
+    """Eliminate the states of every recording by a block-tridiagonal Schur complement.
 
     Args:
         blocks: The normal equations.

@@ -1,4 +1,4 @@
-"""Treat constants known for each record as parameters that no fit changes."""
+"""Treat constants known for each recording as parameters that no fit changes."""
 
 import difflib
 import math
@@ -21,7 +21,7 @@ def known_constants(
 ) -> tuple[Parameter, ...]:
     """Create a parameter for each name in the `constants` of recordings.
 
-    A record that does not state one has the value of the model.
+    A recording that does not state one has the value of the model.
 
     **Raises:** `RecordingError` if a name is not a number of the system, or a value is
     not a number.
@@ -39,7 +39,7 @@ def known_constants(
 
 
 def with_constants(model: Model, recording: Recording) -> Model:
-    """Return the model with the constants of one record.
+    """Return the model with the constants of one recording.
 
     **Raises:** see `known_constants`.
     """

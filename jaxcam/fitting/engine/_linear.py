@@ -1,4 +1,4 @@
-"""Linearise each piece and joint of one record about a point."""
+"""Linearise each piece and joint of one recording about a point."""
 
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -15,7 +15,9 @@ from ._predict import flight_joint, fly, impact_joint, rest, samples
 
 
 class Sharpness(NamedTuple):
-    """Standard errors of the joints of one record, and of the usual piece's state."""
+    """Standard errors of the joints of one recording, and of the usual piece's
+    state.
+    """
 
     flight: Float[Array, "k n"]
     impact: Float[Array, "k n"]
@@ -37,7 +39,7 @@ class Extras(NamedTuple):
 
 
 class LinearPieces(NamedTuple):
-    """Pieces and joints of one record, before summation.
+    """Pieces and joints of one recording, before summation.
 
     The first `n` of `a = n + m` columns are the state at the beginning of the piece,
     the others the parameters.
@@ -52,17 +54,11 @@ class LinearPieces(NamedTuple):
     p: Float[Array, " m"]
     """Slope of the cost of these samples, shape `(m,)`."""
     later: Float[Array, "k e n"]
-    """Rows of each joint for the state after it, for the columns of the piece before
-    it, and for what else varies, in units of the joint's error. `tied`: how far the
-    joint is off."""
+    """Rows of each joint for the state after it, in units of the joint's error."""
     earlier: Float[Array, "k e a"]
-    """Rows of each joint for the state after it, for the columns of the piece before
-    it, and for what else varies, in units of the joint's error. `tied`: how far the
-    joint is off."""
+    """Rows of each joint for the columns of the piece before it, in the same units."""
     direct: Float[Array, "k e m"]
-    """Rows of each joint for the state after it, for the columns of the piece before
-    it, and for what else varies, in units of the joint's error. `tied`: how far the
-    joint is off."""
+    """Rows of each joint for all other variables, in the same units."""
     tied: Float[Array, "k e"]
     """Distance at each joint, in units of its error."""
     flown_cost: Float[Array, " k"]
@@ -76,7 +72,7 @@ class LinearPieces(NamedTuple):
 def linear_pieces(
     model_at: Callable[..., Model], pieces: Pieces, extras: Extras, states, width: int
 ) -> LinearPieces:
-    """Linearise one record about its states.
+    """Linearise one recording about its states.
 
     Args:
         model_at: `model_at(change, start, step)` is the model of a piece that begins at

@@ -30,7 +30,7 @@ class Point(NamedTuple):
     """Values of the parameters, and states at the beginning of each piece."""
 
     values: Float[Array, "r q"]
-    """Values of the parameters of each record, in their units, shape `(r, q)`."""
+    """Values of the parameters of each recording, in their units, shape `(r, q)`."""
     states: Float[Array, "r k n"]
     """State at the beginning of each piece, shape `(r, k, n)`."""
 
@@ -153,14 +153,14 @@ def assemble(
     columns: Int[Array, "r m"],
     scales: Float[Array, "r m"],
 ) -> tuple[Blocks, Costs]:
-    """Linearise about a point; records are distributed over the cores.
+    """Linearise about a point; recordings are distributed over the cores.
 
     Args:
         layout: The location of the parameters.
-        pieces: The pieces of all records.
+        pieces: The pieces of all recordings.
         extras: Further arguments of the compiled programs.
         point: The point.
-        columns: Parameters that are free in each record, shape `(r, m)`.
+        columns: Parameters that are free in each recording, shape `(r, m)`.
         scales: Scales of the normal equations, shape `(r, m)`; zero for padding.
 
     Returns:
@@ -177,7 +177,7 @@ def assemble(
 
 @program
 def assemble_one(near, pieces, extras, states, columns, scales, row):
-    """Apply `assemble` to one record; its number is not part of the program."""
+    """Apply `assemble` to one recording; its number is not part of the program."""
     one = pieces, extras, states, columns, scales
     pieces, extras, states, columns, scales = jax.tree.map(lambda leaf: leaf[row], one)
     near = near.by(columns, scales)
@@ -193,7 +193,7 @@ def assemble_one(near, pieces, extras, states, columns, scales, row):
 
 @program
 def predict(layout: Layout, pieces: Pieces, extras: Extras, point: Point):
-    """Predict samples in flight and in contact, and the joints, of all records."""
+    """Predict samples in flight and in contact, and the joints, of all recordings."""
     return _predicted(layout, pieces, extras, point)
 
 

@@ -181,7 +181,7 @@ _CAM_DRIVE = Turning(_speed, _phase)
 
 
 def filtered_channels(model: Model) -> tuple[str, ...]:
-    """Channels whose sensor has a bandwidth and so a state of its own."""
+    """Channels whose sensor has a bandwidth, and therefore a state."""
     return tuple(name for name in model.sensors if model.sensors[name].filtered)
 
 

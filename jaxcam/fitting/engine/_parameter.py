@@ -39,11 +39,11 @@ class Parameter:
     upper: float = math.inf
     """Upper bound."""
     per_record: bool = False
-    """Whether every record has a value of its own."""
+    """Whether every recording has a separate value."""
     unit: str = ""
     """For tables."""
     known: tuple[float, ...] | None = None
-    """A value for each record, which no fit changes. `Problem.build` creates such
+    """A value for each recording, which no fit changes. `Problem.build` creates such
     parameters from the `constants` of recordings.
     """
 

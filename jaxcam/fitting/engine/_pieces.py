@@ -33,7 +33,7 @@ Numbers: TypeAlias = Array | np.ndarray
 
 
 class Samples(eqx.Module):
-    """Samples of `k` pieces of each of `r` records, sorted into steps.
+    """Samples of `k` pieces of each of `r` recordings, sorted into steps.
 
     Every piece is `n` steps of equal length; a step holds up to `m` samples of `c`
     channels. `place` is where in its step (0 to 1) a sample is.
@@ -47,7 +47,7 @@ class Samples(eqx.Module):
 
 
 class Pieces(eqx.Module):
-    """Everything of some records that a fit needs.
+    """Everything of some recordings that a fit needs.
 
     - `flown`, `rested`: samples in flight and in contact.
     - `joint`: the predecessor of each piece of flight: nothing, flight, or an impact.
@@ -56,7 +56,7 @@ class Pieces(eqx.Module):
         Of a measured input, `angle` is the level and `rate` is zero.
     - `rest_angle`, `rest_rate` `(r, kc, n + 1)`: the drive at each node of contact.
     - `reach`: how far (s) an impact may be from its recorded time.
-    - `drive_error`: standard errors of angle and rate of the drive, per record.
+    - `drive_error`: standard errors of angle and rate of the drive, per recording.
     """
 
     flown: Samples
@@ -88,7 +88,7 @@ class Span:
 def spans(
     segments: Segments, curved: Sequence[str] | None = None, rests: bool = True
 ) -> tuple[list[Span], list[Span]]:
-    """Return the pieces of flight and of contact of one record.
+    """Return the pieces of flight and of contact of one recording.
 
     **Arguments:** pieces of an oscillation are shorter, by the channels `curved`
     (default the segmented channel). Contacts are left out without `rests`.
@@ -170,7 +170,8 @@ def gather(
     curved: Sequence[str] | None = None,
     rests: bool = True,
 ) -> tuple[Pieces, list[tuple[list[Span], list[Span]]]]:
-    """Gather pieces of some records, padded so that similar records share a program.
+    """Gather pieces of some recordings, padded so that similar recordings share a
+    program.
 
     **Arguments:** `measured` is the channel of an input, in the place of a drive;
     `curved` and `rests` are those of `spans`.
@@ -184,7 +185,7 @@ def gather(
         names = ", ".join(part.recording.name for part in segments)
         raise RecordingError(
             f"{names}: there is no flight of {_LEAST} samples to be fitted; give a "
-            f"record in which the motion leaves the surface."
+            "recording in which the motion leaves the surface."
         )
     width = 64 * -(-max(len(flown) for flown, _ in cuts) // 64)
     # none without a contact: its part of a program is then not compiled
@@ -266,7 +267,7 @@ def _samples(part: Segments, cut: list[Span], channels, size, steps, most):
 
 
 def _drive(segments, times):
-    """Angle and rate of each record's drive at some times, shape of `times`."""
+    """Angle and rate of each recording's drive at some times, shape of `times`."""
     angle, rate = np.zeros(times.shape), np.ones(times.shape)
     for row, part in enumerate(segments):
         if part.drive is not None:
@@ -277,7 +278,9 @@ def _drive(segments, times):
 
 
 def _input(segments, channel: str, times):
-    """Each record's input at some times, held since the last sample, in their shape."""
+    """Each recording's input at some times, held since the last sample, in their
+    shape.
+    """
     found = np.zeros(times.shape)
     for row, part in enumerate(segments):
         time = part.recording.time
@@ -287,7 +290,7 @@ def _input(segments, channel: str, times):
 
 
 def _mean_input(segments, channel: str, flown: Samples, steps: int):
-    """Mean of each record's input over every step, shape `(r, k, n)`."""
+    """Mean of each recording's input over every step, shape `(r, k, n)`."""
     step = np.asarray(flown.step)[..., None]
     edges = np.asarray(flown.start)[..., None] + step * np.arange(steps + 1)
     found = np.zeros((*flown.start.shape, steps))

@@ -3,9 +3,9 @@
 **How it works.** A recording is cut (`jaxcam.recordings.segment`) into flights,
 contacts and impacts. Every flight is cut again into pieces of at most 100 samples and
 about half a period of what it shows. Each piece has an initial state of its own and is
-predicted from it alone, all pieces of all records side by side, so no prediction
-exceeds the predictable time, also in a chaotic record. Pieces are connected by joints,
-whose conditions the model gives:
+predicted from it alone, all pieces of all recordings side by side, so no prediction
+exceeds the predictable time, also in a chaotic recording. Pieces are connected by
+joints, whose conditions the model gives:
 
 - within a flight, a piece begins where the one before it ends;
 - at an impact, two flights meet at the instant at which their gaps agree (an event, not
@@ -16,7 +16,7 @@ whose conditions the model gives:
 The accuracy of a joint is that of the drive, measured by its encoder. The initial
 states are eliminated exactly (they form a chain, hence block-tridiagonal normal
 equations); what remains are the normal equations of the few parameters. One iteration
-over six records of 4 s at 2 kHz with ten parameters takes about a tenth of a second.
+over six recordings of 4 s at 2 kHz with ten parameters takes about a tenth of a second.
 
 **Use.**
 
@@ -40,9 +40,9 @@ is the same. So candidates for missing physics are best stated as terms of one s
 with strengths of zero, all in one problem, and freed by name. `linearise(problem, fit)`
 gives score and information of all parameters at once, free or not: what each candidate
 would gain is then linear algebra (`Linearised.gain`). `weights` (one a piece) omit
-records or blocks without compiling again; `held_out_cost(problem, found, weights)` is
-the cost of held-out data: the states of their pieces are fitted to them, the parameters
-are not.
+recordings or blocks without compiling again; `held_out_cost(problem, found, weights)`
+is the cost of held-out data: the states of their pieces are fitted to them, the
+parameters are not.
 """
 
 import dataclasses
@@ -122,7 +122,8 @@ class Problem:
     def build(
         model: Model, segments: Sequence[Segments], parameters: Sequence[Parameter]
     ) -> "Problem":
-        """Cut the recordings into pieces and find a start state for each of them.
+        """Divide the recordings into pieces and estimate an initial state for each of
+        them.
 
         Args:
             model: A system with its sensors, at nominal parameters.
@@ -134,8 +135,8 @@ class Problem:
             A `Problem`.
 
         Raises:
-            RecordingError: A channel is missing, a record has no flight, or a constant
-                is not a number of the system.
+            RecordingError: A channel is missing, a recording has no flight, or a
+                constant is not a number of the system.
             ValueError: A parameter is not one number of the model, or the model is not
                 finite near the data.
         """
@@ -236,12 +237,12 @@ class Problem:
         return Weights(np.asarray(exists, float), np.asarray(rests, float))
 
     def only(self, records: Iterable[str]) -> Weights:
-        """Return weights by which only some records count."""
+        """Return weights by which only some recordings count."""
         wanted = set(records)
         if not wanted <= set(self.records):
             raise ValueError(
-                f"There is no record {min(wanted - set(self.records))!r}; the records "
-                f"are {', '.join(self.records)}."
+                f"There is no recording {min(wanted - set(self.records))!r}; the "
+                f"recordings are {', '.join(self.records)}."
             )
         keep = np.array([name in wanted for name in self.records], dtype=float)
         every = self.everything()
@@ -249,7 +250,7 @@ class Problem:
 
     def between(self, start: float, stop: float) -> Weights:
         """Return weights by which only pieces that begin in a time span (s of each
-        record) count.
+        recording) count.
         """
 
         def inside(samples):

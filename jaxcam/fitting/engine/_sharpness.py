@@ -22,7 +22,8 @@ JOINT = 1e-3
 # small model errors
 _IMPACT = 10**-0.5
 _WIDTH = 4
-# Columns above which programs are as wide as what is free, and by how many they differ
+# Number of columns above which the width of a program follows the number of free
+# parameters, and the difference between widths
 _MANY, _STRIDE = 64, 32
 # Steps of a piece up to which one program serves states and parameters
 _FEW_STEPS = 20
@@ -87,7 +88,7 @@ def states_only(layout: Layout, pieces: Pieces, extras: Extras, point: Point):
     costs.
     """
     # as wide as a fit of everything, which then is compiled already; of many steps, a
-    # program of its own is soon worth the time that it takes to compile
+    # separate program soon repays its compilation time
     few = pieces.angle.shape[-1] <= _FEW_STEPS
     width = width_of(len(layout.places)) if few else _WIDTH
     none = jnp.zeros((pieces.joint.shape[0], width), dtype=int)

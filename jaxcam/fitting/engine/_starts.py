@@ -53,7 +53,8 @@ def _still(model: Model, part: Segments):
     """
     if part.drive is None:
         return model.system
-    # arrays: numbers would be constants of a program that is compiled for each record
+    # arrays: numbers would be constants of a program that is compiled for each
+    # recording
     angle, rate = (jnp.asarray(x) for x in (part.drive.phase, part.drive.speed))
     return model.driven(0.0, angle, rate)
 

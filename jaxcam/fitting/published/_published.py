@@ -192,7 +192,7 @@ def _check_lengths(number: int, names, priors) -> None:
             )
     if not np.all(priors > 0):
         raise ValueError(
-            "Give positive `tolerances`; leave out of `where` what is known."
+            "Give positive `tolerances`; omit known parameters from `where`."
         )
 
 
@@ -250,7 +250,7 @@ def _described(program, cost, progress):
             progress(next(counted), cost(unknowns, value))
         return value, slope
 
-    # value and slope are asked for one after the other, at the same place
+    # value and slope are requested one after the other at the same point
     return lambda unknowns: cached(np.asarray(unknowns, dtype=float).tobytes())
 
 

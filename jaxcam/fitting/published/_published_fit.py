@@ -36,23 +36,19 @@ class PublishedFit:
     covariance: Float[np.ndarray, "p p"]
     """Covariance of the estimates, shape `(p, p)`."""
     shares: Float[np.ndarray, " p"]
-    """`(p,)` and `(p, p)`; share of the information on each combination of
-    parameters that comes from the data and not from the priors (0 to 1), ascending,
-    and the combinations, one per row, in units of the tolerances.
+    """Share of the information on each combination of parameters that comes from
+    the data and not from the priors (0 to 1), ascending, shape `(p,)`.
     """
     directions: Float[np.ndarray, "p p"]
-    """`(p,)` and `(p, p)`; share of the information on each combination of
-    parameters that comes from the data and not from the priors (0 to 1), ascending,
-    and the combinations, one per row, in units of the tolerances.
-    """
+    """The combinations, one per row, in units of the tolerances, shape `(p, p)`."""
     published: tuple[Any, ...]
     """The published numbers."""
     predicted: Float[np.ndarray, " n"]
     """The computed numbers, shape `(n,)`."""
     steps: int
-    """Iterations, and whether the last stage met its tolerance."""
+    """Number of iterations."""
     converged: bool
-    """Iterations, and whether the last stage met its tolerance."""
+    """Whether the last stage met its tolerance."""
 
     @staticmethod
     def build(
@@ -176,8 +172,8 @@ class PublishedFit:
                 f"{sign * direction[k]:+.2f} {self.names[k]}" for k in main
             )
             sentences.append(
-                f"The data give {100 * part:.2g} % of what is known of the combination "
-                f"{words} (in units of the tolerances)."
+                f"The data give {100 * part:.2g} % of the information on the "
+                f"combination {words} (in units of the tolerances)."
             )
         return sentences
 

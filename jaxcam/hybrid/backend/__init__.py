@@ -1,9 +1,9 @@
-"""The event loop as code of this machine, made by LLVM from the traced attempt.
+"""Compile the event loop to machine code with LLVM, from the traced attempt.
 
-XLA compiles an attempt as hundreds of inner loops over a batch, with shared values in
-memory in between. Here one loop holds one attempt for as many batch elements as a
-vector has numbers, and elements that end are replaced inside of it. For runs that are
-not traced; the program is the same, results differ by rounding.
+XLA compiles an attempt as hundreds of inner loops over a batch and passes values
+between them through memory. Here a single loop contains one attempt for as many batch
+elements as fit into a vector, and replaces elements that end. It is used for runs that
+are not traced. The program is the same; results differ by rounding errors.
 """
 
 from ._attempts import (

@@ -1,7 +1,7 @@
-"""Operations on small arrays of numbers: which element goes where, sums and products.
+"""Operations on small arrays: rearrangements, sums and products.
 
-An array is a numpy array of elements, each a number that is known while tracing (of
-numpy) or a value of LLVM.
+An array is a numpy array whose elements are numbers known while tracing (numpy) or
+values of LLVM.
 """
 
 import functools
@@ -18,16 +18,17 @@ from ._elementwise import elementwise
 from ._writer import Lacking, Writer
 
 
-# operations that only move elements, by indices that are known
+# operations that only move elements, by known indices
 MOVES = frozenset(
     """
     broadcast_in_dim concatenate copy dynamic_slice dynamic_update_slice expand_dims
     gather pad rev reshape scatter slice split squeeze stack transpose
     """.split()
 )
-# numbers that a scatter may combine: a float holds as many bits
+# maximum number of values that a scatter may combine: the bits of a float
 _BITS = 52
-# elements of a table that are compared one by one with an index that is not known
+# maximum size of a table whose elements are selected by comparison with an unknown
+# index
 _MOST = 512
 
 
@@ -37,7 +38,7 @@ def known(elements: np.ndarray) -> bool:
 
 @no_type_check
 def moved(equation, inputs) -> list[np.ndarray]:
-    """What goes where, by sending the indices of all elements the same way.
+    """Return the source index of each element, by applying the operation to indices.
 
     Operands that are indices must be known.
     """
@@ -50,7 +51,7 @@ def moved(equation, inputs) -> list[np.ndarray]:
         if i in numbers:
             sent.append(jnp.asarray(join_known(elements)))
             continue
-        # zero stays free: it is what a fill is
+        # zero is reserved for fill values
         first = sum(map(len, flat)) + 1
         places = np.arange(first, first + elements.size, dtype=np.int64)
         flat.append(elements.ravel())
@@ -75,7 +76,7 @@ def moved(equation, inputs) -> list[np.ndarray]:
 
 @no_type_check
 def _plainly_moved(equation, inputs):
-    """The most frequent moves by numpy alone; else `None`."""
+    """Return the most frequent rearrangements, by numpy alone; otherwise `None`."""
     name, params, first = equation.primitive.name, equation.params, inputs[0]
     if name in ("reshape", "squeeze", "expand_dims", "copy"):
         return first.reshape(equation.outvars[0].aval.shape)
@@ -97,7 +98,7 @@ def _plainly_moved(equation, inputs):
 
 
 def _fill(equation):
-    """What a gather gives where it reaches beyond the array."""
+    """Return the value of a gather beyond the array."""
     dtype, value = equation.outvars[0].aval.dtype, equation.params.get("fill_value")
     if value is None:
         inexact = np.issubdtype(dtype, np.inexact)
@@ -106,7 +107,7 @@ def _fill(equation):
 
 
 def _indices_of(name: str, count: int) -> tuple[int, ...]:
-    """Which operands are indices."""
+    """Return which operands are indices."""
     if name == "gather" or name.startswith("scatter"):
         return (1,)
     if name == "dynamic_slice":
@@ -114,7 +115,7 @@ def _indices_of(name: str, count: int) -> tuple[int, ...]:
     return tuple(range(2, count)) if name == "dynamic_update_slice" else ()
 
 
-# scatters that combine what is there with what comes, and by what
+# scatters that combine old and new values, and the operation
 SCATTERS = {
     "scatter-add": "add",
     "scatter-sub": "sub",
@@ -126,14 +127,14 @@ SCATTERS = {
 
 @no_type_check
 def scattered(operation: Callable, equation, inputs) -> np.ndarray:
-    """A scatter that combines, by indices that are known.
+    """Emit a combining scatter with known indices.
 
-    **Raises:** `Lacking` where more numbers come than a float has bits.
+    **Raises:** `Lacking` if more values are combined than a float has bits.
     """
     onto, where, given = inputs
     if given.size > _BITS:
         raise Lacking(f"{equation.primitive.name} of {given.size} numbers")
-    # a bit for each number that comes says where it goes
+    # one bit per value marks its destination
     bits = 2.0 ** np.arange(given.size).reshape(given.shape)
     params = equation.params
     with jax.ensure_compile_time_eval():
@@ -159,7 +160,7 @@ def has_known_indices(equation, inputs) -> bool:
 
 @no_type_check
 def looked_up(w: Writer, equation, inputs, dtypes) -> list[np.ndarray]:
-    """A move by indices that are not known: by comparison with all there may be."""
+    """Emit a rearrangement by unknown indices: compare with all possible ones."""
     name = equation.primitive.name
     if name in ("dynamic_slice", "dynamic_update_slice"):
         return _sliced(w, equation, inputs, dtypes)
@@ -170,7 +171,7 @@ def looked_up(w: Writer, equation, inputs, dtypes) -> list[np.ndarray]:
         raise Lacking("gather of a batch")
     shape, sizes = inputs[0].shape, equation.params["slice_sizes"]
     room = [shape[d] - sizes[d] + 1 for d in numbers.start_index_map]
-    # beyond the array it fills, or takes the nearest
+    # beyond the array, use the fill value or the nearest element
     mode = str(equation.params["mode"]).upper()
     clips = "FILL" not in mode
     return _by_comparison(w, equation, inputs, (1,), room, clips, dtypes)
@@ -240,12 +241,12 @@ def _by_comparison(w: Writer, equation, inputs, places, room, clips, dtypes):
 
 
 def value_of(w: Writer, element, dtype):
-    """An element as a value."""
+    """Return an element as a value."""
     return w.number(element, dtype) if is_known(element) else element
 
 
 def reduced(operation: Callable, elements: np.ndarray, axes) -> np.ndarray:
-    """All elements along some axes as one."""
+    """Reduce the elements along some axes."""
     moved_axes = np.moveaxis(elements, axes, range(len(axes)))
     shape = moved_axes.shape[len(axes) :]
     columns = moved_axes.reshape((-1, *shape))
@@ -259,7 +260,7 @@ def reduced(operation: Callable, elements: np.ndarray, axes) -> np.ndarray:
 
 
 def running(operation: Callable, elements: np.ndarray, axis: int, reverse: bool):
-    """Along an axis each element with all before it, or all after it."""
+    """Compute a cumulative reduction along an axis, forwards or backwards."""
     out = np.moveaxis(elements.copy(), axis, 0)
     out = out[::-1] if reverse else out
     for k in range(1, out.shape[0]):
@@ -270,7 +271,7 @@ def running(operation: Callable, elements: np.ndarray, axis: int, reverse: bool)
 
 
 def product(add: Callable, multiply: Callable, a, b, numbers) -> np.ndarray:
-    """A product of matrices, or of batches of them."""
+    """Multiply matrices, or batches of them."""
     (left, right), (batch_left, batch_right) = numbers
     rest_a = [d for d in range(a.ndim) if d not in (*left, *batch_left)]
     rest_b = [d for d in range(b.ndim) if d not in (*right, *batch_right)]
@@ -288,7 +289,9 @@ def product(add: Callable, multiply: Callable, a, b, numbers) -> np.ndarray:
 
 @no_type_check
 def extreme_place(w: Writer, name: str, elements, axes, dtype, index_dtype):
-    """Where along an axis the largest or smallest element is; NaN before all."""
+    """Return the position of the largest or smallest element along an axis; NaN takes
+    precedence.
+    """
     (axis,) = axes
     columns = np.moveaxis(elements, axis, 0)
     sign = "gt" if name == "argmax" else "lt"

@@ -1,4 +1,4 @@
-"""Attempts of the event loop compiled for this machine, and how they are run."""
+"""Compile attempts of the event loop for this machine, and run them."""
 
 import ctypes
 import logging
@@ -18,7 +18,7 @@ from ._machine import Compiled, compiled
 from ._writer import kind_of, Lacking
 
 
-# rounds of a call, after which Python may be interrupted or show progress
+# rounds per call; between calls Python may be interrupted or show progress
 _PATIENCE = 200_000
 _POINTERS = (ctypes.c_void_p,) * 8
 _ARGUMENTS = (
@@ -34,7 +34,7 @@ _SAID: set[str] = set()
 
 
 class Layout(NamedTuple):
-    """Where arrays of a pytree are among numbers; hashable."""
+    """Positions of the arrays of a pytree in a vector of numbers; hashable."""
 
     structure: Any
     shapes: tuple
@@ -45,7 +45,7 @@ class Layout(NamedTuple):
         return sum(int(np.prod(shape)) for shape in self.shapes)
 
     def tree(self, numbers):
-        """The pytree of these numbers, `(size,)`."""
+        """Return the pytree of these numbers, `(size,)`."""
         leaves, first = [], 0
         for shape, dtype in zip(self.shapes, self.dtypes, strict=True):
             last = first + int(np.prod(shape))
@@ -55,15 +55,15 @@ class Layout(NamedTuple):
 
 
 def laid_out(tree, lanes: int | None = None) -> tuple[np.ndarray, Layout]:
-    """The arrays of a pytree as 64-bit floats: `(size,)`, or `(lanes, size)`.
+    """Return the arrays of a pytree as 64-bit floats: `(size,)`, or `(lanes, size)`.
 
-    **Raises:** `Lacking` where a number is not one.
+    **Raises:** `Lacking` if an element is not a number.
     """
     leaves, structure = jax.tree.flatten(tree)
     rows, shapes, dtypes = [], [], []
     number, head = (1, 0) if lanes is None else (lanes, 1)
     for array in leaves:
-        # a random key is an array, too
+        # a random key is also an array
         kind_of(array.dtype)
         leaf = np.asarray(array)
         floats = leaf.astype(np.float64)
@@ -78,34 +78,34 @@ def laid_out(tree, lanes: int | None = None) -> tuple[np.ndarray, Layout]:
 
 
 class Key(NamedTuple):
-    """What an attempt is compiled for; hashable."""
+    """The key of a compiled attempt; hashable."""
 
-    # what is no array in system and plan, with its types, and where it is
+    # non-array parts of system and plan, with types and positions
     static: tuple
     structure: Any
-    # arrays of system and plan that differ between batch elements, and that do not
+    # arrays of system and plan that differ between batch elements, and shared arrays
     own: Layout
     shared: Layout
     # pytree of the scalars of the state, and their types
     lane: Any
     dtypes: tuple
-    # what is made of a record and the state after it: a place in the log, and a row
+    # function from a record and the following state to a place in the log and a row
     row: Callable
     width: int
 
 
 def key_of(static, own: Layout, shared: Layout, lane: LoopState, row, width) -> Key:
-    """The key of an attempt of such a lane."""
+    """Return the key of an attempt for such a batch element."""
     leaves, structure = jax.tree.flatten(static)
     scalars, lane_structure = jax.tree.flatten(lane)
-    # 1, 1.0 and True are equal, and different programs
+    # 1, 1.0 and True compare equal but need different programs
     kinds = tuple((type(leaf), leaf) for leaf in leaves)
     dtypes = tuple(np.dtype(s.dtype) for s in scalars)
     return Key(kinds, structure, own, shared, lane_structure, dtypes, row, width)
 
 
 def traced(key: Key) -> Program:
-    """One attempt as a program."""
+    """Trace one attempt as a program."""
     static = jax.tree.unflatten(key.structure, [leaf for _, leaf in key.static])
 
     def attempt(own, shared, *scalars):
@@ -139,12 +139,14 @@ def traced(key: Key) -> Program:
 
 
 class Sizes(NamedTuple):
-    """How many numbers there are in a state, of its own and in a row of the log."""
+    """Return the number of values in a state, in the element's own data and in a row of
+    the log.
+    """
 
     state: int
     own: int
     row: int
-    # which number of the state counts the attempts
+    # index of the attempt counter in the state
     steps: int
 
 
@@ -170,11 +172,11 @@ class Attempts:
         limit: float,
         between: Callable[[], None] | None = None,
     ) -> int:
-        """Run batch elements to their ends, or to `limit` attempts each.
+        """Run batch elements to the end, or to `limit` attempts each.
 
-        **Arguments:** numbers of system and plan, `(k,)` and `(lanes, k)`; those of the
-        states, `(lanes, k)`, which are changed in place; the log, `(lanes, places,
-        k)`, whose place `first` comes first; and what is called between two calls.
+        **Arguments:** values of system and plan, `(k,)` and `(lanes, k)`; values of the
+        states, `(lanes, k)`, which are changed in place; the log, `(lanes, places, k)`,
+        which begins with place `first`; and a callback between calls.
 
         **Returns:** the number of attempts in each slot.
         """
@@ -198,9 +200,10 @@ _LOCK = threading.Lock()
 
 
 def attempts_of(key: Key) -> Attempts:
-    """The loop for a key, compiled once.
+    """Return the loop for a key, compiled once.
 
-    **Raises:** `Lacking` where the program needs what the back end has not.
+    **Raises:** `Lacking` if the program needs an operation that the back end does not
+    have.
     """
     with _LOCK:
         if key not in _KNOWN:
@@ -215,16 +218,20 @@ def attempts_of(key: Key) -> Attempts:
 
 
 def say_lacking(lacking: Lacking, demanded: bool) -> None:
-    """Say once that a system runs by XLA; or raise where it must not.
+    """Report once that a system runs with XLA, or raise if that is not allowed.
 
     **Raises:** `ValueError`.
     """
     text = (
-        f"the LLVM back end cannot compile this system: it has no {lacking}. "
-        'Settings(backend="auto") runs it by XLA, which is slower'
+        "the LLVM back end cannot compile this system, because it does not "
+        f'support {lacking}; Settings(backend="auto") runs the system with XLA, '
+        "which is slower"
     )
     if demanded:
         raise ValueError(text) from lacking
     if str(lacking) not in _SAID:
         _SAID.add(str(lacking))
-        _LOG.warning("the system runs by XLA: the LLVM back end has no %s", lacking)
+        _LOG.warning(
+            ("the system runs with XLA, because the LLVM back end does not support %s"),
+            lacking,
+        )

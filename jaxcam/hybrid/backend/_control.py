@@ -1,8 +1,8 @@
-"""Branches and loops inside a program, for batch elements that go different ways.
+"""Branches and loops inside a program, for batch elements that take different paths.
 
-Of a branch all sides are computed and one is chosen; a loop goes on until it is over
-for all. In a side that counts for some batch elements only, loops do not wait for the
-others.
+All sides of a branch are computed and one is selected; a loop continues until it has
+ended for all elements. In a side that is active for only some batch elements, loops do
+not wait for the others.
 """
 
 from collections.abc import Callable
@@ -16,15 +16,15 @@ from ._arrays import value_of
 from ._writer import INT64, kind_of, Lacking, Writer
 
 
-# operations that a loop of known length may be written out to
+# maximum number of operations of an unrolled loop
 _UNROLLED = 6000
-# numbers that a loop may keep on the stack
+# maximum number of values of a loop on the stack
 _KEPT = 16384
 
 
 @no_type_check
 def branches(w: Writer, program: Callable, equation, inputs):
-    """One of several sides, by a number that says which."""
+    """Select one of several sides by an index."""
     which, *arguments = inputs
     sides = equation.params["branches"]
     dtype = equation.invars[0].aval.dtype
@@ -43,7 +43,9 @@ def branches(w: Writer, program: Callable, equation, inputs):
 
 @no_type_check
 def _is_side(w: Writer, index, k: int, number: int, dtype):
-    """Whether it is this side; beyond the first and the last these are taken."""
+    """Return whether the index selects this side; indices out of range select the first
+    or the last.
+    """
     if dtype == np.bool_:
         return index if k else w.builder.not_(index)
     sign = "<=" if k == 0 else ">=" if k == number - 1 else "=="
@@ -65,7 +67,7 @@ def _chosen(w: Writer, side, here, results, others):
 
 
 class _Carried:
-    """The numbers that a loop takes from round to round, as vectors."""
+    """The values that a loop carries from round to round, as vectors."""
 
     def __init__(self, w: Writer, avals, start):
         self.w, self.avals = w, avals
@@ -106,7 +108,7 @@ class _Carried:
 
 @no_type_check
 def while_loop(w: Writer, program: Callable, equation, inputs):
-    """Rounds until no batch element goes on; one that is over stays as it is."""
+    """Repeat until all batch elements have ended; ended ones do not change."""
     params, b = equation.params, w.builder
     first, second = params["cond_nconsts"], params["body_nconsts"]
     of_test, of_body = inputs[:first], inputs[first : first + second]
@@ -134,7 +136,7 @@ def while_loop(w: Writer, program: Callable, equation, inputs):
 
 @no_type_check
 def scan(w: Writer, program: Callable, size: Callable, equation, inputs):
-    """A known number of rounds, written out where they are short."""
+    """Repeat a known number of times, unrolled if the body is short."""
     params = equation.params
     number, length = params["num_carry"], params["length"]
     fixed, rest = inputs[: params["num_consts"]], inputs[params["num_consts"] :]
@@ -204,14 +206,14 @@ def _rolled(w: Writer, program: Callable, body, parts, length: int, reverse: boo
 
 
 class _Table:
-    """Rows of numbers on the stack, found by a number that is not known."""
+    """Rows of values on the stack, accessed by an unknown index."""
 
     def __init__(self, w: Writer, dtype, array, shape=None):
         self.w, self.dtype = w, dtype
         self.shape = array.shape if shape is None else shape
         self.size = int(np.prod(self.shape[1:]))
         kind = kind_of(dtype)
-        # flags take a byte each
+        # each flag takes a byte
         self.kind = w.vector(ir.IntType(8) if kind == ir.IntType(1) else kind)
         if self.shape[0] * self.size > _KEPT:
             raise Lacking(f"scan over {self.shape[0]} rows of {self.size}")

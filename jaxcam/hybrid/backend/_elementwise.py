@@ -1,7 +1,7 @@
-"""One operation of JAX on numbers, as XLA has it where a number is none.
+"""Elementwise operations of JAX, with the conventions of XLA for NaN.
 
-A function here takes the writer, the parameters of the operation, the type of its
-operands in JAX, and the operands, all scalars or all vectors.
+Each function takes the writer, the parameters of the operation, the type of its
+operands in JAX, and the operands, which are all scalars or all vectors.
 """
 
 from typing import no_type_check
@@ -83,7 +83,7 @@ def elementwise(w: Writer, name: str, params, dtype, x):
 
 
 def _of_doubles(w: Writer, name: str, dtype, x):
-    """Functions that are known for 64-bit floats; others are computed as these."""
+    """Wrap a function of 64-bit floats for other types."""
     b, kind = w.builder, x[0].type
     narrow = str(dtype) == "float32"
     if narrow:
@@ -135,7 +135,7 @@ def _comparison(w: Writer, sign: str, dtype, x):
 
 @no_type_check
 def _ordered(w: Writer, sign: str, dtype, x):
-    """Comparison in an order of all floats, in which NaN has a place of its own."""
+    """Compare in a total order of floats, which includes NaN."""
     if not is_float(dtype):
         return _comparison(w, sign, dtype, x)
     b, size = w.builder, kind_of(dtype)
@@ -152,12 +152,12 @@ def _ordered(w: Writer, sign: str, dtype, x):
 
 @no_type_check
 def _extreme(w: Writer, name: str, dtype, left, right):
-    """The larger or the smaller one; of a number and none it is none."""
+    """Return the larger or the smaller operand; NaN if either is NaN."""
     b, sign = w.builder, ">" if name == "max" else "<"
     left, right = w.alike([left, right])
     if not is_float(dtype):
         return b.select(_comparison(w, sign, dtype, [left, right]), left, right)
-    # a comparison with NaN fails and takes the second
+    # a comparison with NaN is false and selects the second operand
     if isinstance(left, ir.Constant):
         return b.select(b.fcmp_ordered(sign, left, right), left, right)
     made = b.select(b.fcmp_ordered(sign, right, left), right, left)
@@ -171,7 +171,7 @@ def _sign(w: Writer, x, dtype):
     b = w.builder
     if is_float(dtype):
         one = w.call("llvm.copysign", [w.like(x, 1.0), x])
-        # zero keeps its sign, and NaN stays
+        # preserve the sign of zero, and NaN
         moves = b.fcmp_ordered("!=", x, w.like(x, 0.0))
         return b.select(moves, one, x)
     zero = w.like(x, 0)
@@ -183,7 +183,7 @@ def _sign(w: Writer, x, dtype):
 
 @no_type_check
 def _power(w: Writer, x, exponent: int, dtype):
-    """By squaring, in the order in which JAX does it."""
+    """Compute an integer power by squaring, in the order of JAX."""
     one = 1.0 if is_float(dtype) else 1
     if exponent == 0:
         return w.like(x, one)
@@ -222,7 +222,9 @@ def _of_integers(w: Writer, name: str, dtype, x):
 
 @no_type_check
 def _quotient(w: Writer, name: str, signed: bool, x):
-    """Division by zero gives -1 and leaves everything; the least number over -1 too."""
+    """Divide integers: division by zero gives -1 and the dividend as remainder; so does
+    the smallest number divided by -1.
+    """
     b, (over, under) = w.builder, x
     zero, one, least = w.like(under, 0), w.like(under, 1), w.like(under, -1)
     odd = b.icmp_signed("==", under, zero)
@@ -242,7 +244,7 @@ def _quotient(w: Writer, name: str, signed: bool, x):
 
 @no_type_check
 def converted(w: Writer, x, old, new):
-    """A number as one of another type, saturated where it does not fit."""
+    """Convert a number to another type, saturated if it is out of range."""
     if old == new:
         return x
     b, kind = w.builder, w.with_kind(x, kind_of(new))
@@ -266,7 +268,7 @@ def converted(w: Writer, x, old, new):
     return b.sext(x, kind) if from_signed else b.zext(x, kind)
 
 
-# of each reduction the operation between two elements
+# the binary operation of each reduction
 REDUCED = {
     "reduce_sum": "add",
     "reduce_prod": "mul",
@@ -276,9 +278,9 @@ REDUCED = {
     "reduce_or": "or",
     "reduce_xor": "xor",
 }
-# and of each running one
+# the binary operation of each cumulative reduction
 RUNNING = {"cumsum": "add", "cumprod": "mul", "cummax": "max", "cummin": "min"}
-# operations on each element alone
+# elementwise operations
 ELEMENTWISE: frozenset[str] = (
     frozenset(
         """

@@ -1,4 +1,4 @@
-"""A program of JAX as instructions of LLVM, operation by operation."""
+"""Translate a program of JAX to instructions of LLVM, operation by operation."""
 
 from typing import no_type_check
 
@@ -25,19 +25,19 @@ from ._elementwise import ELEMENTWISE, elementwise, REDUCED, RUNNING
 from ._writer import Lacking, Writer
 
 
-# operations that leave a number as it is
+# operations that do not change a value
 _NOTHING = frozenset({"stop_gradient", "optimization_barrier"})
 
 
 class Emitter:
-    """Writes programs; their numbers are elements of numpy arrays."""
+    """Emits programs; their values are elements of numpy arrays."""
 
     def __init__(self, writer: Writer):
         self.w = writer
 
     @no_type_check
     def program(self, jaxpr, consts, arguments) -> list[np.ndarray]:
-        """The results of a jaxpr.
+        """Emit a jaxpr and return its results.
 
         **Raises:** `Lacking` with the name of an operation that cannot be written.
         """
@@ -85,7 +85,7 @@ class Emitter:
                 for i in inputs
             ]
             out = np.empty(output.shape, dtype=object)
-            # types of the numbers that are computed with, not of a choice
+            # types of the operands, without the selector
             dtype = dtypes[1] if name == "select_n" else dtypes[0]
             out.ravel()[:] = [
                 self._scalar(name, params, dtype, dtypes, scalars)
@@ -127,7 +127,7 @@ class Emitter:
 
 
 def boxed(array) -> np.ndarray:
-    """An array of known numbers, element by element."""
+    """Return an array of known numbers, element by element."""
     array = np.asarray(array)
     out = np.empty(array.shape, dtype=object)
     for index in np.ndindex(array.shape):
@@ -137,7 +137,7 @@ def boxed(array) -> np.ndarray:
 
 @no_type_check
 def _inside(equation):
-    """The program and the constants of a call; else `None`."""
+    """Return the program and the constants of a call; otherwise `None`."""
     name, params = equation.primitive.name, equation.params
     if name in ("custom_jvp_call", "custom_vjp_call", "custom_vjp_call_jaxpr"):
         inner = params.get("call_jaxpr", params.get("fun_jaxpr"))
@@ -150,7 +150,7 @@ def _inside(equation):
 
 @no_type_check
 def operations(jaxpr) -> int:
-    """How many operations a program has, loops inside counted once."""
+    """Return the number of operations in a program; a loop body counts once."""
     total = 0
     for equation in jaxpr.eqns:
         total += 1

@@ -1,9 +1,9 @@
 """The loop around an attempt: a vector of batch elements, refilled one by one.
 
-The numbers of the batch elements at work stand in slots, a row for each number and a
-column for each slot. Each round loads them, writes one attempt and stores what it
-made; whatever is rare (a row of the log, the end of a batch element) is done slot by
-slot in loops of their own.
+The values of the active batch elements are in slots, with one row per value and one
+column per slot. Each round loads them, performs one attempt and stores the results.
+Rare operations (writing a row of the log, the end of a batch element) are done slot by
+slot in separate loops.
 """
 
 import contextlib
@@ -26,21 +26,21 @@ _FLOAT = np.dtype(np.float64)
 
 
 class Program(NamedTuple):
-    """One attempt: a jaxpr of shared numbers, own numbers and those of the state.
+    """One attempt: a jaxpr of shared values, own values and the state.
 
-    The first two are arrays, the rest scalars. Results are the scalars of the state
-    after it, the place of a row of the log (negative for none), and that row.
+    The first two are arrays, the rest scalars. Results are the scalars of the new
+    state, the place of a row of the log (negative if there is none), and that row.
     """
 
     jaxpr: Any
     consts: list
-    # types of the scalars of the state, and which of them are status and attempts
+    # types of the scalars of the state, and the indices of status and attempt counter
     dtypes: tuple
     status: int
     steps: int
     shared: int
     own: int
-    # numbers in a row of the log
+    # number of values in a row of the log
     row: int
 
 
@@ -51,7 +51,7 @@ class _Arguments(NamedTuple):
     slots: Any
     work: Any
     order: Any
-    # the place in the order that comes next; rounds so far
+    # index of the next batch element; number of rounds
     cursor: Any
     log: Any
     queued: Any
@@ -67,7 +67,9 @@ _KINDS = (
 
 
 def module_of(program: Program, width: int) -> ir.Module:
-    """A module with the function `ENTRY`, for vectors of `width` batch elements."""
+    """Return a module with the function `ENTRY`, for vectors of `width` batch
+    elements.
+    """
     module = ir.Module("attempts")
     function = ir.Function(module, ir.FunctionType(INT64, _KINDS), ENTRY)
     for argument in function.args:
@@ -148,7 +150,7 @@ class _Kernel:
 
     @contextlib.contextmanager
     def _each(self, count):
-        """A loop over 0, 1, ... below `count`, which is above zero."""
+        """Emit a loop over 0, 1, ..., `count` - 1; `count` must be positive."""
         b = self.b
         before, head = b.block, b.append_basic_block("each")
         b.branch(head)
@@ -163,16 +165,16 @@ class _Kernel:
         b.position_at_end(after)
 
     def _column(self, row):
-        """The vector of a row of the slots."""
+        """Return a row of the slots as a vector."""
         place = self.b.gep(self.a.slots, [self._int(row * self.w.width)])
         return self.b.bitcast(place, self.w.vector(DOUBLE).as_pointer())
 
     def _slot(self, row, k):
-        """The place of one number of one slot."""
+        """Return the address of one value of one slot."""
         return self.b.add(self.b.mul(row, self._int(self.w.width)), k)
 
     def _bits(self, flags):
-        """Flags as one number, a bit each."""
+        """Return flags as the bits of one number."""
         if not isinstance(flags.type, ir.VectorType):
             return flags
         return self.b.bitcast(flags, ir.IntType(self.w.width))
@@ -181,14 +183,18 @@ class _Kernel:
         return self.b.icmp_unsigned("!=", bits, ir.Constant(bits.type, 0))
 
     def _copy(self, numbers: int, source, place, target, to) -> None:
-        """A loop that copies numbers; `place` and `to` say where, of the count."""
+        """Emit a loop that copies values; `place` and `to` map the count to
+        addresses.
+        """
         if not numbers:
             return
         with self._each(self._int(numbers)) as i:
             self._store(self._load(source, place(i)), target, to(i))
 
     def _refill(self) -> Any:
-        """Put ended batch elements back and waiting ones in; who is there, by bits."""
+        """Store ended batch elements and load waiting ones; return the occupied slots
+        as bits.
+        """
         b, a = self.b, self.a
         with self._each(self._int(self.w.width)) as k:
             lane = self._load(a.work, k)
@@ -234,7 +240,9 @@ class _Kernel:
         return self._bits(b.icmp_signed(">=", lanes, self.w.like(lanes, 0)))
 
     def _going(self, status, steps):
-        """Whether batch elements of this status and so many attempts go on."""
+        """Return whether batch elements with this status and number of attempts
+        continue.
+        """
         running = self.b.fcmp_ordered("==", status, self.w.like(status, RUNNING))
         limit = self.a.limit
         if isinstance(status.type, ir.VectorType):
@@ -249,7 +257,9 @@ class _Kernel:
         return self._going(status, steps)
 
     def _attempt(self, row):
-        """One attempt in all slots; the place of its row of the log in each."""
+        """Emit one attempt in all slots; return the place of the log row of each
+        slot.
+        """
         b, p = self.b, self.p
         columns = [b.load(self._column(k), align=8) for k in range(self.states + p.own)]
         leaves = [
@@ -271,7 +281,7 @@ class _Kernel:
         return kept[self.states]
 
     def _number(self, element, dtype):
-        """An element of a result as a vector of floats."""
+        """Return an element of a result as a vector of floats."""
         if not isinstance(element, ir.Value):
             return self.w.spread(self.w.number(float(element), _FLOAT))
         return self.w.spread(converted(self.w, element, dtype, _FLOAT))
@@ -281,7 +291,7 @@ class _Kernel:
         return self._bits(here)
 
     def _log(self, row, place) -> None:
-        """Copy rows of the log to where they belong."""
+        """Copy rows to the log."""
         b, a, p = self.b, self.a, self.p
         places = self.w.memory(self.w.vector(DOUBLE), 1)
         b.store(place, places)

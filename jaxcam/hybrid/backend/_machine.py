@@ -1,4 +1,4 @@
-"""Compiling a module for this machine, once; the code is kept on disk."""
+"""Compile a module for this machine once, and store the code on disk."""
 
 import ctypes
 import functools
@@ -16,12 +16,12 @@ import llvmlite
 import llvmlite.binding as llvm
 
 
-# as XLA: no change of the order of operations
+# as in XLA, the order of operations is not changed
 _LEVEL = 2
 
 
 class Compiled:
-    """A function of the machine; it keeps its code alive."""
+    """A compiled function; it keeps its code alive."""
 
     def __init__(self, tracker, name: str, result, arguments):
         self._tracker = tracker
@@ -44,7 +44,7 @@ def _features() -> str:
 
 @functools.cache
 def vector_width() -> int:
-    """How many 64-bit floats a register of this machine holds."""
+    """Return the number of 64-bit floats in a register of this machine."""
     features = llvm.get_host_cpu_features()
     if features.get("avx512f"):
         return 8
@@ -52,7 +52,7 @@ def vector_width() -> int:
 
 
 def _machine():
-    # small: constants are operands, found by their distance from the code
+    # the small code model: constants are addressed relative to the code
     return _target().create_target_machine(
         cpu=llvm.get_host_cpu_name(),
         features=_features(),
@@ -64,7 +64,7 @@ def _machine():
 
 @functools.cache
 def _linker():
-    """What loads code; JITLink keeps a function and its constants together."""
+    """Return the code loader; JITLink keeps a function and its constants together."""
     return llvm.create_lljit_compiler(_machine(), use_jit_link=True)
 
 
@@ -73,7 +73,7 @@ _LOCK = threading.Lock()
 
 
 def compiled(text: str, name: str, result, arguments) -> Compiled:
-    """The function `name` of a module in LLVM's language."""
+    """Compile the function `name` of a module of LLVM IR."""
     _target()
     key = _key(text)
     code = _stored(key)
@@ -90,7 +90,7 @@ def compiled(text: str, name: str, result, arguments) -> Compiled:
 def _code_of(text: str) -> bytes:
     module, machine = llvm.parse_assembly(text), _machine()
     options = llvm.create_pipeline_tuning_options(speed_level=_LEVEL)
-    # it is written as vectors already
+    # the code is already vectorised
     options.loop_vectorization = options.slp_vectorization = False
     builder = llvm.create_pass_builder(machine, options)
     builder.getModulePassManager().run(module, builder)
@@ -111,7 +111,7 @@ def _key(text: str) -> str:
 
 
 def user_cache() -> Path:
-    """The folder in which this user's programs keep what can be made again."""
+    """Return the cache folder of the user."""
     if sys.platform == "win32" and os.environ.get("LOCALAPPDATA"):
         return Path(os.environ["LOCALAPPDATA"])
     if sys.platform == "darwin":
@@ -120,7 +120,7 @@ def user_cache() -> Path:
 
 
 def _folder() -> Path | None:
-    """Where compiled code is kept: with that of XLA if it has a place."""
+    """Return the folder of compiled code: next to that of XLA, if it has one."""
     given = jax.config.jax_compilation_cache_dir  # pyright: ignore
     try:
         folder = Path(given) if given else user_cache() / "jaxcam" / "compiled"
@@ -139,7 +139,7 @@ def _stored(key: str) -> bytes | None:
         content = (folder / key).read_bytes()
     except OSError:
         return None
-    # a file that was cut off, or changed, is made again
+    # a truncated or modified file is replaced
     mark, code = content[:32], content[32:]
     return code if hashlib.sha256(code).digest() == mark else None
 

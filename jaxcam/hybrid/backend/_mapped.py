@@ -1,4 +1,4 @@
-"""A function of numbers, for many batch elements one after the other."""
+"""Apply a compiled function to many batch elements."""
 
 import ctypes
 from typing import Any, NamedTuple
@@ -59,7 +59,7 @@ def _module_of(traced: _Traced, width: int) -> ir.Module:
     first.add_incoming(number(0), before)
 
     def column(array, k):
-        """`width` numbers of row k of an array."""
+        """Return `width` values of row k of an array."""
         place = b.gep(array, [b.add(b.mul(number(k), count), first)])
         return b.bitcast(place, writer.vector(DOUBLE).as_pointer())
 
@@ -83,11 +83,11 @@ def _module_of(traced: _Traced, width: int) -> ir.Module:
 
 
 class Mapped:
-    """`function(shared, own)`, a list of scalars, compiled for many `own`.
+    """Compile `function(shared, own)`, which returns a list of scalars, for many `own`.
 
-    **Arguments:** the function of two arrays of 64-bit floats, and their sizes.
+    **Arguments:** a function of two arrays of 64-bit floats, and their sizes.
 
-    **Raises:** `Lacking` with the name of an operation that the back end has not.
+    **Raises:** `Lacking` with the name of an operation that the back end does not have.
     """
 
     def __init__(self, function, shared: int, own: int, width: int | None = None):
@@ -99,12 +99,14 @@ class Mapped:
         self._function = compiled(text, _NAME, None, [*pointers, ctypes.c_int64])
 
     def __call__(self, shared, own) -> np.ndarray:
-        """Results as 64-bit floats, `(count, results)`, for `own` of `(count, k)`."""
+        """Return the results as 64-bit floats, `(count, results)`, for `own` `(count,
+        k)`.
+        """
         count = len(own)
         if not count:
             return np.empty((0, self.results))
         whole = -(-count // self.width) * self.width
-        # filled up by the last one: a function may not be defined at zero
+        # padded with the last element: a function may be undefined at zero
         rows = np.minimum(np.arange(whole), count - 1)
         columns = np.ascontiguousarray(np.asarray(own, dtype=float)[rows].T)
         shared = np.ascontiguousarray(shared, dtype=float)

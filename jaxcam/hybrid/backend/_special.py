@@ -1,8 +1,8 @@
-"""Exponentials, logarithms and remainders as vectors; the rest by the C library.
+"""Vectorised exponentials, logarithms and remainders; other functions by the C library.
 
 The formulas are those of fdlibm (Sun Microsystems, 1993) without branches: errors are
-below 1 ulp. A function of the C library is called once for each batch element; its
-error is that of the library, mostly below 1 ulp as well.
+below 1 ulp. A function of the C library is called once per batch element; its error is
+usually also below 1 ulp.
 """
 
 from typing import Any
@@ -31,7 +31,7 @@ _LOG = (
     1.531383769920937332e-01,
     1.479819860511658591e-01,
 )
-# operations that are functions of the C library
+# operations computed by the C library
 LIBRARY = frozenset(
     """
     acos acosh asin asinh atan atan2 atanh cbrt cos cosh erf erfc expm1 lgamma log1p
@@ -41,7 +41,7 @@ LIBRARY = frozenset(
 
 
 class Arithmetic:
-    """Short names for arithmetic on values of one shape and numbers of Python."""
+    """Short names for arithmetic on values of one shape and Python numbers."""
 
     def __init__(self, writer: Writer):
         self.w = writer
@@ -95,7 +95,7 @@ class Arithmetic:
 def exp(writer: Writer, x):
     """e^x of 64-bit floats, below 1 ulp."""
     a = Arithmetic(writer)
-    # beyond these limits the result is infinite, or zero; NaN stays
+    # beyond these limits the result is infinite or zero; NaN is preserved
     x = a.choose(a.less(x, -750.0), -750.0, x)
     x = a.choose(a.less(710.0, x), 710.0, x)
     turns = writer.call("llvm.rint", [a.mul(x, _LOG2_E)])
@@ -111,7 +111,7 @@ def exp2(writer: Writer, x):
     turns = writer.call("llvm.rint", [x])
     rest = a.sub(x, turns)
     high = a.b.fmul(rest, writer.like(rest, 0.6931471805599453))
-    # the rounding of this product, and of ln 2 itself
+    # rounding errors of this product and of ln 2 itself
     wrong = writer.call(
         "llvm.fma", [rest, writer.like(rest, 0.6931471805599453), a.b.fneg(high)]
     )
@@ -126,9 +126,9 @@ def _scaled_exp(a: Arithmetic, high, low, turns):
     c = a.sub(r, a.mul(z, a.horner(_EXP, z)))
     bend = a.div(a.mul(r, c), a.sub(2.0, c))
     y = a.sub(1.0, a.sub(a.sub(low, bend), high))
-    # in two factors, each of which is a float
+    # in two factors, each representable as a float
     whole = a.b.fptosi(turns, a.w.with_kind(turns, INT64))
-    # of NaN the number of turns is anything
+    # for NaN the number of turns is arbitrary
     whole = a.b.select(a.is_nan(turns), a.w.like(whole, 0), whole)
     half = a.b.ashr(whole, a.w.like(whole, 1))
     for part in (half, a.b.sub(whole, half)):
@@ -158,13 +158,13 @@ def log(writer: Writer, x):
     made = a.sub(a.mul(k, _LN2_HIGH), a.sub(a.sub(half, low), f))
     made = a.choose(a.equal(x, float("inf")), x, made)
     made = a.choose(a.equal(x, 0.0), float("-inf"), made)
-    # negative, or no number
+    # negative or NaN
     fine = a.b.fcmp_ordered(">=", x, writer.like(x, 0.0))
     return a.choose(fine, made, float("nan"))
 
 
 def remainder(writer: Writer, x, y):
-    """What is left of x after a whole number of y, with the sign of x; exact."""
+    """Return the exact remainder of x divided by y, with the sign of x."""
     name = f"remainder.{writer.width if isinstance(x.type, ir.VectorType) else 1}"
     known = writer.module.globals.get(name)
     if known is None:
@@ -182,7 +182,7 @@ def _write_remainder(writer: Writer, name: str, kind):
     x, y = function.args
     size, step = w.call("llvm.fabs", [x]), w.call("llvm.fabs", [y])
     ratio = w.call("llvm.trunc", [builder.fdiv(size, step)])
-    # a product and a difference without rounding: up to 2^53 steps the rest is a float
+    # product and difference are exact: up to 2^53 steps the remainder is a float
     rest = w.call("llvm.fma", [builder.fneg(ratio), step, size])
     rest = a.choose(a.less(rest, 0.0), builder.fadd(rest, step), rest)
     rest = a.choose(a.less(size, step), size, rest)
@@ -205,7 +205,7 @@ def _write_remainder(writer: Writer, name: str, kind):
 
 
 def library(writer: Writer, name: str, arguments):
-    """A function of the C library of 64-bit floats, for each batch element."""
+    """Call a function of the C library for each batch element."""
     arguments = writer.alike(arguments)
     if not isinstance(arguments[0].type, ir.VectorType):
         return _each(writer, name, arguments)

@@ -1,7 +1,7 @@
-"""Instructions for one batch element, or for as many as a vector holds.
+"""Emit instructions for one batch element, or for a vector of them.
 
-A number that is the same for all batch elements stays a scalar, so that the compiler
-takes what is made of such numbers alone out of the loop.
+A value that is the same for all batch elements stays a scalar, so that the compiler
+moves computations with such values out of the loop.
 """
 
 from typing import Any
@@ -10,7 +10,7 @@ import llvmlite.ir as ir
 import numpy as np
 
 
-# rounding of a product that is added to something may be left out, as XLA does
+# a product and a sum may be fused without intermediate rounding, as in XLA
 FAST = ("contract",)
 
 DOUBLE = ir.DoubleType()
@@ -25,11 +25,11 @@ _KINDS = {
 
 
 class Lacking(Exception):
-    """A program needs an operation that this back end has not; its name."""
+    """The name of an operation that a program needs and this back end does not have."""
 
 
 def kind_of(dtype) -> Any:
-    """The type of a scalar in LLVM."""
+    """Return the type of a scalar in LLVM."""
     if str(dtype) not in _KINDS:
         raise Lacking(f"numbers of type {dtype}")
     return _KINDS[str(dtype)]
@@ -40,19 +40,21 @@ def is_float(dtype) -> bool:
 
 
 class Writer:
-    """Writes into one function; `width` batch elements fit into a vector."""
+    """Emits instructions into one function; `width` batch elements fit into a
+    vector.
+    """
 
     def __init__(self, module: ir.Module, builder: ir.IRBuilder, width: int):
         self.module, self.builder, self.width = module, builder, width
-        # in branches and loops: for which batch elements the result counts
+        # in branches and loops: the batch elements for which the result counts
         self.mask: Any = None
 
     def vector(self, kind):
-        """The type of a number that differs from batch element to batch element."""
+        """Return the type of a value that differs between batch elements."""
         return kind if self.width == 1 else ir.VectorType(kind, self.width)
 
     def number(self, value, dtype):
-        """A number that is known, as a constant."""
+        """Return a known number as a constant."""
         kind = kind_of(dtype)
         if isinstance(kind, ir.IntType):
             bits = int(value) & (2**kind.width - 1)
@@ -60,7 +62,7 @@ class Writer:
         return ir.Constant(kind, float(np.dtype(dtype).type(value)))
 
     def spread(self, value):
-        """A number as a vector."""
+        """Return a value as a vector."""
         kind = value.type
         if self.width == 1 or isinstance(kind, ir.VectorType):
             return value
@@ -72,26 +74,26 @@ class Writer:
         return self.builder.shuffle_vector(one, empty, order)
 
     def alike(self, values) -> list:
-        """All of them as vectors, if one of them is."""
+        """Return all values as vectors, if one of them is a vector."""
         if any(isinstance(v.type, ir.VectorType) for v in values):
             return [self.spread(v) for v in values]
         return list(values)
 
     def like(self, value, number):
-        """A number of Python as a constant of the type of a value."""
+        """Return a Python number as a constant of the type of a value."""
         kind = value.type
         if isinstance(kind, ir.VectorType):
             return ir.Constant(kind, [ir.Constant(kind.element, number)] * kind.count)
         return ir.Constant(kind, number)
 
     def with_kind(self, value, kind):
-        """The type of so many numbers of a kind as the value has."""
+        """Return the type with the given scalar type and the shape of the value."""
         if isinstance(value.type, ir.VectorType):
             return ir.VectorType(kind, value.type.count)
         return kind
 
     def call(self, name: str, arguments, result=None, suffixes=None):
-        """Call of an intrinsic function of LLVM, named by the type of its operand."""
+        """Call an intrinsic function of LLVM, named by the type of its operand."""
         result = arguments[0].type if result is None else result
         full = name + "".join(
             "." + _suffix(kind) for kind in (suffixes or [arguments[0].type])
@@ -105,7 +107,7 @@ class Writer:
         return ir.Function(self.module, kind, name) if known is None else known
 
     def any(self, flags):
-        """Whether a flag is set for some batch element; a scalar."""
+        """Return whether a flag is set for any batch element; a scalar."""
         if not isinstance(flags.type, ir.VectorType):
             return flags
         bits = ir.IntType(flags.type.count)
@@ -113,13 +115,13 @@ class Writer:
         return self.builder.icmp_unsigned("!=", set_bits, ir.Constant(bits, 0))
 
     def both(self, a, b):
-        """Where both flags are set; `None` stands for all."""
+        """Return where both flags are set; `None` stands for all."""
         if a is None or b is None:
             return b if a is None else a
         return self.builder.and_(*self.alike([a, b]))
 
     def choose(self, flag, when_true, when_false):
-        """Selection; the flag may be one for all."""
+        """Select between values; the flag may be a scalar."""
         if isinstance(flag.type, ir.VectorType):
             when_true, when_false = self.spread(when_true), self.spread(when_false)
         else:
@@ -127,7 +129,7 @@ class Writer:
         return self.builder.select(flag, when_true, when_false)
 
     def memory(self, kind, count: int):
-        """Room for `count` numbers on the stack."""
+        """Allocate `count` values on the stack."""
         with self.builder.goto_entry_block():
             return self.builder.alloca(kind, ir.Constant(INT64, count))
 

@@ -105,7 +105,7 @@ def _each(absolute) -> tuple | None:
 
 
 class Attempt(NamedTuple):
-    """An attempted step: where it ends and what was detected."""
+    """An attempted step: its end and the detected events."""
 
     t: Any
     x: tuple

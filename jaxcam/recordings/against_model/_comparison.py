@@ -23,13 +23,11 @@ class Residuals:
     unit: str
     """Unit of the differences."""
     time: Float[np.ndarray, " k"]
-    """Seconds of the record; `turned`: angle of the cam (rad), or nothing."""
+    """Time in the recording (s)."""
     turned: Float[np.ndarray, " k"]
     """Angle of the cam (rad), or empty."""
     value: Float[np.ndarray, " k"]
-    """The differences, in `unit`; `stderr`: their standard errors from the noise
-    alone.
-    """
+    """The differences, in `unit`."""
     stderr: Float[np.ndarray, " k"]
     """Standard errors from the noise alone."""
     piece: Int[np.ndarray, " k"]
@@ -53,29 +51,19 @@ class Row:
     samples: int
     """Number of values compared."""
     rms: float
-    """In `unit`; `ratio`: residual in units of the noise, 1 if the model explains
-    all that the sensors resolve.
-    """
+    """Root mean square of the residuals, in `unit`."""
     noise: float
-    """In `unit`; `ratio`: residual in units of the noise, 1 if the model explains
-    all that the sensors resolve.
-    """
+    """Standard deviation of the noise, in `unit`."""
     ratio: float
     """Residual in units of the noise: 1 if the model explains all that the sensors
     resolve.
     """
     worst_record: str
-    """The middle of the 10 ms in which the mean difference is the most significant;
-    `worst_score`: how many standard errors it is there. The phase is the angle of the
-    cam within its turn (rad)."""
+    """Recording with the most significant mean difference over 10 ms."""
     worst_time: float
-    """The middle of the 10 ms in which the mean difference is the most significant;
-    `worst_score`: how many standard errors it is there. The phase is the angle of the
-    cam within its turn (rad)."""
+    """Middle of these 10 ms (s)."""
     worst_phase: float
-    """The middle of the 10 ms in which the mean difference is the most significant;
-    `worst_score`: how many standard errors it is there. The phase is the angle of the
-    cam within its turn (rad)."""
+    """Angle of the cam within its turn at this time (rad)."""
     worst_score: float
     """Significance of the difference there, in standard errors."""
 

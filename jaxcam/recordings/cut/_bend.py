@@ -3,7 +3,7 @@
 A bend is a function of the cam's angle with the variances of a Gaussian process with a
 Matern kernel of order 5/2, so that it is zero where there are no data. Flights as low
 as the noise resemble a bend, but their place changes with the cam speed. So a bend is
-accepted only if it improves the prediction of one record from the others.
+accepted only if it improves the prediction of one recording from the others.
 """
 
 from typing import NamedTuple
@@ -42,7 +42,7 @@ def spread(length: float) -> Float[np.ndarray, " waves"]:
 
 
 class Seen(NamedTuple):
-    """Information of one record on the coefficients of a surface, about some values.
+    """Information of one recording on the coefficients of a surface, about some values.
 
     `normal` `(p, p)` and `target` `(p,)`, those of a bend last.
     """
@@ -60,7 +60,7 @@ def bend_sizes(
     """Return standard deviations of the coefficients of a bend; zero without a
     significant bend.
 
-    **Arguments:** the information of each record; information and pull of the
+    **Arguments:** the information of each recording; information and pull of the
     tolerances of the `q` coefficients that are not part of a bend; the noise.
     """
     none = np.zeros(WAVES)
@@ -93,10 +93,10 @@ def _evidence(normal, target, known, pull, sizes) -> float:
 
 
 def _foretold(records, known, pull, sizes) -> float:
-    """Return the gain of twice the log-likelihood of records from the bend of all
+    """Return the gain of twice the log-likelihood of recordings from the bend of all
     others.
 
-    The other coefficients are those of all records together.
+    The other coefficients are those of all recordings together.
     """
     count = len(known)
     normal, target = _total(records)

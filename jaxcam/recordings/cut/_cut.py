@@ -84,7 +84,7 @@ def cut(
             latest = float(motion.time[(last + end) // 2])
             boundaries[last] = _not_before(boundaries.get(first), release, latest)
     for place in (0, len(motion.time)):
-        boundaries[place] = _end(motion, place, "the record ends here")
+        boundaries[place] = _end(motion, place, "the recording ends here")
 
     left = {last for _, last in stretches}
     flights = [_flight(sides, span, boundaries, left) for span in spans]
@@ -256,7 +256,7 @@ def _flight(sides, span, boundaries, left: set[int]) -> Flight:
     clear = [clear_of_end(side, span) for side in sides]
     first, last = max(a for a, _ in clear), min(b for _, b in clear)
     start, stop = (boundaries[place] for place in span)
-    hidden = "an impact may hide between here and the end of the record"
+    hidden = "an impact may hide between here and the end of the recording"
     start = start if first == span[0] else _end(motion, first, hidden)
     stop = stop if last == span[1] else _end(motion, last - 1, hidden)
     height = float(np.max(motion.gap[first:last]))

@@ -32,7 +32,7 @@ def fast_speed(recordings: Sequence[Recording], channel: str) -> float:
 
 def usual_acceleration(recordings: Sequence[Recording], channel: str) -> float:
     """Return the size of a channel's second derivative that one sample in ten exceeds,
-    in its units per second squared; infinite if the records are too short.
+    in its units per second squared; infinite if the recordings are too short.
     """
     found = []
     for recording in recordings:

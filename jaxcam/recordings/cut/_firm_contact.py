@@ -31,7 +31,7 @@ _PLACES = 64
 def firm_contact(
     recording: Recording, rig: Rig, speed: float, channel: str, noise: float
 ) -> Bool[np.ndarray, " k"]:
-    """Return the samples of a record that are certainly on the cam.
+    """Return the samples of a recording that are certainly on the cam.
 
     **Arguments:** `speed` of the cam (rad/s), for the rig's system; the channel of the
     follower and its noise.

@@ -91,7 +91,7 @@ def _along(system, times):
 
 
 def may_hop(rig: Rig, drive: Drive) -> Bool[np.ndarray, " k"]:
-    """Return the samples of a record with a possible hidden flight."""
+    """Return the samples of a recording with a possible hidden flight."""
     phases = hop_phases(rig, drive.speed)
     return phases[np.round(drive.angle / (2 * np.pi) * _GRID).astype(int) % _GRID]
 
@@ -123,9 +123,9 @@ def sure_contact(
 def before_release(
     angle: Float[np.ndarray, " k"], first: int, releases: Int[np.ndarray, " releases"]
 ) -> Bool[np.ndarray, " k"]:
-    """Return the samples of a contact cut off by the record's end at which it certainly
-    continues: those before the phase of release elsewhere in the record, because a
-    release just before the end is not observed.
+    """Return the samples of a contact cut off by the recording's end at which it
+    certainly continues: those before the phase of release elsewhere in the recording,
+    because a release just before the end is not observed.
 
     **Arguments:** the angle that the cam has turned (rad), the first sample of the
     contact, and the samples of observed releases.

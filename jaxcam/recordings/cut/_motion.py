@@ -1,4 +1,4 @@
-"""Represent one channel of a record and the surface below it."""
+"""Represent one channel of a recording and the surface below it."""
 
 import dataclasses
 

@@ -1,4 +1,4 @@
-"""Find impacts near the ends of a record, and impacts before it began."""
+"""Find impacts near the ends of a recording, and impacts before it began."""
 
 import dataclasses
 
@@ -15,8 +15,8 @@ _LEAST = 12
 
 
 def clear_of_end(motion: Motion, span: Span) -> Span:
-    """Return the part of a flight certainly before an impact at the record's end, and
-    after an impact at its beginning. So near to an end an impact affects too few
+    """Return the part of a flight certainly before an impact at the recording's end,
+    and after an impact at its beginning. So near to an end an impact affects too few
     samples to be detected, but extrapolation of the flight predicts it.
     """
     first, last = span
@@ -46,7 +46,7 @@ def _near(motion: Motion, fit, rows):
 def settled_alike(contacts: list[Contact], flights: list[Flight]) -> list[Contact]:
     """Give contacts with an unobserved start the settling time of the others.
 
-    A record may begin in the middle of chatter.
+    A recording may begin in the middle of chatter.
     """
     long = [f.stop for f in flights if f.last - f.first > SHORTEST_FLIGHT]
     seen = [any(contact.start is stop for stop in long) for contact in contacts]

@@ -96,15 +96,15 @@ def segment(
         recording: The recording.
         channel: The channel of the motion.
         contact: Value of the channel in contact at each sample, shape `(k,)` or one
-            number; the motion is above it. `None` without `upper`: the entire record is
-            one flight.
+            number; the motion is above it. `None` without `upper`: the entire recording
+            is one flight.
         contact_rate: Its rate of change; default from differences of `contact`.
         upper: Value of the channel at a second surface above the motion, such as the
             far one of two stops.
         upper_rate: Its rate of change.
         tolerance: Largest error of the stated position of each surface, in the units of
             the channel; within it, the surface is shifted to the impacts.
-        noise: Standard deviation of a sample; default measured from the record.
+        noise: Standard deviation of a sample; default measured from the recording.
         restitution: Expected coefficient, for impacts too low to be observed.
 
     Returns:
@@ -211,7 +211,7 @@ def _segment_rig(recording, rig: Rig, drive: Drive, surface: Surface, channel):
 
 
 def _one_flight(recording, channel, noise) -> Segments:
-    why = "no surface was given, so the whole record is one flight"
+    why = "no surface was given, so the whole recording is one flight"
     start, stop = (
         Boundary(float(recording.time[i]), float("nan"), "end of record", why)
         for i in (0, -1)

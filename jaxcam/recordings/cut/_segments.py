@@ -15,9 +15,9 @@ class Boundary:
     """The boundary between one part and the next."""
 
     time: float
-    """Time (s) and its standard error, NaN at the ends of the record."""
+    """Time (s), NaN at the ends of the recording."""
     stderr: float
-    """Time (s) and its standard error, NaN at the ends of the record."""
+    """Standard error of `time` (s)."""
     kind: str
     """`"impact"` (flight to flight), `"several impacts"` (too close together to be
     distinguished), `"landing"` (flight to contact, with impacts too low to be
@@ -76,31 +76,29 @@ class Impacts:
     """Impacts between two observed flights, one entry each."""
 
     time: Float[np.ndarray, " k"]
-    """Seconds."""
+    """Time (s)."""
     time_stderr: Float[np.ndarray, " k"]
-    """Seconds."""
+    """Standard error of `time` (s)."""
     angle: Float[np.ndarray, " k"]
-    """The measured channel at the impact, and the error of its distance from the
-    surface."""
+    """The measured channel at the impact."""
     angle_stderr: Float[np.ndarray, " k"]
-    """The measured channel at the impact, and the error of its distance from the
-    surface."""
+    """Standard error of its distance from the surface."""
     turned: Float[np.ndarray, " k"]
     """Angle that the cam has turned (rad), NaN without a drive."""
     before: Float[np.ndarray, " k"]
-    """Rate of the channel on either side, and their errors."""
+    """Rate of change of the channel before the impact."""
     before_stderr: Float[np.ndarray, " k"]
     """Standard error of `before`."""
     after: Float[np.ndarray, " k"]
-    """Rate of the channel on either side, and their errors."""
+    """Rate of change of the channel after the impact."""
     after_stderr: Float[np.ndarray, " k"]
     """Standard error of `after`."""
     approach: Float[np.ndarray, " k"]
-    """Speeds relative to the surface, both positive."""
+    """Speed relative to the surface before the impact, positive."""
     separation: Float[np.ndarray, " k"]
-    """Speeds relative to the surface, both positive."""
+    """Speed relative to the surface after the impact, positive."""
     surface_stderr: Float[np.ndarray, " k"]
-    """Error of the speed of the surface, which both share."""
+    """Standard error of the speed of the surface, common to both."""
     flight: Int[np.ndarray, " k"]
     """Index of the flight that ends here; the next one begins here."""
     side: Int[np.ndarray, " k"]
@@ -150,8 +148,9 @@ class Segments:
     noise: float
     """Standard deviation of the channel's samples."""
     clock: Float[np.ndarray, " k"]
-    """Time of the model at each sample (s): record time, or that of a drive at constant
-    speed."""
+    """Time of the model at each sample (s): recording time, or that of a drive at
+    constant speed.
+    """
     flights: tuple[Flight, ...]
     """The flights."""
     contacts: tuple[Contact, ...]
@@ -193,7 +192,7 @@ def _counted(number: int, noun: str) -> str:
 
 
 def no_impacts() -> Impacts:
-    """Impacts of a record that has none."""
+    """Impacts of a recording that has none."""
     none = np.zeros(0)
     fields = [field.name for field in dataclasses.fields(Impacts)]
     number = none.astype(int)

@@ -37,9 +37,9 @@ class Surface(eqx.Module):
     phase: Float[Array, ""]
     """Phase of the cam ahead of its measured angle (rad)."""
     cosines: Float[Array, " harmonics"]
-    """Amplitudes of harmonics 2 and 3 on top of it (rad)."""
+    """Cosine amplitudes of the additional harmonics 2 and 3 (rad)."""
     sines: Float[Array, " harmonics"]
-    """Amplitudes of harmonics 2 and 3 on top of it (rad)."""
+    """Sine amplitudes of the additional harmonics 2 and 3 (rad)."""
     bend: Float[Array, " waves"]
     """Amplitudes of a bend, such as a dent, that the harmonics cannot describe; zero
     without a bend.

@@ -86,10 +86,10 @@ def fit_surface(
 def refine_surface(surface: Surface, rig: Rig, segments: Sequence) -> Surface:
     """Fit the profile again, to the impacts and contacts in `Segments`.
 
-    Contacts count from where the unobserved impacts have died out: before,
-    the follower is above the cam on average. It is close to the cam, which counts as
-    one rough point, and never below it: otherwise a part of the cam observed only there
-    would be undetermined. A dent is included if records agree on it.
+    Contacts count from where the unobserved impacts have died out: before, the follower
+    is above the cam on average. It is close to the cam, which counts as one rough
+    point, and never below it: otherwise a part of the cam observed only there would be
+    undetermined. A dent is included if recordings agree on it.
 
     Args:
         surface: The surface so far.
@@ -147,7 +147,7 @@ def _unbent(surface: Surface) -> Surface:
 
 
 def _bend(surface: Surface, rig: Rig, turned, angle, error, ends: list[int]):
-    """Largest bend that fits points of records that end at `ends`."""
+    """Largest bend that fits points of recordings that end at `ends`."""
     vector = vector_of(surface)
     misfit, rows, weight = _weighted(surface, vector, turned, angle, error)
     records = []

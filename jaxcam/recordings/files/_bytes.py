@@ -55,7 +55,7 @@ def inflate_gzip(file: Path, raw: bytes) -> bytes:
             content = stream.read(LARGEST + 1)
     except EOFError:
         raise RecordingError(
-            f"{file}: the compressed file is cut short; copy it again from where it "
+            f"{file}: the compressed file is truncated; copy it again from where it "
             f"came from."
         ) from None
     except (zlib.error, gzip.BadGzipFile):

@@ -51,8 +51,8 @@ def find_gaps(
         many = "a gap" if len(found) == 1 else f"the first of {len(found)} gaps"
         raise RecordingError(
             f"{name}: there is {many} in time at {time[first]:.6g} s, "
-            f"{steps[first]:.4g} s long where samples are {usual:.4g} s apart; read it "
-            f'with gaps="split" to use the pieces as recordings of their own, or '
+            f"{steps[first]:.4g} s long, whereas samples are {usual:.4g} s apart; read "
+            f'it with gaps="split" to use the pieces as separate recordings, or '
             f'gaps="mend" to bridge short ones.'
         )
     return found + 1

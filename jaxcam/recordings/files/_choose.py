@@ -112,8 +112,8 @@ def _source(file: Path, names: Sequence[str] | None) -> Source:
     if name.endswith((".mat", ".parquet")):
         if names is not None:
             raise RecordingError(
-                f"{file}: its columns have names of their own; give pairs, such as "
-                f"--columns angle=angle_rad (columns={{...}} in Python)."
+                f"{file}: its columns already have names; give pairs, such as "
+                "--columns angle=angle_rad (columns={...} in Python)."
             )
         return read_mat(file) if name.endswith(".mat") else read_parquet(file)
     if name.endswith((".xlsx", ".xlsm")):
@@ -159,8 +159,8 @@ def _timed(source: Source, found: dict, rate: float | None) -> dict:
         )
     if rate is not None and TIME in found:
         raise RecordingError(
-            f"{source.file}: it has a time of its own, `{TIME}`; leave out the rate, "
-            f"or that column."
+            f"{source.file} already has the time column `{TIME}`; leave out the rate, "
+            "or that column."
         )
     rate = source.rate if rate is None else rate
     if TIME in found or rate is None or not rate > 0 or not found:

@@ -9,7 +9,7 @@ from .._errors import RecordingError
 from .._recording import Recording
 
 
-# Longest run of dropped samples that is bridged; the motion between is a parabola
+# Longest gap (samples) that is bridged; the motion in it is nearly a parabola
 _BRIDGE = 4
 
 
@@ -44,7 +44,7 @@ def mend(recording: Recording, *, bridge: int = _BRIDGE) -> Mended:
         A [`jaxcam.recordings.files.Mended`][].
 
     Raises:
-        RecordingError: Time does not increase, or nothing is left.
+        RecordingError: Time does not increase, or no piece is long enough.
 
     Examples:
         >>> from jaxcam.recordings import Recording, mend
@@ -64,8 +64,8 @@ def mend(recording: Recording, *, bridge: int = _BRIDGE) -> Mended:
     pieces = _bridged(whole, bridge, notes)
     if not pieces:
         raise RecordingError(
-            f"{recording.name}: the gaps in time leave no piece of {2 * bridge} "
-            f"samples; record the run again."
+            f"{recording.name}: no piece between gaps has {2 * bridge} samples; "
+            "record the run again."
         )
     return Mended(tuple(pieces), tuple(notes))
 
@@ -75,7 +75,7 @@ def _unslipped(
 ) -> Float[np.ndarray, " k"]:
     samples = recording.channels[name]
     steps = np.diff(samples)
-    # change of the motion between two samples, from the neighbours
+    # change of the angle between two samples, from the neighbouring samples
     usual = np.median(steps)
     turns = np.round((steps - usual) / (2 * np.pi))
     # across a gap at which the recording is split, the drive keeps turning
@@ -93,7 +93,7 @@ def _unslipped(
     )
     where = f"at {first:.4f} s" if len(places) == 1 else f"first at {first:.4f} s"
     notes.append(
-        f"{recording.name}: `{name}` jumps by {total} {where}; that was undone."
+        f"{recording.name}: `{name}` jumps by {total} {where}; the jump was removed."
     )
     return unslipped
 
@@ -123,14 +123,15 @@ def _bridged(recording: Recording, bridge: int, notes) -> list[Recording]:
     if filled_total:
         share = filled_total / (filled_total + len(time))
         notes.append(
-            f"{recording.name}: {filled_total} samples ({share:.1%}) were dropped; "
-            f"they are filled in to keep the time even, and not used."
+            f"{recording.name}: {filled_total} samples ({share:.1%}) are missing; "
+            "they are interpolated to keep the sampling uniform, but no fit uses "
+            "them."
         )
     for place in breaks:
         last, length = time[place - 1], (time[place] - time[place - 1]) * 1e3
         notes.append(
-            f"{recording.name}: nothing was recorded for {length:.3g} ms from "
-            f"{last:.4f} s on; the recording is split there."
+            f"{recording.name}: no samples for {length:.3g} ms after {last:.4f} s; "
+            "the recording is split there."
         )
     parts = [rows for rows in np.split(np.arange(len(time)), breaks)]
     parts = [rows for rows in parts if len(rows) >= 2 * max(bridge, 1)]

@@ -37,15 +37,16 @@ def read_recordings(
 ) -> tuple[Recording, ...]:
     """Read every recording in one file: text (plain or gz), .mat, .xlsx or .parquet.
 
-    The end of a column's name is its unit; `_deg`, `_rpm`, `_ms`, `_mm` and the like
-    are converted and the column is renamed (`cam_angle_deg` -> `cam_angle_rad`), and so
-    is one with its unit in brackets (`Time (ms)` -> `time_s`). One column is the time.
+    The end of a column name is its unit. Columns in `_deg`, `_rpm`, `_ms`, `_mm` and
+    similar units are converted and renamed (`cam_angle_deg` -> `cam_angle_rad`), and so
+    are columns with the unit in brackets (`Time (ms)` -> `time_s`). One column is the
+    time.
 
     Args:
         file: The file; `..._150.7rpm.csv` in its name is the nominal speed.
         channels: Required columns (SI names).
-        split: Column that numbers the runs in a file that holds several.
-        gaps: `"refuse"` raises an error for a record with missing samples, `"split"`
+        split: Column with the number of the run, in a file with several runs.
+        gaps: `"refuse"` raises an error for a recording with missing samples, `"split"`
             cuts it into pieces, and `"mend"` repairs it: it bridges short gaps, splits
             at long gaps and corrects slips of an encoder (see `mend`). The repairs are
             listed in `meta["notes"]`.
@@ -148,8 +149,8 @@ def read_case(
     Args:
         folder: The folder.
         channels: Required columns (SI names); `()` for rigs other than a cam-follower.
-        split: Column that numbers the runs in a file that holds several.
-        gaps: Treatment of a record with missing samples: `"refuse"` raises an error,
+        split: Column with the number of the run, in a file with several runs.
+        gaps: Treatment of a recording with missing samples: `"refuse"` raises an error,
             `"split"` cuts it into pieces, `"mend"` repairs it (see `mend`).
         columns: Names of the columns in their order, `"-"` to skip one, for
             files without a line of names; or a channel for each column with another
@@ -174,13 +175,13 @@ def read_case(
         raise RecordingError(f"{folder}: there is no such folder; check the path.")
     if not folder.is_dir():
         raise RecordingError(
-            f"{folder}: a case is a folder of recordings, and this is a file; name the "
-            f"folder that holds it."
+            f"{folder}: a case is a folder of recordings, and this is a file; give "
+            "the folder that contains it."
         )
     files = _tables(folder, SUFFIXES) or _tables(folder, _LAST_RESORT)
     if not files:
         cases = sorted(sub.name for sub in folder.iterdir() if sub.is_dir())
-        hint = f"; name one of its folders ({', '.join(cases[:4])})" if cases else ""
+        hint = f"; give one of its folders ({', '.join(cases[:4])})" if cases else ""
         raise RecordingError(
             f"{folder}: there is no recording (*.csv, *.tsv, *.mat, *.xlsx, *.parquet) "
             f"in this folder{hint}."
@@ -214,7 +215,7 @@ def _split(name, time, values, speed, file, breaks) -> list[Recording]:
 
 
 def _turning(label: str, mended: Mended) -> list[Recording]:
-    """Return the pieces without those in which the cam turns too little.
+    """Return the pieces in which the cam turns far enough.
 
     **Raises:** `RecordingError` if none is left.
     """
@@ -222,7 +223,9 @@ def _turning(label: str, mended: Mended) -> list[Recording]:
     for piece in mended.recordings:
         cam = piece.channels.get("cam_angle_rad")
         if cam is not None and np.ptp(cam) < np.pi:
-            notes.append(f"{piece.name}: it has less than half a turn; it is left out.")
+            notes.append(
+                f"{piece.name} has less than half a turn of the cam; it is omitted."
+            )
         else:
             pieces.append(piece)
     if not pieces:

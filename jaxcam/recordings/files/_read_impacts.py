@@ -67,8 +67,8 @@ def read_impacts(file: str | Path, *, columns: Columns | None = None) -> ImpactT
             found[word], units[word] = numbers, unit_of(name)
     if len(set(units.values())) > 1:
         raise RecordingError(
-            f"{file}: speeds are in {' and '.join(sorted(set(units.values())))}; give "
-            f"all of them in one unit."
+            f"{file}: the speeds are in {' and '.join(sorted(set(units.values())))}; "
+            "give all of them in one unit."
         )
     two = {"before1", "after1", "before2", "after2"} <= set(found)
     if not two and not {"before", "after"} <= set(found):
@@ -118,7 +118,7 @@ def _bodies(file: Path, found: dict, columns: dict) -> Bodies:
             )
     elif first is not None or second is not None:
         raise RecordingError(
-            f"{file}: there is the mass of one body only; give mass1_kg and mass2_kg."
+            f"{file} has the mass of only one body; give both mass1_kg and mass2_kg."
         )
     before, after = (
         np.stack([found[f"{side}1"], found[f"{side}2"]], axis=-1)
@@ -130,21 +130,22 @@ def _bodies(file: Path, found: dict, columns: dict) -> Bodies:
 def _speeds(file: Path, before, after, signed: bool):
     """Return approach and separation speeds of relative velocities, or of magnitudes.
 
-    **Raises:** `RecordingError` that names a row without approach or without an impact.
+    **Raises:** `RecordingError`, which names a row without approach or without an
+    impact.
     """
     if not signed and np.all(before >= 0) and np.all(after >= 0):
         approach, separation = before, after
     else:
         approach, separation = np.abs(before), -after * np.sign(before)
     for wrong, what in (
-        (approach <= 0, "nothing approaches before the impact"),
-        (separation < 0, "the motion goes on as before, through what was hit"),
+        (approach <= 0, "there is no approach before the impact"),
+        (separation < 0, "the bodies pass through each other"),
     ):
         rows = np.flatnonzero(wrong)
         if len(rows):
             more = f" (and in {len(rows) - 1} more rows)" if len(rows) > 1 else ""
             raise RecordingError(
-                f"{file}: in row {rows[0] + 1}{more} {what}; correct its signs, count "
-                f"velocities along one normal, or remove it."
+                f"{file}: in row {rows[0] + 1}{more} {what}; correct its signs, state "
+                "all velocities along one normal, or remove it."
             )
     return approach, separation

@@ -35,8 +35,8 @@ def read_layout(file: Path, tables: dict[str, Any]) -> FileLayout:
         number = isinstance(rate, int | float) and not isinstance(rate, bool)
         if not number or not 0 < rate < math.inf:
             raise RigError(
-                f"{file}: `rate` is {shown_value(rate)}, and must be a positive number "
-                f"of samples a second; correct it."
+                f"{file}: `rate` is {shown_value(rate)}; give a positive number of "
+                "samples per second."
             )
         rate = float(rate)
     if "columns" not in tables:

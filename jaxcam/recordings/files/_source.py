@@ -45,9 +45,7 @@ class Source:
         small = {name.lower(): name for name in (*self.columns, *self.headings)}
         near = [small[one] for one in difflib.get_close_matches(word.lower(), small, 1)]
         hint = f"is {shown(near[0])} meant?" if near else f"it has {self.listed()}."
-        raise RecordingError(
-            f"{self.file}: there is no column {shown(word)} to be named; {hint}"
-        )
+        raise RecordingError(f"{self.file}: there is no column {shown(word)}; {hint}")
 
     def listed(self) -> str:
         """Return the existing names, for a sentence."""
@@ -71,8 +69,8 @@ class Source:
             found = shown(word) if word else "nothing"
             more = f" (and in {len(bad) - 1} more rows)" if len(bad) > 1 else ""
             raise RecordingError(
-                f"{self.file}: the column {shown(name)} has {found} where a number "
-                f"should be, in row {row + 1}{more}; remove those rows or the column."
+                f"{self.file}: the column {shown(name)} has {found} instead of a "
+                f"number in row {row + 1}{more}; remove those rows or the column."
             )
         absurd = np.flatnonzero(np.abs(numbers) > _LARGEST_NUMBER)
         if len(absurd):
@@ -108,7 +106,7 @@ def _of_text(file: Path, name: str, column: pd.Series):
             raise RecordingError(
                 f"{file}: the column {shown(name)} has "
                 f"{shown(str(column.iloc[both[0]]))} in row {both[0] + 1}, with a "
-                f"point and a comma; save the numbers without marks of thousands."
+                "point and a comma; save the numbers without thousands separators."
             )
         column = column.str.replace(",", ".", regex=False)
     numbers = pd.to_numeric(column, errors="coerce")

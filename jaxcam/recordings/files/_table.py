@@ -32,8 +32,8 @@ def read_table(file: Path, names: Sequence[str] | None = None) -> Source:
     **Arguments:** `names` of the columns in their order, instead of those of the file;
     `"-"` skips one.
 
-    **Raises:** `RecordingError` for a file that is missing, empty, cut short, not a
-    text table, or that names its columns badly.
+    **Raises:** `RecordingError` for a file that is missing, empty, truncated or not a
+    text table, or whose column names are invalid.
     """
     return table_of_lines(file, read_lines(file), names)
 
@@ -57,8 +57,8 @@ def table_of_lines(
     rows = [line for line in lines[form.first :] if not line.startswith(COMMENTS)]
     if len(rows) < 2:
         raise RecordingError(
-            f"{file}: it has {len(rows)} rows of samples below its header, and at "
-            f"least two are needed."
+            f"{file} has {len(rows)} rows of samples below its header; at least two "
+            "are needed."
         )
     titles, rows = _without_last(titles, rows, separator)
     if len(rows) * len(titles) > MOST:
@@ -83,7 +83,7 @@ def table_of_lines(
 
 
 def _without_last(titles: list[str], rows: list[str], separator: str):
-    """Return names and rows without a last separator that only one of them has."""
+    """Return names and rows, without a trailing separator that only one of them has."""
     count = len(cells_of(rows[0], separator))
     if count == len(titles) - 1 and not titles[-1]:
         return titles[:-1], rows
@@ -108,10 +108,10 @@ def _titles(file: Path, lines: list[str], form: Form) -> list[str]:
         count = len(cells_of(lines[form.first], form.separator))
         where = "the first line is numbers" if form.first == 0 else "no line does so"
         raise RecordingError(
-            f"{file}: a line above the numbers must name the columns, and {where}; "
-            f"name them in their order, as in --columns time_s,angle_rad "
-            f"(columns=[...] in Python), {LEFT_OUT} for one that is not to be read: "
-            f"there are {count}."
+            f"{file}: a line above the numbers must name the columns, but {where}; "
+            f"name all {count} columns in their order, as in --columns "
+            f"time_s,angle_rad (columns=[...] in Python), with {LEFT_OUT} for a "
+            "skipped one."
         )
     titles = cells_of(bare(lines[form.names]), form.separator)
     if all(map(is_number, titles)):
@@ -175,14 +175,14 @@ def _refuse_cut_line(file, whole, rows, separator, width, named) -> None:
     wrong = np.flatnonzero(counts != width)
     cut = len(wrong) > 0
     if not cut and not whole:
-        # No value is missing. A number shorter than all others in its column has lost
-        # digits, which shows only in a file with a fixed format.
+        # No value is missing. A number that is shorter than all others in its column
+        # has lost digits; this is detectable only in a fixed format.
         last = [len(_decimals(cells_of(row, separator)[-1])) for row in rows]
         cut = len(set(last[:-1])) == 1 and last[-1] < last[0]
     if cut and (len(wrong) == 0 or wrong[0] == len(rows) - 1):
         raise RecordingError(
-            f"{file}: the last line ({shown(rows[-1])}) is cut short, so the file is "
-            f"not whole; copy it again or delete that line."
+            f"{file}: the last line ({shown(rows[-1])}) is truncated, so the file is "
+            "incomplete; copy it again or delete that line."
         )
     if cut:
         row = int(wrong[0])
@@ -192,8 +192,8 @@ def _refuse_cut_line(file, whole, rows, separator, width, named) -> None:
             fix = "if these are decimal commas, save it with semicolons between columns"
         elif separator == " ":
             fix = (
-                "where spaces separate, empty cells are lost: save it with tabs, or "
-                "name the columns that each row has with --columns"
+                "with spaces as separators, empty cells are lost: save it with tabs, "
+                "or name the columns present in every row with --columns"
             )
         raise RecordingError(
             f"{file}: row {row + 1} has {counts[row]} values where {by} {width} "
