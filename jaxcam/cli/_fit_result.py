@@ -37,13 +37,17 @@ class Result:
 
     @property
     def sentence(self) -> str:
+        """Say how the fit ended, and how well it explains its samples."""
+        return f"{self.after.message} {self.remainder}"
+
+    @property
+    def remainder(self) -> str:
         """Say how well the fit explains its samples."""
         quality = self.quality
         ratio = sum(q["ratio"] for q in quality) / len(quality)
         return (
-            f"{self.after.message} {self.problem.samples} samples of "
-            f"{len(self.problem.records)} records are left with {ratio:.3f} times the "
-            "noise of the sensors."
+            f"{self.problem.samples} samples of {len(self.problem.records)} records "
+            f"are left with {ratio:.3f} times the noise of the sensors."
         )
 
     def to_json(self, about: Mapping[str, Any]) -> dict[str, Any]:
@@ -124,7 +128,10 @@ def fitted(
 
 
 def print_fit(output: Output, found: Result, notes: Sequence[str]) -> None:
-    """Print tables and sentences to the terminal."""
+    """Print tables and sentences to the terminal.
+
+    The reason why a fit failed is left to standard error.
+    """
     for sentence in (*notes, *found.seen.sentences()):
         output.print(sentence)
     output.print(parameter_table(found.problem, found.after, found.again))
@@ -134,4 +141,4 @@ def print_fit(output: Output, found: Result, notes: Sequence[str]) -> None:
         where = name.rpartition(", ")[0]
         sentence = law.sentence()
         output.print(f"{where.capitalize()}: {sentence}" if where else sentence)
-    output.print(found.sentence)
+    output.print(found.sentence if found.after.converged else found.remainder)
