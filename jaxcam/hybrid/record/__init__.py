@@ -2,4 +2,5 @@
 
 from ._assemble import assemble as assemble, Parts as Parts
 from ._events import Contacts as Contacts, Impacts as Impacts, Steps as Steps
+from ._printed import Printed as Printed, vector_text as vector_text
 from ._trajectory import Trajectory as Trajectory
