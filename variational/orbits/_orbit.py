@@ -9,7 +9,7 @@ from jaxtyping import Array, Complex, Float
 
 from jaxcam.hybrid import HybridSystem, Settings, simulate
 from jaxcam.hybrid.checks import refuse_tracers
-from jaxcam.hybrid.record import Contacts, Impacts, Printed
+from jaxcam.hybrid.record import Contacts, impact_table, Impacts, Printed
 from jaxcam.hybrid.sizes import component_sizes
 from jaxcam.parameters import real_array, VectorLike
 from jaxcam.tables import ShortTable
@@ -73,7 +73,7 @@ class Orbit(Printed):
             f"{float(self.period):.6g} s, impacts: {int(self.impacts.count)}, "
             f"contacts: {int(self.contacts.count)}, multipliers of modulus {sizes}"
         )
-        return self.impacts.table(sentence)
+        return impact_table(self.impacts, sentence)
 
     @property
     def multipliers(self) -> Complex[Array, " n"]:

@@ -35,19 +35,7 @@ class Impacts(Printed):
         return np.ndim(self.count) > 0
 
     def _table(self) -> ShortTable:
-        return self.table(f"impacts: {int(self.count)}")
-
-    def table(self, sentence: str) -> ShortTable:
-        """Return the table of times and speeds below a sentence."""
-        columns = (self.time, self.constraint, self.speed_before, self.speed_after)
-        rows = [
-            (str(k + 1), f"{t:.8g}", str(which), f"{-before:.6g}", f"{after:.6g}")
-            for k, (t, which, before, after) in enumerate(
-                zip(*(numbers(one, self.count) for one in columns), strict=True)
-            )
-        ]
-        headings = ("impact", "time (s)", "constraint", "approach", "rebound")
-        return ShortTable(sentence, headings, rows)
+        return impact_table(self, f"impacts: {int(self.count)}")
 
 
 class Contacts(Printed):
@@ -115,3 +103,21 @@ class Steps(Printed):
         ]
         headings = ("point", "time (s)", "state", "constraints in contact")
         return ShortTable(f"integration points: {len(rows)}", headings, rows)
+
+
+def impact_table(impacts: Impacts, sentence: str) -> ShortTable:
+    """Return the times and speeds of impacts, below a sentence."""
+    columns = (
+        impacts.time,
+        impacts.constraint,
+        impacts.speed_before,
+        impacts.speed_after,
+    )
+    rows = [
+        (str(k + 1), f"{t:.8g}", str(which), f"{-before:.6g}", f"{after:.6g}")
+        for k, (t, which, before, after) in enumerate(
+            zip(*(numbers(one, impacts.count) for one in columns), strict=True)
+        )
+    ]
+    headings = ("impact", "time (s)", "constraint", "approach", "rebound")
+    return ShortTable(sentence, headings, rows)
