@@ -47,7 +47,13 @@ class Stroboscope(Printed):
     def _table(self) -> ShortTable:
         failed = int(np.count_nonzero(self.code))
         rows = [
-            (str(k), str(impacts), str(steps), vector_text(states[-1]), message(code))
+            (
+                str(k),
+                str(impacts),
+                str(steps),
+                vector_text(states[-1]),
+                message(int(code)),
+            )
             for k, (states, impacts, steps, code) in enumerate(
                 zip(self.states, self.impacts, self.steps, self.code, strict=True)
             )
