@@ -37,17 +37,18 @@ class Result:
 
     @property
     def sentence(self) -> str:
-        """Say how the fit ended, and how well it explains its samples."""
+        """Describe how the fit ended, and how well it explains its samples."""
         return f"{self.after.message} {self.remainder}"
 
     @property
     def remainder(self) -> str:
-        """Say how well the fit explains its samples."""
+        """Describe how well the fit explains its samples."""
         quality = self.quality
         ratio = sum(q["ratio"] for q in quality) / len(quality)
         return (
-            f"{self.problem.samples} samples of {len(self.problem.records)} records "
-            f"are left with {ratio:.3f} times the noise of the sensors."
+            f"The rms residual of {self.problem.samples} samples of "
+            f"{len(self.problem.records)} recordings is {ratio:.3f} times the sensor "
+            "noise."
         )
 
     def to_json(self, about: Mapping[str, Any]) -> dict[str, Any]:

@@ -35,7 +35,7 @@ _LIMITS = tuple(np.geomspace(0.03, 1.5, 12).tolist())
 _SHAPES = ((0.5, 1.0), (1.0, 1.0), (0.5, 2.0), (1.0, 2.0))
 # Forces at nodes, in numbers, that are worked out at once
 _AT_ONCE = 8_000_000
-# Part of a diagonal that keeps a matrix definite against rounding
+# Relative increase of a diagonal that keeps a matrix positive definite
 _FORCES = 1e-9
 
 
@@ -205,7 +205,7 @@ class _Sums:
         self.ff = np.zeros((cells, width, width))
 
     def add(self, direct, pushed, off, sign):
-        """Rows for the parameters and the forces, and what they are to explain."""
+        """Add the rows for the parameters and the forces, and the residuals."""
         self.pp += sign * direct.T @ direct
         self.p += sign * direct.T @ off
         self.pf += sign * (direct.T @ pushed).reshape(-1, *self.shape)

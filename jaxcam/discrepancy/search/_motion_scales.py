@@ -14,7 +14,8 @@ from ..terms import MotionScales
 def motion_scales(
     runs: Sequence[Recording], channel: str, sensor: Sensor, slip: float
 ) -> MotionScales:
-    """Positions, speeds and accelerations of a coordinate that a channel shows.
+    """Return positions, speeds and accelerations of a coordinate that a channel
+    measures.
 
     **Arguments:** `slip`, the speed within which dry friction changes sign.
     """

@@ -5,22 +5,22 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 
-# Part of a diagonal that keeps a matrix definite against rounding
+# Relative increase of a diagonal that keeps a matrix positive definite
 _STATES = 1e-13
 TINY = 1e-300
-"""Divisors that may be zero are at least this."""
+"""Lower limit of divisors that may be zero."""
 
 
 class StateElimination:
     """The states of one record, eliminated from its first piece to its last.
 
     The blocks of a piece are the information of its state with itself and with the
-    parameters, its score, and its information with the forces. Rows of a residual have
-    three parts in that order: by the parameters, what they are to explain, and by the
-    forces.
+    parameters, its score, and its information with the forces. Rows that tie two pieces
+    have three parts in that order: derivatives by the parameters, the residuals, and
+    derivatives by the forces.
 
-    **Arguments:** `add(direct, pushed, off, sign)` collects rows without a state, by
-    the parameters, by the forces and what they are to explain.
+    **Arguments:** `add(direct, pushed, off, sign)` collects rows without a state:
+    derivatives by the parameters and by the forces, and the residuals.
     """
 
     def __init__(self, add: Callable[..., None]):
@@ -50,7 +50,9 @@ class StateElimination:
             self._taken(self._blocks, np.zeros((len(self._blocks[0]), 0)))
 
     def _taken(self, blocks, coupling):
-        """Subtract what a state explains; its coupling and rows over its root."""
+        """Subtract what a state explains, and return its coupling and its rows, divided
+        by the square root of its information.
+        """
         scale = 1 / np.sqrt(np.maximum(np.diag(blocks[0]), TINY))
         scaled = blocks[0] * np.outer(scale, scale)
         root = np.linalg.inv(np.linalg.cholesky(scaled + _STATES * np.eye(len(scale))))

@@ -20,7 +20,7 @@ from ._local_force import Response, stride_of
 from ._state_elimination import StateElimination, TINY
 
 
-# Part of a diagonal that keeps a matrix definite against rounding
+# Relative increase of a diagonal that keeps a matrix positive definite
 _SHAKEN = 1e-9
 
 
@@ -126,7 +126,7 @@ class _Sums:
         self.fc += np.sum(np.real(np.conj(waves) * shaken[m:]), axis=0)
 
     def add(self, direct, pushed, off, sign):
-        """Rows for the parameters and the force, and what they are to explain."""
+        """Add the rows for the parameters and the force, and the residuals."""
         self.pp += sign * direct.T @ direct
         self.p += sign * direct.T @ off
         self.pf += sign * direct.T @ pushed

@@ -144,7 +144,7 @@ class StopBelow(_WithEdge):
 
 
 def _reaction(term: ScaledTerm, depth, velocity, stiffness, damping, loss, friction):
-    """Force of a stop at a depth and a velocity into it."""
+    """Return the force of a stop at a depth and a velocity into it."""
     turned = jnp.tanh(velocity / term.scales.slip)
     touching = 1 - jnp.exp(-depth / (_BEGINS * term.scales.half))
     elastic = depth * (stiffness + damping * velocity + loss * turned)

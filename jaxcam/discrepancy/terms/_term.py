@@ -206,7 +206,7 @@ class Term(eqx.Module):
         return 0.0
 
     def scaled(self, scales: MotionScales) -> "Term":
-        """Return the term with the constants of its form that recordings suggest."""
+        """Return the term with constants taken from the recordings."""
         del scales
         return self
 
