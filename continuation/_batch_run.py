@@ -11,7 +11,7 @@ from jaxtyping import PyTree
 from ._point import set_parameters, with_field
 from ._program import correct_, Corrected
 from .predictors import Station
-from .step_control import way_between
+from .step_control import measure_step
 
 
 _RUNNING, _BOUND, _SHORT, _FULL, _NO_START = range(5)
@@ -160,12 +160,12 @@ def _advance(
         )  # fmt: skip
         z = b.z.at[-1].set(jnp.where(lands, bound, b.z[-1]))
         b = with_field(b, "z", z)
-        way = way_between(a, b, guess)
-        refused = list(control.refusals(way, lane.step, s).values())
+        measures = measure_step(a, b, guess)
+        refused = list(control.refusals(measures, lane.step, s).values())
         inside = (low <= z[-1]) & (z[-1] <= high)
         finite = jnp.all(jnp.isfinite(b.tangent))
         good = b.success & finite & inside & ~jnp.any(jnp.stack(refused))
-        following = control.next_step(way, lane.step, s)
+        following = control.next_step(measures, lane.step, s)
         step = jnp.where(good, following, lane.step / 2)
         count = lane.count + jnp.where(good, 1, 0)
         status = jnp.where(

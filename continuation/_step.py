@@ -12,7 +12,7 @@ from .algorithms import AbstractAlgorithm
 from .predictors import Station
 from .problem import AbstractProblem
 from .special import AbstractExtended
-from .step_control import Refusal, way_between
+from .step_control import measure_step, Refusal
 
 
 class StepAttempt(NamedTuple):
@@ -78,12 +78,12 @@ def _judged(
 ) -> StepAttempt:
     if not b.success or not np.all(np.isfinite(b.tangent)):
         return StepAttempt(None, refusal=Refusal.NOT_CONVERGED)
-    way = way_between(a, b, guess)
+    measures = measure_step(a, b, guess)
     control, settings = algorithm.control, context.settings
-    for reason, holds in control.refusals(way, step, settings).items():
+    for reason, holds in control.refusals(measures, step, settings).items():
         if holds:
             return StepAttempt(None, refusal=reason)
-    return StepAttempt(b, bound, float(control.next_step(way, step, settings)))
+    return StepAttempt(b, bound, float(control.next_step(measures, step, settings)))
 
 
 def _first_bound(

@@ -1,8 +1,8 @@
-"""Define a problem: a residual, its kind of stability, and monitors."""
+"""Define a problem: a residual and its kind of stability; and the start of a branch."""
 
 import abc
 from collections.abc import Callable, Mapping
-from typing import Any, ClassVar, Literal, NamedTuple
+from typing import Any, ClassVar
 
 import equinox as eqx
 import jax
@@ -11,47 +11,12 @@ import numpy as np
 from jaxtyping import Array, Float, Int, PyTree
 
 from ._eigenvalues import eigenvalues_of
+from ._local_dynamics import (
+    LocalDynamics as LocalDynamics,
+    StabilityKind as StabilityKind,
+)
+from ._monitor import Monitor as Monitor
 from .representation import AbstractRepresentation, Unique
-
-
-StabilityKind = Literal["equilibrium", "map", "none"]
-"""Meaning of the eigenvalues of `linearisation`."""
-
-
-class Monitor(eqx.Module):
-    """A test function that a problem adds, and the meaning of its zero.
-
-    Examples:
-        >>> import continuation
-        >>> continuation.Monitor("grazing", ends=True).kind
-        'grazing'
-    """
-
-    kind: str = eqx.field(static=True)
-    """Name of the special point at its zero, such as `"grazing"`."""
-    ends: bool = eqx.field(static=True, default=False)
-    """Whether the branch of this problem ends there. `AbstractProblem.transition` is
-    then asked for another problem with which to continue. The zero of such a monitor is
-    also sought ahead of the last point, when a step fails or its result is rejected; so
-    the monitor may cease to exist, or not change sign, beyond its zero. It must have a
-    nonzero slope on the near side."""
-    bracket: bool = eqx.field(static=True, default=False)
-    """Whether its zero is enclosed by points of the branch instead of solved for by
-    Newton's method; for values whose derivative is costly to compile."""
-    vanishing: tuple[str, ...] = eqx.field(static=True, default=())
-    """Names of monitors that are zero wherever this one is, and are ignored there."""
-
-
-class LocalDynamics(NamedTuple):
-    """The vector field or map around a solution whose eigenvalues are the problem's."""
-
-    at: Array
-    """The solution, shape `(k,)`."""
-    motion: Callable[[Float[Array, " k"]], Float[Array, " k"]] | None
-    """The map or vector field, `(k,)` to `(k,)`, differentiable three times. None: only
-    its Jacobian is known, and higher derivatives come from central differences."""
-    jacobian: Callable[[Float[Array, " k"]], Float[Array, "k k"]]
-    """Its Jacobian, `(k,)` to `(k, k)`."""
 
 
 class Start(eqx.Module):

@@ -18,7 +18,7 @@ class Refusal(enum.StrEnum):
     TURNED = "the branch turned too sharply"
 
 
-class Way(NamedTuple):
+class StepMeasures(NamedTuple):
     """Measures of a step: NumPy numbers, or traced ones in a batch."""
 
     iterations: Any
@@ -34,13 +34,13 @@ class AbstractStepControl(eqx.Module):
 
     @abc.abstractmethod
     def refusals(
-        self, way: Way, step: Any, settings: BranchSettings
+        self, measures: StepMeasures, step: Any, settings: BranchSettings
     ) -> dict[Refusal, Bool[Any, ""]]:
         """Return for each reason to reject a step whether it holds; the first is
         reported.
 
         Args:
-            way: Measures of the step.
+            measures: Measures of the step.
             step: Its length.
             settings: Accuracy and step control.
 
@@ -49,11 +49,13 @@ class AbstractStepControl(eqx.Module):
         """
 
     @abc.abstractmethod
-    def next_step(self, way: Way, step: Any, settings: BranchSettings) -> Any:
+    def next_step(
+        self, measures: StepMeasures, step: Any, settings: BranchSettings
+    ) -> Any:
         """Return the length of the step that follows an accepted one.
 
         Args:
-            way: Measures of the step.
+            measures: Measures of the step.
             step: Its length.
             settings: Accuracy and step control.
 
@@ -68,29 +70,31 @@ class EffortAndAngle(AbstractStepControl):
     See the thesis, section 3.4.4.
     """
 
-    def refusals(self, way: Way, step: Any, settings: BranchSettings):
+    def refusals(self, measures: StepMeasures, step: Any, settings: BranchSettings):
         return {
-            Refusal.FARTHER: way.correction > step,
-            Refusal.TURNED: way.angle > settings.max_angle,
+            Refusal.FARTHER: measures.correction > step,
+            Refusal.TURNED: measures.angle > settings.max_angle,
         }
 
-    def next_step(self, way: Way, step: Any, settings: BranchSettings) -> Any:
+    def next_step(
+        self, measures: StepMeasures, step: Any, settings: BranchSettings
+    ) -> Any:
         s = settings
-        xp = _namespace(way.angle)
-        effort = 2.0 ** ((s.iterations - way.iterations) / 2)
-        straight = s.angle / xp.maximum(way.angle, 1e-3 * s.angle)
+        xp = _namespace(measures.angle)
+        effort = 2.0 ** ((s.iterations - measures.iterations) / 2)
+        straight = s.angle / xp.maximum(measures.angle, 1e-3 * s.angle)
         factor = xp.clip(xp.minimum(effort, straight), 0.5, 2.0)
         return xp.clip(step * factor, s.min_step, s.max_step)
 
 
-def way_between(a: Any, b: Any, guess: Any) -> Way:
+def measure_step(a: Any, b: Any, guess: Any) -> StepMeasures:
     """Measure the step from a to b, corrected from `guess`."""
     xp = _namespace(b.z)
     old, new = a.tangent / b.scale, b.tangent / b.scale
     cosine = (old @ new) / (xp.linalg.norm(old) * xp.linalg.norm(new))
     angle = xp.arccos(xp.clip(cosine, -1.0, 1.0))
     correction = xp.linalg.norm((b.z - guess) / a.scale)
-    return Way(b.iterations * 1.0, correction, angle)
+    return StepMeasures(b.iterations * 1.0, correction, angle)
 
 
 def _namespace(x: Any) -> Any:

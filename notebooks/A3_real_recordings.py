@@ -13,6 +13,7 @@
 # asked what it lacks. (How far the completed models stay with another record, in free
 # runs, is notebook A4.) Nothing is set differently from one to the next: every model
 # states its parameters, its sensor and how noisy that is, and the library is the same.
+# The models that A4 needs as well are in `textbook_models.py`.
 #
 # The recordings are public. Only the pendulum is in the package, with every tenth
 # sample (`jaxcam.data.PENDULUM`):
@@ -36,10 +37,22 @@ from pathlib import Path
 import jax.numpy as jnp
 import matplotlib.pyplot as plt
 import numpy as np
+from textbook_models import (
+    cart,
+    head,
+    hinge,
+    pendulum,
+    read_head,
+    read_stage,
+    read_swings,
+    slower,
+    spring,
+    stage,
+)
 
 import jaxcam
 from jaxcam.discrepancy import diagnose, Diagnosis, library, Policy
-from jaxcam.fitting import fit, held_out_cost, Input, Model, Parameter, Sensor
+from jaxcam.fitting import fit, held_out_cost, Parameter, Sensor
 from jaxcam.plotting import style
 from jaxcam.recordings import read_case, Recording, References, segment
 
@@ -115,53 +128,17 @@ def ask(case: str, system, runs, **options) -> None:
 
 # ## A pendulum
 #
-# Two swings, from 93 degrees and from 4; it hangs at pi. The encoder has 40000 counts a
-# turn. Ten milliseconds are a seventieth of a swing, and at a thousand samples a second
-# the rounding of neighbours is the same, so every tenth sample is kept. The small swing
-# is followed until it sticks.
-
+# Two swings, from 93 degrees and from 4, seen by an encoder. The model is a rigid
+# pendulum with a viscous hinge.
 
 # +
-class Pendulum(jaxcam.HybridSystem):
-    """A rigid pendulum with a viscous hinge: angle from hanging (rad), and its rate."""
-
-    stiffness: float = 60.0
-    damping: float = 0.05
-
-    def vector_field(self, t, state):
-        angle, rate = state
-        pull = self.stiffness * jnp.sin(angle) + self.damping * rate
-        return jnp.stack([rate, -pull])
-
-    def gap(self, t, state):
-        return state[0] + 100.0  # far from any stop
-
-    def impact(self, t, state):
-        return state
-
-
-count = 2 * np.pi / 40000
-swings = []
-for run in read_case(folder / "pendulum", channels=("angle_rad",)):
-    angle, clock = run["angle_rad"][::10], run.time[::10] - run.time[0]
-    moving = np.flatnonzero(np.abs(angle - angle[-1]) > 2 * count)[-1] + 1
-    part = Recording(run.name, clock[:moving], {"angle_rad": angle[:moving]})
-    swings.append(segment(part, "angle_rad", noise=count / np.sqrt(12)))
-
-#
-encoder = {"angle_rad": Sensor(0, noise=count / np.sqrt(12), offset=np.pi)}
-hinge = [
-    Parameter("stiffness", lambda m: m.system.stiffness, scale=0.1, lower=0.0),
-    Parameter("damping", lambda m: m.system.damping, scale=0.01, lower=0.0),
-    Parameter("zero", lambda m: m.sensors["angle_rad"].offset, tolerance=0.01),
-]
 ask(
     "pendulum",
-    Pendulum(),
-    swings,
+    pendulum.system,
+    read_swings(folder),
     # the model has them already
     candidates=terms("viscous_damping", "sensor_offset", center=0.0),
-    sensors=encoder,
+    sensors=pendulum.sensors,
     parameters=hinge,
 )
 # -
@@ -325,63 +302,21 @@ for sheets in ("001", "008", "016", "100"):
 # ## A positioning stage
 #
 # A motor moves a load by a screw: force in, position out (the EMPS benchmark). The
-# measured force is an input of the system, which holds each sample until the next. Four
-# samples are made one: of the position the first, of the force the mean, so that no
-# impulse is lost.
-
+# model is a mass with viscous friction; the measured force is an input of it, which
+# holds each sample until the next. Four samples are made one: of the position the
+# first, of the force the mean.
 
 # +
-class Stage(jaxcam.HybridSystem):
-    """A mass with viscous friction: position (m) and velocity (m/s)."""
-
-    inverse_mass: float = 0.0105
-    viscous: float = 2.0
-    offset: float = 0.0
-    force: float = 0.0
-
-    def vector_field(self, t, state):
-        pushed = self.inverse_mass * self.force - self.offset
-        return jnp.stack([state[1], pushed - self.viscous * state[1]])
-
-    def gap(self, t, state):
-        return state[0] + 100.0
-
-    def impact(self, t, state):
-        return state
-
-
-def slower(run: Recording, channel: str, by: str, count: int, part=slice(None)):
-    """Every so many samples of a channel, and the mean of its input in between."""
-    size = len(run) // count * count
-    clock = run.time[:size:count][part]
-    channels = {
-        channel: run[channel][:size:count][part],
-        by: run[by][:size].reshape(-1, count).mean(axis=1)[part],
-    }
-    name = run.name if part == slice(None) else f"{run.name}_{part.start}"
-    return Recording(name, clock - clock[0], channels)
-
-
-case = list(read_case(folder / "positioning_stage", channels=("position_m",)))
-count = 5e-8  # smallest step of the encoder (m)
-stage = Model(
-    Stage(),
-    {"position_m": Sensor(0, noise=count)},
-    Input("motor_force_N", lambda system: system.force),
-)
-cart = [
-    Parameter("1/mass", lambda m: m.system.inverse_mass, scale=1e-4, lower=0.0),
-    Parameter("viscous", lambda m: m.system.viscous, scale=0.05, lower=0.0),
-    Parameter("offset", lambda m: m.system.offset, scale=0.01),
-]
 ask(
     "positioning stage",
     stage.system,
     [
         segment(
-            slower(run, "position_m", "motor_force_N", 4), "position_m", noise=count
+            slower(run, "position_m", "motor_force_N", 4),
+            "position_m",
+            noise=stage.sensors["position_m"].noise,
         )
-        for run in case
+        for run in read_stage(folder)
     ],
     candidates=terms("viscous_damping", center=0.125, clocked=True),
     sensors=stage.sensors,
@@ -393,53 +328,16 @@ ask(
 # ## A mounting head
 #
 # A head that places components on a board, pushed by a motor: voltage in, position out.
-# It is on a spring; somewhere it touches the board. There is one record: its halves are
-# two.
-
+# The model is a mass on a spring with a damper; somewhere it touches the board. There
+# is one record: its halves are two.
 
 # +
-class Head(jaxcam.HybridSystem):
-    """Mass, spring and damper, pushed by a motor: position (m) and velocity (m/s)."""
-
-    gain: float = 100.0
-    stiffness: float = 650.0
-    damping: float = 13.0
-    offset: float = 0.0
-    voltage: float = 0.0
-
-    def vector_field(self, t, state):
-        pushed = -self.gain * self.voltage - self.offset
-        pulled = self.stiffness * state[0] + self.damping * state[1]
-        return jnp.stack([state[1], pushed - pulled])
-
-    def gap(self, t, state):
-        return state[0] + 100.0
-
-    def impact(self, t, state):
-        return state
-
-
-(run,) = read_case(folder / "mounting_head", channels=("position_m",))
-first, second = (
-    slower(run, "position_m", "voltage_V", 8, half)
-    for half in (slice(0, 1875), slice(1875, 3750))
-)
-head = Model(
-    Head(),
-    {"position_m": Sensor(0, noise=5e-6)},
-    Input("voltage_V", lambda system: system.voltage),
-)
-spring = [
-    Parameter("gain", lambda m: m.system.gain, scale=1.0, lower=0.0),
-    Parameter("stiffness", lambda m: m.system.stiffness, scale=10.0, lower=0.0),
-    Parameter("damping", lambda m: m.system.damping, scale=0.3, lower=0.0),
-    Parameter("offset", lambda m: m.system.offset, scale=0.1),
-]
+_, *halves = read_head(folder)
 every = library(turned=False, extended=True)
 ask(
     "mounting head",
     head.system,
-    [segment(half, "position_m", noise=5e-6) for half in (first, second)],
+    [segment(half, "position_m", noise=5e-6) for half in halves],
     candidates=[t for t in every if t.name in ("stop_above", "coulomb_friction")],
     sensors=head.sensors,
     parameters=spring,

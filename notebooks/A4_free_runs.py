@@ -10,7 +10,8 @@
 #
 # A model is fitted to the whole of one record, from its first samples to its last, and
 # then runs freely through another one, from 20 samples and the measured input. Each
-# line of the result adds a term that the diagnosis of notebook A3 names.
+# line of the result adds a term that the diagnosis of notebook A3 names. The textbook
+# models are in `textbook_models.py`.
 #
 # The recordings are public; A3 says where they are from. The environment variable
 # `JAXCAM_RECORDINGS` names the folder in which a folder `real` holds the sets
@@ -22,15 +23,24 @@ import os
 import sys
 from pathlib import Path
 
-import jax.numpy as jnp
 import matplotlib.pyplot as plt
 import numpy as np
+from textbook_models import (
+    cart,
+    head,
+    hinge,
+    Pendulum,
+    pendulum,
+    read_head,
+    read_stage,
+    read_swings,
+    spring,
+    stage,
+)
 
-import jaxcam
 from jaxcam.discrepancy import with_terms
-from jaxcam.fitting import fit_free_run, free_run, Input, Model, Parameter, Sensor
+from jaxcam.fitting import fit_free_run, free_run, Model
 from jaxcam.plotting import style
-from jaxcam.recordings import read_case, Recording, segment
 
 
 # minutes of work: not without being asked
@@ -68,41 +78,8 @@ def stray(case, label, model, parameters, names, seen, unseen, scales, start=Non
 # Two swings, from 93 degrees and from 4; it hangs at pi. Each predicts the other. Dry
 # friction and drag take the place of the viscous hinge.
 
-
 # +
-class Pendulum(jaxcam.HybridSystem):
-    """A rigid pendulum with a viscous hinge: angle from hanging (rad), and its rate."""
-
-    stiffness: float = 60.0
-    damping: float = 0.05
-
-    def vector_field(self, t, state):
-        angle, rate = state
-        pull = self.stiffness * jnp.sin(angle) + self.damping * rate
-        return jnp.stack([rate, -pull])
-
-    def gap(self, t, state):
-        return state[0] + 100.0  # far from any stop
-
-    def impact(self, t, state):
-        return state
-
-
-count = 2 * np.pi / 40000
-swings = []
-for run in read_case(folder / "pendulum", channels=("angle_rad",)):
-    angle, clock = run["angle_rad"][::10], run.time[::10] - run.time[0]
-    moving = np.flatnonzero(np.abs(angle - angle[-1]) > 2 * count)[-1] + 1
-    part = Recording(run.name, clock[:moving], {"angle_rad": angle[:moving]})
-    swings.append(segment(part, "angle_rad", noise=count / np.sqrt(12)))
-
-encoder = {"angle_rad": Sensor(0, noise=count / np.sqrt(12), offset=np.pi)}
-hinge = [
-    Parameter("stiffness", lambda m: m.system.stiffness, scale=0.1, lower=0.0),
-    Parameter("damping", lambda m: m.system.damping, scale=0.01, lower=0.0),
-    Parameter("zero", lambda m: m.sensors["angle_rad"].offset, tolerance=0.01),
-]
-
+swings = read_swings(folder)
 by_size = {"large to small": swings, "small to large": swings[::-1]}
 viscous = Pendulum(stiffness=64.0)
 rubbing, others = Pendulum(stiffness=64.0, damping=0.0), [hinge[0], hinge[2]]
@@ -112,68 +89,19 @@ for way, (seen, unseen) in by_size.items():
         ("dry friction", rubbing, others, ("coulomb_friction",)),
         ("and drag", rubbing, others, ("coulomb_friction", "quadratic_drag")),
     ):
-        swing = Model(system, encoder)
+        swing = Model(system, pendulum.sensors)
         stray(f"pendulum, {way}", label, swing, own, names, seen, unseen, [seen])
 # -
 
 # ## A positioning stage
 #
-# A motor moves a load by a screw: force in, position out (the EMPS benchmark). Four
-# samples are made one: of the position the first, of the force the mean, so that no
-# impulse is lost.
-
-
-# +
-class Stage(jaxcam.HybridSystem):
-    """A mass with viscous friction: position (m) and velocity (m/s)."""
-
-    inverse_mass: float = 0.0105
-    viscous: float = 2.0
-    offset: float = 0.0
-    force: float = 0.0
-
-    def vector_field(self, t, state):
-        pushed = self.inverse_mass * self.force - self.offset
-        return jnp.stack([state[1], pushed - self.viscous * state[1]])
-
-    def gap(self, t, state):
-        return state[0] + 100.0
-
-    def impact(self, t, state):
-        return state
-
-
-def slower(run: Recording, channel: str, by: str, count: int, part=slice(None)):
-    """Every so many samples of a channel, and the mean of its input in between."""
-    size = len(run) // count * count
-    clock = run.time[:size:count][part]
-    channels = {
-        channel: run[channel][:size:count][part],
-        by: run[by][:size].reshape(-1, count).mean(axis=1)[part],
-    }
-    name = run.name if part == slice(None) else f"{run.name}_{part.start}"
-    return Recording(name, clock - clock[0], channels)
-
-
-case = list(read_case(folder / "positioning_stage", channels=("position_m",)))
-count = 5e-8  # smallest step of the encoder (m)
-stage = Model(
-    Stage(),
-    {"position_m": Sensor(0, noise=count)},
-    Input("motor_force_N", lambda system: system.force),
-)
-cart = [
-    Parameter("1/mass", lambda m: m.system.inverse_mass, scale=1e-4, lower=0.0),
-    Parameter("viscous", lambda m: m.system.viscous, scale=0.05, lower=0.0),
-    Parameter("offset", lambda m: m.system.offset, scale=0.01),
-]
-# -
-
+# A motor moves a load by a screw: force in, position out (the EMPS benchmark).
+#
 # The protocol of the benchmark: parameters from the first record alone, then a free run
 # of the second one, with pulses, from 20 samples. Each line adds a named term.
 
 # +
-estimation, pulses = case
+estimation, pulses = read_stage(folder)
 steps = {
     "textbook": (),
     "dry friction": ("coulomb_friction",),
@@ -208,52 +136,12 @@ print(f"before the first pulse: {np.mean(extra[early]):+.2f} N")
 #
 # A head on a spring, pushed by a motor: voltage in, position out. Somewhere it touches
 # the board. There is one record: its halves are two.
-
-
-# +
-class Head(jaxcam.HybridSystem):
-    """Mass, spring and damper, pushed by a motor: position (m) and velocity (m/s)."""
-
-    gain: float = 100.0
-    stiffness: float = 650.0
-    damping: float = 13.0
-    offset: float = 0.0
-    voltage: float = 0.0
-
-    def vector_field(self, t, state):
-        pushed = -self.gain * self.voltage - self.offset
-        pulled = self.stiffness * state[0] + self.damping * state[1]
-        return jnp.stack([state[1], pushed - pulled])
-
-    def gap(self, t, state):
-        return state[0] + 100.0
-
-    def impact(self, t, state):
-        return state
-
-
-(run,) = read_case(folder / "mounting_head", channels=("position_m",))
-first, second = (
-    slower(run, "position_m", "voltage_V", 8, half)
-    for half in (slice(0, 1875), slice(1875, 3750))
-)
-head = Model(
-    Head(),
-    {"position_m": Sensor(0, noise=5e-6)},
-    Input("voltage_V", lambda system: system.voltage),
-)
-spring = [
-    Parameter("gain", lambda m: m.system.gain, scale=1.0, lower=0.0),
-    Parameter("stiffness", lambda m: m.system.stiffness, scale=10.0, lower=0.0),
-    Parameter("damping", lambda m: m.system.damping, scale=0.3, lower=0.0),
-    Parameter("offset", lambda m: m.system.offset, scale=0.1),
-]
-# -
-
+#
 # The first half predicts the second, and the second the first, in free runs from 20
 # samples.
 
 # +
+run, first, second = read_head(folder)
 touches = {"edge_a": 0.0105, "ka": 630.0, "la": 98.0, "ra": 0.88, "fc": 0.16}
 touches |= {"edge_b": 0.0015, "kd": 2e4}
 for way, (seen, unseen) in {

@@ -4,6 +4,8 @@ import json
 import math
 import re
 import shlex
+import subprocess
+import sys
 from pathlib import Path
 
 import equinox as eqx
@@ -62,6 +64,13 @@ def examples():
 
 def test_version():
     assert jaxcam("--version").stdout == f"jaxcam {package.__version__}\n"
+
+
+@pytest.mark.parametrize("module", ["jaxcam", "jaxcam.cli"])
+def test_python_runs_the_command_as_a_module(module):
+    line = [sys.executable, "-m", module, "--version"]
+    found = subprocess.run(line, capture_output=True, text=True, check=True)
+    assert found.stdout.startswith("jaxcam ")
 
 
 def test_examples_in_the_help_name_options_that_exist():

@@ -4,6 +4,7 @@ import json
 import re
 import shutil
 from pathlib import Path
+from types import SimpleNamespace
 
 import hostile_files
 import numpy as np
@@ -11,7 +12,8 @@ import pytest
 from scipy.integrate import solve_ivp
 from typer.testing import CliRunner
 
-from jaxcam.cli import app
+from jaxcam.cli import _fit_result, app
+from jaxcam.cli._output import Output
 from jaxcam.data import DEMO_RIG
 
 
@@ -99,6 +101,28 @@ def write_case(folder: Path) -> None:
             header="time_s,position_mm",
             comments="",
         )
+
+
+@pytest.mark.parametrize("converged", [True, False])
+def test_the_reason_of_a_failed_fit_is_left_to_standard_error(
+    converged, capsys, monkeypatch
+):
+    for name in ("parameter_table", "correlation_table"):
+        monkeypatch.setattr(_fit_result, name, lambda *fit: "table")
+    after = SimpleNamespace(
+        converged=converged, message="Reason.", most_correlated=lambda: "a and b"
+    )
+    found = SimpleNamespace(
+        problem=None,
+        after=after,
+        again=None,
+        seen=SimpleNamespace(sentences=lambda: []),
+        laws={},
+        remainder="Remainder.",
+        sentence="Reason. Remainder.",
+    )
+    _fit_result.print_fit(Output(None, None), found, ())  # pyright: ignore
+    assert capsys.readouterr().out.count("Reason.") == converged
 
 
 def test_the_example_is_written_once(tmp_path, monkeypatch):

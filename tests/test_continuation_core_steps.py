@@ -9,7 +9,12 @@ import pytest
 import continuation
 from continuation import BranchSettings, Natural, PseudoArclength
 from continuation.predictors import Secant, TangentPredictor
-from continuation.step_control import AbstractStepControl, EffortAndAngle, Refusal, Way
+from continuation.step_control import (
+    AbstractStepControl,
+    EffortAndAngle,
+    Refusal,
+    StepMeasures,
+)
 
 
 def mu(parameters):
@@ -30,10 +35,10 @@ class Short(AbstractStepControl):
 
     kept: ClassVar[float] = 0.03
 
-    def refusals(self, way: Way, step: Any, settings: BranchSettings):
-        return {Refusal.TURNED: way.angle > settings.max_angle}
+    def refusals(self, measures: StepMeasures, step: Any, settings: BranchSettings):
+        return {Refusal.TURNED: measures.angle > settings.max_angle}
 
-    def next_step(self, way: Way, step: Any, settings: BranchSettings):
+    def next_step(self, measures: StepMeasures, step: Any, settings: BranchSettings):
         return 0 * step + self.kept
 
 
@@ -42,8 +47,10 @@ def test_length_follows_effort_and_angle():
     control, settings = EffortAndAngle(), BranchSettings(max_step=1.0)
 
     def factor(iterations, angle):
-        way = Way(np.float64(iterations), np.float64(0.0), np.float64(angle))
-        return control.next_step(way, 0.01, settings) / 0.01
+        measures = StepMeasures(
+            np.float64(iterations), np.float64(0.0), np.float64(angle)
+        )
+        return control.next_step(measures, 0.01, settings) / 0.01
 
     aimed = settings.iterations
     assert factor(aimed, settings.angle) == pytest.approx(1.0)

@@ -10,15 +10,21 @@ from textbook_stage import Stage, staged
 from jaxcam.discrepancy import diagnose, library, Policy
 from jaxcam.discrepancy.search._placing import _signed_gain
 from jaxcam.discrepancy.search._question import by_listing
-from jaxcam.discrepancy.terms import Motion, saved_classes, Visited, Where, WithTerms
+from jaxcam.discrepancy.terms import (
+    Motion,
+    MotionScales,
+    saved_classes,
+    Where,
+    WithTerms,
+)
 from jaxcam.fitting import Input, Parameter, Sensor
 from jaxcam.models.saved import load_system, save_system
 from jaxcam.recordings import Recording, segment
 
 
-VISITED = Visited(-0.2, 0.6, 3.0, 12.0, 0.01)
+SCALES = MotionScales(-0.2, 0.6, 3.0, 12.0, 0.01)
 TERMS = {
-    term.name: term.scaled(VISITED)
+    term.name: term.scaled(SCALES)
     for term in library(extended=True)
     if term.name not in {one.name for one in library()}
 }
@@ -107,7 +113,7 @@ def test_a_restitution_is_a_power_of_the_approach_speed(power):
     ],
 )
 def test_a_stop_takes_energy_out_of_a_motion_into_it_and_back(name, values, edge):
-    sharp = tuple(VISITED._replace(slip=1e-6))
+    sharp = tuple(SCALES._replace(slip=1e-6))
     term = dataclasses.replace(TERMS[name], **values, ranges=sharp)
     angle = np.linspace(0, 2 * np.pi, 4001)[:-1]
     position, velocity = edge + 0.1 * np.sin(angle), 0.1 * np.cos(angle)
@@ -128,9 +134,9 @@ def test_a_stop_takes_energy_out_of_a_motion_into_it_and_back(name, values, edge
 
 def test_scales_are_those_of_the_recordings():
     """A motion a hundred times smaller has sizes and places a hundred times smaller."""
-    small = Visited(*(0.01 * x for x in VISITED))
+    small = MotionScales(*(0.01 * x for x in SCALES))
     for term in library(extended=True):
-        large_one, small_one = term.scaled(VISITED), term.scaled(small)
+        large_one, small_one = term.scaled(SCALES), term.scaled(small)
         for start, other in zip(large_one.starts(), small_one.starts(), strict=True):
             for name, value in start.items():
                 assert other[name] == pytest.approx(0.01 * value, abs=1e-15)
@@ -187,7 +193,7 @@ def test_a_system_with_extended_terms_is_saved_and_read_again(tmp_path):
     assert again.vector_field(t, state) == pytest.approx(
         np.asarray(system.vector_field(t, state)), abs=1e-14
     )
-    assert again.terms[-1].visited == VISITED  # pyright: ignore
+    assert again.terms[-1].scales == SCALES  # pyright: ignore
 
 
 @pytest.mark.slow

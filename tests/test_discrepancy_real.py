@@ -88,6 +88,7 @@ def _force(system):
 def _run_notebook(name: str) -> dict:
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("JAXCAM_RECORDINGS", str(ROOT.resolve()))
+        patch.syspath_prepend(HERE / "notebooks")
         return runpy.run_path(str(HERE / "notebooks" / name))
 
 

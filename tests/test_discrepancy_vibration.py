@@ -19,6 +19,7 @@ from jaxcam.discrepancy.search._hidden_scan import _Chain
 from jaxcam.discrepancy.search._hidden_signals import driven_by
 from jaxcam.discrepancy.search._hidden_state import Hidden, with_hidden
 from jaxcam.discrepancy.search._local_force import force_response
+from jaxcam.discrepancy.search._state_elimination import StateElimination
 from jaxcam.discrepancy.search._vibration_scan import periodogram
 from jaxcam.discrepancy.terms import HiddenForce, WithTerms
 from jaxcam.discrepancy.terms._library import ExternalVibration
@@ -209,3 +210,40 @@ def test_the_scan_of_hidden_elements_promises_what_parameters_gain(
     ):
         expected = np.concatenate([step[labels == name] for name in own])
         np.testing.assert_allclose(values, expected, rtol=0.05)
+
+
+def test_states_are_eliminated_as_from_the_whole_matrix():
+    """Two pieces of two states, three parameters and a force, tied by four rows."""
+    rng = np.random.default_rng(5)
+    n, m, f, rows = 2, 3, 1, 4
+    known = np.zeros((m + f, m + f + 1))
+    whole = np.zeros((2 * n + m + f, 2 * n + m + f + 1))
+
+    def add(direct, pushed, off, sign):
+        moved = np.concatenate([direct, pushed], axis=1)
+        known[...] += sign * moved.T @ np.column_stack([moved, off])
+
+    states = StateElimination(add)
+    rest = slice(2 * n, None)
+    for k in range(2):
+        # rows of the piece itself: its state, parameters and force, and what is off
+        own, off = rng.normal(size=(9, n + m + f)), rng.normal(size=9)
+        place = np.r_[k * n : (k + 1) * n, 2 * n : 2 * n + m + f]
+        square = own.T @ np.column_stack([own, off])
+        whole[np.ix_(place, [*place, -1])] += square
+        known += square[n:, n:]
+        blocks = [
+            square[:n, :n], square[:n, n : n + m], square[:n, -1],
+            square[:n, n + m : -1],
+        ]  # fmt: skip
+        if k == 0:
+            states.begin(blocks)
+        else:
+            tie, off = rng.normal(size=(rows, 2 * n + m + f)), rng.normal(size=rows)
+            whole += tie.T @ np.column_stack([tie, off])
+            direct, pushed = tie[:, 2 * n : 2 * n + m], tie[:, 2 * n + m :]
+            states.follow(blocks, tie[:, :n], tie[:, n : 2 * n], (direct, off, pushed))
+    states.end()
+    inner, side = whole[: 2 * n, : 2 * n], whole[: 2 * n, rest]
+    left = whole[rest, rest] - side[:, :-1].T @ np.linalg.solve(inner, side)
+    assert known == pytest.approx(left, rel=1e-9, abs=1e-9)

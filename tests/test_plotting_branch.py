@@ -1,5 +1,7 @@
 """The bifurcation figure says what the branch says."""
 
+import dataclasses
+
 import matplotlib
 
 
@@ -65,4 +67,17 @@ def test_point_that_was_only_bracketed_is_named_so():
     figure = plotting.branch_diagram(parabola(converged=False), letters=False)
     labels = {line.get_label() for line in figure.axes[0].lines}
     assert "fold (bracketed)" in labels and not figure.axes[0].texts
+    plt.close(figure)
+
+
+@pytest.mark.parametrize("side, expected", [(1, "left"), (-1, "right")])
+def test_the_name_of_a_mark_at_an_edge_is_written_inwards(side, expected):
+    branch = parabola()
+    points = [
+        dataclasses.replace(p, parameter=100 + side * p.parameter)
+        for p in branch.points
+    ]
+    figure = plotting.branch_diagram(Branch(tuple(points), "p", (99.0, 101.0)))
+    (text,) = figure.axes[0].texts
+    assert text.get_ha() == expected
     plt.close(figure)

@@ -16,7 +16,7 @@ from jaxcam.data import DEMO_RIG
 from jaxcam.models import BouncingBall, CamFollower
 from jaxcam.recordings import read_case, read_rig, Recording, segment_case
 from jaxcam.thesis import reproduce, TARGETS
-from jaxcam.thesis.progress import of_share, of_sweep, report
+from jaxcam.thesis.progress import counted, of_share, of_sweep, report, reporting
 from jaxcam.thesis.target import Target
 
 
@@ -160,3 +160,10 @@ def test_the_command_shows_it(told_target):
     shown.clear()
     _reproduce._within(lambda *said: shown.append(said), "f", 0, 1)("preparing", None)
     assert shown == [("f: preparing", None)]
+
+
+def test_a_loop_over_items_counts_them():
+    told = []
+    with reporting(lambda *one: told.append(one)):
+        assert list(counted("measuring lobe", np.array([3.0, 5.0]))) == [3.0, 5.0]
+    assert told == [("measuring lobe, 1 of 2", 0.0), ("measuring lobe, 2 of 2", 0.5)]

@@ -2,14 +2,18 @@
 
 from types import SimpleNamespace
 
+import jax
 import numpy as np
 import pytest
 
+import jaxcam
 from continuation import Branch, Point
 from jaxcam.discrepancy import Diagnosis
 from jaxcam.discrepancy.report import Effect
 from jaxcam.discrepancy.terms import Value
 from jaxcam.fitting._fit_result import Fit
+from jaxcam.hybrid import stroboscope
+from jaxcam.models import BouncingBall, ImpactOscillator
 from jaxcam.tables import ShortTable
 
 
@@ -84,3 +88,39 @@ def test_no_result_prints_its_arrays(kind):
     """The representation that a dataclass writes would show every array."""
     assert "dataclasses" not in kind.__repr__.__module__
     assert kind.__repr__.__qualname__ == f"{kind.__name__}.__repr__"
+
+
+@pytest.fixture(scope="module")
+def bounced():
+    return jaxcam.simulate(BouncingBall(), [1.0, 0.0], 0.0, 5.0)
+
+
+def test_the_parts_of_a_trajectory_print_as_tables(bounced):
+    lines = str(bounced.impacts).splitlines()
+    assert lines[0] == f"impacts: {int(bounced.impacts.count)}"
+    assert lines[2].split() == ["1", "0.45152364", "0", "4.42945", "3.54356"]
+    assert len(lines) == 2 + 21 and bounced.impacts._repr_html_().count("<tr>") == 22
+    # the ball comes to rest and stays
+    assert str(bounced.contacts).splitlines()[-1].split() == [
+        "1", "4.0637128", "5", "0", "no",
+    ]  # fmt: skip
+    lines = str(bounced.steps).splitlines()
+    assert lines[0] == f"integration points: {int(bounced.steps.count)}"
+    assert lines[2].split() == ["1", "0", "1,", "0", "-"]
+    assert lines[-1].split()[-1] == "0"
+
+
+def test_a_batch_and_traced_results_print_as_modules(bounced):
+    batch = jax.tree.map(lambda x: np.stack([x, x]), bounced)
+    for part in (batch, batch.impacts, batch.contacts, batch.steps):
+        assert str(part) == repr(part) and part._repr_html_() is None
+    seen = []
+    jax.jit(lambda part: seen.append((str(part), part._repr_html_())))(bounced.impacts)
+    assert "Impacts(" in seen[0][0] and seen[0][1] is None
+
+
+def test_a_stroboscope_prints_a_row_for_each_trajectory():
+    found = stroboscope(ImpactOscillator(), np.zeros((2, 2)), 4, skip=2)
+    lines = str(found).splitlines()
+    assert lines[0] == "trajectories: 2, failed: 0, samples of each: 2"
+    assert lines[1].split()[-1] == "sample" and len(lines) == 4

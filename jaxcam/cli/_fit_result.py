@@ -39,13 +39,18 @@ class Result:
 
     @property
     def sentence(self) -> str:
+        """Describe how the fit ended, and how well it explains its samples."""
+        return f"{self.after.message} {self.remainder}"
+
+    @property
+    def remainder(self) -> str:
         """Describe how well the fit explains its samples."""
         quality = self.quality
         ratio = sum(q["ratio"] for q in quality) / len(quality)
         return (
-            f"{self.after.message} The rms residual of {self.problem.samples} samples "
-            f"of {len(self.problem.records)} recordings is {ratio:.3f} times the "
-            "sensor noise."
+            f"The rms residual of {self.problem.samples} samples of "
+            f"{len(self.problem.records)} recordings is {ratio:.3f} times the sensor "
+            "noise."
         )
 
     def to_json(self, about: Mapping[str, Any]) -> dict[str, Any]:
@@ -126,7 +131,10 @@ def fitted(
 
 
 def print_fit(output: Output, found: Result, notes: Sequence[str]) -> None:
-    """Print tables and sentences to the terminal."""
+    """Print tables and sentences to the terminal.
+
+    The reason why a fit failed is left to standard error.
+    """
     for sentence in (*notes, *found.seen.sentences()):
         output.print(sentence)
     output.print(parameter_table(found.problem, found.after, found.again))
@@ -136,4 +144,4 @@ def print_fit(output: Output, found: Result, notes: Sequence[str]) -> None:
         where = name.rpartition(", ")[0]
         sentence = law.sentence()
         output.print(f"{where.capitalize()}: {sentence}" if where else sentence)
-    output.print(found.sentence)
+    output.print(found.sentence if found.after.converged else found.remainder)

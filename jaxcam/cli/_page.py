@@ -46,7 +46,9 @@ th, td { padding: .4rem .6rem; text-align: right; white-space: nowrap;
 th { color: var(--quiet); font-weight: 600; white-space: normal; }
 .text { text-align: left; }
 td.text:last-child { white-space: normal; min-width: 18rem; }
-@media (max-width: 34rem) { table { font-size: .85rem; } th, td { padding: .35rem; } }
+@media (max-width: 34rem) { table { font-size: .8rem; }
+  th, td { padding: .35rem .25rem; white-space: normal; }
+  td.text:last-child { min-width: 0; } }
 figure { margin: 1.4rem 0; }
 img { display: block; width: 100%; max-width: 46rem; height: auto; background: #fff;
   border-radius: 6px; border: 1px solid var(--line); }

@@ -9,11 +9,14 @@ import jax.numpy as jnp
 import numpy as np
 
 from ..parameters import as_arrays, pick, real_array, Where
+from ..tables import ShortTable
 from ._settings import Settings
 from ._system import HybridSystem
 from .batch import Chunking, Horizon, Lanes, run_refilled, split_lanes, TurnSamples
 from .checks import check_start, refuse_tracers
+from .codes import message
 from .loop import starts_behind
+from .record import Printed, vector_text
 from .surface import check_restitution, restitutions
 
 
@@ -21,7 +24,7 @@ from .surface import check_restitution, restitutions
 _GROUP = 64
 
 
-class Stroboscope(eqx.Module):
+class Stroboscope(Printed):
     """Stroboscopic samples of many trajectories, as NumPy arrays; NaN where a run
     failed.
     """
@@ -40,6 +43,36 @@ class Stroboscope(eqx.Module):
     """Impacts in each sampled period, shape `(lanes, turns - skip)`."""
     rests: np.ndarray
     """Completed chatter sequences in each sampled period, same shape."""
+
+    def _table(self) -> ShortTable:
+        failed = int(np.count_nonzero(self.code))
+        rows = [
+            (
+                str(k),
+                str(impacts),
+                str(steps),
+                vector_text(states[-1]),
+                message(int(code)),
+            )
+            for k, (states, impacts, steps, code) in enumerate(
+                zip(self.states, self.impacts, self.steps, self.code, strict=True)
+            )
+        ]
+        headings = (
+            "trajectory",
+            "impacts",
+            "steps",
+            "last sample",
+            "failure",
+        )
+        said = (
+            f"trajectories: {len(rows)}, failed: {failed}, "
+            f"samples of each: {self.states.shape[1]}"
+        )
+        # the last column only where there is something to say
+        if not failed:
+            headings, rows = headings[:-1], [row[:-1] for row in rows]
+        return ShortTable(said, headings, rows, ("failure",))
 
 
 def stroboscope(

@@ -164,6 +164,8 @@ def _mark(ax: Axes, branch, value, x_scale) -> None:
 
 def _name(ax: Axes, points, value, x_scale) -> None:
     """Write a word next to each mark, if there is room."""
+    # positions in the picture are those of the final limits
+    ax.autoscale_view()
     taken: list[np.ndarray] = []
     for point in points:
         y = float(np.ravel(np.asarray(value(point), dtype=float))[0])

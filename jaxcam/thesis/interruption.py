@@ -8,6 +8,7 @@ from variational import chatter_accumulation, chatter_frame
 from variational.chatter import fly, interruption_in, release_impacts, surface_state
 
 from ..models import CamFollower, rad_s_to_rpm, rpm_to_rad_s
+from .progress import counted
 from .remember import remembered
 from .speeds import at_speed, speed_of
 
@@ -32,7 +33,7 @@ def interruption(system: CamFollower) -> CamFollower:
         ValueError: The interruption is not within 66 rpm of the thesis' speed.
     """
     places = [0, *(way * k for k in range(1, _RANGES + 1) for way in (1, -1))]
-    for place in places:
+    for place in counted("searching a range of speeds for the interruption", places):
         middle = INTERRUPTION + _RANGE * place
         ends = np.array([middle - _RANGE / 2, middle + _RANGE / 2])
         low, high = np.asarray(rpm_to_rad_s(ends))

@@ -13,6 +13,7 @@ from variational.orbits import (
 )
 
 from ..models import CamFollower, rpm_to_rad_s
+from .progress import counted
 from .speeds import at_rpm, speed_of
 
 
@@ -32,7 +33,8 @@ def orbit_at(system: CamFollower, start: ImpactOrbit, rpm: float) -> ImpactOrbit
     """Follow the orbit `start` from 148 rpm to another speed."""
     strides = max(1, int(np.ceil(abs(rpm - SEARCH) / _STRIDE)))
     orbit = start
-    for speed in np.linspace(SEARCH, rpm, strides + 1)[1:]:
+    speeds = np.linspace(SEARCH, rpm, strides + 1)[1:]
+    for speed in counted(f"following an orbit to {rpm:.6g} rpm, step", speeds):
         orbit = next_orbit(at_rpm(system, speed), orbit)
     return orbit
 
@@ -79,7 +81,8 @@ def along_traces(
     moved = at_rpm(system, SEARCH)
     first = float(np.trace(np.asarray(compiled_monodromy(moved, start))))
     strides = max(1, int(np.ceil(abs(trace - first) / stride)))
-    for value in np.linspace(first, trace, strides + 1)[1:]:
+    traces = np.linspace(first, trace, strides + 1)[1:]
+    for value in counted("following an orbit by its multipliers, step", traces):
         point = point_on_line(system, point, (float(value), 0.0))
     return point
 

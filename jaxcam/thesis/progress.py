@@ -4,10 +4,10 @@ Targets are functions of a rig whose results are cached by their arguments. Ther
 the callback is set by a context manager, not passed as an argument.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, TypeAlias, TypeVar
 
 from ..models import rad_s_to_rpm
 from ..sweeps.blocks import Progress
@@ -16,6 +16,8 @@ from ..sweeps.blocks import Progress
 if TYPE_CHECKING:
     from continuation import Point
 
+
+_T = TypeVar("_T")
 
 Report: TypeAlias = Callable[[str, float | None], None]
 """Callback that takes a sentence and a fraction, or None."""
@@ -59,6 +61,26 @@ def of_share(sentence: str) -> Callable[[float], None]:
     return lambda share: report(sentence, share)
 
 
-def of_point(point: "Point") -> None:
-    """Return a callback for a branch over the speed."""
-    report(f"following a branch, {float(rad_s_to_rpm(point.parameter)):.6g} rpm")
+def of_branch(low: float, high: float) -> "Callable[[Point], None]":
+    """Return the callback of a branch over the speed between bounds (rpm).
+
+    It reports the number of points, and the share of the range that they span.
+    """
+    seen: list[float] = []
+
+    def callback(point: "Point") -> None:
+        seen.append(float(rad_s_to_rpm(point.parameter)))
+        share = (max(seen) - min(seen)) / (high - low)
+        report(
+            f"following a branch, point {len(seen)} at {seen[-1]:.6g} rpm",
+            min(share, 1.0),
+        )
+
+    return callback
+
+
+def counted(sentence: str, items: Collection[_T]) -> Iterator[_T]:
+    """Yield each item, and report before it how many are done."""
+    for k, item in enumerate(items):
+        report(f"{sentence}, {k + 1} of {len(items)}", k / len(items))
+        yield item

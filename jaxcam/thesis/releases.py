@@ -10,6 +10,7 @@ from ..hybrid import simulate, Trajectory
 from ..hybrid.surface import release_point
 from ..models import CamFollower, rpm_to_rad_s
 from .motion_drawing import draw_gap
+from .progress import counted
 from .speeds import at_speed
 from .target import Rows, Target
 
@@ -59,7 +60,7 @@ def released_target(title: str, *cases: tuple[float, float], note: str = "") -> 
 
     def compute(system: CamFollower) -> Rows:
         rows: Rows = []
-        for rpm, printed in cases:
+        for rpm, printed in counted("simulating a cycle from release", cases):
             run = released_turn(system, rpm)
             time = sticking_time(run)
             rests = float(time > 0)

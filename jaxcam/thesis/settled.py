@@ -11,6 +11,7 @@ from ..hybrid import simulate, Trajectory
 from ..models import CamFollower, rpm_to_rad_s
 from ..sweeps import Stroboscopic
 from ..sweeps.attractors import CONTACT, label_name, settle, STICKING
+from .progress import of_share
 from .remember import remembered
 from .speeds import at_rpm, speed_of
 from .target import Rows
@@ -66,7 +67,14 @@ def settled(system: CamFollower, cases: tuple[ShownMotion, ...]) -> list[Settled
         if case.state is not None:
             states[k] = case.state
     samples, labels = settle(
-        section, states, _TURNS, _KEEP, reruns=_RERUNS, where=speed_of, values=speeds
+        section,
+        states,
+        _TURNS,
+        _KEEP,
+        reruns=_RERUNS,
+        where=speed_of,
+        values=speeds,
+        progress=of_share(f"simulating {len(cases)} motions until they settle"),
     )
     return [
         SettledMotion(

@@ -8,8 +8,8 @@ import numpy as np
 from jaxtyping import Array, Complex, Float
 
 from jaxcam.hybrid import HybridSystem, Settings, simulate
-from jaxcam.hybrid.checks import is_traced, refuse_tracers
-from jaxcam.hybrid.record import Contacts, Impacts
+from jaxcam.hybrid.checks import refuse_tracers
+from jaxcam.hybrid.record import Contacts, impact_table, Impacts, Printed
 from jaxcam.hybrid.sizes import component_sizes
 from jaxcam.parameters import real_array, VectorLike
 from jaxcam.tables import ShortTable
@@ -31,7 +31,7 @@ class Event(NamedTuple):
     """Index of the constraint."""
 
 
-class Orbit(eqx.Module):
+class Orbit(Printed):
     """One period of a periodic motion.
 
     Examples:
@@ -65,12 +65,6 @@ class Orbit(eqx.Module):
     sticks: bool = eqx.field(static=True)
     """Whether the orbit has sustained contact."""
 
-    def __str__(self) -> str:
-        return repr(self) if is_traced(self) else self._table().text()
-
-    def _repr_html_(self) -> str | None:
-        return None if is_traced(self) else self._table().html()
-
     def _table(self) -> ShortTable:
         """Tabulate the impacts of one period, with a sentence on stability."""
         sizes = ", ".join(f"{abs(m):.3g}" for m in self.multipliers)
@@ -79,19 +73,7 @@ class Orbit(eqx.Module):
             f"{float(self.period):.6g} s, impacts: {int(self.impacts.count)}, "
             f"contacts: {int(self.contacts.count)}, multipliers of modulus {sizes}"
         )
-        impacts = self.impacts
-        rows = [
-            (
-                str(k + 1),
-                f"{float(impacts.time[k]):.8g}",
-                str(int(impacts.constraint[k])),
-                f"{-float(impacts.speed_before[k]):.6g}",
-                f"{float(impacts.speed_after[k]):.6g}",
-            )
-            for k in range(int(impacts.count))
-        ]
-        headings = ("impact", "time (s)", "constraint", "approach", "rebound")
-        return ShortTable(sentence, headings, rows)
+        return impact_table(self.impacts, sentence)
 
     @property
     def multipliers(self) -> Complex[Array, " n"]:

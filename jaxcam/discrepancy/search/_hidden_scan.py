@@ -21,6 +21,7 @@ from ._hidden_kinds import HYSTERESIS, Kind, RELAXATION, RESONANCE
 from ._hidden_signals import at_times, Driven
 from ._hidden_state import Hidden
 from ._local_force import forces_at_nodes, Response
+from ._state_elimination import StateElimination, TINY
 from ._vibration_scan import scanned_frequencies
 
 
@@ -35,8 +36,7 @@ _SHAPES = ((0.5, 1.0), (1.0, 1.0), (0.5, 2.0), (1.0, 2.0))
 # Number of force values at nodes that are computed at once
 _AT_ONCE = 8_000_000
 # Relative increase of a diagonal that keeps a matrix positive definite
-_STATES, _FORCES = 1e-13, 1e-9
-_TINY = 1e-300
+_FORCES = 1e-9
 
 
 class Promise(NamedTuple):
@@ -162,7 +162,7 @@ class _Chain:
         taken = across @ inside
         left = pull - taken @ score
         matrix = own - taken @ np.swapaxes(across, 1, 2)
-        diagonal = np.maximum(np.einsum("wii->wi", matrix), _TINY)
+        diagonal = np.maximum(np.einsum("wii->wi", matrix), TINY)
         scale = 1 / np.sqrt(diagonal)
         matrix = matrix * scale[:, :, None] * scale[:, None, :]
         matrix = matrix + _FORCES * np.eye(matrix.shape[-1])
@@ -210,8 +210,8 @@ class _Sums:
         self.f = np.zeros((cells, width))
         self.ff = np.zeros((cells, width, width))
 
-    def add(self, direct, pushed, off, sign=1.0):
-        """Return the rows for the parameters and the forces, and the residuals."""
+    def add(self, direct, pushed, off, sign):
+        """Add the rows for the parameters and the forces, and the residuals."""
         self.pp += sign * direct.T @ direct
         self.p += sign * direct.T @ off
         self.pf += sign * (direct.T @ pushed).reshape(-1, *self.shape)
@@ -231,8 +231,7 @@ def _summed(response: Response, r: int, direct, columns, cells: int) -> _Sums:
     n, m = found.later.shape[-1], response.place.shape[1]
     d = direct.shape[-1]
     sums = _Sums(m + d, cells, columns.shape[-1])
-    before, pushed_before = [], np.zeros((0, 0))
-    direct_before = np.zeros((0, 0))
+    states, forces_before, direct_before = StateElimination(sums.add), None, None
     for k in np.flatnonzero(response.exists[r]):
         forces = columns[k].reshape(columns.shape[1], -1)
         inner, slope = found.information[k], found.slope[k]
@@ -254,35 +253,16 @@ def _summed(response: Response, r: int, direct, columns, cells: int) -> _Sums:
         sums.f += (slope[l] @ forces).reshape(sums.shape)
         sums.ff += sums.products(forces, shaken[l])
         here = [known[:n, :n], known[:n, n:], pull[:n], coupled[:n]]
-        if before:
-            later, earlier, off = found.later[k], found.earlier[k], -found.tied[k]
+        if forces_before is None:
+            states.begin(here)
+        else:
+            earlier = found.earlier[k]
             by_parameters = earlier[:, n : n + m] + found.direct[k, :, :m]
             moved = np.concatenate(
                 [by_parameters, earlier[:, l] @ direct_before], axis=1
             )
-            pushed = earlier[:, l] @ pushed_before
-            sums.add(moved, pushed, off)
-            rows = [moved, off, pushed]
-            here = [x + later.T @ y for x, y in zip(here, (later, *rows))]
-            first = earlier[:, :n]
-            before = [x + first.T @ y for x, y in zip(before, (first, *rows))]
-            (_, moved, off, pushed), tie = _halved(before, first.T @ later)
-            sums.add(moved, pushed, off, -1.0)
-            taken = (tie, moved, off, pushed)
-            here = [x - tie.T @ y for x, y in zip(here, taken)]
-        before, pushed_before, direct_before = here, forces, direct[k]
-    if before:
-        (_, moved, off, pushed), _ = _halved(before, np.zeros((n, 0)))
-        sums.add(moved, pushed, off, -1.0)
+            rows = moved, -found.tied[k], earlier[:, l] @ forces_before
+            states.follow(here, earlier[:, :n], found.later[k], rows)
+        forces_before, direct_before = forces, direct[k]
+    states.end()
     return sums
-
-
-def _halved(blocks, coupling):
-    """Return the blocks of one piece and its coupling to the next, divided by the
-    square root of the first.
-    """
-    scale = 1 / np.sqrt(np.maximum(np.diag(blocks[0]), _TINY))
-    scaled = blocks[0] * np.outer(scale, scale)
-    root = np.linalg.inv(np.linalg.cholesky(scaled + _STATES * np.eye(len(scale))))
-    root = root * scale
-    return [root @ part for part in blocks], root @ coupling

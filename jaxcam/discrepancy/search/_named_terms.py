@@ -8,8 +8,8 @@ from ...recordings import Recording, References, Segments
 from ...recordings.cut import fast_speed
 from ...recordings.files import unit_of
 from ..terms import coordinates, library, Term, WithTerms
+from ._motion_scales import motion_scales
 from ._of_base import channel_of, measured_in, of_base, usual_state, within
-from ._visited_by import visited_by
 
 
 def with_terms(
@@ -51,8 +51,8 @@ def with_terms(
     pairs = coordinates(model.system, usual_state(model.system, sensors, runs))
     seen = channel_of(sensors, pairs[0][0])
     references = References.of_speed(fast_speed(runs, seen))
-    visited = visited_by(runs, seen, sensors[seen], references.slip_speed)
-    references = dataclasses.replace(references, spring_center=visited.middle)
+    scales = motion_scales(runs, seen, sensors[seen], references.slip_speed)
+    references = dataclasses.replace(references, spring_center=scales.middle)
     known = {
         term.name: term
         for term in library(references=references, clocked=True, extended=True)
@@ -63,7 +63,7 @@ def with_terms(
             f"There is no term {wrong[0]!r}; the terms are {', '.join(known)}."
         )
     picked = [known[one] if isinstance(one, str) else one for one in terms]
-    scaled = [term.scaled(visited) for term in picked]
+    scaled = [term.scaled(scales) for term in picked]
     placed = measured_in(unit_of(seen), scaled)
     drive: Turning | Input | None = of_base(model.drive)
     more = [p for k, term in enumerate(placed) for p in term.parameters(k)]

@@ -10,6 +10,7 @@ from ...recordings.cut import Segments
 from ...recordings.files import check_channels, check_drive
 from ..policy import Policy
 from ..terms import base_drive, library, Term, watched, WithTerms
+from ._motion_scales import motion_scales
 from ._question import (
     by_listing,
     Question,
@@ -19,7 +20,6 @@ from ._question import (
     term_parameters,
     with_seen_noise,
 )
-from ._visited_by import visited_by
 
 
 _FOLLOWER = "follower_angle_rad"
@@ -52,8 +52,8 @@ def rig_question(
     own = [part.recording for part in cut]
     sensors, noisier = with_seen_noise(base.sensors, own, policy)
     slip = rig.references.slip_speed
-    visited = visited_by(own, _FOLLOWER, sensors[_FOLLOWER], slip)
-    terms, unlisted = by_listing(tuple(term.scaled(visited) for term in candidates))
+    scales = motion_scales(own, _FOLLOWER, sensors[_FOLLOWER], slip)
+    terms, unlisted = by_listing(tuple(term.scaled(scales) for term in candidates))
     model = watched(Model(WithTerms(base.system, terms), sensors, base_drive()))
     parameters = cam_follower_parameters(rig, base=lambda s: s.base)
     names = tuple(p.name for p in parameters)

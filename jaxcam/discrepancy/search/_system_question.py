@@ -21,6 +21,7 @@ from ...recordings.cut import (
 from ...recordings.files import check_channels, unit_of
 from ..policy import Policy
 from ..terms import coordinates, library, Term, terms_of, watched, WithTerms
+from ._motion_scales import motion_scales
 from ._of_base import channel_of, measured_in, of_base, usual_state, within
 from ._question import (
     by_listing,
@@ -30,7 +31,6 @@ from ._question import (
     term_parameters,
     with_seen_noise,
 )
-from ._visited_by import visited_by
 
 
 # Slip speed as a share of the usual change of speed in a step; the impulse of dry
@@ -113,8 +113,8 @@ def system_question(
     def listed(references: References):
         usual = library(turned, references, clocked=clocked)
         offered = usual if candidates is None else candidates
-        visited = visited_by(runs, seen, sensors[seen], references.slip_speed)
-        scaled = [term.scaled(visited) for term in offered]
+        scales = motion_scales(runs, seen, sensors[seen], references.slip_speed)
+        scaled = [term.scaled(scales) for term in offered]
         return by_listing(measured_in(unit, scaled))
 
     terms, unlisted = listed(references)

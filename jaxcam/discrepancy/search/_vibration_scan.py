@@ -17,12 +17,11 @@ from ...fitting import Problem
 from ...fitting.engine import invert_information
 from ..policy import Policy
 from ._local_force import Response, stride_of
+from ._state_elimination import StateElimination, TINY
 
 
 # Relative increase of a diagonal that keeps a matrix positive definite
-_STATES, _SHAKEN = 1e-13, 1e-9
-# Lower limit of divisors that may be zero
-_TINY = 1e-300
+_SHAKEN = 1e-9
 
 
 @dataclasses.dataclass(frozen=True)
@@ -129,8 +128,8 @@ class _Sums:
         self.ff += np.sum(waves * shaken[m:], axis=0)
         self.fc += np.sum(np.real(np.conj(waves) * shaken[m:]), axis=0)
 
-    def add_rows(self, direct, pushed, off, sign=1.0):
-        """Return the rows for the parameters and the force, and the residuals."""
+    def add(self, direct, pushed, off, sign):
+        """Add the rows for the parameters and the force, and the residuals."""
         self.pp += sign * direct.T @ direct
         self.p += sign * direct.T @ off
         self.pf += sign * direct.T @ pushed
@@ -145,7 +144,7 @@ def _summed(response: Response, r: int, rate) -> _Sums:
     n, m = found.later.shape[-1], response.place.shape[1]
     p, l = slice(n, n + m), slice(n + m, None)
     sums = _Sums(found.pp[:m, :m], found.p[:m], len(rate))
-    before, waves_before = [], np.zeros((0, 0))
+    states, waves_before = StateElimination(sums.add), None
     for k in np.flatnonzero(response.exists[r]):
         inner, slope = found.information[k], found.slope[k]
         waves = _waves(response.time[r, k], rate)
@@ -154,35 +153,16 @@ def _summed(response: Response, r: int, rate) -> _Sums:
         # information of the state: with itself, the parameters, the residuals and the
         # force
         here = [inner[:n, :n], inner[:n, p], slope[:n], shaken[:n]]
-        if before:
-            later, earlier, off = found.later[k], found.earlier[k], -found.tied[k]
+        if waves_before is None:
+            states.begin(here)
+        else:
+            earlier = found.earlier[k]
             direct = earlier[:, p] + found.direct[k, :, :m]
-            pushed = earlier[:, l] @ waves_before
-            sums.add_rows(direct, pushed, off)
-            rows = [direct, off, pushed]
-            here = [x + later.T @ y for x, y in zip(here, (later, *rows))]
-            earlier = earlier[:, :n]
-            before = [x + earlier.T @ y for x, y in zip(before, (earlier, *rows))]
-            (_, direct, off, pushed), coupled = _halved(before, earlier.T @ later)
-            sums.add_rows(direct, pushed, off, -1.0)
-            taken = (coupled, direct, off, pushed)
-            here = [x - coupled.T @ y for x, y in zip(here, taken)]
-        before, waves_before = here, waves
-    if before:
-        (_, direct, off, pushed), _ = _halved(before, np.zeros((n, 0)))
-        sums.add_rows(direct, pushed, off, -1.0)
+            rows = direct, -found.tied[k], earlier[:, l] @ waves_before
+            states.follow(here, earlier[:, :n], found.later[k], rows)
+        waves_before = waves
+    states.end()
     return sums
-
-
-def _halved(blocks, coupling):
-    """Return the blocks of one piece and its coupling to the next, divided by the
-    square root of the first.
-    """
-    scale = 1 / np.sqrt(np.maximum(np.diag(blocks[0]), _TINY))
-    scaled = blocks[0] * np.outer(scale, scale)
-    root = np.linalg.inv(np.linalg.cholesky(scaled + _STATES * np.eye(len(scale))))
-    root = root * scale
-    return [root @ part for part in blocks], root @ coupling
 
 
 def _waves(time, rate) -> Complex[np.ndarray, "l w"]:
@@ -213,7 +193,7 @@ def _gain(inside, score, parts) -> Float[np.ndarray, " w"]:
     for k, block in enumerate(own):
         pick = slice(2 * k, 2 * k + 2)
         matrix[:, pick, pick] += np.moveaxis(block, -1, 0)
-    scale = 1 / np.sqrt(np.maximum(np.einsum("wii->wi", matrix), _TINY))
+    scale = 1 / np.sqrt(np.maximum(np.einsum("wii->wi", matrix), TINY))
     matrix = matrix * scale[:, :, None] * scale[:, None, :]
     left = left * scale
     solved = np.linalg.solve(matrix + _SHAKEN * np.eye(width), left[..., None])[..., 0]

@@ -30,6 +30,7 @@ from ._library import (
     library as library,
     saved_classes as saved_classes,
 )
+from ._motion_scales import MotionScales as MotionScales
 from ._primitives import Primitive as Primitive
 from ._scaled import ScaledTerm as ScaledTerm
 from ._sensed import (
@@ -47,7 +48,6 @@ from ._term import (
     terms_of as terms_of,
 )
 from ._value import Value as Value
-from ._visited import Visited as Visited
 from ._where import Where as Where
 from ._with_hidden import WithHidden as WithHidden
 from ._with_terms import base_drive as base_drive, WithTerms as WithTerms

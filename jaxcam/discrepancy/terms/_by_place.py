@@ -31,17 +31,17 @@ class StribeckCurve(ScaledTerm):
 
     def acceleration(self, motion: Motion):
         slow = jnp.exp(-((motion.velocity / self.vs) ** 2))
-        return -self.se * slow * jnp.tanh(motion.velocity / self.visited.slip)
+        return -self.se * slow * jnp.tanh(motion.velocity / self.scales.slip)
 
     def starts(self):
-        return tuple({"vs": share * self.visited.fast} for share in _SHARES)
+        return tuple({"vs": share * self.scales.fast} for share in _SHARES)
 
     def _sizes(self):
-        return {"se": self.visited.push, "vs": 0.05 * self.visited.fast}
+        return {"se": self.scales.push, "vs": 0.05 * self.scales.fast}
 
     def _ends(self):
-        fast = self.visited.fast
-        return {"vs": (2 * self.visited.slip, max(fast, 3 * self.visited.slip))}
+        fast = self.scales.fast
+        return {"vs": (2 * self.scales.slip, max(fast, 3 * self.scales.slip))}
 
 
 class UnevenFriction(ScaledTerm):
@@ -59,9 +59,9 @@ class UnevenFriction(ScaledTerm):
     u2: float = strength("[q]/s^2", 0.1)
 
     def acceleration(self, motion: Motion):
-        place = (motion.position - self.visited.middle) / self.visited.half
+        place = (motion.position - self.scales.middle) / self.scales.half
         size = place * (self.u1 + place * self.u2)
-        return -size * jnp.tanh(motion.velocity / self.visited.slip)
+        return -size * jnp.tanh(motion.velocity / self.scales.slip)
 
     def _sizes(self):
-        return {"u1": self.visited.push, "u2": self.visited.push}
+        return {"u1": self.scales.push, "u2": self.scales.push}

@@ -27,7 +27,7 @@ class DampingForwards(ScaledTerm):
         return -self.cf * jnp.maximum(motion.velocity, 0.0)
 
     def _sizes(self):
-        return {"cf": self.visited.push / self.visited.fast}
+        return {"cf": self.scales.push / self.scales.fast}
 
 
 class DampingBackwards(ScaledTerm):
@@ -43,7 +43,7 @@ class DampingBackwards(ScaledTerm):
         return self.cb * jnp.maximum(-motion.velocity, 0.0)
 
     def _sizes(self):
-        return {"cb": self.visited.push / self.visited.fast}
+        return {"cb": self.scales.push / self.scales.fast}
 
 
 class FrictionForwards(ScaledTerm):
@@ -57,11 +57,11 @@ class FrictionForwards(ScaledTerm):
     ff: float = strength("[q]/s^2", 0.1, lower=0.0)
 
     def acceleration(self, motion: Motion):
-        forwards = (1 + jnp.tanh(motion.velocity / self.visited.slip)) / 2
+        forwards = (1 + jnp.tanh(motion.velocity / self.scales.slip)) / 2
         return -self.ff * forwards
 
     def _sizes(self):
-        return {"ff": self.visited.push}
+        return {"ff": self.scales.push}
 
 
 class FrictionBackwards(ScaledTerm):
@@ -75,8 +75,8 @@ class FrictionBackwards(ScaledTerm):
     fb: float = strength("[q]/s^2", 0.1, lower=0.0)
 
     def acceleration(self, motion: Motion):
-        backwards = (1 - jnp.tanh(motion.velocity / self.visited.slip)) / 2
+        backwards = (1 - jnp.tanh(motion.velocity / self.scales.slip)) / 2
         return self.fb * backwards
 
     def _sizes(self):
-        return {"fb": self.visited.push}
+        return {"fb": self.scales.push}

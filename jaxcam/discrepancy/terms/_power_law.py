@@ -29,5 +29,5 @@ class RestitutionPower(ScaledTerm):
 
     def restitution(self, approach, motion: Motion):
         del motion
-        share = jnp.maximum(approach / self.visited.fast, _SLOWEST)
+        share = jnp.maximum(approach / self.scales.fast, _SLOWEST)
         return jnp.exp(-self.rp * jnp.log(share))

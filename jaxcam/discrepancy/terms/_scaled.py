@@ -5,8 +5,8 @@ from typing import ClassVar
 
 import equinox as eqx
 
+from ._motion_scales import MotionScales
 from ._term import Strength, Term
-from ._visited import Visited
 
 
 class ScaledTerm(Term):
@@ -18,17 +18,20 @@ class ScaledTerm(Term):
 
     # plain numbers, as stored in a saved system
     ranges: tuple[float, ...] = eqx.field(
-        default=tuple(Visited()), static=True, kw_only=True, metadata={"spare": True}
+        default=tuple(MotionScales()),
+        static=True,
+        kw_only=True,
+        metadata={"spare": True},
     )
     listed: ClassVar[bool] = True
 
     @property
-    def visited(self) -> Visited:
-        """Range of the coordinate that the recordings visit."""
-        return Visited(*self.ranges)
+    def scales(self) -> MotionScales:
+        """Scales of the motion in the recordings."""
+        return MotionScales(*self.ranges)
 
-    def scaled(self, visited: Visited) -> "ScaledTerm":
-        found = dataclasses.replace(self, ranges=tuple(visited))
+    def scaled(self, scales: MotionScales) -> "ScaledTerm":
+        found = dataclasses.replace(self, ranges=tuple(scales))
         starts = found.starts()
         # a position in the range, until it is fitted
         inner = starts[len(starts) // 2] if starts else {}

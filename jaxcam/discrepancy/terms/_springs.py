@@ -29,7 +29,7 @@ class ConstantForce(ScaledTerm):
         return self.f0 + 0.0 * motion.position
 
     def _sizes(self):
-        return {"f0": self.visited.push}
+        return {"f0": self.scales.push}
 
 
 class LinearSpring(ScaledTerm):
@@ -42,10 +42,10 @@ class LinearSpring(ScaledTerm):
     k1: float = strength("1/s^2", 1.0, lower=0.0)
 
     def acceleration(self, motion: Motion):
-        return -self.k1 * (motion.position - self.visited.middle)
+        return -self.k1 * (motion.position - self.scales.middle)
 
     def _sizes(self):
-        return {"k1": self.visited.push / self.visited.half}
+        return {"k1": self.scales.push / self.scales.half}
 
 
 class _WithEdge(ScaledTerm):
@@ -58,7 +58,7 @@ class _WithEdge(ScaledTerm):
     dry: ClassVar[tuple[str, ...]] = ()
 
     def starts(self):
-        low, width = self.visited.low, 2 * self.visited.half
+        low, width = self.scales.low, 2 * self.scales.half
         return tuple({self._edge: low + share * width} for share in _SHARES)
 
     @property
@@ -67,17 +67,17 @@ class _WithEdge(ScaledTerm):
         return next(one.name for one in self._declared() if one.inner)
 
     def _stiff(self) -> float:
-        return self.visited.push / self.visited.half
+        return self.scales.push / self.scales.half
 
     def _sizes(self):
-        stiff, visited = self._stiff(), self.visited
+        stiff, scales = self._stiff(), self.scales
         sizes = {one.name: stiff for one in self._declared()}
-        sizes |= {name: stiff / visited.fast for name in self.viscous}
-        sizes |= dict.fromkeys(self.dry, visited.push)
-        return sizes | {self._edge: 0.05 * visited.half}
+        sizes |= {name: stiff / scales.fast for name in self.viscous}
+        sizes |= dict.fromkeys(self.dry, scales.push)
+        return sizes | {self._edge: 0.05 * scales.half}
 
     def _ends(self):
-        return {self._edge: (self.visited.low, self.visited.high)}
+        return {self._edge: (self.scales.low, self.scales.high)}
 
 
 class BilinearSpring(_WithEdge):
@@ -146,7 +146,7 @@ class StopBelow(_WithEdge):
 
 def _reaction(term: ScaledTerm, depth, velocity, stiffness, damping, loss, friction):
     """Return the force of a stop at a depth and a velocity into it."""
-    turned = jnp.tanh(velocity / term.visited.slip)
-    touching = 1 - jnp.exp(-depth / (_BEGINS * term.visited.half))
+    turned = jnp.tanh(velocity / term.scales.slip)
+    touching = 1 - jnp.exp(-depth / (_BEGINS * term.scales.half))
     elastic = depth * (stiffness + damping * velocity + loss * turned)
     return elastic + touching * friction * turned

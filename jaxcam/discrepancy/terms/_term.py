@@ -9,8 +9,8 @@ import equinox as eqx
 import jax.numpy as jnp
 
 from ...fitting import Model, Parameter
+from ._motion_scales import MotionScales
 from ._value import Value
-from ._visited import Visited
 from ._where import Where
 
 
@@ -206,9 +206,9 @@ class Term(eqx.Module):
         del motion
         return 0.0
 
-    def scaled(self, visited: Visited) -> "Term":
+    def scaled(self, scales: MotionScales) -> "Term":
         """Return the term with constants taken from the recordings."""
-        del visited
+        del scales
         return self
 
     def starts(self) -> tuple[Mapping[str, float], ...]:

@@ -1,5 +1,11 @@
 """The record of a run: events, contacts, steps, and the state in between."""
 
 from ._assemble import assemble as assemble, Parts as Parts
-from ._events import Contacts as Contacts, Impacts as Impacts, Steps as Steps
+from ._events import (
+    Contacts as Contacts,
+    impact_table as impact_table,
+    Impacts as Impacts,
+    Steps as Steps,
+)
+from ._printed import Printed as Printed, vector_text as vector_text
 from ._trajectory import Trajectory as Trajectory

@@ -1,13 +1,14 @@
 """The events of a trajectory, and the points between them."""
 
-import equinox as eqx
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from ...parameters import AnyArray
+from ...tables import ShortTable
+from ._printed import numbers, Printed, vector_text
 
 
-class Impacts(eqx.Module):
+class Impacts(Printed):
     """The impacts of a trajectory, in order.
 
     Under a transformation (`jit`, `vmap`, `grad`) the arrays keep a fixed length k; the
@@ -30,8 +31,14 @@ class Impacts(eqx.Module):
     count: Int[AnyArray | np.integer, ""]
     """Number of impacts."""
 
+    def _batched(self) -> bool:
+        return np.ndim(self.count) > 0
 
-class Contacts(eqx.Module):
+    def _table(self) -> ShortTable:
+        return impact_table(self, f"impacts: {int(self.count)}")
+
+
+class Contacts(Printed):
     """The intervals of sustained contact (sticking), in order; padded as `Impacts` is.
 
     A contact that lasts beyond the run has `released` False and ends where the run
@@ -50,8 +57,22 @@ class Contacts(eqx.Module):
     count: Int[AnyArray | np.integer, ""]
     """Number of contacts."""
 
+    def _batched(self) -> bool:
+        return np.ndim(self.count) > 0
 
-class Steps(eqx.Module):
+    def _table(self) -> ShortTable:
+        columns = (self.start, self.end, self.constraint, self.released)
+        rows = [
+            (str(k + 1), f"{a:.8g}", f"{b:.8g}", str(which), "yes" if free else "no")
+            for k, (a, b, which, free) in enumerate(
+                zip(*(numbers(one, self.count) for one in columns), strict=True)
+            )
+        ]
+        headings = ("contact", "start (s)", "end (s)", "constraint", "released")
+        return ShortTable(f"contacts: {len(rows)}", headings, rows)
+
+
+class Steps(Printed):
     """The points between which the motion was integrated, with their modes."""
 
     time: Float[AnyArray, " s"]
@@ -63,3 +84,40 @@ class Steps(eqx.Module):
     `(s, constraints)`."""
     count: Int[AnyArray | np.integer, ""]
     """Number of points."""
+
+    def _batched(self) -> bool:
+        return np.ndim(self.count) > 0
+
+    def _table(self) -> ShortTable:
+        columns = (self.time, self.state, self.contact)
+        rows = [
+            (
+                str(k + 1),
+                f"{t:.8g}",
+                vector_text(state),
+                ", ".join(map(str, np.flatnonzero(held))) or "-",
+            )
+            for k, (t, state, held) in enumerate(
+                zip(*(numbers(one, self.count) for one in columns), strict=True)
+            )
+        ]
+        headings = ("point", "time (s)", "state", "constraints in contact")
+        return ShortTable(f"integration points: {len(rows)}", headings, rows)
+
+
+def impact_table(impacts: Impacts, sentence: str) -> ShortTable:
+    """Return the times and speeds of impacts, below a sentence."""
+    columns = (
+        impacts.time,
+        impacts.constraint,
+        impacts.speed_before,
+        impacts.speed_after,
+    )
+    rows = [
+        (str(k + 1), f"{t:.8g}", str(which), f"{-before:.6g}", f"{after:.6g}")
+        for k, (t, which, before, after) in enumerate(
+            zip(*(numbers(one, impacts.count) for one in columns), strict=True)
+        )
+    ]
+    headings = ("impact", "time (s)", "constraint", "approach", "rebound")
+    return ShortTable(sentence, headings, rows)

@@ -1,24 +1,24 @@
 """The result of a simulation: impacts, contacts, and the state at any time."""
 
-from html import escape
-
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
 
+from ...tables import ShortTable
 from .._settings import Settings
 from .._system import HybridSystem
 from ..checks import is_traced, is_tracing, refuse_tracers
 from ..codes import message
 from ..surface import gaps
 from ._events import Contacts, Impacts, Steps
+from ._printed import Printed
 from ._sample import pad, padded, sample
 from ._section import crossings
 
 
-class Trajectory(eqx.Module):
+class Trajectory(Printed):
     """A trajectory of a hybrid system on [t0, t1].
 
     Examples:
@@ -45,20 +45,17 @@ class Trajectory(eqx.Module):
     code: Int[Array, ""]
     """Index into `RESULTS`: 0 if the run reached t1."""
 
-    def __str__(self) -> str:
-        # batches have no one-line summary
-        if is_traced(self) or np.ndim(self.code):
-            return repr(self)
+    def _batched(self) -> bool:
+        return np.ndim(self.code) > 0
+
+    def _table(self) -> ShortTable:
         end = float(np.asarray(self.steps.time)[int(self.steps.count) - 1])
         said = (
             f"{type(self.system).__name__} from {float(self.t0):g} to {end:g} s, "
             f"impacts: {int(self.impacts.count)}, contacts: {int(self.contacts.count)}"
         )
-        return f"{said}. {self.result}" if self.result else said
-
-    def _repr_html_(self) -> str | None:
-        batch = is_traced(self) or np.ndim(self.code)
-        return None if batch else f"<p>{escape(str(self))}</p>"
+        said = f"{said}. {self.result}" if self.result else said
+        return ShortTable(said, (), ())
 
     @property
     def successful(self):

@@ -1,5 +1,7 @@
 """Run motions until they repeat, or to a limit."""
 
+from collections.abc import Callable
+
 import numpy as np
 
 from ..sections import AbstractSection, Samples, with_lanes
@@ -16,6 +18,7 @@ def settle(
     reruns: int = 0,
     where=None,
     values=None,
+    progress: Callable[[float], None] | None = None,
 ) -> tuple[Samples, Labels]:
     """Sample motions and label them, and extend the runs of those that are not
     periodic.
@@ -30,12 +33,16 @@ def settle(
             before.
         where: Picks a parameter, or several.
         values: Value of the parameter in each lane.
+        progress: Called with the fraction of the periods done.
 
     Returns:
         Samples and labels.
     """
     values = None if values is None else np.asarray(values, dtype=float)
     samples = section.sample(states, turns, keep, where=where, values=values)
+    report = progress or (lambda share: None)
+    done, total = turns, turns * (2 ** (reruns + 1) - 1)
+    report(done / total)
     counted = section.impacting and section.regular
     sizes = section.sizes(states, samples, where, values)
     labels = label(samples, period_tolerance, counted, sizes)
@@ -47,6 +54,8 @@ def settle(
         some = None if values is None else values[open_]
         start = samples.final[open_]
         again = section.sample(start, turns, keep, where=where, values=some)
+        done += turns
+        report(done / total)
         samples = with_lanes(samples, open_, again)
         labels = label(samples, period_tolerance, counted, sizes)
     return samples, labels

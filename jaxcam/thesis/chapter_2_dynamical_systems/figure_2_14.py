@@ -16,6 +16,7 @@ from ...filippov import FilippovTrajectory, simulate_filippov
 from ...filippov.modes import surface_rates
 from ...models import BeltOscillator, CamFollower
 from ...plotting.colours import CONTACT, FLIGHT, IMPACT
+from ..progress import counted
 from ..target import Rows, Target
 
 
@@ -58,7 +59,7 @@ def belted(belt: float, state=(0.0, 0.0), turns: int = _SETTLE) -> Belted:
 def belt_branch() -> list[Belted]:
     """Compute motions over the belt speed, downwards, each from the previous one."""
     made, state = [], (0.0, 0.0)
-    for belt in _BELTS[::-1]:
+    for belt in counted("simulating a speed of the belt", _BELTS[::-1]):
         made.append(belted(belt, state))
         state = tuple(np.asarray(made[-1].run.final))
     return made[::-1]
@@ -84,7 +85,7 @@ def _between(holds, first: Belted, second: Belted) -> float:
     """Bisect the speed at which a property is lost from the first to the second."""
     inside, outside = first.belt, second.belt
     state = tuple(np.asarray(second.run.final))
-    for _ in range(24):
+    for _ in counted("bisecting the speed of the belt, step", range(24)):
         middle = (inside + outside) / 2
         yes = holds(belted(middle, state))
         inside, outside = (middle, outside) if yes else (inside, middle)

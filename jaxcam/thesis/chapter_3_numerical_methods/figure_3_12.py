@@ -11,7 +11,7 @@ from ... import plotting
 from ...models import CamFollower, rad_s_to_rpm
 from ..chapter_5_bifurcations.figure_5_14 import A
 from ..chapter_5_bifurcations.table_5_2 import FLIP_SPEED, FOLD_SPEED
-from ..progress import of_point
+from ..progress import of_branch
 from ..remember import remembered
 from ..speeds import at_rpm, speed_of
 from ..target import Rows, Target
@@ -40,7 +40,7 @@ def hitting_branch(system: CamFollower) -> "Branch":
         speed_of,
         bounds(_HITTING),
         direction="both",
-        callbacks=[of_point],
+        callbacks=[of_branch(*_HITTING)],
     )
 
 

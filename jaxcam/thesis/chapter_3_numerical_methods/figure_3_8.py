@@ -25,6 +25,7 @@ from ..orbits import (
     point_on_line,
     SEARCH,
 )
+from ..progress import counted
 from ..remember import remembered
 from ..speeds import at_rpm
 from ..target import Rows, Target
@@ -63,7 +64,7 @@ def smooth_branch(system: CamFollower, points: int = 16) -> SmoothBranch:
     orbit = start
     for walk in (range(middle, points), range(middle - 1, -1, -1)):
         orbit = orbit_at(system, start, speeds[walk[0]])
-        for k in walk:
+        for k in counted("following an orbit from its neighbour", walk):
             rig = at_rpm(system, speeds[k])
             orbit = next_orbit(rig, orbit)
             angles[k] = float(orbit.states[0, 0])

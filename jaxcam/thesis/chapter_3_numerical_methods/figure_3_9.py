@@ -11,7 +11,7 @@ from ...models import CamFollower, rad_s_to_rpm
 from ...plotting.colours import FLIGHT, SECOND
 from ..chapter_5_bifurcations.figure_5_24 import sticking_times
 from ..interruption import INTERRUPTION, interruption
-from ..progress import of_point
+from ..progress import of_branch
 from ..remember import remembered
 from ..speeds import at_rpm, speed_of
 from ..target import Rows, Target
@@ -44,7 +44,7 @@ def sticking_branch(system: CamFollower) -> "Branch":
         speed_of,
         bounds((_LOWEST, end)),
         direction="both",
-        callbacks=[of_point],
+        callbacks=[of_branch(_LOWEST, end)],
     )
 
 

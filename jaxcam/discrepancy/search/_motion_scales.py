@@ -8,12 +8,12 @@ import numpy as np
 from ...fitting import Sensor
 from ...recordings import Recording
 from ...recordings.cut import fast_speed, usual_acceleration
-from ..terms import Visited
+from ..terms import MotionScales
 
 
-def visited_by(
+def motion_scales(
     runs: Sequence[Recording], channel: str, sensor: Sensor, slip: float
-) -> Visited:
+) -> MotionScales:
     """Return positions, speeds and accelerations of a coordinate that a channel
     measures.
 
@@ -29,4 +29,4 @@ def visited_by(
         # recordings too short for an acceleration: assume the range is crossed at that
         # speed
         push = fast**2 / max(high - low, 1e-300)
-    return Visited(low, high, fast, push, slip)
+    return MotionScales(low, high, fast, push, slip)

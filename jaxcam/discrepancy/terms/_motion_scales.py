@@ -1,9 +1,9 @@
-"""Range of a coordinate in the recordings, from which terms take their scales."""
+"""Scales of the motion in the recordings, from which terms take theirs."""
 
 from typing import NamedTuple
 
 
-class Visited(NamedTuple):
+class MotionScales(NamedTuple):
     """Range of a coordinate, in its unit, and of its velocity.
 
     `low`, `high`: smallest and largest position; `fast`: a speed that is rarely
