@@ -26,6 +26,8 @@ from jaxcam.fitting import read_setup
 
 
 _DURATION = 6.0
+# An effect acts in more than this share of the samples or impacts
+_SEEN = 0.05
 _AT_IMPACTS = ("restitution", "surface")  # kinds that are of a constraint
 
 
@@ -50,6 +52,8 @@ def scales_of(setup, motions: list[Motion]) -> Scales:
 def hidden_case(name: str, setup, effect: str, seed: int):
     """An effect of random size in a rig drawn at random, and its recordings.
 
+    Rigs in which the effect hardly ever acts are drawn again.
+
     **Returns:** the effect, recordings, the motions they show, and the rig.
     """
     rng = np.random.default_rng([seed, *effect.encode()])
@@ -64,11 +68,37 @@ def hidden_case(name: str, setup, effect: str, seed: int):
         except Accumulates:
             continue
         runs, motions = map(list, zip(*made))
-        return hidden, runs, motions, truth
+        if one.memory is not None or _share_acting(hidden, motions) > _SEEN:
+            return hidden, runs, motions, truth
+
+
+def _share_acting(hidden: Hidden, motions: list[Motion]) -> float:
+    """Share of the samples, or impacts, at which an effect differs from its usual
+    value."""
+    _, true, _ = _along(hidden, motions)
+    return float(np.mean(true != np.median(true)))
 
 
 def function_off(found, hidden: Hidden, motions: list[Motion]) -> float:
     """RMS error of a function by the rms of what was hidden, where the rig was."""
+    places, true, known = _along(hidden, motions)
+    places["phase"] = np.mod(places["phase"], 2 * np.pi)
+    table = RegularGridInterpolator(
+        found.grid,
+        found.value,
+        bounds_error=False,
+        fill_value=None,  # pyright: ignore
+    )
+    value = table(np.stack([places[name] for name in found.arguments], axis=1))
+    if hidden.effect.kind == "restitution":
+        value = np.log(value)
+    basis, _ = np.linalg.qr(np.stack(known, axis=1))
+    true, value = (one - basis @ (basis.T @ one) for one in (true, value))
+    return float(np.sqrt(np.mean((value - true) ** 2) / np.mean(true**2)))
+
+
+def _along(hidden: Hidden, motions: list[Motion]):
+    """Arguments and values of an effect along the motions, and what a rig may do."""
     if hidden.effect.kind in _AT_IMPACTS:
         rows = np.concatenate([one.struck for one in motions])
         time, speed, angle = rows.T
@@ -84,19 +114,7 @@ def function_off(found, hidden: Hidden, motions: list[Motion]) -> float:
         places = {"time": time, "phase": angle, "position": x, "velocity": v}
         true = hidden.at(x, v, angle, time)
         known = [np.ones(len(time)), x, v]
-    places["phase"] = np.mod(places["phase"], 2 * np.pi)
-    table = RegularGridInterpolator(
-        found.grid,
-        found.value,
-        bounds_error=False,
-        fill_value=None,  # pyright: ignore
-    )
-    value = table(np.stack([places[name] for name in found.arguments], axis=1))
-    if hidden.effect.kind == "restitution":
-        value = np.log(value)
-    basis, _ = np.linalg.qr(np.stack(known, axis=1))
-    true, value = (one - basis @ (basis.T @ one) for one in (true, value))
-    return float(np.sqrt(np.mean((value - true) ** 2) / np.mean(true**2)))
+    return places, true, known
 
 
 def judged(found: Diagnosis, hidden: Hidden, motions) -> tuple[bool, str]:

@@ -4,23 +4,29 @@ import dataclasses
 from collections.abc import Sequence
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 
 from ...fitting import Fit, Model, Parameter, Problem
 from ...fitting.engine import (
     assemble,
+    Costs,
     eliminate_states,
     free_columns,
     Layout,
     parameter_places,
     Point,
     state_steps,
-    total_cost,
     Weights,
 )
 from ..policy import Policy
 from ..terms import Term, watched, WithTerms
+
+
+# A step that made a recording worse is shortened by the first, down to the second
+_SHORTER, _SHORTEST = 0.25, 0.05
 
 
 def extended(
@@ -71,21 +77,55 @@ def with_states(problem: Problem, found: Fit, weights: Weights, policy: Policy) 
     The programs of the fit itself are reused: all parameters are free, with a scale of
     zero.
     """
-    columns = free_columns(problem, found.free)
-    local = jnp.asarray(columns.local)
-    scales = jnp.zeros(local.shape)
-    extras, point = problem.weighted(weights), found.point
-    none = jnp.zeros(local.shape)
-    costs = found.costs
-    best = np.inf
-    for _ in range(policy.state_iterations):
-        blocks, costs_here = assemble(
+    local = jnp.asarray(free_columns(problem, found.free).local)
+    scales, none = jnp.zeros(local.shape), jnp.zeros(local.shape)
+    extras = problem.weighted(weights)
+
+    def about(states):
+        point = found.point._replace(states=states)
+        blocks, costs = assemble(
             problem.layout, problem.pieces, extras, point, local, scales
         )
-        total = total_cost(costs_here, extras)
-        if total > best - policy.state_gain:
+        steps = state_steps(eliminate_states(blocks), none)
+        return _each(costs, weights), costs, np.asarray(steps)
+
+    states = np.asarray(found.point.states)
+    each, costs, steps = about(jnp.asarray(states))
+    # the states of each recording move by themselves, less far where that made it worse
+    share = np.ones(len(states))
+    for _ in range(policy.state_iterations):
+        moved = states + share[:, None, None] * np.nan_to_num(steps)
+        there, costs_there, steps_there = about(jnp.asarray(moved))
+        better = there < np.where(np.isfinite(each), each, np.inf)
+        gained = np.sum(np.where(better, each - there, 0.0))
+
+        def kept(new, old):
+            return np.where(better.reshape(-1, *[1] * (old.ndim - 1)), new, old)
+
+        states, steps, each = (
+            kept(new, old)
+            for new, old in ((moved, states), (steps_there, steps), (there, each))
+        )
+        costs = jax.tree.map(
+            lambda new, old: kept(*map(np.asarray, (new, old))), costs_there, costs
+        )
+        share = np.where(better, 1.0, _SHORTER * share)
+        if gained < policy.state_gain and np.all(better | (share < _SHORTEST)):
             break
-        best, costs, kept = total, costs_here, point
-        reduced = eliminate_states(blocks)
-        point = point._replace(states=point.states + state_steps(reduced, none))
-    return dataclasses.replace(found, point=kept, cost=best, costs=costs)
+    point = found.point._replace(states=jnp.asarray(states))
+    return dataclasses.replace(
+        found, point=point, cost=float(np.sum(each)), costs=costs
+    )
+
+
+def _each(costs: Costs, weights: Weights) -> Float[np.ndarray, " r"]:
+    """Return the cost of each recording; a joint has the lesser weight of its two."""
+    before = np.concatenate([weights.flown[:, :1], weights.flown[:, :-1]], axis=1)
+    shared = np.minimum(weights.flown, before)
+    pairs = (
+        (weights.flown, costs.flown),
+        (shared, costs.joints),
+        (weights.rested, costs.rested),
+    )
+    parts = [np.where(w > 0, w * np.asarray(c), 0.0).sum(axis=1) for w, c in pairs]
+    return sum(parts, np.zeros(len(shared)))
