@@ -54,7 +54,7 @@ def balls():
 
 
 def test_every_piece_is_held_out_once_and_every_part_holds_out_of_every_record(balls):
-    """The parts of a test on unseen data, in stretches that are dealt out in turn."""
+    """The parts of a test on held-out data: sections of each recording, at random."""
     parts = folds_of(balls, Policy(folds=3, stretch_pieces=2))
     every = balls.everything()
     for side in ("flown", "rested"):

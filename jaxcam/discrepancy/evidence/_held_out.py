@@ -4,6 +4,7 @@ import dataclasses
 import math
 from typing import NamedTuple
 
+import jax
 import numpy as np
 from jaxtyping import Float
 
@@ -11,6 +12,10 @@ from ...fitting import Fit, fit, Problem, Residuals, residuals
 from ...fitting.engine import Weights
 from ..policy import Policy
 from ..search import given_up, Trial, Trials, with_states
+
+
+# Of the distribution of sections: two diagnoses of a case agree
+_SEED = 1
 
 
 class HeldOut(NamedTuple):
@@ -102,27 +107,29 @@ def _square(parts: list[Residuals]) -> tuple[float, int]:
 def folds_of(problem: Problem, policy: Policy) -> list[tuple[Weights, Weights]]:
     """Return weights of the fitted and the held-out data, for each part.
 
-    Every recording is divided into short sections that are distributed in turn, so that
-    each part contains every region that is visited several times.
+    Every recording is divided into short sections. Of each group of successive ones,
+    every part receives one at random: sections in turn could take all visits of a
+    periodic motion to a constraint into one part.
     """
     count = policy.folds if len(problem.records) > 1 else 2
     every = problem.everything()
-    found = []
-    for fold in range(count):
-        flown, rested = np.zeros_like(every.flown), np.zeros_like(every.rested)
-        for row, segments in enumerate(problem.segments):
-            time = segments.recording.time
-            pieces = len(problem.spans[row][0])
-            rounds = max(1, pieces // (count * policy.stretch_pieces))
-            edges = np.linspace(time[0], time[-1], count * rounds + 1)
-            edges[0], edges[-1] = -np.inf, np.inf
-            for number in range((fold + row) % count, count * rounds, count):
-                stretch = problem.between(edges[number], edges[number + 1])
-                flown[row] += stretch.flown[row]
-                rested[row] += stretch.rested[row]
-        seen = Weights(every.flown - flown, every.rested - rested)
-        found.append((seen, Weights(flown, rested)))
-    return found
+    unseen = [jax.tree.map(np.zeros_like, every) for _ in range(count)]
+    rng = np.random.default_rng(_SEED)
+    for row, segments in enumerate(problem.segments):
+        time = segments.recording.time
+        pieces = len(problem.spans[row][0])
+        rounds = max(1, pieces // (count * policy.stretch_pieces))
+        edges = np.linspace(time[0], time[-1], count * rounds + 1)
+        edges[0], edges[-1] = -np.inf, np.inf
+        parts = np.concatenate([rng.permutation(count) for _ in range(rounds)])
+        for number, part in enumerate(parts):
+            section = problem.between(edges[number], edges[number + 1])
+            unseen[part].flown[row] += section.flown[row]
+            unseen[part].rested[row] += section.rested[row]
+    return [
+        (Weights(every.flown - one.flown, every.rested - one.rested), one)
+        for one in unseen
+    ]
 
 
 def _parts(test: Fit, unseen) -> list[Residuals]:

@@ -251,7 +251,8 @@ def impact_joint(model: Model, end, state, t, angle, rate, reach) -> Joint:
     fixed = _constant((model, system, flights))
 
     def newton(_, shift):
-        _, _, gaps, speeds = moved(*fixed, shift)
+        model, system, flights = fixed
+        _, _, gaps, speeds = moved(model, system, flights, shift)
         return jnp.clip(shift + step(gaps, speeds), -reach, reach)
 
     shift = jax.lax.fori_loop(0, _NEWTON, newton, jnp.zeros_like(t))
