@@ -201,7 +201,7 @@ def test_a_lane_that_cannot_start_spoils_nothing():
     )
     assert batch.count.tolist() == [0, 5]
     assert "no solution" in batch.reasons[0]
-    assert "asked for" in batch.reasons[1]
+    assert "requested number" in batch.reasons[1]
     with pytest.raises(ValueError, match="3 values for 2 branches"):
         continuation.follow_batch(
             CUSP, [[0.0], [0.0]], a, (-3.0, 3.0),

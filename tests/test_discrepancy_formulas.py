@@ -110,4 +110,4 @@ def test_damping_in_a_zone_is_a_formula_of_two_arguments():
     window = next(one for one in family.primitives if one.name == "window")
     text, words = formula_of(family, window, np.array([-0.3, 0.2, 0.6]), "force")
     assert text == "-0.3*(-0.1 < position)*(position < 0.5)*velocity"
-    assert words.startswith("damping that acts between position -0.1 and 0.5 only")
+    assert words.startswith("damping that acts only between position -0.1 and 0.5")
