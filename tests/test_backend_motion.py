@@ -186,7 +186,9 @@ class Written(HybridSystem):
 
 
 def test_branches_loops_and_tables_of_the_reader():
-    _assert_same(_runs(Written(), [0.4, 0.0], 6.0), 6.0)
+    """At a jump of the field the step length hangs on rounding, and with it the error
+    of a step: on some processors the runs differ by 2.3e-9."""
+    _assert_same(_runs(Written(), [0.4, 0.0], 6.0), 6.0, 1e-8)
 
 
 class Coupled(HybridSystem):
