@@ -37,7 +37,7 @@ _TOPICS: dict[str, tuple[str, ...]] = {
 
 
 def citation(*names: str) -> str:
-    """Return BibTeX entries of the methods that were used.
+    """Return the BibTeX entries for some topics.
 
     `print(jaxcam.citation())` gives the entry of this package and, in lines that BibTeX
     ignores, the available topics; `jaxcam.citation("chatter", "saltation")` gives

@@ -7,12 +7,11 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxcam.fitting.engine import program
 from jaxcam.fitting.engine._linearise import Layout
 from jaxcam.fitting.engine._model import Model
 from jaxcam.fitting.engine._pieces import _PIECE, spans
-from jaxcam.fitting.engine._predict import contact_state, least_gap
-from jaxcam.models import BouncingBall, ImpactOscillator
+from jaxcam.fitting.engine._predict import contact_state
+from jaxcam.models import BouncingBall
 from jaxcam.recordings import Recording, segment
 
 
@@ -99,37 +98,3 @@ def test_a_model_to_first_order_has_the_derivatives_of_the_model():
     assert np.array(direct(origin)) == pytest.approx(np.array(expanded(origin)))
     slopes = (np.array(jax.jacfwd(f)(origin)) for f in (direct, expanded))
     assert next(slopes) == pytest.approx(next(slopes), rel=1e-14)
-
-
-def test_the_smallest_gap_has_the_slopes_of_the_gap_that_is_smallest():
-    """Also where two gaps are equal, and where the compiler computes a gap twice."""
-
-    class Channel(ImpactOscillator):
-        def gap(self, t, state):
-            return jnp.stack([state[0] + 1.0, 2.0 * (1.0 - state[0])])
-
-    system = Channel()
-    for place, value, slope in (
-        (-0.5, 0.5, 1.0),
-        (0.9, 0.2, -2.0),
-        (1 / 3, 4 / 3, 1.0),
-    ):
-        state = jnp.array([place, 0.3])
-        found, slopes = jax.value_and_grad(least_gap, 2)(
-            system, jnp.asarray(0.0), state
-        )
-        assert abs(float(found) - value) < 1e-15
-        assert np.allclose(slopes, [slope, 0.0], atol=1e-15)
-
-
-def test_programs_of_a_fit_agree_with_those_of_the_default_compiler():
-    """Values within 1e-12, whether a program is to run often or not."""
-
-    def turned(x, k):
-        return jnp.cumsum(jnp.sin(x) * jnp.exp(-k * x)) / jnp.linalg.norm(x)
-
-    x = jnp.linspace(0.1, 3.0, 50)
-    expected = jax.jit(turned)(x, 0.7)
-    for often in (True, False):
-        found = program(turned, runs_often=often)(x, 0.7)
-        assert np.allclose(found, expected, rtol=1e-12)

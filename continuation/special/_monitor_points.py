@@ -51,10 +51,10 @@ class MonitorPoints(AbstractExtended):
 
 
 class MonitorLevel(AbstractProblem):
-    """The point (u, parameter) on a branch where a monitor has some value.
+    """The point (u, parameter) on a branch where a monitor has a given value.
 
-    The number of the monitor is an array unless derivatives of a monitor are costly, so
-    that one program finds the zeros of all.
+    The index of the monitor is an array, so that one program finds the zeros of all,
+    unless the derivatives of a monitor are costly.
     """
 
     base: AbstractProblem

@@ -122,7 +122,7 @@ def _sentence(system: str, made, axis: Axis, sweep: Sweep) -> str:
     low, high = sweep.bounds
     return (
         f"{system}: {total} samples, {axis.name} from {low:g} to {high:g}; "
-        f"{len(made.ranges())} ranges of labels"
+        f"{len(made.ranges())} ranges of {axis.name} with one label"
         + (f", {failed} runs failed or could not start." if failed else ".")
     )
 
@@ -132,9 +132,9 @@ def _table(ranges, axis: Axis):
     from rich.table import Table
 
     table = Table(title=f"attractors, by {axis.name}")
-    for column in ("way", "from", "to", "label"):
+    for column in ("direction", "from", "to", "label"):
         table.add_column(column)
-    words = {0: "each", 1: "up", -1: "down"}
+    words = {0: "independent", 1: "up", -1: "down"}
     for r in ranges[:40]:
         ends = (r.low, r.high) if r.direction >= 0 else (r.high, r.low)
         cells = (f"{end / axis.unit:.6g}" for end in ends)

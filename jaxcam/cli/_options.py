@@ -109,6 +109,6 @@ Gaps: TypeAlias = Annotated[
     str,
     typer.Option(
         metavar="NAME",
-        help="Faulty runs: mend (dropped samples, slips), refuse or split.",
+        help="Faulty recordings: mend (dropped samples, slips), refuse or split.",
     ),
 ]

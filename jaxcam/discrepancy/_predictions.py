@@ -26,8 +26,8 @@ class Prediction:
     """A predicted speed of the cam (rad/s) at which the motion changes.
 
     `before` and `after` are the predictions of the refitted textbook model without and
-    with the missing effects. Their standard errors follow from those of the fits. They
-    are NaN if there is no such speed.
+    with the missing effects. Their standard errors follow from those of the fits. A
+    prediction and its error are NaN if there is no such speed.
 
     Examples:
         >>> from jaxcam.discrepancy import Prediction

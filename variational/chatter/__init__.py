@@ -1,4 +1,4 @@
-"""Analyse chatter by its maps: complete, interrupted, and over a period."""
+"""Analyse complete and interrupted chatter, and chatter over a period, by maps."""
 
 from ._adding import adding_thresholds as adding_thresholds
 from ._beta_map import (

@@ -6,10 +6,9 @@ from typing import NamedTuple
 
 import jax
 import numpy as np
-from jaxtyping import Float
 
 from ...fitting import Fit, fit, Problem, Residuals, residuals
-from ...fitting.engine import Weights
+from ...fitting.engine import cost_by_recording, Weights
 from ..policy import Policy
 from ..search import given_up, Trial, Trials, with_states
 
@@ -69,7 +68,7 @@ def held_out(trials: Trials, before: Trial, after: Trial) -> HeldOut:
             square, count = _square(parts)
             squares[which] += square
             counts[which] += count
-            costs.append(_by_record(test, unseen))
+            costs.append(cost_by_recording(test.costs, unseen))
             if before.names == after.names:
                 squares[1], counts[1] = squares[0], counts[0]
                 unseen_parts[1].extend(parts)
@@ -81,15 +80,6 @@ def held_out(trials: Trials, before: Trial, after: Trial) -> HeldOut:
         parts.sort(key=lambda part: problem.records.index(part.record))
     rms = np.sqrt(squares / np.maximum(counts, 1))
     return HeldOut(float(rms[0]), float(rms[1]), gained, unseen_parts)
-
-
-def _by_record(test: Fit, unseen: Weights) -> Float[np.ndarray, " r"]:
-    """Return the cost of the held-out data; a joint counts if both its pieces do."""
-    flown, joints, rested = (np.asarray(part) for part in test.costs)
-    before = np.concatenate([unseen.flown[:, :1], unseen.flown[:, :-1]], axis=1)
-    shared = np.minimum(unseen.flown, before)
-    in_flight = np.sum(unseen.flown * flown + shared * joints, axis=1)
-    return in_flight + np.sum(unseen.rested * np.nan_to_num(rested), axis=1)
 
 
 def rms_of(fitted: Fit) -> float:

@@ -7,12 +7,11 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
 
 from ...fitting import Fit, Model, Parameter, Problem
 from ...fitting.engine import (
     assemble,
-    Costs,
+    cost_by_recording,
     eliminate_states,
     free_columns,
     Layout,
@@ -25,7 +24,8 @@ from ..policy import Policy
 from ..terms import Term, watched, WithTerms
 
 
-# A step that made a recording worse is shortened by the first, down to the second
+# A step that made a recording worse is shortened by this factor, and given up below
+# this share of its length
 _SHORTER, _SHORTEST = 0.25, 0.05
 
 
@@ -87,45 +87,30 @@ def with_states(problem: Problem, found: Fit, weights: Weights, policy: Policy) 
             problem.layout, problem.pieces, extras, point, local, scales
         )
         steps = state_steps(eliminate_states(blocks), none)
-        return _each(costs, weights), costs, np.asarray(steps)
+        costs = jax.tree.map(np.asarray, costs)
+        return cost_by_recording(costs, weights), costs, np.asarray(steps)
 
     states = np.asarray(found.point.states)
     each, costs, steps = about(jnp.asarray(states))
-    # the states of each recording move by themselves, less far where that made it worse
+    # each recording by itself: a step that made it worse is shortened
     share = np.ones(len(states))
     for _ in range(policy.state_iterations):
         moved = states + share[:, None, None] * np.nan_to_num(steps)
         there, costs_there, steps_there = about(jnp.asarray(moved))
         better = there < np.where(np.isfinite(each), each, np.inf)
-        gained = np.sum(np.where(better, each - there, 0.0))
+        with np.errstate(invalid="ignore"):
+            close = np.abs(there - each) < policy.state_gain
 
         def kept(new, old):
             return np.where(better.reshape(-1, *[1] * (old.ndim - 1)), new, old)
 
-        states, steps, each = (
-            kept(new, old)
-            for new, old in ((moved, states), (steps_there, steps), (there, each))
-        )
-        costs = jax.tree.map(
-            lambda new, old: kept(*map(np.asarray, (new, old))), costs_there, costs
+        states, steps, each, costs = jax.tree.map(
+            kept, (moved, steps_there, there, costs_there), (states, steps, each, costs)
         )
         share = np.where(better, 1.0, _SHORTER * share)
-        if gained < policy.state_gain and np.all(better | (share < _SHORTEST)):
+        if np.all(close | (share < _SHORTEST)):
             break
     point = found.point._replace(states=jnp.asarray(states))
     return dataclasses.replace(
         found, point=point, cost=float(np.sum(each)), costs=costs
     )
-
-
-def _each(costs: Costs, weights: Weights) -> Float[np.ndarray, " r"]:
-    """Return the cost of each recording; a joint has the lesser weight of its two."""
-    before = np.concatenate([weights.flown[:, :1], weights.flown[:, :-1]], axis=1)
-    shared = np.minimum(weights.flown, before)
-    pairs = (
-        (weights.flown, costs.flown),
-        (shared, costs.joints),
-        (weights.rested, costs.rested),
-    )
-    parts = [np.where(w > 0, w * np.asarray(c), 0.0).sum(axis=1) for w, c in pairs]
-    return sum(parts, np.zeros(len(shared)))

@@ -6,7 +6,6 @@ each.
 """
 
 from collections.abc import Sequence
-from functools import partial
 from typing import ClassVar, NamedTuple
 
 import equinox as eqx
@@ -211,7 +210,7 @@ def _onto(response: Response, forces: Float[np.ndarray, "r k l p"]) -> LinearPie
     )
 
 
-@partial(program, runs_often=False)
+@program
 def _linear(
     near, pieces, extras, states, columns, scales, nodes, stride
 ) -> LinearPieces:
@@ -237,7 +236,7 @@ def _linear(
     return jax.vmap(record)(stacked, pieces, extras, states, columns, scales)
 
 
-@partial(program, runs_often=False)
+@program
 def _forces(layout, pieces, point, terms) -> Float[Array, "r k l p"]:
     """Return the acceleration per unit of each strength, at the nodes of every
     piece.

@@ -23,6 +23,7 @@ from ._linearise import (
     assemble as assemble,
     Blocks as Blocks,
     chained as chained,
+    cost_by_recording as cost_by_recording,
     cost_of as cost_of,
     Costs as Costs,
     Layout as Layout,

@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float, Int
 
 from ._each_record import each_record
@@ -265,6 +266,31 @@ def chained(found: LinearPieces) -> Blocks:
     pp = found.pp + jnp.sum(inner, axis=0)
     p = found.p + jnp.sum(found.slope[:, size:] + times(params), axis=0)
     return Blocks(ss, sp, s, product(later, earlier), pp, p)
+
+
+def cost_by_recording(costs: Costs, weights) -> Float[np.ndarray, " r"]:
+    """Return the weighted cost of each recording.
+
+    A joint has the lesser weight of its two pieces. Contact whose surface is not found
+    has no cost, as it gives no information; data without weight have none at all.
+
+    Args:
+        costs: The costs.
+        weights: The [`jaxcam.fitting.engine.Weights`][] of the data.
+
+    Returns:
+        The costs, shape `(r,)`.
+    """
+    before = np.concatenate([weights.flown[:, :1], weights.flown[:, :-1]], axis=1)
+    parts = (
+        (weights.flown, costs.flown),
+        (np.minimum(weights.flown, before), costs.joints),
+        (weights.rested, np.nan_to_num(costs.rested)),
+    )
+    total = np.zeros(len(weights.flown))
+    for weight, cost in parts:
+        total += np.sum(weight * np.where(weight > 0, cost, 0.0), axis=1)
+    return total
 
 
 def total_cost(costs: Costs, extras) -> float:

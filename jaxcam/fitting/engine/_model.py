@@ -50,10 +50,10 @@ class Sensor(eqx.Module):
     offset: Float[Array, ""] = _number(0.0)
     """Offset, in the units of the channel."""
     lag: Float[Array, ""] = _number(0.0)
-    """Lag (s), short compared with the time in which the motion changes."""
+    """Lag (s), short compared with the time scale of the motion."""
     error: Callable | None = eqx.field(default=None, static=True)
-    """Systematic error of the sensor in a fit, `error(system, t, value, slope)` of
-    the value and its rate of change; default none.
+    """Systematic error of the sensor in a fit: a function `error(system, t, value,
+    slope)` of the value and its rate of change; default none.
     """
 
     def __check_init__(self):
@@ -81,7 +81,7 @@ class Sensor(eqx.Module):
 
 
 class Turning(eqx.Module):
-    """A measured drive: the fields in which a system keeps its speed and its phase.
+    """A drive with measured motion, and the fields of a system for its speed and phase.
 
     While a recording is predicted, the speed follows the measured one and the phase
     places the drive at its measured angle. `phase` of the fitted system is then an
@@ -111,8 +111,7 @@ class Turning(eqx.Module):
 
 
 class Input(eqx.Module):
-    """A measured input, as a force or a voltage, and the field in which a system keeps
-    it.
+    """A measured input, such as a force or a voltage, and the field of a system for it.
 
     While a recording is predicted, the system has the value of its own recording,
     each sample held until the next one, as digital controllers do; over a step of the
@@ -153,7 +152,7 @@ class Model(eqx.Module):
     """The measured drive or input of the system, if there is one."""
 
     def driven(self, t, angle, rate) -> HybridSystem:
-        """Return the system near time `t`."""
+        """Return the system with its drive or input as measured at time `t`."""
         if self.drive is None:
             return self.system
         return self.drive.at(self.system, t, angle, rate)

@@ -99,7 +99,7 @@ def contact_state(system, t, guess):
 
     def conditions(system, t, x):
         def gap(t, x):
-            return least_gap(system, t, x)
+            return smallest_gap(system, t, x)
 
         value, speed = jax.jvp(
             gap, (t, x), (jnp.ones_like(t), system.vector_field(t, x))
@@ -232,7 +232,7 @@ def impact_joint(model: Model, end, state, t, angle, rate, reach) -> Joint:
         """
 
         def gap(t, x):
-            return least_gap(system, t, x[:size])
+            return smallest_gap(system, t, x[:size])
 
         def move(x):
             x = runge_kutta(model, system, t, x, shift)[0]
@@ -257,17 +257,20 @@ def impact_joint(model: Model, end, state, t, angle, rate, reach) -> Joint:
 
     shift = jax.lax.fori_loop(0, _NEWTON, newton, jnp.zeros_like(t))
     states, fields, gaps, speeds = moved(model, system, flights, shift)
-    last = jnp.clip(shift + step(gaps, speeds), -reach, reach) - shift
+    last = step(gaps, speeds)
+    # chosen by a condition: the derivative of `clip` compares values for equality
+    inside = jnp.abs(shift + last) < reach
+    last = jnp.where(inside, last, jnp.clip(shift + last, -reach, reach) - shift)
     before, after = states + last * fields
     shift = shift + last
     landed = system.impact(t + shift, before[:size])
     if landed.ndim == 2:
         landed = landed[jnp.argmin(system.gap(t + shift, before[:size]))]
     landed = jnp.concatenate([landed, before[size:]])
-    return Joint(after - landed, least_gap(system, t + shift, before[:size]))
+    return Joint(after - landed, smallest_gap(system, t + shift, before[:size]))
 
 
-def least_gap(system: HybridSystem, t, x) -> Float[Array, ""]:
+def smallest_gap(system: HybridSystem, t, x) -> Float[Array, ""]:
     """Return the smallest gap.
 
     Not by `min`: its derivative compares values for equality, which differ where a

@@ -1,7 +1,5 @@
 """Reject an invalid problem before fitting; each message is a sentence."""
 
-from functools import partial
-
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -26,7 +24,7 @@ def refuse_not_finite(layout: Layout, segments, pieces: Pieces, point: Point) ->
         )
 
 
-@partial(program, runs_often=False)
+@program
 def _rates(layout: Layout, point: Point, pieces: Pieces):
     """Return the rate of change at the initial state of each piece."""
 

@@ -1,4 +1,4 @@
-"""Programs of a fit, compiled in seconds where XLA's defaults take half a minute."""
+"""Compile the programs of a fit."""
 
 from collections.abc import Callable
 from typing import Any, ParamSpec, TypeVar
@@ -9,25 +9,24 @@ import equinox as eqx
 P = ParamSpec("P")
 T = TypeVar("T")
 
-# One MLIR context for each of some 500 fusions is half of the time of a compilation
-_FUSION = "xla_cpu_use_fusion_emitters"
-_LEVEL = "xla_backend_optimization_level"
+# With XLA's fusion emitters, half of a compilation is spent on one MLIR context for
+# each of several hundred fusions. The level of LLVM's optimisation stays: below
+# 2, a value that is needed twice may be rounded in two ways, and derivatives of `min`,
+# `max` and `clip`, which compare values for equality, are then wrong.
+_OPTIONS = {"xla_cpu_use_fusion_emitters": False}
 
 
-def program(function: Callable[P, T], *, runs_often: bool = True) -> Callable[P, T]:
+def program(function: Callable[P, T]) -> Callable[P, T]:
     """Compile a function when it is first called, as `equinox.filter_jit` does.
 
-    Such a program runs as fast as one that is compiled by default, within a tenth. It
-    must not be called in another one: XLA takes options from the outermost.
+    It compiles faster and runs as fast. It cannot be called within another compiled
+    function, because XLA takes options from the outermost one.
 
     Args:
         function: The function.
-        runs_often: False for a function that is called a few times for each program:
-            it compiles twice as fast and runs at half the speed.
 
     Returns:
         The compiled function.
     """
-    options = {_FUSION: False, _LEVEL: 1 if runs_often else 0}
     jitted: Any = eqx.filter_jit
-    return jitted(function, compiler_options=options)
+    return jitted(function, compiler_options=_OPTIONS)

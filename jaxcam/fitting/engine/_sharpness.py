@@ -1,7 +1,5 @@
 """Choose the accuracy of the joints between pieces, from drive and samples."""
 
-from functools import partial
-
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -11,7 +9,7 @@ from ._linear import Extras, Sharpness
 from ._linearise import assemble, Layout, Point
 from ._model import filtered_channels
 from ._pieces import IMPACT, Pieces
-from ._predict import fly, least_gap
+from ._predict import fly, smallest_gap
 from ._program import program
 
 
@@ -142,7 +140,7 @@ def _variances(ss, before):
     return np.abs(found)
 
 
-@partial(program, runs_often=False)
+@program
 def _drive_in_flight(layout: Layout, pieces: Pieces, point: Point):
     """Return the error of each piece's initial state, `(r, k, n)`, due to the drive.
 
@@ -169,7 +167,7 @@ def _drive_in_flight(layout: Layout, pieces: Pieces, point: Point):
     return jax.vmap(one)(*arrays)
 
 
-@partial(program, runs_often=False)
+@program
 def _drive_slopes(layout: Layout, pieces: Pieces, point: Point):
     """Return the slope of the gap, `(r, k, n)`, and errors of an impact due to the
     drive.
@@ -182,14 +180,14 @@ def _drive_slopes(layout: Layout, pieces: Pieces, point: Point):
         def landed(drive):
             system = model.driven(t, drive[0], drive[1])
             x = system.impact(t, state[:size])
-            gap = least_gap(system, t, state[:size])
+            gap = smallest_gap(system, t, state[:size])
             if x.ndim == 2:
                 x = x[jnp.argmin(system.gap(t, state[:size]))]
             return jnp.concatenate([x, state[size:], gap[None]])
 
         def gap_of(x):
             system = model.driven(t, angle, rate)
-            return least_gap(system, t, x[:size])
+            return smallest_gap(system, t, x[:size])
 
         jacobian = jax.jacfwd(landed)(jnp.stack([angle, rate]))
         spread = jnp.sqrt(jacobian**2 @ error**2)

@@ -1,8 +1,8 @@
 """Represent the real cam: the nominal profile, corrected by recordings.
 
-A real cam differs from the nominal one by millimetres, which is tens of times the
-noise of an encoder: with the nominal contact angle contact could not be distinguished
-from a low flight.
+A real cam differs from the nominal one by millimetres, which changes the contact angle
+by tens of times the noise of an encoder. With the nominal angle, contact could not be
+distinguished from a low flight.
 """
 
 import equinox as eqx
@@ -62,7 +62,7 @@ class Surface(eqx.Module):
         return np.asarray(_evaluate(self, padded(turned))[0])[: len(turned)]
 
     def slope(self, turned) -> Float[np.ndarray, " k"]:
-        """Return its derivative by the angle that the cam has turned."""
+        """Return the derivative of the contact angle with respect to the cam angle."""
         turned = np.asarray(turned)
         return np.asarray(_evaluate(self, padded(turned))[1])[: len(turned)]
 

@@ -1,0 +1,143 @@
+"""Compiled programs of a fit, and what is held out of it."""
+
+import dataclasses
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from fitting_rigs import DraggedBall
+
+from jaxcam.discrepancy import Policy
+from jaxcam.discrepancy.evidence._held_out import folds_of
+from jaxcam.discrepancy.search import _extended
+from jaxcam.fitting import fit, Model, Parameter, Problem, Sensor
+from jaxcam.fitting.engine import cost_by_recording, free_columns, Weights
+from jaxcam.fitting.engine._linearise import assemble_one, Costs
+from jaxcam.fitting.engine._predict import smallest_gap
+from jaxcam.recordings import record, segment
+
+
+NOISE = 1e-3
+SENSORS = {"height_m": Sensor(0, noise=NOISE)}
+TRUE = DraggedBall(gravity=9.7, drag=0.12, restitution=0.75)
+PARAMETERS = [
+    Parameter("gravity", lambda m: m.system.gravity, tolerance=0.5),
+    Parameter("drag", lambda m: m.system.drag, lower=0.0, scale=0.1),
+    Parameter("restitution", lambda m: m.system.restitution, upper=1.0),
+]
+
+
+class Room(DraggedBall):
+    """A ball that never reaches the ceiling of its room."""
+
+    def gap(self, t, state):
+        return jnp.stack([state[0], 3.0 - state[0]])
+
+
+@pytest.fixture(scope="module")
+def rooms():
+    runs = []
+    for name, height in (("a", 1.0), ("b", 1.3)):
+        run = record(
+            TRUE,
+            SENSORS,
+            2.0,
+            rng=np.random.default_rng(round(10 * height)),
+            state=jnp.array([height, 0.0]),
+            interval=2e-3,
+            name=name,
+        )
+        floor = np.zeros(len(run))
+        runs.append(segment(run, "height_m", floor, noise=NOISE, restitution=0.8))
+    return Problem.build(Model(Room(), SENSORS), runs, PARAMETERS)
+
+
+@pytest.fixture(scope="module")
+def found(rooms):
+    return fit(rooms)
+
+
+def test_the_smallest_gap_has_the_slopes_of_the_gap_that_is_smallest():
+    """Where two gaps are equal, the slopes of one of them: `min` gives their mean."""
+    room, t = Room(), jnp.asarray(0.0)
+    for height, value, slope in ((0.5, 0.5, 1.0), (2.75, 0.25, -1.0), (1.5, 1.5, 1.0)):
+        state = jnp.array([height, 0.3])
+        least, slopes = jax.value_and_grad(smallest_gap, 2)(room, t, state)
+        assert float(least) == value
+        assert np.array_equal(slopes, [slope, 0.0])
+
+
+def test_normal_equations_do_not_depend_on_how_they_are_compiled(rooms, found):
+    """To 1e-9 of the largest of each kind, at an optimum and away from it."""
+    columns = free_columns(rooms, rooms.names)
+    default = eqx.filter_jit(lambda *args: assemble_one.__wrapped__(*args))
+    rng = np.random.default_rng(0)
+    for away in (0.0, 0.01):
+        states = found.point.states + away * rng.standard_normal(
+            found.point.states.shape
+        )
+        args = (
+            rooms.layout.about(found.point.values[0]),
+            rooms.pieces,
+            rooms.extras,
+            states,
+            jnp.asarray(columns.local),
+            jnp.asarray(columns.scales),
+            jnp.asarray(0),
+        )
+        ours, theirs = (
+            [np.asarray(leaf) for leaf in jax.tree.leaves(each(*args))]
+            for each in (assemble_one, default)
+        )
+        for one, other in zip(ours, theirs):
+            size = np.max(np.abs(other), initial=0.0)
+            np.testing.assert_allclose(one, other, rtol=0, atol=1e-9 * size)
+
+
+def test_states_of_held_out_data_move_by_themselves(rooms, found, monkeypatch):
+    """With steps three times too long, and one recording without weight.
+
+    The full step makes the cost four times as large, so that it is shortened; the
+    states of the other recording stay where they are.
+    """
+    every = rooms.everything()
+    none = Weights(every.flown.copy(), every.rested.copy())
+    none.flown[1], none.rested[1] = 0.0, 0.0
+    moved = np.array(found.point.states)
+    moved[:, :, 1] += 2e-4
+    start = dataclasses.replace(
+        found, point=found.point._replace(states=jnp.asarray(moved))
+    )
+    steps = _extended.state_steps
+    monkeypatch.setattr(_extended, "state_steps", lambda *a: 3.0 * steps(*a))
+    test = _extended.with_states(rooms, start, none, Policy())
+    assert np.array_equal(test.point.states[1], moved[1])
+    best = cost_by_recording(found.costs, none)
+    assert best[1] == 0.0
+    assert test.cost == pytest.approx(best[0], abs=0.1)
+
+
+def test_what_has_no_weight_or_no_surface_costs_nothing():
+    """Joints have the lesser weight of their pieces."""
+    costs = Costs(
+        np.array([[1.0, 2.0, np.nan]]),
+        np.array([[10.0, 20.0, np.inf]]),
+        np.array([[np.nan, 4.0]]),
+    )
+    weights = Weights(np.array([[1.0, 0.5, 0.0]]), np.ones((1, 2)))
+    expected = 1.0 + 0.5 * 2.0 + 1.0 * 10.0 + 0.5 * 20.0 + 4.0
+    assert cost_by_recording(costs, weights) == pytest.approx([expected])
+
+
+def test_no_part_holds_out_sections_at_a_fixed_distance(rooms):
+    """Else it could take all impacts of a periodic motion on one of two stops."""
+    policy = Policy(folds=3, stretch_pieces=1)
+    unseen = [out.flown for _, out in folds_of(rooms, policy)]
+    for row in range(2):
+        count = len(rooms.spans[row][0])
+        parts = np.argmax([out[row, :count] for out in unseen], axis=0)
+        rounds = parts[: 3 * (count // 3)].reshape(-1, 3)
+        assert len(rounds) > 2
+        assert any(tuple(one) != tuple(rounds[0]) for one in rounds)
