@@ -2,6 +2,7 @@
 
 import math
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
@@ -25,6 +26,12 @@ NUMBERS = {
     "wave": (0.7, 2.3, 0.4),
     "forward": (0.6,),
     "falling": (0.6, 0.2),
+    "curved above": (-3.0, 0.6, 1.5),
+    "curved below": (3.0, 0.3, 2.0),
+    "dead zone": (2.0, 0.5, 0.2),
+    "saturating": (1.5, 0.4, 0.1),
+    "fast": (-0.8, 0.2),
+    "power of speed": (-0.8, 1.5),
     "harmonic 1": (0.6, 0.5),
     "harmonic 2": (0.6, 0.5),
     "harmonic 3": (0.6, 0.5),
@@ -65,10 +72,10 @@ def test_the_formula_is_the_function_that_was_fitted(family, primitive):
     term = FREE[Where.FLIGHT].of(family, "a", coefficients, primitive).prepared()
     at = np.linspace(family.low, family.high, 400)
     direction = np.tanh(at / SLIP) if family.jumps else 0 * at
-    found = np.array([float(term.at(x, d)) for x, d in zip(at, direction)])
+    found = np.asarray(term.at(jnp.asarray(at), jnp.asarray(direction)))
     text, _ = formula_of(family, primitive, numbers, "force")
     names = {"max": np.maximum, "sign": np.sign, "wrapped": _wrapped}
-    names |= {name: getattr(np, name) for name in ("exp", "cos", "sin")}
+    names |= {name: getattr(np, name) for name in ("exp", "cos", "sin", "tanh")}
     written = eval(text, names | {str(family.argument): at})
     size = np.max(np.abs(found))
     close = np.abs(found - written) < 2e-3 * size

@@ -8,18 +8,19 @@ import dataclasses
 import itertools
 import math
 
-import jax.numpy as jnp
 import numpy as np
 
-from ..terms import Family, free_basis, Primitive
+from ..terms import Family, free_basis, Place, Primitive
 from ._free_fits import FreeFits, heat_of, Missing, Subset
 from ._hidden_state import Hidden
 from ._roughness import beside, Roughness
-from ._slots import emptied, Free, free_term
+from ._slots import emptied, Free, replaced
 
 
 # Points at which a form is compared with the sines that represent it
 _GRID = 400
+# A form that is worse than its curve by this factor after several attempts is given up
+_HOPELESS = 2.0
 
 
 def formulated(
@@ -62,9 +63,14 @@ def _sound(trial: Missing, one: Free) -> bool:
 
 def _enough(fits: FreeFits, found: Missing, trial: Missing) -> bool:
     """Return whether a form leaves only noise, with better evidence than the curve."""
+    return trial.score < found.score and leaves_noise(fits, trial)
+
+
+def leaves_noise(fits: FreeFits, found: Missing) -> bool:
+    """Return whether the cost of a fit is that of the noise."""
     samples = found.problem.samples
     surplus = fits.policy.cost_errors * math.sqrt(2 * samples)
-    return trial.score < found.score and trial.fit.cost < samples + surplus
+    return found.fit.cost < samples + surplus
 
 
 def _fitted(
@@ -76,10 +82,11 @@ def _fitted(
     form = dataclasses.replace(one, primitive=primitive, roughness=size)
     functions = tuple(form if f is one else f for f in found.functions)
     values = emptied(problem, found.fit.point.values, one.slot)
-    rows = jnp.asarray([problem.names.index(name) for name in form.coefficients])
-    values = values.at[:, rows].set(jnp.asarray(numbers))
+    columns = [problem.names.index(name) for name in form.coefficients]
+    values = replaced(values, columns, numbers)
     point = found.fit.point._replace(values=values)
-    return fits.fitted(Subset(problem, functions, found.names), point)
+    subset = Subset(problem, functions, found.names)
+    return fits.fitted(subset, point, beaten=_HOPELESS * found.fit.cost)
 
 
 def _promising(
@@ -124,10 +131,8 @@ def _sines_of(family: Family, primitive: Primitive, starts, count: int) -> np.nd
     along = np.linspace(family.low, family.high, _GRID)
     basis = free_basis(family, along, count)
     direction = np.tanh(along / family.slip) if family.jumps else np.zeros(_GRID)
-    place = free_term(family, "form").place(along[None])
+    place = Place.between(along[None], family.low, family.high)
     numbers = [np.ones((len(starts), 1)), *starts.T[:, :, None]]
-    values = primitive.value(
-        place, [jnp.asarray(one) for one in numbers], direction[None]
-    )
-    values = np.broadcast_to(np.asarray(values), (len(starts), _GRID))
+    values = primitive.value(place, numbers, direction[None])
+    values = np.broadcast_to(values, (len(starts), _GRID))
     return np.linalg.lstsq(basis, values.T, rcond=1e-6)[0].T

@@ -73,9 +73,16 @@ class FreeFits:
         return names
 
     def fitted(
-        self, subset: Subset, start: Point, iterations: int | None = None
+        self,
+        subset: Subset,
+        start: Point,
+        iterations: int | None = None,
+        beaten: float = math.inf,
     ) -> Missing:
-        """Fit a subset, including the smoothness of its functions."""
+        """Fit a subset, including the smoothness of its functions.
+
+        A fit that is late in falling below the cost `beaten` is stopped.
+        """
         policy, functions = self.policy, subset.functions
         heat, point, found = 1.0, start, None
         # the parameters of a hidden element converge step by step
@@ -90,7 +97,7 @@ class FreeFits:
                 free=free,
                 start=point,
                 iterations=iterations or policy.quick_iterations,
-                stop=self._stop(problem.samples, heat),
+                stop=self._stop(problem.samples, heat, beaten),
             )
             point, before, heat = found.point, heat, heat_of(found)
             if not math.isfinite(found.cost):
@@ -109,11 +116,13 @@ class FreeFits:
         score = self.score(subset, found)
         return Missing(functions, subset.names, found, score, subset.problem)
 
-    def _stop(self, samples: int, heat: float) -> Callable[[Sequence[float]], bool]:
+    def _stop(
+        self, samples: int, heat: float, beaten: float
+    ) -> Callable[[Sequence[float]], bool]:
         """Return whether to stop a fit: it has failed, or its steps no longer affect a
         choice.
         """
-        gives_up = given_up(samples, self.policy)
+        gives_up = given_up(samples, self.policy, beaten)
 
         def stop(costs: Sequence[float]) -> bool:
             steps = list(dict.fromkeys(costs))

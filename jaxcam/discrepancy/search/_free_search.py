@@ -16,7 +16,7 @@ from ...fitting.engine import Point, separated
 from ..policy import Policy
 from ..terms import Family, own_faults, Term, Where
 from ._blocks import blocks_of, values_of
-from ._formulas import formulated
+from ._formulas import formulated, leaves_noise
 from ._free_fits import FreeFits, heat_of, Missing, Subset
 from ._gains import added_gain, gain
 from ._hidden_kinds import KINDS
@@ -58,6 +58,8 @@ class FreeSearch:
         self.families = tuple(families)
         # fits of whole recordings with other functions, or other forms of them
         self.tried: list[Missing] = []
+        # candidates for the first function
+        self.first: list[Lead] = []
         impacting = any(family.where is not Where.FLIGHT for family in families)
         unit = self.families[0].motion_unit
         self.driven = driven_by(problem, unit) if policy.elements else None
@@ -73,7 +75,8 @@ class FreeSearch:
 
     def run(self) -> Missing | None:
         """Return the functions and terms found, or `None` if none is significant."""
-        found = self._grown(self._bare(self.apart, self.problem.start), True)
+        bare = self._bare(self.apart, self.problem.start)
+        found = self._grown(bare, True)
         most = self.policy.iterations
         found = self.fits.fitted(self._tight(found), found.fit.point, most)
         found = self._grown(found, False)
@@ -84,11 +87,38 @@ class FreeSearch:
             return None
         found = self._pruned(found)
         found = simplified(self.fits, self.problem, found, self.progress)
-        small = self._small(found)
+        found = self._formulated(found)
+        if len(found.functions) > 1 or found.names or leaves_noise(self.fits, found):
+            return found
+        rivals = [self._rival_function(bare, lead) for lead in self._others(found)]
+        return min([found, *filter(None, rivals)], key=lambda one: one.score)
+
+    def _formulated(self, found: Missing) -> Missing:
         self.tried.append(found)
+        small = self._small(found)
         found, forms = formulated(self.fits, found, small, self.progress)
         self.tried += forms
         return found
+
+    def _others(self, found: Missing) -> list[Lead]:
+        """Return the candidates for the first function that were not fitted to whole
+        recordings.
+        """
+        fitted = {one.label for trial in self.tried for one in trial.functions}
+        return [
+            lead
+            for lead in self.first
+            if lead.family is not None and lead.label not in fitted
+        ]
+
+    def _rival_function(self, bare: Missing, lead: Lead) -> Missing | None:
+        """Return the fit with another function alone, or `None` if it fails.
+
+        On single pieces of flight a smooth function may be ahead of the right one.
+        """
+        self.progress(f"fitting {lead.label} instead", None)
+        trial = self._with(self.problem, bare, lead)
+        return None if trial is None else self._formulated(trial)
 
     def _bare(self, problem: Problem, start: Point) -> Missing:
         return self.fits.fitted(
@@ -106,6 +136,7 @@ class FreeSearch:
                 # single pieces contain little information on small effects
                 break
             leads = self._leads(problem, found, apart)
+            self.first = self.first or leads
             best = found
             for lead in leads:
                 if self._done(best, lead, leads[0]):
@@ -140,7 +171,7 @@ class FreeSearch:
         tried.
         """
         close = lead.gain > self.policy.rivalling * first.gain
-        return heat_of(best.fit) < self.policy.as_noise and not close
+        return leaves_noise(self.fits, best) and not close
 
     def _small(self, found: Missing) -> float:
         """Return the tolerated residual gain, given the explained one."""

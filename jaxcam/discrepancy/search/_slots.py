@@ -8,6 +8,7 @@ from typing import TypeAlias
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array
 
 from ...fitting import Model, Problem
 from ..terms import (
@@ -186,7 +187,14 @@ def emptied(problem: Problem, values, slot: str):
     """Return parameter values with those of a slot set to zero."""
     parameters = terms_of(problem.model)[_place(problem, slot)].parameters(0)
     rows = [problem.names.index(p.name) for p in parameters if p.known is None]
-    return jnp.asarray(values).at[:, jnp.asarray(rows)].set(0.0)
+    return replaced(values, rows, 0.0)
+
+
+def replaced(values, columns, numbers) -> Array:
+    """Return parameter values with some columns replaced; nothing is compiled."""
+    values = np.array(values)
+    values[:, columns] = numbers
+    return jnp.asarray(values)
 
 
 def _place(problem: Problem, slot: str) -> int:

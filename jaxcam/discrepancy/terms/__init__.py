@@ -31,7 +31,7 @@ from ._library import (
     saved_classes as saved_classes,
 )
 from ._motion_scales import MotionScales as MotionScales
-from ._primitives import Primitive as Primitive
+from ._primitives import Place as Place, Primitive as Primitive
 from ._scaled import ScaledTerm as ScaledTerm
 from ._sensed import (
     more_faults as more_faults,

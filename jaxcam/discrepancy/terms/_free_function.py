@@ -79,6 +79,7 @@ class FreeFunction(Term):
         spacing = (self.high - self.low) / (_KNOTS - 3)
         knots = self.low + spacing * (jnp.arange(_KNOTS, dtype=float) - 1.0)
         numbers, number = self.coefficients, self.form.astype(int)
+        place = Place.between(knots, self.low, self.high)
 
         def sines():
             each = jnp.stack(numbers[:-1]) * 3 / (2 + jnp.cos(self.rates * spacing))
@@ -87,7 +88,7 @@ class FreeFunction(Term):
 
         def of(one: Primitive):
             def form():
-                return one.function(self.place(knots), numbers), one.jump * numbers[0]
+                return one.function(place, numbers), one.jump * numbers[0]
 
             return form
 
@@ -138,11 +139,6 @@ class FreeFunction(Term):
             form=0.0 if primitive is None else 1.0 + PRIMITIVES.index(primitive),
             odd=float(primitive is not None and primitive.odd),
         )
-
-    def place(self, argument) -> Place:
-        """Return an argument in the scales that a form uses."""
-        width = self.high - self.low
-        return Place(argument, (argument - self.low) / width, argument / width)
 
     def at(self, argument, direction: Any = 0.0):
         """Return the function without its factor; beyond the ends it is constant.

@@ -8,7 +8,6 @@ range, so that a fit can move them.
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-import jax.numpy as jnp
 import numpy as np
 
 
@@ -20,13 +19,24 @@ _LEAST = 1e-6
 class Place(NamedTuple):
     """The argument at which a form is evaluated.
 
-    `x`: the argument; `u`: its position in the range, from 0 to 1; `v`: the argument
-    divided by the range.
+    `x`: the argument, an array; `u`: its position in the range, from 0 to 1; `v`: the
+    argument divided by the range.
     """
 
     x: Any
     u: Any
     v: Any
+
+    @classmethod
+    def between(cls, argument, low, high):
+        """Return an argument in the scales of a range."""
+        width = high - low
+        return cls(argument, (argument - low) / width, argument / width)
+
+    @property
+    def xp(self):
+        """Return the module of the argument: `numpy` or `jax.numpy`."""
+        return self.x.__array_namespace__()
 
 
 class Primitive(NamedTuple):
@@ -65,12 +75,24 @@ class Primitive(NamedTuple):
         return turned + self.jump * numbers[0] * direction
 
 
-def _step(x):
-    return (1 + jnp.tanh(x / _EDGE)) / 2
+def _step(at: Place, x):
+    return (1 + at.xp.tanh(x / _EDGE)) / 2
+
+
+def _power(at: Place, x, exponent):
+    """Return `max(x, 0)**exponent`, with derivatives at zero."""
+    seen = x > _LEAST
+    return at.xp.where(seen, at.xp.where(seen, x, 1.0) ** exponent, 0.0)
+
+
+def _beyond(at: Place, x, width):
+    """Return how far `x` is from an interval of some half-width about zero."""
+    inside = at.xp.where(x < -width, -width, x)
+    return x - at.xp.where(x > width, width, inside)
 
 
 def _wrapped(x):
-    return jnp.mod(x + jnp.pi, 2 * jnp.pi) - jnp.pi
+    return (x + np.pi) % (2 * np.pi) - np.pi
 
 
 def _shares(low: float, high: float, count: int) -> tuple[float, ...]:
@@ -83,31 +105,35 @@ _EVERY = _shares(0.0, 2 * np.pi, 73)[:-1]
 STRAIGHT = Primitive("straight", lambda at, p: p[0] * at.u)
 ABOVE = Primitive(
     "above",
-    lambda at, p: p[0] * jnp.maximum(at.u - p[1], 0.0),
+    lambda at, p: p[0] * at.xp.maximum(at.u - p[1], 0.0),
     (_INSIDE,),
     (0.05,),
     places=(1,),
 )
 BELOW = Primitive(
     "below",
-    lambda at, p: p[0] * jnp.maximum(p[1] - at.u, 0.0),
+    lambda at, p: p[0] * at.xp.maximum(p[1] - at.u, 0.0),
     (_INSIDE,),
     (0.05,),
     places=(1,),
 )
 STEP = Primitive(
-    "step", lambda at, p: p[0] * _step(at.u - p[1]), (_INSIDE,), (0.05,), places=(1,)
+    "step",
+    lambda at, p: p[0] * _step(at, at.u - p[1]),
+    (_INSIDE,),
+    (0.05,),
+    places=(1,),
 )
 WINDOW = Primitive(
     "window",
-    lambda at, p: p[0] * (_step(at.u - p[1]) - _step(at.u - p[2])),
+    lambda at, p: p[0] * (_step(at, at.u - p[1]) - _step(at, at.u - p[2])),
     (_INSIDE, _INSIDE),
     (0.05, 0.05),
     places=(1, 2),
 )
 BUMP = Primitive(
     "bump",
-    lambda at, p: p[0] * jnp.exp(-(((at.u - p[1]) / p[2]) ** 2)),
+    lambda at, p: p[0] * at.xp.exp(-(((at.u - p[1]) / p[2]) ** 2)),
     (_INSIDE, (0.03, 0.05, 0.08, 0.12, 0.2, 0.3)),
     (0.05, 0.03),
     places=(1,),
@@ -116,51 +142,97 @@ SQUARE = Primitive("square", lambda at, p: p[0] * (at.u - 0.5) ** 2)
 CUBE = Primitive("cube", lambda at, p: p[0] * (at.u - 0.5) ** 3)
 EXPONENTIAL = Primitive(
     "exponential",
-    lambda at, p: p[0] * jnp.exp(p[1] * (at.u - 0.5)),
+    lambda at, p: p[0] * at.xp.exp(p[1] * (at.u - 0.5)),
     ((-16.0, -8.0, -4.0, -2.0, 2.0, 4.0, 8.0, 16.0),),
     (1.0,),
 )
 POWER = Primitive(
     "power",
-    lambda at, p: p[0] * jnp.maximum(at.u, _LEAST) ** p[1],
+    lambda at, p: p[0] * at.xp.maximum(at.u, _LEAST) ** p[1],
     ((0.5, 1.5, 2.0, 3.0),),
     (0.2,),
 )
+CURVED_ABOVE = Primitive(
+    "curved above",
+    lambda at, p: p[0] * _power(at, at.u - p[1], p[2]),
+    (_shares(0.05, 0.9, 35), (1.5, 2.0, 3.0)),
+    (0.05, 0.2),
+    places=(1,),
+)
+CURVED_BELOW = Primitive(
+    "curved below",
+    lambda at, p: p[0] * _power(at, p[1] - at.u, p[2]),
+    (_shares(0.1, 0.95, 35), (1.5, 2.0, 3.0)),
+    (0.05, 0.2),
+    places=(1,),
+)
+DEAD_ZONE = Primitive(
+    "dead zone",
+    lambda at, p: p[0] * _beyond(at, at.u - p[1], p[2]),
+    (_shares(0.2, 0.8, 25), _shares(0.04, 0.4, 10)),
+    (0.05, 0.05),
+    places=(1,),
+)
+SATURATING = Primitive(
+    "saturating",
+    lambda at, p: p[0] * at.xp.tanh((at.u - p[1]) / p[2]),
+    (_INSIDE, (0.05, 0.1, 0.2, 0.4)),
+    (0.05, 0.05),
+    places=(1,),
+)
 WAVE = Primitive(
     "wave",
-    lambda at, p: p[0] * jnp.cos(2 * jnp.pi * p[1] * at.u - p[2]),
+    lambda at, p: p[0] * at.xp.cos(2 * np.pi * p[1] * at.u - p[2]),
     (_shares(0.75, 8.0, 30), _EVERY[::3]),
     (0.1, 0.3),
 )
 FORWARD = Primitive("forward", lambda at, p: p[0] / 2 + 0.0 * at.u, jump=0.5)
 FALLING = Primitive(
     "falling",
-    lambda at, p: p[0] * jnp.exp(-((at.v / p[1]) ** 2)),
+    lambda at, p: p[0] * at.xp.exp(-((at.v / p[1]) ** 2)),
     ((0.03, 0.05, 0.08, 0.12, 0.2, 0.3, 0.5),),
     (0.05,),
+    odd=True,
+)
+FAST = Primitive(
+    "fast",
+    lambda at, p: p[0] * _power(at, at.xp.abs(at.v) - p[1], 1.0),
+    (_shares(0.02, 0.46, 23),),
+    (0.05,),
+    odd=True,
+    places=(1,),
+)
+POWER_OF_SPEED = Primitive(
+    "power of speed",
+    lambda at, p: p[0] * _power(at, 2 * at.xp.abs(at.v), p[1]),
+    ((0.5, 1.5, 2.0, 3.0, 4.0),),
+    (0.2,),
     odd=True,
 )
 HARMONICS = tuple(
     Primitive(
         f"harmonic {n}",
-        lambda at, p, n=n: p[0] * jnp.cos(n * at.x - p[1]),
+        lambda at, p, n=n: p[0] * at.xp.cos(n * at.x - p[1]),
         (_EVERY[::3],),
         (0.3,),
     )
     for n in (1, 2, 3)
 )
 HALF_TURN = Primitive(
-    "half turn", lambda at, p: p[0] * _step(jnp.sin(at.x - p[1])), (_EVERY,), (0.1,)
+    "half turn",
+    lambda at, p: p[0] * _step(at, at.xp.sin(at.x - p[1])),
+    (_EVERY,),
+    (0.1,),
 )
 ARC = Primitive(
     "arc",
-    lambda at, p: p[0] * _step(jnp.cos(at.x - p[1]) - jnp.cos(p[2])),
+    lambda at, p: p[0] * _step(at, at.xp.cos(at.x - p[1]) - at.xp.cos(p[2])),
     (_EVERY, _shares(0.2, 2.9, 19)),
     (0.1, 0.1),
 )
 BUMP_IN_TURN = Primitive(
     "bump in turn",
-    lambda at, p: p[0] * jnp.exp(-((_wrapped(at.x - p[1]) / p[2]) ** 2)),
+    lambda at, p: p[0] * at.xp.exp(-((_wrapped(at.x - p[1]) / p[2]) ** 2)),
     (_EVERY, (0.1, 0.15, 0.2, 0.3, 0.5, 0.8)),
     (0.1, 0.1),
 )
@@ -176,9 +248,13 @@ ON_A_LINE = (
     CUBE,
     EXPONENTIAL,
     WAVE,
+    CURVED_ABOVE,
+    CURVED_BELOW,
+    DEAD_ZONE,
+    SATURATING,
 )
 FROM_ZERO = (POWER,)
-OF_SPEED = (FORWARD, FALLING)
+OF_SPEED = (FORWARD, FALLING, FAST, POWER_OF_SPEED)
 OF_PHASE = (*HARMONICS, HALF_TURN, ARC, BUMP_IN_TURN)
 
 PRIMITIVES = (*ON_A_LINE, *OF_SPEED, *OF_PHASE, *FROM_ZERO)
