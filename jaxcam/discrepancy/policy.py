@@ -281,6 +281,11 @@ class Policy:
     as_noise: float = _shows(
         1.2, "ratio of rms residual to noise above which a caveat is added"
     )
+    decoy: float = _shows(
+        0.5,
+        "share of a function's gain that its decoy, which acts in the reverse order of "
+        "time, may reach without a caveat",
+    )
     tie: float = _shows(
         10.0,
         "difference in BIC up to which another subset is reported as equally good "

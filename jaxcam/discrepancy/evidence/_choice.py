@@ -206,7 +206,8 @@ def _without_a_name(
         )
         least = min(needed.inclusion, key=lambda one: needed.inclusion[one])
         if needed.inclusion[least] >= policy.sure:
-            return found, needed, rivals(found, search.tried, policy, seed)
+            others = rivals(found, search.tried, policy, seed)
+            return found._replace(decoys=search.decoys(found)), needed, others
         if len(parts) < 2:
             break
         found = search.without(found, least)

@@ -18,6 +18,7 @@ class Reason(enum.StrEnum):
     NAMED_IN_DOUBT = "named in doubt"
     FAR_FROM_DATA = "far from the data"
     TIE = "tie"
+    DECOY = "a decoy explains much"
     NOT_SHARED = "not shared by the records"
     POOR_PREDICTION = "poor prediction"
     ABOVE_NOISE = "above the noise"
@@ -140,6 +141,16 @@ def functions_tie(name: str, rival: Rival) -> Caveat:
         f"in {rival.share:.0%} of the bootstrap samples. Record motions that visit "
         "more of the states at which the two differ.",
         tuple(sorted(rival.missing.names)),
+    )
+
+
+def decoy_explains(share: float) -> Caveat:
+    """Caveat: a function that acts at the wrong times explains much as well."""
+    return Caveat(
+        Reason.DECOY,
+        "A function of the same variables that acts in the reverse order of time would "
+        f"explain {share:.0%} of what it explains, so these recordings hardly show on "
+        "which variables it depends. Record motions that repeat less.",
     )
 
 

@@ -10,9 +10,11 @@ import math
 
 import numpy as np
 
+from ...fitting import Problem
 from ..terms import Family, free_basis, Place, Primitive
 from ._free_fits import FreeFits, heat_of, Missing, Subset
 from ._hidden_state import Hidden
+from ._leads import shows_apart
 from ._roughness import beside, Roughness
 from ._slots import emptied, Free, replaced
 
@@ -24,12 +26,12 @@ _HOPELESS = 2.0
 
 
 def formulated(
-    fits: FreeFits, found: Missing, small: float, progress
+    fits: FreeFits, found: Missing, apart: Problem, small: float, progress
 ) -> tuple[Missing, list[Missing]]:
     """Replace the functions of a fit by forms that explain as much.
 
-    **Arguments:** `small`: the allowed loss of evidence, because integration steps
-    across an edge are less accurate.
+    **Arguments:** `apart`: the problem with disconnected pieces. `small`: the allowed
+    loss of evidence, because integration steps across an edge are less accurate.
 
     **Returns:** the fit, and all fits with forms.
     """
@@ -44,7 +46,8 @@ def formulated(
             ):
                 break
             progress(f"fitting a formula: {primitive.name}", None)
-            trials.append(_fitted(fits, found, one, primitive, numbers))
+            trial = _fitted(fits, found, apart, one, primitive, numbers)
+            trials += [] if trial is None else [trial]
         sound = [trial for trial in trials if _sound(trial, one)]
         tried += sound
         best = min(sound, key=lambda trial: trial.score, default=found)
@@ -74,9 +77,17 @@ def leaves_noise(fits: FreeFits, found: Missing) -> bool:
 
 
 def _fitted(
-    fits: FreeFits, found: Missing, one: Free, primitive: Primitive, numbers
-) -> Missing:
-    """Fit a form in place of a function, starting from given parameters."""
+    fits: FreeFits,
+    found: Missing,
+    apart: Problem,
+    one: Free,
+    primitive: Primitive,
+    numbers,
+) -> Missing | None:
+    """Fit a form in place of a function, starting from given parameters.
+
+    **Returns:** the fit, or `None` if the form does not even explain single pieces.
+    """
     problem = found.problem
     size = Roughness(size=abs(float(numbers[0])))
     form = dataclasses.replace(one, primitive=primitive, roughness=size)
@@ -85,8 +96,16 @@ def _fitted(
     columns = [problem.names.index(name) for name in form.coefficients]
     values = replaced(values, columns, numbers)
     point = found.fit.point._replace(values=values)
+    beaten = _HOPELESS * found.fit.cost
+    if shows_apart(one.family):
+        # with disconnected pieces the fit is almost linear
+        subset = Subset(apart, functions, found.names)
+        first = fits.fitted(subset, point, beaten=beaten)
+        if not first.fit.cost < beaten:
+            return None
+        point = first.fit.point
     subset = Subset(problem, functions, found.names)
-    return fits.fitted(subset, point, beaten=_HOPELESS * found.fit.cost)
+    return fits.fitted(subset, point, beaten=beaten)
 
 
 def _promising(

@@ -30,6 +30,8 @@ class Missing(NamedTuple):
         function).
     - `problem`: the problem with slots for the functions; that of `fit` contains their
       priors.
+    - `decoys`: by label, the gain that was predicted for a function of the same family
+      acting in the reverse order of time, as a share of that of the function.
     """
 
     functions: tuple[Part, ...]
@@ -37,6 +39,7 @@ class Missing(NamedTuple):
     fit: Fit
     score: float
     problem: Problem
+    decoys: tuple[tuple[str, float], ...] = ()
 
 
 class Subset(NamedTuple):

@@ -96,7 +96,7 @@ class FreeSearch:
     def _formulated(self, found: Missing) -> Missing:
         self.tried.append(found)
         small = self._small(found)
-        found, forms = formulated(self.fits, found, small, self.progress)
+        found, forms = formulated(self.fits, found, self.apart, small, self.progress)
         self.tried += forms
         return found
 
@@ -119,6 +119,15 @@ class FreeSearch:
         self.progress(f"fitting {lead.label} instead", None)
         trial = self._with(self.problem, bare, lead)
         return None if trial is None else self._formulated(trial)
+
+    def decoys(self, found: Missing) -> tuple[tuple[str, float], ...]:
+        """Return the labels of functions, and the shares that their decoys gain."""
+        labels = {one.label for one in found.functions}
+        return tuple(
+            (lead.label, lead.decoy)
+            for lead in self.first
+            if lead.label in labels and lead.decoy is not None
+        )
 
     def _bare(self, problem: Problem, start: Point) -> Missing:
         return self.fits.fitted(

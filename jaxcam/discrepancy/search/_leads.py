@@ -22,7 +22,11 @@ from ._slots import filled, Free, free_term, slots_of
 
 
 class Lead(NamedTuple):
-    """One more function or term, with its predicted gain."""
+    """One more function or term, with its predicted gain.
+
+    `decoy` is the gain of a function of the same family that acts in the reverse order
+    of time, as a share of the gain; `None` if it was not computed.
+    """
 
     gain: float
     name: str | None = None
@@ -30,6 +34,7 @@ class Lead(NamedTuple):
     rough: Roughness | None = None
     slot: str = ""
     promise: Promise | None = None
+    decoy: float | None = None
 
     @property
     def label(self) -> str:
@@ -86,9 +91,16 @@ class Leads:
         if not forces and not hidden:
             return
         response = force_response(problem, found.fit.point, self.fits.free(found))
-        for family in forces:
-            # one at a time: all at once would take gigabytes
-            yield self._force(problem, found, family, response, slot or "")
+        # one at a time: all at once would take gigabytes
+        leads = [
+            Lead(rough.gain, None, family, rough, slot or "")
+            for family in forces
+            for rough in [self._force(problem, found, family, response)]
+        ]
+        leads.sort(key=lambda lead: -lead.gain)
+        for number, lead in enumerate(leads):
+            first = not found.functions and number < self.policy.followed
+            yield self._against_decoy(problem, found, lead, response) if first else lead
         if hidden and self.driven is not None:
             self.progress("searching for forces with an internal state", None)
             heat = heat_of(found.fit)
@@ -109,17 +121,27 @@ class Leads:
         found: Missing,
         family: Family,
         response: Response,
-        slot: str,
-    ) -> Lead:
+        decoy: bool = False,
+    ) -> Roughness:
         heat = heat_of(found.fit)
         term = free_term(family, "new")
-        blocks = force_blocks(problem, response, [term])
+        blocks = force_blocks(problem, response, [term], decoy)
         information, score = (x / heat for x in blocks.total())
         rows = blocks.rows(response.free)
         own = blocks.rows([p.name for p in term.parameters(0)])
         zero = np.zeros(len(own))
-        rough = roughness(information, score, rows, own, family, zero, self.policy)
-        return Lead(rough.gain, None, family, rough, slot)
+        return roughness(information, score, rows, own, family, zero, self.policy)
+
+    def _against_decoy(
+        self, problem: Problem, found: Missing, lead: Lead, response: Response
+    ) -> Lead:
+        family = lead.family
+        assert family is not None
+        # harmonics of a phase remain such harmonics in the reverse order
+        if family.periodic or not lead.gain > 0:
+            return lead
+        rough = self._force(problem, found, family, response, decoy=True)
+        return lead._replace(decoy=max(rough.gain, 0.0) / lead.gain)
 
     def _elsewhere(
         self, problem: Problem, found: Missing, apart: bool

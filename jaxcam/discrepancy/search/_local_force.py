@@ -129,17 +129,22 @@ def force_response(problem: Problem, point: Point, free: Sequence[str]) -> Respo
     )
 
 
-def force_blocks(problem: Problem, response: Response, terms: Sequence[Term]) -> Blocks:
+def force_blocks(
+    problem: Problem, response: Response, terms: Sequence[Term], decoy: bool = False
+) -> Blocks:
     """Return score and information of the free parameters and of terms that act in
     flight.
 
     **Arguments:** terms that are not in the problem, are linear in their strengths, and
     act on the first coordinate; the rows of their strengths follow those of the free
-    parameters, in order.
+    parameters, in order. As a `decoy`, the terms act at the wrong times: in the
+    reverse order of the recording.
     """
     strengths = [p for k, term in enumerate(terms) for p in term.parameters(k)]
     scale = np.array([p.scale for p in strengths], dtype=float)
     forces = forces_at_nodes(problem, response, terms) * scale
+    if decoy:
+        forces = _in_reverse(response, forces)
     width, size = forces.shape[-1], len(response.prior)
     chain = jax.vmap(chained)(_onto(response, forces))
     found = eliminate_states(jax.tree.map(jnp.asarray, chain))
@@ -168,6 +173,17 @@ def force_blocks(problem: Problem, response: Response, terms: Sequence[Term]) ->
         np.concatenate([response.pull, none]),
         np.concatenate([response.owner, np.zeros(width, dtype=int)]),
     )
+
+
+def _in_reverse(
+    response: Response, forces: Float[np.ndarray, "r k l p"]
+) -> Float[np.ndarray, "r k l p"]:
+    """Return the forces of each recording in the reverse order of time."""
+    found = forces.copy()
+    for row, exists in enumerate(response.exists):
+        rows = np.flatnonzero(exists)
+        found[row, rows] = forces[row, rows[::-1], ::-1]
+    return found
 
 
 def forces_at_nodes(
