@@ -82,6 +82,22 @@ def test_the_formula_is_the_function_that_was_fitted(family, primitive):
     assert size > 0 and np.mean(close) > 0.85
 
 
+def test_a_form_continues_beyond_the_range_as_its_formula_does():
+    """A hundredth of the samples lies outside the range of velocities. To 1e-9."""
+    family = _family(Variable.POSITION)
+    above = next(one for one in family.primitives if one.name == "above")
+    width = HIGH - LOW
+    at = jnp.array([HIGH + 0.1 * width])
+    coefficients = np.zeros(21)
+    coefficients[:2] = -3.0, 0.6
+    form = FREE[Where.FLIGHT].of(family, "a", coefficients, above).prepared()
+    assert abs(float(form.at(at)[0]) + 3.0 * 0.5) < 1e-9
+    # the curve that it replaces has no data there
+    curve = FREE[Where.FLIGHT].of(family, "a", coefficients).prepared()
+    end = float(curve.at(jnp.array([HIGH]))[0])
+    assert abs(float(curve.at(at)[0]) - end) < 1e-12
+
+
 def test_every_form_has_as_many_numbers_as_it_says():
     for argument in ARGUMENTS:
         for primitive in _family(argument).primitives:

@@ -22,7 +22,9 @@ from ._slots import emptied, Free, replaced
 # Points at which a form is compared with the sines that represent it
 _GRID = 400
 # A form that is worse than its curve by this factor after several attempts is given up
-_HOPELESS = 2.0
+_HOPELESS = 1.25
+# Share of the tolerated residual at which no other form is tried
+_CLEARLY = 0.1
 
 
 def formulated(
@@ -42,7 +44,8 @@ def formulated(
         trials = []
         for primitive, numbers in _promising(fits, found, one):
             if any(
-                _sound(trial, one) and _enough(fits, found, trial) for trial in trials
+                _sound(trial, one) and _enough(fits, found, trial, small)
+                for trial in trials
             ):
                 break
             progress(f"fitting a formula: {primitive.name}", None)
@@ -64,16 +67,20 @@ def _sound(trial: Missing, one: Free) -> bool:
     return math.isfinite(trial.score) and form.primitive.within(numbers)
 
 
-def _enough(fits: FreeFits, found: Missing, trial: Missing) -> bool:
+def _enough(fits: FreeFits, found: Missing, trial: Missing, small: float) -> bool:
     """Return whether a form leaves only noise, with better evidence than the curve."""
-    return trial.score < found.score and leaves_noise(fits, trial)
+    return trial.score < found.score and leaves_noise(fits, trial, small)
 
 
-def leaves_noise(fits: FreeFits, found: Missing) -> bool:
-    """Return whether the cost of a fit is that of the noise."""
+def leaves_noise(fits: FreeFits, found: Missing, small: float = 0.0) -> bool:
+    """Return whether the cost of a fit is that of the noise.
+
+    **Arguments:** `small`: a residual gain that is tolerated; a clearly smaller one
+    does not count.
+    """
     samples = found.problem.samples
     surplus = fits.policy.cost_errors * math.sqrt(2 * samples)
-    return found.fit.cost < samples + surplus
+    return found.fit.cost < samples + max(surplus, _CLEARLY * small)
 
 
 def _fitted(

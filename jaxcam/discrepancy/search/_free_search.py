@@ -88,7 +88,8 @@ class FreeSearch:
         found = self._pruned(found)
         found = simplified(self.fits, self.problem, found, self.progress)
         found = self._formulated(found)
-        if len(found.functions) > 1 or found.names or leaves_noise(self.fits, found):
+        alone = len(found.functions) == 1 and not found.names
+        if not alone or leaves_noise(self.fits, found, self._small(found)):
             return found
         rivals = [self._rival_function(bare, lead) for lead in self._others(found)]
         return min([found, *filter(None, rivals)], key=lambda one: one.score)

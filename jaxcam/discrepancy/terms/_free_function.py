@@ -23,7 +23,9 @@ from ._where import Where
 
 # Knots of the spline that represents a function: two per edge of a form, which is
 # smoothed over a hundredth of the range
-_KNOTS = 256
+_KNOTS = 332
+# The spline continues beyond either end by this share of the range
+_BEYOND = 0.15
 _ARGUMENTS = (Variable.POSITION, Variable.VELOCITY, Variable.PHASE, Variable.TIME)
 """Arguments, in the order of the weights that select one of them."""
 _FACTORS = (Factor.ONE, Factor.VELOCITY, Factor.DIRECTION, Factor.DEFLECTION)
@@ -76,8 +78,8 @@ class FreeFunction(Term):
         its values there divided by `(2 + cos(rate * spacing)) / 3`. The values of a
         form are the coefficients themselves, which smooths its edges over one knot.
         """
-        spacing = (self.high - self.low) / (_KNOTS - 3)
-        knots = self.low + spacing * (jnp.arange(_KNOTS, dtype=float) - 1.0)
+        first, spacing = self._knots
+        knots = first + spacing * (jnp.arange(_KNOTS, dtype=float) - 1.0)
         numbers, number = self.coefficients, self.form.astype(int)
         place = Place.between(knots, self.low, self.high)
 
@@ -99,6 +101,12 @@ class FreeFunction(Term):
             (table, jump),
             is_leaf=lambda x: x is None,
         )
+
+    @property
+    def _knots(self):
+        """Return where the spline begins, and the distance of its knots."""
+        width = self.high - self.low
+        return self.low - _BEYOND * width, width * (1 + 2 * _BEYOND) / (_KNOTS - 3)
 
     @classmethod
     def of(
@@ -141,7 +149,10 @@ class FreeFunction(Term):
         )
 
     def at(self, argument, direction: Any = 0.0):
-        """Return the function without its factor; beyond the ends it is constant.
+        """Return the function without its factor.
+
+        A sum of sines is constant beyond the ends of its range. A form continues there
+        by a share of the range, because some velocities are outside.
 
         **Arguments:** the argument, and the direction of motion.
         """
@@ -154,9 +165,12 @@ class FreeFunction(Term):
         """Evaluate the spline."""
         assert self.table is not None
         width = self.high - self.low
+        start, spacing = self._knots
+        more = jnp.where(self.form > 0, _BEYOND * width, 0.0)
         along = argument - self.low
-        along = jnp.where(self.periodic, along % width, jnp.clip(along, 0.0, width))
-        place = along * ((_KNOTS - 3) / width)
+        within = jnp.clip(along, -more, width + more)
+        along = jnp.where(self.periodic, along % width, within)
+        place = (along + self.low - start) / spacing
         first = jnp.clip(jnp.floor(place), 0, _KNOTS - 4)
         u = place - first
         first = first.astype(int)
