@@ -88,11 +88,15 @@ class FreeSearch:
         found = self._pruned(found)
         found = simplified(self.fits, self.problem, found, self.progress)
         found = self._formulated(found)
-        alone = len(found.functions) == 1 and not found.names
-        if not alone or leaves_noise(self.fits, found, self._small(found)):
+        if len(found.functions) > 1 or found.names:
             return found
-        rivals = [self._rival_function(bare, lead) for lead in self._others(found)]
-        return min([found, *filter(None, rivals)], key=lambda one: one.score)
+        for lead in self._others():
+            if leaves_noise(self.fits, found, self._small(found)):
+                break
+            other = self._rival_function(bare, lead)
+            if other is not None and other.score < found.score:
+                found = other
+        return found
 
     def _formulated(self, found: Missing) -> Missing:
         self.tried.append(found)
@@ -101,7 +105,7 @@ class FreeSearch:
         self.tried += forms
         return found
 
-    def _others(self, found: Missing) -> list[Lead]:
+    def _others(self) -> list[Lead]:
         """Return the candidates for the first function that were not fitted to whole
         recordings.
         """
