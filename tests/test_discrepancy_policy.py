@@ -45,7 +45,7 @@ def test_the_page_states_every_free_function():
         [f"`{one.name}`", one.sentence, str(one.variable), str(one.count)]
         for one in shapes((0.0, 1.0), (-1.0, 1.0), (0.0, 1.0), 1.0)
     ]
-    table = _table(["shape", "meaning", "argument", "coefficients"], rows)
+    table = _table(["shape", "meaning", "variable", "coefficients"], rows)
     assert table in _PAGE, f"put this table into docs/discrepancy.md:\n\n{table}"
 
 

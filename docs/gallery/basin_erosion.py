@@ -1,6 +1,5 @@
-"""Fractions of the initial states that converge to each attractor, as a wall is
-moved.
-"""
+"""The fraction of initial states that converge to each attractor, as a function of the
+position of a wall."""
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -15,7 +14,7 @@ grid = sweeps.Grid((-3.0, -2.5), (0.0, 2.5), (32, 32))
 walls = np.linspace(0.0, 0.4, 9)
 found = sweeps.follow_basins(system, "wall", walls, grid, turns=200)
 
-# an attractor is named as where it is largest; those that are small are one band
+# each attractor has its name where its basin is largest; small basins share one band
 large = found.shares.max(axis=0) > 0.03
 names = found.names[found.shares.argmax(axis=0), np.arange(len(large))]
 bands = [*found.shares.T[large], found.shares.T[~large].sum(axis=0)]

@@ -1,5 +1,5 @@
-"""An impact oscillator over its forcing frequency: periodic windows, period doublings
-and chaos, darker where states are more frequent."""
+"""Bifurcation diagram of an impact oscillator as a function of the forcing frequency:
+periodic windows, period doublings and chaos; darker regions contain more states."""
 
 import numpy as np
 

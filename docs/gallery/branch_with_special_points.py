@@ -1,5 +1,5 @@
-"""A branch of orbits with one impact per period: it is stable between a fold and a
-flip, and ends where the orbit grazes the wall."""
+"""A branch of orbits with one impact per period: the orbits are stable between a fold
+and a flip, and the branch ends where its orbit grazes the wall."""
 
 import continuation
 from jaxcam.models import ImpactOscillator

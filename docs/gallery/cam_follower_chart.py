@@ -1,6 +1,6 @@
-"""Special points of the cam-follower in the plane of speed and restitution: one impact
-per cycle is stable between fold and flip, complete chatter between detachment and
-interruption."""
+"""Bifurcations of the cam-follower in the plane of speed and restitution: the orbit
+with one impact per cycle is stable between its fold and its flip, and chatter is
+complete between detachment and interruption."""
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -18,7 +18,7 @@ def intercept(s):
     return s.restitution.intercept
 
 
-# speed (rpm), a state near the orbit, and where its branch is left
+# speed (rpm), a state near the orbit, and the kinds of point at which its branch ends
 orbits = [
     (145.0, [0.4245, 1.8281], ("fold", "flip")),
     (145.0, None, ("beginning of impacts", "interruption of chattering")),

@@ -1,5 +1,5 @@
-"""Folds and flips in the plane of two parameters: between the two curves the orbit with
-one impact per period is stable."""
+"""A fold curve and a flip curve in the plane of two parameters: between the two curves,
+the orbit with one impact per period is stable."""
 
 import continuation
 from jaxcam.models import ImpactOscillator

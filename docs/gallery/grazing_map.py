@@ -1,4 +1,4 @@
-"""The square-root map of a grazing impact: most steps are small and linear, but an
+"""The square-root map near grazing: most steps are small and linear, but an
 occasional impact moves the state far away."""
 
 import variational

@@ -1,5 +1,5 @@
-"""The map around interrupted chatter: infinitely many lobes, each a smaller copy of the
-previous one, scaled by two powers of the coefficient of restitution."""
+"""The map close to the interruption of chatter: infinitely many lobes, each a smaller
+copy of the previous one, scaled by two powers of the coefficient of restitution."""
 
 from jaxcam.plotting import beta_lobes
 

@@ -1,5 +1,5 @@
-"""Running averages of the two Lyapunov exponents of a chaotic impact oscillator: one is
-positive, and the bands are standard errors."""
+"""Running averages of the two Lyapunov exponents of a chaotic impact oscillator: one
+exponent is positive; the bands show the standard errors."""
 
 import variational
 from jaxcam.models import ImpactOscillator

@@ -26,11 +26,11 @@ from jaxcam.plotting import on_dark, style
 HERE = Path(__file__).parent
 PAGE = HERE.parent / "gallery.md"
 OUT = HERE
-# of the page, from top to bottom
+# of the figures on the page, from top to bottom
 ORDER = tuple((HERE / "order.txt").read_text("utf-8").split())
-# dots an inch
+# dots per inch
 DOTS = 130
-# colours of a picture: few enough for a small file
+# number of colours of a picture, small enough for a small file
 COLOURS = 64
 
 _TOP = """---
@@ -41,9 +41,9 @@ hide:
 
 # Gallery
 
-Each figure links to the short script that draws it. Run a script unchanged, or change
-the system in it. The command `python docs/gallery/make.py` draws all figures in a light
-version and, with [`jaxcam.plotting.on_dark`][], in a dark one.
+Each figure links to the short script that draws it. You can run a script unchanged, or
+change the system in it. The command `python docs/gallery/make.py` draws all figures in
+a light version and, with [`jaxcam.plotting.on_dark`][], in a dark version.
 
 <div class="grid cards" markdown>
 

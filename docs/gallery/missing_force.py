@@ -1,5 +1,5 @@
-"""The force that a model lacks, identified from a recording: a polynomial of the
-velocity is fitted together with the spring, in this case to a swing with air drag."""
+"""The force that a model lacks, identified from a recording: a polynomial in the
+velocity is fitted together with the spring, here to a pendulum swing with air drag."""
 
 import jax
 import jax.numpy as jnp
@@ -14,7 +14,7 @@ from jaxcam.recordings import record, segment
 
 
 class Swing(jaxcam.HybridSystem):
-    """A pendulum with a force of unknown shape, and one that is braked by the air."""
+    """A pendulum with a polynomial force, to be fitted, and with air drag."""
 
     stiffness: float = 140.0
     first: float = 0.0

@@ -1,5 +1,5 @@
-"""A cam program as in handbooks: a modified-sine rise, a dwell, and a return with
-constant acceleration, whose acceleration jumps."""
+"""A cam motion program of the kind found in handbooks: a modified-sine rise, a dwell,
+and a constant-acceleration return, in which the acceleration jumps."""
 
 import numpy as np
 

@@ -1,5 +1,5 @@
-"""The two Floquet multipliers along a branch: they enter the unit circle through +1 at
-a fold, follow a circle of radius r, and leave through –1 at a flip."""
+"""The two Floquet multipliers along a branch: one enters the unit circle through +1 at
+a fold, both move along a circle of radius r, and one leaves through –1 at a flip."""
 
 import matplotlib.pyplot as plt
 import numpy as np

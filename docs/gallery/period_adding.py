@@ -1,5 +1,5 @@
-"""Period adding beyond a grazing bifurcation: towards the grazing at zero, windows of
-period 3, 4, 5, ... follow each other, with chaos in between."""
+"""Period adding beyond a grazing bifurcation: towards the bifurcation at zero, windows
+of period 3, 4, 5, ... follow one another, with chaos in between."""
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -16,6 +16,6 @@ depth = np.repeat(values, 150)
 with style():
     figure, ax = plt.subplots()
     ax.plot(depth, np.ravel(settled), ".", ms=1.0, mew=0, alpha=0.35, color=FLIGHT)
-    ax.set(xlabel="depth of the graze (–)", ylabel="state once a period (–)")
+    ax.set(xlabel="depth beyond grazing (–)", ylabel="state once per period (–)")
     ax.axhline(0, color="0.4", lw=0.8, ls=":")
     ax.text(0.12, 0.004, "no impact below", ha="right", fontsize="small")

@@ -1,5 +1,6 @@
-"""Phase of each impact against that of the previous one in a chaotic motion: the points
-lie on a few thin curves, so one impact nearly determines the time of the next."""
+"""The phase of each impact, plotted against that of the previous impact, in a chaotic
+motion: the points lie on a few thin curves, so one impact nearly determines the time
+of the next."""
 
 import jaxcam
 from jaxcam.models import ImpactOscillator

@@ -24,7 +24,7 @@ circle = radius * np.stack([np.cos(angle), np.sin(angle)], axis=1)
 after = jax.vmap(lambda x: flow(system, x, 0.0, end).state)(start + circle)
 there = flow(system, start, 0.0, end).state
 
-# the same to first order: flight to the impact, saltation matrix, flight on
+# the same to first order: flight, saltation matrix, flight
 ball = ImpactOscillator(omega=2.0, restitution=0.7, wall=9.0, damping=0.0)
 fly = jax.jacfwd(lambda x, t0, t1: flow(ball, x, t0, t1).state)
 time = float(hit.time[0])
@@ -37,6 +37,7 @@ with style():
     ax.plot(*(1e3 * circle.T), color=FLIGHT, label="before")
     ax.plot(*(1e3 * ellipse.T), color=IMPACT, label="after: saltation matrix")
     ax.plot(*(1e3 * (after - there).T), ".", color=IMPACT, ms=8, label="simulated")
-    ax.set(xlabel="deviation of the position (10⁻³)", ylabel="of the velocity (10⁻³)")
+    ax.set_xlabel("deviation of the position (10⁻³)")
+    ax.set_ylabel("deviation of the velocity (10⁻³)")
     ax.set_aspect("equal")
     ax.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=3, columnspacing=1.0)

@@ -1,5 +1,5 @@
-"""A block on a moving belt: dry friction holds it until the spring force exceeds the
-friction, and motions from inside and outside converge to one stick-slip cycle."""
+"""A block on a moving belt: dry friction holds the block until the spring force exceeds
+the friction, and motions from inside and outside converge to one stick-slip cycle."""
 
 import matplotlib.pyplot as plt
 import numpy as np

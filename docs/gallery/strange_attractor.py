@@ -1,5 +1,5 @@
 """Thousands of states of a chaotic impact oscillator, one per period: a strange
-attractor with the fingers typical of grazing impacts."""
+attractor with the fingers that are typical of grazing impacts."""
 
 import matplotlib.pyplot as plt
 import numpy as np

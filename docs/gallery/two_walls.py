@@ -1,5 +1,4 @@
-"""A mass between two walls: the two named gaps over time, and the impacts on either
-side."""
+"""A mass between two walls: the two gaps against time, and the impacts on each wall."""
 
 from typing import ClassVar
 

@@ -1,5 +1,5 @@
-"""The contact force between a valve and its cam at three speeds: where it would have to
-be tensile, the spring is too weak and the valve floats."""
+"""The contact force between a valve and its cam at three speeds: where the force would
+have to be tensile, the spring is too weak and the valve floats."""
 
 import equinox as eqx
 import jax.numpy as jnp
