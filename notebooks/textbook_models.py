@@ -51,8 +51,8 @@ hinge = [
 def read_swings(folder: Path) -> list[Segments]:
     """Read the swings of the pendulum, each until the pendulum sticks.
 
-    Every tenth sample is kept: 10 ms is a seventieth of a swing, and at 1000 samples per
-    second the rounding errors of neighbouring samples are the same.
+    Every tenth sample is kept: 10 ms is a seventieth of a swing, and at 1000 samples
+    per second the rounding errors of neighbouring samples are the same.
     """
     swings = []
     for run in read_case(folder / "pendulum", channels=("angle_rad",)):
@@ -95,7 +95,7 @@ def read_stage(folder: Path) -> list[Recording]:
 
 
 class Head(WithoutStop):
-    """A mass with spring and damper, driven by a motor: position (m), velocity (m/s)."""
+    """A mass with spring, damper and motor; the state is position and velocity."""
 
     gain: float = 100.0
     stiffness: float = 650.0
