@@ -8,11 +8,12 @@
 
 # # A0. Two masses, two stops
 #
-# A system that ships with nothing: two masses in a chain of springs, the first one
-# shaken, each with a stop of its own. Systems of this kind were studied by Wagg (2004,
-# 2005), who found that a mass can stick to its stop while the other one goes on.
+# This notebook defines a system that is not among the ready-made ones: two masses in a
+# chain of springs. The first mass is driven by a force, and each mass has a stop. Wagg
+# (2004, 2005) studied such systems and found that one mass can stick to its stop while
+# the other continues to move.
 #
-# We write it down, simulate it, and look at impacts, sticking and the steady motion.
+# We define the system, simulate it, and look at impacts, sticking and the steady state.
 
 # +
 from typing import ClassVar
@@ -28,9 +29,10 @@ from jaxcam.plotting import phase_portrait, style, time_history
 
 # ## The system
 #
-# State: the two displacements and the two velocities, in units of the first mass and of
-# one spring. Mass 1 hangs between the frame and mass 2. The stops are at `stop_1` and
-# `stop_2`; a gap for each, and one row of `impact` for each.
+# The state consists of the two displacements and the two velocities. All quantities are
+# dimensionless: mass 1 and the stiffness of each spring are one. Mass 1 is connected to
+# the frame and to mass 2. The stops are at `stop_1` and `stop_2`; each has a gap and a
+# row of `impact`.
 
 
 class TwoMasses(jaxcam.HybridSystem):
@@ -70,7 +72,7 @@ class TwoMasses(jaxcam.HybridSystem):
         return 2 * jnp.pi / self.frequency
 
 
-# ## Its motion
+# ## Simulate it
 
 # +
 system = TwoMasses()
@@ -89,14 +91,14 @@ turn = trajectory.stroboscopic()
 print("change of the state over the last turn:", abs(turn[-1] - turn[-2]).max())
 # -
 
-# Neither mass was ever behind its stop, between the steps of the integration either:
+# Neither mass ever penetrates its stop, not even between the steps of the integration:
 
 times = jnp.linspace(0.0, trajectory.t1, 20_001)
 lowest = trajectory.gap(times).min(axis=0)
 print("smallest gaps:", lowest)
 assert (lowest > -1e-9).all()
 
-# ## Pictures
+# ## Figures
 
 history = time_history(
     trajectory,
@@ -110,5 +112,5 @@ for k, ax in enumerate(panels):
     last = (trajectory.t1 - 2 * system.period, trajectory.t1)
     phase_portrait(trajectory, ax, components=(k, 2 + k), between=last)
 
-# The states once a turn fall on each other: the motion has become periodic. In each
-# turn both masses chatter against their stops, stick, and are released.
+# The states sampled once per period coincide, so the motion has become periodic. In
+# each period both masses chatter against their stops, stick, and are released.

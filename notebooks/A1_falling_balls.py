@@ -8,11 +8,13 @@
 
 # # A1. Falling balls
 #
-# Balls were dropped from a bridge and filmed at 15 Hz, each of them twice (de Silva et
-# al. 2020, MIT licence). Textbooks say that they all fall alike. Do they?
+# Several balls were dropped from a bridge and filmed at 15 frames per second, each of
+# them twice (de Silva et al. 2020, MIT licence). According to the textbook, all balls
+# fall in the same way. Do they?
 #
-# The recordings are not part of the package. The folder is named by the environment
-# variable `JAXCAM_RECORDINGS`; without it this notebook says so and stops.
+# The recordings are not part of the package. Set the environment variable
+# `JAXCAM_RECORDINGS` to their folder; without it this notebook prints a message and
+# stops.
 
 # +
 import os
@@ -35,11 +37,11 @@ if not folder.is_dir():
     sys.exit()
 # -
 
-# ## A falling body, in ten lines
+# ## A falling body in ten lines
 
 
 class FallingBody(jaxcam.HybridSystem):
-    """Free fall above the water; state height (m) and velocity (m/s)."""
+    """Free fall above the water; the state is height (m) and velocity (m/s)."""
 
     gravity: float = 9.81
     restitution: float = 0.0
@@ -54,10 +56,10 @@ class FallingBody(jaxcam.HybridSystem):
         return jnp.stack([state[0], -self.restitution * state[1]])
 
 
-# ## What each drop leaves over
+# ## The residual of each drop
 #
-# Each drop is one flight. Its start is fitted, gravity is not; what is left over is
-# what the model lacks, and is measured in units of the noise.
+# Each drop is one flight. Its initial state is fitted, but gravity is not. The residual
+# shows what the model lacks; it is given in units of the noise.
 
 # +
 case = read_case(folder, channels=("height_m",), split="drop")
@@ -76,9 +78,10 @@ print(comparison.sentence())
 
 Console().print(comparison.table())
 
-# ## Picture
+# ## Figure
 
-# The heaviest ball above, the lightest below; grey is the noise.
+# The upper panels show the heaviest ball and the lower panels the lightest. Grey marks
+# the noise.
 
 # +
 with style():
@@ -87,7 +90,8 @@ for panels, name in zip(grid, ("bowling_ball_drop1", "whiffle_ball_1_drop1")):
     residual_by_mode(comparison, panels, record=name)
 # -
 
-# A start fitted to the whole drop hides part of the mismatch and leaves a bow: high at
-# both ends, low in between. That is a body that loses acceleration as it gets faster.
-# The bow is deepest for the lightest ball and hardly there for the heaviest: what is
-# missing is the drag of the air.
+# Because the initial state is fitted to the whole drop, part of the discrepancy is
+# hidden, and a curved residual remains: high at both ends and low in between. Such a
+# residual indicates that the acceleration decreases as the ball gets faster. The
+# curvature is largest for the lightest ball and barely visible for the heaviest. The
+# model lacks air drag.

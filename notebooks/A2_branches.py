@@ -6,12 +6,13 @@
 #       format_name: light
 # ---
 
-# # A2. A branch of impacting orbits
+# # A2. A branch of periodic orbits with impacts
 #
-# An oscillator that hits a wall once in every period of its forcing. We find the orbit,
-# ask how stable it is, and follow it while the wall moves: it is born at a fold, loses
-# its stability at a flip, and ends where it grazes. (Without the callback that stops
-# there, the path follower goes on with the orbit that has one impact more.)
+# A forced oscillator hits a wall once per forcing period. We find this periodic orbit,
+# compute its stability, and follow it as the wall moves. The orbit appears at a fold,
+# loses its stability at a flip, and ends at a grazing. (A callback ends the branch at
+# the grazing. Without it, continuation proceeds with the orbit that has one more
+# impact.)
 
 # +
 import matplotlib.pyplot as plt
@@ -31,14 +32,15 @@ system = ImpactOscillator(omega=2.8, restitution=0.8, wall=-0.5)
 orbit = continuation.periodic_orbit(system, guess=[-0.8, 1.0], periods=1)
 print(f"impact at {orbit.impacts.time[0]:.6f} s, multipliers {orbit.multipliers}")
 
-# Free flight keeps areas and the impact shrinks them by r squared, so the product of
-# the two multipliers is r squared, here 0.64.
+# Free flight preserves areas in the phase plane, and an impact reduces them by the
+# factor r squared. The product of the two multipliers is therefore r squared, here
+# 0.64.
 
 assert np.isclose(np.prod(orbit.multipliers).real, 0.8**2, rtol=1e-9)
 stability = variational.stability(system, orbit)
 print(f"test functions: fold {stability.fold:.4f}, flip {stability.flip:.4f}")
 
-# ## The branch while the wall moves
+# ## The branch as the wall moves
 
 branch = continuation.branch(
     system,
@@ -52,7 +54,7 @@ for point in branch.special:
     print(f"{point.kind:>8} at wall = {point.parameter:.12f} ({point.converged=})")
 print(branch)
 
-# The closed form of the fold of the orbit with one impact a period, for comparison.
+# For comparison, the fold of the orbit with one impact per period has a closed form:
 
 omega, r = 2.8, 0.8
 gamma, turn = 1 / (1 - omega**2), 2 * np.pi / omega
@@ -62,7 +64,7 @@ print(f"fold by the formula: {fold:.12f}")
 found = [point.parameter for point in branch.special if point.kind == "fold"]
 assert min(abs(np.array(found) - fold)) < 1e-9
 
-# Stable parts are drawn solid, unstable ones dashed.
+# Stable parts are drawn as solid lines, unstable parts as dashed lines.
 
 figure = branch_diagram(
     branch,

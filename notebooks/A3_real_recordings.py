@@ -8,24 +8,26 @@
 
 # # A3. What do textbook models lack? Five public recordings
 #
-# A pendulum, falling balls, a marble that bounces on paper, a positioning stage, and a
-# head that places components. Each has a textbook model of a few lines; `diagnose` is
-# asked what it lacks. (How far the completed models stay with another record, in free
-# runs, is notebook A4.) Nothing is set differently from one to the next: every model
-# states its parameters, its sensor and how noisy that is, and the library is the same.
-# The models that A4 needs as well are in `textbook_models.py`.
+# The recordings are of a pendulum, falling balls, a marble that bounces on paper, a
+# positioning stage, and a mounting head that places components. Each has a textbook
+# model of a few lines, and `diagnose` determines what this model lacks. (Notebook A4
+# tests how well the completed models predict another recording in free runs.) The
+# diagnosis is used in the same way for all recordings: every model specifies its
+# parameters, its sensor and the noise of the sensor, and the terms come from one
+# library. The models that A4 also needs are in `textbook_models.py`.
 #
-# The recordings are public. Only the pendulum is in the package, with every tenth
-# sample (`jaxcam.data.PENDULUM`):
+# The recordings are public. The package contains only those of the pendulum, reduced to
+# every tenth sample (`jaxcam.data.PENDULUM`):
 #
 # - `pendulum`: github.com/dynamicslab/MultiArm-Pendulum (MIT), arXiv:2205.06231;
 # - `ball_drop`: github.com/briandesilva/discovery-of-physics-from-data (MIT);
-# - `bouncing_marble`: tracks of a student project (XS06), without a licence;
+# - `bouncing_marble`: tracks from a student project (XS06), without a licence;
 # - `positioning_stage`: the EMPS benchmark, www.nonlinearbenchmark.org;
-# - `mounting_head`: Juloski, Heemels, Ferrari-Trecate 2004, without a licence.
+# - `mounting_head`: Juloski, Heemels and Ferrari-Trecate 2004, without a licence.
 #
-# The environment variable `JAXCAM_RECORDINGS` names the folder in which a folder `real`
-# holds these five; without it this notebook says so and stops.
+# Put these five folders into a folder `real`, and set the environment variable
+# `JAXCAM_RECORDINGS` to the folder that contains `real`. Without it this notebook
+# prints a message and stops.
 
 # +
 import dataclasses
@@ -57,7 +59,7 @@ from jaxcam.plotting import style
 from jaxcam.recordings import read_case, Recording, References, segment
 
 
-# ten minutes of work: not without being asked
+# this takes ten minutes, so it runs only if the recordings are there
 folder = Path(os.environ.get("JAXCAM_RECORDINGS", ".")) / "real"
 if not folder.is_dir():
     print(
@@ -71,10 +73,10 @@ moved: dict[str, tuple[float, float]] = {}
 
 
 def terms(*without: str, center: float = References.spring_center, **options):
-    """The library, without what the textbook model has or what cannot be there.
+    """Return the library without terms that the model includes or that cannot occur.
 
-    No two of these records were started by one clock, so that a vibration could not
-    have the same phase in both.
+    External vibration is omitted: the recordings do not share a time origin, so a
+    vibration would not have the same phase in two of them.
     """
     forms = References(spring_center=center)
     every = library(turned=False, references=forms, **options)
@@ -82,7 +84,10 @@ def terms(*without: str, center: float = References.spring_center, **options):
 
 
 def transferred(result: Diagnosis) -> tuple[float, float]:
-    """Rms of the last record, as the others predict it, without and with terms."""
+    """Return the rms residual of the last recording, predicted from the others.
+
+    The first value is without the added terms, the second with them.
+    """
     rms = []
     for trial in (result.before, result.after):
         problem = trial.problem
@@ -96,7 +101,7 @@ def transferred(result: Diagnosis) -> tuple[float, float]:
 
 
 def ask(case: str, system, runs, **options) -> None:
-    """Diagnose one set, and say what was found."""
+    """Diagnose one data set and print the result."""
     began, used = time.time(), time.process_time()
     result = diagnose(system, runs, case=case, **options)
     found[case] = result
@@ -128,15 +133,15 @@ def ask(case: str, system, runs, **options) -> None:
 
 # ## A pendulum
 #
-# Two swings, from 93 degrees and from 4, seen by an encoder. The model is a rigid
-# pendulum with a viscous hinge.
+# An encoder recorded two swings, which start at 93 and at 4 degrees. The model is a
+# rigid pendulum with viscous friction in the hinge.
 
 # +
 ask(
     "pendulum",
     pendulum.system,
     read_swings(folder),
-    # the model has them already
+    # the model already has these terms
     candidates=terms("viscous_damping", "sensor_offset", center=0.0),
     sensors=pendulum.sensors,
     parameters=hinge,
@@ -145,11 +150,12 @@ ask(
 
 # ## Falling balls
 #
-# Five balls, each dropped twice from a bridge and filmed at 15 Hz. Gravity is what it
-# is: the model has no parameter at all. A film has no data sheet, so the noise is the
-# scatter about a smooth curve (degree 5) through each drop, the same for all balls. The
-# hand is in the first samples: a record begins where the ball has fallen a tenth of its
-# way. In the air nothing rubs, and there is no spring and no hinge.
+# Five balls were each dropped twice from a bridge and filmed at 15 frames per second.
+# Gravity is known, so the model has no parameters. The noise of a film is not specified
+# anywhere; it is estimated from the scatter about a polynomial of degree 5 fitted to
+# each drop, and one value is used for all balls. The hand still holds the ball in the
+# first samples, so a recording begins after a tenth of the height of fall. Terms for
+# dry friction, springs and hinges are excluded, because a ball in the air has none.
 
 
 # +
@@ -169,14 +175,14 @@ class FallingBody(jaxcam.HybridSystem):
 
 
 def scatter(time, samples, degree: int) -> float:
-    """Standard deviation about a polynomial."""
+    """Return the standard deviation about a fitted polynomial."""
     smooth = np.polynomial.Polynomial.fit(time, samples, degree)
     freedom = len(time) - degree - 1
     return float(np.sqrt(np.sum((samples - smooth(time)) ** 2) / freedom))
 
 
 def falling(run: Recording) -> Recording:
-    """The record from where a tenth of the way down is behind it."""
+    """Return the recording without the first tenth of the height of fall."""
     height = run["height_m"]
     first = np.argmax(height < height[0] - 0.1 * np.ptp(height))
     clock = run.time[first:] - run.time[first]
@@ -206,17 +212,18 @@ for ball in sorted({run.name.rsplit("_drop", 1)[0] for run in drops}):
 
 # ## A marble on paper
 #
-# A glass marble falls on stacks of 1 to 100 sheets and is tracked at 200 frames a
-# second; a pixel is 0.799 mm, known to a few per cent from the fall, and a centre to a
-# quarter of a pixel. Tracks are followed from frame to frame; a drop in which the track
-# is lost on the way is left out. The hand is in the first arc, which again begins where
-# a tenth of the way is behind it. The last arc, in which bounces are too low to be told
-# apart, and the rest after it are left out.
+# A glass marble falls onto stacks of 1 to 100 sheets of paper and is tracked at 200
+# frames per second. A pixel is 0.799 mm, known to a few per cent from the free fall,
+# and the centre of the marble is known to a quarter of a pixel. The track is followed
+# from frame to frame; drops in which it is lost are omitted. The hand disturbs the
+# first arc, which therefore begins after a tenth of the height of fall. The last arc,
+# in which the bounces are too low to be distinguished, and the rest after it are
+# omitted.
 
 
 # +
 class Bouncing(jaxcam.HybridSystem):
-    """A ball above a floor: height (m) and velocity (m/s); constant restitution."""
+    """A ball above a floor, with constant restitution: height (m), velocity (m/s)."""
 
     coefficient: float = 0.5
     gravity: float = 9.81
@@ -235,7 +242,7 @@ pixel = 0.799e-3
 
 
 def tracked(file: Path):
-    """Times (s) and heights (pixels, downwards) of the object seen first."""
+    """Return times (s) and heights (pixels, downwards) of the first object found."""
     frames: list[float] = []
     points: list[np.ndarray] = []
     for line in file.read_text().splitlines()[2:]:
@@ -258,7 +265,7 @@ def tracked(file: Path):
 
 
 def drop(file: Path) -> Recording:
-    """Heights above the stack (m), from the hand to the rest."""
+    """Return the heights above the stack (m), from the release to the rest."""
     clock, down = tracked(file)
     low = down > np.mean([down.min(), down.max()])
     still = [k for k in np.flatnonzero(low) if np.ptp(down[k : k + 20]) < 4]
@@ -270,7 +277,7 @@ def drop(file: Path) -> Recording:
 
 
 def arcs(run: Recording):
-    """The arcs of one drop, cut at its impacts."""
+    """Divide one drop into arcs at its impacts."""
     cut = segment(run, "height_m", np.zeros(len(run)), noise=pixel / 4)
     flights = tuple(part for part in cut.flights if part.stop.kind == "impact")
     return dataclasses.replace(cut, flights=flights, contacts=())
@@ -288,7 +295,7 @@ for sheets in ("001", "008", "016", "100"):
         parameters=[
             Parameter("restitution", lambda m: m.system.coefficient, scale=0.01),
             Parameter("gravity", lambda m: m.system.gravity, tolerance=0.5),
-            # the marble rolls a little on the stack, towards the camera or away
+            # the marble moves slightly towards or away from the camera
             Parameter(
                 "level",
                 lambda m: m.sensors["height_m"].offset,
@@ -301,10 +308,10 @@ for sheets in ("001", "008", "016", "100"):
 
 # ## A positioning stage
 #
-# A motor moves a load by a screw: force in, position out (the EMPS benchmark). The
-# model is a mass with viscous friction; the measured force is an input of it, which
-# holds each sample until the next. Four samples are made one: of the position the
-# first, of the force the mean.
+# A motor moves a load through a screw; the force is the input and the position is the
+# output (the EMPS benchmark). The model is a mass with viscous friction. The measured
+# force is held constant from each sample to the next. Each group of four samples is
+# reduced to one: the first position and the mean force.
 
 # +
 ask(
@@ -327,9 +334,10 @@ ask(
 
 # ## A mounting head
 #
-# A head that places components on a board, pushed by a motor: voltage in, position out.
-# The model is a mass on a spring with a damper; somewhere it touches the board. There
-# is one record: its halves are two.
+# A head that places components on a board is driven by a motor; the voltage is the
+# input and the position is the output. The model is a mass with a spring and a damper.
+# The head touches the board at an unknown position. There is only one recording; its
+# two halves are used as two recordings.
 
 # +
 _, *halves = read_head(folder)
@@ -346,10 +354,10 @@ ask(
 )
 # -
 
-# ## All of them
+# ## All recordings
 #
-# Residuals on data that no parameter has seen, in units of the noise: with the textbook
-# model (open) and with what it lacks (filled).
+# The figure shows the residuals on held-out data in units of the noise, with the
+# textbook model (open circles) and with the diagnosed model (filled circles).
 
 # +
 with style():

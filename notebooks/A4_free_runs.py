@@ -6,17 +6,17 @@
 #       format_name: light
 # ---
 
-# # A4. How far does a model stay with another record? Free runs
+# # A4. How well does a model predict another recording? Free runs
 #
-# A model is fitted to the whole of one record, from its first samples to its last, and
-# then runs freely through another one, from 20 samples and the measured input. Each
-# line of the result adds a term that the diagnosis of notebook A3 names. The textbook
-# models are in `textbook_models.py`.
+# A model is fitted to one whole recording and then simulates another one in a free run,
+# which uses only the first 20 samples and the measured input. Each line of the result
+# adds a term that the diagnosis in notebook A3 named. The textbook models are in
+# `textbook_models.py`.
 #
-# The recordings are public; A3 says where they are from. The environment variable
-# `JAXCAM_RECORDINGS` names the folder in which a folder `real` holds the sets
-# `pendulum`, `positioning_stage` and `mounting_head`; without it this notebook says so
-# and stops.
+# The recordings are public; A3 lists their sources. Put the folders `pendulum`,
+# `positioning_stage` and `mounting_head` into a folder `real`, and set the environment
+# variable `JAXCAM_RECORDINGS` to the folder that contains `real`. Without it this
+# notebook prints a message and stops.
 
 # +
 import os
@@ -43,7 +43,7 @@ from jaxcam.fitting import fit_free_run, free_run, Model
 from jaxcam.plotting import style
 
 
-# minutes of work: not without being asked
+# this takes several minutes, so it runs only if the recordings are there
 folder = Path(os.environ.get("JAXCAM_RECORDINGS", ".")) / "real"
 if not folder.is_dir():
     print(
@@ -52,12 +52,12 @@ if not folder.is_dir():
     )
     sys.exit()
 
-# by set and model: rms error of free runs, of the record fitted to and of another one
+# rms errors of free runs by data set and model: of the recording fitted, of the other
 strayed: dict[str, dict[str, tuple[float, float]]] = {}
 
 
 def stray(case, label, model, parameters, names, seen, unseen, scales, start=None):
-    """Fit named terms to free runs of one record, and run another one freely."""
+    """Fit a model with the named terms to one recording and simulate another one."""
     model, parameters = with_terms(model, parameters, names, scales)
     offered = {one.name for one in parameters}
     start = {name: x for name, x in (start or {}).items() if name in offered}
@@ -75,8 +75,9 @@ def stray(case, label, model, parameters, names, seen, unseen, scales, start=Non
 
 # ## A pendulum
 #
-# Two swings, from 93 degrees and from 4; it hangs at pi. Each predicts the other. Dry
-# friction and drag take the place of the viscous hinge.
+# The two swings start at 93 and at 4 degrees; the encoder reads pi when the pendulum
+# hangs at rest. Each swing is predicted from the other. Dry friction and drag replace
+# the viscous friction in the hinge.
 
 # +
 swings = read_swings(folder)
@@ -95,10 +96,12 @@ for way, (seen, unseen) in by_size.items():
 
 # ## A positioning stage
 #
-# A motor moves a load by a screw: force in, position out (the EMPS benchmark).
+# A motor moves a load through a screw; the force is the input and the position is the
+# output (the EMPS benchmark).
 #
-# The protocol of the benchmark: parameters from the first record alone, then a free run
-# of the second one, with pulses, from 20 samples. Each line adds a named term.
+# The protocol of the benchmark is followed: the parameters are fitted to the first
+# recording alone, and the second recording, which contains pulses, is then simulated in
+# a free run from 20 samples. Each line adds one term.
 
 # +
 estimation, pulses = read_stage(folder)
@@ -118,9 +121,10 @@ for label, more in steps.items():
     values |= fitted.values
 # -
 
-# Free runs of the second record stray because its friction is larger from the start,
-# before the first pulse: at the same place and speed, the motor pushes harder in both
-# directions. No model of the first record can know this.
+# Free runs of the second recording deviate from it because its friction is larger from
+# the start, even before the first pulse: at the same position and speed, the motor
+# pushes harder in both directions. No model fitted to the first recording can predict
+# this.
 
 # +
 rate = np.gradient(estimation["position_m"], estimation.time)
@@ -134,11 +138,12 @@ print(f"before the first pulse: {np.mean(extra[early]):+.2f} N")
 
 # ## A mounting head
 #
-# A head on a spring, pushed by a motor: voltage in, position out. Somewhere it touches
-# the board. There is one record: its halves are two.
+# A head on a spring is driven by a motor; the voltage is the input and the position is
+# the output. The head touches a board at an unknown position. There is only one
+# recording, so its two halves are used.
 #
-# The first half predicts the second, and the second the first, in free runs from 20
-# samples.
+# The second half is predicted from the first, and the first from the second, in free
+# runs from 20 samples.
 
 # +
 run, first, second = read_head(folder)
@@ -157,9 +162,10 @@ for way, (seen, unseen) in {
         stray(f"head, {way}", label, head, spring, names, seen, unseen, [run], touches)
 # -
 
-# ## All of them
+# ## All recordings
 #
-# Errors in the record that was not fitted, relative to those of the textbook model.
+# The figure shows the errors in the recording that was not fitted, relative to the
+# errors of the textbook model.
 
 # +
 with style():

@@ -8,10 +8,10 @@
 
 # # B0. Simulate and differentiate
 #
-# Derivatives of a motion go through everything that happens to it: an impact, the
-# infinitely many impacts of a chatter, the rest that follows, and the release. This
-# notebook takes them one after the other, each beside a formula or a difference
-# quotient, and ends with a batch.
+# Derivatives of a trajectory pass through all of its events: an impact, the infinitely
+# many impacts of complete chatter, the sticking that follows, and the release. This
+# notebook covers these in turn, compares each derivative with a formula or a finite
+# difference, and ends with a batch.
 
 # +
 import equinox as eqx
@@ -28,19 +28,20 @@ from jaxcam.plotting import style, time_history
 
 # -
 
-# ## Through one impact, and through a chatter
+# ## Through one impact, and through chatter
 #
-# A ball falls from one metre. It hits, bounces ever faster, and comes to rest at a
-# finite time. A larger gravity makes the first impact earlier and faster; both move
-# the height at 0.7 s. `jax.jacfwd` of `simulate` counts both, because the time of an
-# impact depends on what it depends on. With $t_1 = \sqrt{2h/g}$ and $r$ the
-# restitution,
+# A ball falls from a height of one metre, bounces ever more rapidly, and comes to rest
+# after a finite time. A larger gravity makes the first impact earlier and faster, and
+# both effects change the height at 0.7 s. `jax.jacfwd` of `simulate` includes both,
+# because it also differentiates the time of the impact. With $t_1 = \sqrt{2h/g}$ and
+# the coefficient of restitution $r$,
 #
 # $$y(t) = r g t_1 (t - t_1) - \tfrac12 g (t - t_1)^2, \qquad
 #   t_\infty = t_1 \frac{1 + r}{1 - r}.$$
 #
-# Of the infinitely many impacts some sixty are simulated, and the rest is summed in one
-# formula. The derivative of the moment of rest goes through all of them.
+# Of the infinitely many impacts about sixty are simulated, and the others are summed in
+# closed form. The derivative of the time at which the ball comes to rest passes through
+# all of them.
 
 # +
 start, when = jnp.array([1.0, 0.0]), 0.7
@@ -70,10 +71,10 @@ print("d rest / d (gravity, restitution):  ", forward[1], "formula:", exact[1])
 assert jnp.allclose(forward, exact, rtol=1e-9)
 # -
 
-# One direction alone, `jax.jvp`, costs less; the batch at the end uses it. `jax.grad`
-# and `jax.hessian` work as well, by forward derivatives. Where there is one number at
-# the end and hundreds of parameters, take reverse mode: say so to `simulate`, and keep
-# `max_steps` small, for it always runs that many.
+# `jax.jvp` differentiates in a single direction and costs less; the batch at the end
+# uses it. `jax.grad` and `jax.hessian` work as well, in forward mode. For one scalar
+# result and hundreds of parameters use reverse mode: pass `derivatives="reverse"` to
+# `simulate`, and keep `max_steps` small, because that many steps are always performed.
 
 # +
 
@@ -90,10 +91,10 @@ def backward(parameters):
 assert jnp.allclose(backward(ball), exact[0], rtol=1e-9)
 # -
 
-# ## Through a rest and a release
+# ## Through sticking and a release
 #
-# At 130 rpm the cam-follower is thrown off its cam once a turn, chatters back onto it,
-# and sticks. While it sticks it goes where the cam goes and forgets where it came from.
+# At 130 rpm the follower detaches from its cam once per revolution, chatters, and
+# sticks again. While it sticks, it follows the cam and loses memory of its past.
 
 # +
 rig = CamFollower(speed=jnp.asarray(rpm_to_rad_s(130.0)))
@@ -104,12 +105,13 @@ for begin, end in zip(contacts.start, contacts.end):
 figure = time_history(turn, components=(0,))
 # -
 
-# So the state in the second flight does not depend on the state a turn before, in the
-# first flight, but it does depend on the spring. Both are derivatives of the same run;
-# a central difference of two runs confirms the second.
+# The state in the second flight therefore does not depend on the state one revolution
+# earlier, in the first flight, but it does depend on the stiffness of the spring. One
+# simulation gives the two derivatives; a central difference of two simulations confirms
+# the derivative with respect to the stiffness.
 
 # +
-# a third of the way through the first flight, and one turn later
+# after a third of the first flight, and one revolution later
 first = float(contacts.end[0] + (contacts.start[1] - contacts.end[0]) / 3)
 before = turn.at(jnp.array([first]))[0]
 
@@ -135,9 +137,10 @@ assert jnp.allclose(by_stiffness, difference, rtol=1e-4)
 
 # ## A batch
 #
-# `jax.vmap` runs many motions as one program; lanes may hit and stick as they like. We
-# drop the ball from 300 heights onto a floor that vibrates, and ask for the velocity
-# one second later and its derivative by the height.
+# `jax.vmap` runs many simulations as one program; each batch element may have its own
+# sequence of impacts and contacts. We drop the ball from 300 heights onto a vibrating
+# floor, and compute the velocity after one second and its derivative with respect to
+# the height.
 
 # +
 shaken = BouncingBall(amplitude=jnp.asarray(0.02), frequency=jnp.asarray(20.0))
@@ -172,14 +175,14 @@ with style():
     below.set_xlabel("height of the drop (m)")
 # -
 
-# Within a colour the derivative is that of the curve above it. From one colour to the
-# next the velocity jumps: one impact more has happened before the second is over. No
-# derivative describes a jump, and a quotient of differences taken across it means
-# nothing. (Lower drops end in tens of impacts, and their derivatives are in the
-# hundreds.)
+# Each colour marks a number of impacts. Within a colour, the lower curve is the slope
+# of the upper one. From one colour to the next the velocity jumps, because one more
+# impact occurs within the second. No derivative describes such a jump, and a finite
+# difference across it is meaningless. (Balls dropped from lower heights have tens of
+# impacts, and their derivatives are in the hundreds.)
 
 # +
-# away from the jumps: central differences of the curve against the derivative
+# away from the jumps: central differences of the curve, compared with the derivative
 same = (impacts[2:] == impacts[1:-1]) & (impacts[1:-1] == impacts[:-2])
 quotient = (velocity[2:] - velocity[:-2]) / np.asarray(drops[2:] - drops[:-2])
 error = np.abs(quotient - slope[1:-1])[same]

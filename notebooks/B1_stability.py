@@ -8,9 +8,9 @@
 
 # # B1. Stability: saltation, multipliers, and curves of bifurcations
 #
-# A2 follows one branch and finds a fold, a flip and a grazing on it. Here we look
-# inside: what an impact does to a small deviation, what a turn does to it, and where
-# in the plane of two parameters the orbit exists and is stable. (B2 does the same for
+# Notebook A2 follows one branch and finds a fold, a flip and a grazing on it. Here we
+# examine how a small perturbation changes at an impact and over one period, and where
+# in the plane of two parameters the orbit exists and is stable. (Notebook B2 studies
 # the cam-follower.)
 
 # +
@@ -26,12 +26,14 @@ from jaxcam.plotting import branch_diagram, multipliers, special_curves, style
 
 # -
 
-# ## What an impact does to a deviation
+# ## How an impact changes a perturbation
 #
-# A neighbour hits a little earlier or later than the orbit, and in between the two obey
-# different fields. To first order a deviation is multiplied by the saltation matrix, in
-# which the impact speed stands below. One turn from just after the impact is a free
-# flight and then the impact, so two matrices make the monodromy matrix.
+# A neighbouring trajectory has its impact slightly earlier or later than the orbit, and
+# between the two impacts one trajectory is still in flight and the other has already
+# rebounded. To first order, a perturbation is multiplied by the saltation matrix, which
+# contains the impact speed in the denominator. One period, starting just after the
+# impact, consists of a free flight and an impact, so the monodromy matrix is the
+# product of two matrices.
 
 # +
 system = ImpactOscillator(omega=2.8, restitution=0.8, wall=-0.5)
@@ -40,7 +42,8 @@ hit = float(orbit.impacts.time[0])
 saltation = variational.saltation_matrix(system, hit, orbit.impacts.before[0])
 print("saltation matrix\n", saltation)
 
-# flight is x'' + x = cos(omega t): a rotation of the plane (x, x') by the time flown
+# in flight x'' + x = cos(omega t): perturbations rotate in the (x, x') plane, and the
+# angle is the time of flight
 turn = float(orbit.period)
 rotation = np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
 by_hand = np.asarray(saltation) @ rotation
@@ -51,8 +54,8 @@ np.testing.assert_allclose(
 )
 # -
 
-# The package has two ways to the same matrix: it multiplies such factors, or it
-# differentiates the event loop. They share no formula.
+# The package computes this matrix in two ways: as a product of such factors, or by
+# differentiating the event loop. The two methods have no formula in common.
 
 product = variational.monodromy(system, orbit, method="product")
 differentiated = variational.monodromy(system, orbit, method="flow")
@@ -61,8 +64,8 @@ assert jnp.allclose(product, differentiated, atol=1e-8)
 
 # ## Along a branch
 #
-# While the wall moves, the two multipliers of the orbit leave +1 at the fold and reach
-# -1 at the flip. Their product is the restitution squared, all the way.
+# At the fold one of the two multipliers of the orbit is +1, and at the flip one is -1.
+# Along the whole branch their product is the square of the coefficient of restitution.
 
 # +
 
@@ -96,9 +99,9 @@ drawn = multipliers(along, right, reach=2.0)
 
 # ## Curves in two parameters
 #
-# At a fold and at a flip one more equation holds, so each of them is a curve in a plane
-# of two parameters: here the wall and the frequency. Between the two curves the orbit
-# is stable. Dots are the closed forms.
+# A fold or a flip satisfies one additional equation, so it forms a curve in the plane
+# of two parameters, here the position of the wall and the frequency. The orbit is
+# stable between the two curves. The dots are closed-form values.
 
 
 # +
@@ -114,7 +117,7 @@ curves = {
 
 
 def closed_form(w, r=0.8):
-    """Walls of the fold and the flip of the orbit with one impact a period."""
+    """Return the wall positions of the fold and the flip of the orbit."""
     gamma, half = 1 / (1 - w * w), np.pi / w
     k, m = (1 + r) / np.tan(half) / 2, (1 - r) / (2 * w)
     c, s = np.cos(2 * half), np.sin(2 * half)

@@ -6,13 +6,13 @@
 #       format_name: light
 # ---
 
-# # B2. One impact a turn: the cam-follower
+# # B2. One impact per revolution: the cam-follower
 #
-# Between 136 and 152 rpm the rig of the thesis (chapter 5) has a motion with one impact
-# in every turn of the cam. It is born at a fold, beside the motion that sticks, and
-# doubles its period at a flip. The derivative of either speed by any other parameter
-# comes from the implicit function theorem, without following anything again: what a
-# stiffer spring would do.
+# Between 136 and 152 rpm the rig of the thesis (chapter 5) has an orbit with one impact
+# per revolution of the cam. The orbit appears at a fold, where it coexists with the
+# orbit that sticks, and its period doubles at a flip. The implicit function theorem
+# gives the derivative of either speed with respect to any other parameter without
+# another continuation, and so shows, for example, the effect of a stiffer spring.
 
 # +
 import equinox as eqx
@@ -52,7 +52,7 @@ figure = branch_diagram(
 )
 # -
 
-# ## What moves its ends
+# ## Sensitivity of the fold and the flip
 
 # +
 for point in family.special:
@@ -65,9 +65,9 @@ for point in family.special:
     )
 # -
 
-# Flight is conservative, so the two multipliers of every orbit of the branch have the
-# product r squared. The thesis' Table 5.2 prints ten such pairs, and they gave the law
-# of restitution that it does not print.
+# Flight is conservative, so the product of the two multipliers of every orbit on the
+# branch is r squared. Table 5.2 of the thesis lists ten such pairs. The restitution
+# law, which the thesis does not give, was recovered from them.
 
 # +
 for point in family.regular[:: len(family.regular) // 5]:

@@ -6,13 +6,14 @@
 #       format_name: light
 # ---
 
-# # B3. The birth of chaos
+# # B3. The onset of chaos
 #
-# The thesis' main finding, in its chapter 6. Below 152.67 rpm the follower chatters to
-# rest once a turn, rides on the cam and is released, and so every turn is like the last
-# one. Above, the moment of release comes before the chatter has ended: there is no rest
-# any more, and the motion is chaotic at once, without a period doubling. The theory
-# fits on a page and is in `docs/chatter.md`; here it is drawn.
+# This notebook illustrates the main result of the thesis (chapter 6). Below 152.67 rpm
+# the follower completes its chatter once per revolution, sticks to the cam and is
+# released, so every revolution is the same. Above this speed the release comes before
+# the chatter is complete. There is no more sticking, and the motion becomes chaotic at
+# once, without a period doubling. `docs/chatter.md` explains the theory; this notebook
+# draws it.
 
 # +
 import equinox as eqx
@@ -46,18 +47,18 @@ def at(value):
 rig = preset("calibrated")
 # -
 
-# ## Where chattering is interrupted
+# ## The interruption of chatter
 #
-# The impacts accumulate exactly at the release. As an equation for the speed this has a
-# root that ordinary methods miss (the time of rest falls to zero like a power), so a
-# smooth measure of it is solved.
+# At the interruption, the impacts accumulate exactly at the release. The sticking time
+# falls to zero as a power of the distance in speed, so ordinary root finders fail on
+# it. Instead we find the zero of a smooth margin.
 
 bracket = (rpm_to_rad_s(150.0), rpm_to_rad_s(154.0))
 critical = continuation.chatter_interruption(rig, speed, bracket)
 print(f"complete chattering ends at {rad_s_to_rpm(critical):.5f} rpm")
 
-# The gap shortly before the release, a little below and a little above that speed. The
-# gaps shrink so fast that only their cube roots can be seen.
+# The figure shows the gap near the release at speeds slightly below and slightly above
+# the interruption. The gaps shrink so fast that their cube root is drawn.
 
 # +
 frame = variational.chatter_frame(at(critical))
@@ -81,11 +82,13 @@ with style():
 
 # ## From impact to impact: the lambda-map
 #
-# Near release the acceleration that presses the follower onto the cam is $c\tau$, with
-# $\tau$ the time from release. In $\lambda = u/(c\tau^2)$, with $u$ the rebound speed,
-# one hop is a map of one variable that knows nothing but the restitution $r$. Its fixed
-# point is unstable: from below it the impacts complete in time, from above they are too
-# fast, come to $\lambda > 3/8$, and do not come back.
+# Near the release, the acceleration that presses the follower onto the cam is
+# proportional to the time $\tau$ from release: it is $c\tau$. Let $u$ be the rebound
+# speed and $\lambda = u/(c\tau^2)$. Each flight is then a map of $\lambda$ that depends
+# only on the coefficient of restitution $r$. The fixed point of this map is unstable.
+# If
+# $\lambda$ is below it, the chatter completes in time. If $\lambda$ is above it, the
+# impacts are too fast: $\lambda$ grows beyond $3/8$, and the follower does not return.
 
 # +
 r = float(frame.restitution)
@@ -99,8 +102,9 @@ with style():
     )
 lambda_cobweb(r, left)
 
-# All remaining impacts in one function: what an interrupted sequence leaves over. One
-# impact is moved by a little, and the motion itself followed to the end of the turn.
+# The beta-map combines all remaining impacts of an interrupted sequence in one
+# function. For comparison, one impact is perturbed and the motion is simulated to the
+# end of the cycle.
 
 composed = variational.composed_map(at(critical), speed, 36)
 corners = [3 / 8]
@@ -120,9 +124,10 @@ few = slice(0, 4)
 drawn = beta_lobes(r, right, measured=(deviation[few].ravel(), simulated[few].ravel()))
 # -
 
-# Each lobe is narrower by $q$ and lower by $p^2$ than the next one outside it. So their
-# heights follow a power law with $\kappa = 2\ln p/\ln q$, which the motion obeys over
-# two decades.
+# Each lobe is narrower by the factor $q$ and lower by the factor $p^2$ than the next
+# lobe outside it. The heights of the lobes therefore follow a power law with the
+# exponent
+# $\kappa = 2\ln p/\ln q$, which the simulated motion obeys over two decades.
 
 depth = np.max(np.abs(simulated), axis=1)
 exponent = np.polyfit(np.log(deviation[2:, 0]), np.log(depth[2:]), 1)[0]
@@ -130,14 +135,15 @@ print(f"kappa = {law.kappa:.4f} in theory, {exponent:.4f} in the motion")
 assert abs(exponent / float(law.kappa) - 1) < 0.02
 drawn = lobe_scaling(deviation[:, 0], depth, float(law.kappa))
 
-# ## A turn as a map, and what it iterates to
+# ## One revolution as a map
 #
-# All motions leave the lobes along one line, so once a turn the state is a number, and
-# a turn is a map of that number (section 5.4 of the thesis). It is measured at the
-# interruption, by following 900 states through a turn: flat where the chattering
-# completes, lobes where it does not. The speed moves the map sideways; the fixed point
-# then leaves the flat part and falls among lobes that are steeper than one. That is how
-# chaos is born.
+# After the last impact all states lie on one line, so the state once per revolution is
+# described by a single number, and one revolution is a map of this number (section 5.4
+# of the thesis). The map is computed at the interruption by simulating one revolution
+# from each of 900 states. It is flat where the chatter completes, and has lobes where
+# it does not. A change of the speed shifts the map sideways. The fixed point then
+# leaves the flat part and lies among lobes with slopes steeper than one, which makes
+# the motion chaotic.
 
 # +
 interrupted = at(critical)
@@ -162,7 +168,7 @@ def moved_map(deviation, shift):
     return np.interp(deviation + shift, points, images)
 
 
-# the motion itself, and the map, moved as the theory says
+# the simulated motion, and the map shifted according to the theory
 rpm = np.linspace(-0.02, 0.15, 171)
 beyond = np.asarray(rpm_to_rad_s(rpm))
 motion = stroboscope(

@@ -6,11 +6,12 @@
 #       format_name: light
 # ---
 
-# # B4. Two motions at once, and their basins
+# # B4. Two coexisting attractors and their basins
 #
-# Pushed from one state, an oscillator settles on one impact a period; from another,
-# close by, on six impacts in six periods. Which states lead where? And how well is that
-# known, when the boundary is folded as finely as this one?
+# From one initial state, an oscillator settles to an orbit with one impact per period;
+# from another initial state nearby, to an orbit with six impacts in six periods. Which
+# initial states lead to which orbit? And how well can this be predicted if the basin
+# boundary is as finely folded as here?
 
 # +
 import matplotlib.pyplot as plt
@@ -27,9 +28,10 @@ from jaxcam.plotting import basin_picture, phase_portrait, style
 
 # ## The basins
 #
-# Every state of a grid is followed until it repeats. Those that do not repeat in the
-# first 400 turns go on for twice as many, and so on: the way to P(6,6) takes some
-# thousand turns, and who stops earlier takes it for chaos.
+# The motion from every state of a grid is simulated until it repeats. Motions that do
+# not repeat within 400 periods are extended to twice that length, and so on. The
+# transient to P(6,6) lasts about a thousand periods and would otherwise be mistaken for
+# chaos.
 
 # +
 system = ImpactOscillator(omega=2.6, restitution=0.8, wall=0.0)
@@ -41,13 +43,12 @@ assert found.names == ["P(1,1)", "P(6,6)"]
 figure = basin_picture(found)
 # -
 
-# A number has no error bar unless it says how it was drawn; here it is that of as many
-# states drawn at random.
+# The standard errors are those of an equal number of initial states drawn at random.
 
-# ## The attractors themselves
+# ## The attractors
 #
-# Each is followed for one of its periods. Its multipliers say why one is reached so
-# slowly: they are close to the unit circle.
+# Each attractor is simulated for one of its periods. The multipliers of P(6,6) are
+# close to the unit circle, which explains why this orbit is reached so slowly.
 
 # +
 with style():
@@ -64,11 +65,12 @@ for ax, name, points in zip(panels, found.names, found.orbits, strict=True):
     ax.text(0.5, 0.5, name, transform=ax.transAxes, ha="center")
 # -
 
-# ## How well the end is known
+# ## How well the attractor can be predicted
 #
-# The uncertainty exponent, from the picture alone: where the error of the initial state
-# is halved, the part of states whose end is uncertain shrinks only by two to the power
-# of this exponent. The box dimension of the boundary is that of the plane less it.
+# The uncertainty exponent is computed from the basins alone. If the error of the
+# initial state is halved, the fraction of states with an uncertain attractor falls only
+# by the factor two to the power of this exponent. The box dimension of the basin
+# boundary is two (the dimension of the plane) minus the exponent.
 
 # +
 uncertain = sweeps.uncertainty_exponent(found.attractor)

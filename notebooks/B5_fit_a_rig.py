@@ -8,11 +8,12 @@
 
 # # B5. Fit a rig
 #
-# Three recordings ship with the package: four seconds each of a cam-follower rig at
-# three speeds, through noisy encoders. We fit its spring, its cam and its restitution,
-# ask what the recordings cannot tell, and what the error of a number is worth when the
-# model lacks something. (The recordings were simulated, by code that shares nothing
-# with the fit, so the truth is known. It has friction in its hinge.)
+# The package contains three recordings, each of four seconds, of a cam-follower rig
+# with noisy encoders at three speeds. We fit the parameters of the spring, the cam and
+# the restitution, determine what the recordings cannot reveal, and see how reliable
+# standard errors are if the model lacks an effect. (The recordings were simulated by
+# code that is independent of the fit, so the true values are known. The simulated rig
+# has friction in its hinge.)
 
 # +
 import jax.numpy as jnp
@@ -31,8 +32,9 @@ from jaxcam.recordings import read_case, read_rig, segment_case
 
 # ## The model
 #
-# The textbook rig, and a term that is zero at first: viscous friction of the hinge. As
-# a parameter that is held or freed it costs no second compilation.
+# The model is the textbook rig plus viscous friction in the hinge, which is zero at
+# first. Because the friction is a parameter that can be fixed or free, the model is
+# compiled only once.
 
 
 class Hinged(HybridSystem):
@@ -54,9 +56,9 @@ class Hinged(HybridSystem):
 
 # ## From files to a problem
 #
-# The rig file states nominal values, tolerances and sensors. A recording is cut where
-# it hits and where it rests; each flight is predicted from its own start, so chaos does
-# no harm. The cam turns as its encoder says.
+# The rig file contains nominal values, tolerances and sensors. Each recording is
+# divided at impacts and contacts. Each flight is predicted from its own initial state,
+# so chaotic motion is not a problem. The angle of the cam is taken from its encoder.
 
 # +
 nominal = read_rig(DEMO_RIG / "rig.toml")
@@ -75,8 +77,9 @@ print(f"{problem.samples} samples of {len(problem.records)} records")
 
 # ## The textbook rig
 #
-# Before anything is fitted: what can be seen at all? The spring acts through few
-# combinations of its four numbers, so the others stay where the drawing has them.
+# Before fitting we ask which parameters the data can determine. The spring acts only
+# through a few combinations of its four parameters, so the other combinations keep
+# their nominal values.
 
 # +
 names = [parameter.name for parameter in textbook]
@@ -86,7 +89,7 @@ for sentence in fitting.identify(problem, names, at=before).sentences():
 
 
 def left(fit):
-    """What is left of each record, in units of the noise."""
+    """Return the residual of each recording in units of the noise."""
     return [f"{part.rms / part.noise:.2f}" for part in fitting.residuals(fit)]
 
 
@@ -95,10 +98,11 @@ again = fitting.bootstrap(found, 12)
 print("times the noise left before and after:", left(before), left(found))
 # -
 
-# More than the noise in every record, and four times it in one: something is missing.
-# The standard errors know only the noise, so they are too small. The bootstrap, which
-# weights flights at random, says so for some; but no error bar tells of parameters that
-# have taken over the part of what is missing, as the spring has here.
+# The residual exceeds the noise in every recording, and in one it is four times the
+# noise, so the model lacks an effect. The standard errors take only the noise into
+# account and are too small. The bootstrap, which gives the flights random weights,
+# shows this for some parameters. But neither error reveals that a parameter has
+# absorbed part of the missing effect, as the parameters of the spring have here.
 
 # ## With friction in the hinge
 
@@ -132,13 +136,13 @@ off = (whole["restitution"].value - real.restitution) / whole["restitution"].std
 assert abs(off) < 4
 # -
 
-# Who does not know which term to add asks `jaxcam diagnose`: it tries a library of
-# them, and says `none` or `unknown` where none will do.
+# If you do not know which term to add, use `jaxcam diagnose`. It tests a library of
+# terms, and reports `none` if no term is needed and `unknown` if none is sufficient.
 
-# ## A profile
+# ## A profile likelihood
 #
-# One parameter is held at several values, and all others are fitted again. Where the
-# cost is a parabola, the standard error says it all.
+# One parameter is fixed at several values, and all others are fitted again. If the cost
+# is a parabola, the standard error describes the uncertainty completely.
 
 # +
 curve = fitting.profile(whole, "damping", points=7)

@@ -1,7 +1,7 @@
-"""Three rigs of public recordings that notebooks A3 and A4 share.
+"""Textbook models of three rigs with public recordings, for notebooks A3 and A4.
 
-Each has its textbook model, the sensor and the parameters of the model, and a function
-that reads its recordings from a folder (notebook A3 says where they are from).
+For each rig this module defines the model, its sensor and its parameters, and a
+function that reads the recordings from a folder (notebook A3 lists their sources).
 """
 
 from pathlib import Path
@@ -15,7 +15,7 @@ from jaxcam.recordings import read_case, Recording, segment, Segments
 
 
 class WithoutStop(HybridSystem):
-    """A system that meets no stop."""
+    """A system without stops."""
 
     def gap(self, t, state):
         return state[0] + 100.0
@@ -25,7 +25,7 @@ class WithoutStop(HybridSystem):
 
 
 class Pendulum(WithoutStop):
-    """A rigid pendulum with a viscous hinge: angle from hanging (rad), and its rate."""
+    """A rigid pendulum with a viscous hinge: angle from the vertical, and its rate."""
 
     stiffness: float = 60.0
     damping: float = 0.05
@@ -36,7 +36,7 @@ class Pendulum(WithoutStop):
         return jnp.stack([rate, -pull])
 
 
-# the encoder has 40000 counts a turn; the pendulum hangs at pi
+# the encoder has 40000 counts per revolution and reads pi when the pendulum hangs
 count = 2 * np.pi / 40000
 pendulum = Model(
     Pendulum(), {"angle_rad": Sensor(0, noise=count / np.sqrt(12), offset=np.pi)}
@@ -49,10 +49,10 @@ hinge = [
 
 
 def read_swings(folder: Path) -> list[Segments]:
-    """Read the swings of the pendulum, each until it sticks.
+    """Read the swings of the pendulum, each until the pendulum sticks.
 
-    Ten milliseconds are a seventieth of a swing, and at a thousand samples a second the
-    rounding of neighbours is the same, so every tenth sample is kept.
+    Every tenth sample is kept: 10 ms is a seventieth of a swing, and at 1000 samples
+    per second the rounding errors of neighbouring samples are the same.
     """
     swings = []
     for run in read_case(folder / "pendulum", channels=("angle_rad",)):
@@ -64,7 +64,7 @@ def read_swings(folder: Path) -> list[Segments]:
 
 
 class Stage(WithoutStop):
-    """A mass with viscous friction: position (m) and velocity (m/s)."""
+    """A mass with viscous friction; the state is position (m) and velocity (m/s)."""
 
     inverse_mass: float = 0.0105
     viscous: float = 2.0
@@ -76,7 +76,7 @@ class Stage(WithoutStop):
         return jnp.stack([state[1], pushed - self.viscous * state[1]])
 
 
-# the noise is the smallest step of the encoder (m)
+# the noise is set to the resolution of the encoder (m)
 stage = Model(
     Stage(),
     {"position_m": Sensor(0, noise=5e-8)},
@@ -90,12 +90,12 @@ cart = [
 
 
 def read_stage(folder: Path) -> list[Recording]:
-    """Read the two records of the positioning stage."""
+    """Read the two recordings of the positioning stage."""
     return list(read_case(folder / "positioning_stage", channels=("position_m",)))
 
 
 class Head(WithoutStop):
-    """Mass, spring and damper, pushed by a motor: position (m) and velocity (m/s)."""
+    """A mass with spring, damper and motor; the state is position and velocity."""
 
     gain: float = 100.0
     stiffness: float = 650.0
@@ -123,7 +123,7 @@ spring = [
 
 
 def read_head(folder: Path) -> tuple[Recording, Recording, Recording]:
-    """Read the record of the mounting head: the whole, and its two halves."""
+    """Read the recording of the mounting head: the whole and its two halves."""
     (run,) = read_case(folder / "mounting_head", channels=("position_m",))
     first, second = (
         slower(run, "position_m", "voltage_V", 8, half)
@@ -133,9 +133,9 @@ def read_head(folder: Path) -> tuple[Recording, Recording, Recording]:
 
 
 def slower(run: Recording, channel: str, by: str, count: int, part=slice(None)):
-    """Keep every so many samples of a channel, and the mean of its input in between.
+    """Keep every `count`-th sample of a channel and the mean of its input in between.
 
-    With the mean no impulse is lost.
+    The mean preserves the impulse of the input.
     """
     size = len(run) // count * count
     clock = run.time[:size:count][part]

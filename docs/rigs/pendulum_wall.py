@@ -1,4 +1,4 @@
-"""A pendulum whose pivot is shaken sideways, beside a wall."""
+"""A pendulum next to a wall, with a pivot that is shaken sideways."""
 
 import jax.numpy as jnp
 
@@ -6,7 +6,7 @@ from jaxcam.hybrid import HybridSystem
 
 
 class PendulumWall(HybridSystem):
-    """The pivot moves by `base_amplitude_over_length * sin(phi)` lengths."""
+    """The pivot moves by `base_amplitude_over_length * sin(phi)` times the length."""
 
     state_names = ("angle", "velocity")
     state_units = ("rad", "rad/s")
@@ -16,8 +16,8 @@ class PendulumWall(HybridSystem):
     base_amplitude_over_length: float = 0.1
     wall: float = -0.15  # rad
     restitution: float = 0.7
-    speed: float = 10.0  # of the drive, rad/s
-    phase: float = 0.0  # of the drive at time zero, rad
+    speed: float = 10.0  # speed of the drive, rad/s
+    phase: float = 0.0  # phase of the drive at time zero, rad
 
     @property
     def period(self):

@@ -1,4 +1,4 @@
-"""A linear stage that a measured voltage drives; it never hits anything."""
+"""A linear stage driven by a measured voltage, without impacts."""
 
 import jax.numpy as jnp
 
@@ -6,12 +6,12 @@ from jaxcam.hybrid import HybridSystem
 
 
 class Stage(HybridSystem):
-    """A mass on a rail with a motor."""
+    """A mass on a rail, driven by a motor."""
 
     state_names = ("position", "velocity")
     state_units = ("m", "m/s")
 
-    gain: float = 2.0  # m/s^2 a volt
+    gain: float = 2.0  # m/s^2 per volt
     damping: float = 6.0  # 1/s
     voltage: float = 0.0  # V, measured
 
@@ -19,7 +19,7 @@ class Stage(HybridSystem):
         return jnp.stack([state[1], self.gain * self.voltage - self.damping * state[1]])
 
     def gap(self, t, state):
-        # there is nothing to hit
+        # no stop: the gap is always open
         return jnp.ones_like(t)
 
     def impact(self, t, state):

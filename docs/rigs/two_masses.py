@@ -1,4 +1,4 @@
-"""Two sprung masses in a row: the first hits a wall, the second, shaken, hits it."""
+"""Two sprung masses: the first hits a wall, and the shaken second hits the first."""
 
 import jax.numpy as jnp
 
@@ -6,7 +6,7 @@ from jaxcam.hybrid import HybridSystem
 
 
 class TwoMasses(HybridSystem):
-    """The wall is at `x1 = 0`, and the masses touch where `x2 = x1`."""
+    """The wall is at `x1 = 0`, and the masses touch if `x2 = x1`."""
 
     state_names = ("x1", "v1", "x2", "v2")
     state_units = ("m", "m/s", "m", "m/s")
@@ -21,8 +21,8 @@ class TwoMasses(HybridSystem):
     mass_ratio: float = 0.7  # m2 / m1
     restitution_wall: float = 0.65
     restitution_masses: float = 0.7
-    speed: float = 50.0  # of the drive, rad/s
-    phase: float = 0.0  # of the drive at time zero, rad
+    speed: float = 50.0  # speed of the drive, rad/s
+    phase: float = 0.0  # phase of the drive at time zero, rad
 
     @property
     def period(self):
@@ -42,7 +42,7 @@ class TwoMasses(HybridSystem):
     def impact(self, t, state):
         x1, v1, x2, v2 = state
         on_wall = jnp.stack([x1, -self.restitution_wall * v1, x2, v2])
-        # momentum is kept, and the masses part at a share of their approach
+        # conserved momentum; separation speed = restitution times approach speed
         common = (v1 + self.mass_ratio * v2) / (1 + self.mass_ratio)
         parting = self.restitution_masses * (v1 - v2)
         w1 = common - self.mass_ratio * parting / (1 + self.mass_ratio)

@@ -6,7 +6,7 @@ from jaxcam.hybrid import HybridSystem
 
 
 class TwoStops(HybridSystem):
-    """Position is measured from the base, at `base_amplitude * sin(phi)`."""
+    """The position is relative to the base, which is at `base_amplitude * sin(phi)`."""
 
     state_names = ("position", "velocity")
     state_units = ("m", "m/s")
@@ -18,8 +18,8 @@ class TwoStops(HybridSystem):
     right: float = 0.08  # m
     restitution_left: float = 0.75
     restitution_right: float = 0.6
-    speed: float = 10.0  # of the drive, rad/s
-    phase: float = 0.0  # of the drive at time zero, rad
+    speed: float = 10.0  # speed of the drive, rad/s
+    phase: float = 0.0  # phase of the drive at time zero, rad
 
     @property
     def period(self):
