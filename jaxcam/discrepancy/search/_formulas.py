@@ -1,6 +1,6 @@
 """Replace free functions by parametric forms, fitted to the recordings.
 
-The curve gives the starting values of a form; the evidence of a fit to whole
+The free function gives the starting values of a form; the evidence of a fit to whole
 trajectories decides whether the form is kept.
 """
 
@@ -18,7 +18,7 @@ from ._roughness import beside, Roughness
 from ._slots import emptied, Free, free_term
 
 
-# Points at which a form is compared with the sines that represent it
+# Number of points at which a form is compared with the sines that represent it
 _GRID = 400
 
 
@@ -53,7 +53,7 @@ def formulated(
 
 
 def _sound(trial: Missing, one: Free) -> bool:
-    """Return whether a fit with a form has ended with its positions within the data."""
+    """Return whether a fit with a form converged with its positions within the data."""
     (form,) = (f for f in trial.functions if f.slot == one.slot)
     assert isinstance(form, Free) and form.primitive is not None
     numbers = [trial.fit[name].value for name in form.coefficients]
@@ -61,7 +61,9 @@ def _sound(trial: Missing, one: Free) -> bool:
 
 
 def _enough(fits: FreeFits, found: Missing, trial: Missing) -> bool:
-    """Return whether a form leaves only noise, with better evidence than the curve."""
+    """Return whether a form leaves only noise, with more evidence than the free
+    function.
+    """
     samples = found.problem.samples
     surplus = fits.policy.cost_errors * math.sqrt(2 * samples)
     return trial.score < found.score and trial.fit.cost < samples + surplus
@@ -88,8 +90,8 @@ def _promising(
     """Return the forms most similar to a function where the data determine it, with
     their parameters.
 
-    By the quadratic likelihood about the fit: a form with size s and sines b has the
-    cost of `s b` there.
+    This uses the quadratic likelihood about the fit, in which a form with size s and
+    sines b has the cost of the coefficients `s b`.
     """
     heat, labels = heat_of(found.fit), one.coefficients
     subset = Subset(found.problem, found.functions, found.names)
