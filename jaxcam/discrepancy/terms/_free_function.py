@@ -3,7 +3,7 @@
 A function is a sum of sines whose coefficients have the variances of a Gaussian process
 with a Matern kernel (Solin and Sarkka, Statistics and Computing 2020, eq. 55-59), or of
 harmonics of the drive's phase with the same spectrum. It is therefore linear in the
-fitted coefficients, and its smoothness is one number.
+fitted coefficients, and a single number describes its smoothness.
 """
 
 from typing import Any, ClassVar
@@ -25,7 +25,7 @@ from ._where import Where
 # smoothed over a hundredth of the range
 _KNOTS = 256
 _ARGUMENTS = (Variable.POSITION, Variable.VELOCITY, Variable.PHASE, Variable.TIME)
-"""Arguments, in the order of the weights that select one of them."""
+"""Arguments, in the order of the weights that select them."""
 _FACTORS = (Factor.ONE, Factor.VELOCITY, Factor.DIRECTION, Factor.DEFLECTION)
 
 
@@ -107,7 +107,8 @@ class FreeFunction(Term):
         coefficients,
         primitive: Primitive | None = None,
     ):
-        """Return a member of a family, from the coefficients of its sines and its jump.
+        """Return a member of a family with given coefficients of its sines and its
+        jump.
 
         With a `primitive`, the first of them are its parameters.
         """
@@ -140,7 +141,7 @@ class FreeFunction(Term):
         )
 
     def place(self, argument) -> Place:
-        """Return an argument in the scales that a form uses."""
+        """Return an argument in the scales used by a form."""
         width = self.high - self.low
         return Place(argument, (argument - self.low) / width, argument / width)
 
