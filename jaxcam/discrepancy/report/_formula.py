@@ -56,7 +56,7 @@ _WORDS = {
 }
 _THINGS = {
     "force": "a force",
-    "restitution": "a restitution",
+    "restitution": "a coefficient of restitution",
     "surface": "a surface",
     "sensor": "a sensor error",
 }

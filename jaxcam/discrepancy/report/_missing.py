@@ -34,7 +34,7 @@ _KINDS = {
 }
 _VERBS = {
     "force": "a force",
-    "restitution": "a restitution",
+    "restitution": "a coefficient of restitution",
     "surface": "a surface",
     "sensor": "a sensor error",
 }

@@ -101,8 +101,8 @@ def _as_declared(
     number = isinstance(default, numbers) and not isinstance(default, bool)
     if number or kind in (float, int, jax.Array, "float", "int"):
         raise RigError(
-            f"{file}: `{name}` in [parameters] is not a number; write it without quotes, "
-            f"in SI units."
+            f"{file}: `{name}` in [parameters] is not a number; write it without "
+            f"quotes, in SI units."
         )
     return value
 
