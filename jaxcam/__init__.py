@@ -1,6 +1,6 @@
 """Simulate and analyse mechanical systems with impacts.
 
-Define a system (vector field, gap, impact law), simulate it, and differentiate the
+Define a system (vector field, gap and impact law), simulate it, and differentiate the
 result. Importing this package turns on 64-bit floats in JAX.
 """
 

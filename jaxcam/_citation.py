@@ -1,4 +1,4 @@
-"""Return BibTeX entries of the methods behind a result."""
+"""Return BibTeX entries for the package and for the literature on each topic."""
 
 import re
 from importlib.metadata import version
@@ -33,18 +33,20 @@ _TOPICS: dict[str, tuple[str, ...]] = {
     "time-stepping": ("moreau1988", "cottle1992", "camlibel2002"),
     "uncertainty exponent": ("mcdonald1985",),
 }
-"""Topics that can be cited, and their keys in `references.bib`."""
+"""Topics that can be cited, and the keys of their entries in `references.bib`."""
 
 
 def citation(*names: str) -> str:
-    """Return the BibTeX entries for some topics.
+    """Return the BibTeX entries for the given topics.
 
-    `print(jaxcam.citation())` gives the entry of this package and, in lines that BibTeX
-    ignores, the available topics; `jaxcam.citation("chatter", "saltation")` gives
-    their entries, each of them once.
+    Choose the topics that apply to your work. `print(jaxcam.citation())` prints the
+    entry of this package and a list of all topics, in lines that BibTeX ignores.
+    `jaxcam.citation("chatter", "saltation")` returns the entries for both topics,
+    without duplicates.
 
     Args:
-        *names: Topics, or keys of single entries ("nordmark1991"); case-insensitive.
+        *names: Topics, or keys of single entries such as "nordmark1991";
+            case-insensitive.
 
     Returns:
         Text to append to a `.bib` file.
@@ -74,7 +76,9 @@ def citation(*names: str) -> str:
 
 
 def _entries() -> dict[str, str]:
-    """Return entries by key; each ends with a brace at the start of a line."""
+    """Return the entries by key; each entry ends with a brace at the start of a
+    line.
+    """
     text = _REFERENCES.read_text(encoding="utf-8")
     found = re.finditer(r"^@\w+\{([^,\s]+),\n.*?^\}\n", text, re.DOTALL | re.MULTILINE)
     return {entry[1]: entry[0] for entry in found}

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 
-# rows shown of a longer table: the first and the last
+# number of rows shown of a longer table: the first and the last ones
 _MOST = 20
 _CELL = 'style="text-align: {}"'
 # units that accept a prefix; others (rpm, -) keep their numbers
@@ -15,7 +15,9 @@ _TAKES_PREFIX = ("rad", "m", "s", "N", "V")
 
 
 class ShortTable(NamedTuple):
-    """A sentence and a table below it, with the first and last rows of a long table."""
+    """A sentence with a table below it; of a long table, only the first and last
+    rows.
+    """
 
     sentence: str
     headings: tuple[str, ...]

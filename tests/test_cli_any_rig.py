@@ -132,10 +132,10 @@ def test_the_example_is_written_once(tmp_path, monkeypatch):
     code = (tmp_path / "my-two_stops.py").read_text()
     assert "class MyTwoStops(HybridSystem)" in code
     assert "my-two_stops.py:MyTwoStops" in (tmp_path / "my-two_stops.toml").read_text()
-    assert "exists already" in refusal("new-rig", "my-two_stops")
+    assert "already exists" in refusal("new-rig", "my-two_stops")
     assert (tmp_path / "my-two_stops.py").read_text() == code
     (tmp_path / "my-two_stops.py").unlink()
-    assert "my-two_stops.toml exists already" in refusal("new-rig", "my-two_stops")
+    assert "my-two_stops.toml already exists" in refusal("new-rig", "my-two_stops")
     assert not (tmp_path / "my-two_stops.py").exists()
     # no class may be called that
     run("new-rig", "none")
@@ -197,10 +197,10 @@ def test_a_driven_system_is_simulated_by_turns(rig):
         ("simulate --system cart.py --state 0,1 --t1 1", "as in cart.py:Cart"),
         ("simulate --system card.py:Cart", "no such file"),
         ("simulate --rig card.toml", "no such file"),
-        ("simulate --rig cart.toml --speed 3", "--speed belongs to cam-follower"),
+        ("simulate --rig cart.toml --speed 3", "--speed applies only to cam-follower"),
         ("simulate --rig cart.toml --state 0,1", "has no forcing period"),
         ("simulate --rig cart.toml --system a.json", "leave out --rig"),
-        ("simulate cart.py:Cart", "a system of your own as --system"),
+        ("simulate cart.py:Cart", "a system of your own with --system"),
         ("simulate --rig cart.toml --set stifness=1", "the parameters are stiffness"),
         ("basins --rig cart.toml --turns 30", "give its corners"),
         (

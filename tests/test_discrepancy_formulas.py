@@ -115,7 +115,9 @@ def test_what_falls_from_the_beginning_is_said_to_fall():
     power = next(one for one in family.primitives if one.name == "power")
     text, words = formula_of(family, power, np.array([-0.1, 2.0]), "restitution")
     assert text == f"exp(-0.1*(time/{HIGH:.4g})**2)"
-    assert words.startswith("a restitution that falls as the time to the power 2")
+    assert words.startswith(
+        "a coefficient of restitution that falls as the time to the power 2"
+    )
 
 
 def test_an_elastic_stop_is_said_to_be_one():

@@ -62,8 +62,8 @@ def test_records_are_ranked_by_the_band_of_a_function():
     factors = [each.factor for each in proposed]
     assert factors == sorted(factors) and factors[-1] < 1
     best = proposed[0]
-    assert list(best.now) == ["force by position"]
-    assert best.now["force by position"] == pytest.approx(
+    assert list(best.now) == ["force as a function of position"]
+    assert best.now["force as a function of position"] == pytest.approx(
         np.sqrt(np.mean(_band(found.after, one) ** 2)), rel=0.05
     )
 

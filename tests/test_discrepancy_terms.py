@@ -138,7 +138,7 @@ def test_a_term_is_where_it_acts_unless_it_says_otherwise():
 
 
 def test_a_term_that_misstates_where_it_acts_is_refused():
-    with pytest.raises(TypeError, match=r"Wrong states acts = \('flight',\)"):
+    with pytest.raises(TypeError, match=r"Wrong declares acts = \('flight',\)"):
 
         class Wrong(Term):
             acts = ("flight",)

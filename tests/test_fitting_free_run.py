@@ -142,7 +142,7 @@ def test_what_cannot_be_run_is_refused():
     run = recorded(carted(force), force)
     with pytest.raises(ValueError, match="meets a constraint"):
         free_run(model(wall=0.01), run)
-    with pytest.raises(RecordingError, match="between 2 and the 3000"):
+    with pytest.raises(RecordingError, match="between 2 and 3000"):
         free_run(model(), run, samples=3000)
     turned = Model(
         Cart(), {"position_m": Sensor(0, noise=1.0)}, Turning(_force, _force)

@@ -277,8 +277,8 @@ def test_restitution_from_every_impact():
 @pytest.mark.parametrize(
     ("direction", "words"),
     [
-        ([0.6, 0.8], "only their ratio acts"),
-        ([0.6, -0.8], "only their product acts"),
+        ([0.6, 0.8], "only their ratio matters"),
+        ([0.6, -0.8], "only their product matters"),
         ([0.8, 0.6], "raising K and J together: this"),
     ],
 )
@@ -295,7 +295,7 @@ def test_a_pair_that_is_seen_only_together(direction, words):
         together=np.array([30.0, 40.0]),
     )
     sentences = report.sentences()
-    assert sentences[0].startswith("The data see 1 of 2")
+    assert sentences[0].startswith("The data determine 1 of 2")
     assert words in sentences[1]
 
 

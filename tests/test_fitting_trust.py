@@ -169,7 +169,7 @@ class Broken(Swing):
 
 
 def test_a_model_that_gives_no_numbers_is_a_sentence():
-    with pytest.raises(ValueError, match="no finite number in swing"):
+    with pytest.raises(ValueError, match="not finite in swing"):
         problem_of(swinging(65), Broken())
 
 

@@ -75,6 +75,6 @@ def test_a_pipe_that_never_ends(tmp_path):
 def test_numbers_that_no_sensor_measures(tmp_path):
     file = tmp_path / "run.csv"
     file.write_text("time_s,x_m\n0,1\n1e300,2\n2e300,3\n")
-    assert "no sensor measures" in refusal(file)
+    assert "no sensor can measure" in refusal(file)
     file.write_text("time_s,x_m\n0,1\n1e-300,2\n2e-300,3\n")
-    assert "unit of the time" in refusal(file)
+    assert "unit of time" in refusal(file)

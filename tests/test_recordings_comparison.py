@@ -91,7 +91,7 @@ def test_what_is_missing_shows_in_its_own_mode(tmp_path):
     assert found.row("impact speed").ratio < 1.3
     wrong_law = true_rig(RealRig(restitution=0.5))
     assert compare_case(wrong_law, case).row("impact speed").ratio > 2
-    assert "In flight the follower angle departs from the model" in found.sentence()
+    assert "In flight, the follower angle differs from the model" in found.sentence()
 
 
 def test_the_demonstration_runs():

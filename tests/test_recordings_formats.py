@@ -193,7 +193,7 @@ def test_imagej(tmp_path):
 def test_tracks_of_a_video(tmp_path):
     (run,) = read_recordings(written(tmp_path, MTRACK, "a.tsv"), columns=HEIGHT)
     np.testing.assert_allclose(run["height_m"], [-8e-3, -9.6e-3, -1.28e-2])
-    assert "from line 7 on there is another table" in run.meta["notes"][0]
+    assert "begins in line 7" in run.meta["notes"][0]
     spaced = MTRACK.replace("\t", " ")
     with pytest.raises(RecordingError, match="with spaces as separators, empty cells"):
         read_recordings(written(tmp_path, spaced, "b.tsv"), columns=HEIGHT)
@@ -261,7 +261,7 @@ def test_a_workbook(tmp_path):
     rows[3] = [0.01, "lost"]
     with pytest.raises(RecordingError, match="`lost` instead of a number .* row 2"):
         read_recordings(workbook(tmp_path, a=rows))
-    with pytest.raises(RecordingError, match="not a workbook"):
+    with pytest.raises(RecordingError, match="not an Excel workbook"):
         read_recordings(written(tmp_path, b"PK\3\4 broken", "b.xlsx"))
 
 
@@ -302,7 +302,7 @@ HOSTILE = {
     "clock.csv": (GOOD.replace("0.02", "12:30:01"), "`12:30:01`"),
     "percent.csv": (GOOD.replace("-1.500", "15%"), "`15%`"),
     "unit.csv": (GOOD.replace("-1.500", "1.5 rad"), "`1.5 rad`"),
-    "huge.csv": (GOOD.replace("-1.500", "1e30"), "no sensor measures"),
+    "huge.csv": (GOOD.replace("-1.500", "1e30"), "no sensor can measure"),
     "overflow.csv": (GOOD.replace("-1.500", "1e999"), "instead of a number"),
     "more.csv": (GOOD.replace("-1.500", "1,5"), "row 3 has 3 values"),
     "less.csv": (GOOD.replace("0.02,-1.500", "0.02"), "row 3 has 1 values"),
@@ -313,7 +313,7 @@ HOSTILE = {
     "plain.csv.gz": (GOOD, "not compressed"),
     "renamed.csv": (gzip.compress(GOOD.encode()), "not a text file"),
     "picture.csv": (b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR", "not a text file"),
-    "old.xls": (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", "an Excel before 2007"),
+    "old.xls": (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", "a pre-2007 Excel"),
     "book.csv": (b"PK\3\4\x14\0\x06\0\xff\xff", "not a text file"),
     "text.mat": (GOOD, "not a MATLAB file"),
     "new.mat": (b"\x89HDF\r\n\x1a\n", "version 7.3"),
@@ -347,7 +347,7 @@ HOSTILE = {
     "still.csv": ("time_s,angle_rad\n0,1\n0,2\n1,3\n", "does not increase"),
     "nanoseconds.csv": (
         "time_s,angle_rad\n0,1\n1e-10,2\n2e-10,3\n",
-        "unit of the time",
+        "unit of time",
     ),
     "gap.csv": (GOOD.replace("0.05", "0.50"), "a gap in time"),
     "dead.csv": ("time_s,angle_rad\n0,1\n1,1\n2,1\n", "1 throughout"),

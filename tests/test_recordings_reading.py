@@ -194,7 +194,7 @@ def test_other_units_than_the_name_says(tmp_path):
     milliseconds = {**table, "time_s": table["time_s"] * 1e3}
     assert "milliseconds" in refusal(written(tmp_path, text(milliseconds)))
     file = written(tmp_path, text(table), "run1_170.0rpm.csv")
-    assert "150.0 rpm where the name of the file says 170.0 rpm" in refusal(file)
+    assert "150.0 rpm, but the file name says 170.0 rpm" in refusal(file)
 
 
 def test_dead_channel(tmp_path):
@@ -220,7 +220,7 @@ def test_cases(tmp_path):
     assert [run.name[:4] for run in case] == ["run1", "run2", "run3"]
     assert case["run2"] is case[1]
     assert all(len(run) == 8000 for run in case)
-    with pytest.raises(RecordingError, match="the beginning of 3 names"):
+    with pytest.raises(RecordingError, match="3 names begin with"):
         case["run"]
     with pytest.raises(RecordingError, match="no such folder"):
         read_case(tmp_path / "none")

@@ -60,7 +60,7 @@ def test_replace(rig):
         ("value = 0.045", "value = '0.045'", "must be a number"),
         ("value = 0.045", "vale = 0.045", "`cam_radius` in [geometry] has no `value`"),
         ("tolerance = 0.001, unit", "unit", None),
-        ("tolerance = 0.001", "tolerance = -0.001", "below zero"),
+        ("tolerance = 0.001", "tolerance = -0.001", "negative tolerance"),
         ('unit = "N/m"', 'unit = "N/mm"', 'is given in "N/mm"'),
         ("[0.249, 0.0]", "0.249", "needs two numbers"),
         ('"clockwise"', '"left"', '"clockwise" or "counterclockwise"'),

@@ -65,7 +65,9 @@ def test_columns_rate_and_constants_reach_the_recordings(tmp_path):
 
 def test_constants_of_a_record_that_is_not_there(tmp_path):
     folder = case_of(tmp_path, "drop1")
-    with pytest.raises(RecordingError, match="drop2.* fits none .*`drop1`") as caught:
+    with pytest.raises(
+        RecordingError, match="drop2.* matches none .*`drop1`"
+    ) as caught:
         setup_of(tmp_path).read_case(folder)
     hostile_files.said(caught.value)
 

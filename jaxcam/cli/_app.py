@@ -1,4 +1,4 @@
-"""The commands of `jaxcam`, and the options that come before them."""
+"""The commands of `jaxcam` and its global options."""
 
 import os
 import sys
@@ -23,7 +23,7 @@ app = typer.Typer(
     no_args_is_help=True,
     rich_markup_mode="rich",
     context_settings={"help_option_names": ["-h", "--help"]},
-    # a bug shows an ordinary traceback, which is easier to send on
+    # for a bug, an ordinary traceback is easier to report
     pretty_exceptions_enable=False,
 )
 app.command()(one_sentence(simulate))
@@ -67,12 +67,12 @@ def _options(
 
 
 def main() -> None:
-    """Run the command that the arguments of the process name."""
+    """Run the command given by the process arguments."""
     try:
         app()
     except SystemExit as end:
         if end.code == INTERRUPTED:
-            # what XLA is still computing would crash the interpreter as it shuts down
+            # pending XLA computations would crash the interpreter as it shuts down
             sys.stdout.flush()
             sys.stderr.flush()
             os._exit(INTERRUPTED)

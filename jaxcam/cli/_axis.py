@@ -8,14 +8,14 @@ from ._choices import CAM
 
 
 class Axis(NamedTuple):
-    """A parameter in the unit of the command line.
+    """A parameter in the unit used on the command line.
 
-    The command line gives speeds in rpm, which become rad/s; other parameters are SI.
+    Speeds are given in rpm and converted to rad/s; other parameters are in SI units.
     """
 
     parameter: str
     unit: float
-    """Size of one of the command line's units, in SI units."""
+    """One command-line unit, in SI units."""
 
     @staticmethod
     def of(parameter: str, system: str) -> "Axis":

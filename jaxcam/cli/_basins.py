@@ -1,4 +1,4 @@
-"""`jaxcam basins`: which initial states end on which attractor."""
+"""`jaxcam basins`: which initial states lead to which attractor."""
 
 from pathlib import Path
 from typing import Annotated

@@ -27,7 +27,7 @@ class Cells:
         str | None, typer.Option(metavar="A,B", help="Upper corner of the grid.")
     ] = None
     shape: Annotated[
-        str, typer.Option(metavar="K,L", help="Cells along each component.")
+        str, typer.Option(metavar="K,L", help="Number of cells along each component.")
     ] = "128,128"
     turns: Annotated[
         int, typer.Option(metavar="N", help="Forcing periods per run.")
@@ -75,7 +75,7 @@ class Cells:
 
     @property
     def counts(self) -> tuple[int, ...]:
-        """Cells along each component."""
+        """Number of cells along each component."""
         cells = numbers("--shape", self.shape, "128,128")
         if any(cell != int(cell) for cell in cells):
             raise ValueError(f"--shape is {self.shape!r}; give whole numbers.")

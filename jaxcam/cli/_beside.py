@@ -1,4 +1,4 @@
-"""Run work in a separate process, parallel to that of the command."""
+"""Run work in a separate process, in parallel with the command."""
 
 import multiprocessing
 from collections.abc import Callable, Iterator
@@ -18,7 +18,7 @@ def beside(
     """Start `work(folder)` in another process; return a function that awaits the
     result.
 
-    Without a folder nothing is done and the result is `None`.
+    Without a folder, nothing is done and the result is `None`.
     """
     if folder is None:
         yield lambda: None

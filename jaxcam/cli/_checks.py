@@ -1,4 +1,4 @@
-"""Check option values that several commands share."""
+"""Checks of option values shared by several commands."""
 
 import math
 from pathlib import Path
@@ -42,8 +42,8 @@ def check_size(options: str, *counts: int) -> None:
     """Reject a sweep that would not fit into memory."""
     if math.prod(counts) > _MOST:
         raise ValueError(
-            f"{options} are {' times '.join(f'{float(c):.6g}' for c in counts)} "
-            f"numbers, more than {_MOST:.0e}; give fewer."
+            f"{options} request {' times '.join(f'{float(c):.6g}' for c in counts)} "
+            f"values, more than {_MOST:.0e}; reduce them."
         )
 
 

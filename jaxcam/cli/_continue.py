@@ -33,7 +33,7 @@ def continue_(
     resume: Resume = False,
 ) -> None:
     """
-    Continue a periodic orbit over a parameter; list its bifurcations.
+    Continue a periodic orbit in a parameter and list its bifurcations.
 
     \b
     Examples:

@@ -36,7 +36,7 @@ class BranchRange:
         float | None,
         typer.Option(
             metavar="P",
-            help=("Value of the parameter at the start; default: that of the system."),
+            help=("Initial value of the parameter; default: that of the system."),
         ),
     ] = None
 
@@ -46,7 +46,7 @@ class BranchRange:
         return ordered_bounds(self.low, self.high)
 
     def started(self, model, axis: Axis):
-        """Return the system with the parameter at its first value.
+        """Return the system with the parameter at its initial value.
 
         Raises:
             ValueError: The parameter is unknown, or the start is out of bounds.
@@ -67,7 +67,7 @@ class BranchRange:
         if not low <= value <= high:
             raise ValueError(
                 f"the branch starts at {name} = {value:g}, outside {low:g} to "
-                f"{high:g}; choose the start with --at, or other bounds."
+                f"{high:g}; change --at or the bounds."
             )
         first = jnp.asarray(axis.unit * value, dtype=float)
         return eqx.tree_at(pick_by_name(name), model, first)
@@ -82,7 +82,7 @@ class Following:
         typer.Option(
             metavar="A,B",
             help=(
-                "Guess of the state of the orbit at time zero, such as 0.3,0. "
+                "Initial guess of the orbit's state at time zero, such as 0.3,0. "
                 "Default: the orbit to which the motion converges."
             ),
         ),

@@ -38,15 +38,15 @@ def demo(
     ] = True,
     branches: Annotated[
         bool,
-        typer.Option(help=("Follow two branches of orbits of the rig of the thesis.")),
+        typer.Option(help=("Also continue two orbits of the thesis rig.")),
     ] = True,
 ) -> None:
     """
     Compare recordings with a model, diagnose the model, and continue two orbits.
 
-    By default, the simulated recordings that ship with the package are used. The report
-    is DIR/index.html, including figures, and DIR/result.json; the diagnosis is in
-    DIR/diagnosis.
+    By default, the simulated recordings shipped with the package are used. The report
+    with its figures is DIR/index.html, the data are in DIR/result.json, and the
+    diagnosis is in DIR/diagnosis.
 
     \b
     Examples:

@@ -1,4 +1,4 @@
-"""Two branches of the rig of the thesis for `jaxcam demo`: P(1,1) and P(inf,1)."""
+"""Two branches of the thesis rig for `jaxcam demo`: P(1,1) and P(inf,1)."""
 
 import dataclasses
 from pathlib import Path
@@ -22,7 +22,7 @@ class Branches:
 
 HEADINGS = ("orbit", "event", "at (rpm)", "largest multiplier (modulus)")
 _CAPTION = (
-    "Continuation for the rig of the thesis: follower angle once per cycle against "
+    "Continuation for the thesis rig: follower angle, sampled once per cycle, against "
     "cam speed. Stable orbits are solid, unstable ones dashed. P(1,1) has one impact "
     "per cycle; P(inf,1) chatters, sticks and is released."
 )
@@ -36,8 +36,8 @@ def _interrupted(point) -> bool:
 def follow_branches(folder: Path) -> Branches:
     """Follow both branches and draw them.
 
-    It runs in a separate process, parallel to other work, because it compiles for half
-    a minute.
+    This runs in a separate process, in parallel with other work, because compilation
+    takes half a minute.
     """
     import equinox as eqx
     import jax.numpy as jnp

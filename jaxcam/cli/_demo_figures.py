@@ -52,7 +52,7 @@ def draw(
             keep(
                 figure,
                 f"residual_by_mode_{against}",
-                f"Recording minus model by mode, over {_AGAINST[against]}. The band "
+                f"Recording minus model by mode, against {_AGAINST[against]}. The band "
                 "is +-2 standard deviations of the noise.",
             )
     for motion in _slowest_and_fastest(simulated):
@@ -66,12 +66,12 @@ def draw(
         keep(
             plotting.phase_portrait(motion, between=last(motion, 12.0)),
             f"phase_portrait_{rpm:.1f}rpm",
-            f"The nominal rig at {at}: velocity over angle.",
+            f"The nominal rig at {at}: velocity against angle.",
         )
     return found
 
 
-_AGAINST = {"time": "time", "phase": "the cam angle in one turn"}
+_AGAINST = {"time": "time", "phase": "cam angle within one turn"}
 
 
 def _slowest_and_fastest(simulated: Sequence[Trajectory]) -> list[Trajectory]:

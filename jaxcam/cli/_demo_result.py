@@ -95,7 +95,7 @@ def write_result(folder: Path, found: DemoResult) -> dict[str, Any]:
 def print_result(output: Output, found: DemoResult) -> None:
     """Print tables and sentences to the terminal."""
     if found.simulated:
-        output.print("The recordings that ship with the package are simulated.")
+        output.print("The recordings shipped with the package are simulated.")
     for run in found.segments:
         output.print(run.sentence())
     output.print(found.comparison.table())
@@ -114,7 +114,7 @@ def _next_steps(found) -> list[tuple[str, str]]:
         (
             f"jaxcam simulate cam-follower --speed {rpm:.1f} --turns 40 "
             f"--out ./jaxcam-{rpm:.1f}rpm",
-            "Motion of the first run with the parameters of Table 4.4.",
+            "Motion at the speed of the first run, with the parameters of Table 4.4.",
         ),
         (
             f"jaxcam simulate cam-follower --speed {rpm:.1f} --set restitution.r=0.5",
@@ -133,7 +133,7 @@ def _next_steps(found) -> list[tuple[str, str]]:
         (
             "jaxcam new-rig cart",
             "A system of your own: edit cart.py, which contains its equations, and "
-            "cart.toml, which states known parameters and sensors.",
+            "cart.toml, which lists its known parameters and sensors.",
         ),
         (
             "jaxcam simulate --rig cart.toml --state 0,0.8 --t1 3 --out ./cart-run",

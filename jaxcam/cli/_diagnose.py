@@ -1,4 +1,4 @@
-"""`jaxcam diagnose`: the physics that a model lacks, from recordings."""
+"""`jaxcam diagnose`: find the physics that a model lacks, from recordings."""
 
 import dataclasses
 from pathlib import Path
@@ -45,7 +45,8 @@ def diagnose(
     """
     Determine from recordings which physics a model lacks.
 
-    It works for a cam-follower and for any system in a Python file; see jaxcam new-rig.
+    The rig is a cam-follower or any system defined in a Python file; see jaxcam
+    new-rig.
 
     \b
     Examples:
@@ -95,7 +96,8 @@ def _kept_fits(out: Path | None, resume: bool) -> Path | None:
     """Return the folder that stores the fits of a stopped run.
 
     Raises:
-        ValueError: There is nothing to resume, or the folder contains a stopped run.
+        ValueError: There is nothing to resume, or the folder contains the fits of a
+            stopped run and `resume` is false.
     """
     keep = None if out is None else out / "fits"
     if resume and (keep is None or not keep.is_dir()):
@@ -143,8 +145,8 @@ def _print(output, found, notes, outlook) -> None:
     for sentence in (*notes, found.summary, *caveats):
         output.print(sentence)
     output.print(
-        f"On held-out flights: {found.heldout_before:.3e} {found.unit} before, "
-        f"{found.heldout_after:.3e} after, noise {found.noise_floor:.3e}."
+        f"Error on held-out flights: {found.heldout_before:.3e} {found.unit} before, "
+        f"{found.heldout_after:.3e} after; noise: {found.noise_floor:.3e}."
     )
     for table in outlook.tables():
         output.print(terminal_table(table))

@@ -55,9 +55,9 @@ def draw(folder: Path, found: Diagnosis) -> list[tuple[Path, str]]:
 
 _MISSING = (
     "Unnamed functions, fitted together with the rig, with bands of twice the "
-    "standard error. A function of two arguments is shown over the first one, at "
-    "several values of the second. A part that the rig parameters can represent may "
-    "be contained in them instead."
+    "standard error. A function of two arguments is shown against the first one, at "
+    "several values of the second. The rig parameters may have absorbed any part that "
+    "they can represent."
 )
 _UNSEEN = (
     "Residuals of a held-out recording, predicted one flight ahead: the textbook "
@@ -65,9 +65,9 @@ _UNSEEN = (
     "effects (bottom). The band is +-2 standard deviations of the noise."
 )
 _MAPS = (
-    "Mean residual of each recording over {}, in standard errors, before (left) and "
-    "after (right): flights at the top, contacts (if any) at the bottom. In pure "
-    "noise, one of a hundred such maps would exceed the range of the colours."
+    "Mean residual of each recording against {}, in standard errors, before (left) "
+    "and after (right): flights at the top, contacts (if any) at the bottom. For pure "
+    "noise, one such map in a hundred would exceed the colour range."
 )
 _SHAPES = (
     "Estimated corrections of the textbook model (grey) and of the model with the "
@@ -245,7 +245,7 @@ def _ranking(plt, found: Diagnosis):
     pairs = [(one.name, one.delta_bic) for one in ranked] or [("none", 0.0)]
     figure, axis = plt.subplots(figsize=(8, 0.35 * len(pairs) + 1.0))
     names = [name.replace("_", " ").replace("+", " + ") for name, _ in pairs]
-    # dots, not bars: a logarithmic axis has no zero to measure a length from
+    # dots, not bars: a logarithmic axis has no zero for bars to start from
     for row, (_, delta) in enumerate(pairs):
         axis.plot(max(delta, 0.1), row, "o", color=FLIGHT)
         axis.annotate(

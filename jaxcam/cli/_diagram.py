@@ -35,7 +35,7 @@ def diagram(
     resume: Resume = False,
 ) -> None:
     """
-    Draw a bifurcation diagram over a parameter; list the ranges of each label.
+    Draw a bifurcation diagram and list the parameter ranges of the attractors.
 
     \b
     Examples:
@@ -122,16 +122,16 @@ def _sentence(system: str, made, axis: Axis, sweep: Sweep) -> str:
     low, high = sweep.bounds
     return (
         f"{system}: {total} samples, {axis.name} from {low:g} to {high:g}; "
-        f"{len(made.ranges())} ranges of {axis.name} with one label"
+        f"{len(made.ranges())} ranges with the same attractor throughout"
         + (f", {failed} runs failed or could not start." if failed else ".")
     )
 
 
 def _table(ranges, axis: Axis):
-    """Tabulate the labels in the order of the parameter, at most a screenful."""
+    """Tabulate the labels in order of the parameter, at most one screenful."""
     from rich.table import Table
 
-    table = Table(title=f"attractors, by {axis.name}")
+    table = Table(title=f"Attractors against {axis.name}")
     for column in ("direction", "from", "to", "label"):
         table.add_column(column)
     words = {0: "independent", 1: "up", -1: "down"}

@@ -48,8 +48,8 @@ class Sweep:
         str | None,
         typer.Option(
             metavar="A,B",
-            help="Seconds to wait and to store at each value, as in an experiment; "
-            "instead of --turns and --keep.",
+            help="Seconds to wait and to record at each value, as in an experiment; "
+            "replaces --turns and --keep.",
         ),
     ] = None
     section: Annotated[
@@ -76,13 +76,13 @@ class Sweep:
 
     @property
     def seconds(self) -> tuple[float, ...] | None:
-        """Return the seconds to wait and to store."""
+        """Return the seconds to wait and to record."""
         if self.dwell is None:
             return None
         found = numbers("--dwell", self.dwell, "60,10")
         if len(found) != 2:
             raise ValueError(
-                f"--dwell is {self.dwell!r}; give the seconds to wait and to store, "
+                f"--dwell is {self.dwell!r}; give the seconds to wait and to record, "
                 "such as 60,10."
             )
         return found
@@ -100,7 +100,7 @@ class Starts:
         int | None,
         typer.Option(
             metavar="N",
-            help=("Or N random initial states per value, between --low and --high."),
+            help=("Use N random initial states per value, between --low and --high."),
         ),
     ] = None
     corner: Annotated[
@@ -152,7 +152,7 @@ class Starts:
         return low, numbers("--high", str(self.opposite), "0.5,3")
 
     def states(self, sweep: Sweep):
-        """Return the initial states as [`jaxcam.sweeps.diagram`][] takes them."""
+        """Return the initial states in the form used by [`jaxcam.sweeps.diagram`][]."""
         from ..sweeps import monte_carlo
 
         if self.starts is None:

@@ -16,7 +16,7 @@ BAD_INPUT = 2
 STOPPED_EARLY = 1
 INTERRUPTED = 130
 
-# messages written for Python name arguments; here they are options
+# messages written for Python refer to arguments, which are options here
 _OPTIONS = (
     ("or pass state=None to start", "or give --state release to start"),
     ("state=None needs", "--state release needs"),

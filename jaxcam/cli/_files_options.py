@@ -12,7 +12,7 @@ from ._options import Gaps
 
 @dataclasses.dataclass(frozen=True)
 class Files:
-    """Options for files: columns, units, and the treatment of faulty files."""
+    """Options for files: columns, units and the handling of faulty files."""
 
     gaps: Gaps = "mend"
     columns: Annotated[
@@ -31,7 +31,7 @@ class Files:
     ] = None
     split: Annotated[
         str | None,
-        typer.Option(metavar="COLUMN", help="Column with the number of the run."),
+        typer.Option(metavar="COLUMN", help="Column with the run number."),
     ] = None
 
     def check(self) -> None:

@@ -40,9 +40,9 @@ def fit(
     """
     Fit the parameters of a rig to recordings.
 
-    It works for a cam-follower and for any system in a Python file; see jaxcam new-rig.
-    From a file with one impact per row (columns before_m_s and after_m_s) it fits a
-    restitution law.
+    The rig is a cam-follower or any system defined in a Python file; see jaxcam
+    new-rig. If CASE is a file with one impact per row (columns before_m_s and
+    after_m_s), a restitution law is fitted.
 
     \b
     Examples:

@@ -1,4 +1,4 @@
-"""`jaxcam fit TABLE.csv`: the law of restitution of a table of impacts."""
+"""`jaxcam fit TABLE.csv`: fit a restitution law to a table of impacts."""
 
 from pathlib import Path
 
@@ -16,7 +16,7 @@ def is_table(case: Path, files: Files) -> bool:
 
 
 def fit_impacts(case: Path, files: Files, json_file: Path | None) -> None:
-    """Print the restitution law that the impacts support, and write it as data.
+    """Print the restitution laws fitted to the impacts, and write them as data.
 
     Raises:
         ValueError: The table is invalid; the message names the row and the fix.
@@ -26,7 +26,7 @@ def fit_impacts(case: Path, files: Files, json_file: Path | None) -> None:
 
     found = impact_law(read_impacts(case, columns=files.named()))
     output = Output(json_file, None)
-    table = Table(title="Laws of restitution")
+    table = Table(title="Restitution laws")
     table.add_column("law", no_wrap=True)
     for heading in ("parameters", "delta BIC"):
         table.add_column(heading, justify="right")

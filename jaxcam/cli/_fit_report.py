@@ -56,9 +56,7 @@ def correlation_table(found: Fit) -> Table:
 
 
 def draw(folder: Path, before: Fit, after: Fit) -> list[Path]:
-    """Draw residuals of each recording before and after the fit, over time and drive
-    angle.
-    """
+    """Draw the residuals before and after the fit, against time and drive angle."""
     import matplotlib.pyplot as plt
 
     from ..plotting import save_figure, style

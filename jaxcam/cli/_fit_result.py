@@ -39,12 +39,12 @@ class Result:
 
     @property
     def sentence(self) -> str:
-        """Describe how the fit ended, and how well it explains its samples."""
+        """Describe how the fit ended, and how well it explains the samples."""
         return f"{self.after.message} {self.remainder}"
 
     @property
     def remainder(self) -> str:
-        """Describe how well the fit explains its samples."""
+        """Describe how well the fit explains the samples."""
         quality = self.quality
         ratio = sum(q["ratio"] for q in quality) / len(quality)
         return (
@@ -73,13 +73,13 @@ class Result:
         drive, model = self.segments[0].drive, self.after.model(0)
         for one in self.problem.parameters:
             if one.known is not None:
-                # conditions of the first recording only
+                # a condition that holds for the first recording only
                 usual = one.where(self.problem.model)
                 model = eqx.tree_at(one.where, model, usual)
         system = model.system
         if drive is not None:
-            # the complete model: the encoder's zero is that of the geometry, the speed
-            # is free
+            # the complete model: the drive runs at constant speed, and its angle is
+            # zero at time zero
             system = model.driven(0.0, 0.0 * drive.phase, drive.speed)
         return as_saved(system, fit)
 
@@ -87,7 +87,7 @@ class Result:
 def fitted(
     runs: Iterable[Recording], nominal: Rig | fitting.Setup, bootstrap: int, report
 ) -> Result:
-    """Segment the runs and fit; report the parameters that the data distinguish.
+    """Segment the runs and fit the parameters of the rig.
 
     **Arguments:** `bootstrap`: number of Bayesian bootstrap replicates; 0 omits them.
 
@@ -133,7 +133,7 @@ def fitted(
 def print_fit(output: Output, found: Result, notes: Sequence[str]) -> None:
     """Print tables and sentences to the terminal.
 
-    The reason why a fit failed is left to standard error.
+    If a fit failed, the reason goes to standard error instead.
     """
     for sentence in (*notes, *found.seen.sentences()):
         output.print(sentence)

@@ -1,4 +1,4 @@
-"""Laws of restitution from the impacts on each gap of a system."""
+"""Restitution laws from the impacts at each gap of a system."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -32,7 +32,7 @@ def impact_laws(segments: Sequence[Segments]) -> dict[str, RestitutionFit]:
 
 
 def _on(part: Segments, side: int) -> Segments:
-    """Return a recording with the impacts on one of its gaps only."""
+    """Return a recording with the impacts at one of its gaps only."""
     keep = part.impacts.side == side
     columns = {
         field.name: getattr(part.impacts, field.name)[keep]

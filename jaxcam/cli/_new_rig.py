@@ -12,7 +12,7 @@ from ..data import NEW_RIG
 from ._output import write_text
 
 
-# names in the example that become those of the new rig
+# names in the example, to be replaced by those of the new rig
 _FILE, _CLASS = "cart", "Cart"
 
 
@@ -41,7 +41,7 @@ def new_rig(
     files = {name.parent / f"{name.name}{kind}": kind for kind in (".py", ".toml")}
     for file in files:
         if file.exists():
-            raise ValueError(f"{file} exists already; give another name.")
+            raise ValueError(f"{file} already exists; give another name.")
     for file, kind in files.items():
         text = (NEW_RIG / f"{_FILE}{kind}").read_text("utf-8")
         text = text.replace(f"{_FILE}.", f"{name.name}.")

@@ -13,9 +13,7 @@ _SHIPPED = {"demo": DEMO_RIG, "pendulum": PENDULUM}
 
 
 def _shipped(case: Path) -> Path:
-    """Return the folder; a word for shipped recordings yields their folder in the
-    package.
-    """
+    """Return the folder of a case; a shipped case is given by its name."""
     return case if case.exists() else _SHIPPED.get(str(case), case)
 
 

@@ -31,19 +31,20 @@ class Outlook:
         """The tables that are not empty; speeds in rpm."""
         if self.speeds:
             yield Rows(
-                "What changes",
-                ("what happens", "textbook (rpm)", "with the missing effects (rpm)"),
+                "Cam speeds at which the motion changes",
+                ("change", "textbook (rpm)", "with the missing effects (rpm)"),
                 [(one.name, _rpm(one.before), _rpm(one.after)) for one in self.speeds],
-                "Cam speeds at which the motion of this rig changes; the standard "
-                "errors follow from those of the fit.",
+                "Predictions for this rig; the standard errors follow from those of "
+                "the fit.",
             )
         if self.experiments:
             yield Rows(
                 "Recommended next recording",
-                ("one more recording at", "errors become", "of"),
+                ("recording at", "errors become", "parameters"),
                 [(one.name, f"{one.factor:.0%}", _asked(one)) for one in self.shown],
-                "Standard errors with this recording in addition to the others, from "
-                "the sensitivities of the diagnosed model.",
+                "Standard errors with this recording in addition to the others, "
+                "relative to those without it, from the sensitivities of the diagnosed "
+                "model.",
             )
 
     @property

@@ -100,14 +100,14 @@ def page(report: Report) -> str:
         table_html(
             HEADINGS, [row for one in report.rests for row in rest_rows(one)], (0, 1)
         ),
-        '<p class="note">The simulated rig has the parameters of its file and the '
+        '<p class="note">The simulation uses the parameters of the rig file and the '
         "mean speed of the run, and starts twenty cycles earlier. Angles are cam "
-        "angles; ± is the spread between contacts. If simulation and recording "
-        "differ completely, the rig may be on another attractor that coexists at the "
-        "same speed.</p>",
+        "angles; ± is the standard deviation over the contacts. If simulation and "
+        "recording differ completely, the rig may be on another attractor that "
+        "coexists at the same speed.</p>",
         "<h2>Figures</h2>",
         *(figure_html(file, caption) for file, caption in report.figures),
-        "<h2>The runs</h2>",
+        "<h2>Runs</h2>",
         f"<ul>{''.join(f'<li>{escape(run)}</li>' for run in report.runs)}</ul>",
         "<h2>Next: your own system, your own recording</h2>",
         *(

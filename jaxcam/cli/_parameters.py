@@ -80,7 +80,7 @@ def pick_by_name(name: str) -> Callable[[Any], Any]:
 
 
 def _in_rpm(system: HybridSystem) -> bool:
-    """Return whether the command line counts the speed of a system in rpm."""
+    """Return whether the speed of a system is given in rpm on the command line."""
     return isinstance(getattr(system, "base", system), CamFollower)
 
 

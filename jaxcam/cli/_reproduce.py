@@ -1,4 +1,4 @@
-"""`jaxcam reproduce`: compare printed values of the thesis with computed ones."""
+"""`jaxcam reproduce`: compare values printed in the thesis with computed ones."""
 
 import time
 from pathlib import Path
@@ -42,13 +42,13 @@ def reproduce(
         Path | None,
         typer.Option(
             metavar="DIR",
-            help="Write numbers and figures to DIR; for all targets also a page.",
+            help="Write numbers and figures to DIR, and with all targets also a page.",
         ),
     ] = None,
     resume: Resume = False,
 ) -> None:
     """
-    Reproduce tables and figures of the thesis; show printed and computed values.
+    Reproduce tables and figures of the thesis; compare printed and computed values.
 
     \b
     Examples:
@@ -97,7 +97,7 @@ def _compute(names, preset, size, output, resume, several: bool) -> None:
         if changed:
             output.print(
                 f"The code has changed since {len(changed)} of {len(names)} targets "
-                "were computed; they are computed again."
+                "were computed; they will be recomputed."
             )
     records, begin = [], time.perf_counter()
     for position, name in enumerate(names):

@@ -12,14 +12,14 @@ from ._reproduce_record import Origin, TargetRecord
 
 
 HEADINGS = ("quantity", "printed", "computed", "difference", "relative", "unit")
-_OVERVIEW = ("target", "", "largest relative", "compared", "time")
+_OVERVIEW = ("target", "", "largest relative difference", "values compared", "time")
 _MORE = """
 nav a { display: inline-block; padding: .15rem .45rem .15rem 0; color: inherit; }
 section { border-top: 1px solid var(--line); margin-top: 2.4rem; }
 section h2 { margin-top: 1.2rem; }
 td.text { white-space: normal; min-width: 8rem; }
 """
-"""Style of this page, in addition to that of all pages."""
+"""Style of this page, in addition to the common style."""
 _CHAPTERS = {
     "1": "Introduction",
     "2": "Smooth and nonsmooth dynamical systems",
@@ -62,15 +62,17 @@ def _page(folder, records, settings, of) -> str:
     title = "Tables and figures of the thesis, printed and computed"
     failed = [record.name for record in records if record.error is not None]
     minutes = sum(record.seconds for record in records) / 60
-    sentence = f"{len(records)} of {of} targets, {minutes:.1f} minutes of computing"
+    sentence = (
+        f"{len(records)} of {of} targets, {minutes:.1f} minutes of computing time"
+    )
     sentence += f"; {len(failed)} failed: {', '.join(failed)}." if failed else "."
     parts = [
         f"<h1>{title}</h1>",
         f'<p class="sentence">{escape(sentence)}</p>',
         f'<p class="note">jaxcam {escape(settings.version)}, rig '
-        f"{escape(settings.preset)}, sizes {escape(settings.size)}. A relative "
-        "difference is divided by the size of the printed value. Where no printed "
-        "value is shown, the thesis has a drawing without a number.</p>",
+        f"{escape(settings.preset)}, size {escape(settings.size)}. Relative "
+        "differences refer to the magnitude of the printed value. Where no printed "
+        "value is shown, the thesis gives only a drawing.</p>",
     ]
     for chapter, words in _CHAPTERS.items():
         own = [r for r in records if r.name.partition("-")[2].startswith(chapter)]

@@ -67,8 +67,8 @@ def make(
 ) -> TargetRecord:
     """Compute a target, and draw it if a folder is given.
 
-    **Arguments:** `keep_going`: an exception becomes part of the record; `progress`:
-    as of `reproduce`, also while it is drawn.
+    **Arguments:** `keep_going`: an exception becomes part of the record; `progress`: as
+    in `reproduce`, also called while the figure is drawn.
     """
     begin, rows, drawn = time.perf_counter(), [], False
     try:
@@ -128,7 +128,7 @@ def earlier(out: Path, name: str, settings: Origin) -> TargetRecord | None:
 
 
 def by_other_code(out: Path, names: Iterable[str], settings: Origin) -> list[str]:
-    """Return the targets computed with the same settings, but by other code."""
+    """Return the targets computed with the same settings, but by different code."""
     found = []
     for name in names:
         try:
@@ -143,7 +143,7 @@ def by_other_code(out: Path, names: Iterable[str], settings: Origin) -> list[str
 
 def _read(out: Path, name: str) -> TargetRecord:
     found = json.loads((out / f"{name}.json").read_text(encoding="utf-8"))
-    # records without a mark are those of other code
+    # records without a mark are from different code
     found["settings"] = Origin(**{"code": "", **found["settings"]})
     if found["name"] != name or not isinstance(found.get("figure", False), bool):
         raise ValueError("the record of another target, or damaged")

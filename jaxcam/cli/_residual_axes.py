@@ -1,4 +1,4 @@
-"""Axes of residual plots: a suitable unit, over the drive angle or time."""
+"""Axes of residual plots: a suitable unit, and drive angle or time."""
 
 import math
 from collections.abc import Sequence
@@ -49,7 +49,7 @@ class Along:
 
     @property
     def word(self) -> str:
-        return "the angle of the drive" if self.turns else "time"
+        return "drive angle" if self.turns else "time"
 
     def place(self, part: Residuals) -> Float[np.ndarray, " k"]:
         """Return the position of each residual between `start` and `end`."""

@@ -22,8 +22,8 @@ _SETTLE = 20.0
 class Intervals(NamedTuple):
     """Contact intervals, each from its start to the release.
 
-    - `begins`, `ends`: angle of the cam (rad) at either end of each, not wrapped.
-    - `turns`: number of turns of the cam that were examined.
+    - `begins`, `ends`: cam angle (rad) at the start and end of each, not wrapped. -
+      `turns`: number of cam turns examined.
     - `share`: fraction of the time in contact, including intervals truncated by the
       ends of the recording.
     """
@@ -44,7 +44,7 @@ class Rests:
     simulated: Intervals
 
     def to_json(self) -> dict[str, Any]:
-        """Return plain data; cam angles in one turn (rad)."""
+        """Return plain data; cam angles (rad) are wrapped to one turn."""
         return {
             which: {
                 "per_turn": len(part.begins) / part.turns,
@@ -72,9 +72,7 @@ def simulate_run(rig: Rig, run: Segments) -> Trajectory:
 
 
 def rests(run: Segments, motion: Trajectory) -> Rests:
-    """Return contact intervals of a run, and those of `simulate_run` in its time
-    span.
-    """
+    """Return the contact intervals of a run and of its simulation."""
     assert run.drive is not None
     name, rpm = run.recording.name, float(rad_s_to_rpm(run.drive.speed))
     return Rests(name, rpm, _recorded(run), _simulated(run, motion))
@@ -93,7 +91,7 @@ def rest_table(found: list[Rests]) -> Table:
     return table
 
 
-HEADINGS = ("run", "", "a turn", "from (rad)", "to (rad)", "of the time")
+HEADINGS = ("run", "", "per turn", "from (rad)", "to (rad)", "share of time")
 
 
 def rest_rows(one: Rests) -> list[tuple[str, ...]]:
@@ -140,7 +138,7 @@ def _simulated(run: Segments, motion: Trajectory) -> Intervals:
 
 
 def _typical(angle: Float[np.ndarray, " k"]) -> str:
-    """Return the mean cam angle in one turn, and the spread of several intervals."""
+    """Return the mean cam angle within one turn, and the standard deviation."""
     if not len(angle):
         return "-"
     mean = np.mean(np.exp(1j * angle))

@@ -12,7 +12,7 @@ _SOURCE = "source"
 
 
 def as_saved(system: HybridSystem, about: dict[str, Any]) -> dict[str, Any]:
-    """Return a system as data, with the file of a system outside the package.
+    """Return a system as data, with the source file if it is outside the package.
 
     A system that cannot be saved yields `about`, and the reason as `not_saved`.
     """
@@ -30,7 +30,7 @@ def as_saved(system: HybridSystem, about: dict[str, Any]) -> dict[str, Any]:
 
 
 def load_saved(file: Path) -> HybridSystem:
-    """Load the system in a file of `jaxcam fit` or `jaxcam diagnose`.
+    """Load the system in a file written by `jaxcam fit` or `jaxcam diagnose`.
 
     The Python file that defines a user's system is executed.
 

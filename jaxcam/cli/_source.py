@@ -28,7 +28,7 @@ class Source:
         return self.saved is not None or self.rig is not None
 
     def system(self) -> HybridSystem:
-        """Return the saved system, or that of a file with its nominal values.
+        """Return the saved system, or the one in a Python file with its nominal values.
 
         Raises:
             ValueError: A file is invalid; the message names it and the fix.
@@ -46,7 +46,7 @@ class Source:
             return stated_system(self.saved, system_class(str(self.saved)), {})
         if named is not None and not coded:
             raise ValueError(
-                f"{named} contains the values of its system; leave out --rig, or give "
+                f"{named} already contains parameter values; leave out --rig, or give "
                 "--system FILE.py:CLASS."
             )
         if coded or is_setup(self.rig):
@@ -65,7 +65,7 @@ class Source:
         if not self:
             if _is_code(word):
                 raise ValueError(
-                    f"{word[:100]}: give a system of your own as --system."
+                    f"{word[:100]}: give a system of your own with --system."
                 )
             return choose("SYSTEM", word, SYSTEMS)
         from ..discrepancy.terms import WithTerms
@@ -95,8 +95,8 @@ def make_system(
         for option, value in (("--preset", preset), ("--speed", rpm)):
             if value is not None:
                 raise ValueError(
-                    f"{option} belongs to {CAM}; leave it out, and use --set for the "
-                    f"parameters of {name}."
+                    f"{option} applies only to {CAM}; leave it out, and use --set for "
+                    f"the parameters of {name}."
                 )
         if source:
             return source.system()

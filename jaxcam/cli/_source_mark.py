@@ -1,4 +1,4 @@
-"""A hash of the source code, to distinguish results of other versions."""
+"""A hash of the source code, to recognise results of other versions."""
 
 import functools
 import hashlib
@@ -16,8 +16,8 @@ _BENEATH = ("jax", "jaxlib", "diffrax", "equinox", "numpy", "scipy", "matplotlib
 def source_mark() -> str:
     """Hash all source files of the project and the versions of its dependencies.
 
-    It also changes with a comment: an unnecessary computation costs only minutes,
-    whereas a result of outdated code would be misleading.
+    The hash also changes if only a comment changes: an unnecessary computation costs
+    only minutes, whereas a result of outdated code would be misleading.
     """
     folders = [folder for name in _PACKAGES for folder in _folders(name)]
     versions = [f"{name} {_version(name)}" for name in _BENEATH]
@@ -25,7 +25,7 @@ def source_mark() -> str:
 
 
 def source_hash(folders: list[Path], words: list[str]) -> str:
-    """Hash the names and contents of Python's files in some folders, and some words."""
+    """Hash the names and contents of the Python files in folders, and extra words."""
     found = hashlib.sha256("\n".join(words).encode())
     for folder in folders:
         for file in sorted(folder.rglob("*")):

@@ -22,7 +22,7 @@ class Execution:
     cluster: Cluster = None
 
     def check(self) -> None:
-        """Reject a wrong number or address before the work begins."""
+        """Reject an invalid number or address before the work begins."""
         at_least("--workers", self.workers, 1)
         address = self.cluster
         if address is not None and address != "local" and "://" not in address:
@@ -44,8 +44,8 @@ class Execution:
         if self.cluster is not None and system_source(type(base)) is not None:
             raise ValueError(
                 f"--cluster: worker processes cannot load {type(base).__name__}, "
-                "which is in a file of your own; leave --cluster out to run in local "
-                "threads."
+                "which is defined in your own file; leave --cluster out to run in "
+                "local threads."
             )
 
     @contextmanager

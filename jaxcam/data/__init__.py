@@ -1,4 +1,4 @@
-"""Small recordings, and an example of a rig of your own, shipped with the package.
+"""Small recordings and an example of a user-defined rig, shipped with the package.
 
 The cam-follower recordings are simulated; those of the pendulum are real.
 """
@@ -7,10 +7,10 @@ from pathlib import Path
 
 
 DEMO_RIG = Path(__file__).parent / "demo_rig"
-"""A case folder of three simulated recordings and its rig file (`make_demo.py`)."""
+"""A case folder with three simulated recordings and a rig file (`make_demo.py`)."""
 
 PENDULUM = Path(__file__).parent / "pendulum"
-"""A case folder of two real recordings and its rig file (`pendulum/SOURCE.md`)."""
+"""A case folder with two real recordings and a rig file (`pendulum/SOURCE.md`)."""
 
 NEW_RIG = Path(__file__).parent / "new_rig"
-"""A system in Python and its rig file, to be copied and changed (`jaxcam new-rig`)."""
+"""A system in Python and its rig file, to be copied and edited (`jaxcam new-rig`)."""

@@ -3,8 +3,8 @@
     python -m jaxcam.data.make_demo
 
 The rig is simulated here with a scalar Runge-Kutta loop that is independent of
-`jaxcam.hybrid`, so that the comparison is meaningful. It has a viscous hinge, which the
-textbook model lacks, a drive that wanders, and encoders with noise.
+`jaxcam.hybrid`, so that the comparison is meaningful. The rig has a viscous hinge,
+which the textbook model lacks, a drive whose speed wanders, and encoders with noise.
 """
 
 import dataclasses
@@ -16,17 +16,17 @@ from pathlib import Path
 import numpy as np
 
 
-# A gap that opens from zero is not yet closed again by rounding errors (rad)
+# A gap that opens from zero is not closed again by rounding errors above this (rad)
 _ROUNDING = 1e-13
 
 
 @dataclasses.dataclass(frozen=True)
 class RealRig:
-    """The real parameters of a rig, different from its rig file (SI units).
+    """The true parameters of a rig, which differ from its rig file (SI units).
 
     - `height`: cam radius plus half height of the follower (m).
-    - `damping`: viscous, of the follower's velocity (1/s).
-    - `wander`: slow relative variation of the cam's speed.
+    - `damping`: viscous damping of the follower divided by its inertia (1/s).
+    - `wander`: slow relative variation of the cam speed.
     """
 
     height: float = 0.0663
@@ -42,7 +42,9 @@ class RealRig:
     wander: float = 2e-4
 
     def acceleration(self, angle: float, velocity: float) -> float:
-        """Acceleration (rad/s^2) of the free follower: spring (4.9), viscous hinge."""
+        """Return the acceleration (rad/s^2) of the free follower: spring (thesis, eq.
+        4.9) and viscous hinge.
+        """
         sine, secant = math.sin(angle), 1 / math.cos(angle)
         stretch = (self.spring_hook_x * sine + self.half_height) * secant
         arm = (self.spring_hook_x + self.half_height * sine) * secant**2
@@ -50,7 +52,9 @@ class RealRig:
         return torque - self.damping * velocity
 
     def profile(self, harmonics: int = 14) -> np.ndarray:
-        """Complex Fourier coefficients of the contact angle of a clockwise cam."""
+        """Return the complex Fourier coefficients of the contact angle of a clockwise
+        cam.
+        """
         turned = 2 * np.pi * np.arange(256) / 256
         x = self.eccentricity * np.cos(turned) + self.center_x
         y = -self.eccentricity * np.sin(turned) + self.center_y
@@ -62,7 +66,7 @@ class RealRig:
 
 @dataclasses.dataclass(frozen=True)
 class Truth:
-    """The true motion: samples, impacts, and contacts as (landing, release)."""
+    """The true motion: samples, impacts, and contacts as pairs (landing, release)."""
 
     time: np.ndarray
     turned: np.ndarray
@@ -74,7 +78,7 @@ class Truth:
 
 
 class _Cam:
-    """The drive, and the angle of contact over time."""
+    """The drive, and the contact angle as a function of time."""
 
     def __init__(self, rig: RealRig, speed: float, phase: float):
         self.rig, self.speed, self.phase = rig, speed, phase
@@ -84,7 +88,7 @@ class _Cam:
         self.second = self.coefficients * self.order**2
 
     def drive(self, t):
-        """Angle of the cam, its rate and the rate of that."""
+        """Return the cam angle and its first and second derivatives."""
         angle, rate, change = self.speed * t + self.phase, self.speed, 0.0
         for share, frequency in ((0.7, 0.31), (0.3, 0.87)):
             w, a = 2 * math.pi * frequency, self.rig.wander * self.speed * share
@@ -94,7 +98,7 @@ class _Cam:
         return angle, rate, change
 
     def surface(self, t):
-        """Angle, velocity and acceleration of a follower in contact."""
+        """Return the angle, velocity and acceleration of a follower in contact."""
         angle, rate, change = self.drive(t)
         turn = np.exp(self.order * angle)
         slope, bend = (self.first @ turn).real, (self.second @ turn).real
@@ -103,14 +107,14 @@ class _Cam:
 
 
 class _Follower:
-    """The follower's flights, impacts and contacts, from a little above the cam."""
+    """The follower's flights, impacts and contacts, starting slightly above the cam."""
 
     def __init__(self, rig: RealRig, cam: _Cam, interval: float):
         self.rig, self.cam, self.interval = rig, cam, interval
         self.t, (self.x, self.v, _) = 0.0, cam.surface(0.0)
         self.x += 0.01
         self.resting, self.landed = False, 0.0
-        # of a step; the next flight must not end inside its own first one
+        # fraction of a step; the next flight must not end within its own first one
         self.longest = interval
         self.impacts: list[tuple[float, float]] = []
         self.contacts: list[tuple[float, float]] = []
@@ -137,12 +141,14 @@ class _Follower:
         return bool(x < self.cam.surface(t)[0] - _ROUNDING)
 
     def _lifts(self, t: float) -> bool:
-        """Return whether a follower that rests is pulled off the cam."""
+        """Return whether a follower at rest is pulled off the cam."""
         x, v, a = self.cam.surface(t)
         return bool(self.rig.acceleration(x, v) > a)
 
     def _fly(self, h: float) -> tuple[float, float]:
-        """Angle and velocity after a flight of length h, by one Runge-Kutta step."""
+        """Return angle and velocity after a flight of duration h, by one Runge-Kutta
+        step.
+        """
         x, v, f = self.x, self.v, self.rig.acceleration
         a1 = f(x, v)
         v2 = v + h / 2 * a1
@@ -166,7 +172,9 @@ class _Follower:
         self.x, self.v, _ = self.cam.surface(self.t)
 
     def _hit(self, h: float) -> None:
-        """An impact after a flight of length h, or contact where flights are short."""
+        """Apply an impact after a flight of duration h, or begin contact if flights are
+        short.
+        """
         r = self.rig.restitution
         _, before = self._fly(h)
         self.t += h
@@ -176,7 +184,7 @@ class _Follower:
         self.impacts.append((self.t, approach))
         pull = acceleration - self.rig.acceleration(self.x, self.v)
         flight = 2 * r * approach / pull if pull > 0 else self.interval
-        # the remaining flights take this long together
+        # total duration of the remaining flights
         if 0 < flight < 1e-6 * (1 - r):
             self.resting, self.landed = True, self.t
             self.v, self.longest = rate, self.interval
@@ -185,7 +193,9 @@ class _Follower:
 
 
 def _bisect(h: float, crossed: Callable[[float], bool]) -> float:
-    """Return the time in (0, h] from which a condition holds that is true at h."""
+    """Return the time in (0, h] from which a condition holds, given that it holds
+    at h.
+    """
     low, high = 0.0, h
     for _ in range(45):
         middle = (low + high) / 2
@@ -202,7 +212,7 @@ def simulate_rig(
     interval: float = 5e-4,
     phase: float = 0.0,
 ) -> Truth:
-    """Run the rig at `speed` (rad/s) and keep the last `duration` (s)."""
+    """Simulate the rig at `speed` (rad/s) and keep the last `duration` (s)."""
     cam = _Cam(rig, speed, phase)
     follower = _Follower(rig, cam, interval)
     total = round((settle + duration) / interval)
@@ -231,7 +241,7 @@ def measure(samples: np.ndarray, noise: float, counts: int, rng) -> np.ndarray:
 def recording_text(truth: Truth, rng, *, sensors: Sequence[float]) -> str:
     """Return a recording as CSV; `sensors` are noise and counts of cam and follower."""
     cam_noise, cam_counts, noise, counts = sensors
-    # as an encoder that is zeroed once a turn before the recording begins
+    # as for an encoder that is zeroed once in the turn before the recording begins
     turned = truth.turned - 2 * np.pi * np.floor(truth.turned[0] / (2 * np.pi))
     columns = zip(
         truth.time,
@@ -243,7 +253,7 @@ def recording_text(truth: Truth, rng, *, sensors: Sequence[float]) -> str:
 
 
 DEMO_SENSORS = (9e-5, 16384, 7e-5, 36000)
-"""Noise (rad) and counts a turn of the two encoders of the demonstration rig."""
+"""Noise (rad) and counts per turn of the two encoders of the demonstration rig."""
 DEMO_SPEEDS_RPM = (136.5, 146.0, 158.0)
 
 
@@ -255,7 +265,7 @@ def main() -> None:
         truth = simulate_rig(RealRig(), rpm * math.pi / 30, 4.0)
         text = recording_text(truth, rng, sensors=DEMO_SENSORS)
         file = folder / f"run{number}_{rpm:.1f}rpm.csv.gz"
-        # no time stamp, so that the same files come out each time
+        # no time stamp, so that the files are reproducible
         file.write_bytes(gzip.compress(text.encode(), 9, mtime=0))
         print(f"{file.name}: {file.stat().st_size / 1e3:.0f} kB")
 

@@ -1,8 +1,8 @@
 """Make `pendulum/*.csv.gz`: `python -m jaxcam.data.make_pendulum FOLDER`.
 
-`FOLDER` holds `swing_large.csv.gz` and `swing_small.csv.gz`, two swings of the public
-recordings that `pendulum/SOURCE.md` names, at 1 kHz. Every tenth sample is kept. The
-end of a swing, where the pendulum hangs still, is cut off.
+`FOLDER` contains `swing_large.csv.gz` and `swing_small.csv.gz`, two swings at 1 kHz
+from the public recordings named in `pendulum/SOURCE.md`. Every tenth sample is kept.
+The end of each swing, where the pendulum hangs at rest, is omitted.
 """
 
 import gzip
@@ -36,7 +36,7 @@ def main(source: Path) -> None:
     for name in ("swing_large", "swing_small"):
         file = folder / f"{name}.csv.gz"
         data = thinned(source / file.name).encode("utf-8")
-        # no time stamp: the same data are the same file
+        # no time stamp, so that the same data give the same file
         file.write_bytes(gzip.compress(data, mtime=0))
 
 

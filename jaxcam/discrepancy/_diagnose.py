@@ -1,4 +1,4 @@
-"""Diagnose recordings: the verdict is an effect, none or unknown."""
+"""Diagnose recordings: the verdict is "effect", "none" or "unknown"."""
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -39,18 +39,17 @@ def diagnose(
 ) -> Diagnosis:
     """Diagnose from recordings which physics a model lacks.
 
-    A diagnosis takes minutes; the notebooks show one.
+    A diagnosis takes minutes; the notebooks contain an example.
 
     Args:
         system: A `Rig` from `jaxcam.recordings.read_rig` or a `Setup` from
-            `jaxcam.fitting.read_setup`, which state sensors and tolerances; or any
+            `jaxcam.fitting.read_setup`, which include sensors and tolerances; or any
             system with one coordinate, together with `sensors`, `parameters` and
             `drive`.
         recordings: At least two recordings of a rig; for a bare system, segments from
             `jaxcam.recordings.segment`.
         candidates: Terms that may be named; default `library()`, with the constants of
-            the rig. Those that are not `listed` only help to describe an unknown
-            effect.
+            the rig. Terms with `listed=False` only help to describe an unknown effect.
         sensors: For a bare system, as for `jaxcam.fitting.Model`.
         parameters: For a bare system, as for `jaxcam.fitting.Problem`.
         drive: For a bare system, its measured drive or input.
@@ -59,7 +58,7 @@ def diagnose(
         progress: Called with a sentence and a fraction, or `None`.
         keep: Folder in which fits are stored until the diagnosis is complete; an
             interrupted diagnosis continues from there.
-        policy: Settings that decide a verdict, and limit the time of a search.
+        policy: Settings that determine the verdict and limit the search time.
 
     Returns:
         A [`jaxcam.discrepancy.Diagnosis`][].

@@ -1,7 +1,7 @@
 """Find the physics that would move predicted event speeds to the observed ones.
 
-It needs no recordings, only the bifurcation speeds of a rig. The strength of each term
-and one parameter of the rig are fitted to these speeds.
+No recordings are needed, only the bifurcation speeds of a rig. The strength of each
+term and one parameter of the rig are fitted to these speeds.
 """
 
 import dataclasses
@@ -34,8 +34,8 @@ class EventCause:
     beside: float
     """Value of the rig parameter that was fitted together with the strength."""
     speeds: Float[np.ndarray, "4"]
-    """Shape `(4,)`, rad/s, valve float, fold and flip of P(1,1), interruption of
-    chatter; NaN if there is none.
+    """Speeds (rad/s), shape `(4,)`: valve float, fold and flip of P(1,1), interruption
+    of chatter; NaN if there is none.
     """
     misfit: float
     """Sum of the squared residuals of the speeds and of the deviation of the parameter,
@@ -56,7 +56,7 @@ def event_causes(
 ) -> tuple[EventCause, ...]:
     """Rank terms by their fit to the observed event speeds of a rig.
 
-    Each term is tried alone. A few speeds hardly distinguish between terms: terms whose
+    Each term is tried alone. Four speeds hardly distinguish between terms: those whose
     misfit is within a few units of the smallest are equally good.
 
     Args:
@@ -146,7 +146,7 @@ class _Path:
     def left(self, strength: float, pull: float) -> Float[np.ndarray, " m"]:
         found = self.at(strength, pull)
         if np.isfinite(found.values).all():
-            # the next search begins here
+            # the next search starts here
             self.here = found
         return self.goal.left(found.values, pull)
 
@@ -193,7 +193,7 @@ def _best(path: _Path, term: Term) -> EventCause:
 
 
 def _along(path: _Path, size: float) -> tuple[float, float, EventSpeeds]:
-    """Find the least misfit between zero and large strengths."""
+    """Find the smallest misfit between zero and large strengths."""
     best, policy = (math.inf, 0.0, path.here), path.goal.policy
     first, ratio, most = policy.cause_strengths
     for k in range(most):

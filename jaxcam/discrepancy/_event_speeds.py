@@ -30,7 +30,7 @@ EVENTS = (
     "P(1,1) doubles its period (flip)",
     "chattering is interrupted",
 )
-"""Names of the events at the speeds, in their order."""
+"""Names of the events, in the order of the speeds."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -78,7 +78,7 @@ def event_speeds(system: WithTerms, policy: Policy = Policy()) -> EventSpeeds:
     """Find the four speeds of a rig; its present speed has no effect.
 
     The base is a [`jaxcam.models.CamFollower`][]; terms may depend on time only through
-    the phase of the cam. The policy gives the range in which orbits are sought.
+    the phase of the cam. The policy gives the range in which orbits are searched for.
     """
     lift = _float_of(system)
     if lift is None:

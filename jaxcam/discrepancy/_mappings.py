@@ -1,4 +1,4 @@
-"""Limit the memory mappings that compiled programs take."""
+"""Limit the number of memory mappings used by compiled programs."""
 
 from pathlib import Path
 
@@ -13,8 +13,8 @@ _USED, _LIMIT = Path("/proc/self/maps"), Path("/proc/sys/vm/max_map_count")
 def make_room(used: Path = _USED, limit: Path = _LIMIT) -> bool:
     """Drop compiled programs if another diagnosis might exceed the limit.
 
-    Each program takes some of the memory mappings that Linux allows a process; beyond
-    the limit the compiler fails with "Cannot allocate memory". On other systems this
+    Each program uses some of the memory mappings that Linux allows per process; beyond
+    the limit, the compiler fails with "Cannot allocate memory". On other systems this
     does nothing.
 
     **Returns:** whether programs were dropped.

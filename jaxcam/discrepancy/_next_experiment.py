@@ -49,7 +49,7 @@ class Experiment:
 
     @property
     def factor(self) -> float:
-        """Geometric mean of `then` over `now`."""
+        """Geometric mean of `then / now`."""
         logs = [math.log(self.then[one] / self.now[one]) for one in self.now]
         return math.exp(sum(logs) / len(logs)) if logs else 1.0
 
@@ -73,7 +73,7 @@ def compare_experiments(
         asked: Names of the parameters to be determined. The default is the strengths of
             the named terms and the bands of unnamed functions; terms whose BIC is not
             much worse stay free, so that the best recording also distinguishes them. If
-            nothing is missing, it is all terms, one at a time.
+            nothing is missing, the default is all terms, one at a time.
         progress: Called with a sentence and a fraction, or `None`.
 
     Returns:
@@ -93,7 +93,7 @@ def compare_experiments(
     problem = Problem.build(fit.problem.model, records, parameters)
     values = np.repeat(np.asarray(fit.point.values)[:1], len(problem.segments), axis=0)
     point = problem.start._replace(values=jnp.asarray(values))
-    # parameters of one recording say nothing about another recording
+    # parameters of one recording do not affect another recording
     names = [p.name for p in parameters if p.known is None and not p.per_record]
     report("computing the information of the existing recordings", None)
     known = blocks_of(fit.problem, fit.point, names=names)
@@ -127,7 +127,7 @@ def _refuse_hidden(found: Diagnosis) -> None:
 
 
 def _of_others(parameter: Parameter, records: int) -> Parameter:
-    """Return a parameter whose value is known per recording, with the value of the
+    """Return a parameter whose value is known for each recording, with the value of the
     first recording for new ones.
     """
     if parameter.known is None:
@@ -152,7 +152,8 @@ def next_experiments(
         rig: As given to `diagnose`.
         speeds: Available speeds of the drive (rad/s); by default, several within and
             slightly beyond the recorded range.
-        duration: Duration of a recording (s); default that of the existing recordings.
+        duration: Duration of a recording (s); by default, that of the existing
+            recordings.
         asked: As in [`jaxcam.discrepancy.compare_experiments`][].
         seed: Seed of the simulated noise.
         progress: Called with a sentence and a fraction, or `None`.
@@ -293,14 +294,14 @@ def _questions(found: Diagnosis, asked) -> dict[str, _Question]:
         for one in found.missing:
             free = sorted({*rig, *beside, *one.numbers})
             slopes = slopes_of_function(found.after, one)
-            about = f"{one.kind} by {' and '.join(one.arguments)}"
+            about = f"{one.kind} as a function of {' and '.join(one.arguments)}"
             questions[about] = _Question(free, list(one.numbers), slopes)
         return questions
     return {one: _of_parameter(rig, one) for names in own.values() for one in names}
 
 
 def _stderr(known: Blocks, more, question: _Question) -> float:
-    """Return the standard errors of the target quantities when some parameters are
+    """Return the rms standard error of the target quantities when some parameters are
     free.
     """
     information, score = known.total()

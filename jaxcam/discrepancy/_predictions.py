@@ -52,14 +52,14 @@ def predictions(
     *,
     progress: Callable[[float], None] | None = None,
 ) -> tuple[Prediction, ...]:
-    """Predict the speeds at which the motion of a cam-follower rig changes, by both
+    """Predict the speeds at which the motion of a cam-follower rig changes, with both
     models.
 
     These are the speeds of valve float, of the fold and the flip of P(1,1), and of the
-    interruption of complete chatter. Their errors are estimated from random rigs drawn
-    according to the errors of the fits. The named terms are part of the second model,
-    except those with an independent frequency, whose motion is not periodic with the
-    cam.
+    interruption of complete chatter. Their errors are estimated from random rigs, drawn
+    from the distribution of the fitted parameters. The second model includes the named
+    terms except those with a frequency of their own, because the motion is then not
+    periodic with the cam.
 
     Args:
         found: The diagnosis.

@@ -1,7 +1,7 @@
 """Find and exclude a recording that is inconsistent with the others.
 
-No physics shared with the others explains a misread recording (another gain, another
-rig, a wrong unit), and it would hide the physics that is missing in all of them.
+A misread recording (wrong gain, rig or unit) cannot be explained by physics that it
+shares with the others, and it would hide the physics missing in all of them.
 """
 
 import dataclasses
@@ -16,8 +16,8 @@ def odd_record(found: Diagnosis) -> str | None:
     """Return the recording that a diagnosis leaves unexplained while it explains all
     others.
 
-    There must be at least `policy.records_apart` recordings. The cost per sample of
-    this one is not `near` the data and exceeds that of every other one by a factor of
+    There must be at least `policy.records_apart` recordings. The cost per sample of the
+    odd one exceeds `policy.near`, and that of every other one by a factor of
     `policy.odd`.
     """
     policy, costs = found.policy, cost_by_record(found.after)
@@ -52,12 +52,12 @@ def set_aside(found: Diagnosis, again: Diagnosis, name: str) -> Diagnosis:
     costs = cost_by_record(found.after)
     better = max(cost_by_record(again.after).values()) < costs[name] / found.policy.odd
     chosen = again if better else found
-    done = "is excluded" if better else "is not explained by any term that was tried"
+    done = "is excluded" if better else "is not explained by any of the terms tried"
     sentence = (
-        f"The recording {name} {done}: its residual from the model of all recordings "
-        f"is {np.sqrt(costs[name]):.2g} times the noise, that of every other one at "
-        f"most {np.sqrt(sorted(costs.values())[-2]):.2g} times. Check how it was made "
-        "and read."
+        f"The recording {name} {done}: with the model fitted to all recordings, its "
+        f"residual is {np.sqrt(costs[name]):.2g} times the noise, that of every other "
+        f"one at most {np.sqrt(sorted(costs.values())[-2]):.2g} times. Check how it "
+        "was recorded and read."
     )
     caveat = Caveat(Reason.SET_ASIDE, sentence)
     return dataclasses.replace(chosen, caveats=(caveat, *chosen.caveats))

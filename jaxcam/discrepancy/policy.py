@@ -1,9 +1,9 @@
-"""Define all settings of a diagnosis.
+"""All settings of a diagnosis.
 
-The first group decides a verdict; quantities that follow from the data or from another
-setting (the BIC, the error rate per term, the detection limit) are derived. The second
-group limits the search: it changes the computing time and should not change the
-verdict. A third group selects the content of a report.
+The first group determines the verdict; quantities that follow from the data or from
+another setting (the BIC, the error rate per term and the detection limit) are derived.
+The second group limits the search: it affects the computing time and should not affect
+the verdict. The third group determines the content of a report.
 """
 
 import dataclasses
@@ -16,7 +16,7 @@ from scipy.stats import norm
 
 
 class Group(enum.StrEnum):
-    """The aspect that a setting of a policy can change."""
+    """What a setting of a policy affects."""
 
     VERDICT = "verdict"
     BUDGET = "budget"
@@ -50,13 +50,13 @@ class Setting(NamedTuple):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Policy:
-    """Settings that decide a verdict, limit a search, and choose the content of a
-    report.
+    """Settings that determine the verdict, limit the search and select the content of
+    the report.
 
     To change a setting, pass `diagnose(..., policy=Policy(false_alarms=0.05))`. Numbers
     without a unit are ratios or counts. A cost is minus twice the log-likelihood; a
     cost per sample of one means that the residuals are pure noise.
-    [Discrepancy](../discrepancy.md) has the table of all fields, and `settings` yields
+    [Discrepancy](../discrepancy.md) lists all fields in a table, and `settings` yields
     each with its meaning.
 
     Raises:
@@ -68,7 +68,7 @@ class Policy:
         0.05
     """
 
-    # settings that decide a verdict
+    # settings that determine the verdict
     false_alarms: float = _decides(
         0.01,
         "probability that any term is named although nothing is missing; divided among "
@@ -122,10 +122,10 @@ class Policy:
         2.5, "minimum integration steps per period of a vibration"
     )
     residual_lags: int = _decides(
-        20, "lags (samples) of the autocorrelation of the residuals"
+        20, "number of lags (samples) in the autocorrelation test of the residuals"
     )
     residual_stretches: int = _decides(
-        4, "sections per recording in that test; the worst is not counted"
+        4, "sections per recording in that test; the worst one is ignored"
     )
     velocity_tail: float = _decides(
         0.005, "share of the velocities beyond each end of a free function of velocity"
@@ -160,7 +160,7 @@ class Policy:
     )
     iterations: int = _bounds(60, "maximum iterations in the fit of a leading subset")
     heldout_iterations: int = _bounds(
-        15, "maximum iterations in a fit to a part of the recordings"
+        15, "maximum iterations in a fit to part of the recordings"
     )
     state_iterations: int = _bounds(
         12, "maximum Newton steps when only states are fitted"
@@ -171,7 +171,7 @@ class Policy:
     kept: int = _bounds(3, "number of subsets of each size that are extended")
     tried: int = _bounds(6, "number of subsets fitted at each size above one")
     leads: float = _bounds(
-        50.0, "difference in BIC up to which a subset may lead to a better one"
+        50.0, "difference in BIC up to which a subset is extended further"
     )
     helped: float = _bounds(
         0.7, "maximum share of the cost that a term may leave for the search to go on"
@@ -185,17 +185,19 @@ class Policy:
         3.0, "prior standard errors beyond which a fit is restarted from nominal"
     )
     hopeless: float = _bounds(
-        2.0, "multiple of the smallest cost above which a fit is not refined"
+        2.0, "multiple of the smallest cost above which a fit is not refined further"
     )
     explained: float = _bounds(
         1.2, "cost per sample below which a fit is never stopped early"
     )
     crawl_steps: int = _bounds(
-        2, "number of last steps by which slow convergence is detected"
+        2, "number of final steps used to detect slow convergence"
     )
-    crawl_attempts: int = _bounds(4, "minimum number of attempts in these steps")
+    crawl_attempts: int = _bounds(
+        4, "minimum number of step attempts during these steps"
+    )
     crawl_gain: float = _bounds(
-        0.01, "maximum share of the remaining cost gained in these steps"
+        0.01, "share of the remaining cost below which the gain in these steps is slow"
     )
     late: int = _bounds(
         8, "attempts after which a fit must be better than the subset it extends"
@@ -230,7 +232,8 @@ class Policy:
         4, "maximum number of fits of a free function until its prior converges"
     )
     recentred: int = _bounds(
-        12, "additional fits until the parameters of an element converge"
+        12,
+        "maximum number of additional fits for the parameters of an element",
     )
     heated: float = _bounds(
         1.5, "ratio of consecutive costs below which the prior has converged"
@@ -292,7 +295,7 @@ class Policy:
         "(above it, evidence is very strong: Kass and Raftery 1995)",
     )
     moved_errors: float = _shows(
-        3.0, "standard errors above which the summary reports a moved parameter"
+        3.0, "standard errors above which the summary reports a shifted parameter"
     )
     rival: float = _shows(
         30.0, "difference in BIC up to which the next experiment tests another term"
@@ -304,10 +307,12 @@ class Policy:
         3.0, "standard deviations above which an excess of cost is not noise"
     )
     nearby: float = _shows(
-        0.03, "distance at which data are near a point, as a share of the range"
+        0.03,
+        "distance within which data count as near a point, as a share of the range",
     )
     visited: float = _shows(
-        0.1, "minimum density of data where a function is shown, relative to uniform"
+        0.1,
+        "minimum data density at which a function is shown, relative to uniform",
     )
     shape_points: int = _shows(48, "number of points at which a free function is shown")
     alternatives: int = _shows(8, "maximum number of alternatives listed")

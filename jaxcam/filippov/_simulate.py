@@ -1,4 +1,4 @@
-"""Simulate a Filippov system and locate every switch."""
+"""Simulate a Filippov system and locate all switches."""
 
 import jax
 import jax.numpy as jnp
@@ -34,9 +34,9 @@ def simulate_filippov(
 ) -> FilippovTrajectory:
     """Simulate a Filippov system from `t0` to `t1`.
 
-    Switches are located to the accuracy of the steps; switches within a step are
-    detected by a cubic in time. On the surface the motion crosses, or slides by
-    Filippov's convex combination until one field becomes tangent.
+    Switches are located with the accuracy of the steps; switches within a step are
+    detected by a cubic in time. At the surface, the motion crosses, or slides according
+    to Filippov's convex combination until one field becomes tangent.
 
     Args:
         system: The system.
@@ -44,13 +44,13 @@ def simulate_filippov(
         t0: Start time (s).
         t1: End time (s).
         tolerance: Relative error allowed per step.
-        max_steps: Budget of attempted integration steps.
+        max_steps: Maximum number of attempted integration steps.
 
     Returns:
         A [`jaxcam.filippov.FilippovTrajectory`][].
 
     Raises:
-        ValueError: The start is not finite, or on the part of the surface from which
+        ValueError: The start is not finite, or is on a part of the surface from which
             both fields point away, where the motion is not unique.
 
     Examples:
@@ -103,7 +103,7 @@ def simulate_filippov(
 def _check(system, state, t0, t1):
     system.check()
     if state.ndim != 1 or not bool(jnp.all(jnp.isfinite(state))):
-        raise ValueError("Give a state that is one vector of finite numbers.")
+        raise ValueError("Give the state as one vector of finite numbers.")
     if not (
         bool(jnp.isfinite(t0)) and bool(jnp.isfinite(t1)) and float(t1) > float(t0)
     ):

@@ -1,6 +1,6 @@
 """Take one attempted step: accept it, shorten it, or end it at the surface.
 
-It is separate from the event loop of `jaxcam.hybrid`, because a switch changes the
+This is separate from the event loop of `jaxcam.hybrid`, because a switch changes the
 field and not the state: there are no impacts, and a step ends on the surface.
 """
 
@@ -17,8 +17,8 @@ from .modes import levels, mode_after, mode_field, onto_surface
 NOTHING, STEP, EVENT = 0, 1, 2
 RUNNING, DONE, FAILED, NOT_FINITE = 0, 1, 2, 3
 
-# an event is reached by a series from this part of the step on, which then errs by its
-# third power
+# an event beyond this fraction of the step is reached by a series, whose error is of
+# third order in the rest
 _CLOSE = 1e-5
 _RETAKES = 80
 
@@ -30,15 +30,17 @@ class FilippovState(NamedTuple):
     x: Any
     mode: Any
     step: Any
-    """Length of the next step, and of the last one that no event cut short."""
+    """Length of the next step, and of the last step that was not shortened by an
+    event.
+    """
     natural: Any
     failures: Any
     status: Any
 
 
 class StepRow(NamedTuple):
-    """The outcome of an attempted step: its kind, and time, state, mode and level after
-    it.
+    """The outcome of an attempted step: its kind, and the time, state, mode and level
+    after it.
     """
 
     kind: Any
@@ -49,12 +51,12 @@ class StepRow(NamedTuple):
 
 
 def in_mode(system: FilippovSystem, mode, t, x, h):
-    """Take a step of the field in force; sliding stays on the surface."""
+    """Take a step along the active field; sliding stays on the surface."""
 
     def field(s, y):
         return mode_field(system, mode, s, y)
 
-    # of order five: over its steps a level is nearly cubic, so its minima are detected
+    # fifth order: over its steps, a level is nearly cubic, so its minima are detected
     after, error, _ = array_step(DOPRI5, field, t, x, h, unrolled=True)
     held = onto_surface(system, t + h, after)
     return jnp.where(mode == 0, held, after), error
@@ -63,7 +65,7 @@ def in_mode(system: FilippovSystem, mode, t, x, h):
 def attempt(
     system: FilippovSystem, tolerance, t1, carried: FilippovState
 ) -> tuple[FilippovState, StepRow]:
-    """Try one step towards `t1`; a motion that has ended stays as it is."""
+    """Attempt one step towards `t1`; a motion that has ended does not change."""
     active = carried.status == RUNNING
     wanted = jax.lax.stop_gradient(carried.step)
     last = carried.t + wanted >= t1
@@ -103,7 +105,8 @@ def attempt(
     retake = fits & (part < 1)
     good = fits & ~retake & active
 
-    # the event: the remaining time by a series, which also carries its derivative
+    # the event: the remaining time follows from a series, which also carries its
+    # derivative
     delta = jnp.where(lands, offset[which], 0.0)
 
     def field(t, x):
@@ -149,9 +152,10 @@ def attempt(
 
 
 def _dip(value0, slope0, value1, slope1):
-    """Return the place at which the cubic through two ends is below zero; 1 if nowhere.
+    """Return the position at which the cubic through two ends is below zero; 1 if it
+    never is.
 
-    The place is that of its least value, as a fraction of the step.
+    The position is that of its minimum, as a fraction of the step.
     """
     a = 2 * (value0 - value1) + slope0 + slope1
     b = -3 * (value0 - value1) - 2 * slope0 - slope1

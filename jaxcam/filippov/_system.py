@@ -1,4 +1,4 @@
-"""Define a Filippov system: one vector field on either side of a surface."""
+"""Filippov systems, with one vector field on either side of a surface."""
 
 import abc
 from typing import Any, ClassVar
@@ -10,12 +10,12 @@ from jaxtyping import Array, Float
 class FilippovSystem(eqx.Module):
     """A system whose vector field jumps across a surface (thesis, eq. 2.19).
 
-    Subclass it and define the three methods below, smooth in time and state, also
-    beyond the surface. Every floating-point field is a parameter. The state itself
+    Subclass it and define the three methods below, which must be smooth in time and
+    state, even beyond the surface. Every floating-point field is a parameter. The state
     never jumps. In a [`jaxcam.hybrid.HybridSystem`][], by contrast, the surface is
-    never crossed, contact takes two conditions on the state (gap and normal velocity)
-    and begins by an impact. Here both sides are open and sliding takes one condition,
-    so the two kinds have separate event loops.
+    never crossed, and contact imposes two conditions on the state (gap and normal
+    velocity) and begins with an impact. Here, the motion can be on both sides, and
+    sliding imposes one condition. The two kinds therefore have separate event loops.
 
     Examples:
         >>> from jaxcam.filippov import FilippovSystem, simulate_filippov
@@ -31,9 +31,9 @@ class FilippovSystem(eqx.Module):
     """
 
     state_names: ClassVar[tuple[str, ...]] = ()
-    """Names of the state's components."""
+    """Names of the state components."""
     state_units: ClassVar[tuple[str, ...]] = ()
-    """Units of the state's components."""
+    """Units of the state components."""
 
     @abc.abstractmethod
     def above(self, t, state: Float[Array, " n"]) -> Float[Array, " n"]:
@@ -45,11 +45,11 @@ class FilippovSystem(eqx.Module):
 
     @abc.abstractmethod
     def switching(self, t, state: Float[Array, " n"]) -> Float[Array, ""]:
-        """Return the scalar H whose zero is the surface."""
+        """Return the scalar H that is zero on the surface."""
 
     @property
     def period(self) -> Any:
-        """Period of the forcing (s), or `None` for a system without one."""
+        """Period of the forcing (s), or `None` for an autonomous system."""
         return None
 
     def check(self) -> None:

@@ -12,16 +12,16 @@ from ._system import FilippovSystem
 
 
 class Switches(eqx.Module):
-    """The events of a motion, in order: crossings, and begin and end of sliding."""
+    """The events of a motion, in order: crossings, and the start and end of sliding."""
 
     time: Float[Array, " k"]
     """Time of each event (s), shape `(k,)`."""
     state: Float[Array, "k n"]
-    """State there, shape `(k, n)`."""
+    """State at each event, shape `(k, n)`."""
     before: Int[Array, " k"]
-    """Mode before the event, 1 above, 0 sliding, -1 below; shape `(k,)`."""
+    """Mode before each event: 1 above, 0 sliding, -1 below; shape `(k,)`."""
     after: Int[Array, " k"]
-    """Mode after the event, shape `(k,)`."""
+    """Mode after each event, shape `(k,)`."""
 
     @property
     def count(self) -> int:
@@ -49,13 +49,13 @@ class FilippovTrajectory(eqx.Module):
     time: Float[Array, " s"]
     """Times at the ends of the steps (s), shape `(s,)`."""
     state: Float[Array, "s n"]
-    """States there, shape `(s, n)`."""
+    """States at these times, shape `(s, n)`."""
     mode: Int[Array, " s"]
-    """Mode from there on: 1 above, 0 sliding, -1 below; shape `(s,)`."""
+    """Mode after each of these times: 1 above, 0 sliding, -1 below; shape `(s,)`."""
     switches: Switches
     """The events, in order."""
     result: str = eqx.field(static=True)
-    """Empty, or the reason why t1 was not reached."""
+    """The reason why t1 was not reached; empty if it was."""
 
     @property
     def final(self) -> Float[Array, " n"]:
@@ -63,17 +63,17 @@ class FilippovTrajectory(eqx.Module):
         return self.state[-1]
 
     def at(self, times: VectorLike) -> Float[Array, "times n"]:
-        """Return the state at each of `times` (s), by one more step from the point
-        before it.
+        """Return the state at each of `times` (s), by one additional step from the
+        point before it.
 
         Args:
             times: Times (s), shape `(times,)`.
 
         Returns:
-            Shape `(times, n)`.
+            States, shape `(times, n)`.
 
         Raises:
-            ValueError: A time lies outside the run.
+            ValueError: A time is outside the run.
         """
         wanted = np.asarray(times, dtype=float)
         known = np.asarray(self.time)
@@ -82,7 +82,7 @@ class FilippovTrajectory(eqx.Module):
             wanted.min() >= known[0] - room and wanted.max() <= known[-1] + room
         ):
             raise ValueError(
-                f"times reach from {wanted.min():g} to {wanted.max():g} s but the "
+                f"times extend from {wanted.min():g} to {wanted.max():g} s, but the "
                 f"trajectory covers {known[0]:g} to {known[-1]:g} s"
             )
         k = np.clip(np.searchsorted(known, wanted, side="right") - 1, 0, len(known) - 1)
@@ -96,8 +96,8 @@ class FilippovTrajectory(eqx.Module):
         )
 
     def sliding(self) -> Float[Array, "intervals 2"]:
-        """Return begin and end (s) of each interval of sliding, shape
-        `(intervals, 2)`.
+        """Return the start and end (s) of each sliding interval, shape `(intervals,
+        2)`.
         """
         mode, time = np.asarray(self.mode), np.asarray(self.time)
         held = mode == 0

@@ -1,4 +1,4 @@
-"""Run the loop with or without a record, or integrate a single mode."""
+"""Run the event loop with or without a record, or integrate a single mode."""
 
 import equinox as eqx
 import equinox.internal as eqxi
@@ -13,7 +13,7 @@ from .modes import first_mode
 
 
 CHUNK = 256
-"""Attempts between two checks from Python."""
+"""Number of attempts between two checks from Python."""
 
 
 def first_filippov_state(system: FilippovSystem, state, t0, t1) -> FilippovState:
@@ -32,7 +32,7 @@ def start(system, state, t0, t1) -> FilippovState:
 
 @eqx.filter_jit
 def chunk(system, tolerance, t1, carried: FilippovState):
-    """Run many attempts, with a row for each."""
+    """Run many attempts, recording a row for each."""
 
     def one(carried, _):
         return attempt(system, tolerance, t1, carried)
@@ -49,11 +49,11 @@ def filippov_flow(
     tolerance=1e-10,
     max_steps: int = 100_000,
 ) -> Float[Array, " n"]:
-    """Return the state at `t1` of the motion that starts from `state`; for use inside
+    """Return the state at `t1` of the motion that starts at `state`; for use inside
     `jit`.
 
-    It can be batched and differentiated in state, times and parameters: crossing,
-    entering and leaving a sliding mode carry their derivatives.
+    It can be batched, and differentiated with respect to state, times and parameters,
+    including the effects of crossing the surface and of entering and leaving sliding.
 
     Args:
         system: The system.
@@ -64,7 +64,8 @@ def filippov_flow(
         max_steps: Budget of attempted integration steps.
 
     Returns:
-        Shape `(n,)`; NaN if `t1` is not reached within `max_steps` attempted steps.
+        The state, shape `(n,)`; NaN if `t1` is not reached within `max_steps` attempted
+            steps.
 
     Examples:
         >>> from jaxcam.filippov import filippov_flow
@@ -98,7 +99,8 @@ def leg_flow(
 ) -> Float[Array, " n"]:
     """Integrate one mode from `t0` to `t1` in equal steps, without events.
 
-    It is differentiable: the flow between two events of variational theory.
+    The result is differentiable: it is the flow between two events that variational
+    theory needs.
 
     Args:
         system: The system.

@@ -1,4 +1,6 @@
-"""Classify motion at the surface: crossing, sliding, and the field in force."""
+"""Classify the motion at the surface (crossing or sliding), and find the active
+field.
+"""
 
 import jax
 import jax.numpy as jnp
@@ -10,8 +12,8 @@ from ._system import FilippovSystem
 def surface_rates(
     system: FilippovSystem, t, state: Float[Array, " n"]
 ) -> tuple[Float[Array, ""], Float[Array, ""]]:
-    """Return the rates of change of H along both fields, time included (thesis,
-    eq. 3.9).
+    """Return the rates of change of H along both fields, including time (thesis, eq.
+    3.9).
 
     Args:
         system: The system.
@@ -31,8 +33,8 @@ def surface_rates(
 
 
 def sliding_share(system: FilippovSystem, t, state) -> Float[Array, ""]:
-    """Return the share of the field above in sliding: between 0 and 1 where it
-    slides.
+    """Return the share of the upper field in sliding; it is between 0 and 1 if the
+    system slides.
     """
     above, below = surface_rates(system, t, state)
     difference = below - above
@@ -62,10 +64,10 @@ def equivalent_control(
 ) -> tuple[Float[Array, ""], Float[Array, " n"]]:
     """Return Utkin's equivalent control of x' = f + g u with u = 1 above and -1 below.
 
-    It solves H_t + H_x (f + g u) = 0 and lies in [-1, 1] where the system slides.
-    Because the control enters linearly, its field is Filippov's. It is also the force
-    of dry friction over the largest friction force, or the mean of a relay (V. I.
-    Utkin's method of equivalent control).
+    It solves H_t + H_x (f + g u) = 0 and is in [-1, 1] if the system slides. Because
+    the control enters linearly, the resulting field is that of Filippov. It is also the
+    dry-friction force divided by its maximum, or the mean of a relay (V. I. Utkin's
+    method of equivalent control).
 
     Args:
         system: The system.
@@ -95,8 +97,8 @@ def equivalent_control(
 def region(system: FilippovSystem, t, state: Float[Array, " n"]) -> str:
     """Classify a state on the surface.
 
-    "crossing up", "crossing down", "sliding" (both fields point to the surface),
-    "escaping" (both point away: the motion is not unique), or "tangent".
+    A state is "crossing up", "crossing down", "sliding" (both fields point towards the
+    surface), "escaping" (both point away, so the motion is not unique), or "tangent".
 
     Args:
         system: The system.
@@ -115,8 +117,7 @@ def region(system: FilippovSystem, t, state: Float[Array, " n"]) -> str:
 
 
 def mode_field(system: FilippovSystem, mode, t, state) -> Float[Array, " n"]:
-    """Return the field in force: mode 1 above the surface, -1 below it, 0 sliding on
-    it.
+    """Return the active field: mode 1 above the surface, -1 below it, 0 sliding on it.
 
     Args:
         system: The system.
@@ -132,9 +133,9 @@ def mode_field(system: FilippovSystem, mode, t, state) -> Float[Array, " n"]:
 
 
 def levels(system: FilippovSystem, mode, t, state) -> Float[Array, " 2"]:
-    """Return the quantities that stay positive in a mode: H, or both inward rates.
+    """Return the quantities that remain positive in a mode: H, or both inward rates.
 
-    The second level of a side is always 1.
+    On one side of the surface, the second level is always 1.
     """
     above, below = surface_rates(system, t, state)
     height = mode * system.switching(t, state)
@@ -151,8 +152,9 @@ def onto_surface(system: FilippovSystem, t, state) -> Float[Array, " n"]:
 def mode_after(system: FilippovSystem, mode, level, t, state):
     """Return the mode in which a motion continues from an event on the surface.
 
-    A side ends in crossing or sliding; sliding ends where one of the fields begins to
-    point away from the surface, to the side of that field.
+    Motion on one side ends in crossing or sliding. Sliding ends when one of the fields
+    begins to point away from the surface; the motion then continues on the side of that
+    field.
     """
     above, below = surface_rates(system, t, state)
     down = jnp.where(below < 0, -1.0, 0.0)
@@ -162,7 +164,7 @@ def mode_after(system: FilippovSystem, mode, level, t, state):
 
 
 def first_mode(system: FilippovSystem, t, state):
-    """Return the mode of a start; escaping counts as above."""
+    """Return the initial mode; escaping counts as above."""
     height = system.switching(t, state)
     above, below = surface_rates(system, t, state)
     on = jnp.abs(height) <= 1e-12 * (1.0 + jnp.max(jnp.abs(state)))

@@ -1,4 +1,4 @@
-"""Bayesian bootstrap over blocks: the scatter of estimates under random weights."""
+"""Block-wise Bayesian bootstrap: the scatter of estimates under random weights."""
 
 import dataclasses
 from collections.abc import Callable
@@ -13,11 +13,11 @@ from .engine import Weights
 
 @dataclasses.dataclass(frozen=True)
 class Bootstrap:
-    """Estimates of a Bayesian bootstrap, in the order of the fit.
+    """Estimates from a Bayesian bootstrap, in the order of the fit.
 
-    Unlike the Fisher information they account for the actual residuals: a
-    model with a discrepancy scatters more than the noise explains.
-    The example continues that of [`jaxcam.fitting.fit`][].
+    Unlike the Fisher information, they account for the actual residuals: if the model
+    has a discrepancy, the estimates scatter more than the noise explains. The example
+    continues that of [`jaxcam.fitting.fit`][].
 
     Examples:
         >>> from jaxcam.fitting import bootstrap
@@ -36,7 +36,7 @@ class Bootstrap:
         return np.std(self.estimates, axis=0, ddof=1)
 
     def interval(self, name: str, level: float = 0.95) -> tuple[float, float]:
-        """Return the interval between the outer percentiles of a parameter."""
+        """Return the percentile interval of a parameter."""
         names = [one.name for one in self.found.estimates]
         column = self.estimates[:, names.index(self.found[name].name)]
         low, high = np.quantile(column, [(1 - level) / 2, (1 + level) / 2])
@@ -55,21 +55,22 @@ def bootstrap(
     """Repeat a fit with random weights of flights and contacts (Bayesian bootstrap over
     blocks; Rubin, 1981).
 
-    A block is one flight, all its pieces together, or one contact, since residuals are
-    correlated within one part of a motion. Weights are exponential with mean 1. Drawing
-    blocks with replacement would give weights of the same mean and variance, but would
-    omit some blocks, and with them the impacts at both their ends. Each repetition
-    starts at the optimum and needs few iterations. The example continues that of
-    [`jaxcam.fitting.fit`][].
+    A block is one flight with all its pieces, or one contact, because residuals are
+    correlated within a flight or contact. The weights are exponentially distributed
+    with mean 1. Drawing blocks with replacement would give weights of the same mean and
+    variance, but would omit some blocks and the impacts at both their ends. Each
+    repetition starts at the optimum and needs few iterations. The example continues
+    that of [`jaxcam.fitting.fit`][].
 
     Args:
         found: The fit.
         repetitions: Number of repetitions.
         seed: Seed of the random weights.
-        prior: Whether tolerances count as prior knowledge; use the value used for
+        prior: Whether tolerances count as prior knowledge; use the same value as for
             `found`.
-        iterations: Largest number of iterations of each repetition.
-        progress: Called with the number of repetitions done, and their total number.
+        iterations: Maximum number of iterations in each repetition.
+        progress: Called with the number of completed repetitions and their total
+            number.
 
     Returns:
         A [`jaxcam.fitting.Bootstrap`][].

@@ -1,4 +1,4 @@
-"""State the cam-follower as a fitting problem: parameters, tolerances and sensors."""
+"""The cam-follower as a fitting problem: parameters, tolerances and sensors."""
 
 import math
 from collections.abc import Sequence
@@ -10,7 +10,8 @@ from .engine import cam_follower_drive, Model, Parameter, Sensor
 def cam_follower_model(
     rig: Rig, channels: Sequence[str] = ("follower_angle_rad",)
 ) -> Model:
-    """Return the nominal model with its sensors; the drive follows the cam's encoder.
+    """Return the nominal model with its sensors and a drive that follows the cam
+    encoder.
 
     Args:
         rig: The rig.
@@ -40,7 +41,7 @@ def cam_follower_model(
 
 
 def rig_sensors(rig: Rig) -> dict[str, Sensor]:
-    """Return the sensors of the follower, by channel, as the rig file states them.
+    """Return the sensors of the follower as specified in the rig file.
 
     Args:
         rig: The rig.
@@ -75,15 +76,16 @@ def rig_sensors(rig: Rig) -> dict[str, Sensor]:
 
 
 def cam_follower_parameters(rig: Rig, base=lambda system: system) -> list[Parameter]:
-    """Return the identifiable parameters of the rig: K (as K/J), spring, cam,
-    restitution.
+    """Return the identifiable parameters of the rig: stiffness K (as K/J), spring, cam
+    and restitution.
 
-    The inertia is held, since only K/J acts; so is the follower's half height in the
-    profile, since only its sum with the cam's radius does.
+    The inertia is held fixed because only K/J affects the motion. The follower's half
+    height in the profile is also fixed, because only its sum with the cam radius
+    matters.
 
     Args:
         rig: The rig.
-        base: Picks the `CamFollower` out of a system that wraps it.
+        base: Selects the `CamFollower` in a system that wraps it.
 
     Returns:
         A list of [`jaxcam.fitting.Parameter`][].

@@ -8,10 +8,10 @@ import numpy as np
 from .engine import Costs, FLIGHT, IMPACT, Point, Problem, Weights
 
 
-# Cost of a sample, or of a component of a joint, that noise does not explain: it is 1
-# on average, and a piece of thousands of samples is within a few per cent of that
+# Cost per sample, or per component of a joint, that noise does not explain: with noise
+# alone it is 1 on average, and within a few per cent of 1 for thousands of samples
 _PIECE, _JOINT, _MEAN = 4.0, 9.0, 9.0
-# Fraction of the pieces that must be below it: a bad recording among many is an outlier
+# Fraction of the pieces that must be below it: one bad recording of many is an outlier
 _USUAL = 0.75
 # Tolerance for reaching a bound, relative to the parameter's scale
 _ON_BOUND = 1e-9
@@ -56,8 +56,8 @@ def not_finite(problem: Problem, point: Point, cost: float, costs: Costs) -> str
         r, k = np.argwhere(bad)[0]
         when = float(np.asarray(pieces.flown.start)[r, k])
         return (
-            f"The model gives no finite number in {problem.records[r]} from {when:.4g} "
-            f"s on; check its vector field, gap and impact there, or bound the "
+            f"The model is not finite in {problem.records[r]} from {when:.4g} s "
+            f"onwards; check its vector field, gap and impact there, or bound the "
             f"parameters."
         )
     if not np.isfinite(cost):
@@ -66,10 +66,10 @@ def not_finite(problem: Problem, point: Point, cost: float, costs: Costs) -> str
 
 
 def far_from_data(problem: Problem, costs: Costs, weights: Weights | None) -> str:
-    """Return a sentence if the cost is far above the noise, otherwise the empty string.
+    """Return a sentence if the cost is far above the noise, otherwise an empty string.
 
     The test uses the upper quartile over the pieces, so that one bad recording among
-    many does not count, and the mean, so that no part may be very far off.
+    many does not matter, and the mean, so that no part can be very far off.
     """
     pieces = problem.pieces
     weights = weights or problem.everything()
@@ -100,8 +100,8 @@ def far_from_data(problem: Problem, costs: Costs, weights: Weights | None) -> st
         if not level <= most:
             return (
                 f"The fit is far from the data in {name}: the {what} at least "
-                f"{level:.3g} in a quarter of them, whereas noise gives 1; the model, "
-                "the initial values or the stated noise are wrong."
+                f"{level:.3g} in a quarter of the cases, compared with 1 for noise; "
+                "the model, the initial values or the stated noise must be wrong."
             )
     total = np.where(used, flown + joints, 0.0)
     rest = np.sum(np.where(resting, rested, 0.0))
@@ -112,7 +112,7 @@ def far_from_data(problem: Problem, costs: Costs, weights: Weights | None) -> st
         when = float(np.asarray(pieces.flown.start)[r, k])
         return (
             f"The fit is far from the data: the cost per sample is {mean:.3g}, "
-            f"whereas noise gives 1; most of it is in {problem.records[r]} near "
+            f"compared with 1 for noise; it is largest in {problem.records[r]} near "
             f"{when:.4g} s, so check the residuals there."
         )
     return ""
@@ -128,7 +128,7 @@ def on_a_bound(problem: Problem, free, point: Point) -> list[str]:
         for bound, side in ((parameter.lower, "lower"), (parameter.upper, "upper")):
             if np.any(np.abs(column - bound) <= near):
                 found.append(
-                    f"{name} is at its {side} bound {bound:g}, where its error means "
-                    f"nothing; widen the bound or hold the parameter."
+                    f"{name} is at its {side} bound {bound:g}, where its error is "
+                    f"meaningless; widen the bound or hold the parameter."
                 )
     return found

@@ -1,6 +1,4 @@
-"""Compute the joint confidence region of parameters, the ellipsoid of their
-covariance.
-"""
+"""Compute the joint confidence region of parameters from their covariance."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -14,10 +12,10 @@ from jaxtyping import Bool, Float
 class Ellipse:
     """Joint confidence region of d parameters, an ellipse or an ellipsoid.
 
-    The points p with (p - centre)' C^-1 (p - centre) below the quantile of a chi-square
-    with d degrees of freedom, C the covariance of these parameters with all others left
-    free. It is exact for a model that is linear over the region; for a nonlinear model
-    see [`jaxcam.fitting.excess_cost`][].
+    It contains the points p with (p - centre)' C^-1 (p - centre) below the quantile of
+    the chi-square distribution with d degrees of freedom, where C is the covariance of
+    these parameters with all others free. The region is exact for a model that is
+    linear over it; for a nonlinear model see [`jaxcam.fitting.excess_cost`][].
     """
 
     names: tuple[str, ...]
@@ -31,20 +29,21 @@ class Ellipse:
 
     @property
     def limit(self) -> float:
-        """Chi-square at the edge."""
+        """Chi-square at the boundary."""
         return float(scipy.stats.chi2.ppf(self.level, len(self.names)))
 
     @property
     def axes(self) -> Float[np.ndarray, "d d"]:
-        """Half axes, one a row, from the centre to the edge, the longest first.
-
+        """Semi-axes, one per row, from the centre to the boundary, the longest first.
         They are orthogonal with each parameter in units of its standard error, so they
         do not depend on the units.
         """
         return (self._roots() * np.sqrt(self.limit)).T
 
     def chi_square(self, points: Float[np.ndarray, "*k d"]) -> Float[np.ndarray, "*k"]:
-        """Return the squared distance of points from the centre, in standard errors."""
+        """Return the squared distance of points from the centre, in units of the
+        standard errors.
+        """
         off = (np.asarray(points, dtype=float) - self.centre) @ np.linalg.pinv(
             self._roots()
         ).T
@@ -55,15 +54,15 @@ class Ellipse:
         return self.chi_square(points) <= self.limit
 
     def polygon(self, points: int = 181) -> Float[np.ndarray, "k 2"]:
-        """Return the edge of an ellipse as a closed line, shape `(points, 2)`, for
-        drawing.
+        """Return the boundary of an ellipse as a closed line for plotting, shape
+        `(points, 2)`.
 
         Raises:
             ValueError: There are more than two parameters.
         """
         if len(self.names) != 2:
             raise ValueError(
-                f"An ellipsoid of {len(self.names)} parameters has no outline; ask for "
+                f"An ellipsoid of {len(self.names)} parameters has no outline; request "
                 f"the ellipse of two of them."
             )
         angle = np.linspace(0.0, 2 * np.pi, points)
@@ -81,12 +80,12 @@ class Ellipse:
 def ellipse_of(
     names: Sequence[str], labels: Sequence[str], centre, covariance, level: float
 ) -> Ellipse:
-    """Return the region of the parameters `names` among those with these labels."""
+    """Return the region of the parameters `names`, which must be among the labels."""
     if not 0 < level < 1:
         raise ValueError(f"The level is {level:g}; give a probability between 0 and 1.")
     if len(set(names)) != len(names) or len(names) < 2:
         raise ValueError(
-            f"A joint region needs two or more different parameters, not "
+            f"A joint region requires two or more different parameters, not "
             f"{', '.join(names) or 'none'}."
         )
     missing = [name for name in names if name not in labels]
@@ -116,7 +115,7 @@ def most_correlated(labels: Sequence[str], correlation) -> str:
     together = "in opposite directions" if value < 0 else "together"
     return (
         f"{labels[k]} and {labels[i]} are the hardest to distinguish: their errors "
-        f"go {together} "
+        f"vary {together} "
         f"(correlation {value:+.4f}), and if one were known, the error of the other "
-        f"would be {kept:.2g} times what it is."
+        f"would be {kept:.2g} times its present value."
     )

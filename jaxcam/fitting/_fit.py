@@ -1,4 +1,4 @@
-"""Fit the parameters of a `Problem` by Levenberg-Marquardt, with eliminated states."""
+"""Fit the parameters of a `Problem` by Levenberg-Marquardt, eliminating the states."""
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -29,16 +29,17 @@ from .engine import (
 
 _ITERATIONS = 60
 PROMISE = 1e-3
-"""A step that promises less than this (twice the log-likelihood) is the last."""
-# and so must an undamped step: less than a tenth of a standard error
+"""The iteration ends if the predicted gain in twice the log-likelihood is below this.
+"""
+# limit of the predicted gain of an undamped step: less than a tenth of a standard error
 _GRADIENT = 1e-2
-# Steps that may follow before the first one is judged
+# Steps that may follow before the first one is accepted or rejected
 _CORRECTIONS = 3
-# A flight with more pieces than this is not predicted from its start at first
+# A flight with more pieces than this is initially not predicted from its start
 _LONG = 16
-# Factors of parameters without a tolerance, for restarts after a fit ended far off
+# Factors on parameters without a tolerance, for restarts after a fit ended far off
 _FACTORS = (0.7, 1.4, 0.5, 2.0)
-# in units of the parameters' scales, over which a model may bend
+# in units of the parameters' scales, over which a model may be nonlinear
 _FIRST_DAMPING, _LEAST_DAMPING, _MOST_DAMPING = 1.0, 1e-6, 1e12
 
 
@@ -55,28 +56,27 @@ def fit(
 ) -> Fit:
     """Fit the free parameters of a problem.
 
-    If a fit from the problem's own start ends far above the noise, and neither `start`
-    nor `stop` was given, it is repeated from other starts, and the best fit is
-    returned.
+    If neither `start` nor `stop` is given and the fit ends far above the noise, it is
+    repeated from other starts, and the best fit is returned.
 
     Args:
         problem: The problem.
-        free: Names of the parameters to fit; default all. The others stay at the values
-            of `start`.
+        free: Names of the parameters to fit; default all. The others keep the values of
+            `start`.
         start: Another fit, or values of some parameters; default the nominal ones.
         weights: Weight of each piece of the data.
         prior: Whether the tolerances count as prior knowledge; bounds always hold.
-        iterations: Largest number of iterations.
-        stop: Called after each iteration with the costs so far, from the start on; if
-            it returns True, the fit ends without convergence. Long flights are first
-            fitted completely with loose joints; the costs are those of the iterations
-            after that.
-        progress: Called with the number of the iteration and the cost.
+        iterations: Maximum number of iterations.
+        stop: Called after each iteration with all costs so far, including that of the
+            start; if it returns True, the fit ends without convergence. Long flights
+            are first fitted to convergence with loose joints; only the costs of the
+            subsequent iterations are passed.
+        progress: Called with the iteration number and the cost.
 
     Returns:
-        A [`jaxcam.fitting.Fit`][]. It has `converged` only at an optimum that the noise
-            explains, away from all bounds, with every error known; its `reasons` say
-            why not.
+        A [`jaxcam.fitting.Fit`][]. It has `converged` only if it is at an optimum away
+            from all bounds, the noise explains the residuals, and every error is
+            finite; otherwise, `reasons` explains why not.
 
     Raises:
         ValueError: A name is not a parameter.
@@ -109,8 +109,8 @@ def fit(
     long = problem.longest_flight > _LONG and fresh
     first = loosely() if long else point
     found = _descend(problem, columns, extras, first, prior, iterations, stop, progress)
-    # above the noise there may be a better optimum; a caller who gives `stop` or
-    # `start` is responsible for that
+    # if the cost is far above the noise, there may be a better optimum; a caller who
+    # gives `stop` or `start` has to search for it
     if fresh and stop is None and iterations > 0 and _far(problem, found, weights):
         for other in _other_starts(problem, columns, extras, point, prior, loosely):
             again = _descend(problem, columns, extras, other, prior, iterations)
@@ -122,7 +122,7 @@ def fit(
 
 
 class _Descent(NamedTuple):
-    """The end of an iteration."""
+    """The result of an iteration."""
 
     point: Point
     blocks: Blocks
@@ -199,8 +199,8 @@ def _descend(
             found, changed = linearise(step)
             value = total(changed, step)
         for _ in range(_CORRECTIONS):
-            # the valley is curved and steep: a long step along it ends on its side, and
-            # is judged after the next steps
+            # the valley is curved and steep: a long step along it ends on its side, so
+            # it is assessed after the next steps
             if value <= cost or not np.isfinite(value):
                 break
             step, _ = damped_step(problem, columns, found, step, damping, prior)
@@ -216,8 +216,8 @@ def _descend(
             damping *= 10
             if damping > _MOST_DAMPING:
                 message = (
-                    "No step improves the fit any more although it is not at an "
-                    "optimum; look at the residuals, or start elsewhere."
+                    "No further step improves the fit, although it is not at an "
+                    "optimum; check the residuals, or start elsewhere."
                 )
                 break
         so_far.append(cost)
@@ -226,18 +226,18 @@ def _descend(
             break
     else:
         message = (
-            f"The optimum was not reached in {iterations} iterations; allow more of "
-            f"them, or start closer."
+            f"The optimum was not reached in {iterations} iterations; allow more, or "
+            f"start closer to it."
         )
     return _Descent(point, blocks, costs, cost, optimal, count, message)
 
 
 def held_out_cost(problem: Problem, found: Fit, weights: Weights) -> float:
-    """Return the cost of held-out data under a fit.
+    """Return the cost of held-out data for a fit.
 
-    The parameters stay as they are; the states of the pieces are fitted to the data, as
-    they cannot be predicted. Joints between pieces that count are included.
-    The example continues that of [`jaxcam.fitting.fit`][].
+    The parameters are not changed; the states of the pieces are fitted to the data,
+    because they cannot be predicted. Joints between held-out pieces are included. The
+    example continues that of [`jaxcam.fitting.fit`][].
 
     Args:
         problem: The problem.
@@ -257,7 +257,7 @@ def held_out_cost(problem: Problem, found: Fit, weights: Weights) -> float:
 
 
 def start_point(problem: Problem, start) -> Point:
-    """Return the start of the iteration."""
+    """Return the starting point of the iteration."""
     if isinstance(start, Fit):
         return start.point
     if isinstance(start, Point):

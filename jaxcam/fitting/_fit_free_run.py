@@ -1,4 +1,4 @@
-"""Fit parameters to the error of complete free runs, the criterion of benchmarks."""
+"""Fit parameters to complete free runs, the criterion used in benchmarks."""
 
 import dataclasses
 from collections.abc import Mapping, Sequence
@@ -24,7 +24,7 @@ from .engine import (
 # Number of updates of the initial states; parameter step, in scales, at which the
 # iteration ends
 _ROUNDS, _SETTLED = 4, 1e-2
-# Evaluations of a round at most
+# Maximum number of evaluations between two updates
 _EVALUATIONS = 40
 
 
@@ -35,7 +35,7 @@ class FreeRunFit:
     model: Model
     """The model with these parameters."""
     values: Mapping[str, float]
-    """Their values, by name."""
+    """Their values by name."""
     runs: tuple[FreeRun, ...]
     """The free run of each recording."""
     converged: bool
@@ -54,16 +54,16 @@ def fit_free_run(
 
     `fit` compares each piece of a recording with a prediction from the piece before,
     and estimates the error of each parameter. This function minimises the error of a
-    simulation that starts at the first samples. A model discrepancy accumulates in it
-    and biases the parameters, so no errors are given. Channels count in units of their
-    noise.
+    simulation that starts at the first samples. A model discrepancy accumulates in the
+    simulation and biases the parameters, so no errors are given. Channels are weighted
+    by the inverse of their noise.
 
     Args:
         model: A system with its sensors and its input.
-        recordings: Recordings without impacts, evenly sampled; one value of each
-            parameter serves all of them.
-        parameters: Parameters to fit; bounds and scales count, tolerances do not.
-        start: Values of some parameters to start from; default those of the model.
+        recordings: Evenly sampled recordings without impacts; each parameter has the
+            same value in all of them.
+        parameters: Parameters to fit; bounds and scales are used, tolerances are not.
+        start: Initial values of some parameters; default those of the model.
         samples: Number of samples from which the initial state of a recording is
             estimated.
 
@@ -72,8 +72,8 @@ def fit_free_run(
 
     Raises:
         RecordingError: See `free_run`.
-        ValueError: A parameter is not one number of the model, or a start is none of
-            the parameters; see also `free_run`.
+        ValueError: A parameter is not a single number of the model, or `start` names an
+            unknown parameter; see also `free_run`.
 
     Examples:
         >>> from jaxcam.fitting import fit_free_run, Model, Parameter, Sensor
@@ -145,14 +145,14 @@ def _missed(ready: Sequence[tuple[Layout, Prepared]], values):
 
 
 def _slopes(ready: Sequence[tuple[Layout, Prepared]], scale, values):
-    """Return the derivatives of the residuals by the parameters."""
+    """Return the derivatives of the residuals with respect to the parameters."""
     units = jnp.asarray(scale)
     rows = [_along(*one, jnp.asarray(values), units) for one in ready]
     return _sound(np.concatenate(rows, axis=1).T) / scale
 
 
 def _sound(numbers):
-    # a motion that is not finite counts as a very large error
+    # a non-finite motion counts as a very large error
     return np.nan_to_num(numbers, nan=1e12, posinf=1e12, neginf=-1e12)
 
 
@@ -162,7 +162,7 @@ def _off(layout: Layout, one: Prepared, values):
     found = simulated(model, restarted(model, one)).channels
     missed = (found - one.data) / one.noise[None]
     missed = jnp.where(jnp.isfinite(one.data), missed, 0.0)
-    # the samples that the state was found from do not count
+    # the samples from which the state was estimated do not count
     counts = jnp.arange(missed.shape[0]) >= one.samples
     return jnp.ravel(jnp.where(counts[:, None], missed, 0.0))
 

@@ -28,10 +28,10 @@ from .engine import (
 
 @dataclasses.dataclass(frozen=True)
 class Estimate:
-    """A fitted number and its standard error; of a recording where each has its own.
+    """A fitted number and its standard error, for all recordings or for one of them.
 
-    The error is infinite where the data do not constrain the value; the fit then says
-    so and has not converged.
+    The error is infinite if the data do not constrain the value; the fit then reports
+    this and has not converged.
     """
 
     name: str
@@ -43,16 +43,16 @@ class Estimate:
     unit: str = ""
     """Unit."""
     record: str | None = None
-    """Name of the recording, where each has its own value."""
+    """Name of the recording if each has its own value, otherwise `None`."""
 
     @property
     def label(self) -> str:
-        """The name, with `@record` where each recording has its own."""
+        """The name, with `@record` if each recording has its own value."""
         return self.name if self.record is None else f"{self.name}@{self.record}"
 
     @property
     def interval(self) -> tuple[float, float]:
-        """The 95 % interval of a Gaussian with this standard error."""
+        """The 95 % interval of a Gaussian distribution with this standard error."""
         return self.value - 1.96 * self.stderr, self.value + 1.96 * self.stderr
 
 
@@ -74,7 +74,7 @@ class Fit:
     free: tuple[str, ...]
     """Names of the parameters that were free."""
     estimates: tuple[Estimate, ...]
-    """One estimate for each free number, in the order of `covariance`."""
+    """One estimate for each free value, in the order of `covariance`."""
     covariance: Float[np.ndarray, "g g"]
     """Covariance from the Fisher information, including prior knowledge."""
     cost: float
@@ -86,7 +86,7 @@ class Fit:
     iterations: int
     """Number of iterations."""
     ended: str
-    """The reason why the iteration ended, in words."""
+    """The reason the iteration ended, in words."""
     weights: Weights | None = None
     """Weight of each piece of the data; `None` if all have the same weight."""
     unconstrained: tuple[Unconstrained, ...] = ()
@@ -99,11 +99,11 @@ class Fit:
         return self._table().html()
 
     def _table(self) -> ShortTable:
-        """Outcome of the fit, and its estimates."""
+        """Outcome and estimates of the fit."""
         count = (
             f"{self.problem.samples} samples, {len(self.problem.records)} recordings"
         )
-        trusted = "converged" if self.converged else "not to be trusted"
+        trusted = "converged" if self.converged else "not trustworthy"
         rows = [
             (one.label, f"{one.value:.7g}", f"{one.stderr:.2g}", one.unit)
             for one in self.estimates
@@ -114,9 +114,9 @@ class Fit:
 
     @functools.cached_property
     def reasons(self) -> tuple[Reason, ...]:
-        """The reasons not to trust the fit; empty where it has converged.
+        """The reasons not to trust the fit; empty if it has converged.
 
-        They are computed from the fit itself, so they cannot contradict it.
+        They are computed from the fit itself, so they are always consistent with it.
         """
         found = []
         if not self.optimal:
@@ -142,15 +142,16 @@ class Fit:
 
     @property
     def converged(self) -> bool:
-        """Return whether the fit is at an optimum that the noise explains.
+        """Return whether the fit is at an optimum with residuals that the noise
+        explains.
 
-        All errors are known then; otherwise `reasons` says why not.
+        All errors are then finite; otherwise, `reasons` explains why not.
         """
         return not self.reasons
 
     @property
     def message(self) -> str:
-        """Say how the fit ended, with every reason for doubt."""
+        """Describe how the fit ended, with every reason for doubt."""
         return " ".join(one.sentence for one in self.reasons) or self.ended
 
     def __getitem__(self, name: str) -> Estimate:
@@ -173,12 +174,12 @@ class Fit:
         return self.covariance / np.outer(size, size)
 
     def ellipse(self, names: Sequence[str], level: float = 0.95) -> Ellipse:
-        """Return the joint confidence region of two or more parameters, the others left
+        """Return the joint confidence region of two or more parameters, with all others
         free.
 
         Args:
-            names: Names as in `estimates`, with `@record` where each recording has its
-                own.
+            names: Names as in `estimates`, with `@record` if each recording has its own
+                value.
             level: Probability that the region contains the true values.
 
         Returns:
@@ -186,8 +187,8 @@ class Fit:
 
         Raises:
             KeyError: A name was not fitted.
-            ValueError: The level lies outside 0 and 1, there are fewer than two names,
-                or an error is not finite.
+            ValueError: The level is not between 0 and 1, there are fewer than two
+                names, or an error is not finite.
         """
         labels = [one.label for one in self.estimates]
         values = [one.value for one in self.estimates]
@@ -198,8 +199,8 @@ class Fit:
         return most_correlated([e.label for e in self.estimates], self.correlation)
 
     def model(self, record: int | str = 0) -> Model:
-        """Return the model with the fitted parameters, of one recording where they
-        differ.
+        """Return the model with the fitted parameters; if recordings differ, those of
+        one recording.
         """
         names = self.problem.records
         row = names.index(record) if isinstance(record, str) else record

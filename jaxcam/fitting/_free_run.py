@@ -26,14 +26,14 @@ from .engine import (
 
 # Steps of Newton's method on the initial state, and its relative tolerance
 _NEWTON, _STILL = 20, 1e-12
-# Fraction of the information that holds an unobserved state in place
+# Fraction of the information used to hold an unobserved state in place
 _LEAST = 1e-12
-# Steps between two samples: to begin with, and at most
+# Steps between two samples: initial and maximum number
 _FIRST_STEPS, _MOST_STEPS = 2, 64
-# Change of the simulated motion, in standard deviations of the noise or relative to
-# the motion, that halving the steps may make
+# Allowed change of the simulated motion when the steps are halved, in standard
+# deviations of the noise or relative to the motion
 _OF_NOISE, _OF_MOTION = 0.1, 1e-6
-# Steps between two samples may differ by this part
+# Relative difference allowed between sampling intervals
 _UNEVEN = 0.01
 
 
@@ -58,7 +58,7 @@ class FreeRun:
 
     @property
     def rmse(self) -> dict[str, float]:
-        """Root of the mean squared difference of each channel, in its unit."""
+        """Root-mean-square difference of each channel, in its unit."""
         return {
             name: float(np.sqrt(np.nanmean(self.residual(name)[self.samples :] ** 2)))
             for name in self.simulated
@@ -75,13 +75,13 @@ def free_run(
     """Simulate a complete recording from its first samples and its input.
 
     The state at the first sample is the one whose motion fits the first `samples` best.
-    From there on only the measured input is used, held between samples, so that errors
-    accumulate over the recording. Benchmarks of identification test a model in this
+    From there on, only the measured input is used, held between samples, so errors
+    accumulate over the recording. System-identification benchmarks test a model in this
     way, whereas a fit tests it piece by piece.
 
     Args:
         model: A system with its sensors and its input, such as `found.model()`.
-        recording: An evenly sampled recording; its `constants` are those of the system.
+        recording: An evenly sampled recording; its `constants` are used for the system.
         samples: Number of samples from which the initial state is estimated.
 
     Returns:
@@ -89,7 +89,7 @@ def free_run(
 
     Raises:
         RecordingError: The recording is too short, unevenly sampled or lacks a channel.
-        ValueError: The drive of the model turns, or the motion meets a constraint or
+        ValueError: The model has a turning drive, or the motion meets a constraint or
             does not stay finite.
 
     Examples:
@@ -115,8 +115,8 @@ def free_run(
     if len(below):
         raise ValueError(
             f"{run.name}: the free run meets a constraint at "
-            f"{run.time[below[0]]:.4g} s; it serves motions without impacts, use "
-            f"`jaxcam.simulate` for others."
+            f"{run.time[below[0]]:.4g} s; a free run is for motions without impacts, "
+            f"use `jaxcam.simulate` for others."
         )
     data = np.asarray(one.data)
     return FreeRun(
@@ -132,8 +132,8 @@ def free_run(
 class Prepared(eqx.Module):
     """A recording prepared for a free run.
 
-    `state` `(n,)` at the first sample, found from `samples` of them; times `start` and
-    `interval` (s); the input's `level` `(k,)`; `data` `(k, c)` and their `noise`
+    `state` `(n,)` at the first sample, estimated from `samples` of them; times `start`
+    and `interval` (s); the input's `level` `(k,)`; `data` `(k, c)` and their `noise`
     `(c,)`; the number of `steps` between two samples.
     """
 
@@ -148,7 +148,7 @@ class Prepared(eqx.Module):
 
 
 class Simulated(NamedTuple):
-    """Channels `(k, c)` and the least gap `(k,)` at each sample."""
+    """Channels `(k, c)` and the smallest gap `(k,)` at each sample."""
 
     channels: Float[Array, "k c"]
     gap: Float[Array, " k"]
@@ -162,7 +162,7 @@ def prepared(model: Model, recording: Recording | Segments, samples: int) -> Pre
     run = recording.recording if isinstance(recording, Segments) else recording
     if isinstance(model.drive, Turning):
         raise ValueError(
-            "A free run follows a measured input; of a system with a turning drive, "
+            "A free run follows a measured input; for a system with a turning drive, "
             "compare flights with `jaxcam.recordings.compare`."
         )
     model = with_constants(model, run)
@@ -170,8 +170,8 @@ def prepared(model: Model, recording: Recording | Segments, samples: int) -> Pre
     data = np.stack([run[name] for name in model.sensors], axis=-1)
     if not 2 <= samples < len(run):
         raise RecordingError(
-            f"{run.name}: {samples} samples to begin with are not between 2 and the "
-            f"{len(run)} of the recording."
+            f"{run.name}: `samples` is {samples}; give a number between 2 and "
+            f"{len(run)}, the number of samples in the recording."
         )
     interval = (run.time[-1] - run.time[0]) / (len(run) - 1)
     one = Prepared(
@@ -252,7 +252,7 @@ def _started(model: Model, one: Prepared) -> Prepared:
         if not now < cost * (1 - _STILL):
             break
         cost = now
-        # rows in equal units: an unobserved state does not move
+        # rows scaled to equal units; an unobserved state does not move
         scale = np.linalg.norm(rows, axis=0)
         scale = np.where(scale > 0, scale, 1.0)
         state = state - np.linalg.lstsq(rows / scale, missed, rcond=None)[0] / scale
@@ -261,7 +261,9 @@ def _started(model: Model, one: Prepared) -> Prepared:
 
 @eqx.filter_jit
 def _off(model: Model, one: Prepared, state):
-    """Return residuals in units of the noise, and their slopes by the initial state."""
+    """Return residuals in units of the noise, and their derivatives with respect to the
+    initial state.
+    """
 
     def missed(state):
         found = simulated(model, dataclasses.replace(one, state=state)).channels
@@ -274,12 +276,12 @@ def _off(model: Model, one: Prepared, state):
 def restarted(model: Model, one: Prepared) -> Prepared:
     """Return the recording with the initial state for another model, to first order.
 
-    It is differentiable, so that a fit includes the dependence of the start on
-    parameters.
+    The result is differentiable, so that a fit includes the dependence of the initial
+    state on the parameters.
     """
     few = _first(one)
     missed, rows = _off(model, few, few.state)
-    # slopes are exact enough at the fitted state; only their size changes
+    # the derivatives at the fitted state are accurate enough; only their size changes
     scale = jnp.linalg.norm(jax.lax.stop_gradient(rows), axis=0)
     scale = jnp.where(scale > 0, scale, 1.0)
     rows = rows / scale[None]

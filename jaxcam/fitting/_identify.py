@@ -12,20 +12,20 @@ from ._fit_result import Fit
 from .engine import assemble, free_columns, Problem, reduced
 
 
-# a combination is identifiable if the data reduce its error to this part of the
+# a combination is identifiable if the data reduce its error to this fraction of the
 # tolerance
 _SEEN = 0.5
-# Squared share of a parameter in a direction that rounding may make
+# Squared share of a parameter in a direction that may be due to rounding
 _ROUNDING = 1e-12
-# two relative changes are the same to this part
+# relative difference up to which two relative changes are equal
 _SAME = 0.05
-# members of a combination that are named: at least this part of the largest
+# members of a combination are named if they are at least this fraction of the largest
 _MEMBER = 0.15
 
 
 @dataclasses.dataclass(frozen=True)
 class Identifiability:
-    """The combinations of parameters that the data determine, best first.
+    """Combinations of parameters, in order of how well the data determine them.
 
     The example continues that of [`jaxcam.fitting.fit`][].
 
@@ -41,21 +41,23 @@ class Identifiability:
     """Combinations, one per row, each parameter in units of its scale, shape `(g, g)`.
     """
     stderr: Float[np.ndarray, " g"]
-    """Error of each combination from the data alone, in the same units."""
+    """Standard error of each combination from the data alone, in the same units."""
     values: Float[np.ndarray, " g"]
-    """Value of each parameter at which it was evaluated."""
+    """Parameter values at which the analysis was made."""
     scales: Float[np.ndarray, " g"]
     """Scale of each parameter."""
     alone: Float[np.ndarray, " g"]
-    """Error of each parameter from the data alone if all others are known, in units of
-    the scale."""
+    """Standard error of each parameter from the data alone if all others are known, in
+    units of the scale.
+    """
     together: Float[np.ndarray, " g"]
-    """Error of each parameter from the data alone if no other is known, in units of the
-    scale."""
+    """Standard error of each parameter from the data alone if no other is known, in
+    units of the scale.
+    """
 
     @property
     def seen(self) -> int:
-        """Number of combinations that the data determine to better than half their
+        """Number of combinations that the data determine to within half their
         tolerance.
         """
         return int(np.sum(self.stderr < _SEEN))
@@ -64,15 +66,15 @@ class Identifiability:
         """Return the report, one fact per sentence."""
         total = len(self.names)
         if not total:
-            return ["Nothing is to be fitted."]
+            return ["There is nothing to fit."]
         found = [
-            f"The data see {self.seen} of {total} combinations of parameters better "
-            f"than the tolerances do."
+            f"The data determine {self.seen} of {total} combinations of parameters "
+            f"better than the tolerances do."
         ]
         dead = [n for n, a in zip(self.names, self.alone) if not np.isfinite(a)]
         if dead:
             found.append(
-                f"They do not depend on {_listed(dead)} at all: hold "
+                f"The data do not depend on {_listed(dead)} at all: hold "
                 f"{'it' if len(dead) == 1 else 'them'}."
             )
         alone = [
@@ -97,8 +99,8 @@ class Identifiability:
     def _unseen(self, stderr, direction, members) -> str:
         if len(members) == 1:
             return (
-                f"The data constrain {members[0]} less than its tolerance does, so the "
-                f"tolerance decides."
+                f"The data constrain {members[0]} less than its tolerance does, so its "
+                f"value is set by the tolerance."
             )
         shares = {self.names[k]: direction[k] for k in range(len(self.names))}
         sign = np.sign(shares[members[0]])
@@ -111,8 +113,8 @@ class Identifiability:
             what += f" while lowering {_listed(down)}"
         what += self._relation(direction, members)
         return (
-            f"The data hardly notice {what}: this combination is left to the "
-            f"tolerances."
+            f"The data are hardly sensitive to {what}: this combination is set by "
+            f"the tolerances."
         )
 
     def _relation(self, direction, members) -> str:
@@ -122,9 +124,9 @@ class Identifiability:
             return ""
         one, other = direction[pair] * self.scales[pair] / self.values[pair]
         if abs(one - other) < _SAME * abs(one):
-            return " (only their ratio acts)"
+            return " (only their ratio matters)"
         if abs(one + other) < _SAME * abs(one):
-            return " (only their product acts)"
+            return " (only their product matters)"
         return ""
 
 
@@ -133,10 +135,10 @@ def identify(
 ) -> Identifiability:
     """Analyse which parameters the recordings can determine, without fitting them.
 
-    The Fisher information at the nominal parameters, with the states of all pieces
-    eliminated: its large eigenvalues belong to combinations that the data determine,
-    its small ones to those that only the tolerances constrain. The example continues
-    that of [`jaxcam.fitting.fit`][].
+    The analysis uses the Fisher information at the nominal parameters, with the states
+    of all pieces eliminated. Its large eigenvalues belong to combinations that the data
+    determine, its small ones to those that only the tolerances constrain. The example
+    continues that of [`jaxcam.fitting.fit`][].
 
     Args:
         problem: The problem.
@@ -172,14 +174,14 @@ def identify(
             "its vector field, gap and impact at the nominal parameters for NaN."
         )
     values, vectors = np.linalg.eigh(information)
-    # what rounding makes of zero is zero
+    # values within rounding of zero are zero
     floor = np.finfo(float).eps * len(values) * max(np.max(values, initial=0.0), 0.0)
     values = np.where(values > floor, values, 0.0)[::-1]
     directions = vectors.T[::-1]
     with np.errstate(divide="ignore", invalid="ignore"):
         stderr = 1 / np.sqrt(values)
         alone = 1 / np.sqrt(np.maximum(np.diag(information), 0.0))
-        # a direction of which nothing is known is itself known to rounding only
+        # a direction about which nothing is known is itself affected by rounding
         dead = ~np.isfinite(stderr)[:, None]
         spread = np.where(dead & (directions**2 < _ROUNDING), 0.0, directions**2)
         weighted = np.where(spread > 0, spread * stderr[:, None] ** 2, 0.0)

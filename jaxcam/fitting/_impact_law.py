@@ -1,4 +1,4 @@
-"""Fit the law of restitution of a table of impacts, and check momentum conservation."""
+"""Fit a restitution law to a table of impacts, and check momentum conservation."""
 
 import dataclasses
 from typing import Any
@@ -15,13 +15,13 @@ from ._restitution import fit_rows, RestitutionFit
 
 # Smallest number of impacts for a law and its scatter
 _LEAST = 4
-# A row this many standard deviations off is an outlier
+# A row that deviates by more than this many standard deviations is an outlier
 _MISREAD = 6.0
 # Probability that a constant restitution appears to depend on the speed
 _CHANCE = 0.01
 # If more than this fraction are outliers, none is excluded
 _MAJORITY = 0.7
-# standard deviations in the median of the size of a Gaussian number
+# median of the absolute value of a Gaussian variable, in standard deviations
 _MAD = 1.4826
 # Smallest ratio of speeds that shows a dependence of restitution on speed
 _RANGE = 1.5
@@ -46,22 +46,23 @@ class ImpactLaw:
     table: ImpactTable
     """The table of impacts."""
     laws: dict[str, RestitutionFit]
-    """`"constant"`, and the power law as `"falling"` or `"rising"`."""
+    """The fitted laws: `"constant"`, and the power law as `"falling"` or `"rising"`."""
     best: str
     """Name of the law that the impacts support."""
     delta_bic: dict[str, float]
-    """BIC of each law minus that of the constant law; below zero is better. A power
-    law that the impacts do not support is the constant law with one extra parameter.
+    """BIC of each law minus that of the constant law; negative is better. A power law
+    that the impacts do not support is the constant law with one extra parameter.
     """
     p_value: float
-    """Probability of the power law's gain where restitution is constant."""
+    """Probability of such a gain of the power law if restitution is constant."""
     scatter: float
-    """Standard deviation of an impact, in `scatter_unit`."""
+    """Standard deviation of single impacts, in `scatter_unit`."""
     scatter_unit: str
     """Unit of the scatter: that of the speed, `"1"` for the restitution, or `"stated"`
-    for its standard errors."""
+    for the standard errors in the table.
+    """
     set_aside: tuple[int, ...]
-    """Rows (from 1) that are outliers."""
+    """Rows that are outliers, counted from 1."""
     momentum: MomentumBalance | None
     """Momentum balance of two bodies, or `None`."""
 
@@ -101,17 +102,17 @@ class ImpactLaw:
             f"{slow:.3g} {table.unit} to {ends[1]:.3g} at {fast:.3g} {table.unit}: "
             f"r = r0 (1 + v / {v_ref:.4g} {table.unit})^-b with r0 = {r0:.4g} +- "
             f"{law.stderr[0]:.1g} and b = {exponent:.3g} +- {law.stderr[1]:.1g} "
-            f"(p = {self.p_value:.2g}, delta BIC {self.delta_bic[self.best]:+.1f} to a "
-            f"constant one)."
+            f"(p = {self.p_value:.2g}, delta BIC {self.delta_bic[self.best]:+.1f} "
+            f"relative to a constant)."
         )
 
     def _caveats(self) -> list[str]:
         table, found = self.table, list(self.table.notes)
         if self.scatter_unit == "stated":
-            found.append(f"Impacts scatter by {self.scatter:.2g} times their errors.")
+            found.append(f"The scatter is {self.scatter:.2g} times the stated errors.")
         elif self.scatter_unit == "1":
             found.append(
-                f"The restitution of an impact scatters by {self.scatter:.2g}."
+                f"The coefficient of restitution scatters by {self.scatter:.2g}."
             )
         else:
             found.append(
@@ -120,18 +121,18 @@ class ImpactLaw:
             )
         if self.set_aside:
             rows = ", ".join(map(str, self.set_aside))
-            found.append(f"Set aside, far from all others: row {rows}; look it up.")
+            found.append(f"Excluded as an outlier: row {rows}; check the table.")
         span = float(np.max(table.approach) / np.min(table.approach))
         if span < _RANGE:
             found.append(
-                f"The fastest impact is {span:.2f} times as fast as the slowest: that "
-                f"tells little of how restitution depends on the speed."
+                f"The fastest impact is only {span:.2f} times as fast as the slowest: "
+                f"this shows little about how restitution depends on speed."
             )
         r = float(np.median(table.separation / table.approach))
         if r > 1:
             found.append(
-                f"Bodies part {r:.2f} times as fast as they meet; look whether the "
-                f"columns before and after are exchanged."
+                f"The bodies separate {r:.2f} times as fast as they approach; check "
+                f"whether the columns before and after are interchanged."
             )
         if self.momentum is not None:
             found.append(self.momentum.sentence())
@@ -161,12 +162,12 @@ class ImpactLaw:
 def impact_law(table: ImpactTable) -> ImpactLaw:
     """Return the restitution law that a table of impacts supports.
 
-    A constant restitution and a power of the speed, r = r0 (1 + v / v_ref)^-b with the
-    median speed as v_ref, are fitted by least squares. The scatter of an impact is
-    estimated: constant in its speed or constant in its restitution, whichever is
-    likelier; where the table states errors, in proportion to these. The power law is
-    named where, by an F test, a constant law would gain as much in one table of a
-    hundred.
+    A constant coefficient of restitution and a power law, r = r0 (1 + v / v_ref)^-b
+    with the median speed as v_ref, are fitted by least squares. The scatter of single
+    impacts is estimated: it is constant either in the speed or in the coefficient of
+    restitution, whichever is more likely; if the table contains errors, it is
+    proportional to them. The power law is chosen if, according to an F test, it would
+    gain as much by chance in at most one of a hundred tables with constant restitution.
 
     Args:
         table: The impacts.
@@ -187,13 +188,13 @@ def impact_law(table: ImpactTable) -> ImpactLaw:
     """
     if len(table) < _LEAST:
         raise RecordingError(
-            f"{table.name}: there are {len(table)} impacts, and at least {_LEAST} are "
+            f"{table.name}: there are only {len(table)} impacts; at least {_LEAST} are "
             f"needed for a law and its error."
         )
     weights = _weights(table)
     every = np.ones(len(table), dtype=bool)
     kept = {name: _sound(table, one) for name, one in weights.items()}
-    # the same rows for both, or they could not be compared
+    # the same rows for both laws, so that they can be compared
     some = np.any(list(kept.values()), axis=0)
     kind = max(weights, key=lambda name: _likelihood(table, weights[name], some))
     keep = kept[kind]
@@ -203,7 +204,7 @@ def impact_law(table: ImpactTable) -> ImpactLaw:
 
 
 def _weights(table: ImpactTable) -> dict[str, Float[np.ndarray, " k"]]:
-    """Return the relative scatter of an impact, by its unit."""
+    """Return the relative scatter of the impacts, for each unit."""
     if table.approach_stderr is None and table.separation_stderr is None:
         return {table.unit: np.ones(len(table)), "1": table.approach}
     r = float(np.median(table.separation / table.approach))
@@ -240,7 +241,7 @@ def _sound(table: ImpactTable, weights) -> Bool[np.ndarray, " k"]:
 
 
 def _typical(off, table: ImpactTable, weights) -> float:
-    """Estimate the scatter robustly; for an exact table, that of rounding."""
+    """Estimate the scatter robustly; for an exact table, it is that of rounding."""
     least = 1e-9 * float(np.max(table.separation / weights)) + 1e-300
     return max(_MAD * float(np.median(np.abs(off))), least)
 
@@ -254,7 +255,7 @@ def _misfit(table: ImpactTable, errors, keep):
 
 
 def _likelihood(table: ImpactTable, weights, keep) -> float:
-    """Return the log-likelihood of a Gaussian scatter in proportion to the weights."""
+    """Return the log-likelihood for Gaussian scatter proportional to the weights."""
     scale = _typical(_misfit(table, weights, keep)[keep], table, weights)
     off = _misfit(table, weights * scale, keep)[keep] * scale
     size = max(float(np.sqrt(np.mean(off**2))), 1e-300)
@@ -272,7 +273,7 @@ def _off(table: ImpactTable, r):
 def _chosen(table: ImpactTable, kind: str, weights, keep) -> ImpactLaw:
     count = int(np.sum(keep))
     scale = 1.0
-    # the size of the scatter is that of the more general law
+    # the scatter is that about the more general law
     for _ in range(3):
         fits = _fits(table, weights * scale, keep)
         most = fits.get("power", fits["constant"])

@@ -1,4 +1,4 @@
-"""Check that two colliding bodies keep their momentum."""
+"""Check that the momentum of two colliding bodies is conserved."""
 
 import dataclasses
 from typing import Any
@@ -16,11 +16,12 @@ _ERRORS, _SHARE = 3.0, 0.005
 
 @dataclasses.dataclass(frozen=True)
 class MomentumBalance:
-    """Momentum of two bodies in their impacts."""
+    """Momentum balance of two bodies in their impacts."""
 
     change: float
-    """Change of the total momentum, relative to the momentum exchanged; NaN where the
-    masses are unknown."""
+    """Change of the total momentum, relative to the momentum exchanged; NaN if the
+    masses are unknown.
+    """
     stderr: float
     """Standard error of `change`."""
     ratio: float
@@ -28,11 +29,11 @@ class MomentumBalance:
     ratio_stderr: float
     """Standard error of `ratio`."""
     stated: float
-    """The same ratio of the stated masses, or NaN."""
+    """Ratio of the stated masses, or NaN."""
 
     @property
     def kept(self) -> bool:
-        """Return whether a change is within its error, or too small to matter."""
+        """Return whether the change is within its error, or too small to matter."""
         size = abs(self.change)
         return not (size > _ERRORS * self.stderr and size > _SHARE)
 
@@ -40,14 +41,16 @@ class MomentumBalance:
         """Return the balance in words."""
         ratio = f"{self.ratio:.4g} +- {self.ratio_stderr:.1g}"
         if np.isnan(self.stated):
-            return f"If momentum is kept, the second mass is {ratio} times the first."
+            return (
+                f"If momentum is conserved, the second mass is {ratio} times the first."
+            )
         change = f"{self.change:+.2%} +- {self.stderr:.1%} of the exchanged momentum"
         if self.kept:
-            return f"Momentum is kept: both together change by {change}."
+            return f"Momentum is conserved: the total changes by {change}."
         return (
-            f"Momentum is not kept: both together change by {change}; it would be with "
-            f"masses in the ratio {ratio} where {self.stated:.4g} is stated: look at "
-            f"the masses, the scale of either speed, and what else pushes."
+            f"Momentum is not conserved: the total changes by {change}. It would be "
+            f"conserved for a mass ratio of {ratio} instead of {self.stated:.4g}; "
+            f"check the masses, the scale of either speed, and other forces."
         )
 
     def to_json(self) -> dict[str, Any]:
@@ -66,7 +69,7 @@ def momentum_of(
         return None
     bodies = table.bodies
     change = (bodies.after - bodies.before)[keep]
-    # the first body loses what the second gains
+    # the first body loses the momentum that the second gains
     sign = np.where(change[:, 0] < 0, 1.0, -1.0)
     first, second = -sign * change[:, 0], sign * change[:, 1]
     ratio, error = _ratio(first, second)

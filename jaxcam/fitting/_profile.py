@@ -1,4 +1,4 @@
-"""Compute profile likelihoods: the cost of the best fit with some parameters held."""
+"""Compute profile likelihoods: the cost of the best fit with some parameters fixed."""
 
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
@@ -15,16 +15,16 @@ from .engine import Weights
 class Profile:
     """The profile likelihood of one parameter.
 
-    The cost is below 3.84 inside the 95 % interval; `interval` is interpolated,
+    The cost is below 3.84 inside the 95 % interval; `interval` is interpolated, and
     infinite on a side without a value of higher cost.
     """
 
     name: str
     """Name of the parameter."""
     values: Float[np.ndarray, " k"]
-    """Values at which it was held, shape `(k,)`."""
+    """Values at which the parameter was held, shape `(k,)`."""
     cost: Float[np.ndarray, " k"]
-    """Minus twice the log-likelihood above the optimum, shape `(k,)`."""
+    """Minus twice the log-likelihood, relative to the optimum, shape `(k,)`."""
     fits: tuple[Fit, ...]
     """The fits at these values."""
 
@@ -59,8 +59,8 @@ def profile(
     prior: bool = True,
     progress: Callable[[int, int], None] | None = None,
 ) -> Profile:
-    """Compute a profile likelihood: fit all other parameters with one held at several
-    values.
+    """Compute a profile likelihood: hold one parameter at several values and fit all
+    others.
 
     The example continues that of [`jaxcam.fitting.fit`][].
 
@@ -68,13 +68,13 @@ def profile(
         found: The fit, in which `name` was free.
         name: Name of the parameter.
         reach: Range, in standard errors on both sides.
-        points: Number of values, the optimum included.
-        values: Values at which to hold it instead, in any order; a value is inside the
-            95 % interval if its cost is below 3.84.
-        weights: Weight of each piece of the data; use the value used for `found`.
+        points: Number of values, including the optimum.
+        values: Values at which to hold the parameter instead, in any order; a value is
+            inside the 95 % interval if its cost is below 3.84.
+        weights: Weight of each piece of the data; use the same value as for `found`.
         prior: Whether tolerances count as prior knowledge; use the value used for
             `found`.
-        progress: Called with the number of values done and their total number.
+        progress: Called with the number of completed values and their total number.
 
     Returns:
         A `Profile`.
@@ -101,7 +101,7 @@ def profile(
     place = problem.names.index(name)
     fits: dict[int, Fit] = {}
     middle = int(np.searchsorted(tried, estimate.value))
-    # outwards from the optimum, each from its neighbour
+    # outwards from the optimum, each fit starting from its neighbour
     for side in (range(middle, len(tried)), range(middle - 1, -1, -1)):
         near = found
         for k in side:
@@ -112,7 +112,7 @@ def profile(
             fits[k] = near
             if progress is not None:
                 progress(len(fits), len(tried))
-    # prior knowledge of the held parameter counts as well
+    # prior knowledge of the fixed parameter counts as well
     cost = np.array([fits[k].cost for k in range(len(tried))])
     if prior:
         cost = cost + _known(problem, name, tried)
@@ -131,18 +131,18 @@ def excess_cost(
     weights: Weights | None = None,
     prior: bool = True,
 ) -> float:
-    """Return the cost above the optimum with several parameters held and all others
-    fitted.
+    """Return the cost, relative to the optimum, with several parameters held and all
+    others fitted.
 
-    It defines the joint confidence region of d parameters of a nonlinear model: values
-    are inside where it is below the quantile of a chi-square with d degrees of freedom,
-    `found.ellipse(names).limit`. The example continues that of
+    This cost defines the joint confidence region of d parameters of a nonlinear model:
+    values are inside if it is below the quantile of the chi-square distribution with d
+    degrees of freedom, `found.ellipse(names).limit`. The example continues that of
     [`jaxcam.fitting.fit`][].
 
     Args:
-        found: The fit, in which all of these were free.
+        found: The fit, in which all these parameters were free.
         values: Values by name.
-        weights: Weight of each piece of the data; use the value used for `found`.
+        weights: Weight of each piece of the data; use the same value as for `found`.
         prior: Whether tolerances count as prior knowledge; use the value used for
             `found`.
 

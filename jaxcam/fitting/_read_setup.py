@@ -40,7 +40,7 @@ _NUMBER = ("value", "tolerance", "lower", "upper", "unit")
 
 
 class _Stated(NamedTuple):
-    """One entry of `[parameters]`; without a tolerance it is held fixed."""
+    """One entry of `[parameters]`; without a tolerance, it is held fixed."""
 
     value: float | bool | str
     tolerance: float = 0.0
@@ -54,13 +54,14 @@ def read_setup(
 ) -> Setup:
     """Read a rig file (TOML) of a system of your own.
 
-    `system` in the file, such as `"two_stops.py:TwoStops"`, names a Python file next to
-    it and a class, and the Python file is run: read only rigs that you trust.
+    `system` in the rig file, such as `"two_stops.py:TwoStops"`, names a Python file
+    next to it and a class. The Python file is executed, so read only rig files that you
+    trust.
 
     Args:
         path: The file.
-        system: System that replaces that of the file: a class, or `FILE.py:CLASS`
-            relative to the working directory.
+        system: System to use instead of the one in the file: a class, or
+            `FILE.py:CLASS` relative to the working directory.
 
     Returns:
         A [`jaxcam.fitting.Setup`][].
@@ -107,7 +108,7 @@ def read_setup(
 
 
 def is_setup(path: str | Path) -> bool:
-    """Return whether a rig file is one for `read_setup`, not that of a cam-follower.
+    """Return whether a rig file is for `read_setup` and not for a cam-follower.
 
     Args:
         path: The file.
@@ -135,7 +136,7 @@ def _class(file: Path, tables, system) -> type[HybridSystem]:
     named = tables.get("system")
     if not isinstance(named, str) or not named.strip():
         raise RigError(
-            f"{file}: it does not name a system; begin it with "
+            f"{file}: the file does not name a system; begin it with "
             f'system = "FILE.py:CLASS".'
         )
     return system_class(named, file.parent)
@@ -186,10 +187,10 @@ def _stated(section: Section, key: str) -> _Stated:
     if tolerance != math.inf:
         tolerance = section.as_number(key, tolerance)
     if tolerance < 0:
-        raise section.error(key, f"has the tolerance {tolerance:g}, below zero")
+        raise section.error(key, f"has the negative tolerance {tolerance:g}")
     unit = entry.get("unit", "")
     if not isinstance(unit, str):
-        raise section.error(key, f"has the unit {shown_value(unit)}, which is no word")
+        raise section.error(key, f"has the unit {shown_value(unit)}, which is not text")
     return _Stated(value, float(tolerance), lower, upper, unit)
 
 
@@ -209,7 +210,8 @@ def _records(
 ) -> dict[str, dict[str, float]]:
     """Read the constants of recordings, by patterns of their names.
 
-    **Arguments:** `taken` are the numbers that are fitted or measured by a channel.
+    **Arguments:** `taken` contains the numbers that are fitted or measured by a
+    channel.
     """
     if "records" not in tables:
         return {}
@@ -224,7 +226,7 @@ def _records(
             if name in taken:
                 raise inner.error(
                     name,
-                    "is fitted or measured, and cannot be known of a recording as well",
+                    "is fitted or measured, so no recording can state it",
                 )
             values[name] = inner.quantity(key, None).value
         found[pattern] = values
@@ -236,7 +238,9 @@ def _entries(section: Section) -> Iterator[tuple[str, None]]:
 
 
 def _phase_of(drive: Turning | Input | None) -> str | None:
-    """Return the phase field of a turning drive, the encoder's zero to be fitted."""
+    """Return the phase field of a turning drive, which represents the encoder's
+    zero.
+    """
     if not isinstance(drive, Turning):
         return None
     assert isinstance(drive.phase, Field)
@@ -251,7 +255,7 @@ def _drive(
     """
     if "drive" in tables and "input" in tables:
         raise RigError(
-            f"{file}: there are both [drive] and [input]; remove the one that the "
+            f"{file}: it contains both [drive] and [input]; remove the one that the "
             f"system does not have."
         )
     if "drive" in tables:
@@ -278,15 +282,15 @@ def _sensors(file: Path, tables, system: HybridSystem) -> dict[str, Sensor]:
     outer = Section(file, "channels", tables)
     if not outer.table:
         raise RigError(
-            f"{file}: [channels] is empty; add a table for each channel that is "
-            f"measured, such as [channels.position_m]."
+            f"{file}: [channels] is empty; add a table for each measured channel, "
+            f"such as [channels.position_m]."
         )
     return {_channel(outer, name): _sensor(outer, name, system) for name in outer.table}
 
 
 def _sensor(outer: Section, name: str, system: HybridSystem) -> Sensor:
     if not isinstance(outer.table[name], dict):
-        raise outer.error(name, "is no table with `sees` and `noise`")
+        raise outer.error(name, "is not a table with `sees` and `noise`")
     section = Section(outer.file, name, outer.table, outer.name)
     seen = section.choice("sees", *system.state_names)
     unit = unit_of(name) or None
@@ -305,6 +309,7 @@ def _channel(section: Section, name: str) -> str:
     renamed, factor = si(name)
     if renamed != name or factor != 1.0:
         raise section.error(
-            name, f"is read in SI units; call it `{renamed}` and give its noise in them"
+            name,
+            f"is read in SI units; call it `{renamed}` and give its noise in SI units",
         )
     return name

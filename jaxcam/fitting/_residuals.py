@@ -1,4 +1,4 @@
-"""Residuals of a fit: data minus model by recording, mode, time and phase."""
+"""Residuals of a fit: data minus model, with recording, mode, time and phase."""
 
 import dataclasses
 
@@ -43,7 +43,8 @@ class Residuals:
         return float(np.sqrt(np.mean(self.value**2)))
 
     def autocorrelation(self, lags: int = 20) -> Float[np.ndarray, " lags"]:
-        """Return the correlation of samples 1, 2, ... apart within a flight or contact.
+        """Return the correlation of samples at lags 1, 2, ... within a flight or
+        contact.
 
         White residuals are within about `2 / sqrt(k)` of zero.
         """

@@ -1,4 +1,4 @@
-"""Fit laws of restitution to all recorded impacts, and by the thesis' method."""
+"""Fit restitution laws to all recorded impacts, or by the method of the thesis."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -16,7 +16,7 @@ from ..recordings import RecordingError, Segments
 from .engine import Turning
 
 
-# Errors beyond this many standard errors count by their size, not its square (Huber)
+# Residuals beyond this many standard errors count linearly, not quadratically (Huber)
 _HUBER = 3.0
 # Runge-Kutta steps of one flight
 _STEPS = 200
@@ -24,7 +24,7 @@ _STEPS = 200
 
 @dataclasses.dataclass(frozen=True)
 class RestitutionFit:
-    """A law of restitution fitted to measured impacts.
+    """A restitution law fitted to measured impacts.
 
     Examples:
         >>> from jaxcam.fitting import impact_law
@@ -37,7 +37,7 @@ class RestitutionFit:
     """
 
     law: eqx.Module
-    """The fitted law, a Module for `CamFollower(restitution=...)`."""
+    """The fitted law, a module that can be passed to `CamFollower(restitution=...)`."""
     names: tuple[str, ...]
     """Names of its parameters."""
     values: Float[np.ndarray, " p"]
@@ -45,9 +45,11 @@ class RestitutionFit:
     stderr: Float[np.ndarray, " p"]
     """Their standard errors."""
     cost: float
-    """Sum of squared residuals in standard errors, with the loss function of Huber."""
+    """Sum of squared residuals in units of the standard errors, with Huber's loss
+    function.
+    """
     freedom: int
-    """Number of impacts minus number of parameters; `cost / freedom` is 1 if the
+    """Number of impacts minus number of parameters; `cost / freedom` is about 1 if the
     law explains all impacts.
     """
 
@@ -59,20 +61,20 @@ class RestitutionFit:
         )
         ratio = self.cost / max(1, self.freedom)
         return (
-            f"{type(self.law).__name__}: {parts}; {ratio:.2f} times the noise over "
-            f"{self.freedom + len(self.names)} impacts."
+            f"{type(self.law).__name__}: {parts}; the residual is {ratio:.2f} times "
+            f"the noise for {self.freedom + len(self.names)} impacts."
         )
 
 
 def restitution_laws(segments: Sequence[Segments]) -> dict[str, RestitutionFit]:
-    """Fit three restitution laws to the impacts of some recordings.
+    """Fit three restitution laws to the impacts in recordings.
 
     Args:
         segments: The segmented recordings.
 
     Returns:
-        `"constant"`, `"speed"` (linear in the speed of the drive, Figure 4.15 of the
-            thesis) and `"approach"` (a power of the approach speed); laws with
+        The laws `"constant"`, `"speed"` (linear in the speed of the drive; thesis,
+            Figure 4.15) and `"approach"` (a power of the approach speed); laws with
             undetermined parameters are omitted.
 
     Raises:
@@ -104,7 +106,7 @@ def restitution_laws(segments: Sequence[Segments]) -> dict[str, RestitutionFit]:
         try:
             found[name] = fit_restitution(segments, law, names)
         except np.linalg.LinAlgError:
-            # the impacts leave a combination of its parameters open
+            # the impacts do not determine a combination of its parameters
             continue
     return found
 
@@ -114,14 +116,14 @@ def fit_restitution(
 ) -> RestitutionFit:
     """Fit parameters of a restitution law to the speeds before and after every impact.
 
-    The misfit of an impact is its separation speed less r times its approach speed,
-    over the error that both speeds and that of the surface give it. Levenberg-Marquardt
-    (optimistix); an outlier counts by its size.
+    The misfit of an impact is its separation speed minus r times its approach speed,
+    divided by the error due to both speeds and the speed of the surface. The method is
+    Levenberg-Marquardt (optimistix); outliers count linearly (Huber).
 
     Args:
         segments: Segments from `segment_case` or `segment`.
         law: Initial law, called as `law(speed, approach_speed)`.
-        names: Fields of the law to fit; the others stay.
+        names: Fields of the law to fit; the others are not changed.
 
     Returns:
         A [`jaxcam.fitting.RestitutionFit`][].
@@ -161,8 +163,8 @@ def fit_restitution(
     data = data[:, fine]
     if data.shape[1] <= len(names):
         raise RecordingError(
-            f"There are {data.shape[1]} clear impacts for {len(names)} parameters of "
-            f"restitution; give more recordings, or a simpler law."
+            f"There are only {data.shape[1]} clear impacts for {len(names)} "
+            f"restitution parameters; give more recordings, or a simpler law."
         )
     return fit_rows(data, law, names)
 
@@ -206,7 +208,7 @@ def _misfit(values, data, law, names):
     changed = _with(law, names, values)
     r = jax.vmap(changed)(speed, approach)
     error = jnp.sqrt(after**2 + (r * before) ** 2 + ((1 + r) * surface) ** 2)
-    # the error is a weight and must not reduce the misfit
+    # the error is a weight, so it must not depend on the parameters
     return (separation - r * approach) / jax.lax.stop_gradient(error)
 
 
@@ -241,14 +243,15 @@ def _normal(law, names, values, data):
 def first_bounce(
     system: HybridSystem, segments: Segments, drive: Turning
 ) -> Float[np.ndarray, " turns"]:
-    """Compute the restitution from the height of the first rebound (thesis, section
-    4.6.1).
+    """Compute the coefficient of restitution from the height of the first rebound
+    (thesis, section 4.6.1).
 
-    After each release the first impact ends the high flight of that period. The system
-    is started on the surface at that impact with a separation speed such that the next
-    flight rises as high above the cam as the recorded one; the coefficient is this
-    speed over the recorded approach speed. Unlike a fit of whole
-    trajectories it uses one number per period, the largest of several noisy ones.
+    In each period, the first impact after the release ends the highest flight. A
+    simulation starts on the surface at that impact, with a separation speed such that
+    the next flight rises as high above the cam as the recorded one; the coefficient is
+    this speed divided by the recorded approach speed. Unlike a fit of whole
+    trajectories, this method uses one number per period, the largest of several noisy
+    ones.
 
     Args:
         system: The system.
@@ -256,8 +259,7 @@ def first_bounce(
         drive: The measured drive.
 
     Returns:
-        One coefficient for each period that has such a pair of flights, shape
-            `(periods,)`.
+        One coefficient for each period with such a pair of flights, shape `(periods,)`.
 
     Raises:
         RecordingError: The recording has no measured drive.
@@ -265,8 +267,8 @@ def first_bounce(
     impacts, flights = segments.impacts, segments.flights
     if segments.drive is None:
         raise RecordingError(
-            f"{segments.recording.name}: it was cut without its drive; use "
-            f"`segment_case`."
+            f"{segments.recording.name}: the recording was segmented without its "
+            f"drive; use `segment_case`."
         )
     time = segments.recording.time
     found = []
@@ -291,7 +293,7 @@ def first_bounce(
 @eqx.filter_jit
 def _speed_for_height(system, angle, duration, height) -> Array:
     """Find the separation speed of a flight of this `height` by bisection."""
-    # the gap is an angle less the cam's; on the cam both agree
+    # the gap is an angle minus that of the cam; on the cam, both are equal
     contact = angle - system.gap(jnp.asarray(0.0), jnp.stack([angle, 0.0 * angle]))
     start = jnp.stack([contact, jnp.zeros_like(contact)])
     zero = jnp.zeros_like(contact)

@@ -17,18 +17,20 @@ from .engine import cost_of, Layout, Model, Point, Problem
 def cost_and_gradient(
     problem: Problem, point: Point, where: Callable[[Model], Any], values: Any
 ) -> tuple[Any, Any]:
-    """Return the cost of a problem and its gradient by any part of the model.
+    """Return the cost of a problem and its gradient with respect to any part of the
+    model.
 
-    It takes about as long for a neural network with thousands of weights in the vector
-    field as for one parameter. The states of the pieces stay as they are in `point`; at
-    states that are fitted (`fit(problem, free=())`) they do not add to the gradient, so
-    that this is the gradient of the best cost.
+    The computing time for a neural network with thousands of weights in the vector
+    field is about the same as for one parameter. The states of the pieces are those of
+    `point`. If they are fitted (`fit(problem, free=())`), they do not contribute to the
+    gradient, so the result is the gradient of the cost minimised over the states.
 
     **Arguments:**
 
-    - `where`: picks a field, or a tuple of fields, out of the model: `lambda m:
+    - `where`: selects a field of the model, or a tuple of fields: `lambda m:
         m.system.network`.
-    - `values`: values of the picked fields; their inexact arrays are differentiated.
+    - `values`: values of the selected fields; their floating-point arrays are
+        differentiated.
 
     **Returns:** the cost, and the gradient as a tree like `values`.
     """
@@ -39,7 +41,7 @@ def cost_and_gradient(
 
 @eqx.filter_jit
 def _gradient(layout, pieces, extras, point, where, values):
-    # the values of the parameters are part of the model from here on
+    # from here on, the parameter values are part of the model
     model = layout.at(point.values[0])
     bare = Point(point.values[:, :0], point.states)
 
@@ -75,28 +77,29 @@ def train(
     steps: int = 100,
     progress: Callable[[int, float], None] | None = None,
 ) -> Trained:
-    """Fit a part of a model that has very many parameters, such as a network.
+    """Fit part of a model that has very many parameters, such as a neural network.
 
-    L-BFGS (scipy) with gradients in reverse mode. At each step the states of the pieces
-    are fitted first, so that the gradient is that of the best cost.
+    The method is L-BFGS (scipy) with reverse-mode gradients. At each step, the states
+    of the pieces are fitted first, so the gradient is that of the cost minimised over
+    the states.
 
     Args:
         problem: The problem.
-        where: Picks a field, or a tuple of fields, out of the model:
-            `lambda m: m.system.network`.
-        steps: Largest number of L-BFGS steps.
+        where: Selects a field of the model, or a tuple of fields: `lambda m:
+            m.system.network`.
+        steps: Maximum number of L-BFGS steps.
         progress: Called after each evaluation with its number and its cost.
 
     Returns:
         A `Trained`.
 
     Raises:
-        ValueError: A number of the problem differs from recording to recording.
+        ValueError: A parameter of the problem differs from recording to recording.
     """
     own = [p.name for p in problem.parameters if p.per_record or p.known is not None]
     if own:
         raise ValueError(
-            f"`train` requires parameters that all recordings share, and {own[0]!r} "
+            f"`train` requires parameters shared by all recordings, but {own[0]!r} "
             "has a separate value in each; leave it out."
         )
     values = where(problem.model)
@@ -130,7 +133,7 @@ def train(
 
 
 def _with_part(problem: Problem, where: Callable[[Model], Any], values: Any) -> Problem:
-    """Return the problem with a part of its model replaced."""
+    """Return the problem with part of its model replaced."""
     model = eqx.tree_at(where, problem.model, values)
     layout = eqx.tree_at(lambda found: found.model, problem.layout, model)
     return dataclasses.replace(problem, model=model, layout=layout)

@@ -1,4 +1,4 @@
-"""Compute score and information of all parameters at a fit, free or not."""
+"""Compute the score and information of all parameters at a fit, free or not."""
 
 import dataclasses
 from collections.abc import Iterable
@@ -25,7 +25,7 @@ from .engine import (
 class Linearised:
     """The likelihood about a fit as a quadratic function of all parameters.
 
-    In units of each parameter's scale, with states eliminated.
+    Each parameter is in units of its scale, and the states are eliminated.
     """
 
     problem: Problem
@@ -33,7 +33,7 @@ class Linearised:
     names: tuple[str, ...]
     """Names of the parameters."""
     columns: Columns
-    """The free numbers."""
+    """The free values."""
     information: Float[np.ndarray, "g g"]
     """Information of the data alone, shape `(g, g)`."""
     score: Float[np.ndarray, " g"]
@@ -42,7 +42,7 @@ class Linearised:
     """Diagonal of the prior's information, shape `(g,)`."""
 
     def gain(self, names: Iterable[str], beside: Iterable[str] = ()) -> float:
-        """Return the gain of twice the log-likelihood if `names` were freed.
+        """Return the gain in twice the log-likelihood if `names` were freed.
 
         Args:
             names: Names of the parameters to free.
@@ -58,8 +58,8 @@ class Linearised:
     def step(self, names: Iterable[str]) -> dict[str, tuple[float, float]]:
         """Return the change of each freed parameter, and its standard error.
 
-        It is exact for a quadratic likelihood. Parameters that differ from recording to
-        recording are named `name@record`.
+        The result is exact for a quadratic likelihood. Parameters that differ from
+        recording to recording are named `name@record`.
         """
         rows = self._rows(names)
         inverse = invert_information(self._block(rows))
@@ -92,7 +92,7 @@ class Linearised:
 def linearise(
     problem: Problem, found: Fit, *, weights: Weights | None = None, prior: bool = True
 ) -> Linearised:
-    """Return score and information of all parameters about a fit.
+    """Return the score and information of all parameters about a fit.
 
     The example continues that of [`jaxcam.fitting.fit`][].
 

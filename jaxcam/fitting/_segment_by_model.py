@@ -1,4 +1,4 @@
-"""Segment recordings of any system at its own gaps, computed from its channels."""
+"""Segment recordings of any system at gaps computed from its channels."""
 
 import dataclasses
 from collections.abc import Callable, Sequence
@@ -28,20 +28,22 @@ def segment_by_model(
     restitution: float = 0.5,
     progress: Callable[[float], None] | None = None,
 ) -> tuple[Segments, ...]:
-    """Cut recordings at every gap of a model's system, as measured by its channels.
+    """Segment recordings at every gap of a model's system, as measured by its channels.
 
-    A gap is computed from the measured components of the state, and set to zero where
-    its velocity jumps, as far as the tolerances of the parameters allow. Without a gap
-    the whole recording is one flight.
+    A gap is computed from the measured components of the state and shifted so that it
+    is zero where its velocity jumps, as far as the tolerances of the parameters allow.
+    Without a gap, the whole recording is one flight.
 
     Args:
-        model: The model. Components of the state are measured by sensors whose
-            `observe` is a number and that have no bandwidth.
+        model: The model. State components count as measured if a sensor without a
+            bandwidth has their index as `observe`.
         recordings: The recordings.
         parameters: Parameters whose tolerances limit the error of a gap.
-        drive_channel: The encoder of a drive (rad), of a model with a `Turning` drive.
-        restitution: Expected coefficient, for impacts too low to be observed.
-        progress: Called with the fraction of recordings done.
+        drive_channel: The channel of the drive's encoder (rad), for a model with a
+            `Turning` drive.
+        restitution: Expected coefficient of restitution, for impacts too weak to be
+            observed.
+        progress: Called with the fraction of recordings completed.
 
     Returns:
         The segments of each recording.
@@ -107,7 +109,9 @@ def _states(model: Model, picks, recording) -> Float[np.ndarray, "k n"]:
 
 
 def _gaps(model: Model, parameters, recording, states, drive: Drive | None):
-    """Gaps `(g, k)`, their slopes by the state `(g, n)` and their errors `(g,)`."""
+    """Return gaps `(g, k)`, their derivatives with respect to the state `(g, n)` and
+    their errors `(g,)`.
+    """
     layout = Layout(model, parameter_places(model, parameters))
     values = np.array([float(p.where(model)) for p in parameters])
     tolerances = np.array([p.tolerance for p in parameters])
@@ -138,8 +142,8 @@ def _gap(layout: Layout, values, times, states, angles, rates):
 
 @eqx.filter_jit
 def _slopes(layout: Layout, values, times, states, angles, rates):
-    """Return slopes of the gaps by the state and by the parameters, sample by
-    sample.
+    """Return the derivatives of the gaps with respect to the state and the parameters,
+    sample by sample.
     """
 
     def one(time, state, angle, rate):
@@ -166,7 +170,6 @@ def _refuse_unseen(model: Model, picks, recording, slopes) -> None:
             name = f"`{names[place]}`" if names else f"component {place} of the state"
             raise RecordingError(
                 f"{recording.name}: gap {number + 1} depends on {name}, which no "
-                f"channel measures; give a sensor whose `observe` is {place}, without "
-                "a "
-                f"bandwidth."
+                f"channel measures; add a sensor without a bandwidth whose `observe` "
+                f"is {place}."
             )

@@ -1,4 +1,4 @@
-"""Represent the rig file of any system: its sensors and known values."""
+"""The content of a rig file of any system: its sensors and known values."""
 
 import dataclasses
 import fnmatch
@@ -32,20 +32,21 @@ class Setup:
     drive_channel: str | None = None
     """Channel of the encoder of a turning drive (rad), or `None`."""
     references: Mapping[str, float] = dataclasses.field(default_factory=dict)
-    """Constants of the forms of missing physics that are stated, by the names of fields
-    of `jaxcam.recordings.References`, in the units of the motion; the others follow its
-    speeds."""
+    """Stated constants of missing-physics terms, by the names of the fields of
+    `jaxcam.recordings.References`, in the units of the motion; the others follow from
+    the speeds of the motion.
+    """
     records: Mapping[str, Mapping[str, float]] = dataclasses.field(default_factory=dict)
     """Known constants of single recordings, by patterns of their names: `{"run3*":
-    {"mass": 0.31}}`; of several matches, the last counts.
+    {"mass": 0.31}}`; if several match, the last one counts.
     """
     files: FileLayout = FileLayout()
-    """Names of the columns of recordings, and their sampling rate."""
+    """Column names and sampling rate of the recordings."""
 
     @property
     def channels(self) -> tuple[str, ...]:
-        """Return the channels that a recording must contain, the motion's sensors
-        first.
+        """Return the channels that a recording must contain, starting with the motion
+        sensors.
         """
         drive = self.model.drive
         measured = drive.channel if isinstance(drive, Input) else self.drive_channel
@@ -60,8 +61,8 @@ class Setup:
     ) -> Case:
         """Return the recordings in a folder, with the columns and constants of the rig.
 
-        As `jaxcam.recordings.read_case`, with the names of columns and the constants
-        that the rig states.
+        This is `jaxcam.recordings.read_case` with the column names and constants of the
+        rig file.
 
         Raises:
             RecordingError: As for `read_case`; or constants belong to a recording that
@@ -78,7 +79,8 @@ class Setup:
         return self.known_of(case)
 
     def known_of(self, case: Case) -> Case:
-        """Return the case with the constants that the rig states for each recording.
+        """Return the case with the constants that the rig file gives for each
+        recording.
 
         Raises:
             RecordingError: Constants belong to a recording that does not exist.
@@ -87,8 +89,8 @@ class Setup:
             if not any(_fits(run.name, pattern) for run in case):
                 names = ", ".join(f"`{run.name}`" for run in case)
                 raise RecordingError(
-                    f'{case.name}: [records."{pattern}"] of the rig file fits none of '
-                    f"its recordings; they are {names}."
+                    f'{case.name}: [records."{pattern}"] of the rig file matches none '
+                    f"of the recordings; they are {names}."
                 )
         runs = tuple(self._with_known(run) for run in case)
         return dataclasses.replace(case, recordings=runs)
@@ -107,10 +109,10 @@ class Setup:
         *,
         progress: Callable[[float], None] | None = None,
     ) -> tuple[Segments, ...]:
-        """Return recordings segmented at the gaps of the system; segments are
-        unchanged.
+        """Return recordings segmented at the gaps of the system; existing segments are
+        kept.
 
-        `progress` is called with the fraction of recordings done.
+        `progress` is called with the fraction of recordings completed.
 
         Raises:
             RecordingError: A channel is missing, or a gap is not measured by any
@@ -144,8 +146,8 @@ class Setup:
 
 
 def _fits(name: str, pattern: str) -> bool:
-    """Return whether a name denotes a recording or a piece of it: `run3_piece2` by
-    `run3`.
+    """Return whether a pattern matches a recording or a piece of it: `run3` matches
+    `run3_piece2`.
     """
     whole = re.sub(r"_piece\d+$", "", name)
     return any(fnmatch.fnmatchcase(one, pattern) for one in (name, whole))

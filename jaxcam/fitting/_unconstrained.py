@@ -8,12 +8,12 @@ from jaxtyping import Float
 
 
 # Fractions of the largest singular value, with columns of unit length, below which a
-# combination is rounding, and may be rounding
+# combination is certainly, or possibly, due to rounding
 _BLIND, _DOUBTFUL = 1e-6, 3e-3
 # Growth of information that comes from the states alone, if they are held a hundred
 # times as firmly
 _GROWS = 10.0
-# Members of a combination that are named: at least this part of the largest
+# Members of a combination are named if they are at least this fraction of the largest
 _MEMBER = 0.1
 
 
@@ -22,9 +22,11 @@ class Unconstrained:
     """A combination of parameters that can change without changing the data."""
 
     names: tuple[str, ...]
-    """Names of the parameters, `name@record` where each recording has its own."""
+    """Names of the parameters; `name@record` if each recording has its own value."""
     shares: Float[np.ndarray, " k"]
-    """Change of each parameter, in its own unit, the largest of them by its scale."""
+    """Change of each parameter in its unit; the largest change equals the parameter's
+    scale.
+    """
 
     def sentence(self) -> str:
         """Return the combination, and the remedy, in words."""
@@ -37,8 +39,8 @@ class Unconstrained:
             f"{name} by {share:+.3g}" for name, share in zip(self.names, self.shares)
         )
         return (
-            f"The data see no change of {moves} together; hold one of them or give it "
-            f"a tolerance."
+            f"A joint change of {moves} does not affect the data; hold one of them or "
+            f"give it a tolerance."
         )
 
 
@@ -54,7 +56,7 @@ def unconstrained(
     the squares of the singular values, with every column of J at unit length.
 
     **Arguments:** names and `information` of the parameters in units of their `scale`;
-    `firmer` gives the same with the eliminated states held more firmly.
+    `firmer` returns the same matrix with the eliminated states held more firmly.
     """
     diagonal = np.diag(information)
     dead = ~(diagonal > 0)
@@ -73,7 +75,7 @@ def unconstrained(
         )
         for value, vector in zip(values, vectors.T):
             rounding = value <= _BLIND**2 * len(rows) * values[-1]
-            # a state held by rounding only contributes its information
+            # a state held only by rounding contributes information
             lent = vector @ held @ vector > _GROWS * max(value, 0.0)
             if not (rounding or (value <= _DOUBTFUL**2 * values[-1] and lent)):
                 continue

@@ -19,7 +19,7 @@ from .loop import first_state, Functions, iteration, Plan
 from .lowering import depend_on, one_kernel, whole, with_kept
 
 
-# iterations between two checks whether any lane still runs
+# iterations between two checks of whether any batch element is still running
 _BLOCK = 4
 
 
@@ -35,7 +35,7 @@ class Arrival(eqx.Module):
     steps: Float[Array, ""]
     """Number of attempted integration steps."""
     code: Int[Array, ""]
-    """Index into `RESULTS`: 0 where the run reached the end."""
+    """Index into `RESULTS`; 0 if the run reached the end."""
 
 
 def flow(
@@ -51,10 +51,10 @@ def flow(
 
     The function is pure: it can be compiled (`jit`), batched (`vmap`) and
     differentiated (`jvp`, `grad`, `linearize`, nested) with respect to state, times and
-    parameters. A gradient costs one forward derivative per number differentiated by.
-    The number of impacts, contacts and releases may differ between batch elements. An
-    invalid start (behind a constraint, not finite, t1 before t0) returns a result code
-    of its own and the state NaN; outside of transformations the system is checked
+    parameters. A gradient costs one forward derivative per differentiation variable.
+    The numbers of impacts, contacts and releases may differ between batch elements. For
+    an invalid start (behind a constraint, not finite, t1 before t0), the result has a
+    specific code and the state NaN; outside of transformations, the system is checked
     first.
 
     Args:
@@ -63,7 +63,7 @@ def flow(
         t0: Start time (s).
         t1: End time (s), t1 >= t0.
         settings: Accuracy; default `Settings()`.
-        max_steps: Budget of attempted integration steps.
+        max_steps: Maximum number of attempted integration steps.
 
     Returns:
         An `Arrival`, whose `code` is an index into `RESULTS`.

@@ -11,7 +11,7 @@ from ..parameters import FloatScalar
 
 
 class Settings(eqx.Module):
-    """Accuracy settings of a run; they do not change its physics.
+    """Accuracy settings of a run; they do not change the physics.
 
     Examples:
         >>> from jaxcam.models import BouncingBall
@@ -23,45 +23,53 @@ class Settings(eqx.Module):
     """
 
     tolerance: FloatScalar = 1e-10
-    """Relative error allowed per step. Each component is measured against the distance
-    it has moved since the start of the run; at first, against its distance from the
-    constraint if a gap depends on it, otherwise against its own size. The accuracy is
-    therefore independent of the units and of the origin of a coordinate. A coordinate
-    is still known only to 1e-15 of its value, which limits the resolution of a small
-    gap far from the origin."""
+    """Relative error allowed per step. The error of each component is relative to the
+    distance that it has moved since the start of the run; at first, it is relative to
+    the distance from the constraint if a gap depends on the component, otherwise to its
+    magnitude. The accuracy is therefore independent of the units and of the origin of a
+    coordinate. However, a coordinate is known only to 1e-15 of its value, which limits
+    the resolution of a small gap far from the origin.
+    """
     chatter_smallness: FloatScalar = 1e-3
-    """Chatter is completed analytically only where lambda/(1 - r) is below this, with
-    lambda = v |j| / a^2. The relative error of the completed time is about its square.
+    """Chatter is completed analytically only if lambda/(1 - r) is below this value,
+    with lambda = v |j| / a^2. The relative error of the completed time is about its
+    square.
     """
     chatter_depth: FloatScalar = 1e-6
     """Chatter is completed analytically only after the speed has fallen to this
-    fraction of the fastest rebound since the last release (or the impacts can no longer
-    be resolved in floating point). 1 completes as soon as the theory allows (fast, for
-    sweeps); small values list more impacts of each sequence."""
+    fraction of the fastest rebound since the last release, or if the impacts can no
+    longer be resolved in floating point. With 1, chatter is completed as soon as the
+    theory allows (fast, for sweeps); with smaller values, more impacts of each sequence
+    are listed.
+    """
     solver: diffrax.AbstractSolver = eqx.field(
         default_factory=diffrax.Dopri8, static=True
     )
     """Explicit Runge-Kutta solver of diffrax with an error estimate."""
     absolute: FloatScalar | Float[ArrayLike, " n"] | None = None
-    """Absolute error allowed, in units of the state: a number, or one per component,
-    shape `(n,)`. It replaces the scale described under `tolerance`: the error allowed
-    becomes `absolute + tolerance * |state|`."""
+    """Absolute error allowed, in units of the state: one number, or one per component,
+    shape `(n,)`. It replaces the scale described under `tolerance`: the allowed error
+    becomes `absolute + tolerance * |state|`.
+    """
     max_step: FloatScalar | None = None
     """Longest integration step (s). A force or barrier that is narrower than a step can
-    be stepped over: set this where forces are brief, or declare their times as
-    [`jaxcam.hybrid.HybridSystem.breakpoints`][]. By default a step is at most a quarter
-    of the system's period; without a period, at most 1/64 of the run while the error
-    estimate is uninformative (at rest, or in a uniform field)."""
+    be stepped over: set this if forces are brief, or declare their times as
+    [`jaxcam.hybrid.HybridSystem.breakpoints`][]. By default, a step is at most a
+    quarter of the system's period; without a period, it is at most 1/64 of the run
+    while the error estimate is uninformative (at rest, or in a uniform field).
+    """
     plain: bool = eqx.field(default=False, static=True)
-    """Run the event loop without the compiler passes of `jaxcam.hybrid.lowering`. About
-    ten times slower, equal within the tolerance, and without reverse mode: a check of
-    these passes, and a fallback if one fails."""
+    """Run the event loop without the compiler passes of `jaxcam.hybrid.lowering`. This
+    is about ten times slower, gives the same result within the tolerance, and has no
+    reverse mode. It serves as a check of these passes, and as a fallback if one fails.
+    """
 
     backend: Literal["auto", "llvm", "xla"] = eqx.field(default="xla", static=True)
-    """Compiler of runs that are not traced: `"xla"`, through which all traced runs and
-    derivatives go; `"llvm"`, which is faster and rejects a system with an unsupported
-    operation; or `"auto"`, LLVM if possible, otherwise XLA. Results differ by
-    rounding."""
+    """Compiler for runs that are not traced: `"xla"`, which is also used for all traced
+    runs and derivatives; `"llvm"`, which is faster but rejects a system with an
+    unsupported operation; or `"auto"`, LLVM if possible, otherwise XLA. Results differ
+    only by rounding.
+    """
 
     @property
     def compiles(self) -> bool:
@@ -85,8 +93,8 @@ class Settings(eqx.Module):
             )
         if not 0 < float(self.chatter_smallness) <= 0.1:
             raise ValueError(
-                f"chatter_smallness is {float(self.chatter_smallness):g}; the map for "
-                "completing chatter needs a value in (0, 0.1], such as 1e-3"
+                f"chatter_smallness is {float(self.chatter_smallness):g}; completion "
+                "of chatter requires a value in (0, 0.1], such as 1e-3"
             )
         if not 0 < float(self.chatter_depth) <= 1:
             raise ValueError(
@@ -98,10 +106,10 @@ class Settings(eqx.Module):
         ):
             raise ValueError(
                 f"absolute is {self.absolute}; give positive numbers in units of the "
-                "state, or leave it out"
+                "state, or omit it"
             )
         if self.max_step is not None and not float(np.asarray(self.max_step)) > 0:
             raise ValueError(
                 f"max_step is {float(np.asarray(self.max_step)):g}; give a positive "
-                "length in seconds"
+                "step length in seconds"
             )

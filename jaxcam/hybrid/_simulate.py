@@ -45,27 +45,28 @@ def simulate(
     Args:
         system: A [`jaxcam.hybrid.HybridSystem`][].
         state: Initial state, shape `(n,)`, with every gap >= 0. `None` starts on the
-            orbit last released from contact (systems with a period, two states and one
-            constraint): in contact at `t0` if contact holds then, otherwise from the
-            last release before.
+            orbit that was last released from contact (for systems with a period, two
+            states and one constraint): in contact at `t0` if contact is maintained
+            then, otherwise at the last release before `t0`.
         t0: Start time (s).
         t1: End time (s), t1 >= t0.
-        tolerance: Error allowed per step, relative to how far each component moves.
-        solver: Explicit Runge-Kutta solver of diffrax, default `Dopri8`.
+        tolerance: Error allowed per step, relative to the distance that each component
+            moves.
+        solver: Explicit Runge-Kutta solver from diffrax; default `Dopri8`.
         settings: All accuracy settings; overrides `tolerance` and `solver`.
-        max_step: Longest integration step (s); a narrower force or barrier may be
-            stepped over.
-        max_steps: Budget of attempted steps. By default up to a million; inside `jit`,
-            `vmap`, `jvp` or `grad`, where array sizes must be fixed, 4096 with padded
-            arrays.
-        derivatives: "forward", or "reverse" for gradients by hundreds of numbers; both
-            serve jvp, linearize, grad and hessian. "reverse" always runs `max_steps`
-            attempts.
+        max_step: Longest integration step (s); briefer forces or narrower barriers may
+            be stepped over.
+        max_steps: Maximum number of attempted steps. The default is a million; inside
+            `jit`, `vmap`, `jvp` or `grad`, where array sizes must be fixed, it is 4096
+            with padded arrays.
+        derivatives: "forward", or "reverse" for gradients with respect to hundreds of
+            numbers; both support jvp, linearize, grad and hessian. "reverse" always
+            runs `max_steps` attempts.
         engine: "loop", or "diffeqsolve" for one diffrax call per piece of motion.
-        progress: Called from time to time with the fraction done.
+        progress: Called at intervals with the completed fraction.
 
     Returns:
-        A trajectory. If it did not reach t1, its `result` says why.
+        A trajectory. If it did not reach t1, its `result` gives the reason.
 
     Raises:
         ValueError: The state is not finite or lies behind a constraint, t1 < t0, a
@@ -109,7 +110,7 @@ def simulate(
     tableau_of(settings.solver)
     if traced or derivatives == "reverse":
         rows = 4096 if max_steps is None else max_steps
-        # a scan is run backward step by step, a loop only as a whole
+        # a scan can be run backward step by step, a loop only as a whole
         forward = _forward if settings.plain else whole(_forward)
         of_rows: Callable[..., tuple[Parts, Any]] = (
             _reversible if derivatives == "reverse" else forward
@@ -156,8 +157,8 @@ def _released(system, t0, traced):
     state, time, nowhere = _release_point(system, t0)
     if not traced and bool(nowhere):
         raise ValueError(
-            "there is no contact anywhere in the period, so no release point; pass the "
-            "state to start from"
+            "there is no contact in the period, and therefore no release point; pass "
+            "the state to start from"
         )
     return state, time
 
@@ -181,7 +182,7 @@ def _release_point(system, t0):
 def _forward(
     system, settings, t0, state, t1, rows: int
 ) -> tuple[Parts, Int[Array, ""]]:
-    """Parts and result code of a run whose arrays have fixed lengths."""
+    """Return parts and result code of a run whose arrays have fixed lengths."""
     return _of_rows(run, system, settings, t0, state, t1, rows)
 
 
@@ -204,14 +205,14 @@ def _assemble(system, t0, state, contact, log: Log) -> Parts:
     t0, state, contact, log = jax.tree.map(np.asarray, (t0, state, contact, log))
     log = Log(*(part[log.kind > 0] for part in log))
     rows, width = log.contact.shape
-    # contacts that hold at the start belong to no row
+    # contacts at the start do not belong to any row
     sizes = rows, width * (rows + 1)
     return assemble(system, t0, state, contact, log, sizes, np)
 
 
 @jax.jit
 def _code(carried: LoopState):
-    """Index into `RESULTS`; an unfinished run has used up its budget."""
+    """Return the index into `RESULTS`; an unfinished run has used up its steps."""
     return carried.status.astype(jnp.int32)
 
 

@@ -20,7 +20,7 @@ from .record import Printed, vector_text
 from .surface import check_restitution, restitutions
 
 
-# ratio of lanes in a group to lanes in a block
+# ratio of trajectories in a group to those in a block
 _GROUP = 64
 
 
@@ -37,8 +37,7 @@ class Stroboscope(Printed):
     steps: np.ndarray
     """Number of attempted integration steps, shape `(lanes,)`."""
     code: np.ndarray
-    """Index into `RESULTS`, shape `(lanes,)`: 0 where the trajectory reached its end.
-    """
+    """Index into `RESULTS`, shape `(lanes,)`; 0 if the trajectory reached its end."""
     hits: np.ndarray
     """Impacts in each sampled period, shape `(lanes, turns - skip)`."""
     rests: np.ndarray
@@ -69,7 +68,7 @@ class Stroboscope(Printed):
             f"trajectories: {len(rows)}, failed: {failed}, "
             f"samples of each: {self.states.shape[1]}"
         )
-        # the last column only where there is something to say
+        # the last column is shown only if there is something to report
         if not failed:
             headings, rows = headings[:-1], [row[:-1] for row in rows]
         return ShortTable(said, headings, rows, ("failure",))
@@ -96,8 +95,8 @@ def stroboscope(
 
     Args:
         system: The system; all trajectories share it unless `where` is given.
-        states: Initial states, shape `(lanes, n)`, or `(n,)` for the same start
-            everywhere.
+        states: Initial states, shape `(lanes, n)` with one row per trajectory, or
+            `(n,)` if all start from the same state.
         turns: Number of periods.
         skip: Number of periods at the start that are not sampled.
         t0: Start time (s).
@@ -106,13 +105,14 @@ def stroboscope(
         values: Value of that parameter in each trajectory, shape `(lanes,)` or
             `(lanes, k)`.
         period: Sampling period (s); default the system's forcing period.
-        settings: Accuracy; the default completes chatter as soon as the theory allows.
-        block: Number of trajectories advanced together; one that ends makes room for
-            the next.
-        rows: Attempted steps between two checks for ended trajectories.
-        max_steps: Budget of attempted steps per trajectory.
+        settings: Accuracy settings; the default completes chatter as soon as the theory
+            allows.
+        block: Number of trajectories advanced together; each one that ends is replaced
+            by the next.
+        rows: Number of attempted steps between two checks for ended trajectories.
+        max_steps: Maximum number of attempted steps per trajectory.
         workers: Number of threads; results do not depend on it.
-        progress: Called with the fraction of trajectories done.
+        progress: Called with the fraction of trajectories completed.
 
     Returns:
         A `Stroboscope` of NumPy arrays.
@@ -144,15 +144,15 @@ def stroboscope(
         values is not None and values.shape != (lanes, *several)
     ):
         raise ValueError(
-            "give where and values together, with one value for each lane: "
-            f"{lanes} lanes here"
+            "give where and values together, with one value for each of the "
+            f"{lanes} trajectories"
         )
     length = None if period is None else jnp.asarray(period, dtype=jnp.float64)
     _check_times(system, period, turns, skip)
     start = jnp.asarray(t0, dtype=jnp.float64)
     _check(*split_lanes(system, where, values), settings, start, length, states)
 
-    # a group keeps its block busy until its last lanes, and bounds the memory
+    # groups bound the memory; each keeps its block busy until its last trajectories
     width = min(block, lanes)
     shares = -(-lanes // (workers * width))
     group = width * min(_GROUP, shares)
@@ -178,7 +178,7 @@ def stroboscope(
 
 
 def _one_for_each(states, values) -> np.ndarray:
-    """Return one initial state for each lane, shape `(lanes, n)`."""
+    """Return one initial state for each trajectory, shape `(lanes, n)`."""
     if states.ndim != 1:
         return states
     return np.broadcast_to(states, (1 if values is None else len(values), len(states)))
@@ -196,18 +196,20 @@ def _check_times(system, period, turns, skip) -> None:
 
 
 def _check(batched, shared, settings, t0, period, states) -> None:
-    """Raise `ValueError` for lanes that cannot start; the first is checked closely."""
+    """Raise `ValueError` for trajectories that cannot start; the first is checked
+    fully.
+    """
     first = eqx.combine(jax.tree.map(lambda leaf: leaf[0], batched), shared)
     one = jnp.asarray(states[0])
     check_start(first, settings, t0, one, t0)
     if not np.all(np.isfinite(states)):
-        raise ValueError("a state is not finite; every component of each must be")
+        raise ValueError("a state is not finite; all components must be finite")
 
     seen = _starts(batched, shared, period, t0, jnp.asarray(states))
     nearest, behind, lengths, returned = map(np.asarray, seen)
     if not np.all(lengths > 0):
         raise ValueError(
-            "the period of a lane is not positive; check values and period"
+            "the period of a trajectory is not positive; check values and period"
         )
     check_restitution(first, returned)
     if not np.all(np.isfinite(nearest)):
@@ -215,14 +217,14 @@ def _check(batched, shared, settings, t0, period, states) -> None:
     if np.any(behind):
         lane = int(np.argmin(np.where(behind, nearest, np.inf)))
         raise ValueError(
-            f"gap is negative ({float(nearest[lane]):.1e}) at t0 in lane {lane}; "
+            f"gap is negative ({float(nearest[lane]):.1e}) at t0 in trajectory {lane}; "
             "start outside the constraint"
         )
 
 
 @eqx.filter_jit
 def _starts(batched, shared, period, t0, states):
-    """Return smallest gap, whether it is negative, period and restitution, per lane."""
+    """Return, per trajectory, smallest gap, its sign, period and restitution."""
 
     def one(batched, state):
         system = eqx.combine(batched, shared)

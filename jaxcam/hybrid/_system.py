@@ -1,4 +1,4 @@
-"""Define a hybrid system by three functions of time and state, and its parameters."""
+"""A hybrid system, defined by its parameters and three functions of time and state."""
 
 import abc
 from typing import Any, ClassVar
@@ -14,16 +14,17 @@ class HybridSystem(eqx.Module):
 
     Subclass it, define the three methods below, and declare the parameters as fields:
     every floating-point field is a parameter that can be swept, fitted, continued and
-    differentiated, and is picked with a `where` function (`lambda s: s.speed`).
+    differentiated, and that can be selected by a `where` function (`lambda s:
+    s.speed`).
 
     All three methods take the time `t` (seconds, a scalar) and the state (shape
-    `(n,)`), are smooth in both, and are written with `jax.numpy`. With one constraint
-    `gap` returns a scalar; with `m` constraints it returns shape `(m,)` and `impact`
-    returns shape `(m, n)`, one row for each constraint.
+    `(n,)`), must be smooth in both, and are written with `jax.numpy`. With one
+    constraint, `gap` returns a scalar; with `m` constraints, it returns shape `(m,)`
+    and `impact` returns shape `(m, n)`, one row for each constraint.
 
     Everything else (normal velocity, acceleration and jerk of the gap, the sticking
-    field, release, the completion of chatter) is derived from them by automatic
-    differentiation.
+    field, release and the completion of chatter) is derived from these functions by
+    automatic differentiation.
 
     Examples:
         >>> class Ball(jaxcam.HybridSystem):
@@ -39,14 +40,15 @@ class HybridSystem(eqx.Module):
     """
 
     state_names: ClassVar[tuple[str, ...]] = ()
-    """Names of the state's components, for tables and axes."""
+    """Names of the state components, used in tables and axis labels."""
     state_units: ClassVar[tuple[str, ...]] = ()
-    """Units of the state's components, for tables and axes."""
+    """Units of the state components, used in tables and axis labels."""
     constraint_names: ClassVar[tuple[str, ...]] = ()
     """Names of the constraints, in the order of `gap`, such as `("left", "right")`."""
     active: ClassVar[bool] = False
-    """Whether impacts may add energy, as at a driven bumper or in reversed time.
-    Otherwise a coefficient of restitution above one is an error."""
+    """Whether impacts may add energy, as with a driven bumper or in reversed time.
+    Otherwise, a coefficient of restitution above one is an error.
+    """
 
     @abc.abstractmethod
     def vector_field(
@@ -59,7 +61,7 @@ class HybridSystem(eqx.Module):
             state: State, shape `(n,)`.
 
         Returns:
-            Rates per second, shape `(n,)`.
+            Rates of change (per second), shape `(n,)`.
         """
 
     @abc.abstractmethod
@@ -80,11 +82,11 @@ class HybridSystem(eqx.Module):
     def impact(
         self, t: RealScalar, state: Float[Array, " n"]
     ) -> Float[Array, "*constraints n"]:
-        """Return the state just after an impact that finds the system in `state`.
+        """Return the state just after an impact, given the `state` just before it.
 
-        It must have the form `state + W(t, state) * normal_velocity` (thesis,
-        eq. 2.27), so that a grazing state is unchanged. With coefficient of restitution
-        r the normal velocity is multiplied by -r.
+        It must have the form `state + W(t, state) * normal_velocity` (thesis, eq.
+        2.27), so that a grazing state is unchanged. With a coefficient of restitution
+        r, the normal velocity is multiplied by -r.
 
         Args:
             t: Time (s).
@@ -97,19 +99,19 @@ class HybridSystem(eqx.Module):
 
     @property
     def period(self) -> Any:
-        """Return the period of the forcing (s), or `None` for a system without one."""
+        """Return the period of the forcing (s), or `None` for an autonomous system."""
         return None
 
     @property
     def breakpoints(self) -> Any:
         """Return the times at which a function may change abruptly (s), or `None`.
 
-        Shape `(k,)`. Steps end exactly there, and the field, gap and impact law are
-        evaluated on either side only, so that a switch may be written with
-        `jnp.where(t < b, ...)`. A system with a `period` repeats them in every period,
-        at `b + k * period`; without one they are times of the run. Declare a brief
-        force by the times at which it begins and ends; keep them few, since each adds
-        some operations to every step.
+        The shape is `(k,)`. Steps end exactly at these times, and the vector field, gap
+        and impact law are evaluated only on either side of them, so a switch may be
+        written with `jnp.where(t < b, ...)`. In a system with a `period`, they repeat
+        in every period, at `b + k * period`; otherwise they are times of the run.
+        Declare a brief force by the times at which it begins and ends. Keep the number
+        small, because each time adds operations to every step.
         """
         return None
 
@@ -121,17 +123,17 @@ class HybridSystem(eqx.Module):
     def prepared(self) -> "HybridSystem":
         """Return an equivalent system that is cheaper to evaluate many times.
 
-        Called once before a simulation, and differentiated through. For example, a cam
-        profile replaces its geometry by Fourier coefficients here.
+        It is called once before a simulation, and derivatives pass through it. For
+        example, a cam profile is replaced here by its Fourier coefficients.
 
         Returns:
-            The system itself by default.
+            The equivalent system; by default, the system itself.
         """
         return self
 
     def check(self) -> None:
         """Raise `ValueError` if a parameter has no physical meaning.
 
-        Called with concrete parameters, before a simulation starts.
+        It is called with concrete parameters before a simulation starts.
         """
         return None

@@ -1,4 +1,4 @@
-"""Run the loop outside of traces, chunk by chunk, by LLVM or by XLA."""
+"""Run the loop outside of traces, chunk by chunk, with LLVM or XLA."""
 
 from collections.abc import Callable
 from typing import Any
@@ -23,7 +23,7 @@ from .loop import (
 )
 
 
-# rows of a chunk: for progress, interruption and growing logs
+# rows of a chunk, between which progress is shown and a run can be interrupted
 _CHUNK = 2048
 
 
@@ -44,7 +44,7 @@ def run_untraced(
 
 
 def prepare(system, settings, t0, state, t1, differentiable):
-    """Return functions, plan and first state of a run."""
+    """Return the functions, the plan and the first state of a run."""
     system = system.prepared()
     functions = Functions(system, state.shape[0], settings.plain)
     plan = Plan.of(system, settings, t0, t1, differentiable=differentiable)

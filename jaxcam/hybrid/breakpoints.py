@@ -1,6 +1,6 @@
 """Handle declared times of abrupt change: no step reaches across one.
 
-Between two of them the functions are evaluated strictly inside the interval, so that a
+Between two such times, the functions are evaluated strictly inside the interval, so a
 switch at the time itself may be written with `<` or `<=`. Any other time is used
 unchanged: a shift by rounding would move a wall away from a detected impact.
 """
@@ -9,8 +9,8 @@ import jax
 import jax.numpy as jnp
 
 
-# how far from a breakpoint functions are evaluated, relative to the time: more than
-# rounding of a phase made of it
+# distance from a breakpoint at which functions are evaluated, relative to the time:
+# more than the rounding of a phase computed from it
 _SIDE = 2e-15
 
 
@@ -24,17 +24,17 @@ def declared(system) -> tuple:
 
 
 def next_breakpoint(breaks, repeat, t):
-    """Return the first breakpoint after `t`; they recur every `repeat` (s), inf for
-    never.
+    """Return the first breakpoint after `t`; breakpoints recur every `repeat` (s), or
+    never if it is inf.
     """
     return neighbours(breaks, repeat, t)[1]
 
 
 def neighbours(breaks, repeat, t):
-    """Return the last breakpoint at or before `t`, and the first after it; else -inf
-    and inf.
+    """Return the last breakpoint at or before `t` and the first after it, or -inf and
+    inf.
 
-    They recur every `repeat` (s), inf for never.
+    Breakpoints recur every `repeat` (s), or never if it is inf.
     """
     behind, ahead = -jnp.inf, jnp.inf
     recurs = jnp.isfinite(repeat)
@@ -52,20 +52,20 @@ def neighbours(breaks, repeat, t):
 
 
 def between(t, low, high, span):
-    """Return the time `t` moved inside (low, high), without a change of its
-    derivative.
-    """
+    """Return the time `t` moved inside (low, high), without changing its derivative."""
     inside = jnp.maximum(after(low, span), jnp.minimum(t, before(high, span)))
     return t + jax.lax.stop_gradient(inside - t)
 
 
 def after(t, span):
-    """Just after `t`, which may be -inf; `span` (s) is the length of the run."""
+    """Return a time just after `t`, which may be -inf; `span` (s) is the length of the
+    run.
+    """
     finite = jnp.where(jnp.isfinite(t), t, 0.0)
     return t + jax.lax.stop_gradient(_SIDE * (jnp.abs(finite) + span))
 
 
 def before(t, span):
-    """Just before `t`, which may be inf."""
+    """Return a time just before `t`, which may be inf."""
     finite = jnp.where(jnp.isfinite(t), t, 0.0)
     return t - jax.lax.stop_gradient(_SIDE * (jnp.abs(finite) + span))

@@ -21,7 +21,7 @@ def is_traced(tree) -> bool:
 
 
 def is_tracing() -> bool:
-    """Return whether a computation here becomes part of a program, as inside `jit`."""
+    """Return whether a computation is being traced into a program, as inside `jit`."""
     return isinstance(jnp.asarray(0.0), Tracer)
 
 
@@ -45,7 +45,7 @@ def check_start(system: HybridSystem, settings: Settings, t0, state, t1) -> None
     settings.check()
     if state.ndim != 1:
         raise ValueError(
-            f"state has shape {state.shape}; pass one vector, and jax.vmap for many"
+            f"state has shape {state.shape}; pass one vector, and use jax.vmap for many"
         )
     if not np.all(np.isfinite(state)):
         raise ValueError(
@@ -54,15 +54,15 @@ def check_start(system: HybridSystem, settings: Settings, t0, state, t1) -> None
     number = np.size(settings.absolute) if settings.absolute is not None else 1
     if number not in (1, len(state)):
         raise ValueError(
-            f"absolute has {number} numbers and the state {len(state)} components; "
-            "give one number, or one for each component"
+            f"absolute has {number} numbers, but the state has {len(state)} "
+            "components; give one number, or one for each component"
         )
     if not (np.isfinite(t0) and np.isfinite(t1)):
         raise ValueError("t0 and t1 must be finite times in seconds")
     if float(t1) < float(t0):
         raise ValueError(
-            f"t1 = {float(t1):g} s lies before t0 = {float(t0):g} s; motion runs "
-            "forward, so exchange them"
+            f"t1 = {float(t1):g} s is before t0 = {float(t0):g} s; time runs forward, "
+            "so interchange them"
         )
     check_system(system, t0, state)
     behind, values = map(np.asarray, _starts_behind(system, t0, state))
@@ -78,7 +78,7 @@ def check_start(system: HybridSystem, settings: Settings, t0, state, t1) -> None
 _starts_behind = eqx.filter_jit(starts_behind)
 _restitutions = eqx.filter_jit(restitutions)
 
-# systems that passed, because a check costs as much as a short run: by their shapes,
+# systems that passed, because a check takes as long as a short run: by their shapes,
 # and by all their numbers
 _WELL_SHAPED: set = set()
 _SOUND: set = set()
@@ -153,8 +153,8 @@ def _check_shapes(system, t0, state) -> None:
     after = _shape(system, "impact", t0, state)
     if after.shape != (*gap.shape, n):
         raise ValueError(
-            f"impact returns shape {after.shape} but gap has shape {gap.shape} and the "
-            f"state {(n,)}; return shape {(*gap.shape, n)}, one row for each gap"
+            f"impact returns shape {after.shape}, but gap has shape {gap.shape} and "
+            f"the state {(n,)}; return shape {(*gap.shape, n)}, one row for each gap"
         )
     for name, made in (("vector_field", rate), ("gap", gap), ("impact", after)):
         if made.dtype != jnp.float64:
@@ -171,8 +171,8 @@ def _shape(system, name, t0, state):
     except (ConcretizationTypeError, TracerArrayConversionError) as error:
         raise ValueError(
             f"{name} needs the values of time or state, which are not "
-            "known while it is compiled; write it with jax.numpy (jnp.cos, not np.cos "
-            "or math.cos), and jnp.where instead of if"
+            "known during compilation; write it with jax.numpy (jnp.cos, not np.cos "
+            "or math.cos), and use jnp.where instead of if"
         ) from error
     if not isinstance(made, jax.ShapeDtypeStruct):
         raise ValueError(

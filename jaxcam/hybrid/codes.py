@@ -1,4 +1,4 @@
-"""Define codes of log rows and messages for the end of a run."""
+"""Codes for log rows, and messages for the end of a run."""
 
 import enum
 import operator
@@ -12,7 +12,7 @@ class RowKind(enum.IntEnum):
     NOTHING = 0
     STEP = 1
     IMPACT = 2
-    # the impact after which the remaining, infinitely many ones are summed
+    # the impact after which the infinitely many remaining ones are summed
     LAST_IMPACT = 3
     CONTACT = 4
     RELEASE = 5
@@ -28,14 +28,14 @@ class _ByCode(type(eqx.Enumeration)):
 
 
 class RESULTS(eqx.Enumeration, metaclass=_ByCode):
-    """Reasons why a run ended; each message says what to do about it.
+    """Reasons why a run ended; each message states the remedy.
 
-    `RESULTS[trajectory.code]` is the sentence of a result code, 0 being success.
+    `RESULTS[trajectory.code]` is the message for a result code; 0 means success.
 
     Examples:
         >>> from jaxcam.hybrid import RESULTS
         >>> RESULTS[RESULTS.backward]
-        't1 lies before t0, and motion runs forward: exchange them.'
+        't1 is before t0, but time runs forward: interchange them.'
     """
 
     successful = ""
@@ -43,12 +43,12 @@ class RESULTS(eqx.Enumeration, metaclass=_ByCode):
     running = (
         "The step budget ran out before t1: raise max_steps, or loosen the tolerance."
     )
-    """The step budget ran out."""
+    """The maximum number of steps was reached."""
     step_failed = (
         "No step was short enough: the vector field or the gap is not smooth here, or "
-        "the tolerance is below rounding; loosen the tolerance or check the functions."
+        "the tolerance is below rounding; loosen the tolerance, or check the functions."
     )
-    """The integration step shrank to nothing."""
+    """The integration step became too small."""
     not_finite = (
         "The vector field, gap or impact law returned NaN or infinity: check the "
         "parameters and the state just before this time."
@@ -59,8 +59,8 @@ class RESULTS(eqx.Enumeration, metaclass=_ByCode):
         "state=None to start at the release point."
     )
     """A gap is negative at t0."""
-    backward = "t1 lies before t0, and motion runs forward: exchange them."
-    """t1 lies before t0."""
+    backward = "t1 is before t0, but time runs forward: interchange them."
+    """t1 is before t0."""
     together = (
         "Impacts on two or more constraints accumulate together, and only those on one "
         "are summed: choose t1 before this time, or parameters with which one "
@@ -81,8 +81,7 @@ _ITEMS = (
 FINISHED, RUNNING, STEP_FAILED, NOT_FINITE, BEHIND, BACKWARD, TOGETHER = map(
     float, range(len(_ITEMS))
 )
-"""Codes: the place of each item above. A lane of the loop has one of them as its
-status."""
+"""Codes: the index of each item above. The status of a batch element is one of them."""
 
 
 def message(code: int) -> str:

@@ -1,8 +1,9 @@
 """Take explicit Runge-Kutta steps of scalars or arrays, and integrate flights.
 
-Every free flight consists of these steps, with the tableau of a diffrax solver. The
-event loop unrolls steps into scalars. Theory and fits use array steps with a loop over
-the stages, which run equally fast and compile in a tenth of the time.
+All free flights are computed with these steps, using the tableau of a diffrax solver.
+The event loop unrolls the steps into scalars. Variational theory and fits use array
+steps with a loop over the stages, which are equally fast and compile in a tenth of the
+time.
 """
 
 import functools
@@ -54,7 +55,7 @@ def tableau_of(solver) -> Tableau:
             "diffrax.Dopri8() or diffrax.Tsit5()"
         )
     weights = np.asarray(table.b_sol, dtype=float)
-    # a last stage that serves only the next step is not needed here
+    # a last stage that is used only by the next step is not needed here
     last = int(np.max(np.nonzero((weights != 0) | (error != 0)))) + 1
     return Tableau(
         lower=tuple(tuple(map(float, row)) for row in table.a_lower[: last - 1]),
@@ -66,9 +67,9 @@ def tableau_of(solver) -> Tableau:
 
 
 DOPRI5 = tableau_of(diffrax.Dopri5())
-"""Tableau of Dormand and Prince's method of order five."""
+"""Tableau of the fifth-order Dormand-Prince method."""
 DOPRI8 = tableau_of(diffrax.Dopri8())
-"""Tableau of Dormand and Prince's method of order eight."""
+"""Tableau of the eighth-order Dormand-Prince method."""
 RK4 = Tableau(
     lower=((0.5,), (0.0, 0.5), (0.0, 0.0, 1.0)),
     nodes=(0.0, 0.5, 0.5, 1.0),
@@ -76,15 +77,16 @@ RK4 = Tableau(
     error=(0.0,) * 4,
     order=4,
 )
-"""Tableau of the classical method of order four, which diffrax lacks; without an error
-estimate."""
+"""Tableau of the classical fourth-order method, which is not in diffrax; it has no
+error estimate.
+"""
 
 
 class Squared(NamedTuple):
     """Coefficients of a component whose rate is another component, y'' = f.
 
-    Its stages are y + c h y' + h^2 sum of `lower` times f, so that the rates of the
-    component itself are not summed, and those of y' only where f depends on it.
+    The stages are y + c h y' + h^2 times the sum of `lower` times f, so the rates of
+    the component itself are not summed, and those of y' only if f depends on it.
     """
 
     lower: tuple[tuple[float, ...], ...]
@@ -102,18 +104,18 @@ def _lower(tableau: Tableau) -> np.ndarray:
 
 @functools.cache
 def squared(tableau: Tableau) -> Squared:
-    """Return the tableau applied twice. (Nystroem's form of a Runge-Kutta step)"""
+    """Return the tableau applied twice (the Nystroem form of a Runge-Kutta step)."""
     a = _lower(tableau)
     lower = a @ a
     rows = np.vstack([lower, np.asarray(tableau.weights) @ a, tableau.error @ a])
-    # sums that vanish by the order conditions leave rounding errors
+    # sums that should vanish by the order conditions are left with rounding errors
     rows[np.abs(rows) < 1e-14] = 0.0
     *stages, weights, error = (tuple(map(float, row)) for row in rows)
     return Squared(tuple(stages[1:]), weights, error)
 
 
 def _combine(weights, stages, i):
-    """Sum of component `i` of the stages with constant weights; None where empty."""
+    """Return the weighted sum of component `i` of the stages; None if it is empty."""
     total = None
     for w, s in zip(weights, stages):
         if w != 0.0:
@@ -122,7 +124,7 @@ def _combine(weights, stages, i):
 
 
 def step(tableau: Tableau, field, t, x: tuple, h):
-    """One step of length `h` from `(t, x)`.
+    """Take one step of length `h` from `(t, x)`.
 
     **Arguments:** `field(t, x)` and `x` work on tuples of scalars.
 
@@ -136,7 +138,7 @@ def step(tableau: Tableau, field, t, x: tuple, h):
     h2 = h * h
 
     def moved(i, node, once, double):
-        """Change of component i over the step, or over a part of it."""
+        """Return the change of component i over the step, or over part of it."""
         if i not in rate_of:
             return h * _combine(once, stages, i)
         change = node * (h * x[rate_of[i]]) if node != 0.0 else None
@@ -158,13 +160,16 @@ def step(tableau: Tableau, field, t, x: tuple, h):
 
 
 def rates_among(x, rates) -> dict[int, int]:
-    """Return which components are rates of others: position and velocity."""
+    """Return which components are rates of change of others, as velocities are of
+    positions.
+    """
     found = {}
     for i, rate in enumerate(rates):
         for j, component in enumerate(x):
             if rate is component and i != j:
                 found[i] = j
-    # the rate itself is integrated directly; otherwise there would be a third level
+    # the rate itself is integrated directly, because otherwise there would be a third
+    # level
     return {i: j for i, j in found.items() if j not in found}
 
 
@@ -185,8 +190,8 @@ def array_step(
         t: Time (s).
         x: State, shape `(n,)`.
         h: Step length (s).
-        unrolled: Write out the stages one by one, for steps in a hot loop; otherwise
-            `field` is compiled once.
+        unrolled: Whether to write out the stages one by one, for steps in a hot loop;
+            otherwise `field` is compiled only once.
 
     Returns:
         The state after the step, its error estimate, and the rate at `(t, x)`, each
@@ -220,14 +225,16 @@ def array_step(
         rows = (jnp.arange(len(tableau.nodes)), lower, nodes)
         rates, _ = jax.lax.scan(stage, empty, rows)
     else:
-        # each stage needs the one before alone: less to carry along
+        # each stage needs only the previous one, so less is carried along
         shares = jnp.asarray([0.0, *(row[-1] for row in tableau.lower)])
         _, rates = jax.lax.scan(chained, jnp.zeros_like(x), (shares, nodes))
     return x + h * _weighted(weights, rates), h * _weighted(wrong, rates), rates[0]
 
 
 def _weighted(weights, rates):
-    """Weighted sum of the stages; with derivatives a product of matrices is slower."""
+    """Return the weighted sum of the stages; with derivatives, a matrix product is
+    slower.
+    """
     return jnp.sum(weights[:, None] * rates, axis=0)
 
 
@@ -276,7 +283,7 @@ def adaptive_steps(
 ) -> Float[Array, " n"]:
     """Integrate `field(t, x)` from `(t0, x0)` to `t1` with adaptive steps.
 
-    Derivatives are taken at fixed step lengths.
+    Derivatives are computed with the step lengths held fixed.
 
     Args:
         tableau: Coefficients of a method with an error estimate.
@@ -285,10 +292,11 @@ def adaptive_steps(
         x0: Initial state, shape `(n,)`.
         t1: End time (s).
         tolerance: Error allowed per step, relative to 1 + |x|.
-        max_steps: Budget of attempted steps.
+        max_steps: Maximum number of attempted steps.
 
     Returns:
-        The state at `t1`, shape `(n,)`; NaN if `max_steps` attempts do not reach it.
+        The state at `t1`, shape `(n,)`; NaN if it is not reached within `max_steps`
+            attempts.
 
     Examples:
         >>> from jaxcam.hybrid.runge_kutta import DOPRI5, adaptive_steps

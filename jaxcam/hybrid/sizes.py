@@ -1,4 +1,4 @@
-"""Measure the size of each component of a motion, for comparisons without units."""
+"""Measure the size of each component of a motion, for dimensionless comparisons."""
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -16,9 +16,9 @@ def component_sizes(
 ) -> Float[Array, " n"]:
     """Return the scale of each state component, for relative comparisons of two states.
 
-    The scale is the size of the component plus the distance that its rate in free
-    flight covers in period / (2 pi): for a harmonic motion this is of the order of its
-    amplitude at every phase.
+    The scale is the magnitude of the component plus the distance that its rate of
+    change in free flight covers in period / (2 pi). For a harmonic motion, this is of
+    the order of the amplitude at every phase.
 
     Args:
         system: The system.

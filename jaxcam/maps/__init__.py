@@ -1,4 +1,4 @@
-"""Iterated maps: smooth and piecewise-smooth ones, their orbits and bifurcations."""
+"""Smooth and piecewise-smooth iterated maps, with their orbits and bifurcations."""
 
 from ._attractor import map_attractor as map_attractor
 from ._border_collision import (

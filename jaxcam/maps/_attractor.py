@@ -11,7 +11,7 @@ from ..parameters import real_array
 
 
 class Attractor(NamedTuple):
-    """The attractor of one orbit."""
+    """The attractor of an orbit."""
 
     period: int
     """Smallest detected period; 0 if there is none."""
@@ -40,14 +40,14 @@ def map_attractor(
     count: int = 20_000,
     longest: int = 64,
 ) -> Attractor:
-    """Classify the attractor on which the orbit of `start` ends.
+    """Classify the attractor to which the orbit of `start` converges.
 
     Args:
         system: A map of one variable, differentiable except on borders.
         start: First point.
-        transient: Number of iterates that are dropped.
-        count: Number of iterates that are used.
-        longest: Longest period that is detected.
+        transient: Number of initial iterates to discard.
+        count: Number of iterates to use.
+        longest: Longest period to detect.
 
     Returns:
         An `Attractor`.
@@ -70,7 +70,7 @@ def _settle(system, start, transient, count, longest):
     def one(carry, _):
         x, total = carry
         following, slope = jax.jvp(system, (x,), (jnp.ones_like(x),))
-        # a superstable orbit has no exponent
+        # a superstable orbit has no finite exponent
         total = total + jnp.log(jnp.maximum(jnp.abs(slope), 1e-300))
         return (following, total), None
 

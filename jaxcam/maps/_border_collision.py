@@ -1,4 +1,4 @@
-"""A fixed point that meets the border of a piecewise-smooth map."""
+"""Collisions of a fixed point with the border of a piecewise-smooth map."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -19,7 +19,8 @@ class BorderCollision(NamedTuple):
 
     kind: str
     """"persistence": the fixed point continues on the other side; "nonsmooth fold": two
-    of them meet and vanish."""
+    fixed points meet and disappear.
+    """
     period_two: bool
     """Whether an orbit of period two emerges, visiting both sides."""
     stable_left: bool
@@ -27,18 +28,18 @@ class BorderCollision(NamedTuple):
     stable_right: bool
     """Whether the fixed point is stable right of the border."""
     parameter: float = float("nan")
-    """Parameter at the collision; NaN where matrices alone were classified."""
+    """Parameter at the collision; NaN if only matrices were classified."""
     state: float = float("nan")
-    """State at the collision; NaN where matrices alone were classified."""
+    """State at the collision; NaN if only matrices were classified."""
 
 
 def classify_border_collision(left, right) -> BorderCollision:
     """Classify a border collision by the derivatives on both sides (Feigin).
 
-    A fixed point persists where the numbers of real eigenvalues above 1 have an even
-    sum, else it is a nonsmooth fold; an orbit of period two emerges where the numbers
-    below -1 have an odd sum. (M. di Bernardo et al., Piecewise-smooth Dynamical
-    Systems, 2008, section 3.1)
+    A fixed point persists if the total number of real eigenvalues above 1 on both sides
+    is even; otherwise, the collision is a nonsmooth fold. An orbit of period two
+    emerges if the total number of those below -1 is odd. (M. di Bernardo et al.,
+    Piecewise-smooth Dynamical Systems, 2008, section 3.1)
 
     Args:
         left: Derivative on the left: a number, or a matrix `(n, n)`.
@@ -76,15 +77,15 @@ def border_collision(
 
     Args:
         system: A continuous map.
-        where: Picks the parameter.
-        guess: Guess of the parameter.
-        state: Guess of the fixed point.
+        where: Selects the parameter.
+        guess: Initial guess of the parameter.
+        state: Initial guess of the fixed point.
 
     Returns:
         A `BorderCollision`.
 
     Raises:
-        ValueError: It is not found, or the map jumps at the border.
+        ValueError: No collision is found, or the map jumps at the border.
 
     Examples:
         >>> from jaxcam.maps import SkewMap, border_collision

@@ -19,22 +19,23 @@ def superstable(
     """Return parameters at which the critical point has period 1, 2, 4, ..., 2^(count -
     1).
 
-    There is one in each window of the cascade, and they accumulate as its doublings do.
-    Each is found by Newton's method from an extrapolation of the previous ones.
+    There is one such parameter in each window of the cascade, and they accumulate at
+    the same rate as its period doublings. Each is found by Newton's method, starting
+    from an extrapolation of the previous ones.
 
     Args:
-        system: The map, a Module.
-        where: Picks the parameter.
+        system: The map, a module.
+        where: Selects the parameter.
         critical: The critical point.
-        first: Guesses of the first two parameters.
+        first: Initial guesses of the first two parameters.
         count: Number of parameters.
 
     Returns:
         Shape `(count,)`.
 
     Raises:
-        ValueError: Newton's method does not converge; rounding ends the cascade at
-            about the thirteenth.
+        ValueError: Newton's method does not converge; rounding limits `count` to about
+            thirteen.
 
     Examples:
         >>> from jaxcam.maps import LogisticMap, superstable

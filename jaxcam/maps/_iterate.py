@@ -1,4 +1,4 @@
-"""Orbits of maps, and diagrams of them."""
+"""Orbits of maps, and their bifurcation diagrams."""
 
 from collections.abc import Callable
 
@@ -11,7 +11,7 @@ from ..parameters import real_array, VectorLike
 
 
 def iterate(system: Callable, start: ArrayLike | VectorLike, count: int) -> jax.Array:
-    """Iterate a map, and return the orbit.
+    """Iterate a map and return the orbit.
 
     Args:
         system: The map.
@@ -19,7 +19,7 @@ def iterate(system: Callable, start: ArrayLike | VectorLike, count: int) -> jax.
         count: Number of iterations.
 
     Returns:
-        The orbit with its start, shape `(count + 1, ...)`.
+        The orbit, including its start, shape `(count + 1, ...)`.
 
     Examples:
         >>> from jaxcam.maps import LogisticMap, iterate
@@ -39,15 +39,15 @@ def map_diagram(
     transient: int = 1000,
     keep: int = 200,
 ) -> Float[Array, "values keep"]:
-    """Return the settled orbit of one start for each value of a parameter.
+    """Return the steady-state orbit from a given start for each value of a parameter.
 
     Args:
-        system: The map, a Module.
-        where: Picks the parameter.
+        system: The map, a module.
+        where: Selects the parameter.
         values: Values of the parameter, shape `(values,)`.
         start: First point.
-        transient: Number of iterates that are dropped.
-        keep: Number of iterates that are kept.
+        transient: Number of initial iterates to discard.
+        keep: Number of iterates to keep.
 
     Returns:
         Shape `(values, keep)`.

@@ -24,11 +24,11 @@ class LogisticMap(eqx.Module):
         return self.mu * x * (1 - x)
 
     def fixed_point(self) -> jax.Array:
-        """Return the fixed point that is not zero; stable for 1 < mu < 3."""
+        """Return the nonzero fixed point, which is stable for 1 < mu < 3."""
         return (self.mu - 1) / self.mu
 
     def period_two(self) -> Float[Array, " 2"]:
-        """Return both points of the orbit of period two, `(2,)`; NaN for mu < 3
+        """Return the two points of the period-two orbit, `(2,)`; NaN for mu < 3
         (thesis, section 2.2.2).
         """
         mu = self.mu

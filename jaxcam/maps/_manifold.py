@@ -1,4 +1,4 @@
-"""Compute invariant manifolds of saddles of planar maps, grown from the saddle."""
+"""Compute invariant manifolds of saddles of planar maps, starting from the saddle."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -17,7 +17,8 @@ _MOST_POINTS = 20_000
 
 
 class Saddle(NamedTuple):
-    """A fixed point of a planar map with one multiplier inside the unit circle.
+    """A fixed point of a planar map with one multiplier inside and one outside the unit
+    circle.
 
     Examples:
         >>> from jaxcam.maps import saddle_at
@@ -28,7 +29,7 @@ class Saddle(NamedTuple):
     point: Float[Array, " 2"]
     """The fixed point, shape `(2,)`."""
     multipliers: Float[np.ndarray, " 2"]
-    """Multipliers, the stable one first, shape `(2,)`."""
+    """Multipliers, stable one first, shape `(2,)`."""
     directions: Float[np.ndarray, "2 2"]
     """Eigenvectors as columns, shape `(2, 2)`."""
 
@@ -38,7 +39,7 @@ def saddle_at(system: Callable, guess: VectorLike) -> Saddle:
 
     Args:
         system: A planar map.
-        guess: Guess of the saddle, shape `(2,)`.
+        guess: Initial guess of the saddle, shape `(2,)`.
 
     Returns:
         A [`jaxcam.maps.Saddle`][].
@@ -86,21 +87,23 @@ def grow_manifold(
     """Return one side of the unstable manifold of a saddle, as a curve from the saddle.
 
     It consists of a short segment along the unstable direction and its images. Points
-    are added to the first segment wherever their images lie too far apart, so that
-    every point of the curve is an exact image of one on the segment, and folds are
-    resolved. For the stable manifold pass the inverse map.
+    are added to the first segment wherever their images are too far apart, so that
+    every point of the curve is an exact image of a point on the segment, and folds are
+    resolved. For the stable manifold, pass the inverse map.
 
     Args:
         system: The map, traceable by JAX.
         point: The saddle, shape `(2,)`.
         direction: Unstable direction, whose sign chooses the side, shape `(2,)`.
         length: Length of the curve.
-        spacing: Largest distance of neighbouring points.
-        start: Distance from the saddle at which it begins; its square is the error.
+        spacing: Largest distance between neighbouring points.
+        start: Distance from the saddle at which the curve begins; its square is the
+            error.
 
     Returns:
         The points in order, shape `(points, 2)`. The curve ends where the map is not
-            finite, or jumps: there no refinement brings neighbours together.
+            finite or jumps, since no refinement could bring neighbouring points
+            together there.
 
     Raises:
         ValueError: The direction is not stretched by the map.
@@ -124,7 +127,7 @@ def grow_manifold(
         )
     times = 2 if stretch < 0 else 1
     ratio = abs(stretch) ** times
-    # even in the logarithm of the distance, which is what the map shifts
+    # equidistant in the logarithm of the distance, which the map shifts
     fractions = np.linspace(0.0, 1.0, 24)
     pieces, grown, order = [point[None]], 0.0, 0
     total = 1

@@ -1,6 +1,4 @@
-"""Piecewise-smooth maps of one variable, with their border at zero (thesis,
-eq. 2.20).
-"""
+"""Piecewise-smooth maps of one variable with a border at zero (thesis, eq. 2.20)."""
 
 import abc
 
@@ -21,7 +19,8 @@ def _parameter(default=None):
 class PiecewiseMap(eqx.Module):
     """A map with one rule for x <= 0 and another for x > 0.
 
-    Subclass it and define both; for `border_collision` they must be smooth at zero.
+    Subclass it and define both rules; for `border_collision`, they must be smooth at
+    zero.
 
     Examples:
         >>> from jaxcam.maps import PiecewiseMap
@@ -49,8 +48,8 @@ class PiecewiseMap(eqx.Module):
 class SkewMap(PiecewiseMap):
     """Skew map x -> a x + mu for x <= 0, b x + mu + jump for x > 0.
 
-    The normal form of a border collision where `jump` is zero; with a jump, that of a
-    discontinuous map (thesis, Figure 2.11 (a) and (b)).
+    It is the normal form of a border collision if `jump` is zero, and that of a
+    discontinuous map otherwise (thesis, Figure 2.11 (a) and (b)).
 
     Examples:
         >>> from jaxcam.maps import SkewMap
@@ -79,7 +78,7 @@ class SkewMap(PiecewiseMap):
 class SquareRootMap(PiecewiseMap):
     """Square-root map x -> a x + mu for x <= 0, mu - root sqrt(x) for x > 0.
 
-    The form of the Poincare map close to a grazing impact (thesis, Figure 2.11 (c)).
+    It is the form of the Poincare map near a grazing impact (thesis, Figure 2.11 (c)).
 
     Examples:
         >>> from jaxcam.maps import SquareRootMap
@@ -100,5 +99,5 @@ class SquareRootMap(PiecewiseMap):
 
     def right(self, x) -> jax.Array:
         """Return mu - root sqrt(x)."""
-        # of no consequence on the other side, but finite and differentiable there
+        # not used on the other side, but finite and differentiable there
         return self.mu - self.root * jnp.sqrt(jnp.where(x > 0, x, 1.0))

@@ -1,4 +1,4 @@
-"""Normal forms of the local bifurcations of codimension one. (Figure 2.7)"""
+"""Normal forms of the local bifurcations of codimension one (thesis, Figure 2.7)."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -11,8 +11,8 @@ import numpy as np
 class NormalForm(NamedTuple):
     """A normal form with its branches in closed form.
 
-    A field x' = f(x, mu), or a map if `discrete`. For the Hopf bifurcation x is the
-    radius.
+    It is a field x' = f(x, mu), or a map if `discrete`. For the Hopf bifurcation, x is
+    the radius.
     """
 
     title: str
@@ -20,18 +20,18 @@ class NormalForm(NamedTuple):
     field: Callable
     """The field or map, `f(x, mu)`."""
     branches: tuple[Callable, ...]
-    """Branches as functions of mu, NaN where they do not exist."""
+    """Branches as functions of mu; NaN where they do not exist."""
     discrete: bool = False
     """Whether `field` is a map."""
 
     def stable(self, branch: int, mu) -> np.ndarray:
-        """Return whether a branch attracts at each `mu`, by the derivative of the
-        field.
+        """Return whether a branch is attracting at each `mu`, from the derivative of
+        the field.
         """
         mu = np.atleast_1d(np.asarray(mu, dtype=float))
         x = np.asarray(self.branches[branch](mu), dtype=float)
         slope = jax.vmap(jax.grad(self.field))(jnp.asarray(x), jnp.asarray(mu))
-        # an orbit of period two of an odd map: the square of the slope there
+        # for a period-two orbit of an odd map, the square of the slope there
         return np.abs(slope) < 1 if self.discrete else np.asarray(slope) < 0
 
 
@@ -62,7 +62,7 @@ NORMAL_FORMS: dict[str, NormalForm] = {
         discrete=True,
     ),
 }
-"""The normal forms of Figure 2.7. The map printed for period doubling, (1 + mu) x -
-x^3, has its multiplier at +1 and is a pitchfork; with the sign of the map changed it
-doubles.
+"""The normal forms of Figure 2.7 of the thesis. The map printed there for period
+doubling, (1 + mu) x - x^3, has its multiplier at +1, which is a pitchfork bifurcation;
+with the opposite sign, the map has a period doubling.
 """

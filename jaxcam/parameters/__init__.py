@@ -1,4 +1,4 @@
-"""Pick parameters of any pytree, and convert floats to arrays."""
+"""Select parameters of any pytree, and convert floats to arrays."""
 
 from ._arrays import as_arrays as as_arrays
 from ._pick import (

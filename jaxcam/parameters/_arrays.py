@@ -1,4 +1,4 @@
-"""Convert floats to arrays, so that they are arguments of a program, not constants."""
+"""Convert floats to arrays, so that they are program arguments instead of constants."""
 
 from typing import TypeVar
 

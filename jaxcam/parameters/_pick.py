@@ -1,4 +1,4 @@
-"""Pick varying parameters by a function or by a dotted name."""
+"""Select the parameters to vary by a function or by a dotted name."""
 
 import re
 from collections.abc import Callable
@@ -25,11 +25,11 @@ class _Marker:
 
 @dataclass(frozen=True)
 class Pick:
-    """The parameters that a `where` picks, without its code.
+    """The parameters selected by a `where`, without its code.
 
-    It can be hashed, sent to another process and compared. Called with a tree of the
-    same structure it returns the leaf, or with `several` the tuple of leaves, so it
-    serves wherever equinox takes a `where`.
+    A `Pick` can be hashed, compared, and sent to another process. If it is called with
+    a tree of the same structure, it returns the leaf, or with `several` the tuple of
+    leaves, so it can be used wherever equinox takes a `where`.
 
     Examples:
         >>> from jaxcam.models import BouncingBall
@@ -39,7 +39,7 @@ class Pick:
     """
 
     leaves: tuple[int, ...]
-    """Places among the leaves of the tree."""
+    """Indices among the leaves of the tree."""
     names: tuple[str, ...]
     """Dotted names, such as `speed` or `profile.radius`."""
     several: bool = False
@@ -69,7 +69,7 @@ def pick(
     *,
     integers: bool = False,
 ) -> Pick:
-    """Return the parameters of `tree` that `where` picks.
+    """Return the parameters of `tree` selected by `where`.
 
     Args:
         where: A function of the tree (`lambda system: system.speed`), a dotted name
@@ -82,7 +82,7 @@ def pick(
         A [`jaxcam.parameters.Pick`][].
 
     Raises:
-        ValueError: A parameter does not exist or is not one number.
+        ValueError: A parameter does not exist or is not a single number.
 
     Examples:
         >>> from jaxcam.models import BouncingBall
@@ -96,8 +96,8 @@ def pick(
     found = [_places(part, tree, integers) for part in parts]
     if isinstance(where, tuple) and any(len(places) != 1 for places in found):
         raise ValueError(
-            "where is a tuple of functions that pick several parameters each; let each "
-            "of them pick one"
+            "where is a tuple of functions, of which at least one selects several "
+            "parameters; let each select only one"
         )
     places = tuple(place for some in found for place in some)
     named = _named_leaves(tree)
@@ -115,12 +115,13 @@ def unit_tangent(where: Where, tree: _Tree) -> _Tree:
     """Return the direction in which one parameter grows, for `equinox.filter_jvp`.
 
     Args:
-        where: Picks a parameter of the system: `lambda s: s.speed`, or its dotted name.
+        where: Selects a parameter of the system: `lambda s: s.speed`, or its dotted
+            name.
         tree: A system, or any other pytree.
 
     Returns:
-        Zeros for every inexact array of the tree, 1 for the parameter that `where`
-            picks, `None` for all other leaves.
+        Zeros for every floating-point array of the tree, 1 for the parameter selected
+            by `where`, and `None` for all other leaves.
 
     Examples:
         >>> from jaxcam.models import BouncingBall
@@ -130,7 +131,7 @@ def unit_tangent(where: Where, tree: _Tree) -> _Tree:
     """
     picked = pick(where, tree)
     zeros = jax.tree.map(jnp.zeros_like, eqx.filter(tree, eqx.is_inexact_array))
-    # the tree of arrays has fewer leaves, so the parameter has another place in it
+    # the tree of arrays has fewer leaves, so the parameter has another index in it
     along = pick(picked.names[0], zeros)
     return along.replaced(zeros, jnp.ones_like(picked(tree)))
 
@@ -155,10 +156,10 @@ def parameter_names(tree: PyTree, *, integers: bool = False) -> list[str]:
 
 
 def _places(where: Callable | str, tree, integers) -> tuple[int, ...]:
-    """Return the places among the leaves picked by a function or name."""
+    """Return the indices of the leaves selected by a function or name."""
     if isinstance(where, str):
         names = [name for name, _ in _named_leaves(tree)]
-        # a name may be written as Python spells it: terms[0].c1
+        # a name may be written in Python syntax: terms[0].c1
         name = re.sub(r"\[['\"]?(\w+)['\"]?\]", r".\1", where).lstrip(".")
         if name not in names:
             raise ValueError(
@@ -171,13 +172,13 @@ def _places(where: Callable | str, tree, integers) -> tuple[int, ...]:
         made = where(marked)
     except (AttributeError, KeyError, IndexError, TypeError) as error:
         raise ValueError(
-            f"where picks a parameter that does not exist ({error}); "
+            f"where selects a parameter that does not exist ({error}); "
             f"{_known(tree, integers)}"
         ) from error
     made = tuple(made) if isinstance(made, tuple | list) else (made,)
     if not made or not all(isinstance(one, _Marker) for one in made):
         raise ValueError(
-            "where must pick parameters as they are, as in `lambda system: "
+            "where must select parameters as they are, as in `lambda system: "
             f"system.speed`; {_known(tree, integers)}"
         )
     return tuple(one.index for one in made)
@@ -197,7 +198,7 @@ def _named_leaves(tree) -> list[tuple[str, Any]]:
 
 
 def _varies(leaf, integers: bool) -> bool:
-    """Return whether a leaf is one number that can vary."""
+    """Return whether a leaf is a single number that can vary."""
     if isinstance(leaf, bool):
         return False
     if isinstance(leaf, float | np.floating):

@@ -9,13 +9,13 @@ def real_array(values, name: str = "state") -> jax.Array:
 
     Args:
         values: Numbers.
-        name: Name of the argument, for the message.
+        name: Name of the argument for the message.
 
     Returns:
         A real array.
 
     Raises:
-        ValueError: The numbers are complex; their imaginary part would be lost.
+        ValueError: The numbers are complex, so their imaginary parts would be lost.
 
     Examples:
         >>> from jaxcam.parameters import real_array
@@ -24,7 +24,7 @@ def real_array(values, name: str = "state") -> jax.Array:
     """
     if any(jnp.iscomplexobj(leaf) for leaf in jax.tree.leaves(values)):
         raise ValueError(
-            f"{name} is complex; give real numbers, with real and imaginary part as "
-            "two components where both are meant"
+            f"{name} is complex; give real numbers, with the real and imaginary parts "
+            "as two components if both are needed"
         )
     return jnp.asarray(values, dtype=jnp.float64)

@@ -1,4 +1,4 @@
-"""Array types of input from outside and of results on the host."""
+"""Array types of user input and of results on the host."""
 
 from collections.abc import Sequence
 from typing import TypeAlias
@@ -8,9 +8,9 @@ from jaxtyping import Array, ArrayLike, Float, Real
 
 
 AnyArray: TypeAlias = Array | np.ndarray
-"""An array of a program, or of the host."""
+"""An array in a program, or on the host."""
 RealScalar: TypeAlias = Real[ArrayLike, ""]
 FloatScalar: TypeAlias = float | Float[AnyArray, ""]
 """A number that may be an argument of a program."""
 VectorLike: TypeAlias = Float[ArrayLike, " _"] | Sequence[RealScalar]
-"""One vector of any length, as an array or as a list of numbers."""
+"""A vector of any length, as an array or a list of numbers."""

@@ -1,4 +1,6 @@
-"""Estimate the drive of a rig from its encoder: angle, rate, mean speed, clock."""
+"""Estimate the motion of a drive from its encoder: angle, rate, mean speed and
+clock.
+"""
 
 import dataclasses
 
@@ -10,8 +12,8 @@ from ._errors import RecordingError
 from ._recording import Recording
 
 
-# The drive wanders over seconds and ripples once a turn; 50 ms follows both and
-# leaves a tenth of the encoder's noise.
+# The speed of a drive wanders over seconds and ripples once per turn; a window of 50 ms
+# follows both and leaves a tenth of the encoder noise
 _WINDOW = 0.05
 
 
@@ -20,17 +22,17 @@ class Drive:
     """The measured motion of a drive, such as the cam of a cam-follower."""
 
     angle: Float[np.ndarray, " k"]
-    """Smoothed angle (rad), unwrapped, counted in the sense of turning."""
+    """Smoothed angle (rad), unwrapped, positive in the sense of rotation."""
     rate: Float[np.ndarray, " k"]
-    """Its rate of change (rad/s)."""
+    """Rate of change of the angle (rad/s)."""
     speed: float
-    """Slope (rad/s) of the straight line `speed * time + phase` through the angle."""
+    """Slope (rad/s) of the straight line `speed * time + phase` fitted to the angle."""
     phase: float
     """Value (rad) of this line at time zero."""
     noise: float
     """Standard deviation of the raw samples about the smoothed angle (rad)."""
     window: int
-    """Number of samples in each of the parabolas that smooth it."""
+    """Number of samples in each smoothing parabola."""
 
     @property
     def clock(self) -> Float[np.ndarray, " k"]:
@@ -46,7 +48,7 @@ class Drive:
 def read_drive(recording: Recording, channel: str = "cam_angle_rad") -> Drive:
     """Smooth the encoder of a drive with local parabolas over 50 ms.
 
-    **Raises:** `RecordingError` for a shorter recording, or a drive at rest.
+    **Raises:** `RecordingError` if the recording is shorter, or the drive is at rest.
     """
     raw = recording[channel]
     if np.any(np.abs(np.diff(raw)) > np.pi):
@@ -66,8 +68,9 @@ def read_drive(recording: Recording, channel: str = "cam_angle_rad") -> Drive:
     speed, phase = np.polyfit(recording.time, raw, 1)
     if abs(angle[-1] - angle[0]) < np.pi:
         raise RecordingError(
-            f"{recording.name}: the drive turns by {abs(angle[-1] - angle[0]):.2g} "
-            "rad only; give a recording of at least half a turn."
+            f"{recording.name}: the drive turns by only "
+            f"{abs(angle[-1] - angle[0]):.2g} rad; give a recording of at least half "
+            "a turn."
         )
     noise = float(np.std(raw - angle))
     return Drive(angle, rate, float(speed), float(phase), noise, count)

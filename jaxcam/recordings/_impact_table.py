@@ -1,4 +1,4 @@
-"""Store a table of measured impacts, with speeds before and after."""
+"""A table of measured impacts, with the speeds before and after."""
 
 import dataclasses
 
@@ -17,7 +17,7 @@ class Bodies:
     after: Float[np.ndarray, "k 2"]
     """Velocities after the impacts, shape `(k, 2)`."""
     mass: Float[np.ndarray, "k 2"] | None = None
-    """Masses of both (kg), shape `(k, 2)`, or `None`."""
+    """Masses of the two bodies (kg), shape `(k, 2)`, or `None`."""
 
 
 @dataclasses.dataclass(frozen=True)

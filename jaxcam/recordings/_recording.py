@@ -1,4 +1,4 @@
-"""Store recordings, the sensor data of one run, and cases, folders of runs."""
+"""Recordings (the sensor data of one run) and cases (folders of runs)."""
 
 import dataclasses
 from collections.abc import Iterator, Mapping
@@ -23,19 +23,21 @@ class Recording:
     """
 
     name: str
-    """Name of the run, for tables and messages."""
+    """Name of the run, used in tables and messages."""
     time: Float[np.ndarray, " k"]
-    """Seconds, shape `(k,)`, strictly increasing."""
+    """Times of the samples (s), strictly increasing, shape `(k,)`."""
     channels: Mapping[str, Float[np.ndarray, " k"]]
-    """Measured quantities, each of shape `(k,)`. The end of a name is the unit:
-    `follower_angle_rad`, `gyro_rad_s`, `height_m`."""
+    """Measured quantities, each of shape `(k,)`. Names end with the unit:
+    `follower_angle_rad`, `gyro_rad_s`, `height_m`.
+    """
     nominal_speed: float | None = None
     """Speed of the drive according to the file name (rad/s), or `None`."""
     meta: Mapping[str, Any] = dataclasses.field(default_factory=dict)
-    """Additional information (the file, the piece of it, ...)."""
+    """Additional information, such as the file."""
     constants: Mapping[str, float] = dataclasses.field(default_factory=dict)
-    """Known constants of this run alone, by names of fields of the system:
-    `{"mass": 0.31}`. A fit uses them unchanged."""
+    """Known constants of this run, by the names of system fields: `{"mass": 0.31}`. A
+    fit does not change them.
+    """
 
     def __getitem__(self, channel: str) -> Float[np.ndarray, " k"]:
         """Return the samples of one channel, shape `(k,)`.
@@ -67,13 +69,13 @@ class Recording:
         """Return the part with `start <= time < stop`, under the same name.
 
         Raises:
-            RecordingError: Fewer than two samples are left.
+            RecordingError: Fewer than two samples remain.
         """
         keep = (self.time >= start) & (self.time < stop)
         if keep.sum() < 2:
             raise RecordingError(
                 f"{self.name}: there are fewer than two samples between {start:g} s "
-                f"and {stop:g} s; it runs from {self.time[0]:g} s to "
+                f"and {stop:g} s; the recording runs from {self.time[0]:g} s to "
                 f"{self.time[-1]:g} s."
             )
         channels = {name: samples[keep] for name, samples in self.channels.items()}
@@ -105,8 +107,8 @@ class Case:
         if len(found) != 1:
             names = _listed(run.name for run in self.recordings)
             raise RecordingError(
-                f"{self.name}: `{index}` is the beginning of {len(found)} names; the "
-                f"runs are {names}."
+                f"{self.name}: {len(found)} names begin with `{index}`; the runs are "
+                f"{names}."
             )
         return found[0]
 

@@ -1,4 +1,4 @@
-"""Represent a rig file: nominal parameters, tolerances and sensors."""
+"""The content of a rig file: nominal parameters, tolerances and sensors."""
 
 import dataclasses
 import difflib
@@ -12,7 +12,7 @@ from ..models import CamFollower, ConstantRestitution, EccentricCircle
 from ._errors import RigError
 
 
-# 19 of 20 speeds of the thesis' cam-follower are below this (rad/s)
+# 19 of 20 velocities of the thesis cam-follower are below this (rad/s)
 _FAST = 2.0
 
 
@@ -23,7 +23,7 @@ class Quantity:
     value: float
     """Nominal value."""
     tolerance: float = 0.0
-    """Largest deviation of the real value."""
+    """Largest deviation of the actual value."""
 
     @property
     def array(self) -> jax.Array:
@@ -33,12 +33,12 @@ class Quantity:
 
 @dataclasses.dataclass(frozen=True)
 class Gyro:
-    """A rate sensor: first-order bandwidth (Hz), range and noise (rad/s)."""
+    """A rate gyro: first-order bandwidth (Hz), range and noise (rad/s)."""
 
     bandwidth_hz: float
-    """Bandwidth (Hz)."""
+    """First-order bandwidth (Hz)."""
     range_rad_s: float
-    """Largest rate (rad/s)."""
+    """Largest measurable rate (rad/s)."""
     noise_rad_s: float
     """Standard deviation of the noise (rad/s)."""
 
@@ -50,33 +50,35 @@ class Sensors:
     sample_rate: float
     """Sampling rate (Hz)."""
     cam_counts_per_turn: int
-    """Counts of the cam's encoder per turn."""
+    """Counts per turn of the cam encoder."""
     follower_counts_per_turn: int
-    """Counts of the follower's encoder per turn."""
+    """Counts per turn of the follower encoder."""
     cam_noise: float
-    """Standard deviation of the cam's angle (rad)."""
+    """Standard deviation of the noise of the cam angle (rad)."""
     follower_noise: float
-    """Standard deviation of the follower's angle (rad)."""
+    """Standard deviation of the noise of the follower angle (rad)."""
     gyro: Gyro | None = None
-    """The rate sensor, if there is one."""
+    """The rate gyro, if there is one."""
 
     @property
     def follower_floor(self) -> float:
-        """Standard deviation of the follower's angle (rad): noise and quantisation."""
+        """Standard deviation of the follower angle (rad), from noise and
+        quantisation.
+        """
         return _floor(self.follower_noise, self.follower_counts_per_turn)
 
     @property
     def cam_floor(self) -> float:
-        """Standard deviation of the cam's angle (rad): noise and quantisation."""
+        """Standard deviation of the cam angle (rad), from noise and quantisation."""
         return _floor(self.cam_noise, self.cam_counts_per_turn)
 
 
 @dataclasses.dataclass(frozen=True)
 class References:
-    """Constants in the forms of physics that a rig's model may lack.
+    """Constants in the functional forms of missing-physics terms.
 
-    They fix what a strength means and are not fitted; by default, those of the thesis'
-    cam-follower.
+    They define the meaning of each strength and are not fitted; the defaults are those
+    of the thesis cam-follower.
 
     Examples:
         >>> from jaxcam.recordings import References
@@ -87,22 +89,26 @@ class References:
     spring_center: float = 0.27
     """Angle (rad) about which a nonlinear spring is symmetric."""
     impact_speed: float = 0.3
-    """Approach speed (rad/s) in a restitution that falls with it."""
+    """Reference approach speed (rad/s) of a coefficient of restitution that decreases
+    with it.
+    """
     profile_lead: float = 0.7
-    """Phase (rad) of an error of the cam's profile twice per turn."""
+    """Phase (rad) of a twice-per-turn error of the cam profile."""
     stribeck_speed: float = 0.1
-    """Speed (rad/s) up to which friction is larger."""
+    """Stribeck speed (rad/s), up to which friction is larger."""
     slip_speed: float = 0.015
-    """Speed (rad/s) within which dry friction changes sign, far below the speeds of the
-    motion; `free_slip_speed` in friction that varies with position."""
+    """Speed (rad/s) over which dry friction changes sign, far below the speeds of the
+    motion; for friction that varies with position, `free_slip_speed` is used instead.
+    """
     free_slip_speed: float = 0.01
     """Slip speed (rad/s) of friction that varies with position."""
 
     @classmethod
     def of_speed(cls, fast: float) -> "References":
-        """Return the constants for a motion whose fast speeds are about `fast`.
+        """Return the constants for a motion whose high speeds are about `fast`.
 
-        The ratio of each speed to those of the motion is that of the thesis' rig.
+        The ratio of each constant speed to those of the motion is the same as for the
+        thesis rig.
         """
         share, usual = fast / _FAST, cls()
         return cls(
@@ -114,8 +120,8 @@ class References:
         )
 
     def sharper(self, share: float) -> "References":
-        """Return the constants with dry friction that changes sign within a share of
-        the speed.
+        """Return the constants with dry friction that changes sign over a share of the
+        speed.
         """
         return dataclasses.replace(
             self,
@@ -126,10 +132,10 @@ class References:
 
 @dataclasses.dataclass(frozen=True)
 class Rig:
-    """The content of `rig.toml`, typed and checked; `system` turns it into a model.
+    """The checked content of `rig.toml`; `system` creates a model from it.
 
-    Lengths are m, the inertia kg m^2, the stiffness N/m. Only the ratio of stiffness
-    and inertia can be identified from a recording.
+    Lengths are in m, the inertia in kg m^2 and the stiffness in N/m. Only the ratio of
+    stiffness to inertia can be identified from a recording.
 
     Examples:
         >>> from jaxcam.data import DEMO_RIG
@@ -143,11 +149,11 @@ class Rig:
     cam_eccentricity: Quantity
     """Eccentricity of the cam (m)."""
     cam_center_x: Quantity
-    """x-coordinate of the cam's axis from the hinge (m)."""
+    """x-coordinate of the cam axis relative to the hinge (m)."""
     cam_center_y: Quantity
-    """y-coordinate of the cam's axis from the hinge (m)."""
+    """y-coordinate of the cam axis relative to the hinge (m)."""
     follower_half_height: Quantity
-    """Distance of the follower's face from the hinge (m)."""
+    """Distance of the follower face from the hinge (m)."""
     cam_rotation: str
     """"clockwise" or "counterclockwise"."""
     inertia: Quantity
@@ -163,10 +169,10 @@ class Rig:
     sensors: Sensors
     """Sensors of the rig."""
     references: References = References()
-    """Constants of the forms of missing physics."""
+    """Constants of the missing-physics terms."""
 
     def replace(self, **values: float) -> "Rig":
-        """Return the rig with other nominal values; tolerances stay.
+        """Return the rig with other nominal values and unchanged tolerances.
 
         Raises:
             RigError: A name is not a quantity of the rig.
@@ -196,12 +202,14 @@ class Rig:
         *,
         restitution: eqx.Module | None = None,
     ) -> CamFollower:
-        """Return the nominal model, a `CamFollower` with its cam at `speed` (rad/s).
+        """Return the nominal model, a `CamFollower` with its cam turning at `speed`
+        (rad/s).
 
         Args:
             speed: Speed of the cam (rad/s).
-            phase: Angle that the cam has turned at time zero (rad).
-            restitution: Law that replaces the rig's constant coefficient.
+            phase: Angle of the cam at time zero (rad).
+            restitution: Restitution law to use instead of the rig's constant
+                coefficient.
         """
         if restitution is None:
             restitution = ConstantRestitution(self.restitution.array)
@@ -227,5 +235,5 @@ def _meant(name: str, rig: Rig) -> str:
 
 def _floor(noise: float, counts: int) -> float:
     step = 2 * math.pi / counts
-    # a rounded number is off by a uniform error of variance step^2 / 12
+    # a rounded number has a uniform error of variance step^2 / 12
     return math.sqrt(noise**2 + step**2 / 12)

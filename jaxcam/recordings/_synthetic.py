@@ -1,4 +1,4 @@
-"""Simulate recordings of a known system, to test an experiment in advance."""
+"""Simulate recordings of a known system, for example to plan an experiment."""
 
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -14,12 +14,12 @@ from ._errors import RecordingError
 from ._recording import Recording
 
 
-# Filter steps per sample, since impacts fall between samples
+# Filter steps per sample, because impacts fall between samples
 _FINER = 256
 
 
 class Wandering(HybridSystem):
-    """A driven system whose drive wanders slowly, as real drives do.
+    """A driven system whose drive speed wanders slowly, as in real drives.
 
     The drive turns at `speed (1 + depth w)` with w = 0.7 cos(2 pi 0.31 t) + 0.3 cos(2
     pi 0.87 t): two slow harmonics with incommensurate frequencies.
@@ -34,15 +34,15 @@ class Wandering(HybridSystem):
     base: HybridSystem
     """The system."""
     depth: float = 2e-4
-    """Relative size of the wandering."""
+    """Relative amplitude of the wandering."""
     speed: Callable[[Any], Array] = eqx.field(
         default=lambda system: system.speed, static=True
     )
-    """Picks the speed out of `base`."""
+    """Selects the speed field of `base`."""
     phase: Callable[[Any], Array] = eqx.field(
         default=lambda system: system.phase, static=True
     )
-    """Picks the phase out of `base`."""
+    """Selects the phase field of `base`."""
 
     @property
     def state_names(self) -> tuple[str, ...]:  # pyright: ignore
@@ -67,7 +67,7 @@ class Wandering(HybridSystem):
         self.base.check()
 
     def angle(self, t) -> Array:
-        """Return the angle that the drive has turned (rad) at `t` (s), elementwise."""
+        """Return the angle of the drive (rad) at `t` (s), elementwise."""
         wander = 0.0
         for share, frequency in _TONES:
             w = 2 * jnp.pi * frequency
@@ -75,7 +75,7 @@ class Wandering(HybridSystem):
         return self.phase(self.base) + self.speed(self.base) * (t + self.depth * wander)
 
     def at(self, t) -> HybridSystem:
-        """Return the base near time `t`, turning at the drive's speed of that time."""
+        """Return the base near time `t`, with the drive speed at that time."""
         angle, rate = jax.jvp(self.angle, (t,), (jnp.ones_like(t),))
         here = rate, angle - rate * t
         return eqx.tree_at(lambda s: (self.speed(s), self.phase(s)), self.base, here)
@@ -109,15 +109,15 @@ def record(
     drive_channel: str = "cam_angle_rad",
     name: str = "synthetic",
 ) -> Recording:
-    """Simulate a system and record it through sensors.
+    """Simulate a system and record it with sensors.
 
     Args:
         system: The system; a driven one may be a `Wandering`.
         sensors: A `jaxcam.fitting.Sensor` for each channel.
         duration: Length of the recording (s).
-        rng: Random number generator of the noise.
+        rng: Random number generator for the noise.
         state: Initial state, `(n,)`; `None` for the release point.
-        settle: Time to wait before (s).
+        settle: Time to wait before the recording (s).
         interval: Time between samples (s).
         drive: Noise and resolution (rad) of an encoder on the drive of a `Wandering`,
             recorded as `drive_channel`.

@@ -1,4 +1,4 @@
-"""Run steps in chunks of equal length, so that any number of steps compiles once."""
+"""Run steps in chunks of equal length, so that only one program is compiled."""
 
 from collections.abc import Callable
 from typing import Any
@@ -9,7 +9,7 @@ import numpy as np
 
 
 CHUNK = 1024
-"""Steps in a chunk."""
+"""Number of steps in a chunk."""
 
 
 def in_chunks(
@@ -18,9 +18,10 @@ def in_chunks(
     steps: int,
     progress: Callable[[float], None] | None = None,
 ):
-    """Return the outputs of `steps` steps; `run(carry, k)` runs a chunk from step k on.
+    """Return the outputs of `steps` steps; `run(carry, k)` runs a chunk starting at
+    step k.
 
-    `progress` is called with the fraction of steps done.
+    `progress` is called with the fraction of steps completed.
     """
     parts = []
     for first in range(0, steps, CHUNK):

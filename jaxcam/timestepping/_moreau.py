@@ -1,4 +1,4 @@
-"""Simulate a hybrid system by Moreau's time-stepping: impacts are part of a step."""
+"""Simulate a hybrid system by Moreau's time-stepping method."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -32,17 +32,17 @@ class SteppedMotion(NamedTuple):
     state: Float[Array, "times n"]
     """States, shape `(steps + 1, n)`."""
     percussion: Float[Array, "steps m"]
-    """Change of each normal velocity by impacts and contact, shape `(steps, m)`."""
+    """Change of each normal velocity due to impacts and contact, shape `(steps, m)`."""
     gap: Float[Array, "times m"]
     """Gaps, shape `(steps + 1, m)`."""
 
     def rests_from(self, constraint: int = 0) -> float:
-        """Return the time (s) from which contact acts in every step up to the end.
+        """Return the time (s) from which there is contact in every step up to the end.
 
-        Where chatter ends in contact this is the accumulation time, within a few steps.
+        If chatter ends in contact, this is the accumulation time to within a few steps.
 
         Returns:
-            The time; NaN where there is no contact in the last step.
+            The time; NaN if there is no contact in the last step.
         """
         pushed = np.asarray(self.percussion[:, constraint]) > 0
         if not pushed[-1]:
@@ -60,16 +60,16 @@ def moreau(
     *,
     progress: Callable[[float], None] | None = None,
 ) -> SteppedMotion:
-    """Simulate from `t0` to `t1` by `steps` time steps without event detection
+    """Simulate from `t0` to `t1` in `steps` time steps without event detection
     (Moreau).
 
-    A step integrates free flight by the midpoint rule. If it ends behind a constraint,
-    the velocities jump at mid-step, by complementarity: each normal velocity at the end
-    is at least that of the impact law, never negative, and larger only where no
-    percussion acts (after J. J. Moreau, Unilateral contact and dry friction in finite
-    freedom dynamics, 1988). Impacts, simultaneous impacts, chatter and sticking follow
-    from this one rule without tuning. The error is of order one in the step, and gaps
-    are violated by as much.
+    Each step integrates free flight by the midpoint rule. If it ends behind a
+    constraint, the velocities jump at mid-step according to a complementarity
+    condition: each normal velocity at the end is at least that of the impact law, never
+    negative, and larger only if no percussion acts (after J. J. Moreau, Unilateral
+    contact and dry friction in finite freedom dynamics, 1988). Impacts, simultaneous
+    impacts, chatter and sticking all follow from this rule without tuning. The error,
+    and the penetration of constraints, is of first order in the step.
 
     Args:
         system: The system.
@@ -77,7 +77,7 @@ def moreau(
         t0: Start time (s).
         t1: End time (s).
         steps: Number of steps.
-        progress: Called with the fraction of steps done.
+        progress: Called with the fraction of steps completed.
 
     Returns:
         A [`jaxcam.timestepping.SteppedMotion`][].
@@ -105,7 +105,7 @@ def moreau(
     explain(int(jnp.max(codes)), f" of step {int(jnp.argmax(codes > 0))}")
     if not bool(jnp.all(jnp.isfinite(states))):
         raise ValueError(
-            "The motion is not finite: take more steps, or check the parameters."
+            "The motion is not finite: use more steps, or check the parameters."
         )
     times = jnp.asarray(np.linspace(t0, t1, steps + 1))
     states = jnp.concatenate([state[None], states])
@@ -127,7 +127,7 @@ def _run(system, state, first, t0, h):
         free = x + h * field(middle, half)
         behind = gaps(system, end, free) <= 0
         directions = normal_directions(system, end, free)
-        # the jump happens at mid-step: its effect on the rest of the step is a
+        # the jump occurs at mid-step, and its effect on the rest of the step is a
         # derivative
         moves = jax.vmap(
             lambda d: d + h / 2 * jax.jvp(lambda y: field(end, y), (free,), (d,))[1]
@@ -137,7 +137,7 @@ def _run(system, state, first, t0, h):
             return normal_velocity(system, end, y)
 
         gradient = jax.jacfwd(speed)(free)
-        # the effect of an impact at mid-step on the end; rest if there is none
+        # the effect of an impact at mid-step on the end state, or rest if there is none
         after = impacts(system, middle, half)
         later = jax.vmap(lambda y: y + h / 2 * field(middle, y))(after)
         least = jnp.maximum(jnp.diagonal(jax.vmap(speed)(later)), 0.0)

@@ -16,16 +16,16 @@ from .relay import is_p_matrix, relay_problem, RelaySystem
 
 
 class RelayMotion(NamedTuple):
-    """A relay system's motion at the ends of the steps; the first row is the start."""
+    """Motion of a relay system at the ends of the steps; the first row is the start."""
 
     time: Float[Array, " times"]
     """Times (s), shape `(steps + 1,)`."""
     state: Float[Array, "times n"]
     """States, shape `(steps + 1, n)`."""
     inputs: Float[Array, "steps m"]
-    """Inputs u over each step, shape `(steps, m)`."""
+    """Inputs u in each step, shape `(steps, m)`."""
     outputs: Float[Array, "steps m"]
-    """Outputs y over each step, shape `(steps, m)`."""
+    """Outputs y in each step, shape `(steps, m)`."""
 
 
 def relay_steps(
@@ -36,26 +36,27 @@ def relay_steps(
     *,
     progress: Callable[[float], None] | None = None,
 ) -> RelayMotion:
-    """Simulate a relay system from time zero to `t1` by `steps` backward Euler steps.
+    """Simulate a relay system from time zero to `t1` in `steps` backward Euler steps.
 
-    Switches are not located and sliding needs no special treatment: infinitely many
-    events in finite time cost no more than none. The error is of order one in the step
-    (M. K. Camlibel, W. P. M. H. Heemels, J. M. Schumacher, Consistency of a
-    time-stepping method for a class of piecewise-linear networks, 2002).
+    Switches are not located, and sliding requires no special handling: infinitely many
+    events in finite time take no more computing time than none. The error is of first
+    order in the step (M. K. Camlibel, W. P. M. H. Heemels, J. M. Schumacher,
+    Consistency of a time-stepping method for a class of piecewise-linear networks,
+    2002).
 
     Args:
         system: The system.
         state: Initial state, shape `(n,)`.
         t1: End time (s).
         steps: Number of steps.
-        progress: Called with the fraction of steps done.
+        progress: Called with the fraction of steps completed.
 
     Returns:
         A `RelayMotion`.
 
     Raises:
         ValueError: A step has no solution or more than one: I - h A is singular, or C
-            (I/h - A)^-1 B + D is no P-matrix.
+            (I/h - A)^-1 B + D is not a P-matrix.
 
     Examples:
         >>> from jaxcam.timestepping import RelaySystem, relay_steps
@@ -73,13 +74,13 @@ def relay_steps(
     matrix = np.eye(n) - float(h) * np.asarray(system.A)
     if not np.linalg.cond(matrix) < 1e12:
         raise ValueError(
-            "I - h A cannot be inverted for this step; take another number of steps."
+            "I - h A cannot be inverted for this step; change the number of steps."
         )
     one_step = _one_step(system, h)[2]
     if not is_p_matrix(one_step):
         raise ValueError(
             "A step of this relay system has more than one solution: C (I/h - A)^-1 B "
-            "+ D is no P-matrix; change the signs of B or C, or take shorter steps."
+            "+ D is not a P-matrix; change the signs of B or C, or use shorter steps."
         )
     states, inputs, outputs, codes = in_chunks(
         lambda x, _: _run(system, x, h), state, steps, progress

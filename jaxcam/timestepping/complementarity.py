@@ -1,4 +1,4 @@
-"""Linear complementarity problems, by Lemke's method."""
+"""Solve linear complementarity problems by Lemke's method."""
 
 from typing import NamedTuple
 
@@ -8,9 +8,9 @@ import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Float, Int
 
 
-# entries of the tableau below this part of the largest one are rounding
+# entries of the tableau below this fraction of the largest one are rounding errors
 _TINY = 1e-12
-# no vertex is visited twice, and only few of the 2^m are visited
+# no vertex is visited twice, and only a few of the 2^m are visited
 _PIVOTS = 40
 
 SOLVED, RAY, EXHAUSTED = 0, 1, 2
@@ -24,17 +24,17 @@ class Pivoting(NamedTuple):
     w: Float[Array, " m"]
     """w = M z + q, shape `(m,)`."""
     code: Int[Array, ""]
-    """0 solved, 1 ended on a ray (no solution is known), 2 out of pivots."""
+    """0: solved; 1: ended on a ray (no solution found); 2: too many pivots."""
 
 
 def lemke(matrix: Float[Array, "m m"], vector: Float[Array, " m"]) -> Pivoting:
     """Solve z >= 0, w = M z + q >= 0, z . w = 0; for use inside `jit`, `scan` and
     `vmap`.
 
-    Lemke's complementary pivots with the lexicographic rule, which cannot cycle (R. W.
-    Cottle, J.-S. Pang, R. E. Stone, The Linear Complementarity Problem, 1992, section
-    4.4). Where M is copositive-plus a ray means that there is no solution; for other M
-    it means that none was found.
+    The method is Lemke's complementary pivoting with the lexicographic rule, which
+    cannot cycle (R. W. Cottle, J.-S. Pang, R. E. Stone, The Linear Complementarity
+    Problem, 1992, section 4.4). If M is copositive-plus, a ray means that there is no
+    solution; for other M, it means that none was found.
 
     Args:
         matrix: M, shape `(m, m)`.
@@ -93,15 +93,14 @@ def lemke(matrix: Float[Array, "m m"], vector: Float[Array, " m"]) -> Pivoting:
 def solve_lcp(
     matrix: Float[ArrayLike, "m m"], vector: Float[ArrayLike, " m"]
 ) -> Float[Array, " m"]:
-    """Return the z of [`jaxcam.timestepping.complementarity.lemke`][], or raise an
-    error.
+    """Return the solution z of [`jaxcam.timestepping.complementarity.lemke`][].
 
     Args:
         matrix: M, shape `(m, m)`.
         vector: q, shape `(m,)`.
 
     Returns:
-        Shape `(m,)`.
+        The solution, shape `(m,)`.
 
     Raises:
         ValueError: Lemke's method finds no solution.
@@ -110,7 +109,7 @@ def solve_lcp(
     vector = jnp.asarray(vector, dtype=jnp.float64)
     if matrix.shape != (vector.shape[0], vector.shape[0]):
         raise ValueError(
-            f"Give a square matrix and a vector of its size: their shapes are "
+            f"Give a square matrix and a vector of the same size: their shapes are "
             f"{matrix.shape} and {vector.shape}."
         )
     found = _lemke(matrix, vector)
@@ -126,18 +125,18 @@ def explain(code: int, where: str = "") -> None:
     if code == RAY:
         raise ValueError(
             f"The complementarity problem{where} has no solution that Lemke's method "
-            "can find: its matrix is not copositive-plus and the pivots end on a ray; "
-            "check the signs of the model, or take a shorter step."
+            "can find: its matrix is not copositive-plus, and the pivots end on a ray; "
+            "check the signs of the model, or use a shorter step."
         )
     if code == EXHAUSTED:
         raise ValueError(
             f"The complementarity problem{where} needs too many pivots; scale its rows "
-            "so that they are of one size."
+            "to similar magnitudes."
         )
 
 
 def _least(rows, allowed, m):
-    """Return the lexicographically least of the allowed rows."""
+    """Return the lexicographically smallest of the allowed rows."""
     mask = allowed
     for k in range(m + 1):
         values = jnp.where(mask, rows[:, k], jnp.inf)

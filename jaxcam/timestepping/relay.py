@@ -1,4 +1,4 @@
-"""Define linear systems with ideal relays, and the problem of one step."""
+"""Linear systems with ideal relays, and the problem of one time step."""
 
 import equinox as eqx
 import jax
@@ -17,14 +17,14 @@ def _matrix(value) -> jax.Array:
 
 
 class RelaySystem(eqx.Module):
-    """Linear system with relays: x' = A x + B u, y = C x + D u, each u_i the relay of
-    -y_i.
+    """Linear system with relays: x' = A x + B u, y = C x + D u, where each u_i is the
+    relay output for -y_i.
 
-    A relay gives 1 for y < 0, -1 for y > 0, and anything between where y = 0, as
-    sliding requires (thesis, eq. 3.1). D is zero by default.
+    A relay gives 1 for y < 0, -1 for y > 0, and any value between for y = 0, as sliding
+    requires (thesis, eq. 3.1). D is zero by default.
 
     Raises:
-        ValueError: The shapes do not fit.
+        ValueError: The shapes are inconsistent.
 
     Examples:
         >>> from jaxcam.timestepping import RelaySystem
@@ -57,18 +57,18 @@ class RelaySystem(eqx.Module):
 def relay_problem(
     matrix: Float[Array, "m m"], vector: Float[Array, " m"]
 ) -> tuple[Float[Array, " m"], Float[Array, " m"], Pivoting]:
-    """Solve y = M u + q with each u_i the relay of -y_i (thesis, eq. 3.3).
+    """Solve y = M u + q, where each u_i is the relay output for -y_i (thesis, eq. 3.3).
 
-    It is a complementarity problem of twice the size, of 1 + u with the positive part
-    of y and 1 - u with its negative part. It always has a solution, since u is bounded;
-    a unique one where M is a P-matrix.
+    This is a complementarity problem of twice the size, between 1 + u and the positive
+    part of y, and between 1 - u and its negative part. Because u is bounded, it always
+    has a solution; the solution is unique if M is a P-matrix.
 
     Args:
         matrix: M, shape `(m, m)`.
         vector: q, shape `(m,)`.
 
     Returns:
-        u and y, shape `(m,)`, and how the pivoting ended.
+        u and y, shape `(m,)`, and the code with which the pivoting ended.
     """
     m = vector.shape[0]
     eye = jnp.eye(m, dtype=vector.dtype)
@@ -80,7 +80,8 @@ def relay_problem(
 
 
 def is_p_matrix(matrix: Float[ArrayLike, "m m"]) -> bool:
-    """Return whether all principal minors are positive: one solution for every vector.
+    """Return whether all principal minors are positive, so that every solution is
+    unique.
 
     Args:
         matrix: Shape `(m, m)`.
@@ -95,8 +96,8 @@ def is_p_matrix(matrix: Float[ArrayLike, "m m"]) -> bool:
     m = values.shape[0]
     if m > _LARGEST:
         raise ValueError(
-            f"There are 2^{m} principal minors, too many to try; split the system into "
-            "parts that do not act on each other."
+            f"There are 2^{m} principal minors, too many to check; divide the system "
+            "into parts that do not act on each other."
         )
     for mask in range(1, 2**m):
         rows = [i for i in range(m) if mask >> i & 1]

@@ -1,4 +1,4 @@
-"""A cart on a spring between two stops: an example to be edited.
+"""A cart on a spring between two stops: an example to edit.
 
 A system defines three functions of the state: the free motion, the gap to each
 constraint, and the state after an impact. Units are SI.
@@ -10,20 +10,22 @@ from jaxcam import HybridSystem
 
 
 class Cart(HybridSystem):
-    # the components of the state, in the order in which the functions below take them
+    # the components of the state, in the order used by the functions below
     state_names = ("position", "velocity")
     state_units = ("m", "m/s")
 
-    # parameters; cart.toml states their values and tolerances
+    # parameters; cart.toml contains their values and tolerances
     stiffness: float = 40.0  # stiffness of the spring divided by the mass (1/s^2)
     damping: float = 0.3  # divided by the mass (1/s)
-    left: float = -0.05  # places of the stops (m)
+    left: float = -0.05  # positions of the stops (m)
     right: float = 0.06
-    restitution_left: float = 0.7  # speed after an impact over the speed before it
+    restitution_left: float = (
+        0.7  # speed after an impact divided by the speed before it
+    )
     restitution_right: float = 0.7
 
     def vector_field(self, t, state):
-        """Return the rate of change of the state in free motion: velocity,
+        """Return the rate of change of the state in free motion: velocity and
         acceleration.
         """
         position, velocity = state
@@ -33,7 +35,7 @@ class Cart(HybridSystem):
     def gap(self, t, state):
         """Return the distance to each stop (m): positive when free, zero in contact.
 
-        With one stop it is a number, and `impact` returns one state.
+        With one stop, it is a number, and `impact` returns one state.
         """
         return jnp.stack([state[0] - self.left, self.right - state[0]])
 
@@ -47,9 +49,9 @@ class Cart(HybridSystem):
         after_right = jnp.stack([position, -self.restitution_right * velocity])
         return jnp.stack([after_left, after_right])
 
-    # A system that is driven has fields for its drive, `speed: float` (rad/s) and
-    # `phase: float` (rad), uses `self.speed * t + self.phase` for the angle of the
-    # drive, and states the period of it:
+    # A driven system has two fields for its drive, `speed: float` (rad/s) and `phase:
+    # float` (rad). It uses `self.speed * t + self.phase` as the angle of the drive and
+    # defines its period:
     #
     # @property
     # def period(self):

@@ -6,7 +6,7 @@ from jaxcam import HybridSystem
 
 
 class Pendulum(HybridSystem):
-    """The angle is counted as the encoder counts it; `hanging` is straight down."""
+    """The angle is that of the encoder; `hanging` is its value straight down."""
 
     state_names = ("angle", "rate")
     state_units = ("rad", "rad/s")

@@ -1,7 +1,7 @@
 """Find parameters whose fitted values are outside their stated tolerances.
 
-An excess over the tolerance is an effect that acts like the parameter, or an error in
-the rig file.
+A value outside the tolerance indicates an effect that acts like the parameter, or an
+error in the rig file.
 """
 
 import math
@@ -21,7 +21,7 @@ class Beyond(NamedTuple):
     - `value`, `stderr`, `unit`: result of the fit; `low`, `high`: ends of the
       tolerance.
     - `excess`: distance beyond the nearer end, positive.
-    - `chance`: share of the bootstrap distribution that is beyond it.
+    - `chance`: share of the bootstrap distribution beyond that end.
     """
 
     name: str

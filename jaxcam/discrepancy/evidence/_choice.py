@@ -37,15 +37,15 @@ class Outside(NamedTuple):
 
 @dataclasses.dataclass(frozen=True)
 class Choice:
-    """The result of a search, and the evidence for it.
+    """The result of a search and the evidence for it.
 
-    - `found`: the best subset; `best`: the part of it that is named; `before`: the fit
+    - `found`: the best subset; `best`: the named part of it; `before`: the fit
         without terms, with the rig parameters held within their tolerances.
     - `inclusion`, `deviation`: results of the bootstrap, by term and by parameter.
     - `doubtful`: terms that were dropped, with the share of the bootstrap samples that
         retain them; `needed`: those that are named nevertheless.
     - `masked`: terms that were dropped, with their shares of the explained cost,
-        because the smoothed corner of another term leaves as much.
+        because the smoothed corner of another term may leave as much unexplained.
     - `beyond`: rig parameters that are outside their tolerances.
     - `missing`: unnamed functions that explain more than named terms;
         `needs`: their bootstrap results, by label; `rivals`: other functions that were
@@ -91,7 +91,7 @@ def choose(question: Question, trials: Trials, seed: int) -> Choice:
     left_after = _left(question, trials, best) if best.names else left_before
     held, needed = None, []
     if doubtful and any(one.significant for one in left_after):
-        # a discrepancy is certain, and the term explains all of it
+        # there certainly is a discrepancy, and the term explains all of it
         with_all = _left(question, trials, found)
         if not any(one.significant for one in with_all):
             whole = held_out(trials, before, found)
@@ -167,8 +167,8 @@ def _bounded(trials: Trials, less: Fit, best: Fit) -> Fit:
 def _without_a_name(
     question: Question, trials: Trials, best: Trial, left: list[Structure], seed: int
 ) -> tuple[Missing | None, Needs | None, tuple[Rival, ...]]:
-    """Return the functions that explain the residual of the named terms, by their
-    evidence.
+    """Return the functions that explain the residual of the named terms, chosen by
+    their evidence.
 
     A residual that is small compared with the part explained by a named term does not
     count. A function that the bootstrap samples do not retain is not needed.

@@ -13,7 +13,7 @@ from ..policy import Policy
 from ..search import given_up, Trial, Trials, with_states
 
 
-# Of the distribution of sections: two diagnoses of a case agree
+# Seed of the distribution of sections: two diagnoses of a case agree
 _SEED = 1
 
 
@@ -97,9 +97,9 @@ def _square(parts: list[Residuals]) -> tuple[float, int]:
 def folds_of(problem: Problem, policy: Policy) -> list[tuple[Weights, Weights]]:
     """Return weights of the fitted and the held-out data, for each part.
 
-    Every recording is divided into short sections. Of each group of successive ones,
-    every part receives one at random: sections in turn could take all visits of a
-    periodic motion to a constraint into one part.
+    Every recording is divided into short sections. From each group of successive
+    sections, every part receives one at random: if sections were assigned in turn, all
+    visits of a periodic motion to a constraint could end up in one part.
     """
     count = policy.folds if len(problem.records) > 1 else 2
     every = problem.everything()
@@ -123,7 +123,7 @@ def folds_of(problem: Problem, policy: Policy) -> list[tuple[Weights, Weights]]:
 
 
 def _parts(test: Fit, unseen) -> list[Residuals]:
-    """Return the residuals of the pieces that count."""
+    """Return the residuals of the held-out pieces."""
     found = []
     problem = test.problem
     for part in residuals(test):

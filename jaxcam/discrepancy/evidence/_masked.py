@@ -7,9 +7,10 @@ def unmasked(trials: Trials, best: Trial) -> tuple[Trial, list[tuple[str, float]
     """Return a subset without the terms that the error of a smoothed corner also
     explains.
 
-    Dry friction jumps when the velocity changes sign. Its form is smoothed, and steps
-    do not end there, so a small share of the explained cost may remain. With many
-    samples this share is significant, and another term may represent it.
+    Dry friction jumps when the velocity changes sign. The jump is smoothed, and
+    integration steps do not end there, so a small share of the explained cost may
+    remain. With many samples this share is significant, and another term may represent
+    it.
 
     **Returns:** the fit, and the dropped terms, each with its share of the explained
     cost.

@@ -18,7 +18,7 @@ def sure(
     """Return the part of a subset that does not depend on a few blocks of the
     recordings.
 
-    A term whose strength might be zero is dropped first, then the one that the fewest
+    Terms whose strengths might be zero are dropped first, then the term that the fewest
     bootstrap samples need.
 
     **Returns:** the fit, its result of `redrawn`, and the dropped terms with the share
@@ -51,7 +51,8 @@ def _size(trials: Trials, best: Trial, name: str, deviation) -> float:
 
 
 class Needs(NamedTuple):
-    """Need for the parts of a model, in the bootstrap samples and in all data.
+    """Whether the parts of a model are needed, in the bootstrap samples and in all
+    data.
 
     - `inclusion`: share of the bootstrap samples that would retain a part.
     - `deviation`: standard deviation of each free parameter over the bootstrap samples.
@@ -97,7 +98,7 @@ def needs(
     required to retain it; the policy, a seed, and the parameters to assess (default:
     all).
     """
-    # joints between blocks belong to neither, so blocks must be long
+    # joints between blocks belong to none of them, so blocks must be long
     pieces = max(len(flown) for flown, _ in problem.spans)
     slices = min(policy.stretches, max(1, pieces // policy.stretch_pieces))
     blocks = blocks_of(problem, found.point, slices, names)

@@ -24,7 +24,7 @@ _TINY = 1e-300
 
 @dataclasses.dataclass(frozen=True)
 class Ripple:
-    """Speed ripple of the drive once per turn."""
+    """Once-per-turn speed ripple of the drive."""
 
     eps: float
     """Relative amplitude."""
@@ -47,11 +47,11 @@ class Ripple:
     heldout_gain: float
     """Gain in the log-likelihood of held-out recordings."""
     inclusion: float
-    """Share of the bootstrap samples in which it is significant."""
+    """Share of the bootstrap samples in which the ripple is significant."""
 
     def significant(self, tests: int, policy: Policy) -> bool:
-        """Return whether it is significant, as one of `tests` tests, and exceeds the
-        threshold of the BIC.
+        """Return whether the ripple is significant, as one of `tests` tests, and
+        exceeds the threshold of the BIC.
 
         As for any named term, this must also hold in most bootstrap samples.
         """
@@ -160,7 +160,7 @@ def _amplitudes(
     length = time[-1] * (1 + 1 / len(time))
     slow = np.arange(1, int(2 * length * policy.drive_wander * rate) + 1)
     wander = np.cos(np.pi * np.outer(time / length, slow))
-    # cosines have zero slope at both ends; a drive need not
+    # cosines have zero slope at both ends; the drive signal need not
     ends = np.polynomial.legendre.legvander(2 * time / length - 1, policy.drive_degree)
     columns = [*ends.T, *wander.T]
     found, errors = np.zeros(len(orders), dtype=complex), np.zeros(len(orders))

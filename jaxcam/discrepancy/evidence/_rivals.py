@@ -1,4 +1,4 @@
-"""Other functions in the place of those found, by a bootstrap over the records."""
+"""Other functions in place of those found, compared by a bootstrap of the records."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -12,11 +12,11 @@ from ..search import Missing
 
 
 class Rival(NamedTuple):
-    """Functions and terms that were fitted in the place of what was chosen.
+    """Functions and terms that were fitted in place of the chosen ones.
 
-    - `worse`: score less that of the choice.
-    - `share`: share of the bootstrap samples in which it would have been chosen. The
-      score is like a BIC, so this estimates its posterior probability.
+    - `worse`: score minus that of the choice.
+    - `share`: share of the bootstrap samples in which they would have been chosen. The
+      score corresponds to a BIC, so the share estimates their posterior probability.
     """
 
     missing: Missing
@@ -29,8 +29,8 @@ def rivals(
 ) -> tuple[Rival, ...]:
     """Return the best of the other fits, the best first, one for each set of parts.
 
-    A block bootstrap draws stretches of the records, the same for all fits. No fit is
-    repeated: a sample weights the costs of the stretches.
+    A block bootstrap draws stretches of the records, the same ones for all fits. No fit
+    is repeated: each bootstrap sample weights the costs of the stretches.
     """
     ranked = sorted(
         (one for one in tried if one is not found), key=lambda one: one.score

@@ -1,4 +1,4 @@
-"""Shares of the misfit, by effect and by part of the motion."""
+"""Shares of the misfit, for each effect and for each part of the motion."""
 
 import math
 from collections.abc import Mapping
@@ -15,7 +15,7 @@ class Shares(NamedTuple):
     """Shares of the misfit of the textbook model; their sum is one.
 
     - `of`: the share of each named term or function, by label.
-    - `left`: the share that nothing explains.
+    - `left`: the unexplained share.
     """
 
     of: dict[str, float]
@@ -32,7 +32,8 @@ def shares(
     """Divide the misfit of a model among the effects that explain it.
 
     The part explained by all effects together is the reduction of the cost from
-    `before` to `after`; it is divided in proportion to the loss without each of them.
+    `before` to `after`; it is divided in proportion to the loss when each of them is
+    removed.
 
     **Arguments:** fits without and with the effects; the increase in the cost without
     each effect; the gain of a further function (0 if no structure remains); the policy.

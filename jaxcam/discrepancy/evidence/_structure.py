@@ -36,7 +36,7 @@ _TINY = 1e-300
 
 
 class Form(enum.StrEnum):
-    """The form in which a structure is sought; equal to its name as a string."""
+    """The form of a structure that is searched for; equal to its name as a string."""
 
     TERM = "term"
     FUNCTION = "function"
@@ -81,8 +81,8 @@ class Structure:
 
     predicted_gain: float = math.inf
     """Increase in the log-likelihood of one half of the recordings with the estimate
-    from the other half, if `gain` is above its threshold; negative for an effect that
-    differs from recording to recording.
+    from the other half, if `gain` is above its threshold. It is negative for an effect
+    that differs from recording to recording.
     """
     form: Form = Form.FUNCTION
     """An unlisted term, a free function, a vibration, or residuals that are correlated
@@ -120,8 +120,8 @@ def structures(
     """Test the residuals of a fit for structures, and return them with the largest
     excess first.
 
-    **Arguments:** the fit, the response to a force about it, terms that describe but
-    are not verdicts, the periodogram of the residuals, whether there is a drive, the
+    **Arguments:** the fit, the response to a force about it, terms that only describe
+    an unknown effect, the periodogram of the residuals, whether there is a drive, the
     constants of forms, the unit of the motion, and the policy.
     """
     problem, seen = found.problem, visited_states(found.problem)
@@ -280,8 +280,8 @@ def _coloured(found: Fit, tests: int, policy: Policy) -> Structure:
     score = float(total) / math.sqrt(max(int(count), 1))
     bic = math.log(found.problem.samples)
     chance = float(norm.isf(policy.false_alarms / tests)) ** 2
-    # as the gain of one parameter, neglecting the smooth part that the fitted states
-    # absorb
+    # expressed as the gain of one parameter; the smooth part that the fitted states
+    # absorb is neglected
     return Structure(
         "coloured_residuals",
         "a smooth deviation that no shape describes",

@@ -1,6 +1,4 @@
-"""List other explanations, the best first, each with the reason why it was not
-named.
-"""
+"""List other explanations, the best first, each with the reason for its rejection."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -44,7 +42,7 @@ def alternatives_of(trials: Trials, choice: Choice) -> tuple[Alternative, ...]:
     found += _additions(trials, choice)
     found.sort(key=lambda one: one.delta_bic)
     most = trials.policy.alternatives
-    # a single term is always listed, however many subsets contain it
+    # a single term is always listed, even if many subsets contain it
     singles = [one for one in found[most:] if len(one.terms) == 1]
     return (*found[:most], *singles)
 
@@ -69,7 +67,7 @@ def alternatives_to_functions(
             _name(trial),
             trial.bic - missing.score,
             _terms(trial),
-            "named terms alone explain less than the function",
+            "the named terms alone explain less than the function",
         )
         for trial in named[: policy.alternatives]
     ]
@@ -86,7 +84,7 @@ def rival_name(rival: Rival) -> str:
 def _why_not(rival: Rival, policy: Policy) -> str:
     found = rival.missing.fit
     if found.cost > policy.near * found.problem.samples:
-        return "its fit did not come near the data"
+        return "its fit did not come close to the data"
     return f"would be chosen in {rival.share:.0%} of the bootstrap samples"
 
 
@@ -114,11 +112,11 @@ def _additions(trials: Trials, choice: Choice) -> Iterator[Alternative]:
             gain = added_gain(information, score, free, own, trials.policy.alike)
         asked = trials.threshold(term.name)
         reason = (
-            f"would gain {max(gain, 0.0):.3g} in twice the log-likelihood, where "
+            f"would increase twice the log-likelihood by {max(gain, 0.0):.3g}, where "
             f"{asked:.3g} is required"
         )
         if term.name in dropped:
-            reason += "; it is in doubt, see the caveat"
+            reason += "; it is doubtful, see the caveat"
         delta = trials.count([term.name]) * price - gain
         terms = tuple(sorted(names))
         yield Alternative("+".join(terms), delta, terms, reason)
@@ -128,9 +126,9 @@ def _worse(trials: Trials, choice: Choice, trial: Trial) -> str:
     """Return the reason why a fitted subset is not the named one."""
     best, samples = choice.best, trials.problem.samples
     if not trials.settled(trial):
-        return "its fit did not come near the data"
+        return "its fit did not come close to the data"
     if abs(trial.bic - best.bic) < trials.policy.tie:
-        return "explains as much: these recordings cannot distinguish between them"
+        return "explains as much: these recordings cannot distinguish between the two"
     if trial.bic < best.bic:
         return "fits better, but not all of its terms are certain"
     return (

@@ -10,7 +10,7 @@ from ._words import listed, number, quantity
 
 
 class Reason(enum.StrEnum):
-    """The reason of a caveat; equal to its name as a string."""
+    """The reason for a caveat; equal to its name as a string."""
 
     SMALL_REMAINDER = "small remainder"
     IN_DOUBT = "in doubt"
@@ -70,7 +70,7 @@ def caveats_of(
             Reason.NOT_SHARED,
             "A discrepancy that differs from recording to recording remains "
             f"({apart[0].sentence}). It is not physics that the recordings share; "
-            "check how they were made.",
+            "check how the recordings were made.",
         )
     held = choice.held
     if held.after > trials.policy.as_noise:
@@ -82,7 +82,7 @@ def noisier_than_stated(question: Question) -> Iterator[Caveat]:
     for one in question.noisier:
         yield Caveat(
             Reason.NOISIER,
-            f"The recordings show a noise of {one.seen:.3g} in `{one.channel}`, "
+            f"The measured noise of `{one.channel}` is {one.seen:.3g}, "
             f"{one.seen / one.stated:.2g} times the stated noise ({one.stated:.3g}); "
             "the larger value was used.",
         )
@@ -101,14 +101,14 @@ def above_noise(held: HeldOut, named: bool) -> Caveat:
 
 
 def poor_prediction(held: HeldOut) -> Caveat:
-    """Caveat: a part of the recordings does not determine the parameters that the
-    others need.
+    """Caveat: some recordings do not determine the parameters needed to predict the
+    others.
     """
     return Caveat(
         Reason.POOR_PREDICTION,
-        "A part of the recordings does not determine the parameters well enough to "
-        f"predict the others: the residual is {held.after:.2g} times the noise, that "
-        f"of the textbook model {held.before:.2g} times. Record at more speeds.",
+        "Part of the data does not determine the parameters well enough to predict "
+        f"the rest: the residual is {held.after:.2g} times the noise, that of the "
+        f"textbook model {held.before:.2g} times. Record at more speeds.",
     )
 
 
@@ -127,8 +127,8 @@ def functions_fall_short(left: float) -> Caveat:
     """Caveat: unnamed functions do not explain the recordings down to the noise."""
     return Caveat(
         Reason.FAR_FROM_DATA,
-        f"With these functions the residual of the fit is still {left:.2g} times the "
-        "noise: they are a part of the missing physics, and their form is "
+        f"With these functions, the residual of the fit is still {left:.2g} times the "
+        "noise: they are only part of the missing physics, and their form is "
         "approximate.",
     )
 
@@ -139,7 +139,7 @@ def functions_tie(name: str, rival: Rival) -> Caveat:
         Reason.TIE,
         f"These recordings do not distinguish it from {name}, which would be chosen "
         f"in {rival.share:.0%} of the bootstrap samples. Record motions that visit "
-        "more of the states at which the two differ.",
+        "more of the states in which the two differ.",
         tuple(sorted(rival.missing.names)),
     )
 
@@ -189,8 +189,8 @@ def _masked(choice: Choice, name: str, share: float) -> Caveat:
     return Caveat(
         Reason.MASKED,
         f"A term for {name.replace('_', ' ')} would explain {share:.1g} of the misfit "
-        f"that {listed(sorted(choice.best.names))} explains: no more than the "
-        "smoothing of dry friction at zero velocity may leave.",
+        f"explained by {listed(sorted(choice.best.names))}: no more than the "
+        "smoothing of dry friction at zero velocity may leave unexplained.",
         (name,),
     )
 
@@ -206,8 +206,8 @@ def _named_in_doubt(trials: Trials, name: str, share: float) -> Caveat:
 
 
 def _against(trials: Trials, share: float) -> str:
-    """Return the evidence against a term that gains in a share of the bootstrap
-    samples.
+    """Return the evidence against a term that improves the fit in a share of the
+    bootstrap samples.
     """
     if share >= trials.policy.sure:
         return "its strength varies so much between blocks that it might be zero"
@@ -220,8 +220,8 @@ def _far(trials: Trials) -> Caveat:
     named = listed(sorted(least.names)) if least.names else "none of them"
     return Caveat(
         Reason.FAR_FROM_DATA,
-        "No subset of the known effects comes near these recordings: the residual of "
-        f"the best fit, with {named}, is {rms_of(least.fit):.2g} times the noise. "
+        "No subset of the known effects comes close to these recordings: the residual "
+        f"of the best fit, with {named}, is {rms_of(least.fit):.2g} times the noise. "
         "Statements about shape and location are approximate.",
         tuple(sorted(least.names)),
     )

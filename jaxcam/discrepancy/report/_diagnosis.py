@@ -35,7 +35,7 @@ class Alternative(NamedTuple):
     """Another subset of terms, or other functions, with its difference in BIC.
 
     `name` joins the names of its `terms`, or is `"none"`, or gives functions by a
-    formula or by their arguments; `reason` says why it was not named.
+    formula or by their arguments; `reason` states why it was not named.
     """
 
     name: str
@@ -67,15 +67,15 @@ class Effect:
     delta_bic: float
     """BIC with it minus BIC without it."""
     heldout_gain_nats: float
-    """Gain of the log-likelihood on held-out data."""
+    """Gain in the log-likelihood of held-out data."""
     inclusion: float | None
     """Share of the bootstrap samples in which it would be named; `None` for an unknown
     effect without a function."""
     term: bool = True
     """Whether it is a named term; otherwise it is unknown."""
     share: float | None = None
-    """Share of the misfit that it explains; for an unknown effect, the share that
-    nothing explains. `None` for the drive, which is diagnosed from its own channel.
+    """Share of the misfit that it explains; for an unknown effect, the unexplained
+    share. `None` for the drive, which is diagnosed from its own channel.
     """
 
     def to_json(self) -> dict[str, Any]:
@@ -113,12 +113,13 @@ class Diagnosis:
     alternatives: tuple[Alternative, ...]
     """Other subsets of terms, the best first."""
     heldout_before: float
-    """Rms of the held-out residuals of the textbook model (`unit`), one flight ahead.
+    """Rms of the held-out residuals of the textbook model (in `unit`), predicted one
+    flight ahead.
     """
     heldout_after: float
-    """Rms of the held-out residuals with the effects (`unit`)."""
+    """Rms of the held-out residuals with the effects (in `unit`)."""
     noise_floor: float
-    """Rms of the noise (`unit`)."""
+    """Rms of the noise (in `unit`)."""
     unit: str
     """Unit of the residuals."""
     rig: dict[str, Value]
@@ -130,16 +131,17 @@ class Diagnosis:
     after: Fit
     """Fit of the chosen model."""
     left_before: tuple[Structure, ...]
-    """Structures sought in the residuals of the textbook model."""
+    """Structures searched for in the residuals of the textbook model."""
     left_after: tuple[Structure, ...]
-    """Structures sought in the residuals of the chosen model."""
+    """Structures searched for in the residuals of the chosen model."""
     unseen: tuple[list[Residuals], list[Residuals]]
     """Held-out residuals of both models."""
     ripple: Ripple | None
     """Speed ripple of the drive."""
     pulls: dict[str, tuple[float, float]]
-    """Deviation of each parameter from nominal without the effects and with them, in
-    tolerances."""
+    """Deviation of each parameter from nominal, in tolerances: without and with the
+    effects.
+    """
     limits: dict[str, Value]
     """Detection limits: the smallest strength at which each term would have been named.
     """
@@ -195,7 +197,7 @@ class Diagnosis:
     def system(self, record: int | str = 0) -> HybridSystem:
         """Return the system with the named terms and no others.
 
-        The drive turns at the speed of the given recording. Sensor faults are not
+        The drive turns at the speed of the given recording. Sensor errors are not
         included. A force with an internal state is included with that state: the system
         is then a `WithHidden`, whose additional components do not change at impacts.
         """

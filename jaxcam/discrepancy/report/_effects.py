@@ -1,4 +1,4 @@
-"""Report an effect: its numbers, its location, and the evidence."""
+"""Report an effect: its parameters, its location and the evidence."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -172,7 +172,7 @@ def unknown_effect(trials: Trials, choice: Choice, share: float) -> Effect:
     """Return the unnamed effect of a residual structure.
 
     Args:
-        share: Share of the misfit that nothing explains.
+        share: The unexplained share of the misfit.
     """
     first, problem = choice.unexplained[0], trials.problem
     return Effect(

@@ -65,12 +65,12 @@ _WORDS = {
     "harmonic 2": "varies twice per turn",
     "harmonic 3": "varies three times per turn",
     "half turn": "acts in one half of each turn, from {x} {turn}",
-    "arc": "acts only in a part of each turn, around {x} {turn}, over +-{half}",
+    "arc": "acts only in part of each turn, around {x} {turn}, over +-{half}",
     "bump in turn": "acts only around {x} {turn} in each turn, over about {half}",
 }
 _THINGS = {
     "force": "a force",
-    "restitution": "a restitution",
+    "restitution": "a coefficient of restitution",
     "surface": "a surface",
     "sensor": "a sensor error",
 }
@@ -162,7 +162,7 @@ def _mechanism(family: Family, primitive: Primitive, numbers, values) -> str:
     side = primitive.name
     if back:
         return (
-            f"; it pushes back {side} {values['a']} {unit} with {stiffness}, as an "
-            f"elastic stop would"
+            f"; it pushes back {side} {values['a']} {unit} with a stiffness of "
+            f"{stiffness}, as an elastic stop would"
         )
-    return f"; it pulls {side} {values['a']} {unit} with {stiffness}"
+    return f"; it pulls {side} {values['a']} {unit} with a stiffness of {stiffness}"

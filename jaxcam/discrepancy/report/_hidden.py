@@ -15,16 +15,16 @@ from ._words import quantity
 # A resonance is shown from a tenth of its frequency to ten times that, a relaxation for
 # five of its time constants
 _DECADE, _TIMES = 10.0, 5.0
-# Integration steps of a hysteresis between two points of its table
+# Integration steps of a hysteresis between two successive points of its table
 _STEPS = 20
 
 
 def hidden_table(found: Fit, hidden: Hidden, points: int):
-    """Tabulate the effect of an element over its argument, with standard errors.
+    """Tabulate the effect of an element against its argument, with standard errors.
 
-    For a resonance, this is the magnitude of the force for a unit deflection over
-    frequency (Hz). For a relaxation, it is the force over the time (s) after a unit
-    deflection. For a hysteresis, it is the force over the distance from a reversal,
+    For a resonance, this is the magnitude of the force for a unit deflection against
+    frequency (Hz). For a relaxation, it is the force against the time (s) after a unit
+    deflection. For a hysteresis, it is the force against the distance from a reversal,
     starting from full slip.
 
     **Returns:** the argument, values and errors, each `(points,)`, and the element.
@@ -125,7 +125,7 @@ def hidden_words(found: Fit, hidden: Hidden, element: HiddenElement, unit: str) 
     if isinstance(element, Resonator):
         return (
             f"a resonance at {said} Hz with {100 * float(element.ratio):.2g} % "
-            "damping driven by the motion, impacts included, like the surge of a "
+            "damping, driven by the motion (including impacts), like the surge of a "
             "spring"
         )
     if isinstance(element, Relaxation):

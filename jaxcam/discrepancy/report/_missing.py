@@ -1,4 +1,4 @@
-"""Report unnamed physics as a table, in words, and as a part of the verdict."""
+"""Report unnamed physics as a table, in words, and as part of the verdict."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -34,7 +34,7 @@ _KINDS = {
 }
 _VERBS = {
     "force": "a force",
-    "restitution": "a restitution",
+    "restitution": "a coefficient of restitution",
     "surface": "a surface",
     "sensor": "a sensor error",
 }
@@ -57,7 +57,7 @@ class MissingFunction:
         last reversal.
     - `value`, `stderr`: value and standard error in `unit` at the points of the grid,
       `(n,)` or `(n, m)`.
-    - `words`: a description. `records`: the recordings in which it was sought.
+    - `words`: a description. `records`: the recordings that were searched for it.
     - `formula`: the formula of the value, if a parametric form explains as much.
     - `element`: for a resonance or a force with memory, the element for a simulation.
     - `numbers`: for any other function, the names of its fitted parameters.
@@ -177,7 +177,7 @@ def named_function(found: Fit, one: Free | Hidden) -> str:
         return one.label
     kind = _KINDS[one.family.where]
     if one.primitive is None:
-        return f"{kind} by {' and '.join(one.family.arguments)}"
+        return f"{kind} as a function of {' and '.join(one.family.arguments)}"
     numbers = np.array([found[name].value for name in one.coefficients])
     return f"{kind} {formula_of(one.family, one.primitive, numbers, kind)[0]}"
 

@@ -83,13 +83,13 @@ def summary_of_functions(
         before, after = (factor * floor * one for one in (held.before, held.after))
         return (
             f"{found} Fitted together with the rig, it reduces the error on held-out "
-            f"flights from {before:.3g} to {quantity(f'{after:.3g}', unit)}, where "
-            f"the noise is {factor * floor:.3g}."
+            f"flights from {before:.3g} to {quantity(f'{after:.3g}', unit)}; the "
+            f"noise is {factor * floor:.3g}."
         )
     return (
         f"{found} Fitted together with the rig, it explains the recordings to within "
-        f"{left:.3g} times the noise; a part of the recordings does not determine it "
-        "well enough to predict the others."
+        f"{left:.3g} times the noise; part of the data does not determine it well "
+        "enough to predict the rest."
     )
 
 
@@ -98,7 +98,7 @@ def _nothing(choice: Choice, least: Mapping[str, Limit], policy: Policy) -> str:
     tail = ""
     for name, limit in least.items():
         size = quantity(f"{limit.size:.2g}", limit.unit)
-        tail = f" A {name} of {size} would have been seen."
+        tail = f" A {name} of {size} would have been detected."
         break
     if fitted > policy.as_noise:
         return (
@@ -108,8 +108,8 @@ def _nothing(choice: Choice, least: Mapping[str, Limit], policy: Policy) -> str:
         )
     if unseen > policy.as_noise:
         tail = (
-            f"{tail} However, a part of the recordings does not determine the "
-            "parameters well enough to predict the others: the residual is "
+            f"{tail} However, part of the data does not determine the parameters "
+            "well enough to predict the rest: the residual is "
             f"{unseen:.2g} times the noise."
         )
     return (
@@ -136,6 +136,6 @@ def _moved(best: Trial, within: Fit, rig: Sequence[str], policy: Policy) -> str:
     if moved[name] < policy.moved_errors:
         return ""
     return (
-        f" Without it, a fit would have moved {name.replace('_', ' ')} from "
+        f" Without it, the fit would have shifted {name.replace('_', ' ')} from "
         f"{best.fit[name].value:.5g} to {within[name].value:.5g}."
     )

@@ -21,7 +21,7 @@ def number(value: float, stderr: float, unit: str) -> str:
 
 
 def percent(share: float) -> str:
-    """Return a share in per cent, with significant digits only."""
+    """Return a share as a percentage, without insignificant digits."""
     if 0 < share < 0.01:
         return "less than 1 %"
     if 0.99 < share < 1:

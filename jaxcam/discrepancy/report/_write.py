@@ -170,8 +170,8 @@ def _of_functions(
 
 
 def _doubts_of(choice: Choice, missing: Missing, policy: Policy) -> Iterator[Caveat]:
-    """Return caveats: the functions do not explain all data or the held-out data, or
-    other functions explain as much.
+    """Return caveats if the functions do not explain all data or the held-out data, or
+    if other functions explain as much.
     """
     left, held = rms_of(missing.fit), choice.held
     for rival in choice.rivals:

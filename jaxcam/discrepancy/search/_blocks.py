@@ -25,7 +25,7 @@ class Blocks:
     A block is a section of one recording. `information` `(b, g, g)` and `score` `(b,
     g)` are in units of the parameter scales, with the states eliminated; `prior` `(g,)`
     and `pull` `(g,)` are the contributions of the tolerances to both. `owner` `(g,)` is
-    the number of the recording to which a parameter belongs, zero if all share it.
+    the index of the recording to which a parameter belongs, zero if all share it.
     """
 
     names: tuple[str, ...]

@@ -24,8 +24,8 @@ from ..policy import Policy
 from ..terms import Term, watched, WithTerms
 
 
-# A step that made a recording worse is shortened by this factor, and given up below
-# this share of its length
+# A step that worsens the fit of a recording is shortened by this factor, and abandoned
+# below this share of its length
 _SHORTER, _SHORTEST = 0.25, 0.05
 
 
@@ -92,7 +92,7 @@ def with_states(problem: Problem, found: Fit, weights: Weights, policy: Policy) 
 
     states = np.asarray(found.point.states)
     each, costs, steps = about(jnp.asarray(states))
-    # each recording by itself: a step that made it worse is shortened
+    # for each recording separately: a step that worsened its fit is shortened
     share = np.ones(len(states))
     for _ in range(policy.state_iterations):
         moved = states + share[:, None, None] * np.nan_to_num(steps)

@@ -1,6 +1,6 @@
 """Replace free functions by parametric forms, fitted to the recordings.
 
-The curve gives the starting values of a form; the evidence of a fit to whole
+The free function gives the starting values of a form; the evidence of a fit to whole
 trajectories decides whether the form is kept.
 """
 
@@ -19,7 +19,7 @@ from ._roughness import beside, Roughness
 from ._slots import emptied, Free, replaced
 
 
-# Points at which a form is compared with the sines that represent it
+# Number of points at which a form is compared with the sines that represent it
 _GRID = 400
 # A form that is worse than its curve by this factor after several attempts is given up
 _HOPELESS = 1.25
@@ -60,7 +60,7 @@ def formulated(
 
 
 def _sound(trial: Missing, one: Free) -> bool:
-    """Return whether a fit with a form has ended with its positions within the data."""
+    """Return whether a fit with a form converged with its positions within the data."""
     (form,) = (f for f in trial.functions if f.slot == one.slot)
     assert isinstance(form, Free) and form.primitive is not None
     numbers = [trial.fit[name].value for name in form.coefficients]
@@ -68,7 +68,9 @@ def _sound(trial: Missing, one: Free) -> bool:
 
 
 def _enough(fits: FreeFits, found: Missing, trial: Missing, small: float) -> bool:
-    """Return whether a form leaves only noise, with better evidence than the curve."""
+    """Return whether a form leaves only noise, with more evidence than the free
+    function.
+    """
     return trial.score < found.score and leaves_noise(fits, trial, small)
 
 
@@ -121,8 +123,8 @@ def _promising(
     """Return the forms most similar to a function where the data determine it, with
     their parameters.
 
-    By the quadratic likelihood about the fit: a form with size s and sines b has the
-    cost of `s b` there.
+    This uses the quadratic likelihood about the fit, in which a form with size s and
+    sines b has the cost of the coefficients `s b`.
     """
     heat, labels = heat_of(found.fit), one.coefficients
     subset = Subset(found.problem, found.functions, found.names)

@@ -122,8 +122,8 @@ class FreeFits:
     def _stop(
         self, samples: int, heat: float, beaten: float
     ) -> Callable[[Sequence[float]], bool]:
-        """Return whether to stop a fit: it has failed, or its steps no longer affect a
-        choice.
+        """Return a function that stops a fit if it has failed or its steps no longer
+        affect a choice.
         """
         gives_up = given_up(samples, self.policy, beaten)
 
@@ -151,7 +151,7 @@ class FreeFits:
 
     def _rougher(self, subset, functions, point, heat) -> tuple[Part, ...]:
         """Return the functions with the smoothness, and the hidden elements with the
-        parameters, that a fit suggests.
+        parameters, suggested by a fit.
         """
         found = []
         for one in functions:
@@ -171,10 +171,10 @@ class FreeFits:
         return tuple(found)
 
     def needed_parts(self, found: Missing, one: Hidden) -> tuple[int, ...]:
-        """Return the direct parts of an element's force that are worth a parameter.
+        """Return the direct parts of an element's force that justify a parameter.
 
-        They are removed one by one, the least significant first, by the quadratic
-        likelihood about the fit.
+        The others are removed one by one, the least significant first, according to the
+        quadratic likelihood about the fit.
         """
         heat = heat_of(found.fit)
         problem = heated(filled(found.problem, found.functions), heat)
@@ -320,8 +320,8 @@ def _as_before(fresh, one) -> bool:
 
 
 def _recentred(problem: Problem, fresh, functions, point: Point) -> Point:
-    """Return the point for functions about other parameters of their hidden
-    elements.
+    """Return the point for functions whose hidden elements are linearised about other
+    parameters.
     """
     for one, before in zip(fresh, functions):
         if one is not before and isinstance(one, Hidden):

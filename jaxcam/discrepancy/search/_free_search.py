@@ -1,7 +1,7 @@
 """Search for unnamed functions in addition to named terms, by their evidence.
 
-The search first uses single pieces of flight, which are independent of impacts and
-other flights, and then whole recordings.
+The search first uses single pieces of flight, which do not depend on impacts and other
+flights, and then whole recordings.
 """
 
 import dataclasses
@@ -143,7 +143,7 @@ class FreeSearch:
         return Subset(self.problem, found.functions, found.names)
 
     def _grown(self, found: Missing, apart: bool) -> Missing:
-        """Add one function or term after the other."""
+        """Add functions or terms one at a time."""
         problem = self.apart if apart else self.problem
         while len(found.functions) + len(found.names) < self.policy.most_terms:
             if apart and heat_of(found.fit) < self.policy.as_noise:

@@ -44,10 +44,11 @@ def predicted_gain(blocks: Blocks, free, new, policy: Policy) -> float:
     """Return the gain in twice the log-likelihood of recordings when `new` is estimated
     from others.
 
-    The recordings are divided into two halves, each predicts the other, and the sum is
-    returned; the `free` parameters are fitted to either half. An effect that differs
-    from recording to recording, such as the faults of a film, gains in the fit and
-    loses here. The gain is infinite for one recording, which cannot be predicted.
+    The recordings are divided into two halves, each of which predicts the other, and
+    the sum of the gains is returned; the `free` parameters are fitted to either half.
+    An effect that differs from recording to recording, such as the distortion of a
+    film, has a gain in the fit but a loss here. The gain is infinite for a single
+    recording, which cannot be predicted.
     """
     names = list(dict.fromkeys(blocks.record))
     if len(names) < 2:
@@ -91,8 +92,8 @@ def _beside(information, score, free, new, basis):
 def newton_step(information, score, rows):
     """Return the steps of some parameters to their optimum, and their covariance.
 
-    A parameter on which the data have no information does not move and has an infinite
-    variance.
+    A parameter about which the data contain no information does not move and has an
+    infinite variance.
     """
     step = np.zeros(len(rows))
     covariance = np.diag(np.full(len(rows), np.inf))

@@ -1,7 +1,7 @@
 """Stop a fit that makes little progress far from the data, or is late.
 
-Without the right term a fit may take very many small steps along a valley of the cost;
-with the right term it needs a few large steps.
+Without the right term, a fit may take very many small steps along a valley of the cost;
+with the right term, it needs a few large steps.
 """
 
 import math

@@ -58,8 +58,8 @@ class Kind:
 
     - `name`: its name in sentences; `numbers`: its parameters; `outputs`: names of its
       strengths.
-    - `signals(driven, cells)`: for each set of parameters, outputs `(r, n, o)` and free
-        motions `(r, n, s)`.
+    - `signals(driven, cells)`: returns, for each set of parameters, the outputs `(r, n,
+      o)` and free motions `(r, n, s)`.
     """
 
     name: str

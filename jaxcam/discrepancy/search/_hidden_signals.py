@@ -12,7 +12,8 @@ from ...fitting import Problem
 
 
 # Window (samples) of the quadratic polynomials that smooth a flight. They cause no
-# delay, and they suppress only frequencies far above those that steps resolve
+# delay, and they suppress only frequencies far above those that the integration steps
+# resolve
 _WINDOW = 9
 # Samples are padded to a multiple of this, so that similar recordings share a program
 _STRIDE = 2048
@@ -114,7 +115,7 @@ def relaxation_signals(driven: Driven, time: float):
 
 
 def _first_order(position, pole: complex, interval: float):
-    """Solve `y' = pole y + q` from the state of rest."""
+    """Solve `y' = pole y + q`, starting from rest."""
     x = pole * interval
     end = np.exp(x)
     last = (end - 1 - x) / (x * pole)
@@ -126,7 +127,7 @@ def _first_order(position, pole: complex, interval: float):
     return found
 
 
-# Initial state of a hysteresis, to compute the effect of a change of it
+# Initial state of a hysteresis, used to compute the effect of a change in it
 _BESIDE = 1e-3
 
 

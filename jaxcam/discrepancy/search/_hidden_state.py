@@ -100,8 +100,8 @@ class Hidden:
         return count * math.log(samples) + 2 * math.log(self.cells)
 
     def moved_from(self, other: "Hidden") -> float:
-        """Return the distance of its parameters from those of another element, in their
-        reaches.
+        """Return the distance of its parameters from those of another element, in units
+        of their largest changes.
         """
         return max(
             abs(number.change(a, b)) / self.kind.reach(number, other.numbers)

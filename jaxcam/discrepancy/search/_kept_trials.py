@@ -17,7 +17,7 @@ from ...fitting.engine import Point
 from ..policy import Policy
 
 
-# exceptions of numpy for files that are foreign or damaged
+# exceptions raised by numpy for foreign or damaged files
 _BROKEN = (
     OSError,
     ValueError,
@@ -44,7 +44,7 @@ class KeptTrials:
     """The results of the fits of each subset of terms, one small file per subset.
 
     A file is used only for the same recordings, parameters, rig and policy; an
-    incomplete file or one of another problem is ignored.
+    incomplete file or one from another problem is ignored.
 
     **Arguments:** the folder, which is created with the first file, the problem and the
     policy.

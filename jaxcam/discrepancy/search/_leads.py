@@ -77,7 +77,7 @@ class Leads:
         return sorted(leads, key=lambda lead: -lead.gain)
 
     def _slot(self, problem: Problem, found: Missing, where: Where) -> str | None:
-        """Return the free slots for one more function."""
+        """Return a free slot for one more function, if there is one."""
         used = {one.slot for one in found.functions}
         if len(used) >= self.policy.functions:
             return None
@@ -110,7 +110,7 @@ class Leads:
                 yield Lead(grown, promise=one)
 
     def _has_room(self, found: Missing) -> bool:
-        """Return the lead for one force with an internal state."""
+        """Return whether a force with an internal state can be added."""
         slots = {one.slot for one in found.functions}
         one = any(isinstance(f, Hidden) for f in found.functions)
         return len(slots) < self.policy.functions and not one

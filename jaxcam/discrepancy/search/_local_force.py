@@ -39,7 +39,7 @@ _NODES = 20
 
 
 class LocalForce(Term):
-    """A force given at times `start + k spacing`, linear in between."""
+    """A force given at times `start + k * spacing`, interpolated linearly."""
 
     name: ClassVar[str] = "local_force"
     sentence: ClassVar[str] = "a force at one time"
@@ -84,8 +84,8 @@ class Response(NamedTuple):
 def stride_of(problem: Problem) -> int:
     """Return the number of half steps between nodes of a force.
 
-    Steps may be shorter than the time scale of a force requires: they follow a measured
-    input, or errors that accumulate over a flight of many pieces.
+    Steps may be shorter than the time scale of a force requires, because of a measured
+    input or of errors that accumulate over a flight of many pieces.
     """
     halves = 2 * problem.pieces.angle.shape[-1]
     stride = max(1, halves // _NODES)

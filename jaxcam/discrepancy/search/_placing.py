@@ -1,4 +1,4 @@
-"""Find the edge, knee or speed at which a term would gain most."""
+"""Find the edge, knee or speed at which a term would have the largest gain."""
 
 import dataclasses
 from collections.abc import Mapping
@@ -29,7 +29,7 @@ class Placing(NamedTuple):
 def placing(
     problem: Problem, response: Response, term: Term, policy: Policy
 ) -> Placing:
-    """Return the best of the starts of a term that acts on the first coordinate.
+    """Return the best starting values of a term that acts on the first coordinate.
 
     This uses the quadratic likelihood about a fit, with strengths of the permitted
     sign.
@@ -46,7 +46,7 @@ def placing(
     best = Placing(0.0, starts[0])
     for first in range(0, len(starts), together):
         some = starts[first : first + together]
-        # the same number each time, so that one program serves
+        # the same number each time, so that one program suffices
         filled = [*some, *[some[-1]] * (together - len(some))]
         copies = [dataclasses.replace(term, **start) for start in filled]
         blocks = force_blocks(problem, response, copies)
@@ -64,7 +64,7 @@ def _beside(information, score, free, new):
     """Return information and score of some strengths, with the free parameters
     eliminated.
 
-    They are in units in which the information on each strength is one.
+    Strengths are scaled so that the information on each is one.
     """
     free = free[np.diag(information)[free] > 0]
     inside = invert_information(information[np.ix_(free, free)])

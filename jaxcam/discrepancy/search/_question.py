@@ -19,7 +19,7 @@ Report = Callable[[str, float | None], None]
 
 
 class Shown(NamedTuple):
-    """Report of a fitted parameter: divided by a constant, with another name."""
+    """How a fitted parameter is reported: divided by a constant, under another name."""
 
     name: str
     divisor: float
@@ -67,7 +67,7 @@ def with_seen_noise(
 ) -> tuple[dict[str, Sensor], tuple[Noisier, ...]]:
     """Return the sensors with the measured noise, if it exceeds the stated noise.
 
-    If the stated noise were too small, every fault of a sensor would look like physics.
+    If the stated noise were too small, every sensor error would look like physics.
     """
     found, noisier = dict(sensors), []
     for name, sensor in sensors.items():

@@ -34,7 +34,7 @@ def rig_question(
     report: Report,
     policy: Policy,
 ) -> Question:
-    """Return the problem of a cam-follower rig, which states its sensors and
+    """Return the problem of a cam-follower rig; the rig contains sensors and
     tolerances.
 
     **Raises:** `RecordingError` for recordings that cannot be those of the rig.
@@ -81,7 +81,7 @@ def rig_question(
 def _check(rig: Rig, runs: Sequence[Recording]) -> None:
     """Reject recordings that cannot be those of the rig.
 
-    **Raises:** `RecordingError`, which states the recording and its fault.
+    **Raises:** `RecordingError`, which names the recording and its fault.
     """
     surface = rig.system(1.0)
     angles = np.asarray(surface.contact_angle(np.linspace(0, 2 * np.pi, _ANGLES)))

@@ -13,7 +13,7 @@ from ._vibration_scan import Periodogram
 
 
 class Search:
-    """The search over subsets and its order, which is not by largest gain alone."""
+    """The search over subsets; their order depends on more than the largest gain."""
 
     def __init__(self, trials: Trials):
         self.trials, self.policy = trials, trials.policy
@@ -65,8 +65,8 @@ class Search:
         return self._swapped(self._smallest(best))
 
     def _leads(self, before: Trial, best: Trial) -> bool:
-        """Return whether to continue the search; far from the data only if terms help a
-        lot.
+        """Return whether to continue the search; far from the data, only if the terms
+        help substantially.
         """
         part = best.fit.cost / before.fit.cost
         return self.trials.settled(best) or part < self.policy.helped
@@ -94,7 +94,7 @@ class Search:
         # scores at the best subset are most reliable
         own = self._promises(best, self.trials.scan(best.names))
         for trial in kept:
-            # if the best one lacks nothing, only equally good ones can lead further
+            # if the best subset leaves only noise, only equally good ones are extended
             if not own and trial.bic > best.bic + self.policy.leads:
                 continue
             for names, bic in self._promises(
@@ -107,9 +107,9 @@ class Search:
         return promised
 
     def _smallest(self, best: Trial) -> Trial:
-        """Drop terms that are not needed, by the error rate as well as BIC."""
+        """Drop terms that are not needed according to the error rate and the BIC."""
         for name in sorted(best.names):
-            # start here with one term less: its own fit may have failed
+            # start from here with one term fewer: its own fit may have failed
             self.trials.attempt(best.names - {name}, best, self.policy.iterations)
         for size in range(len(best.names)):
             enough = []

@@ -28,7 +28,7 @@ from ._hidden_state import Hidden, with_hidden
 from ._roughness import Roughness
 
 
-# Sines of a function, and one more coefficient for its jump
+# Number of sines of a function; one more coefficient represents its jump
 _SINES = {Where.FLIGHT: 20, Where.IMPACT: 10, Where.CONTACT: 24, Where.SENSOR: 20}
 # Number of slots for functions of each kind in a problem
 _ROOM = ((Where.FLIGHT, "force_a"), (Where.FLIGHT, "force_b"))

@@ -15,12 +15,12 @@ class StateElimination:
     """The states of one record, eliminated from its first piece to its last.
 
     The blocks of a piece are the information of its state with itself and with the
-    parameters, its score, and its information with the forces. Rows that tie two pieces
-    have three parts in that order: derivatives by the parameters, the residuals, and
-    derivatives by the forces.
+    parameters, its score, and its information with the forces. Rows that connect two
+    pieces have three parts, in this order: derivatives with respect to the parameters,
+    residuals, and derivatives with respect to the forces.
 
     **Arguments:** `add(direct, pushed, off, sign)` collects rows without a state:
-    derivatives by the parameters and by the forces, and the residuals.
+    derivatives with respect to the parameters and to the forces, and the residuals.
     """
 
     def __init__(self, add: Callable[..., None]):
@@ -28,14 +28,15 @@ class StateElimination:
         self._blocks: list[np.ndarray] = []
 
     def begin(self, blocks: Sequence[np.ndarray]) -> None:
-        """Begin with the blocks of the first piece."""
+        """Start with the blocks of the first piece."""
         self._blocks = list(blocks)
 
     def follow(self, blocks: Sequence[np.ndarray], earlier, later, rows) -> None:
-        """Go on to the next piece, which rows tie to the state before it.
+        """Continue with the next piece, which rows connect to the previous state.
 
-        **Arguments:** the blocks of the next piece; derivatives of the rows by the
-        state before and by the state of the next piece; the three parts of the rows.
+        **Arguments:** the blocks of the next piece; derivatives of the rows with
+        respect to the previous state and to the state of the next piece; the three
+        parts of the rows.
         """
         direct, off, pushed = rows
         self._add(direct, pushed, off, 1.0)
@@ -45,13 +46,13 @@ class StateElimination:
         self._blocks = [x - taken[0].T @ y for x, y in zip(here, taken)]
 
     def end(self) -> None:
-        """Eliminate the state of the last piece; nothing to do without a piece."""
+        """Eliminate the state of the last piece, if there is one."""
         if self._blocks:
             self._taken(self._blocks, np.zeros((len(self._blocks[0]), 0)))
 
     def _taken(self, blocks, coupling):
-        """Subtract what a state explains, and return its coupling and its rows, divided
-        by the square root of its information.
+        """Subtract the contribution of a state, and return its coupling and its rows,
+        divided by the square root of its information.
         """
         scale = 1 / np.sqrt(np.maximum(np.diag(blocks[0]), TINY))
         scaled = blocks[0] * np.outer(scale, scale)

@@ -1,4 +1,4 @@
-"""The problem of any system, as its setup states it."""
+"""The problem of any system, as defined by its setup."""
 
 import dataclasses
 from collections.abc import Mapping, Sequence
@@ -33,8 +33,8 @@ from ._question import (
 )
 
 
-# Slip speed as a share of the usual change of speed in a step; the impulse of dry
-# friction is then integrated accurately enough
+# Slip speed as a share of the usual change of speed per step, so that the impulse of
+# dry friction is integrated accurately enough
 _RESOLVED = 0.3
 
 
@@ -45,7 +45,7 @@ def setup_question(
     report: Report,
     policy: Policy,
 ) -> Question:
-    """Return the problem of a rig with any system, which states its sensors and
+    """Return the problem of a rig with any system; the setup contains sensors and
     tolerances.
 
     **Raises:** `RecordingError` for recordings that cannot be those of the rig.
@@ -99,7 +99,7 @@ def system_question(
         if not isinstance(part, Segments):
             raise ValueError(
                 "Segment the recordings first: call "
-                "`jaxcam.recordings.segment(recording, channel)` for each of them."
+                "`jaxcam.recordings.segment(recording, channel)` for each one."
             )
     runs = [part.recording for part in recordings]
     sensors, noisier = with_seen_noise(sensors, runs, policy)

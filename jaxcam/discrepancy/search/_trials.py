@@ -22,8 +22,8 @@ from ._vibration_scan import Periodogram, periodogram
 
 @dataclasses.dataclass(frozen=True)
 class Trial:
-    """A fitted subset of terms; `cut` if only the number of iterations ended the
-    fit.
+    """A fitted subset of terms; `cut` if the fit ended only because of the limit on
+    iterations.
     """
 
     names: frozenset[str]
@@ -84,8 +84,8 @@ class Trials:
         return len(self.parameters(names)) - len(self.rig)
 
     def threshold(self, name: str) -> float:
-        """Return the required gain of a term: the larger of those by BIC and by error
-        rate.
+        """Return the required gain of a term: the larger of those from the BIC and from
+        the error rate.
         """
         term = self.term(name)
         number, chance = self.count([name]), self.policy.false_alarms / len(self.terms)
@@ -167,7 +167,7 @@ class Trials:
         if self._sound(found) or self.hopeless(found.cost):
             return found
         if astray and grown and found.cost < start.fit.cost:
-            # restarting from nominal won
+            # restarting from nominal gave the better fit
             return found
         again = self._fit(free, second, iterations, found.cost, decides)
         return min(found, again, key=_cost)
@@ -194,13 +194,13 @@ class Trials:
     def settled(self, trial: Trial) -> bool:
         """Return whether the quadratic model about a fit is valid.
 
-        It is valid at an optimum, and elsewhere near the data.
+        It is valid at an optimum, and also elsewhere if the fit is near the data.
         """
         close = trial.fit.cost < self.policy.near * self.problem.samples
         return trial.fit.optimal or close
 
     def without(self, best: Trial, name: str) -> Trial:
-        """Return the fit of a subset with one term less."""
+        """Return the fit of a subset with one term fewer."""
         rest = best.names - {name}
         known = self.known.get(rest) or self.attempt(rest, best, self.policy.iterations)
         assert known is not None
@@ -245,7 +245,7 @@ class Trials:
         return self._scans[names]
 
     def placed(self, names: frozenset[str], term: Term) -> Placing:
-        """Return the start at which a term would gain most in addition to a fit."""
+        """Return the start at which adding a term to a fit would gain most."""
         key = names, term.name
         if key not in self._placed:
             self.progress(f"searching for the position of {term.sentence}", None)
@@ -279,9 +279,7 @@ class Trials:
         return True
 
     def _seeded(self, names: frozenset[str], start: Trial, place: Point) -> Point:
-        """Return a starting point; terms that the other fit lacks have zero
-        strength.
-        """
+        """Return a starting point; terms not in the other fit have zero strength."""
         values = np.array(place.values)
         everything = self.problem.names
         for term in self.terms:

@@ -1,9 +1,9 @@
 """Scan frequencies for a vibration: predict the gain of a force at each.
 
 A vibration too weak to be visible in the samples of a flight still affects the approach
-speed, and so the impact and the next flight. The scan therefore uses the complete
-likelihood, including impacts, with the states and the free parameters eliminated. This
-is the predicted gain of a fit with that frequency.
+speed, and thus the impact and the next flight. The scan therefore uses the complete
+likelihood, including impacts, with the states and the free parameters eliminated. The
+result is the predicted gain of a fit with that frequency.
 """
 
 import dataclasses
@@ -55,7 +55,7 @@ class Periodogram:
 
 
 def periodogram(problem: Problem, response: Response, policy: Policy) -> Periodogram:
-    """Scan all frequencies that the flights can show.
+    """Scan all frequencies that the flights can resolve.
 
     **Arguments:** the problem, and its `Response` about a fit.
     """

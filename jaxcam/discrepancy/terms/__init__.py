@@ -1,4 +1,4 @@
-"""Physics that a model may lack, and systems that have it.
+"""Physics that a model may lack, and systems that include it.
 
 A `Term` has a strength; a `Shape` is a free function that shows where something is
 missing and how it varies.

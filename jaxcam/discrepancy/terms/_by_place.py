@@ -1,4 +1,4 @@
-"""Friction with its own scale of speed or position."""
+"""Friction with its own speed or position scale."""
 
 from typing import ClassVar
 
@@ -9,7 +9,7 @@ from ._scaled import ScaledTerm
 from ._term import Motion, strength
 
 
-# Stribeck speeds that are tried, as shares of the highest speed
+# Stribeck speeds to try, as shares of the highest speed
 _SHARES = tuple(np.geomspace(0.02, 0.6, 9).tolist())
 
 
@@ -52,7 +52,7 @@ class UnevenFriction(ScaledTerm):
 
     name: ClassVar[str] = "uneven_friction"
     sentence: ClassVar[str] = "dry friction that varies with position"
-    region: ClassVar[str] = "in flight, by position"
+    region: ClassVar[str] = "in flight, as a function of position"
     source: ClassVar[str] = "Armstrong-Helouvry 1991, chapter 4"
     corner: ClassVar[bool] = True
     u1: float = strength("[q]/s^2", 0.1)

@@ -1,4 +1,4 @@
-"""Determine which components of a state are coordinates and which are velocities."""
+"""Determine which state components are coordinates and which are velocities."""
 
 import jax
 import jax.numpy as jnp
@@ -8,8 +8,7 @@ from jaxtyping import Float
 from ...hybrid import HybridSystem
 
 
-# Number of points at which the field is evaluated, drawn at random near a recorded
-# state
+# Number of random points near a recorded state at which the field is evaluated
 _LOOKS = 3
 
 

@@ -1,4 +1,4 @@
-"""Families of free functions, by their arguments and by the place where they act."""
+"""Families of free functions, defined by their arguments and where they act."""
 
 import dataclasses
 import enum
@@ -20,7 +20,7 @@ from ._shapes import Variable
 from ._where import Where
 
 
-# The domain of the sines exceeds that of the data by this share on either side, because
+# The domain of the sines extends beyond the data by this share at either end, because
 # all sines vanish at its ends
 _MARGIN = 0.15
 
@@ -92,7 +92,7 @@ class Family:
         if self.periodic:
             return OF_PHASE
         if self.where is Where.SENSOR and self.argument is not Variable.TIME:
-            # a gain or a lag has a name
+            # a gain or a lag is a named term
             return tuple(one for one in ON_A_LINE if one is not STRAIGHT)
         if self.argument in (Variable.TIME, Variable.APPROACH):
             return (*ON_A_LINE, *FROM_ZERO)

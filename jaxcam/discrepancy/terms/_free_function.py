@@ -3,7 +3,7 @@
 A function is a sum of sines whose coefficients have the variances of a Gaussian process
 with a Matern kernel (Solin and Sarkka, Statistics and Computing 2020, eq. 55-59), or of
 harmonics of the drive's phase with the same spectrum. It is therefore linear in the
-fitted coefficients, and its smoothness is one number.
+fitted coefficients, and a single number describes its smoothness.
 """
 
 from typing import Any, ClassVar
@@ -27,7 +27,7 @@ _KNOTS = 332
 # The spline continues beyond either end by this share of the range
 _BEYOND = 0.15
 _ARGUMENTS = (Variable.POSITION, Variable.VELOCITY, Variable.PHASE, Variable.TIME)
-"""Arguments, in the order of the weights that select one of them."""
+"""Arguments, in the order of the weights that select them."""
 _FACTORS = (Factor.ONE, Factor.VELOCITY, Factor.DIRECTION, Factor.DEFLECTION)
 
 
@@ -116,7 +116,8 @@ class FreeFunction(Term):
         coefficients,
         primitive: Primitive | None = None,
     ):
-        """Return a member of a family, from the coefficients of its sines and its jump.
+        """Return a member of a family with given coefficients of its sines and its
+        jump.
 
         With a `primitive`, the first of them are its parameters.
         """

@@ -25,10 +25,10 @@ def _field(default: float = 0.0):
 class HiddenElement(eqx.Module):
     """A hidden state and the force that it exerts, per unit of mass.
 
-    In addition the force has a constant part, a part proportional to the deflection of
-    the coordinate from `middle`, and a part proportional to its velocity: `constant`,
-    `stiffness`, `damping`. A transfer function needs them if a resonance alone does not
-    represent it.
+    In addition, the force has a `constant` part, a part proportional to the deflection
+    of the coordinate from `middle` (`stiffness`), and a part proportional to its
+    velocity (`damping`). They are needed if a resonance alone does not represent the
+    transfer function.
     """
 
     names: ClassVar[tuple[str, ...]]
@@ -78,7 +78,7 @@ class HiddenElement(eqx.Module):
 
 
 class Resonator(HiddenElement):
-    """A resonance that the position drives, `z'' + 2 D w z' + w^2 z = q`.
+    """A resonance driven by the position, `z'' + 2 D w z' + w^2 z = q`.
 
     The force is `by_state * z + by_rate * z'`, with `w = 2 pi frequency` and the
     damping ratio D.
@@ -120,9 +120,7 @@ class Resonator(HiddenElement):
         return self.by_state * hidden[0] + self.by_rate * hidden[1]
 
     def transfer(self, frequency):
-        """Return the ratio of force and deflection at some frequencies (Hz),
-        complex.
-        """
+        """Return the complex ratio of force to deflection at given frequencies (Hz)."""
         s = 2j * jnp.pi * frequency
         w = 2 * jnp.pi * self.frequency
         below = s**2 + 2 * self.ratio * w * s + w**2
@@ -164,7 +162,7 @@ class Relaxation(HiddenElement):
 
 
 class Hysteresis(HiddenElement):
-    """Hysteresis of Bouc and Wen, `z' = v (1 - (d sign(v z) + 1 - d) |z / limit|^n)`.
+    """Bouc-Wen hysteresis, `z' = v (1 - (d sign(v z) + 1 - d) |z / limit|^n)`.
 
     The force is `by_state * z`; `sharing` is d, `power` n.
     """

@@ -1,4 +1,4 @@
-"""A force with an internal state, as signals of time in each recording.
+"""A force with an internal state, represented by time signals in each recording.
 
 The measured position drives a hidden element through a known filter, so that its force
 is a sum of known signals. The fit determines their strengths; the parameters of the
@@ -21,7 +21,7 @@ from ._term import Motion, Term, terms_of
 SHARED = 5
 # signals of the free motion of the element, with separate strengths in each recording
 STARTS = 2
-# direct parts of the force: constant, by deflection, by velocity
+# direct parts of the force: constant, proportional to deflection and to velocity
 DIRECT = 3
 
 
@@ -30,7 +30,7 @@ def _numbers(values) -> tuple[Array, ...]:
 
 
 class ByMotion(Term):
-    """A constant force, a stiffness about some position and a damping."""
+    """A constant force, a stiffness about a given position, and damping."""
 
     name: ClassVar[str] = "by_motion"
     sentence: ClassVar[str] = "a force that is linear in the motion"
@@ -60,9 +60,9 @@ class ByMotion(Term):
 class HiddenForce(Term):
     """A force that is a sum of signals, which differ from recording to recording.
 
-    **Arguments:** strengths `shared`, `starts` and `direct`; the number of the
-    `record`; a `table` of the signals `(r, n, SHARED + STARTS)` at the times `begin + k
-    interval` of each recording; the `middle` of the positions.
+    **Arguments:** strengths `shared`, `starts` and `direct`; the index of the `record`;
+    a `table` of the signals `(r, n, SHARED + STARTS)` at the times `begin + k interval`
+    of each recording; the `middle` of the positions.
     """
 
     name: ClassVar[str] = "hidden_force"

@@ -34,12 +34,12 @@ from ._with_terms import WithTerms
 
 
 def _reference(default: float):
-    """A constant of a form: it is not fitted, and files of earlier versions omit it."""
+    """A constant of a form, which is not fitted; files of earlier versions omit it."""
     return eqx.field(default=default, static=True, metadata={"spare": True})
 
 
-# Share of dry friction up to which a push is balanced exactly; width over which the
-# balance then fades; a push far beyond both
+# Share of dry friction up to which an applied force is balanced exactly; width over
+# which the balance then fades; a force far beyond both
 _HELD, _FADE, _MANY = 0.99, 0.5, 1e3
 
 
@@ -57,11 +57,12 @@ class ViscousDamping(Term):
 
 
 class CoulombFriction(Term):
-    """Dry friction, `-fc sign(v)`, which holds a body that is pushed by less than `fc`.
+    """Dry friction, `-fc sign(v)`, which holds a body at rest under a force below `fc`.
 
-    The sign is `tanh(v / slip)`, so that it can be integrated; `slip` (rad/s) is far
+    The sign is smoothed to `tanh(v / slip)` for the integration; `slip` (rad/s) is far
     below the speeds that determine the friction. While friction holds the body, the
-    `tanh` is shifted so that it balances the push at rest, and the body does not creep.
+    `tanh` is shifted so that it balances the applied force at rest, and the body does
+    not creep.
     """
 
     name: ClassVar[str] = "coulomb_friction"
@@ -77,14 +78,14 @@ class CoulombFriction(Term):
     def acceleration(self, motion: Motion):
         share = _share_of(motion.pushed, self.fc)
         size = jnp.abs(share)
-        # a body pushed by more than its friction reverses smoothly
+        # a body under a force above its friction reverses smoothly
         held = jnp.where(size < 1, size, jnp.clip((1 + _FADE - size) / _FADE, 0.0, 1.0))
         balance = jnp.sign(share) * jnp.arctanh(jnp.minimum(held, _HELD))
         return -self.fc * jnp.tanh(motion.velocity / self.slip + balance)
 
 
 def _share_of(push, friction):
-    """Return a push in units of the friction; a large number if there is no
+    """Return the applied force in units of the friction; a large number without
     friction.
     """
     some = friction > 0
@@ -92,7 +93,7 @@ def _share_of(push, friction):
 
 
 class QuadraticDrag(Term):
-    """Drag of a turbulent fluid, `-c2 |v| v`."""
+    """Turbulent drag, `-c2 |v| v`."""
 
     name: ClassVar[str] = "quadratic_drag"
     sentence: ClassVar[str] = "quadratic drag, as from moving air or oil"
@@ -108,7 +109,7 @@ class NonlinearSpring(Term):
     """A spring that hardens (or softens) away from its centre, `-k3 (q - q0)^3`."""
 
     name: ClassVar[str] = "nonlinear_spring"
-    sentence: ClassVar[str] = "a cubic part of the spring force"
+    sentence: ClassVar[str] = "a cubic component of the spring force"
     region: ClassVar[str] = "in flight, at large deflections"
     source: ClassVar[str] = "Duffing 1918; Kovacic and Brennan 2011, chapter 2"
     k3: float = strength("1/(s^2 [q]^2)", 100.0)
@@ -122,9 +123,11 @@ class RestitutionVelocity(Term):
     """Restitution that falls with the approach speed, `r0 (1 + v / reference)^-rb`."""
 
     name: ClassVar[str] = "restitution_velocity"
-    sentence: ClassVar[str] = "a restitution that depends on the approach speed"
+    sentence: ClassVar[str] = (
+        "a coefficient of restitution that depends on the approach speed"
+    )
     where: ClassVar[str] = Where.IMPACT
-    region: ClassVar[str] = "at impacts, by approach speed"
+    region: ClassVar[str] = "at impacts, as a function of approach speed"
     source: ClassVar[str] = "Goldsmith, Impact, 1960, chapter 8; Johnson 1985, 11.5"
     rb: float = strength("-", 0.02, lower=0.0)
     reference: float = _reference(References.impact_speed)
@@ -135,12 +138,12 @@ class RestitutionVelocity(Term):
 
 
 class CamProfileError(Term):
-    """A cam that is out of round, by `run cos(2 phi + lead)`."""
+    """A cam that is out of round by `run cos(2 phi + lead)`."""
 
     name: ClassVar[str] = "cam_profile_error"
     sentence: ClassVar[str] = "an error of the surface, twice per turn"
     where: ClassVar[str] = Where.CONTACT
-    region: ClassVar[str] = "at impacts and in contact, by drive angle"
+    region: ClassVar[str] = "at impacts and in contact, as a function of drive angle"
     source: ClassVar[str] = "Norton, Cam Design and Manufacturing Handbook, chapter 12"
     run: float = strength("[q]", 1e-4)
     lead: float = _reference(References.profile_lead)
@@ -152,7 +155,8 @@ class CamProfileError(Term):
 class ExternalVibration(Term):
     """A foundation that shakes, `ext sin(2 pi fe t + phase)`.
 
-    The amplitudes of sine and cosine are fitted, in which it is linear.
+    The fitted parameters are the amplitudes of sine and cosine, in which the term is
+    linear.
     """
 
     name: ClassVar[str] = "external_vibration"
@@ -183,14 +187,14 @@ class ExternalVibration(Term):
 class DriveRipple(Term):
     """A drive whose speed varies with its own angle, `w (1 + eps cos(phi - psi))`.
 
-    It is found in the channel of the drive itself; the motion is computed from that
-    channel in any case.
+    The ripple is found in the channel of the drive itself; the motion is computed from
+    that channel in any case.
     """
 
     name: ClassVar[str] = "drive_ripple"
     sentence: ClassVar[str] = "a ripple of the drive speed, once per turn"
     where: ClassVar[str] = Where.DRIVE
-    region: ClassVar[str] = "in the drive angle, by drive angle"
+    region: ClassVar[str] = "in the drive angle itself"
     source: ClassVar[str] = "Norton, Cam Design and Manufacturing Handbook, chapter 10"
 
 
@@ -235,7 +239,7 @@ class GravityImbalance(Term):
 
     name: ClassVar[str] = "gravity_imbalance"
     sentence: ClassVar[str] = "the weight of an unbalanced arm"
-    region: ClassVar[str] = "in flight, by position"
+    region: ClassVar[str] = "in flight, as a function of position"
     source: ClassVar[str] = "Meriam and Kraige, Dynamics, chapter 6"
     listed: ClassVar[bool] = False
     imbalance: float = strength("[q]/s^2", 0.1)
@@ -245,12 +249,14 @@ class GravityImbalance(Term):
 
 
 class SpeedDependentBounce(Term):
-    """Restitution that varies with the speed of the drive, by `br` per rad/s."""
+    """A coefficient of restitution that changes by `br` per rad/s of drive speed."""
 
     name: ClassVar[str] = "restitution_drive_speed"
-    sentence: ClassVar[str] = "a restitution that depends on the drive speed"
+    sentence: ClassVar[str] = (
+        "a coefficient of restitution that depends on the drive speed"
+    )
     where: ClassVar[str] = Where.IMPACT
-    region: ClassVar[str] = "at impacts, by drive speed"
+    region: ClassVar[str] = "at impacts, as a function of drive speed"
     source: ClassVar[str] = "Chong 2016, section 4.6.1 (Figure 4.15)"
     listed: ClassVar[bool] = False
     br: float = strength("s/rad", 1e-3)
@@ -285,16 +291,17 @@ def library(
     """Return all terms that `diagnose` tries by default.
 
     Args:
-        turned: Whether the system has a drive; without one there are no profile errors.
+        turned: Whether the system has a drive; without one, there are no profile
+            errors.
         references: Constants of the forms, which belong to a rig (`rig.references`),
-            such as the centre of a nonlinear spring or the speed at which a restitution
-            is stated.
-        clocked: Whether any event has a known time, as with a drive (the default) or a
-            measured input. Otherwise a lag is only a shift of the time origin.
+            such as the centre of a nonlinear spring or the reference speed of a
+            restitution law.
+        clocked: Whether times are known absolutely, from a drive (the default) or a
+            measured input. Otherwise, a sensor lag is only a shift of the time origin.
         extended: Whether to add terms that most rigs already have as parameters, or
             that take longer to search: position-dependent forces with an edge, friction
             that depends on direction, speed or position, and a power law of
-            restitution. Their constants come from the recordings.
+            restitution. The constants of these terms come from the recordings.
 
     Returns:
         A tuple of [`jaxcam.discrepancy.Term`][].

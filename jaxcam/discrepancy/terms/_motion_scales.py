@@ -1,4 +1,4 @@
-"""Scales of the motion in the recordings, from which terms take theirs."""
+"""Scales of the recorded motion, used to scale the terms."""
 
 from typing import NamedTuple
 

@@ -12,9 +12,9 @@ _SOURCE = "Armstrong-Helouvry 1991, Control of Machines with Friction"
 
 
 class DampingForwards(ScaledTerm):
-    """Viscous damping of motion in the positive direction only, `-cf max(v, 0)`.
+    """Viscous damping for motion in the positive direction only, `-cf max(v, 0)`.
 
-    In addition to damping in both directions, it is the excess in this direction.
+    If there is also damping in both directions, this is the excess in this direction.
     """
 
     name: ClassVar[str] = "damping_forwards"
@@ -31,7 +31,7 @@ class DampingForwards(ScaledTerm):
 
 
 class DampingBackwards(ScaledTerm):
-    """Viscous damping of motion in the negative direction only, `cb max(-v, 0)`."""
+    """Viscous damping for motion in the negative direction only, `cb max(-v, 0)`."""
 
     name: ClassVar[str] = "damping_backwards"
     sentence: ClassVar[str] = "viscous damping that is larger at negative velocities"
@@ -47,7 +47,7 @@ class DampingBackwards(ScaledTerm):
 
 
 class FrictionForwards(ScaledTerm):
-    """Dry friction of motion in the positive direction only, `-ff` for `v > 0`."""
+    """Dry friction for motion in the positive direction only, `-ff` for `v > 0`."""
 
     name: ClassVar[str] = "friction_forwards"
     sentence: ClassVar[str] = "dry friction that is larger at positive velocities"
@@ -65,7 +65,7 @@ class FrictionForwards(ScaledTerm):
 
 
 class FrictionBackwards(ScaledTerm):
-    """Dry friction of motion in the negative direction only, `fb` for `v < 0`."""
+    """Dry friction for motion in the negative direction only, `fb` for `v < 0`."""
 
     name: ClassVar[str] = "friction_backwards"
     sentence: ClassVar[str] = "dry friction that is larger at negative velocities"

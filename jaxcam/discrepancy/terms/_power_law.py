@@ -1,4 +1,4 @@
-"""A restitution that is a power of the approach speed."""
+"""A coefficient of restitution that is a power of the approach speed."""
 
 from typing import ClassVar
 
@@ -14,16 +14,18 @@ _SLOWEST = 1e-3
 
 
 class RestitutionPower(ScaledTerm):
-    """Restitution as a power of the approach speed, `r0 (v / v0)^-rp`.
+    """Coefficient of restitution as a power of the approach speed, `r0 (v/v0)^-rp`.
 
-    It decreases with the speed for a positive `rp`, as in plastic impacts, and
-    increases for a negative one; `v0` is the highest usual speed of the recordings.
+    It decreases with speed for a positive `rp`, as in plastic impacts, and increases
+    for a negative one; `v0` is a speed rarely exceeded in the recordings.
     """
 
     name: ClassVar[str] = "restitution_power"
-    sentence: ClassVar[str] = "a restitution that is a power of the approach speed"
+    sentence: ClassVar[str] = (
+        "a coefficient of restitution that is a power of the approach speed"
+    )
     where: ClassVar[str] = Where.IMPACT
-    region: ClassVar[str] = "at impacts, by approach speed"
+    region: ClassVar[str] = "at impacts, as a function of approach speed"
     source: ClassVar[str] = "Johnson, Contact Mechanics, 1985, section 11.5"
     rp: float = strength("-", 0.05)
 

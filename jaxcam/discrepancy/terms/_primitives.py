@@ -1,7 +1,7 @@
 """Parametric forms that may replace a free function.
 
-A form is a function of `u`, the argument as a share of the range visited, or of a
-phase; its first parameter is its size. Edges are smoothed over a hundredth of the
+A form is a function of a phase, or of `u`, the argument as a share of the range
+visited; its first parameter is its size. Edges are smoothed over a hundredth of the
 range, so that a fit can move them.
 """
 

@@ -1,4 +1,4 @@
-"""Terms whose constants are scaled from the recorded motion."""
+"""Terms whose constants are derived from the recorded motion."""
 
 import dataclasses
 from typing import ClassVar
@@ -10,7 +10,7 @@ from ._term import Strength, Term
 
 
 class ScaledTerm(Term):
-    """A term whose constants come from the recordings: ranges, speeds, accelerations.
+    """A term whose constants (ranges, speeds, accelerations) come from the recordings.
 
     Subclasses give the size of each strength in `_sizes`, and the bounds of each inner
     parameter in `_ends`.
@@ -50,7 +50,7 @@ class ScaledTerm(Term):
         )
 
     def _declared(self) -> tuple[Strength, ...]:
-        """Return the strengths as their fields state them."""
+        """Return the strengths as declared by their fields."""
         return super().strengths()
 
     def _sizes(self) -> dict[str, float]:

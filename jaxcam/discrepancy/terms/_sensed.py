@@ -10,7 +10,7 @@ from ._with_terms import drive_at
 
 
 def watched(model: Model) -> Model:
-    """Return the model with a sensor whose reading includes the sensor errors of its
+    """Return the model with a sensor whose reading includes the sensor errors among its
     terms.
     """
     if not any(Where.SENSOR in term.acts for term in terms_of(model)):
@@ -34,7 +34,7 @@ _FAULTS = ("gain", "offset", "lag")
 
 
 def more_faults(model: Model, parameters: Sequence[Parameter]) -> list[Parameter]:
-    """Return gain, offset and lag of that sensor as parameters, unless they already
+    """Return the gain, offset and lag of that sensor as parameters, unless they already
     are.
     """
     known = set(own_faults(model, parameters))

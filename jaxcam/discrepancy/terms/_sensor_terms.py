@@ -6,7 +6,7 @@ from ._term import SensorTerm, strength
 
 
 class SensorLag(SensorTerm):
-    """A delay of a channel of the motion."""
+    """A delay in a channel of the motion."""
 
     name: ClassVar[str] = "sensor_lag"
     sentence: ClassVar[str] = "a lag of the sensor"
@@ -29,10 +29,10 @@ class SensorGain(SensorTerm):
 
 
 class SensorOffset(SensorTerm):
-    """A wrong zero of the sensor."""
+    """A zero offset of the sensor."""
 
     name: ClassVar[str] = "sensor_offset"
-    sentence: ClassVar[str] = "a wrong zero of the sensor"
+    sentence: ClassVar[str] = "a zero offset of the sensor"
     region: ClassVar[str] = "in the measured motion, everywhere"
     source: ClassVar[str] = "Doebelin, Measurement Systems, chapter 3"
     listed: ClassVar[bool] = False

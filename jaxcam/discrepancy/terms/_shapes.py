@@ -1,7 +1,7 @@
 """Forces, restitutions and surfaces as free functions of one variable.
 
-A shape is not a verdict. If no named term explains the residual, a shape shows where it
-is and how it varies.
+A shape is not a verdict. If no named term explains the residual, a shape shows where
+the residual occurs and how it varies.
 """
 
 import abc
@@ -85,7 +85,7 @@ class Shape(Term):
 
 
 class Polynomial(Shape):
-    """Return Chebyshev polynomials between two ends; `first` is the lowest degree."""
+    """Chebyshev polynomials between two ends; `first` is the lowest degree."""
 
     low: Array = eqx.field(converter=_number)
     high: Array = eqx.field(converter=_number)
@@ -94,7 +94,7 @@ class Polynomial(Shape):
     def basis(self, quantity) -> Array:
         middle, half = (self.high + self.low) / 2, (self.high - self.low) / 2
         x = jnp.clip((quantity - middle) / half, -_END, _END)
-        # all at once: a recurrence would be compiled degree by degree
+        # all at once, because a recurrence would be compiled degree by degree
         last = self.first + len(self.coefficients)
         degrees = jnp.arange(self.first, last, dtype=float)
         return jnp.cos(degrees * jnp.arccos(x))
@@ -105,9 +105,7 @@ class Polynomial(Shape):
 
 
 class Harmonics(Shape):
-    """Return cosines, then sines, of multiples of the phase; `first` is the lowest
-    order.
-    """
+    """Cosines, then sines, of multiples of the phase; `first` is the lowest order."""
 
     first: int = eqx.field(default=1, static=True)
 
@@ -125,7 +123,7 @@ class Harmonics(Shape):
 class ForceOfAngle(Polynomial):
     name: ClassVar[str] = "force_of_angle"
     sentence: ClassVar[str] = "a force that depends on the position"
-    region: ClassVar[str] = "in flight, by position"
+    region: ClassVar[str] = "in flight, as a function of position"
     variable: ClassVar[Variable] = Variable.POSITION
     count: ClassVar[int] = 6
 
@@ -136,7 +134,7 @@ class ForceOfAngle(Polynomial):
 class ForceOfVelocity(Polynomial):
     name: ClassVar[str] = "force_of_velocity"
     sentence: ClassVar[str] = "a force that depends on the velocity"
-    region: ClassVar[str] = "in flight, by velocity"
+    region: ClassVar[str] = "in flight, as a function of velocity"
     variable: ClassVar[Variable] = Variable.VELOCITY
     count: ClassVar[int] = 6
 
@@ -147,7 +145,7 @@ class ForceOfVelocity(Polynomial):
 class ForceOfTime(Polynomial):
     name: ClassVar[str] = "force_of_time"
     sentence: ClassVar[str] = "a force that varies during a recording"
-    region: ClassVar[str] = "in flight, by time in the recording"
+    region: ClassVar[str] = "in flight, as a function of time"
     variable: ClassVar[Variable] = Variable.TIME
     count: ClassVar[int] = 5
 
@@ -158,7 +156,9 @@ class ForceOfTime(Polynomial):
 class FrictionOfAngle(Polynomial):
     name: ClassVar[str] = "friction_of_angle"
     sentence: ClassVar[str] = "friction that depends on the position"
-    region: ClassVar[str] = "in flight, by position and direction of motion"
+    region: ClassVar[str] = (
+        "in flight, as a function of position and direction of motion"
+    )
     quantity: ClassVar[str] = "friction"
     variable: ClassVar[Variable] = Variable.POSITION
     count: ClassVar[int] = 3
@@ -172,7 +172,7 @@ class FrictionOfAngle(Polynomial):
 class ForceOfPhase(Harmonics):
     name: ClassVar[str] = "force_of_phase"
     sentence: ClassVar[str] = "a force that depends on the drive phase"
-    region: ClassVar[str] = "in flight, by drive phase"
+    region: ClassVar[str] = "in flight, as a function of drive phase"
     variable: ClassVar[Variable] = Variable.PHASE
     count: ClassVar[int] = 8
 
@@ -184,7 +184,7 @@ class SurfaceOfPhase(Harmonics):
     name: ClassVar[str] = "surface_of_phase"
     sentence: ClassVar[str] = "a surface that deviates from that of the model"
     where: ClassVar[str] = Where.CONTACT
-    region: ClassVar[str] = "at impacts and in contact, by drive phase"
+    region: ClassVar[str] = "at impacts and in contact, as a function of drive phase"
     quantity: ClassVar[str] = "surface"
     variable: ClassVar[Variable] = Variable.PHASE
     count: ClassVar[int] = 8
@@ -197,9 +197,11 @@ class SurfaceOfPhase(Harmonics):
 
 class BounceOfSpeed(Polynomial):
     name: ClassVar[str] = "bounce_of_speed"
-    sentence: ClassVar[str] = "a restitution that depends on the approach speed"
+    sentence: ClassVar[str] = (
+        "a coefficient of restitution that depends on the approach speed"
+    )
     where: ClassVar[str] = Where.IMPACT
-    region: ClassVar[str] = "at impacts, by approach speed"
+    region: ClassVar[str] = "at impacts, as a function of approach speed"
     quantity: ClassVar[str] = "bounce"
     variable: ClassVar[Variable] = Variable.APPROACH
     count: ClassVar[int] = 4
@@ -212,9 +214,11 @@ class BounceOfSpeed(Polynomial):
 
 class BounceOfTime(Polynomial):
     name: ClassVar[str] = "bounce_of_time"
-    sentence: ClassVar[str] = "a restitution that varies during a recording"
+    sentence: ClassVar[str] = (
+        "a coefficient of restitution that varies during a recording"
+    )
     where: ClassVar[str] = Where.IMPACT
-    region: ClassVar[str] = "at impacts, by time in the recording"
+    region: ClassVar[str] = "at impacts, as a function of time"
     quantity: ClassVar[str] = "bounce"
     variable: ClassVar[Variable] = Variable.TIME
     count: ClassVar[int] = 3
@@ -228,9 +232,11 @@ class BounceOfTime(Polynomial):
 
 class BounceOfPhase(Harmonics):
     name: ClassVar[str] = "bounce_of_phase"
-    sentence: ClassVar[str] = "a restitution that depends on the drive phase"
+    sentence: ClassVar[str] = (
+        "a coefficient of restitution that depends on the drive phase"
+    )
     where: ClassVar[str] = Where.IMPACT
-    region: ClassVar[str] = "at impacts, by drive phase"
+    region: ClassVar[str] = "at impacts, as a function of drive phase"
     quantity: ClassVar[str] = "bounce"
     variable: ClassVar[Variable] = Variable.PHASE
     count: ClassVar[int] = 4
@@ -246,7 +252,7 @@ class SensorOfPosition(Polynomial):
     name: ClassVar[str] = "sensor_of_position"
     sentence: ClassVar[str] = "a sensor error that depends on the position"
     where: ClassVar[str] = Where.SENSOR
-    region: ClassVar[str] = "in the measured motion, by position"
+    region: ClassVar[str] = "in the measured motion, as a function of position"
     quantity: ClassVar[str] = "sensor"
     variable: ClassVar[Variable] = Variable.POSITION
     count: ClassVar[int] = 5
@@ -261,7 +267,7 @@ class SensorOfTime(Polynomial):
     name: ClassVar[str] = "sensor_of_time"
     sentence: ClassVar[str] = "a sensor error that drifts during a recording"
     where: ClassVar[str] = Where.SENSOR
-    region: ClassVar[str] = "in the measured motion, by time in the recording"
+    region: ClassVar[str] = "in the measured motion, as a function of time"
     quantity: ClassVar[str] = "sensor"
     variable: ClassVar[Variable] = Variable.TIME
     count: ClassVar[int] = 4
@@ -276,7 +282,7 @@ class SensorOfPhase(Harmonics):
     name: ClassVar[str] = "sensor_of_phase"
     sentence: ClassVar[str] = "a sensor error that depends on the drive phase"
     where: ClassVar[str] = Where.SENSOR
-    region: ClassVar[str] = "in the measured motion, by drive phase"
+    region: ClassVar[str] = "in the measured motion, as a function of drive phase"
     quantity: ClassVar[str] = "sensor"
     variable: ClassVar[Variable] = Variable.PHASE
     count: ClassVar[int] = 6
@@ -299,7 +305,7 @@ def shapes(
 
     **Arguments:** smallest and largest position, velocity and approach speed, the
     duration of the recordings (s), whether there is a drive with a phase, and the
-    constants of forms.
+    constants of the terms.
     """
 
     def zeros(kind: type[Shape]) -> list[float]:
@@ -313,7 +319,7 @@ def shapes(
         FrictionOfAngle(zeros(FrictionOfAngle), *positions, first=0, slip=slip),
         BounceOfSpeed(zeros(BounceOfSpeed), *approach),
         BounceOfTime(zeros(BounceOfTime), 0.0, duration),
-        # a constant is an offset, a part proportional to the position is a gain
+        # a constant is an offset; a part proportional to the position is a gain error
         SensorOfPosition(zeros(SensorOfPosition), *positions, first=2),
         SensorOfTime(zeros(SensorOfTime), 0.0, duration),
     ]

@@ -1,5 +1,5 @@
-"""Forces that depend on position: constant, linear, with a knee, and one-sided
-stops.
+"""Forces that depend on position: constant, linear, with a knee, or from a one-sided
+stop.
 """
 
 from typing import ClassVar
@@ -11,14 +11,14 @@ from ._scaled import ScaledTerm
 from ._term import Motion, strength
 
 
-# Positions of a knee or an edge that are tried, as shares of the range visited
+# Positions of a knee or an edge to try, as shares of the range visited
 _SHARES = tuple(np.linspace(0.02, 0.98, 33).tolist())
-# Depth over which the dry friction of a stop sets in, in halves of the range
+# Depth over which the dry friction of a stop sets in, as a share of half the range
 _BEGINS = 0.02
 
 
 class ConstantForce(ScaledTerm):
-    """A constant force such as weight, `f0`."""
+    """A constant force, such as weight: `f0`."""
 
     name: ClassVar[str] = "constant_force"
     sentence: ClassVar[str] = "a constant force"
@@ -37,7 +37,7 @@ class LinearSpring(ScaledTerm):
 
     name: ClassVar[str] = "linear_spring"
     sentence: ClassVar[str] = "a force proportional to the deflection"
-    region: ClassVar[str] = "in flight, by position"
+    region: ClassVar[str] = "in flight, as a function of position"
     source: ClassVar[str] = "Hooke 1678"
     k1: float = strength("1/s^2", 1.0, lower=0.0)
 

@@ -52,7 +52,7 @@ MOTION = "[q]"
 """Placeholder in units for the unit of the coordinate on which a term acts."""
 
 
-# files that do not state where a term acts have the default
+# files that do not specify where a term acts have the default
 _SPARE = {"spare": True}
 
 
@@ -68,9 +68,9 @@ def strength(
     """Declare a fitted field of a term.
 
     Args:
-        unit: Unit for tables; `[q]` in it is replaced by the unit of the coordinate.
+        unit: Unit shown in tables; `[q]` is replaced by the unit of the coordinate.
         size: A significant change; it does not influence the result.
-        lower: Lower bound, for example for a sign that physics requires.
+        lower: Lower bound, for example for a sign required by physics.
         upper: Upper bound.
         default: Value of a new term.
         inner: Whether it has no effect while the strengths are zero, like an edge or a
@@ -102,7 +102,7 @@ def strength(
 
 @dataclasses.dataclass(frozen=True)
 class Strength:
-    """One fitted parameter of a term, as `strength` declares it."""
+    """One fitted parameter of a term, as declared by `strength`."""
 
     name: str
     """Name of the field."""
@@ -119,7 +119,7 @@ class Strength:
 
 
 class Term(eqx.Module):
-    """A physical effect that a model may lack. Subclass it, and declare strengths with
+    """A physical effect that a model may lack. Subclass this and declare strengths with
     `strength`.
 
     A term with zero strengths has no effect. It acts in flight, on the surface, at
@@ -177,8 +177,8 @@ class Term(eqx.Module):
         stated = vars(cls).get("acts", acts)
         if set(stated) != set(acts):
             raise TypeError(
-                f"{cls.__name__} states acts = {tuple(map(str, stated))} and overrides "
-                f"the methods for {tuple(map(str, acts))}; leave `acts` out."
+                f"{cls.__name__} declares acts = {tuple(map(str, stated))} but "
+                f"overrides the methods for {tuple(map(str, acts))}; leave `acts` out."
             )
         cls.acts = acts
         if acts and not any("where" in vars(one) for one in above):
@@ -197,7 +197,7 @@ class Term(eqx.Module):
         return 0.0
 
     def restitution(self, approach, motion: Motion):
-        """Return the factor on the restitution coefficient at an approach speed."""
+        """Return the factor on the coefficient of restitution at an approach speed."""
         del approach, motion
         return 1.0
 
@@ -212,16 +212,14 @@ class Term(eqx.Module):
         return self
 
     def starts(self) -> tuple[Mapping[str, float], ...]:
-        """Return values of its inner numbers from which a fit may start.
+        """Return values of the inner parameters from which a fit may start.
 
         There are none for a frequency, which a scan finds.
         """
         return ()
 
     def prepared(self) -> "Term":
-        """Return the term with all quantities precomputed that it needs at every
-        step.
-        """
+        """Return the term with precomputed quantities that it needs at every step."""
         return self
 
     def strengths(self) -> tuple[Strength, ...]:
@@ -239,7 +237,7 @@ class Term(eqx.Module):
         return tuple(getattr(self, one.name) for one in self.strengths())
 
     def written(self, unit: str) -> str:
-        """Return a unit with that of the coordinate inserted."""
+        """Return a unit with the unit of the coordinate inserted."""
         return unit.replace(MOTION, self.motion_unit)
 
     def reported(self, values: Mapping[str, Value]) -> dict[str, Value]:

@@ -4,7 +4,7 @@ import enum
 
 
 class Where(enum.StrEnum):
-    """The place at which something acts; equal to its name as a string."""
+    """The place where an effect acts; equal to its name as a string."""
 
     FLIGHT = "flight"
     IMPACT = "impact"

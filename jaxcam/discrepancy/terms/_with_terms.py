@@ -128,9 +128,9 @@ class WithTerms(HybridSystem):
                 motion = self.motion(t, state, term.coordinate, field)
                 factor = factor * term.restitution(jnp.abs(speed), motion)
             if len(self.coordinates) > 1:
-                # along the impulse, which is distributed among the bodies: the change
-                # of state by the law for unit normal velocity, divided by its change of
-                # normal velocity
+                # in the direction of the impulse, which is distributed among the
+                # bodies: the change of state according to the law for unit normal
+                # velocity, divided by its change of normal velocity
                 _, kept = jax.jvp(law, (seen,), (push,))
                 taken = push - kept
                 push = taken / self._along(t, state, number, taken)
@@ -151,7 +151,7 @@ class WithTerms(HybridSystem):
         size = sum(slope**2 for slope in slopes)
         push = jnp.zeros_like(state)
         for (_, place), slope in zip(self.coordinates, slopes):
-            # without motion of the gap there is no impact
+            # if the gap does not move, there is no impact
             push = push.at[place].set(slope / jnp.where(size > 0, size, 1.0))
         return speed, push
 
@@ -195,7 +195,9 @@ class WithTerms(HybridSystem):
 
 
 def drive_at(base, t):
-    """Return angle (rad) and speed (rad/s) of the drive; time if there is no drive."""
+    """Return the angle (rad) and speed (rad/s) of the drive; without a drive, time and
+    one.
+    """
     if hasattr(base, "speed") and hasattr(base, "phase"):
         return base.speed * t + base.phase, base.speed
     if base.period is not None:

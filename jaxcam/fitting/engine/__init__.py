@@ -1,4 +1,4 @@
-"""Combine recordings and a model into a problem with its normal equations."""
+"""Build fitting problems from recordings and a model, and form the normal equations."""
 
 from ._columns import (
     Columns as Columns,

@@ -1,4 +1,4 @@
-"""Locate the free numbers of a fit, with their priors and normal equations."""
+"""Locate the free values of a fit, with their priors and normal equations."""
 
 import dataclasses
 from collections.abc import Iterable
@@ -16,23 +16,25 @@ from ._sharpness import shared_width
 
 @dataclasses.dataclass(frozen=True)
 class Columns:
-    """The free numbers of a fit.
+    """The free values of a fit: one per free parameter, or one per parameter and
+    recording.
 
-    `local` `(r, m)`: which parameter each column of a recording's equations is; `place`
-    `(r, m)`: its index among the free numbers, -1 for padding.
+    `local` `(r, m)`: the parameter to which each column of a recording's equations
+    belongs; `place` `(r, m)`: its index among the free values, -1 for padding.
     """
 
     parameter: Int[np.ndarray, " g"]
-    """Index of the parameter of each free number, shape `(g,)`."""
+    """Index of the parameter of each free value, shape `(g,)`."""
     record: Int[np.ndarray, " g"]
-    """Index of its recording, -1 for all, shape `(g,)`."""
+    """Index of the recording of each free value, -1 for all recordings, shape `(g,)`.
+    """
     local: Int[np.ndarray, "r m"]
     """Index of the parameter of each column of a recording's equations, shape `(r, m)`.
     """
     place: Int[np.ndarray, "r m"]
-    """Index of the column among the free numbers, -1 for padding, shape `(r, m)`."""
+    """Index of the column among the free values, -1 for padding, shape `(r, m)`."""
     scale: Float[np.ndarray, " g"]
-    """Scale of each free number, shape `(g,)`."""
+    """Scale of each free value, shape `(g,)`."""
 
     @property
     def scales(self) -> Float[np.ndarray, "r m"]:
@@ -41,7 +43,7 @@ class Columns:
 
 
 def free_columns(problem: Problem, free: Iterable[str] | None) -> Columns:
-    """Return the free numbers of a problem, by the names of parameters.
+    """Return the free values of a problem, given the names of the parameters.
 
     Args:
         problem: The problem.
@@ -88,19 +90,19 @@ def free_columns(problem: Problem, free: Iterable[str] | None) -> Columns:
 
 
 def reduced(columns: Columns, blocks: Blocks):
-    """Return information and score of the free numbers, in units of their scales."""
+    """Return the information and score of the free values, in units of their scales."""
     return gathered(columns, eliminate_states(blocks))
 
 
 def held_firmer(columns: Columns, blocks: Blocks):
-    """Return `reduced` information with the states held a hundred times as firmly. A
-    part that grows with it is not information of the data.
+    """Return the `reduced` information with the states held a hundred times as firmly.
+    Any part that grows does not come from the data.
     """
     return gathered(columns, eliminate_states(blocks, jnp.asarray(100 * LEAST)))[0]
 
 
 def gathered(columns: Columns, found):
-    """Sum over the recordings, with each number in its place."""
+    """Sum over the recordings, adding each value in its place."""
     size = len(columns.scale)
     information, score = np.zeros((size + 1, size + 1)), np.zeros(size + 1)
     for r, place in enumerate(columns.place):
@@ -114,9 +116,9 @@ def invert_information(
 ) -> Float[np.ndarray, "g g"]:
     """Return the inverse of a positive semidefinite information matrix.
 
-    It is scaled to a unit diagonal and inverted by its eigenvalues, none of which is
-    less than rounding makes it. An undetermined number (a zero on the diagonal) gets an
-    infinite variance.
+    The matrix is scaled to a unit diagonal and inverted by its eigenvalues, which are
+    limited from below by their rounding error. An undetermined value (a zero on the
+    diagonal) has an infinite variance.
 
     Args:
         information: The matrix, shape `(g, g)`.
@@ -148,11 +150,11 @@ def invert_information(
 
 
 def off_nominal(problem: Problem, columns: Columns, point: Point):
-    """Return the distance of each free number from its nominal value, in scales.
+    """Return the distance of each free value from nominal, in units of its scale.
 
     Args:
         problem: The problem.
-        columns: The free numbers.
+        columns: The free values.
         point: The values.
 
     Returns:
@@ -174,11 +176,11 @@ def _nominal(problem: Problem, place: int | np.integer) -> float:
 def prior_information(problem: Problem, columns: Columns, prior: bool):
     """Return the information of the tolerances, `(scale / stderr)^2`.
 
-    Zero with `prior=False`, and for a parameter without prior knowledge.
+    It is zero with `prior=False`, and for a parameter without prior knowledge.
 
     Args:
         problem: The problem.
-        columns: The free numbers.
+        columns: The free values.
         prior: Whether the tolerances count.
 
     Returns:
@@ -189,7 +191,7 @@ def prior_information(problem: Problem, columns: Columns, prior: bool):
 
 
 def prior_cost(problem: Problem, columns: Columns, point: Point, prior: bool) -> float:
-    """Return the squared distance of the free numbers from their priors."""
+    """Return the squared distance of the free values from their priors."""
     if not prior or not len(columns.scale):
         return 0.0
     off = off_nominal(problem, columns, point)
@@ -197,7 +199,7 @@ def prior_cost(problem: Problem, columns: Columns, point: Point, prior: bool) ->
 
 
 def inside(problem: Problem, columns: Columns, point: Point) -> Point:
-    """Return the point, moved inside the bounds of the free parameters."""
+    """Return the point, moved to within the bounds of the free parameters."""
     values = np.array(point.values)
     for p in set(columns.parameter.tolist()):
         one = problem.parameters[p]

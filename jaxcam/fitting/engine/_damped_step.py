@@ -1,4 +1,4 @@
-"""Take one damped step of scoring, within the bounds of the parameters."""
+"""Take one damped scoring step within the bounds of the parameters."""
 
 import jax.numpy as jnp
 import numpy as np
@@ -63,7 +63,7 @@ def _bounded(problem, columns, point, information, score, damping):
         try:
             change[open_] = np.linalg.solve(damped[np.ix_(open_, open_)], right)
         except np.linalg.LinAlgError:
-            # singular to rounding: more damping is needed
+            # singular to within rounding: more damping is needed
             return np.full(size, np.nan)
         beyond = open_ & ((change < low) | (change > high))
         if not np.any(beyond):

@@ -1,6 +1,4 @@
-"""Run the same program for every recording on all cores (XLA uses one core per
-call).
-"""
+"""Run the same program for every recording on all cores; XLA uses one core per call."""
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor

@@ -1,9 +1,10 @@
-"""Solve the normal equations of a chain of pieces: first the states, then the rest.
+"""Solve the normal equations of a chain of pieces: first the states, then the
+parameters.
 
-The states of a recording couple to their neighbours alone, so that they are eliminated
-from the first to the last with matrices of the size of one state (block-tridiagonal
-elimination). What is left is the reduced information of the parameters, the Schur
-complement; the states follow backwards.
+Each state of a recording is coupled only to its neighbours, so the states are
+eliminated from the first to the last with matrices of the size of one state
+(block-tridiagonal elimination). The result is the reduced information of the
+parameters, the Schur complement; the states follow by back substitution.
 """
 
 from typing import NamedTuple
@@ -16,7 +17,7 @@ from ._linearise import Blocks
 from ._program import program
 
 
-# Fraction of the information that holds an unconstrained state in place
+# Fraction of the information used to hold an unconstrained state in place
 LEAST = 1e-13
 
 
@@ -24,7 +25,7 @@ class Reduced(NamedTuple):
     """Normal equations of the parameters with the states eliminated.
 
     For each record: `information` `(m, m)`, `score` `(m,)`; `gain` `(k, n, m + 1 + n)`
-    gives each state from the parameters, a constant, and the state after it.
+    expresses each state in terms of the parameters, a constant, and the next state.
     """
 
     information: Float[Array, "r m m"]
@@ -32,8 +33,9 @@ class Reduced(NamedTuple):
     score: Float[Array, "r m"]
     """Score of the parameters of each recording, shape `(r, m)`."""
     gain: Float[Array, "r k n c"]
-    """Gives each state from the parameters, a constant, and the state after it, shape
-    `(r, k, n, m + 1 + n)`."""
+    """Expresses each state in terms of the parameters, a constant and the next state,
+    shape `(r, k, n, m + 1 + n)`.
+    """
 
 
 @program
@@ -42,7 +44,7 @@ def eliminate_states(blocks: Blocks, least: float | Array = LEAST) -> Reduced:
 
     Args:
         blocks: The normal equations.
-        least: Share of its own information that holds a state.
+        least: Share of its own information by which each state is held in place.
 
     Returns:
         A [`jaxcam.fitting.engine.Reduced`][].
@@ -52,7 +54,7 @@ def eliminate_states(blocks: Blocks, least: float | Array = LEAST) -> Reduced:
 
 @program
 def state_steps(reduced: Reduced, change: Float[Array, "r m"]) -> Float[Array, "r k n"]:
-    """Return the steps of the states that belong to a step of the parameters.
+    """Return the steps of the states that correspond to a step of the parameters.
 
     Args:
         reduced: The reduced equations.
@@ -79,7 +81,8 @@ def _eliminate(blocks: Blocks, part):
     size, width = blocks.sp.shape[1:]
 
     def forwards(carry, inputs):
-        # information of the pieces before on this piece's state, parameters and both
+        # information of the previous pieces on this piece's state, on the parameters,
+        # and on both
         ss, sp, s, information, score = carry
         here_ss, here_sp, here_s, after = inputs
         # an unconstrained state does not move
@@ -121,11 +124,13 @@ def _eliminate(blocks: Blocks, part):
 
 
 def _solve(matrix, right):
-    """Positive definite, scaled to a unit diagonal: states differ by their units."""
+    """Solve a positive definite system, scaled to a unit diagonal since states have
+    different units.
+    """
     scale = 1 / jnp.sqrt(jnp.diagonal(matrix))
     scaled = matrix * jnp.outer(scale, scale)
     if matrix.shape[0] == 2:
-        # a call into LAPACK for each would take longer than everything else
+        # a LAPACK call for each matrix would take longer than everything else
         b = scaled[0, 1]
         det = 1 - b * b
         x, y = right[0] * scale[0], right[1] * scale[1]

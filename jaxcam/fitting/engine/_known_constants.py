@@ -1,4 +1,4 @@
-"""Treat constants known for each recording as parameters that no fit changes."""
+"""Represent constants known for each recording as parameters that no fit changes."""
 
 import difflib
 import math
@@ -21,7 +21,7 @@ def known_constants(
 ) -> tuple[Parameter, ...]:
     """Create a parameter for each name in the `constants` of recordings.
 
-    A recording that does not state one has the value of the model.
+    If a recording does not contain a constant, the value of the model is used.
 
     **Raises:** `RecordingError` if a name is not a number of the system, or a value is
     not a number.
@@ -53,14 +53,14 @@ def with_constants(model: Model, recording: Recording) -> Model:
 def _place(system: HybridSystem, recording: Recording, name: str) -> str:
     """Return the full name of a number of the system, or of a wrapped system.
 
-    Of several parts with such a number, it is that of the outermost.
+    If several parts have such a number, the outermost is used.
     """
     value = recording.constants[name]
     if isinstance(value, bool) or not isinstance(value, int | float | np.floating):
         value = math.nan
     if not math.isfinite(value):
         raise RecordingError(
-            f"{recording.name}: its constant `{name}` is not a finite number; correct "
+            f"{recording.name}: the constant `{name}` is not a finite number; correct "
             "it."
         )
     every = parameter_names(system)
@@ -69,7 +69,7 @@ def _place(system: HybridSystem, recording: Recording, name: str) -> str:
         near = difflib.get_close_matches(name, every, n=1)
         hint = f"is `{near[0]}` meant?" if near else f"it has {', '.join(every)}."
         raise RecordingError(
-            f"{recording.name}: its constant `{name}` is not a number of the system; "
+            f"{recording.name}: the constant `{name}` is not a number of the system; "
             f"{hint}"
         )
     return min(inside, key=lambda one: one.count("."))

@@ -16,11 +16,11 @@ _FAR = 5.0
 
 
 class Scored(NamedTuple):
-    """Of each sample, elementwise.
+    """Cost, score and information of each sample.
 
-    - `cost`: minus twice the logarithm of the likelihood, less a constant, so that a
-      sample of Gaussian noise costs 1 on average.
-    - `score`: derivative of the logarithm of the likelihood to the prediction.
+    - `cost`: minus twice the log-likelihood, shifted by a constant so that it is 1 on
+        average for Gaussian noise.
+    - `score`: derivative of the log-likelihood with respect to the prediction.
     - `information`: the expected square of the score.
     """
 
@@ -61,23 +61,24 @@ def _within(sensor: Sensor, value, predicted) -> Scored:
 
 
 def _rounded(sensor: Sensor, off) -> Scored:
-    """Noise first, then rounding: the probability of an interval.
+    """Return the likelihood of noise followed by rounding: the probability of an
+    interval.
 
-    With z = (off +- resolution / 2) / noise it is Phi(z_high) - Phi(z_low).
+    With z = (off +- resolution / 2) / noise, it is Phi(z_high) - Phi(z_low).
     """
     half = sensor.resolution / 2 / sensor.noise
-    # by symmetry in the lower tail, where differences keep their accuracy
+    # evaluated by symmetry in the lower tail, where differences remain accurate
     z = -jnp.abs(off) / sensor.noise
     high, low = log_ndtr(z + half), log_ndtr(z - half)
     chance = high + jnp.log1p(-jnp.exp(low - high))
     density = _log_density(z + half), _log_density(z - half)
     pull = jnp.exp(density[1] - chance) - jnp.exp(density[0] - chance)
-    # the constant normalises the cost of noise of the same variance
+    # the constant normalises the cost for Gaussian noise of the same variance
     variance = sensor.floor**2
     constant = jnp.log(sensor.resolution**2 / (2 * jnp.pi * variance))
     slope = -jnp.sign(off) * pull / sensor.noise
-    # far out, reached by bad starts only, the cost is steeper than the mean information
-    # predicts, and a step by it alone would go too far
+    # far out, which only bad starts reach, the cost is steeper than the mean
+    # information predicts, and a step based on it alone would go too far
     far = jnp.abs(off) > sensor.resolution / 2 + _FAR * sensor.noise
     safe = jnp.where(far, off, 1.0)
     information = jnp.where(far, slope / safe, 1 / variance)
@@ -85,7 +86,7 @@ def _rounded(sensor: Sensor, off) -> Scored:
 
 
 def _beyond(sensor: Sensor, value, predicted) -> Scored:
-    """Return the probability of a true value beyond the limit: Phi(z)."""
+    """Return the likelihood of a true value beyond the limit, Phi(z)."""
     z = (jnp.sign(value) * predicted - sensor.limit) / sensor.noise
     chance = log_ndtr(z)
     ratio = jnp.exp(_log_density(z) - chance)

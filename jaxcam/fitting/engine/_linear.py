@@ -15,8 +15,8 @@ from ._predict import flight_joint, fly, impact_joint, rest, samples
 
 
 class Sharpness(NamedTuple):
-    """Standard errors of the joints of one recording, and of the usual piece's
-    state.
+    """Standard errors of the joints of one recording, and of the state of a typical
+    piece.
     """
 
     flight: Float[Array, "k n"]
@@ -26,10 +26,11 @@ class Sharpness(NamedTuple):
 
 
 class Extras(NamedTuple):
-    """Further arguments of a program: reference states of contact and the joints'
-    errors.
+    """Further arguments of a program: reference states in contact and the errors of the
+    joints.
 
-    `weight` `(r, k)` and `rest_weight` `(r, kc)` of the data of each piece.
+    `weight` `(r, k)` and `rest_weight` `(r, kc)` are the weights of the data of each
+    piece.
     """
 
     guess: Float[Array, "r kc n"]
@@ -42,25 +43,25 @@ class LinearPieces(NamedTuple):
     """Pieces and joints of one recording, before summation.
 
     The first `n` of `a = n + m` columns are the state at the beginning of the piece,
-    the others the parameters.
+    the others are the parameters.
     """
 
     information: Float[Array, "k a a"]
     """Information of the samples of each piece in flight, shape `(k, a, a)`."""
     slope: Float[Array, "k a"]
-    """Slope of the cost of these samples, shape `(k, a)`."""
+    """Gradient of the cost of these samples, shape `(k, a)`."""
     pp: Float[Array, "m m"]
-    """Information of all samples in contact, by the parameters, shape `(m, m)`."""
+    """Information of all samples in contact on the parameters, shape `(m, m)`."""
     p: Float[Array, " m"]
-    """Slope of the cost of these samples, shape `(m,)`."""
+    """Gradient of the cost of these samples, shape `(m,)`."""
     later: Float[Array, "k e n"]
-    """Rows of each joint for the state after it, in units of the joint's error."""
+    """Rows of each joint for the state after the joint, in units of its error."""
     earlier: Float[Array, "k e a"]
-    """Rows of each joint for the columns of the piece before it, in the same units."""
+    """Rows of each joint for the columns of the previous piece, in the same units."""
     direct: Float[Array, "k e m"]
     """Rows of each joint for all other variables, in the same units."""
     tied: Float[Array, "k e"]
-    """Distance at each joint, in units of its error."""
+    """Mismatch at each joint, in units of its error."""
     flown_cost: Float[Array, " k"]
     """Cost of each piece in flight."""
     joint_cost: Float[Array, " k"]
@@ -109,7 +110,7 @@ def linear_pieces(
 
     pp, p, rested_cost = _linear_contacts(model_at, pieces, extras, origin)
 
-    # rows for the earlier state, the later state and what else varies
+    # rows for the earlier state, the later state and all other variables
     def joint_of(before, state, t, *inputs):
         def off(before, state, change):
             model = model_at(change, t, jnp.ones_like(t))
@@ -148,7 +149,9 @@ def linear_pieces(
 
 
 def _linear_contacts(model_at: Callable[..., Model], pieces: Pieces, extras, origin):
-    """Information, score and cost of the pieces in contact, by the parameters alone."""
+    """Return information, score and cost of the pieces in contact, for the parameters
+    alone.
+    """
     width = len(origin)
     if not len(pieces.rest_exists):
         return jnp.zeros((width, width)), jnp.zeros(width), jnp.zeros(0)
@@ -165,7 +168,7 @@ def _linear_contacts(model_at: Callable[..., Model], pieces: Pieces, extras, ori
     sensors = tuple(model_at(origin, 0.0, 1.0).sensors.values())
     found = score_all(sensors, part.value, seen)
     weight = jnp.where(part.known, extras.rest_weight[:, None, None, None], 0.0)
-    # if the surface cannot be found, it gives no information
+    # if the surface cannot be found, the piece gives no information
     rows = jnp.where(part.known[..., None], rows, 0.0)
     pp = jnp.einsum("knmca,knmc,knmcb->ab", rows, weight * found.information, rows)
     p = jnp.einsum(
@@ -176,11 +179,11 @@ def _linear_contacts(model_at: Callable[..., Model], pieces: Pieces, extras, ori
 
 
 def _columns(function, *args):
-    """Return value and Jacobian of a function of some vectors, its columns side by
-    side.
+    """Return the value and Jacobian of a function of several vectors, with the columns
+    side by side.
 
-    Vectors are separate arguments: parts that depend on one of them alone are then
-    computed once, for all the pieces that share it.
+    The vectors are separate arguments, so that parts that depend on only one of them
+    are computed once for all pieces that share it.
     """
     count = sum(len(one) for one in args)
     edges = np.cumsum([len(one) for one in args])[:-1]
@@ -205,7 +208,9 @@ def rested(model: Model, guess, start, step, angle, rate, place):
 
 
 def rested_all(model: Model, pieces: Pieces, extras: Extras):
-    """Samples of all pieces in contact of one record, shape `(kc, n, m, c)`."""
+    """Return the samples of all pieces in contact of one record, shape `(kc, n, m,
+    c)`.
+    """
     if not len(pieces.rest_exists):
         return jnp.zeros(pieces.rested.value.shape)
     return jax.vmap(lambda *a: rested(model, *a))(*rest_inputs(pieces, extras))
@@ -247,7 +252,9 @@ def _flat(joint):
 
 
 def strength(sharpness: Sharpness, kind):
-    """Return the inverse error of each part of a joint, zero if there is none."""
+    """Return the inverse error of each component of a joint, zero if there is no
+    joint.
+    """
     error = jnp.concatenate([sharpness.impact, sharpness.gap[..., None]], axis=-1)
     flight = jnp.concatenate(
         [sharpness.flight, jnp.full_like(sharpness.gap[..., None], jnp.inf)], axis=-1

@@ -1,4 +1,4 @@
-"""Scores and information of every piece and joint about a point."""
+"""Score and information of every piece and joint about a point."""
 
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -41,9 +41,9 @@ def _as_it_is(model: Model) -> Model:
 
 
 class Layout(eqx.Module):
-    """The location of the parameters in a model: its leaves, and the fitted ones.
+    """The location of the parameters among the leaves of a model.
 
-    `ready` computes the quantities that a model needs at every step once for all.
+    `ready` precomputes the quantities that a model needs at every step.
     """
 
     model: Model
@@ -84,19 +84,20 @@ class Layout(eqx.Module):
 
 
 class Expansion(eqx.Module):
-    """A model to first order in its parameters.
+    """A first-order expansion of a model in its parameters.
 
     The quantities needed at every step are computed and differentiated once, instead of
     in each piece.
 
-    - `slopes`: of each leaf, a row for each parameter; None where it depends on none.
+    - `slopes`: derivatives of each leaf, a row for each parameter; None if the leaf
+        depends on none.
     """
 
     model: Model
     slopes: tuple[Float[Array, "..."] | None, ...]
 
     def by(self, columns: Int[Array, " m"], scales: Float[Array, " m"]) -> "Expansion":
-        """Return the expansion by some of the parameters in units of their scales."""
+        """Return the expansion in some of the parameters, in units of their scales."""
 
         def rows(slope):
             return slope[columns] * scales.reshape(-1, *[1] * (slope.ndim - 1))
@@ -117,26 +118,28 @@ class Expansion(eqx.Module):
 class Blocks(NamedTuple):
     """Normal equations of the pieces of one record: information and score.
 
-    `ss, sp, s` of each piece's state; `pp, p` of the parameters, over all pieces and
-    joints; `before` couples the state of a piece to that of the one before it.
+    `ss, sp, s` belong to the state of each piece; `pp, p` to the parameters, summed
+    over all pieces and joints; `before` couples the state of a piece to that of the
+    previous one.
     """
 
     ss: Float[Array, "k n n"]
     """Information of each piece's state, shape `(k, n, n)`."""
     sp: Float[Array, "k n m"]
-    """Information of state and parameters, shape `(k, n, m)`."""
+    """Information that couples state and parameters, shape `(k, n, m)`."""
     s: Float[Array, "k n"]
     """Score of each piece's state, shape `(k, n)`."""
     before: Float[Array, "k n n"]
-    """Coupling of a piece's state to that of the piece before, shape `(k, n, n)`."""
+    """Coupling of a piece's state to that of the previous piece, shape `(k, n, n)`."""
     pp: Float[Array, "m m"]
-    """Information of the parameters, over all pieces and joints, shape `(m, m)`."""
+    """Information of the parameters, summed over all pieces and joints, shape `(m, m)`.
+    """
     p: Float[Array, " m"]
     """Score of the parameters, shape `(m,)`."""
 
 
 class Costs(NamedTuple):
-    """Minus twice the log-likelihood of each piece, by its parts."""
+    """Minus twice the log-likelihood of each piece and joint."""
 
     flown: Float[Array, "r k"]
     """Cost of each piece in flight, shape `(r, k)`."""
@@ -178,7 +181,7 @@ def assemble(
 
 @program
 def assemble_one(near, pieces, extras, states, columns, scales, row):
-    """Apply `assemble` to one recording; its number is not part of the program."""
+    """Apply `assemble` to one recording; its index is not part of the program."""
     one = pieces, extras, states, columns, scales
     pieces, extras, states, columns, scales = jax.tree.map(lambda leaf: leaf[row], one)
     near = near.by(columns, scales)
@@ -271,8 +274,9 @@ def chained(found: LinearPieces) -> Blocks:
 def cost_by_recording(costs: Costs, weights) -> Float[np.ndarray, " r"]:
     """Return the weighted cost of each recording.
 
-    A joint has the lesser weight of its two pieces. Contact whose surface is not found
-    has no cost, as it gives no information; data without weight have none at all.
+    A joint has the smaller weight of its two pieces. A contact whose surface is not
+    found has no cost, because it gives no information; data with zero weight have no
+    cost either.
 
     Args:
         costs: The costs.
@@ -294,7 +298,8 @@ def cost_by_recording(costs: Costs, weights) -> Float[np.ndarray, " r"]:
 
 
 def total_cost(costs: Costs, extras) -> float:
-    """Return the weighted cost of all pieces; a joint has the lesser weight of its two.
+    """Return the weighted cost of all pieces; a joint has the smaller weight of its two
+    pieces.
 
     Args:
         costs: The costs.

@@ -1,4 +1,4 @@
-"""The model to fit: a system, its drive, and its sensors."""
+"""The model to fit: a system, its drive and its sensors."""
 
 from collections.abc import Callable, Mapping
 
@@ -20,11 +20,12 @@ def _number(default: float):
 class Sensor(eqx.Module):
     """A sensor: the map from the state x(t) to one channel of a recording.
 
-    The sensor measures `offset + gain * observe(x(t - lag))`, through a first-order
-    filter if it has a bandwidth, with white noise, rounded to its resolution and
-    saturated at its limit. The likelihood is that of such samples: a rounded one is
-    known to an interval, a saturated one only to lie beyond the limit. Gain, offset and
-    lag can be fitted like parameters of the system.
+    The sensor measures `offset + gain * observe(x(t - lag))`, passed through a
+    first-order filter if the sensor has a bandwidth. White noise is added, and the
+    result is rounded to the resolution and saturated at the limit. The likelihood
+    accounts for rounding and saturation: a rounded sample only implies that the value
+    is within an interval, a saturated one only that it is beyond the limit. Gain,
+    offset and lag can be fitted like parameters of the system.
 
     Examples:
         >>> from jaxcam.fitting import Sensor
@@ -33,40 +34,44 @@ class Sensor(eqx.Module):
     """
 
     observe: int | Callable[[Array], Array] = eqx.field(static=True)
-    """A component of the state, or a function of the state."""
+    """Index of a state component, or a function of the state."""
     noise: Float[Array, ""] = eqx.field(converter=_array)
     """Standard deviation of the noise, in the units of the channel."""
     resolution: float = eqx.field(default=0.0, static=True)
-    """Smallest step of the channel; zero for a continuous one."""
+    """Resolution of the channel; zero if it is continuous."""
     limit: float = eqx.field(default=float("inf"), static=True)
-    """Largest magnitude of the channel."""
+    """Magnitude at which the channel saturates."""
     bandwidth_hz: float = eqx.field(default=float("inf"), static=True)
-    """Bandwidth of a first-order filter (Hz); infinite for none."""
+    """Bandwidth of a first-order filter (Hz); infinite if there is no filter."""
     tails: float = eqx.field(default=float("inf"), static=True)
-    """Degrees of freedom of a Student distribution for noise with outliers; infinite
-    for a Gaussian one."""
+    """Degrees of freedom of a Student t distribution for noise with outliers; infinite
+    for Gaussian noise.
+    """
     gain: Float[Array, ""] = _number(1.0)
-    """Gain."""
+    """Gain of the channel."""
     offset: Float[Array, ""] = _number(0.0)
     """Offset, in the units of the channel."""
     lag: Float[Array, ""] = _number(0.0)
-    """Lag (s), short compared with the time scale of the motion."""
+    """Lag (s); it must be short compared with the time scale of the motion."""
     error: Callable | None = eqx.field(default=None, static=True)
-    """Systematic error of the sensor in a fit: a function `error(system, t, value,
-    slope)` of the value and its rate of change; default none.
+    """Systematic error added to the sensor reading in a fit: a function `error(system,
+    t, value, slope)`, where `slope` is the rate of change of `value`; default none.
     """
 
     def __check_init__(self):
         if not self.noise > 0:
-            raise ValueError(f"Give a sensor a positive `noise`; it is {self.noise}.")
+            raise ValueError(
+                f"The `noise` of a sensor is {self.noise}; make it positive."
+            )
         if not self.bandwidth_hz > 0:
             raise ValueError(
-                f"Give a sensor a positive `bandwidth_hz`; it is {self.bandwidth_hz}."
+                f"The `bandwidth_hz` of a sensor is {self.bandwidth_hz}; make it "
+                "positive."
             )
 
     @property
     def floor(self) -> Float[Array, ""]:
-        """Standard deviation of noise and rounding together."""
+        """Standard deviation of noise and rounding combined."""
         return jnp.sqrt(self.noise**2 + self.resolution**2 / 12)
 
     @property
@@ -74,18 +79,21 @@ class Sensor(eqx.Module):
         return self.bandwidth_hz != float("inf")
 
     def seen(self, state: Float[Array, " n"]) -> Array:
-        """Return the measured quantity of a state, before gain and offset."""
+        """Return the measured quantity for a state, before gain and offset are
+        applied.
+        """
         if isinstance(self.observe, int):
             return state[self.observe]
         return jnp.asarray(self.observe(state))
 
 
 class Turning(eqx.Module):
-    """A drive with measured motion, and the fields of a system for its speed and phase.
+    """A drive whose motion is measured, with the system fields for its speed and phase.
 
-    While a recording is predicted, the speed follows the measured one and the phase
-    places the drive at its measured angle. `phase` of the fitted system is then an
-    offset between its angle and the encoder's.
+    When a recording is predicted, the speed field is set to the measured speed, and the
+    phase field such that the drive angle is the measured angle plus the `phase` of the
+    fitted system. This `phase` is therefore the offset of the drive angle from the
+    encoder reading.
 
     Examples:
         >>> from jaxcam.fitting import Turning
@@ -96,13 +104,13 @@ class Turning(eqx.Module):
     """
 
     speed: Callable[[HybridSystem], Array] = eqx.field(static=True)
-    """Picks the speed out of the system, such as `lambda s: s.speed`."""
+    """Selects the speed field of the system, such as `lambda s: s.speed`."""
     phase: Callable[[HybridSystem], Array] = eqx.field(static=True)
-    """Picks the phase out of the system, such as `lambda s: s.phase`."""
+    """Selects the phase field of the system, such as `lambda s: s.phase`."""
 
     def at(self, system, t, angle, rate):
-        """Return the system with its drive at `angle` and turning at `rate` at time
-        `t`.
+        """Return the system with its drive turning at `rate`, and at the encoder angle
+        `angle` at time `t`.
         """
         phase = self.phase(system) + angle - rate * t
         return eqx.tree_at(
@@ -111,11 +119,11 @@ class Turning(eqx.Module):
 
 
 class Input(eqx.Module):
-    """A measured input, such as a force or a voltage, and the field of a system for it.
+    """A measured input, such as a force or a voltage, with the system field for it.
 
-    While a recording is predicted, the system has the value of its own recording,
-    each sample held until the next one, as digital controllers do; over a step of the
-    integration, its mean.
+    When a recording is predicted, the field follows the input in that recording. Each
+    sample is held until the next (zero-order hold), as in digital controllers, and each
+    integration step uses the mean over the step.
 
     Examples:
         >>> from jaxcam.fitting import Input
@@ -124,9 +132,9 @@ class Input(eqx.Module):
     """
 
     channel: str = eqx.field(static=True)
-    """Channel of the recordings."""
+    """Channel of the recordings that contains the input."""
     value: Callable[[HybridSystem], Array] = eqx.field(static=True)
-    """Picks the field out of the system, such as `lambda s: s.force`."""
+    """Selects the field of the system, such as `lambda s: s.force`."""
 
     def at(self, system, t, level, rate):
         """Return the system with its input at `level`."""
@@ -135,7 +143,8 @@ class Input(eqx.Module):
 
 
 class Model(eqx.Module):
-    """A system and its sensors, from which parameters are picked.
+    """A system with its sensors and its drive or input, from which parameters are
+    selected.
 
     Examples:
         >>> from jaxcam.fitting import Model, Sensor
@@ -180,12 +189,12 @@ _CAM_DRIVE = Turning(_speed, _phase)
 
 
 def filtered_channels(model: Model) -> tuple[str, ...]:
-    """Channels whose sensor has a bandwidth, and therefore a state."""
+    """Return the channels whose sensor has a bandwidth and therefore a filter state."""
     return tuple(name for name in model.sensors if model.sensors[name].filtered)
 
 
 def augmented_field(model: Model, system, t, state):
-    """Rate of change of the system's state and of the sensors' filters."""
+    """Return the rate of change of the system state and of the sensor filters."""
     lags = filtered_channels(model)
     size = state.shape[0] - len(lags)
     x = state[:size]

@@ -1,6 +1,4 @@
-"""Fit the states of single pieces by least squares of the model, from several
-starts.
-"""
+"""Fit the states of single pieces by least squares, from several starts."""
 
 from collections.abc import Sequence
 
@@ -18,15 +16,15 @@ from ._program import program
 from ._sharpness import states_only
 
 
-# Directions of a state with less than this fraction of the largest information are held
+# State directions with less than this fraction of the largest information are held
 _BLIND = 1e-10
-# Number of samples that determine the curvature of a piece
+# Number of samples needed to determine the curvature of a piece
 _FEW = 24
 # Cost of a sample above which a start is rejected: three times the noise
 _FAR = 9.0
 # Damped steps from each start
 _STEPS = 12
-# Steps that lower the cost of no piece by more than this share, after which it ends
+# The iteration ends after this many steps that reduce no cost by more than this share
 _QUIET, _LITTLE = 3, 1e-3
 _FIRST_DAMPING, _LEAST_DAMPING = 1e-3, 1e-9
 
@@ -40,11 +38,12 @@ def own_states(
 ) -> Point:
     """Fit the states of pieces that polynomials do not determine.
 
-    Few samples do not show the curvature of a flight, and with a wrong velocity it
-    never meets the flight before it: one step of Gauss and Newton without joints.
-    Where the model stays far from the samples, as where they are few to a period,
-    damped steps from several starts: the point, `others`, and what the model makes of
-    the pieces before and after. The one that fits best is kept, piece by piece.
+    A few samples do not determine the curvature of a flight, and with a wrong initial
+    velocity, the flight never meets the previous one. Such pieces take one Gauss-Newton
+    step without joints. If the model remains far from the samples, for example because
+    there are few samples per period, damped steps are taken from several starts: the
+    point, `others`, and predictions from the neighbouring pieces. For each piece, the
+    best fit is kept.
     """
     alone = eqx.tree_at(lambda p: p.joint, pieces, jnp.zeros_like(pieces.joint))
     count = np.asarray(jnp.sum(pieces.flown.known, axis=(-3, -2, -1)))
@@ -59,7 +58,7 @@ def own_states(
     cost = np.where(better, after, before)
 
     def far():
-        # a cost that is no number is far as well
+        # a non-finite cost counts as far
         return np.asarray(pieces.exists) & (count > 0) & ~(cost <= _FAR * count)
 
     def offer(start):
@@ -86,7 +85,9 @@ def own_states(
 
 
 def _descended(layout, alone, extras, point, start):
-    """Damped Gauss-Newton of every piece by itself: the states and their costs."""
+    """Return states and costs from damped Gauss-Newton steps for each piece
+    separately.
+    """
     start = np.where(np.isfinite(start), start, 0.0)
     states = jnp.asarray(start)
     blocks, costs = states_only(layout, alone, extras, Point(point.values, states))
@@ -113,7 +114,9 @@ def _descended(layout, alone, extras, point, start):
 
 
 def _step(blocks, damping):
-    """Gauss-Newton steps of the states, in units of what the samples see of each."""
+    """Return Gauss-Newton steps of the states, scaled by the information in the
+    samples.
+    """
     known = jnp.diagonal(blocks.ss, axis1=-2, axis2=-1)
     unit = jnp.where(known > 0, 1 / jnp.sqrt(jnp.where(known > 0, known, 1.0)), 0.0)
     scaled = blocks.ss * unit[..., :, None] * unit[..., None, :]
@@ -126,7 +129,9 @@ def _step(blocks, damping):
 
 @program
 def _ends(layout: Layout, pieces: Pieces, point: Point):
-    """Each piece's state at its end, and that state after an impact there."""
+    """Return the state of each piece at its end, and the state after an impact
+    there.
+    """
 
     def one(values, states, pieces):
         model = layout.at(values)

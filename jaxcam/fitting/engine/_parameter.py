@@ -1,4 +1,4 @@
-"""A parameter to fit, and its prior knowledge."""
+"""A parameter to fit, and prior knowledge about it."""
 
 import dataclasses
 import math
@@ -11,7 +11,7 @@ from ._model import Model
 
 @dataclasses.dataclass(frozen=True)
 class Parameter:
-    """One number of a model that may be fitted, and its prior knowledge.
+    """A number of a model that may be fitted, and prior knowledge about it.
 
     Examples:
         >>> from jaxcam.fitting import Parameter
@@ -21,19 +21,20 @@ class Parameter:
     """
 
     name: str
-    """Name of the parameter, for tables and to free it."""
+    """Name of the parameter, used in tables and to free it."""
     where: Callable[[Model], Array]
-    """Picks it out of a `Model`: `lambda m: m.system.stiffness`."""
+    """Selects the number in a `Model`: `lambda m: m.system.stiffness`."""
     tolerance: float = math.inf
-    """Largest deviation from `nominal`, as stated by the manufacturer: any value
-    within it is equally likely. The fit uses a Gaussian of the same standard
-    deviation, `tolerance / sqrt(3)`. Infinite without prior knowledge.
+    """Largest deviation from `nominal`, as stated by the manufacturer: any value within
+    it is equally likely. The fit uses a Gaussian of the same standard deviation,
+    `tolerance / sqrt(3)`. It is infinite without prior knowledge.
     """
     nominal: float | None = None
-    """Nominal value; default the model's own."""
+    """Nominal value; default that of the model."""
     scale: float | None = None
-    """Size of a relevant change; by default the tolerance, or else a hundredth of
-    the value. It does not influence the result."""
+    """Size of a relevant change; by default the tolerance, or a hundredth of the value
+    if there is none. It does not influence the result.
+    """
     lower: float = -math.inf
     """Lower bound."""
     upper: float = math.inf
@@ -41,7 +42,7 @@ class Parameter:
     per_record: bool = False
     """Whether every recording has a separate value."""
     unit: str = ""
-    """For tables."""
+    """Unit shown in tables."""
     known: tuple[float, ...] | None = None
     """A value for each recording, which no fit changes. `Problem.build` creates such
     parameters from the `constants` of recordings.
@@ -51,7 +52,7 @@ class Parameter:
         if not self.tolerance > 0:
             raise ValueError(
                 f"The parameter {self.name!r} has the tolerance {self.tolerance:g}; "
-                f"give a positive one, or leave the parameter out to hold it."
+                f"give a positive one, or omit the parameter to hold it."
             )
         if not self.lower < self.upper:
             raise ValueError(

@@ -9,22 +9,24 @@ _SHORTEST = 12
 # The residual of a cubic must be less than this fraction of that of a straight line: a
 # sine passes up to about half of its period
 _PART = 0.05
-# Residuals up to this multiple of the noise are noise, for any curvature
+# Residuals up to this multiple of the noise count as noise, regardless of curvature
 _NOISE = 2.0
-# Part of the windows of a flight that must pass
+# Fraction of the windows of a flight that must pass
 _MOST = 0.75
 
 
 def bearable_length(
     samples: Float[np.ndarray, " k"], noise: float, longest: int
 ) -> int:
-    """Return the longest piece of a flight that a cubic follows, in samples.
+    """Return the length (samples) of the longest piece of a flight that a cubic fits.
 
-    The state at the beginning of a piece is found from a polynomial through it, and a
+    The initial state of a piece is estimated from a polynomial fitted to it, and a
     prediction over more than half a period has more than one optimum in the frequency.
-    It tries `longest` and shorter lengths by factors of about 0.7.
+    The lengths tried are `longest` and shorter ones, decreasing by factors of about
+    0.7.
 
-    **Arguments:** samples of one flight, their noise, and the most samples of a piece.
+    **Arguments:** samples of one flight, their noise, and the maximum number of samples
+    in a piece.
     """
     values = np.asarray(samples, dtype=float)
     values = values[np.isfinite(values)]
@@ -35,7 +37,7 @@ def bearable_length(
 
 
 def _followed(values, noise: float, length: int) -> bool:
-    """Return whether cubics follow most windows of this length."""
+    """Return whether cubics fit most windows of this length."""
     length = min(length, len(values))
     if length < _SHORTEST:
         return True

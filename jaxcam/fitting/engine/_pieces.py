@@ -17,18 +17,19 @@ from ._piece_length import bearable_length
 # Largest number of samples in a piece: enough for its own initial state, short compared
 # with the time over which impacts magnify an error
 _PIECE = 100
-# A flight with fewer samples than this gives no information by itself; between two
-# impacts, this many determine its velocity and link the flights before and after it
+# A flight with fewer samples than the first number gives no information by itself;
+# between two impacts, the second number determines its velocity and links the flights
+# before and after it
 _LEAST, _TIED = 8, 3
 # The number of samples in a step is rounded up to a multiple of this
 _SHARED = 4
-# what precedes a piece
+# predecessor of a piece
 FREE, FLIGHT, IMPACT = 0, 1, 2
 # Half-width (samples) of the search for the time of an impact about the recorded one
 _REACH = 20.0
 
 
-# numpy while it is put together, JAX in the programs
+# numpy during assembly, JAX in the programs
 Numbers: TypeAlias = Array | np.ndarray
 
 
@@ -36,7 +37,7 @@ class Samples(eqx.Module):
     """Samples of `k` pieces of each of `r` recordings, sorted into steps.
 
     Every piece is `n` steps of equal length; a step holds up to `m` samples of `c`
-    channels. `place` is where in its step (0 to 1) a sample is.
+    channels. `place` is the position of a sample within its step (0 to 1).
     """
 
     start: Float[Numbers, "r k"]
@@ -47,16 +48,16 @@ class Samples(eqx.Module):
 
 
 class Pieces(eqx.Module):
-    """Everything of some recordings that a fit needs.
+    """All data of the recordings that a fit needs.
 
     - `flown`, `rested`: samples in flight and in contact.
     - `joint`: the predecessor of each piece of flight: nothing, flight, or an impact.
     - `exists`: false where padded. `angle`, `rate` `(r, k, n)`: the drive in the middle
         of each step; `angle_at`, `rate_at` `(r, k)`: at the beginning of each piece.
-        Of a measured input, `angle` is the level and `rate` is zero.
+        For a measured input, `angle` is its level and `rate` is zero.
     - `rest_angle`, `rest_rate` `(r, kc, n + 1)`: the drive at each node of contact.
-    - `reach`: how far (s) an impact may be from its recorded time.
-    - `drive_error`: standard errors of angle and rate of the drive, per recording.
+    - `reach`: largest deviation (s) of an impact from its recorded time.
+    - `drive_error`: standard errors of the drive's angle and rate, for each recording.
     """
 
     flown: Samples
@@ -90,8 +91,8 @@ def spans(
 ) -> tuple[list[Span], list[Span]]:
     """Return the pieces of flight and of contact of one recording.
 
-    **Arguments:** pieces of an oscillation are shorter, by the channels `curved`
-    (default the segmented channel). Contacts are left out without `rests`.
+    **Arguments:** pieces of an oscillation are shorter, as determined from the channels
+    `curved` (default: the segmented channel). Without `rests`, contacts are omitted.
     """
     record = segments.recording
     time, interval = record.time, record.interval
@@ -131,7 +132,7 @@ def spans(
     rested = []
     for number, contact in enumerate(segments.contacts if rests else ()):
         rows = np.flatnonzero(segments.resting(contact) & valid)
-        # by time: if little of a contact is certain, samples lie far apart
+        # divided by time: if little of a contact is certain, its samples are far apart
         whole = np.arange(rows[0], rows[-1] + 1) if len(rows) else rows
         for stretch in np.array_split(whole, max(1, -(-len(whole) // _PIECE))):
             block = np.intersect1d(stretch, rows, assume_unique=True)
@@ -142,8 +143,8 @@ def spans(
 
 
 def _sharp(edge, interval: float) -> bool:
-    """Return whether a boundary is an impact with a time known well enough for a
-    joint.
+    """Return whether a boundary is an impact whose time is known accurately enough for
+    a joint.
     """
     return edge.kind == "impact" and bool(edge.stderr < 2 * interval)
 
@@ -173,8 +174,8 @@ def gather(
     """Gather pieces of some recordings, padded so that similar recordings share a
     program.
 
-    **Arguments:** `measured` is the channel of an input, in the place of a drive;
-    `curved` and `rests` are those of `spans`.
+    **Arguments:** `measured` is the channel of an input, in place of a drive; `curved`
+    and `rests` are those of `spans`.
 
     **Raises:** `RecordingError` if there is nothing to fit.
     """
@@ -184,11 +185,11 @@ def gather(
     if not any(flown for flown, _ in cuts):
         names = ", ".join(part.recording.name for part in segments)
         raise RecordingError(
-            f"{names}: there is no flight of {_LEAST} samples to be fitted; give a "
+            f"{names}: there is no flight of at least {_LEAST} samples to fit; give a "
             "recording in which the motion leaves the surface."
         )
     width = 64 * -(-max(len(flown) for flown, _ in cuts) // 64)
-    # none without a contact: its part of a program is then not compiled
+    # empty without a contact, whose part of a program is then not compiled
     resting = 32 * -(-max(len(rested) for _, rested in cuts) // 32)
     most = max(_most_in_a_step(part, cut, steps) for part, cut in zip(segments, cuts))
     both = [
@@ -267,7 +268,7 @@ def _samples(part: Segments, cut: list[Span], channels, size, steps, most):
 
 
 def _drive(segments, times):
-    """Angle and rate of each recording's drive at some times, shape of `times`."""
+    """Return the angle and rate of each recording's drive, in the shape of `times`."""
     angle, rate = np.zeros(times.shape), np.ones(times.shape)
     for row, part in enumerate(segments):
         if part.drive is not None:
@@ -278,8 +279,8 @@ def _drive(segments, times):
 
 
 def _input(segments, channel: str, times):
-    """Each recording's input at some times, held since the last sample, in their
-    shape.
+    """Return the input of each recording, held since the last sample, in the shape of
+    `times`.
     """
     found = np.zeros(times.shape)
     for row, part in enumerate(segments):
@@ -290,7 +291,7 @@ def _input(segments, channel: str, times):
 
 
 def _mean_input(segments, channel: str, flown: Samples, steps: int):
-    """Mean of each recording's input over every step, shape `(r, k, n)`."""
+    """Return the mean of each recording's input over every step, shape `(r, k, n)`."""
     step = np.asarray(flown.step)[..., None]
     edges = np.asarray(flown.start)[..., None] + step * np.arange(steps + 1)
     found = np.zeros((*flown.start.shape, steps))
@@ -302,7 +303,7 @@ def _mean_input(segments, channel: str, flown: Samples, steps: int):
 
 
 def _drive_error(part: Segments) -> tuple[float, float]:
-    """Standard errors of the smoothed angle and rate of a drive."""
+    """Return the standard errors of the smoothed angle and rate of a drive."""
     if part.drive is None:
         return 0.0, 0.0
     interval = part.recording.interval

@@ -1,4 +1,4 @@
-"""Predict one piece: its samples, its end, and its joint."""
+"""Predict one piece: its samples, its end and its joint."""
 
 from typing import NamedTuple
 
@@ -19,7 +19,7 @@ _NEWTON = 4
 class Nodes(NamedTuple):
     """Channels before gain, offset and lag, at both ends of each step.
 
-    `left`, `right` `(n, c)`, and their rates of change.
+    They are `left` and `right` `(n, c)`, and their rates of change.
     """
 
     left: Float[Array, "n c"]
@@ -29,7 +29,7 @@ class Nodes(NamedTuple):
 
 
 def fly(model: Model, state, start, step, angle, rate):
-    """Integrate one piece of flight by classical Runge-Kutta.
+    """Integrate one piece of flight by the classical Runge-Kutta method.
 
     **Returns:** the state at its end `(n,)`, and its `Nodes`.
     """
@@ -65,7 +65,7 @@ def runge_kutta(model: Model, system, t, x, h):
         h: Step length (s).
 
     Returns:
-        The state after it, and the first slope.
+        The state after the step, and the slope at its start.
     """
 
     def field(t, x):
@@ -92,9 +92,10 @@ def rest(model: Model, guess, start, step, angle, rate):
 
 
 def contact_state(system, t, guess):
-    """State with gap and normal velocity zero that is nearest to `guess`, and its rate.
+    """Return the state with zero gap and normal velocity nearest to `guess`, and its
+    rate.
 
-    **Returns:** two tuples of one array `(n,)`, as `jax.jvp` takes them.
+    **Returns:** two tuples of one array `(n,)`, in the form used by `jax.jvp`.
     """
 
     def conditions(system, t, x):
@@ -107,7 +108,7 @@ def contact_state(system, t, guess):
         return jnp.stack([value, speed])
 
     # the search and the slopes at the root need no derivatives: the residuals below
-    # carry them all
+    # provide all of them
     fixed, when = _constant(system), jax.lax.stop_gradient(t)
 
     def newton(_, carried):
@@ -131,7 +132,9 @@ def contact_state(system, t, guess):
 
 
 def _constant(tree):
-    """The same numbers without derivatives: a loop over them is not differentiated."""
+    """Return the same numbers without derivatives, so a loop over them is not
+    differentiated.
+    """
 
     def fixed(leaf):
         return jax.lax.stop_gradient(leaf) if eqx.is_inexact_array(leaf) else leaf
@@ -140,7 +143,7 @@ def _constant(tree):
 
 
 def _least(slopes, residual):
-    """Return the least step that changes two conditions by a residual."""
+    """Return the smallest step that changes two conditions by a residual."""
     (a, b), (_, d) = slopes @ slopes.T
     det = a * d - b * b
     first, second = residual
@@ -151,8 +154,8 @@ def _least(slopes, residual):
 def samples(model: Model, nodes: Nodes, start, step, place, along):
     """Sample every channel, shape `(n, m, c)`, by cubic Hermite polynomials.
 
-    **Arguments:** the position `along` each step at which the drive is given, its angle
-    and rate.
+    **Arguments:** the position `along` each step at which the drive is given, and its
+    angle and rate.
     """
     u = place[..., None]
     left, right = nodes.left[:, None], nodes.right[:, None]
@@ -200,10 +203,10 @@ def _errors(model: Model, start, step, place, along, value, slope):
 
 
 class Joint(NamedTuple):
-    """The distance of two pieces from the joint that the model predicts.
+    """The mismatch of two pieces relative to the joint predicted by the model.
 
-    `state` `(n,)`: the later piece less what follows from the earlier one. `gap`: at
-    the impact.
+    `state` `(n,)`: state of the later piece minus that predicted from the earlier one.
+    `gap`: gap at the impact.
     """
 
     state: Float[Array, " n"]
@@ -227,9 +230,7 @@ def impact_joint(model: Model, end, state, t, angle, rate, reach) -> Joint:
     flights = jnp.stack([end, state])
 
     def moved(model, system, flights, shift):
-        """Return both flights at another time: states, their rates, gaps and their
-        rates.
-        """
+        """Return states, gaps and their rates for both flights at another time."""
 
         def gap(t, x):
             return smallest_gap(system, t, x[:size])
@@ -247,7 +248,7 @@ def impact_joint(model: Model, end, state, t, angle, rate, reach) -> Joint:
         slope = jnp.where(slope == 0, jnp.inf, slope)
         return -(gaps[1] - gaps[0]) / jax.lax.stop_gradient(slope)
 
-    # the search needs no derivatives: its last step, from a fixed start, carries them
+    # the search needs no derivatives: its last step, from a fixed start, provides them
     fixed = _constant((model, system, flights))
 
     def newton(_, shift):
@@ -258,7 +259,8 @@ def impact_joint(model: Model, end, state, t, angle, rate, reach) -> Joint:
     shift = jax.lax.fori_loop(0, _NEWTON, newton, jnp.zeros_like(t))
     states, fields, gaps, speeds = moved(model, system, flights, shift)
     last = step(gaps, speeds)
-    # chosen by a condition: the derivative of `clip` compares values for equality
+    # selected by a condition, because the derivative of `clip` tests values for
+    # equality
     inside = jnp.abs(shift + last) < reach
     last = jnp.where(inside, last, jnp.clip(shift + last, -reach, reach) - shift)
     before, after = states + last * fields
@@ -273,8 +275,8 @@ def impact_joint(model: Model, end, state, t, angle, rate, reach) -> Joint:
 def smallest_gap(system: HybridSystem, t, x) -> Float[Array, ""]:
     """Return the smallest gap.
 
-    Not by `min`: its derivative compares values for equality, which differ where a
-    program computes one of them twice.
+    `min` is not used, because its derivative tests values for equality, which may fail
+    if a program computes one of them twice.
     """
     first, *others = jnp.atleast_1d(system.gap(t, x))
     for other in others:
@@ -283,7 +285,7 @@ def smallest_gap(system: HybridSystem, t, x) -> Float[Array, ""]:
 
 
 def _raw(model: Model, state, field):
-    """Channels and their rates, before gain, offset and lag, shapes `(c,)`."""
+    """Return channels and their rates, before gain, offset and lag, shapes `(c,)`."""
     lags = filtered_channels(model)
     size = state.shape[0] - len(lags)
     values, rates = [], []

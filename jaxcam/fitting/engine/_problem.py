@@ -1,21 +1,22 @@
 """Build fitting problems from recordings and a model: the interface of the engine.
 
-**How it works.** A recording is cut (`jaxcam.recordings.segment`) into flights,
-contacts and impacts. Every flight is cut again into pieces of at most 100 samples and
-about half a period of what it shows. Each piece has an initial state of its own and is
-predicted from it alone, all pieces of all recordings side by side, so no prediction
-exceeds the predictable time, also in a chaotic recording. Pieces are connected by
-joints, whose conditions the model gives:
+**Method.** A recording is segmented (`jaxcam.recordings.segment`) into flights,
+contacts and impacts. Every flight is divided into pieces of at most 100 samples and
+about half a period of the oscillation that it contains. Each piece has its own initial
+state and is predicted from it alone, in parallel with all others, so that no prediction
+exceeds the predictable time, even in a chaotic recording. Pieces are connected by
+joints, whose conditions follow from the model:
 
-- within a flight, a piece begins where the one before it ends;
-- at an impact, two flights meet at the instant at which their gaps agree (an event, not
-  a parameter: found by Newton and differentiated implicitly). There the gap must be
-  zero and the motion after be the impact law of the motion before;
+- within a flight, a piece begins where the previous one ends;
+- at an impact, two flights meet at the instant at which their gaps are equal (an event,
+    not a parameter: it is found by Newton's method and differentiated implicitly).
+    There the gap must be zero, and the state after the impact must follow from the
+    state before it by the impact law;
 - contacts are predicted from the surface alone.
 
-The accuracy of a joint is that of the drive, measured by its encoder. The initial
-states are eliminated exactly (they form a chain, hence block-tridiagonal normal
-equations); what remains are the normal equations of the few parameters. One iteration
+The accuracy of a joint follows from that of the drive as measured by its encoder. The
+initial states are eliminated exactly (they form a chain, so the normal equations are
+block-tridiagonal); the normal equations of the few parameters remain. One iteration
 over six recordings of 4 s at 2 kHz with ten parameters takes about a tenth of a second.
 
 **Use.**
@@ -34,15 +35,15 @@ again = fit(problem, start=null, weights=problem.only(problem.records[:4]))
 found["stiffness"].value, found["stiffness"].stderr, found.covariance, found.model(0)
 ```
 
-**Many fits.** Parameters that are not free cost next to nothing and do not change the
+**Many fits.** Parameters that are not free cost almost nothing and do not change the
 compiled program, as long as the number of free ones, rounded up to a multiple of four,
-is the same. So candidates for missing physics are best stated as terms of one system
-with strengths of zero, all in one problem, and freed by name. `linearise(problem, fit)`
-gives score and information of all parameters at once, free or not: what each candidate
-would gain is then linear algebra (`Linearised.gain`). `weights` (one a piece) omit
-recordings or blocks without compiling again; `held_out_cost(problem, found, weights)`
-is the cost of held-out data: the states of their pieces are fitted to them, the
-parameters are not.
+is the same. Candidates for missing physics are therefore best defined as terms of one
+system with zero strengths, all in one problem, and freed by name. `linearise(problem,
+fit)` returns the score and information of all parameters at once, free or not, from
+which the gain of each candidate follows by linear algebra (`Linearised.gain`).
+`weights` (one per piece) omit recordings or blocks without recompilation.
+`held_out_cost(problem, found, weights)` is the cost of held-out data: the states of
+their pieces are fitted to them, but not the parameters.
 """
 
 import dataclasses
@@ -68,7 +69,7 @@ from ._starts import state_size, suggested_starts
 from ._step_size import fine_enough, follows_inputs, longest_flight
 
 
-# Steps of a piece to begin with, and at most
+# Initial and maximum number of steps of a piece
 _STEPS, _MOST_STEPS = 10, 160
 
 
@@ -83,9 +84,9 @@ class Weights(eqx.Module):
 
 @dataclasses.dataclass(frozen=True)
 class Problem:
-    """Recordings, a model, and its parameters that may be fitted.
+    """Recordings, a model, and the parameters that may be fitted.
 
-    Built by `Problem.build`.
+    It is created by `Problem.build`.
 
     Examples:
         >>> from jaxcam import fitting, recordings
@@ -114,7 +115,7 @@ class Problem:
     layout: Layout
     """The location of the parameters in the model."""
     start: Point
-    """Nominal parameters, and the states that the data suggest."""
+    """Nominal parameters, and states estimated from the data."""
     extras: Extras
     """Further arguments of the compiled programs."""
 
@@ -129,7 +130,7 @@ class Problem:
             model: A system with its sensors, at nominal parameters.
             segments: Recordings from `jaxcam.recordings.segment_case` or `segment`;
                 their `constants` become parameters that no fit changes.
-            parameters: Those that may be fitted, free or not.
+            parameters: The parameters that may be fitted, free or not.
 
         Returns:
             A `Problem`.
@@ -137,8 +138,8 @@ class Problem:
         Raises:
             RecordingError: A channel is missing, a recording has no flight, or a
                 constant is not a number of the system.
-            ValueError: A parameter is not one number of the model, or the model is not
-                finite near the data.
+            ValueError: A parameter is not a single number of the model, or the model is
+                not finite near the data.
         """
         segments = tuple(segments)
         if not segments:
@@ -160,7 +161,7 @@ class Problem:
                 values[:, column] = one.known
         measured = model.drive.channel if isinstance(model.drive, Input) else None
         steps, first, extras = _STEPS, _STEPS, None
-        # filtered channels are smooth where the motion is not
+        # filtered channels are smooth even where the motion is not
         curved = [name for name in model.sensors if not model.sensors[name].filtered]
         # contact does not show which of several coordinates are at rest
         rests = state_size(model) <= 2
@@ -208,7 +209,7 @@ class Problem:
 
     @property
     def samples(self) -> int:
-        """Number of samples of all channels that are fitted."""
+        """Number of fitted samples in all channels."""
         known = self.pieces.flown.known, self.pieces.rested.known
         return int(sum(jnp.sum(part) for part in known))
 
@@ -232,12 +233,12 @@ class Problem:
         )
 
     def everything(self) -> Weights:
-        """Return weights by which all data count once."""
+        """Return weights with which all data count once."""
         exists, rests = self.pieces.exists, self.pieces.rest_exists
         return Weights(np.asarray(exists, float), np.asarray(rests, float))
 
     def only(self, records: Iterable[str]) -> Weights:
-        """Return weights by which only some recordings count."""
+        """Return weights with which only some recordings count."""
         wanted = set(records)
         if not wanted <= set(self.records):
             raise ValueError(
@@ -249,7 +250,7 @@ class Problem:
         return Weights(every.flown * keep[:, None], every.rested * keep[:, None])
 
     def between(self, start: float, stop: float) -> Weights:
-        """Return weights by which only pieces that begin in a time span (s of each
+        """Return weights with which only pieces that begin in a time span (s, in each
         recording) count.
         """
 
@@ -264,7 +265,7 @@ class Problem:
         )
 
     def weighted(self, weights: Weights | None) -> Extras:
-        """Return the arguments of the compiled programs, with some weights."""
+        """Return the arguments of the compiled programs, with given weights."""
         weights = weights or self.everything()
         return self.extras._replace(
             weight=jnp.asarray(weights.flown), rest_weight=jnp.asarray(weights.rested)

@@ -18,9 +18,9 @@ def refuse_not_finite(layout: Layout, segments, pieces: Pieces, point: Point) ->
         r, k = np.argwhere(bad)[0]
         state = ", ".join(f"{x:.4g}" for x in np.asarray(point.states)[r, k])
         raise ValueError(
-            f"The model gives no finite number in {segments[r].recording.name} at "
-            f"{pieces.flown.start[r, k]:.4g} s, where the data suggest the state "
-            f"({state}); check its vector field and the nominal parameters there."
+            f"The model is not finite in {segments[r].recording.name} at "
+            f"{pieces.flown.start[r, k]:.4g} s, where the state estimated from the "
+            f"data is ({state}); check its vector field and the nominal parameters."
         )
 
 
@@ -60,8 +60,8 @@ def parameter_places(model: Model, parameters) -> tuple[int, ...]:
         One index per parameter.
 
     Raises:
-        ValueError: A parameter is not one number of the model, or the same one as
-            another.
+        ValueError: A parameter is not a single number of the model, or it is the same
+            number as another parameter.
     """
     leaves, tree = jax.tree.flatten(model)
     numbered = jax.tree.unflatten(tree, list(range(len(leaves))))
@@ -70,14 +70,14 @@ def parameter_places(model: Model, parameters) -> tuple[int, ...]:
         place = parameter.where(numbered)
         if not isinstance(place, int) or np.shape(leaves[place]) != ():
             raise ValueError(
-                f"The parameter {parameter.name!r} is not one number of the model; let "
-                f"`where` pick a field that holds a single number."
+                f"The parameter {parameter.name!r} is not a single number of the "
+                f"model; let `where` select a field that is a single number."
             )
         if place in places:
             other = parameters[places.index(place)].name
             raise ValueError(
                 f"The parameters {other!r} and {parameter.name!r} are the same number; "
-                f"leave one of them out."
+                f"omit one of them."
             )
         places.append(place)
     return tuple(places)

@@ -1,4 +1,4 @@
-"""Choose the accuracy of the joints between pieces, from drive and samples."""
+"""Choose the accuracy of the joints between pieces from the drive and the samples."""
 
 import equinox as eqx
 import jax
@@ -13,17 +13,18 @@ from ._predict import fly, smallest_gap
 from ._program import program
 
 
-# A joint within a flight is this much sharper than its samples determine the state
+# Standard error of a joint within a flight, relative to that of the state from the
+# samples
 JOINT = 1e-3
-# An impact is this much sharper than the flights on both sides are determined: losing a
-# tenth of their variance is negligible, and it removes the effects of chaos and of
-# small model errors
+# Standard error of an impact joint, relative to those of the flights on both sides:
+# losing a tenth of their variance is negligible, and it removes the effects of chaos
+# and of small model errors
 _IMPACT = 10**-0.5
 _WIDTH = 4
 # Number of columns above which the width of a program follows the number of free
 # parameters, and the difference between widths
 _MANY, _STRIDE = 64, 32
-# Steps of a piece up to which one program serves states and parameters
+# Number of steps of a piece up to which one program is used for states and parameters
 _FEW_STEPS = 20
 
 
@@ -37,15 +38,17 @@ def width_of(number: int) -> int:
 def shared_width(free: int, most: int) -> int:
     """Return the number of columns of a program for a subset of the numbers.
 
-    A small set is always computed completely, so that one program serves every choice;
-    a large set is rounded up to a multiple of 32.
+    A small set is always computed completely, so that one program suffices for every
+    choice; a large set is rounded up to a multiple of 32.
     """
     whole = width_of(most)
     return whole if whole <= _MANY else min(whole, _STRIDE * -(-free // _STRIDE))
 
 
 def joint_sharpness(layout: Layout, pieces: Pieces, point: Point, guess) -> Extras:
-    """Return the sharpness of the joints, as far as drive and samples resolve it."""
+    """Return the sharpness of the joints, as far as the drive and the samples resolve
+    it.
+    """
     records, width = pieces.joint.shape
     size = point.states.shape[-1]
     one = jnp.ones((records, width, size))
@@ -59,13 +62,13 @@ def joint_sharpness(layout: Layout, pieces: Pieces, point: Point, guess) -> Extr
     blocks, _ = states_only(layout, alone, extras, point)
     information = jnp.diagonal(blocks.ss, axis1=-2, axis2=-1)
     usual = jnp.nanmedian(jnp.where(information > 0, information, jnp.nan), axis=(0, 1))
-    # an unobserved state is tied as tightly as the least observable state
+    # an unobserved state is connected as tightly as the least observable state
     usual = jnp.where(jnp.isnan(usual), jnp.nanmin(usual), usual)
     floor = JOINT / jnp.sqrt(usual)
     flight = jnp.broadcast_to(floor, one.shape)
     piece = flight / JOINT
     if np.any(np.asarray(pieces.drive_error) > 0):
-        # a component driven by the drive is known as well as the drive
+        # a component determined by the drive is known as accurately as the drive
         by_drive = _drive_in_flight(layout, pieces, point)
         flight = jnp.sqrt(flight**2 + jnp.nan_to_num(by_drive) ** 2)
     sharp = extras._replace(sharpness=Sharpness(flight, flight, one[..., 0], piece))
@@ -85,8 +88,8 @@ def states_only(layout: Layout, pieces: Pieces, extras: Extras, point: Point):
     """Return normal equations of the states, with all parameters held, and the
     costs.
     """
-    # as wide as a fit of everything, which then is compiled already; of many steps, a
-    # separate program soon repays its compilation time
+    # as wide as a fit of all parameters, whose program is then already compiled; for
+    # many steps, a separate program soon repays its compilation time
     few = pieces.angle.shape[-1] <= _FEW_STEPS
     width = width_of(len(layout.places)) if few else _WIDTH
     none = jnp.zeros((pieces.joint.shape[0], width), dtype=int)
@@ -97,9 +100,9 @@ def states_only(layout: Layout, pieces: Pieces, extras: Extras, point: Point):
 def loosened(extras: Extras) -> Extras:
     """Return joints within flights that are as loose as the samples of a piece allow.
 
-    States that the data suggest do not join. Where a flight has many pieces, closing
-    all of them at once would predict the last piece from the first with inaccurate
-    parameters.
+    States estimated from the data are not continuous from piece to piece. In a flight
+    of many pieces, closing all joints at once would predict the last piece from the
+    first with inaccurate parameters.
     """
     sharpness = extras.sharpness
     return extras._replace(sharpness=sharpness._replace(flight=sharpness.piece))
@@ -108,8 +111,8 @@ def loosened(extras: Extras) -> Extras:
 def separated(extras: Extras) -> Extras:
     """Return joints that are so loose that each piece is fitted separately.
 
-    A force that the model lacks acts in every piece; its effect through impacts and
-    other flights is strongly nonlinear.
+    A missing force acts in every piece, whereas its effect through impacts and other
+    flights is strongly nonlinear.
     """
     sharp = extras.sharpness
     return extras._replace(
@@ -169,7 +172,7 @@ def _drive_in_flight(layout: Layout, pieces: Pieces, point: Point):
 
 @program
 def _drive_slopes(layout: Layout, pieces: Pieces, point: Point):
-    """Return the slope of the gap, `(r, k, n)`, and errors of an impact due to the
+    """Return the slope of the gap, `(r, k, n)`, and the errors of an impact due to the
     drive.
     """
 

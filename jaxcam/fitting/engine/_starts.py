@@ -48,21 +48,19 @@ def suggested_starts(model: Model, segments, cuts, pieces: Pieces):
 
 
 def _still(model: Model, part: Segments):
-    """Return the system with its drive at the mean speed; its field serves as a
-    guide only.
+    """Return the system with its drive at the mean speed; its field is only used as a
+    guide.
     """
     if part.drive is None:
         return model.system
-    # arrays: numbers would be constants of a program that is compiled for each
+    # arrays, because numbers would be constants of a program compiled for each
     # recording
     angle, rate = (jnp.asarray(x) for x in (part.drive.phase, part.drive.speed))
     return model.driven(0.0, angle, rate)
 
 
 def _with_samples(side: list[Span]):
-    """Extend pieces that are too short for a polynomial by samples of their
-    neighbours.
-    """
+    """Extend pieces too short for a polynomial by samples of their neighbours."""
     for k, span in enumerate(side):
         if len(span.rows) >= 4:
             yield span

@@ -12,11 +12,13 @@ from ._predict import fly
 from ._program import program
 
 
-# Change (in units of the noise) that halving the steps may make
+# Allowed change (in units of the noise) when the steps are halved
 _STEP_ERROR = 0.01
-# Number of pieces above which the limit decreases, as errors add up along a flight
+# Number of pieces above which the limit decreases, because errors accumulate along a
+# flight
 _LONG = 16
-# Step over time constant of a filter: Hermite's error is then 1e-4 of a jump
+# Step divided by the time constant of a filter; the Hermite error is then 1e-4 of a
+# jump
 _FILTER_STEP = 0.4
 
 
@@ -29,7 +31,8 @@ def longest_flight(cuts) -> int:
 def follows_inputs(model: Model, segments, pieces: Pieces) -> bool:
     """Return whether the steps are short compared with sensor filters and input.
 
-    A filter is not at rest after an impact, which the initial states do not show.
+    A filter is not settled after an impact, which the initial states do not account
+    for.
     """
     longest = float(np.max(np.where(pieces.exists, pieces.flown.step, 0.0)))
     interval = min(part.recording.interval for part in segments)
@@ -44,18 +47,19 @@ def fine_enough(
 ) -> bool:
     """Return whether halving the steps changes all states by less than their errors.
 
-    **Arguments:** `flight` is the number of pieces of the longest flight.
+    **Arguments:** `flight` is the number of pieces in the longest flight.
     """
     part = pieces.flown
     rate = np.repeat(pieces.rate, 2, axis=-1)
-    # a quarter of a step before and after the middle, as the drive turns evenly
+    # a quarter of a step before and after the middle, because the drive turns uniformly
     quarter = np.asarray(part.step)[..., None] / 4
     sign = np.tile([-1.0, 1.0], pieces.rate.shape[-1])
     half = np.repeat(pieces.angle, 2, axis=-1) + sign * quarter * rate, rate
     coarse = _ends(layout, point, part.start, part.step, pieces.angle, pieces.rate)
     fine = _ends(layout, point, part.start, part.step / 2, *half)
     change = np.abs(coarse - fine) / np.asarray(extras.sharpness.piece)
-    # errors of one sign add up to a frequency over a flight of many pieces
+    # errors of the same sign accumulate over a flight of many pieces, like a frequency
+    # error
     part_of_error = _STEP_ERROR / max(1.0, flight / _LONG) ** 1.5
     return bool(np.max(np.where(pieces.exists[..., None], change, 0.0)) < part_of_error)
 

@@ -1,4 +1,4 @@
-"""Pick a number of a system by its dotted name."""
+"""Select a number of a system by its dotted name."""
 
 import dataclasses
 from typing import Any
@@ -6,10 +6,10 @@ from typing import Any
 
 @dataclasses.dataclass(frozen=True)
 class Field:
-    """A picker of a number of a system or a model: `Field("spring.stiffness")`.
+    """Selects a number of a system or a model: `Field("spring.stiffness")`.
 
-    Two of the same name are equal and have the same hash, so that problems of the same
-    rig share compiled programs, as those with a new `lambda` each do not.
+    Two fields of the same name are equal and have the same hash, so problems of the
+    same rig share compiled programs; with separate `lambda` functions they would not.
     """
 
     name: str

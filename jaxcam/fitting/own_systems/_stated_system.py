@@ -19,7 +19,7 @@ from ._system_file import fault
 
 
 Stated: TypeAlias = float | bool | str
-"""A number, or another value of a field."""
+"""A number, or any other value of a field."""
 
 
 def stated_system(
@@ -30,22 +30,22 @@ def stated_system(
     fitted: Collection[str] = (),
     measured: Mapping[str, float] = {},
 ) -> HybridSystem:
-    """Return a system with some of its fields as a file states them.
+    """Return a system with some of its field values taken from a file.
 
     Args:
         file: The file, for messages.
-        values: Values by the names of fields, dotted for those of a part of the system,
+        values: Values by field name. A dotted name belongs to a part of the system,
             which must then have a default.
-        fitted: Names of the fields that have to be numbers.
-        measured: Fields that follow a channel, and their value without a default and
-            without a value in the file.
+        fitted: Names of the fields that must be numbers.
+        measured: Fields that follow a channel, each with the value used if there is no
+            default and no value in the file.
 
     Returns:
         The system.
 
     Raises:
-        RigError: The system cannot be made; the message names the file, the field and
-            the fix.
+        RigError: The system cannot be created; the message names the file, the field
+            and the fix.
     """
     known = inspect.signature(cls).parameters
     for name in (*values, *measured):
@@ -70,8 +70,8 @@ def stated_system(
         system = as_arrays(cls(**given))
     except Exception as error:
         raise RigError(
-            f"{file}: {cls.__name__} cannot be made of these values ({fault(error)}); "
-            f"correct [parameters]."
+            f"{file}: {cls.__name__} cannot be created from these values "
+            f"({fault(error)}); correct [parameters]."
         ) from error
     names = parameter_names(system)
     inner = [name for name in values if "." in name]
@@ -90,19 +90,19 @@ def _as_declared(
 ) -> Any:
     """Convert a value to the type of its field.
 
-    **Raises:** `RigError` for a word or a flag where a number belongs.
+    **Raises:** `RigError` for text or a boolean in place of a number.
     """
     kind, default = declared.annotation, declared.default
     if isinstance(value, float):
-        # a number of teeth, by which a loop may count
+        # an integer such as a number of teeth, used as a loop bound
         whole = kind in (int, "int") and value.is_integer()
         return int(value) if whole and not varies else value
     numbers = float | int | jax.Array
     number = isinstance(default, numbers) and not isinstance(default, bool)
     if number or kind in (float, int, jax.Array, "float", "int"):
         raise RigError(
-            f"{file}: `{name}` in [parameters] is no number; write it without quotes, "
-            f"in SI units."
+            f"{file}: `{name}` in [parameters] is not a number; write it without "
+            f"quotes, in SI units."
         )
     return value
 
@@ -114,8 +114,8 @@ def _unknown(
     hint = f"is `{near[0]}` meant?" if near else f"it has {', '.join(known) or 'none'}."
     where = "[parameters]" if listed else "[drive] or [input]"
     return RigError(
-        f"{file}: {where} names `{printable(name)}`, a number that {cls.__name__} has "
-        f"not; {hint}"
+        f"{file}: {where} contains `{printable(name)}`, but {cls.__name__} has no such "
+        f"number; {hint}"
     )
 
 
@@ -124,8 +124,8 @@ def _refuse_broken(file: Path, system: HybridSystem) -> None:
     name, count = type(system).__name__, len(system.state_names)
     if not count:
         raise RigError(
-            f'{file}: {name} names no states; add state_names = ("position", '
-            f'"velocity") to the class.'
+            f"{file}: {name} does not name its states; add state_names = "
+            f'("position", "velocity") to the class.'
         )
     try:
         system.check()
@@ -153,6 +153,6 @@ def _refuse_broken(file: Path, system: HybridSystem) -> None:
     for function, shape in wanted.items():
         if found[function] != shape:
             raise RigError(
-                f"{file}: `{function}` of {name} has the shape {found[function]} where "
-                f"{shape} belongs to its {count} state names; correct it."
+                f"{file}: `{function}` of {name} has the shape {found[function]}, but "
+                f"{shape} is required for its {count} state names; correct it."
             )

@@ -15,17 +15,17 @@ from ...recordings import RigError
 from ...recordings.files import printable
 
 
-# number of characters of a foreign message that are repeated
+# maximum number of characters repeated from a foreign message
 _MOST = 200
-# programs are compiled for classes: a file that did not change is not run again
+# programs are compiled for classes, so an unchanged file is not executed again
 _loaded: dict[Path, tuple[bytes, ModuleType]] = {}
 
 
 def system_class(named: str, folder: str | Path = ".") -> type[HybridSystem]:
-    """Return the class of a system in a Python file, which is run.
+    """Return the class of a system in a Python file; the file is executed.
 
     Args:
-        named: `FILE.py:CLASS`, the file relative to `folder`.
+        named: `FILE.py:CLASS`, with the file relative to `folder`.
         folder: The folder.
 
     Returns:
@@ -41,7 +41,7 @@ def system_class(named: str, folder: str | Path = ".") -> type[HybridSystem]:
     if not name:
         some = next(iter(found), "CLASS")
         raise RigError(
-            f"{file}: say which class of it is the system, as in {file.name}:{some}."
+            f"{file}: name the class that is the system, as in {file.name}:{some}."
         )
     cls = getattr(module, name, None)
     if cls is None:
@@ -50,7 +50,8 @@ def system_class(named: str, folder: str | Path = ".") -> type[HybridSystem]:
         raise RigError(f"{file}: there is no class `{name}` in it; {hint}")
     if not inspect.isclass(cls) or not issubclass(cls, HybridSystem):
         raise RigError(
-            f"{file}: `{name}` is no HybridSystem; derive it from jaxcam.HybridSystem."
+            f"{file}: `{name}` is not a HybridSystem; derive it from "
+            "jaxcam.HybridSystem."
         )
     missing = sorted(cls.__abstractmethods__)
     if missing:
@@ -59,7 +60,8 @@ def system_class(named: str, folder: str | Path = ".") -> type[HybridSystem]:
 
 
 def system_source(cls: type[HybridSystem]) -> str | None:
-    """Return `FILE.py:CLASS` of a class from such a file, or `None` for any other.
+    """Return `FILE.py:CLASS` for a class from such a file, or `None` for any other
+    class.
 
     Args:
         cls: The class.
@@ -84,7 +86,7 @@ def classes_beside(cls: type[HybridSystem]) -> tuple[type, ...]:
 def split_name(named: str) -> tuple[str, str]:
     """Split `FILE.py:CLASS` into file and class; the class may be missing."""
     path, colon, name = named.rpartition(":")
-    # the colon of a drive, as in C:\rigs\cart.py, names no class
+    # the colon after a drive letter, as in C:\rigs\cart.py, is not followed by a class
     return (path, name) if colon and name.isidentifier() else (named, "")
 
 
@@ -97,7 +99,7 @@ def fault(error: BaseException, file: Path | None = None) -> str:
     ]
     where = f"line {lines[-1]} raises " if lines and lines[-1] else ""
     if isinstance(error, SyntaxError):
-        where = f"line {error.lineno} is no Python: "
+        where = f"line {error.lineno} is not valid Python: "
     words = " ".join(str(error).split())
     words = words if len(words) <= _MOST else f"{words[:_MOST]}..."
     said = f"{type(error).__name__}: {words}" if words else type(error).__name__
@@ -105,7 +107,7 @@ def fault(error: BaseException, file: Path | None = None) -> str:
 
 
 def _module(file: Path) -> ModuleType:
-    """Return the definitions of a file, which is run again only if it changes."""
+    """Return the module of a file, which is executed again only if it changes."""
     if file.suffix != ".py":
         raise RigError(f"{file}: name a Python file and a class, as in cart.py:Cart.")
     if not file.is_file():
@@ -123,7 +125,7 @@ def _module(file: Path) -> ModuleType:
     # modules next to the file can be imported by it
     sys.path.insert(0, str(file.parent))
     try:
-        # compiled here, since the cache of Python's own import compares seconds only
+        # compiled here because the import cache of Python compares whole seconds only
         exec(compile(content, str(file), "exec"), vars(module))
     except (Exception, SystemExit) as error:
         del sys.modules[name]

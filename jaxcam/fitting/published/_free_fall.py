@@ -23,7 +23,7 @@ class FreeFall(eqx.Module):
     system: HybridSystem
     """The system."""
     state: Float[Array, " n"] | tuple[Float[Array, ""], ...]
-    """State at the start, shape `(n,)`, or its components one by one."""
+    """Initial state, shape `(n,)`, or its components as a tuple."""
 
 
 def fit_free_fall(
@@ -41,30 +41,32 @@ def fit_free_fall(
     """Fit one parameter, and the initial state, to a motion without contact.
 
     The motion of the rig depends on inertia and stiffness only through M = J/K (thesis,
-    eq. 4.9): pick one of them with `where` and hold the other.
+    eq. 4.9): select one of them with `where`; the other is held.
 
     Args:
         system: The system.
-        where: Picks the parameter of the system.
+        where: Selects the parameter of the system.
         times: Times (s), increasing, before the first impact, shape `(k,)`.
         measured: One component of the state at these times, shape `(k,)`.
         error: Standard error of a sample, in the unit of the component.
-        state: Guess of the state at `times[0]`, shape `(n,)`.
+        state: Initial guess of the state at `times[0]`, shape `(n,)`.
         observe: Index of the measured component.
-        name: Name of the parameter, for the report.
-        steps: Number of Runge-Kutta steps of order 8 between two samples.
+        name: Name of the parameter for the report.
+        steps: Number of eighth-order Runge-Kutta steps between two samples.
 
     Returns:
         A [`jaxcam.fitting.published.PublishedFit`][] whose `model` has the fields
             `system` and `state`.
 
     Raises:
-        ValueError: Times do not increase.
+        ValueError: The times do not increase.
     """
     times, measured = np.asarray(times, dtype=float), np.asarray(measured, dtype=float)
     state = np.asarray(state, dtype=float)
     if times.shape != measured.shape or not np.all(np.diff(times) > 0):
-        raise ValueError("Give increasing `times` and one measured value for each.")
+        raise ValueError(
+            "Give increasing `times` and one measured value for each time."
+        )
     number = state.shape[0]
     starts, spans = jnp.asarray(times[:-1]), jnp.asarray(np.diff(times))
 
@@ -77,7 +79,7 @@ def fit_free_fall(
         _, later = jax.lax.scan(one, model.state, (starts, spans))
         return jnp.append(model.state[observe], later)
 
-    # the state is split into scalars, so that each can be free
+    # the state is split into scalars, so that each can be a free parameter
     def pick(model):
         return [where(model.system), *model.state]
 

@@ -22,19 +22,20 @@ def interruption_of_chattering(
     """Return the parameter value at which complete chattering ends at the release
     point.
 
-    [`variational.chatter_interruption`][] for use in a fit: forward-differentiable in
-    all other parameters, and NaN instead of an error when a step of the fit moves the
-    interruption out of the bracket.
+    This is [`variational.chatter_interruption`][] for use in a fit: it can be
+    differentiated in forward mode with respect to all other parameters, and it returns
+    NaN instead of raising an error if a step of the fit moves the interruption out of
+    the bracket.
 
     Args:
         system: A system with two states, one constraint and a period.
-        where: Picks the parameter.
-        bracket: Two values of it, wide around the published one, with complete
-            chattering at one of them only.
+        where: Selects the parameter.
+        bracket: Two values of the parameter, well to either side of the published one,
+            with complete chattering at only one of them.
         periods: Number of forcing periods from release to the release after sticking.
 
     Returns:
-        The parameter, in its own unit; NaN where the bracket holds no interruption.
+        The parameter, in its own unit; NaN if the bracket contains no interruption.
 
     Raises:
         ValueError: The system has no period.

@@ -1,8 +1,8 @@
 """Fit parameters to printed numbers instead of recordings.
 
-The data are published numbers (multipliers, positions, speeds,
-bifurcation points), the model is the differentiable function that computes them, and
-nominal values with tolerances are the prior:
+The data are published numbers (multipliers, positions, speeds, bifurcation points). The
+model is a differentiable function that computes them, and nominal values with
+tolerances are the prior:
 
     minimise  sum ((f_i(p) - y_i) / e_i)^2  +  sum ((p_j - n_j) / s_j)^2.
 """
@@ -24,14 +24,14 @@ from ...parameters import VectorLike
 from ._published_fit import PublishedFit
 
 
-# a residual of this many standard errors, or one that cannot be computed
+# upper limit of a residual in standard errors, used if it cannot be computed
 _HOPELESS = 1e8
-# relative change at which the iteration ends
+# relative change below which the iteration ends
 _XTOL = 1e-10
 
 
 class Published(eqx.Module):
-    """Printed numbers, and the function that computes them from the model.
+    """Printed numbers and the function that computes them from the model.
 
     Raises:
         ValueError: An error is not positive.
@@ -44,16 +44,18 @@ class Published(eqx.Module):
     """
 
     name: str = eqx.field(static=True)
-    """Name of the numbers, for the report."""
+    """Name of the numbers for the report."""
     compute: Callable[[Any], Float[Array, " k"]]
-    """Takes the model and returns `(k,)`; differentiable, as
-    [`variational.impact_orbit`][] and [`variational.fold_of_orbit`][] are."""
+    """Function of the model that returns an array `(k,)`; it must be differentiable,
+    like [`variational.impact_orbit`][] and [`variational.fold_of_orbit`][] are.
+    """
     values: Float[np.ndarray, " k"]
-    """Shape `(k,)`, as printed."""
+    """The values as printed, shape `(k,)`."""
     errors: Float[np.ndarray, " k"]
-    """Standard errors, a number or shape `(k,)`. A number printed with its last digit
-    at 10^-m has 10^-m / sqrt(12) from rounding alone; see
-    [`jaxcam.fitting.published.rounding_error`][]."""
+    """Standard errors, a number or an array `(k,)`. A number printed to m decimal
+    places has a standard error of 10^-m / sqrt(12) from rounding alone; see
+    [`jaxcam.fitting.published.rounding_error`][].
+    """
 
     def __init__(self, name: str, compute, values, errors):
         self.name = name
@@ -65,15 +67,16 @@ class Published(eqx.Module):
         if not np.all(self.errors > 0):
             raise ValueError(
                 f"Give {name!r} positive standard errors; a printed number has at "
-                "least that of its rounding."
+                "least the error of rounding."
             )
 
 
 def rounding_error(decimals: int) -> float:
-    """Return the standard deviation of the error of rounding to `decimals` digits.
+    """Return the standard deviation of the error of rounding to `decimals` decimal
+    places.
 
     Args:
-        decimals: Number of digits after the point.
+        decimals: Number of digits after the decimal point.
 
     Returns:
         10^-decimals / sqrt(12).
@@ -94,18 +97,20 @@ def fit_published(
 ) -> PublishedFit:
     """Fit parameters of a model to published numbers.
 
-    Levenberg-Marquardt (MINPACK); far from the data, errors are first taken larger.
+    The method is Levenberg-Marquardt (MINPACK); far from the data, larger errors are
+    used at first.
 
     Args:
-        model: A system, or a Module with one in it, at the nominal values.
-        where: Picks the free scalars, which centre the priors.
+        model: A system, or a module that contains one, at the nominal values.
+        where: Selects the free scalars, whose nominal values are the centres of the
+            priors.
         published: The data.
         names: Names of the free parameters.
         tolerances: Standard deviations of the priors; infinity for none.
         start: Initial values; default nominal.
-        max_steps: Largest number of evaluations per scale of the errors.
-        progress: Called after each evaluation with its number and its cost, the sum
-            that is minimised.
+        max_steps: Maximum number of evaluations for each scale of the errors.
+        progress: Called after each evaluation with its number and the cost (the sum to
+            be minimised).
 
     Returns:
         A [`jaxcam.fitting.published.PublishedFit`][].
@@ -141,7 +146,8 @@ def fit_published(
 
     @eqx.filter_jit
     def program(unknowns, model):
-        # one call site: tracing and compiling the quantities takes most of the time
+        # a single call site, because tracing and compiling the quantities takes most of
+        # the time
         def twice(unknowns):
             value = predicted(unknowns, model)
             return value, value
@@ -187,7 +193,7 @@ def _check_lengths(number: int, names, priors) -> None:
     for given, length in (("names", len(names)), ("tolerances", len(priors))):
         if length != number:
             raise ValueError(
-                f"`where` picks {number} numbers, and there are {length} `{given}`; "
+                f"`where` selects {number} numbers, but there are {length} `{given}`; "
                 "give one for each."
             )
     if not np.all(priors > 0):
@@ -205,13 +211,14 @@ def _refuse_lost(published, values) -> None:
     ]
     if lost:
         raise ValueError(
-            f"Start nearer: {', '.join(lost)} cannot be computed at the start."
+            f"{', '.join(lost)} cannot be computed at the start; start nearer to the "
+            "solution."
         )
 
 
 def _least_squares(describe, values, errors, weights, unknowns, max_steps):
-    """Return the optimum for these errors; `describe` gives quantities and their
-    slopes.
+    """Return the optimum for these errors; `describe` returns the quantities and their
+    derivatives.
     """
 
     def residuals(unknowns):
@@ -223,9 +230,9 @@ def _least_squares(describe, values, errors, weights, unknowns, max_steps):
         slope = describe(unknowns)[1] / errors[:, None]
         return np.concatenate([np.nan_to_num(slope), np.diag(weights)])
 
-    # optimistix ends at the same optimum, but scales no parameter by its slope and
-    # compiles the quantities into its loop: for the rig of the thesis 1.7 times the
-    # steps and twice the time
+    # optimistix finds the same optimum, but does not scale parameters by their
+    # derivatives and compiles the quantities into its loop: for the thesis rig, it
+    # needs 1.7 times the steps and twice the time
     return scipy.optimize.least_squares(
         residuals,
         unknowns,
@@ -239,7 +246,7 @@ def _least_squares(describe, values, errors, weights, unknowns, max_steps):
 
 
 def _described(program, cost, progress):
-    """Return quantities and their slopes; the last evaluation is cached."""
+    """Return the quantities and their derivatives; the last evaluation is cached."""
     counted = itertools.count(1)
 
     @functools.lru_cache(maxsize=1)
@@ -250,7 +257,7 @@ def _described(program, cost, progress):
             progress(next(counted), cost(unknowns, value))
         return value, slope
 
-    # value and slope are requested one after the other at the same point
+    # value and derivative are requested one after the other at the same point
     return lambda unknowns: cached(np.asarray(unknowns, dtype=float).tobytes())
 
 
@@ -262,7 +269,7 @@ def _split(published, vector):
 def _picked(model, where):
     leaves = [jnp.asarray(leaf, dtype=float) for leaf in where(model)]
     if any(leaf.ndim != 0 for leaf in leaves):
-        raise ValueError("`where` must pick single numbers; index arrays in it.")
+        raise ValueError("`where` must select single numbers; index any arrays in it.")
     flat, unravel = ravel_pytree(leaves)
     like = where(model)
 

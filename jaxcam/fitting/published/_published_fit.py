@@ -18,9 +18,9 @@ if TYPE_CHECKING:
 class PublishedFit:
     """Result of [`jaxcam.fitting.fit_published`][].
 
-    - `estimates`, `stderr`, `covariance`: `(p,)`, `(p,)`, `(p, p)`; priors
-        included, errors of the data as stated.
-    - `chi_square`: of the data alone.
+    - `estimates`, `stderr`, `covariance`: shapes `(p,)`, `(p,)`, `(p, p)`; including
+        the priors, with the stated errors of the data.
+    - `chi_square`: chi-square of the data alone.
     """
 
     model: Any
@@ -32,12 +32,12 @@ class PublishedFit:
     tolerances: Float[np.ndarray, " p"]
     """Tolerances, shape `(p,)`."""
     estimates: Float[np.ndarray, " p"]
-    """Estimates, priors included, shape `(p,)`."""
+    """Estimates, including the priors, shape `(p,)`."""
     covariance: Float[np.ndarray, "p p"]
     """Covariance of the estimates, shape `(p, p)`."""
     shares: Float[np.ndarray, " p"]
-    """Share of the information on each combination of parameters that comes from
-    the data and not from the priors (0 to 1), ascending, shape `(p,)`.
+    """Share of the information on each combination of parameters that comes from the
+    data rather than the priors (0 to 1), ascending, shape `(p,)`.
     """
     directions: Float[np.ndarray, "p p"]
     """The combinations, one per row, in units of the tolerances, shape `(p, p)`."""
@@ -48,7 +48,7 @@ class PublishedFit:
     steps: int
     """Number of iterations."""
     converged: bool
-    """Whether the last stage met its tolerance."""
+    """Whether the last stage of the fit met its tolerance."""
 
     @staticmethod
     def build(
@@ -64,8 +64,8 @@ class PublishedFit:
         steps,
         converged,
     ) -> "PublishedFit":
-        """Return the result from the Jacobian of the data in standard errors by the
-        parameters.
+        """Return the result, given the Jacobian of the data (in standard errors) with
+        respect to the parameters.
         """
         finite: Bool[np.ndarray, " p"] = np.isfinite(tolerances)
         units = np.where(finite, tolerances, np.where(nominal == 0, 1, np.abs(nominal)))
@@ -103,7 +103,7 @@ class PublishedFit:
         return self.covariance / np.outer(errors, errors)
 
     def ellipse(self, names: Sequence[str], level: float = 0.95) -> Ellipse:
-        """Return the joint confidence region of two or more parameters, the others left
+        """Return the joint confidence region of two or more parameters, with all others
         free.
 
         Raises:
@@ -155,11 +155,11 @@ class PublishedFit:
         )
 
     def weak(self, share: float = 0.5) -> list[str]:
-        """Return the combinations of parameters that rest on the priors more than on
-        the data.
+        """Return the combinations of parameters that are determined more by the priors
+        than by the data.
 
-        One sentence each, the weakest first; `share` is the part of the information
-        that must come from the data.
+        There is one sentence for each, the weakest first; `share` is the share of the
+        information that must come from the data.
         """
         sentences = []
         for part, direction in zip(self.shares, self.directions, strict=True):
@@ -172,7 +172,7 @@ class PublishedFit:
                 f"{sign * direction[k]:+.2f} {self.names[k]}" for k in main
             )
             sentences.append(
-                f"The data give {100 * part:.2g} % of the information on the "
+                f"The data provide {100 * part:.2g} % of the information on the "
                 f"combination {words} (in units of the tolerances)."
             )
         return sentences

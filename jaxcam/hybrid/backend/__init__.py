@@ -1,9 +1,10 @@
-"""Compile the event loop to machine code with LLVM, from the traced attempt.
+"""Compile the event loop to machine code with LLVM, starting from the traced attempt.
 
 XLA compiles an attempt as hundreds of inner loops over a batch and passes values
-between them through memory. Here a single loop contains one attempt for as many batch
-elements as fit into a vector, and replaces elements that end. It is used for runs that
-are not traced. The program is the same; results differ by rounding errors.
+between them through memory. Here, a single loop contains one attempt for as many batch
+elements as fit into a vector register, and replaces elements that end. It is used for
+runs that are not traced. The program is the same; results differ only by rounding
+errors.
 """
 
 from ._attempts import (

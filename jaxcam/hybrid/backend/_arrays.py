@@ -1,7 +1,7 @@
 """Operations on small arrays: rearrangements, sums and products.
 
-An array is a numpy array whose elements are numbers known while tracing (numpy) or
-values of LLVM.
+An array is a numpy array whose elements are numbers known while tracing (numpy) or LLVM
+values.
 """
 
 import functools
@@ -76,7 +76,9 @@ def moved(equation, inputs) -> list[np.ndarray]:
 
 @no_type_check
 def _plainly_moved(equation, inputs):
-    """Return the most frequent rearrangements, by numpy alone; otherwise `None`."""
+    """Return the result of common rearrangements, using only numpy; otherwise
+    `None`.
+    """
     name, params, first = equation.primitive.name, equation.params, inputs[0]
     if name in ("reshape", "squeeze", "expand_dims", "copy"):
         return first.reshape(equation.outvars[0].aval.shape)
@@ -98,7 +100,7 @@ def _plainly_moved(equation, inputs):
 
 
 def _fill(equation):
-    """Return the value of a gather beyond the array."""
+    """Return the value of a gather outside the array."""
     dtype, value = equation.outvars[0].aval.dtype, equation.params.get("fill_value")
     if value is None:
         inexact = np.issubdtype(dtype, np.inexact)
@@ -171,7 +173,7 @@ def looked_up(w: Writer, equation, inputs, dtypes) -> list[np.ndarray]:
         raise Lacking("gather of a batch")
     shape, sizes = inputs[0].shape, equation.params["slice_sizes"]
     room = [shape[d] - sizes[d] + 1 for d in numbers.start_index_map]
-    # beyond the array, use the fill value or the nearest element
+    # outside the array, use the fill value or the nearest element
     mode = str(equation.params["mode"]).upper()
     clips = "FILL" not in mode
     return _by_comparison(w, equation, inputs, (1,), room, clips, dtypes)

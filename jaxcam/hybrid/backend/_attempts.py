@@ -18,7 +18,7 @@ from ._machine import Compiled, compiled
 from ._writer import kind_of, Lacking
 
 
-# rounds per call; between calls Python may be interrupted or show progress
+# rounds per call; between calls, Python can be interrupted or show progress
 _PATIENCE = 200_000
 _POINTERS = (ctypes.c_void_p,) * 8
 _ARGUMENTS = (
@@ -80,10 +80,11 @@ def laid_out(tree, lanes: int | None = None) -> tuple[np.ndarray, Layout]:
 class Key(NamedTuple):
     """The key of a compiled attempt; hashable."""
 
-    # non-array parts of system and plan, with types and positions
+    # non-array parts of the system and the plan, with types and positions
     static: tuple
     structure: Any
-    # arrays of system and plan that differ between batch elements, and shared arrays
+    # arrays of the system and the plan that differ between batch elements, and shared
+    # ones
     own: Layout
     shared: Layout
     # pytree of the scalars of the state, and their types
@@ -95,7 +96,7 @@ class Key(NamedTuple):
 
 
 def key_of(static, own: Layout, shared: Layout, lane: LoopState, row, width) -> Key:
-    """Return the key of an attempt for such a batch element."""
+    """Return the key of an attempt for batch elements of this kind."""
     leaves, structure = jax.tree.flatten(static)
     scalars, lane_structure = jax.tree.flatten(lane)
     # 1, 1.0 and True compare equal but need different programs
@@ -139,8 +140,8 @@ def traced(key: Key) -> Program:
 
 
 class Sizes(NamedTuple):
-    """Return the number of values in a state, in the element's own data and in a row of
-    the log.
+    """The number of values in a state, in the data of one element, and in a row of the
+    log.
     """
 
     state: int

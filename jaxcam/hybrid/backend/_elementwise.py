@@ -1,7 +1,7 @@
-"""Elementwise operations of JAX, with the conventions of XLA for NaN.
+"""Elementwise operations of JAX, with XLA's conventions for NaN.
 
-Each function takes the writer, the parameters of the operation, the type of its
-operands in JAX, and the operands, which are all scalars or all vectors.
+Each function takes the writer, the parameters of the operation, the JAX type of its
+operands, and the operands, which are either all scalars or all vectors.
 """
 
 from typing import no_type_check
@@ -29,7 +29,7 @@ _SUMS = {"add": "add", "add_any": "add", "sub": "sub", "mul": "mul"}
 
 @no_type_check
 def elementwise(w: Writer, name: str, params, dtype, x):
-    """The result of an operation.
+    """Return the result of an operation.
 
     **Raises:** `Lacking`, with the name of the operation.
     """

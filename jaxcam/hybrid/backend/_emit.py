@@ -1,4 +1,4 @@
-"""Translate a program of JAX to instructions of LLVM, operation by operation."""
+"""Translate a JAX program to LLVM instructions, operation by operation."""
 
 from typing import no_type_check
 

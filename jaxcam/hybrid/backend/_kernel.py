@@ -26,15 +26,16 @@ _FLOAT = np.dtype(np.float64)
 
 
 class Program(NamedTuple):
-    """One attempt: a jaxpr of shared values, own values and the state.
+    """One attempt: a jaxpr whose inputs are shared values, own values and the state.
 
-    The first two are arrays, the rest scalars. Results are the scalars of the new
-    state, the place of a row of the log (negative if there is none), and that row.
+    The first two are arrays, the others scalars. The results are the scalars of the new
+    state, the index of a row of the log (negative if there is none), and that row.
     """
 
     jaxpr: Any
     consts: list
-    # types of the scalars of the state, and the indices of status and attempt counter
+    # types of the scalars of the state, and the indices of the status and attempt
+    # counter
     dtypes: tuple
     status: int
     steps: int

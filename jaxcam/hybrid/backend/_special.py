@@ -1,4 +1,5 @@
-"""Vectorised exponentials, logarithms and remainders; other functions by the C library.
+"""Vectorised exponentials, logarithms and remainders; other functions from the C
+library.
 
 The formulas are those of fdlibm (Sun Microsystems, 1993) without branches: errors are
 below 1 ulp. A function of the C library is called once per batch element; its error is
@@ -93,7 +94,7 @@ class Arithmetic:
 
 
 def exp(writer: Writer, x):
-    """e^x of 64-bit floats, below 1 ulp."""
+    """Return e^x of 64-bit floats with an error below 1 ulp."""
     a = Arithmetic(writer)
     # beyond these limits the result is infinite or zero; NaN is preserved
     x = a.choose(a.less(x, -750.0), -750.0, x)
@@ -104,7 +105,7 @@ def exp(writer: Writer, x):
 
 
 def exp2(writer: Writer, x):
-    """2^x of 64-bit floats, below 1 ulp."""
+    """Return 2^x of 64-bit floats with an error below 1 ulp."""
     a = Arithmetic(writer)
     x = a.choose(a.less(x, -1080.0), -1080.0, x)
     x = a.choose(a.less(1025.0, x), 1025.0, x)
@@ -120,7 +121,7 @@ def exp2(writer: Writer, x):
 
 
 def _scaled_exp(a: Arithmetic, high, low, turns):
-    """e^(high - low) 2^turns for |high| <= ln 2 / 2."""
+    """Return e^(high - low) 2^turns for |high| <= ln 2 / 2."""
     r = a.sub(high, low)
     z = a.mul(r, r)
     c = a.sub(r, a.mul(z, a.horner(_EXP, z)))
@@ -138,12 +139,12 @@ def _scaled_exp(a: Arithmetic, high, low, turns):
 
 
 def log(writer: Writer, x):
-    """Natural logarithm of 64-bit floats, below 1 ulp."""
+    """Return the natural logarithm of 64-bit floats with an error below 1 ulp."""
     a = Arithmetic(writer)
     small = a.less(x, 2.2250738585072014e-308)
     y = a.choose(small, a.b.fmul(x, writer.like(x, 2.0**54)), x)
     bits = a.bits(y)
-    # the exponent of y over sqrt(1/2)
+    # the exponent of y / sqrt(1/2)
     shifted = a.b.sub(bits, writer.like(bits, 0x3FE6A09E667F3BCD))
     turns = a.b.ashr(shifted, writer.like(bits, 52))
     mantissa = a.b.sub(bits, a.b.shl(turns, writer.like(bits, 52)))

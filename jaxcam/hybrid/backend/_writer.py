@@ -29,7 +29,7 @@ class Lacking(Exception):
 
 
 def kind_of(dtype) -> Any:
-    """Return the type of a scalar in LLVM."""
+    """Return the LLVM type of a scalar."""
     if str(dtype) not in _KINDS:
         raise Lacking(f"numbers of type {dtype}")
     return _KINDS[str(dtype)]
@@ -46,7 +46,7 @@ class Writer:
 
     def __init__(self, module: ir.Module, builder: ir.IRBuilder, width: int):
         self.module, self.builder, self.width = module, builder, width
-        # in branches and loops: the batch elements for which the result counts
+        # in branches and loops: the batch elements for which the result is used
         self.mask: Any = None
 
     def vector(self, kind):

@@ -1,7 +1,9 @@
-"""Store many lanes as one matrix of numbers, and compile the loop that works on it.
+"""Store many batch elements (lanes) as one matrix, and compile the loop that works on
+it.
 
-Each chunk is one dispatch of few arrays. Passing a whole system and all leaves of a
-lane instead would cost four times as much: as much as 64 lanes need for a chunk.
+Each chunk is one dispatch with few arrays. Passing a whole system and all leaves of a
+lane instead would take four times as long, which is as long as 64 lanes need for a
+chunk.
 """
 
 import functools
@@ -18,18 +20,18 @@ from ..loop import attempts, first_state, Functions, LoopState, Plan, run_many
 from ..lowering import one_kernel, Packed, without_library
 
 
-# starts that are computed at once, over lanes that run at once
+# ratio of starts computed at once to lanes that run at once
 _AT_ONCE = 16
 
 
 class LaneLayout(NamedTuple):
-    """The rows of the matrix that hold each number of a lane, and their types."""
+    """The matrix rows that hold each number of a lane, and their types."""
 
     rows: LoopState
     dtypes: tuple
 
     def unpacked(self, numbers) -> LoopState:
-        """The lane whose numbers these are."""
+        """Return the lane with these numbers."""
         leaves = [
             number.astype(dtype)
             for number, dtype in zip(numbers, self.dtypes, strict=True)
@@ -37,13 +39,13 @@ class LaneLayout(NamedTuple):
         return jax.tree.unflatten(jax.tree.structure(self.rows), leaves)
 
     def example(self) -> LoopState:
-        """Shapes of the scalars of a lane."""
+        """Return the shapes of the scalars of a lane."""
         kinds = [jax.ShapeDtypeStruct((), dtype) for dtype in self.dtypes]
         return jax.tree.unflatten(jax.tree.structure(self.rows), kinds)
 
 
 def packed(lane: LoopState):
-    """All numbers of a lane (or of many) as rows of 64-bit floats."""
+    """Return all numbers of one or more lanes as rows of 64-bit floats."""
     return jnp.stack([jnp.asarray(leaf, jnp.float64) for leaf in jax.tree.leaves(lane)])
 
 
@@ -60,22 +62,24 @@ class Lanes(NamedTuple):
 
     system: HybridSystem
     where: Callable | None
-    """The leaves picked by `where` take `values`, `(lanes,)` or `(lanes, k)`; or
-    neither."""
+    """The leaves selected by `where` take the `values`, `(lanes,)` or `(lanes, k)`;
+    both may be `None`.
+    """
     values: np.ndarray | None
     states: np.ndarray
-    """(lanes, n)."""
+    """Initial states, `(lanes, n)`."""
 
     def some(self, which: slice) -> "Lanes":
-        """Return a part of the lanes."""
+        """Return some of the lanes."""
         values = None if self.values is None else self.values[which]
         return self._replace(values=values, states=self.states[which])
 
 
 class Horizon(NamedTuple):
-    """The time span to run: `number` periods of length `period` (s) from `t0` (s) on.
+    """The time span to run: `number` periods of length `period` (s), starting at `t0`
+    (s).
 
-    By default the period is the system's own, lane by lane.
+    By default, the period is that of the system in each lane.
     """
 
     t0: Any
@@ -84,21 +88,21 @@ class Horizon(NamedTuple):
 
 
 class LaneStart(NamedTuple):
-    """Initial lanes, one column each, and the arrays they are run with."""
+    """Initial lanes, one column each, and the arrays with which they are run."""
 
     slots: LaneLayout
     numbers: np.ndarray
     own: Any
-    """Parts of system and plan that differ from lane to lane, and that do not."""
+    """Parts of the system and the plan that differ between lanes, and shared parts."""
     shared: Any
     static: Any
 
 
 def start_lanes(lanes: Lanes, horizon: Horizon, settings, width: int) -> LaneStart:
-    """Return the start of lanes; `width` of them will run at a time."""
+    """Return the start of the lanes, of which `width` will run at a time."""
     pieces, count = [], len(lanes.states)
     whole = jnp.asarray(float(horizon.number))
-    # padded, so that two compiled programs serve all numbers of lanes
+    # padded, so that two compiled programs suffice for any number of lanes
     part_size = width if count <= 2 * width else _AT_ONCE * width
     for first in range(0, count, part_size):
         some = np.minimum(np.arange(first, first + part_size), count - 1)
@@ -118,15 +122,15 @@ def start_lanes(lanes: Lanes, horizon: Horizon, settings, width: int) -> LaneSta
 def compiled_chunk(
     start: LaneStart, own: Packed, shared: Packed, rows: int, row: Callable
 ):
-    """Return the compiled loop: own and shared parts, each as numbers and what is
-    apart, and the numbers of the lanes, to numbers and log.
+    """Return the compiled loop, a function of own and shared parts (each as numbers and
+    separate leaves) and of the numbers of the lanes, which returns numbers and log.
 
-    It makes `rows` attempts in each slot, in whole blocks. `row` is that of a `Table`;
-    of each of its numbers the log has one array, `(rows, slots)`, first the places plus
-    one, which are zero where nothing was done.
+    It makes `rows` attempts in each slot, in whole blocks. `row` is that of a `Table`.
+    The log has one array `(rows, slots)` for each number in a row; the first contains
+    the places plus one, and is zero where nothing was done.
     """
     leaves, structure = jax.tree.flatten(start.static)
-    # 1, 1.0 and True are equal, and different programs
+    # 1, 1.0 and True compare equal but need different programs
     key = tuple((type(leaf), leaf) for leaf in leaves)
     flat, lane = jax.tree.flatten(start.slots.rows)
     packings = own.packing, shared.packing
@@ -144,7 +148,7 @@ def _chunk(
 
     def numbers_of(record, lane):
         place, values = row(record, lane)
-        # rows of a chunk that ends early are zero: no place
+        # rows of a chunk that ends early are zero, which means no place
         return [jnp.asarray(v) for v in (place + 1.0, *values)]
 
     def one(own, shared, lane):
@@ -167,7 +171,7 @@ def _chunk(
         _, plan = static
         return one_kernel(loop, batch=True, on=not plan.plain)(numbers)
 
-    # the widest vectors that the machine has; XLA is shy of them by default
+    # the widest vectors of the machine, which XLA avoids by default
     return jax.jit(whole, compiler_options={"xla_cpu_prefer_vector_width": 512})
 
 
@@ -185,7 +189,9 @@ def split_lanes(system, where, values):
 
 @eqx.filter_jit
 def _start(batched, shared, period, t0, turns, settings, states):
-    """Layout and numbers; system and plan, split by what differs from lane to lane."""
+    """Return layout and numbers, and system and plan split into own and shared
+    parts.
+    """
 
     def prepared(batched):
         system = eqx.combine(batched, shared).prepared()
@@ -226,7 +232,7 @@ def _start(batched, shared, period, t0, turns, settings, states):
 
 
 def _depends(function: Callable, argument):
-    """Return for each leaf of the result whether it depends on the argument."""
+    """Return whether each leaf of the result depends on the argument."""
     result = eqx.filter_eval_shape(function, argument)
     closed = jax.make_jaxpr(lambda a: eqx.filter(function(a), eqx.is_array))(argument)
     known = {id(v) for v in closed.jaxpr.invars}

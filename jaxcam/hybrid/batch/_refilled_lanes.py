@@ -1,5 +1,5 @@
-"""Run a group of lanes in fewer batch positions; the next lane replaces an ended
-one.
+"""Run a group of lanes in fewer batch positions; each ended lane is replaced by the
+next.
 """
 
 from typing import NamedTuple
@@ -22,23 +22,25 @@ from ._table import Table
 
 
 class Chunking(NamedTuple):
-    """Chunk sizes of a batch run; they change no result except through the budget."""
+    """Chunk sizes of a batch run; only the maximum number of attempts affects
+    results.
+    """
 
     width: int
-    """Lanes that run at a time."""
+    """Number of lanes that run at a time."""
     rows: int
-    """Attempts in a chunk, after which ended lanes are replaced."""
+    """Number of attempts in a chunk, after which ended lanes are replaced."""
     max_steps: int
-    """Attempts of one lane, at most."""
+    """Maximum number of attempts of one lane."""
 
 
 def run_refilled(
     lanes: Lanes, horizon: Horizon, settings, chunking: Chunking, table: Table
 ):
-    """Run some lanes; the next lane replaces one that has ended.
+    """Run some lanes; each lane that ends is replaced by the next.
 
-    Lanes are independent, so their order and grouping change no result. The
-    log of all goes into the `table`.
+    Lanes are independent, so their order and grouping do not change any result. The
+    logs of all lanes are stored in the `table`.
 
     Returns:
         Impacts, attempts and result codes, each `(lanes,)`.
@@ -81,7 +83,7 @@ def _by_xla(start: LaneStart, chunking: Chunking, table: Table):
     place = start.slots.rows
     ends = np.zeros((count, 3), dtype=int)
     # spread evenly, to estimate the cost of the others; positions without a lane of
-    # their own hold the last one and do not run
+    # their own hold the last one and are not run
     first = np.linspace(0, count - 1, min(width, count)).astype(int)
     work, used = np.full(width, count - 1), np.zeros(width)
     work[: len(first)], running = first, np.arange(width) < count
@@ -100,7 +102,7 @@ def _by_xla(start: LaneStart, chunking: Chunking, table: Table):
         numbers = np.array(numbers)
         counted = [place.status, place.impacts, place.steps]
         ends[work[over]] = numbers[counted].T[over]
-        # a lane that has used up the budget stays where it is
+        # a lane that has used up its attempts does not change
         numbers[place.status, over], running[over] = FINISHED, False
         if not sorted_yet:
             waiting = costly_first(waiting, work, used, numbers[place.stops])
@@ -114,7 +116,7 @@ def _by_xla(start: LaneStart, chunking: Chunking, table: Table):
 
 
 def costly_first(waiting, work, used, stops):
-    """Sort the waiting lanes by expected attempts, the largest first.
+    """Sort the waiting lanes by expected number of attempts, the largest first.
 
     A long lane that starts last leaves the other positions idle. Neighbouring lanes
     have similar costs, so the attempts per period of running lanes predict them.

@@ -1,4 +1,4 @@
-"""A table in which each row of a log is stored at its batch element's place."""
+"""A table that stores each row of a log at a place of its batch element."""
 
 from collections.abc import Callable
 
@@ -10,8 +10,8 @@ class Table:
 
     **Arguments:** `row(record, state)`, which returns the place (negative for none) and
     the numbers of the row for an attempt and the state after it; the numbers of batch
-    elements, places and columns; and the place that comes `first`. A later row replaces
-    an earlier one in its place.
+    elements, places and columns; and the `first` place. A later row replaces an earlier
+    one at the same place.
     """
 
     def __init__(
@@ -23,16 +23,16 @@ class Table:
     def take(self, work, log) -> None:
         """Store the results of attempts, `(attempts, slots)` each, at their places.
 
-        Places come first in the log, plus one; zero means none.
+        The first array of the log contains the places plus one; zero means none.
         """
         lanes, places, width = self.numbers.shape
         place, *values = [np.asarray(part).ravel() for part in log]
         at = np.flatnonzero(place > 0)
         lane, place = work[at % len(work)], place[at].astype(int) - 1 - self.first
-        # rounding may set the end of the run apart from its last stop
+        # rounding may separate the end of the run from its last stop
         real = (place >= 0) & (place < places)
         at = at[real]
-        # one index into all lanes and places is quicker than two
+        # one index into all lanes and places is faster than two
         rows = self.numbers.reshape(lanes * places, width)
         found = np.stack([value[at] for value in values], axis=1)
         rows[lane[real] * places + place[real]] = found

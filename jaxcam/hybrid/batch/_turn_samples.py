@@ -1,4 +1,4 @@
-"""Samples of many batch elements once per period, and the events in between."""
+"""Samples of many batch elements once per period, and the events between samples."""
 
 import jax.numpy as jnp
 import numpy as np

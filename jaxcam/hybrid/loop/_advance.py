@@ -17,11 +17,11 @@ from ._select import any_of, select
 
 # consecutive attempts without progress in time after which a run gives up
 _PATIENCE = 80
-# impacts on two constraints in so small a part of a natural step accumulate together
+# impacts on two constraints within this fraction of a natural step accumulate together
 _TOGETHER = 1e-3
-# steps in a period of the forcing, at least
+# minimum number of steps per forcing period
 _PARTS = 4
-# steps in a run where neither their errors nor a period say anything, at least
+# minimum number of steps in a run if neither their errors nor a period limit them
 _UNSEEN = 64
 
 
@@ -30,28 +30,29 @@ class Plan(NamedTuple):
 
     t0: Any
     t1: Any
-    # the run also stops, and records, at t0 + k stop_period
+    # the run also stops and records at t0 + k stop_period
     stop_period: Any
-    # caps the step where the error estimate is uninformative: in contact, and at rest
+    # limits the step if the error estimate is uninformative: in contact, and at rest
     # without a force
     longest_step: Any
-    # the same cap without a period
+    # the same limit without a period
     unseen_step: Any
-    # one over the length of the run
+    # inverse of the length of the run
     per_run: Any
-    # times that steps must end at, and their period
+    # times at which steps must end, and their period
     breaks: tuple
     repeat: Any
     tolerance: Any
-    # absolute error allowed in each component; None: by the scale of the motion
+    # absolute error allowed in each component; None: follows from the scale of the
+    # motion
     absolute: Any
     smallness: Any
     depth: Any
     tableau: Tableau
-    # without the compiler passes that make the loop fast
+    # whether to omit the compiler passes that make the loop fast
     plain: bool
     # whether a step ends exactly at a release, which only derivatives need: the state
-    # follows by a series over the little time left
+    # follows from a series over the short remaining time
     exact_release: bool
 
     @staticmethod
@@ -65,8 +66,8 @@ class Plan(NamedTuple):
         stop_period=jnp.inf,
         differentiable=True,
     ) -> "Plan":
-        """Return the plan of a run from `t0` to `t1`; `period` defaults to the system's
-        own.
+        """Return the plan of a run from `t0` to `t1`; `period` defaults to that of the
+        system.
         """
         own = system.period
         period = own if period is None else period
@@ -95,7 +96,7 @@ class Plan(NamedTuple):
 
 
 def _each(absolute) -> tuple | None:
-    """Return the absolute errors allowed as scalars; one alone counts for all
+    """Return the allowed absolute errors as scalars; a single one applies to all
     components.
     """
     if absolute is None:
@@ -114,9 +115,9 @@ class Attempt(NamedTuple):
     # the jets before the event at the end of the step
     arrived: tuple
     length: Any
-    # error of the step over the error allowed
+    # error of the step relative to the allowed error
     effort: Any
-    # change of each component in the step, accepted or not
+    # change of each component in the step, whether accepted or not
     tried: tuple
     # whether the step is accepted; if not: is the error small enough, are all numbers
     # finite, is Newton's method on the surface still converging, and a better length
@@ -130,15 +131,15 @@ class Attempt(NamedTuple):
     lands: Any
     # which constraint was hit
     hit: list
-    # a flight that rounding hides
+    # a flight hidden by rounding
     hidden: Any
     begins: Any
-    # a release is near: the step is retaken to it, and then ends there
+    # a release is near: the step is repeated so that it ends there
     locates: Any
     released: Any
     fastest: Any
-    # length of the next step where it is a physical time: to the release, or the
-    # duration of the rest of the impacts
+    # length of the next step if it is a physical time: the time to the release, or the
+    # duration of the remaining impacts
     fixed: Any
     blur: tuple
     held: tuple
@@ -151,7 +152,7 @@ def after_attempt(plan: Plan, carried: LoopState, attempt: Attempt) -> LoopState
     longest = _longest(plan, carried, attempt)
     trial = _next_length(plan, carried, attempt, longest)
     fixed = (good & attempt.begins) | (carried.completing & ~good) | attempt.locates
-    # steps too short to advance the time make no progress either
+    # steps too short to advance the time also count as no progress
     moved = good & (attempt.t > carried.t)
     failures = jnp.where(moved | ~active, 0.0, carried.failures + 1.0)
     stop_gradient = jax.lax.stop_gradient
@@ -193,22 +194,22 @@ def after_attempt(plan: Plan, carried: LoopState, attempt: Attempt) -> LoopState
 
 
 def _longest(plan, carried, attempt):
-    """Return the longest step that the error allows; short steps say little about
-    it.
+    """Return the longest step that the error allows; short steps contain little
+    information about it.
     """
     h, effort = attempt.length, attempt.effort
-    # single precision is plenty for choosing a step, and much cheaper
+    # single precision is sufficient for choosing a step, and much cheaper
     rough = jnp.asarray(jnp.clip(effort, 1e-12, 1e12), dtype=jnp.float32)
     rough = jnp.exp2(jnp.log2(rough) * jnp.float32(-1.0 / plan.tableau.order))
     factor = jnp.clip(0.9 * jnp.asarray(rough, dtype=jnp.float64), 0.2, 6.0)
     factor = jnp.where(jnp.isfinite(effort), factor, 0.1)
-    # a much shorter step says nothing about the longest
+    # a much shorter step contains no information about the longest
     grown = jnp.where(h < 0.5 * carried.longest, carried.longest, h * factor)
     grown = jnp.where(
         h < 0.999 * carried.longest, jnp.maximum(carried.longest, grown), grown
     )
     grown = jnp.where(any_of(carried.contact) & (effort == 0.0), carried.longest, grown)
-    # nor does an error that is rounding
+    # nor does an error due to rounding
     blind = says_nothing(effort, plan.tolerance)
     most = jnp.maximum(carried.longest, plan.unseen_step)
     grown = jnp.where(blind, jnp.minimum(grown, most), grown)
@@ -218,7 +219,7 @@ def _longest(plan, carried, attempt):
 
 
 def _next_length(plan, carried, attempt, longest):
-    """Return the step to the next contact or release, or the longest one allowed."""
+    """Return the step to the next contact or release, or the longest allowed step."""
     ahead = jnp.minimum(longest, 6.0 * carried.ramp)
     good, h = attempt.good, attempt.length
     # the step that completes a chatter did not follow the motion
@@ -228,7 +229,7 @@ def _next_length(plan, carried, attempt, longest):
         ends = carried.jets[k], attempt.arrived[k]
         flight = time_to_contact(jet, end_curvature(*ends, inverse))
         held = jnp.minimum(time_to_release(*ends, inverse), plan.longest_step)
-        # a multiplier this close that did not release only touches zero
+        # a multiplier this close to zero that did not release only touches zero
         held = jnp.maximum(held, CLOSE * longest)
         limit = jnp.where(contact, held, jnp.where(flight > 0, flight, jnp.inf))
         ahead = jnp.minimum(ahead, limit)
@@ -255,7 +256,7 @@ def _struck(carried, attempt):
 
 
 def _together(carried):
-    """Return whether two constraints were hit within a vanishing part of a natural
+    """Return whether two constraints were hit within a negligible fraction of a natural
     step.
     """
     room = _TOGETHER * carried.longest

@@ -15,12 +15,12 @@ from ._gap_polynomial import (
 )
 
 
-# a landing is taken over by the Taylor series from this fraction of the step on: the
-# series then errs by its fourth power
+# a landing is computed by the Taylor series if it lies beyond this fraction of the
+# step: the error of the series is of fourth order in the rest
 _CLOSE = 2e-3
-# and the gap is nearly a straight line there, so that its root is a short series
+# and if the gap is nearly a straight line there, so that its root is a short series
 _STRAIGHT = 4e-3
-# error of the gap's polynomial over the largest gap, up to which it is believed
+# error of the gap polynomial relative to the largest gap up to which it is trusted
 _TRUST = 0.02
 # fraction of the longest step within which a motion off the surface does not return
 _SHORT = 1e-3
@@ -49,16 +49,16 @@ def judge(
     polynomial = bernstein(left, right, h)
     inward = moves_in(right, rounding)
     behind = (right.gap < -slack) | ((right.gap < 0) & inward)
-    # on the surface at the very start and moving, or pulled, in: no time passes
+    # on the surface at the start of the step and moving or pulled in: no time passes
     now = (left.gap <= 0) & moves_in(left, rounding) & (h == 0)
-    # a polynomial that errs by a part of the gap's own size says nothing; of a gap that
-    # has been closed so far, that size is rounding itself
+    # a polynomial whose error is comparable with the gap is uninformative; for a gap
+    # that has been closed so far, the gap itself is rounding
     size = jnp.maximum(scale, jnp.maximum(jnp.abs(left.gap), jnp.abs(right.gap)))
-    # a power of time from rest on the surface is as vague however short the step is
+    # for a power of time starting from rest on the surface, shorter steps do not help
     leaves = (left.gap == 0) & (left.velocity == 0) & (h <= _SHORT * longest)
     leaves = leaves & (right.velocity > 0) & (right.acceleration > 0)
     vague = (polynomial.error > _TRUST * size + rounding) & ~now & ~leaves
-    # judged by the straight line, since the series can vanish far from the root
+    # based on the straight line, because the series can vanish far from the root
     distance = jnp.abs(right.gap)
     speed = jnp.abs(right.velocity)
     straight = distance * jnp.abs(right.acceleration) <= _STRAIGHT * speed * speed
@@ -77,9 +77,9 @@ def judge(
 
 
 def moves_in(jet: Jet, rounding):
-    """Return whether the motion now enters, or is accelerated into, the constraint.
+    """Return whether the motion enters, or is accelerated into, the constraint.
 
-    A parabola that turns before it is below rounding only touches.
+    A parabola that turns back before its depth exceeds rounding only touches.
     """
     touches = (jet.acceleration > 0) & (
         2 * jet.acceleration * (jet.gap + rounding) > jet.velocity**2

@@ -30,7 +30,7 @@ from ._gap_polynomial import Jet
 
 
 class Frame(NamedTuple):
-    """Directions that put a state back on the surface: see `Functions.onto`."""
+    """Directions used to move a state back onto the surface; see `Functions.onto`."""
 
     lift: tuple
     push: tuple
@@ -39,11 +39,11 @@ class Frame(NamedTuple):
 
 
 class Functions:
-    """Functions of `(t, x)`, `x` a tuple of scalars, with the parameters bound.
+    """Functions of `(t, x)` with `x` a tuple of scalars and the parameters bound.
 
-    `planar` systems have two states and one constraint: gap and normal velocity fix
-    the state during contact, which then needs no integration. `plain` functions are
-    called unchanged, on arrays.
+    `planar` systems have two states and one constraint: gap and normal velocity
+    determine the state during contact, which then needs no integration. `plain`
+    functions are called unchanged, with arrays.
     """
 
     def __init__(self, system: HybridSystem, n: int, plain: bool = False):
@@ -91,7 +91,7 @@ class Functions:
 
     @contextlib.contextmanager
     def sharing(self):
-        """Within this block, equal expressions of the same scalars are computed once.
+        """Compute equal expressions of the same scalars only once within this block.
 
         All calls in the block must belong to one trace (no loop or branch inside).
         """
@@ -117,7 +117,9 @@ class Functions:
         return [Jet(*rows[k]) for k in range(self.m)]
 
     def taylor(self, t, x, contact):
-        """Rates of first, second and third order of the state, three tuples."""
+        """Return the first, second and third time derivatives of the state as three
+        tuples.
+        """
         rows = self._taylor(t, _pack(x), _pack(contact))
         return tuple(tuple(row) for row in rows)
 
@@ -141,7 +143,7 @@ class Functions:
         )
 
     def lift(self, t, x):
-        """Directions in which the gaps grow by one."""
+        """Return the directions in which the gaps grow by one."""
         return tuple(map(tuple, self._lift(t, _pack(x))))
 
     def blur(self, t, x, extents):
@@ -155,12 +157,12 @@ class Functions:
         return tuple(self._speed_blur(t, _pack(x), _pack(reach)))
 
     def chatter(self, t, before, after):
-        """C, r0 and the state P of `_chatter.py` for each constraint."""
+        """Return C, r0 and the state P of `_chatter.py` for each constraint."""
         damping, restitution, rest = self._chatter(t, _pack(before), _pack(after))
         return tuple(damping), tuple(restitution), tuple(map(tuple, rest))
 
     def onto(self, frame: Frame, jets, x, contact):
-        """One Newton step of the state onto gap = normal velocity = 0."""
+        """Take one Newton step of the state towards gap = normal velocity = 0."""
         for k in range(self.m):
             gap, velocity = jets[k].gap, jets[k].velocity
             slip = velocity - gap * frame.lift_velocity[k]
@@ -183,7 +185,9 @@ def _pack(scalars) -> np.ndarray:
 
 
 def _planar_jet(system, t, x, contact):
-    """Free jet; in contact the rate of a along the sticking motion is j - C a."""
+    """Return the free jet; in contact, the rate of a along the sticking motion is j - C
+    a.
+    """
     jet = free_jet(system, t, x)
     direction = normal_directions(system, t, x)[0]
     _, damping = jax.jvp(
@@ -208,7 +212,9 @@ def _mode_taylor(system, t, x, contact):
 
 
 def _frame(system, t, x):
-    """Directions E (gap by one) and D (velocity by one), v_x E, and C = a_x D."""
+    """Return the directions E (unit gap) and D (unit velocity), v_x E, and C = a_x
+    D.
+    """
     slope = jax.jacfwd(lambda y: normal_velocity(system, t, y))(x)
     curve = jax.jacfwd(lambda y: normal_acceleration(system, t, y))(x)
     push = normal_directions(system, t, x)

@@ -1,10 +1,10 @@
-"""The gap inside one step, as the polynomial through its jets at both ends.
+"""The gap within one step, as the polynomial through its jets at both ends.
 
-H, v, a and j at the two ends of a step fix a polynomial of degree seven. Its Bernstein
-coefficients bound it from below: where they are positive the step has not crossed the
-constraint, within the error of the polynomial, which is estimated by its difference
-from the polynomial of degree five that ignores the jerks. All functions take scalars
-and are free of branches.
+H, v, a and j at the two ends of a step determine a polynomial of degree seven. Its
+Bernstein coefficients bound it from below: if they are positive, the step has not
+crossed the constraint, to within the error of the polynomial. That error is estimated
+by the difference from the polynomial of degree five that ignores the jerks. All
+functions take scalars and have no branches.
 """
 
 from typing import Any, NamedTuple
@@ -22,14 +22,16 @@ class Jet(NamedTuple):
 
 
 class Bernstein(NamedTuple):
-    """Coefficients of degree seven on the step, and the trust in them."""
+    """Coefficients of degree seven on the step, and their error."""
 
     coefficients: tuple
     error: Any
 
 
 def _scaled(jet: Jet, h) -> tuple:
-    """Coefficients of the cubic through a jet, in time over `h`."""
+    """Return the coefficients of the cubic through a jet, as a function of time /
+    `h`.
+    """
     h2 = h * h
     return (
         jet.gap,
@@ -40,14 +42,14 @@ def _scaled(jet: Jet, h) -> tuple:
 
 
 def _remainders(left: tuple, right: tuple) -> tuple:
-    """Return the error of the left parabola at the right end: `_scaled` of it."""
+    """Return the error of the left parabola at the right end, as for `_scaled`."""
     c0, c1, c2, _ = left
     e0, e1, e2, _ = right
     return e0 - (c0 + c1 + c2), e1 - (c1 + 2 * c2), e2 - c2
 
 
 def bernstein(left: Jet, right: Jet, h) -> Bernstein:
-    """Bernstein coefficients of the gap over a step of length `h`."""
+    """Return the Bernstein coefficients of the gap over a step of length `h`."""
     (c0, c1, c2, c3), (e0, e1, e2, e3) = _scaled(left, h), _scaled(right, h)
     b = (
         c0,
@@ -63,10 +65,11 @@ def bernstein(left: Jet, right: Jet, h) -> Bernstein:
 
 
 def _mistrust(left: Jet, right: Jet, h):
-    """Bound of the difference to the polynomial of degree five, which ignores j.
+    """Return a bound of the difference from the polynomial of degree five, which
+    ignores j.
 
-    The difference is s^3 (1-s)^3 (p + q (2s - 1)); its third coefficients at the ends
-    are what the jerks differ by there.
+    The difference is s^3 (1-s)^3 (p + q (2s - 1)); its third-order coefficients at the
+    ends are the differences of the jerks there.
     """
     at_left, at_right = _scaled(left, h), _scaled(right, h)
     r0, r1, r2 = _remainders(at_left, at_right)
@@ -76,10 +79,10 @@ def _mistrust(left: Jet, right: Jet, h):
 
 
 def lowest(polynomial: Bernstein):
-    """Return a lower bound of the gap inside the step, its error taken off.
+    """Return a lower bound of the gap within the step, minus its error.
 
-    The error of the interpolation vanishes with its third derivative at both ends: it
-    belongs to the two middle coefficients, with weight 64/35.
+    The interpolation error vanishes together with its derivatives up to the third at
+    both ends, so it is assigned to the two middle coefficients, with weight 64/35.
     """
     b = polynomial.coefficients
     outer = jnp.minimum(jnp.minimum(b[1], b[2]), jnp.minimum(b[5], b[6]))
@@ -88,7 +91,7 @@ def lowest(polynomial: Bernstein):
 
 
 def power_coefficients(left: Jet, right: Jet, h) -> tuple:
-    """Coefficients c0..c7 of the same polynomial in s = time/h."""
+    """Return the coefficients c0..c7 of the same polynomial in s = time/h."""
     at_left, at_right = _scaled(left, h), _scaled(right, h)
     r0, r1, r2 = _remainders(at_left, at_right)
     c3, e3 = at_left[3], at_right[3]
@@ -110,9 +113,10 @@ def _value_and_slope(c, s):
 
 
 def crossing(c, halvings: int = 3, newtons: int = 2):
-    """Return where in (0, 1) the polynomial falls below zero, given that it does.
+    """Return where in (0, 1) the polynomial falls below zero, provided that it does.
 
-    A few halvings find the neighbourhood, Newton inside the bracket finds the root.
+    A few bisections find the neighbourhood, then Newton's method within the bracket
+    finds the root.
     """
     low, high = jnp.zeros_like(c[0]), jnp.ones_like(c[0])
     for _ in range(halvings):
@@ -145,11 +149,13 @@ def lowest_point(polynomial: Bernstein, c):
 
 
 def time_to_contact(jet: Jet, snap):
-    """Time until the quartic through the jet falls to zero; inf where it does not.
+    """Return the time until the quartic through the jet falls to zero; inf if it does
+    not.
 
-    Leaving the surface (v > 0, little height) the cubic has an exact smallest root;
-    else the root of the parabola is taken. One Newton step follows, with `snap`, the
-    rate of the jerk; it need not be accurate, and is left out where it matters much.
+    When the motion leaves the surface (v > 0 at a small gap), the smallest root of the
+    cubic is known exactly; otherwise, the root of the parabola is used. One Newton step
+    follows, with the rate of the jerk `snap`, which need not be accurate and is omitted
+    if its effect is large.
     """
     g, v, a, j = jet
     leaving = (v > 0) & (jnp.abs(g * a) < 1e-3 * v * v)
@@ -170,10 +176,10 @@ def time_to_contact(jet: Jet, snap):
 
 
 def time_to_release(left: Jet, right: Jet, inverse):
-    """Time until the acceleration rises through zero; inf where it does not.
+    """Return the time until the acceleration rises through zero; inf if it does not.
 
-    The cubic through a and j at both ends of a step is followed beyond its end: the
-    root of its parabola there, refined. `inverse` is one over the length of the step.
+    The cubic through a and j at both ends of a step is extrapolated beyond its end: the
+    root of its parabola there is refined. `inverse` is the inverse of the step length.
     """
     a, j = right.acceleration, right.jerk
     bend = end_curvature(left, right, inverse)
@@ -193,18 +199,20 @@ def time_to_release(left: Jet, right: Jet, inverse):
 
 
 def end_curvature(left: Jet, right: Jet, inverse):
-    """Second derivative at its end of the cubic through a and j at both ends of a step.
+    """Return the second derivative, at the end of a step, of the cubic through a and j
+    at both ends.
 
-    `inverse` is one over the length of the step.
+    `inverse` is the inverse of the step length.
     """
     bend = 6 * inverse * (left.acceleration - right.acceleration)
     return inverse * (bend + 2 * left.jerk + 4 * right.jerk)
 
 
 def time_to_root(jet: Jet):
-    """Signed time to the nearby zero of the cubic, where |g a| is small against v^2.
+    """Return the signed time to the nearby zero of the cubic, if |g a| is small
+    compared with v^2.
 
-    The series that inverts the cubic, to fourth order in g/v.
+    It is the series that inverts the cubic, to fourth order in g/v.
     """
     g, v, a, j = jet
     inverse = 1.0 / jnp.where(v == 0, 1.0, v)

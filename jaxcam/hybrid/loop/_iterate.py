@@ -1,9 +1,10 @@
 """Define one iteration of the event loop: one attempted step in the current mode.
 
 The loop has no inner loop. A step that crosses a constraint, or may have crossed it, is
-rejected; the lane keeps its state and the next iteration tries a better length.
-Everything is arithmetic on scalars and selection, so that a batch of lanes, each in its
-own mode, advances together; lengths of steps carry no derivative, times of events do.
+rejected; the batch element (lane) keeps its state, and the next iteration tries a
+better length. All operations are scalar arithmetic and selection, so a batch of lanes,
+each in its own mode, advances together. Step lengths carry no derivative, but event
+times do.
 """
 
 from typing import Any, NamedTuple
@@ -42,9 +43,9 @@ class Judged(NamedTuple):
     lands: Any
     # whether the flights allow the step
     good: Any
-    # whether it ends behind a constraint that is hit after a release
+    # whether the step ends behind a constraint that is hit after a release
     over: Any
-    # the length of a step that errors alone would allow
+    # the step length that the errors alone would allow
     natural: Any
     # largest gap that contact has suppressed; resolution of a zero gap there
     held: list
@@ -72,7 +73,7 @@ def _iterate(
     landing = land(functions, plan, carried, end, made, lands, flown, rounding)
     chatter, begins = landing.chatter, landing.begins
 
-    # contact: the state is put on the surface a second time, then judged
+    # contact: the state is moved onto the surface a second time, then checked
     settled = functions.onto(made.frame, landing.jets, landing.x, landing.contact)
     near = [
         jnp.abs(a - b) <= 1e-7 * (jnp.abs(a) + w)
@@ -125,7 +126,7 @@ def _iterate(
         fits=made.effort <= 1.0,
         finite=finite,
         shorter=_shorter(functions, end, judged, held, converged),
-        # algebraic contact may start its next attempt from here
+        # algebraic contact can start its next attempt from here
         guess=left if functions.planar else carried.x,
         settling=~converged & functions.planar,
         stopped=stopped,
@@ -182,7 +183,8 @@ def _judge_flights(
         ]
     )
     natural = jnp.minimum(carried.longest, plan.longest_step)
-    # the motion suppressed by the multipliers counts as gap: rounding is a part of it
+    # the motion suppressed by the multipliers counts as gap, since rounding is relative
+    # to it
     held = [
         jnp.maximum(s, natural * natural * jnp.abs(j.acceleration))
         for s, j in zip(carried.held, carried.jets, strict=True)
@@ -224,7 +226,7 @@ def _judge_contacts(
 
 
 def _shorter(functions, end: StepEnd, judged: Judged, held: StepVerdict, converged):
-    """Return the length to try next, if the step is not accepted."""
+    """Return the step length to try next if the step is not accepted."""
     shorter = jnp.minimum(judged.flown.length, held.length)
     to_impact = jnp.minimum(shorter, end.length + judged.flown.offset)
     shorter = jnp.where(judged.over, to_impact, shorter)
@@ -245,8 +247,9 @@ def _kind(carried, lands, begins, released, stopped):
 def _next_jets(carried, jets, landing: Landing, went, pressing, delay):
     """Return the jets of the next step, in which rounding must not undo a contact.
 
-    On the surface the gap is zero, at a release velocity is too, and the acceleration
-    does not press; a chatter that completes goes on with the acceleration of its end.
+    On the surface, the gap is zero; at a release, the velocity is also zero and the
+    acceleration is not compressive. A completed chatter continues with the acceleration
+    at its end.
     """
     hit, chatter, after = landing.hit, landing.chatter, []
     for k, jet in enumerate(jets):
@@ -273,7 +276,7 @@ def _next_jets(carried, jets, landing: Landing, went, pressing, delay):
 
 
 def _waits_for_release(carried, jets, flown, natural, tiny):
-    """Return whether a contact releases before the impact that a step has found.
+    """Return whether a contact releases before the impact found in a step.
 
     The impact is logged after the release.
     """
@@ -287,7 +290,7 @@ def _waits_for_release(carried, jets, flown, natural, tiny):
 
 
 def _where_passed(functions, plan, passed, t, x, contact, jets):
-    """Return the jets on the far side of a breakpoint, where one was passed."""
+    """Return the jets on the far side of a breakpoint if one was passed."""
     fresh = functions.jets(after(t, plan.t1 - plan.t0), x, contact)
     return tuple(
         Jet(*select(passed, new, old)) for new, old in zip(fresh, jets, strict=True)

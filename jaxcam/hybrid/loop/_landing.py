@@ -1,4 +1,4 @@
-"""Apply the impact at the end of a step, and decide on completing its chatter."""
+"""Apply the impact at the end of a step, and decide whether to complete its chatter."""
 
 from typing import Any, NamedTuple
 
@@ -30,7 +30,7 @@ class Landing(NamedTuple):
     # whether the chatter is completed from here
     begins: Any
     fastest: Any
-    # whether rounding hides the flight that follows, or the one before
+    # whether rounding hides the next flight, or the previous one
     hidden: Any
 
 
@@ -72,10 +72,10 @@ def land(
     fastest = jnp.where(lands, jnp.maximum(carried.fastest, rebound), carried.fastest)
     impact = Impact(t, landed, after, approach, rebound, flown.constraint)
     chatter = rest_of_chatter(functions, plan, impact, jets, contact, end.stop)
-    # deep enough into the sequence, or so low that rounding hides the next flight
+    # far enough into the sequence, or so low that rounding hides the next flight
     pulled = jnp.abs(of_constraint([j.acceleration for j in jets], flown.constraint))
     deep = rebound <= plan.depth * fastest
-    # a flight is v^2 / 2a high: hidden below 250 times the rounding
+    # the height of a flight is v^2 / 2a; below 250 times the rounding, it is hidden
     low = 500 * of_constraint(carried.blur, flown.constraint)
     begins = lands & chatter.possible & (deep | (rebound * rebound <= low * pulled))
     hidden = _hides(
@@ -102,10 +102,10 @@ def _kept_contacts(functions, carried, lands, t, before, after):
 
 
 def _hides(carried, t, impact, pulled, rounding):
-    """Return whether the flight after an impact, or before it, is lost in rounding.
+    """Return whether the flight after or before an impact is lost in rounding.
 
-    The flight after it is v^2 / 2a high; without an acceleration towards the
-    constraint, the flight before it was at most as high as its final speed times its
+    The height of the flight after it is v^2 / 2a; without an acceleration towards the
+    constraint, the height of the flight before it was at most its final speed times its
     duration.
     """
     after = impact.rebound * impact.rebound <= 500 * rounding * pulled

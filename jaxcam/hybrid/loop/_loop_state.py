@@ -15,7 +15,7 @@ from ._start import first_status
 
 
 class LoopState(NamedTuple):
-    """All scalars, so that a batch of lanes is a set of plain vectors."""
+    """The loop state as scalars, so that a batch is a set of plain vectors."""
 
     t: Any
     x: tuple
@@ -24,7 +24,7 @@ class LoopState(NamedTuple):
     # the next step to try, and the longest one that the error allows
     step: Any
     longest: Any
-    # the end of this step is an accumulation or a release, so its length is fixed
+    # the end of this step is an accumulation point or a release, so its length is fixed
     completing: Any
     locating: Any
     stops: Any
@@ -33,9 +33,10 @@ class LoopState(NamedTuple):
     scale: tuple
     # resolution of each gap
     blur: tuple
-    # largest gap that contact has suppressed: the multiplier over a natural step
+    # largest gap that contact has suppressed: that of the multiplier over a natural
+    # step
     held: tuple
-    # for several constraints: time of the last impact on each, and the number of
+    # for several constraints: time of the last impact on each, and number of
     # consecutive impacts whose flights are below rounding
     struck: tuple
     crowded: tuple
@@ -56,10 +57,10 @@ class LoopState(NamedTuple):
 def first_state(
     functions: Functions, t0, x, t1, longest=jnp.inf, period=jnp.inf
 ) -> LoopState:
-    """The first loop state, in contact where gap and velocity are zero and a < 0.
+    """Return the first loop state, with contact if gap and velocity are zero and a < 0.
 
-    Without a normal force, contact is assumed; it ends as soon as a force pulls. An
-    invalid start becomes NaN. `longest` is the longest step (s) that is allowed, and
+    Without a normal force, contact is assumed; it ends as soon as a tensile force acts.
+    An invalid start becomes NaN. `longest` is the longest allowed step (s), and
     `period` that of the forcing.
     """
     free = tuple(jnp.asarray(False) for _ in range(functions.m))
@@ -82,7 +83,7 @@ def first_state(
         low = (jet.acceleration < 0) & (velocity * velocity <= hop)
         touching = near & ((jnp.abs(velocity) <= slow) | low)
         contact.append(touching & _presses(jet, tiny) & (status == RUNNING))
-        # off the surface a start is unchanged; on it, rounding is removed
+        # off the surface, the start is unchanged; on it, rounding is removed
         behind = near & (gap < 0)
         shift = jax.lax.stop_gradient(jnp.where(behind, gap, 0.0))
         x = tuple(a - shift * b for a, b in zip(x, lift, strict=True))
@@ -95,7 +96,7 @@ def first_state(
             )
         )
     longest = jnp.minimum((t1 - t0) / 64, longest)
-    # in contact the error estimate may be uninformative, and the length is capped
+    # in contact, the error estimate may be uninformative, so the step length is limited
     held = any_of(contact)
     rates = functions.taylor(t0, x, contact)
     first = jnp.where(held, longest, first_step(extents, rates, t0, longest))
@@ -129,10 +130,11 @@ def first_state(
 
 
 def _presses(jet: Jet, tiny):
-    """Return whether a constraint touched without velocity presses, or is about to.
+    """Return whether a constraint touched with zero velocity is under compression, or
+    about to be.
 
-    A flight under acceleration and jerk no higher than `tiny`, 2 a^3 / (3 j^2), is
-    none.
+    A flight due to acceleration and jerk whose height 2 a^3 / (3 j^2) does not exceed
+    `tiny` is ignored.
     """
     a, j = jet.acceleration, jet.jerk
     return (a < 0) | ((j <= 0) & (2 * a * a * a <= 3 * tiny * j * j))

@@ -6,7 +6,7 @@ from ._flight import StepVerdict
 from ._gap_polynomial import end_curvature, Jet
 
 
-# a release is located by retaking the step until this fraction of a natural step
+# a release is located by repeating the step until this fraction of a natural step
 # remains, over which the multiplier is a parabola
 CLOSE = 1e-7
 
@@ -14,19 +14,19 @@ CLOSE = 1e-7
 def judge_contact(
     left: Jet, right: Jet, h, scale, rounding, room, completing, locating
 ) -> StepVerdict:
-    """Judge the step of one constraint in contact.
+    """Check the step of one constraint in contact.
 
     The multiplier (the acceleration a that contact suppresses) is negative while the
-    constraint presses. Inside the step it is the cubic through values and rates at
-    both ends, trusted up to what the trapezoidal rule misses. `scale` is the length of
-    a step that errors alone would allow, `rounding` the gap that cannot be told from
-    zero. A step ends at an accumulation of impacts where `completing`, and at a release
-    that is known to be near where `locating`.
+    contact is under compression. Within the step, it is the cubic through the values
+    and rates at both ends, trusted to within the error of the trapezoidal rule. `scale`
+    is the step length that errors alone would allow, and `rounding` the gap that cannot
+    be distinguished from zero. If `completing`, the step ends at an accumulation point;
+    if `locating`, it ends at a release known to be near.
     """
     a0, a1 = left.acceleration, right.acceleration
     s0, s1 = h * left.jerk, h * right.jerk
     trust = jnp.abs(a1 - a0 - (s0 + s1) / 2)
-    # a pull too weak to open a gap in the step is ignored
+    # tension too weak to open a gap within the step is ignored
     first = a0 + s0 * (1 / 3)
     highest = jnp.maximum(first, a1 - s1 * (1 / 3)) + trust
     inside = (highest > 0) & (highest * h * h > rounding)
@@ -41,10 +41,10 @@ def judge_contact(
     # the remaining time is so short that the first correction is enough
     offset = straight * (1 - jnp.where(jnp.abs(bend) < 0.01, bend, 0.0))
     near = rises & pulls & (jnp.abs(offset) <= CLOSE * scale)
-    # the zero of a multiplier that has none of its rates there is only enclosed
+    # the zero of a multiplier whose rates also vanish there can only be bracketed
     enclosed = passed & (h <= CLOSE * scale)
     # a multiplier that only touches zero: no flight would exceed rounding. Its rate
-    # falls by at least half, which rounding cannot cause over a short step
+    # decreases by at least half, which rounding cannot cause over a short step
     falls = (left.jerk > 0) & (2 * right.jerk <= left.jerk) & (h > 0)
     curved = jnp.where(falls, (left.jerk - right.jerk) * inverse, 1.0)
     peak = a1 + right.jerk**2 / (2 * curved)
@@ -55,7 +55,7 @@ def judge_contact(
     early = (a0 < 0) & (first > 0)
     lets_go = near & (locating | (~touches & ~early & (offset <= room)))
     lets_go = (lets_go | (enclosed & ~touches)) & ~completing
-    # short of its end a step that only might have released is halved
+    # a step that may have released before its end is halved
     suspect = inside & ~passed & ((a0 < 0) | (s0 > 0))
     retake = (passed | suspect) & ~lets_go & ~touches & ~completing
     share = jnp.where(passed, _root(a0, s0, a1, s1), 0.5)
@@ -66,8 +66,8 @@ def judge_contact(
 
 
 def opens(jet: Jet, scale, rounding):
-    """Return whether the extrapolated multiplier opens a gap in a natural step. A
-    multiplier that is zero up to rounding does not.
+    """Return whether the extrapolated multiplier opens a gap within a natural step. A
+    multiplier that is zero to within rounding does not.
     """
     rise = jnp.maximum(jet.jerk, 0.0)
     pull = jnp.maximum(jet.acceleration, 0.0) + rise * (scale / 3)
@@ -83,8 +83,8 @@ def lets_go_before(jet: Jet, offset, scale, rounding):
 
 
 def _root(a0, s0, a1, s1):
-    """Return where in (0, 1) the cubic rises through zero; from the chord, by
-    Newton.
+    """Return where in (0, 1) the cubic rises through zero, by Newton's method starting
+    from the chord.
     """
     rise = a1 - a0
     c2 = 3 * rise - 2 * s0 - s1
@@ -94,5 +94,5 @@ def _root(a0, s0, a1, s1):
         value = a0 + s * (s0 + s * (c2 + s * c3))
         slope = s0 + s * (2 * c2 + 3 * s * c3)
         s = jnp.clip(s - value / jnp.where(slope > 0, slope, jnp.inf), 0.02, 1.0)
-    # from where the cubic is flat Newton may leave the step
+    # starting where the cubic is flat, Newton's method may leave the step
     return jnp.where(s < 1.0, s, 0.5)

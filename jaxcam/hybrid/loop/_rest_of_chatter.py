@@ -9,7 +9,7 @@ from ._select import of_constraint, select
 
 
 class Rest(NamedTuple):
-    """The remaining impacts of a chatter, starting with this impact."""
+    """The remaining impacts of a chatter sequence, starting with this impact."""
 
     possible: Any
     duration: Any
@@ -24,7 +24,7 @@ class Impact(NamedTuple):
     t: Any
     before: tuple
     after: tuple
-    # normal velocity before it, negative, and after it
+    # normal velocity before the impact (negative) and after it
     approach: Any
     rebound: Any
     constraint: Any
@@ -59,7 +59,7 @@ def rest_of_chatter(functions, plan, impact: Impact, jets, contact, stop) -> Res
     soon = (t + duration <= stop) | (duration <= 1e-13 * jnp.abs(t))
     possible = possible & (a < 0) & (at_end < 0) & soon
     for k, jet in enumerate(jets if functions.m > 1 else ()):
-        # no other gap closes meanwhile; over so short a time it is a parabola
+        # no other gap closes in the meantime; over such a short time, it is a parabola
         left = jet.gap + duration * (jet.velocity + duration * jet.acceleration / 2)
         clear = (constraint == k) | contact[k] | (left > 0)
         possible = possible & clear

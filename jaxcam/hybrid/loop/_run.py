@@ -17,12 +17,12 @@ from ._loop_state import LoopState
 
 
 # iterations between two checks for running lanes, and between two writes to
-# the log, which under vmap are costly
+# the log, which are costly under vmap
 _BLOCK = 16
 
 
 class Log(NamedTuple):
-    """One row an iteration; rows of kind `Row.NOTHING` are failed attempts."""
+    """One row per iteration; rows of kind `Row.NOTHING` are failed attempts."""
 
     kind: Float[Array, " rows"]
     constraint: Float[Array, " rows"]
@@ -45,8 +45,8 @@ def run(
 ) -> tuple[LoopState, Log]:
     """Iterate until the run has finished or the log is full.
 
-    Forward mode only. Under `vmap` the iterations are shared by all lanes, so that one
-    row of the log is written for all of them at once.
+    This supports forward mode only. Under `vmap`, all lanes share the iterations, so
+    one row of the log is written for all of them at once.
     """
     carried, log = run_raw(functions, plan, carried, rows, _row, company)
     return carried, log_of(log, functions.n, functions.m)
@@ -60,9 +60,9 @@ def run_raw(
     row,
     company: Company = "few",
 ):
-    """Run the loop with a log of the scalars `row(record, state)` of each attempt.
+    """Run the loop and log the scalars `row(record, state)` of each attempt.
 
-    It is compiled for the number of batch elements, `company`.
+    It is compiled for `company` batch elements.
     """
     carried = jax.tree.map(jnp.asarray, carried)
 
@@ -70,7 +70,8 @@ def run_raw(
         carried, record = iteration(functions, plan, carried)
         return carried, jnp.stack(row(record, carried))
 
-    # scalars of one run are never computed twice; keeping them costs compile time
+    # scalars of a single run are never computed twice; keeping them takes compilation
+    # time
     alone = company == "one"
     keeping, kept = with_kept(body, carried, on=not (functions.plain or alone))
     width = len(row(_empty_record(functions.n, functions.m), carried))
@@ -102,7 +103,7 @@ def attempts(functions: Functions, plan: Plan, carried: LoopState, row):
     """Run a block of attempts of one trajectory, to be mapped over many.
 
     Returns:
-        The lane, and of each number in `row` an array, one for each attempt.
+        The lane, and for each number in `row` an array with one entry per attempt.
     """
 
     def body(carried):
@@ -118,7 +119,7 @@ def attempts(functions: Functions, plan: Plan, carried: LoopState, row):
 
 
 def run_many(some: Callable, lanes: LoopState, rows: int, row):
-    """Iterate until no lane runs or the log is full.
+    """Iterate until no lane is running or the log is full.
 
     **Arguments:** `some(lanes)`, the `attempts` of all lanes with the lanes last in the
     log; the lanes, `(lanes,)` each; the rows of the log, and `row`.
@@ -126,8 +127,8 @@ def run_many(some: Callable, lanes: LoopState, rows: int, row):
     Returns:
         The lanes and the log, `(rows, lanes)` for each number in a row.
     """
-    # the log is written in its final layout: under `vmap` each write would move all of
-    # it
+    # the log is written in its final layout, because under `vmap` each write would move
+    # all of it
     blocks, width = -(-rows // _BLOCK), len(lanes.status)
     parts = row(_empty_record(len(lanes.x), len(lanes.jets)), lanes)
     log = [jnp.zeros((blocks * _BLOCK, width)) for _ in parts]
@@ -157,7 +158,7 @@ def run_reversible(
 ) -> tuple[LoopState, Log]:
     """Run a fixed number of `rows` iterations, for reverse-mode differentiation.
 
-    Blocks of iterations are recomputed on the way back, so that memory grows with the
+    Blocks of iterations are recomputed in the backward pass, so memory grows with the
     square root of their number.
     """
     block = max(1, int(rows**0.5))

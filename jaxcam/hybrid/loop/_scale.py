@@ -1,7 +1,7 @@
-"""Measure the size of a motion, the reference of its error and rounding.
+"""Measure the scale of a motion, to which its error and rounding are relative.
 
-All measures are independent of units: motions in micrometres and milliseconds or in
-metres and seconds are treated equally.
+All measures are independent of units: it makes no difference whether a motion is given
+in micrometres and milliseconds or in metres and seconds.
 """
 
 import jax
@@ -12,19 +12,20 @@ from ._select import largest
 
 # an error below this fraction of a component's scale is rounding
 _ROUNDING = 1e-15
-# error allowed over the tolerance times the scale of the motion: a state of order one,
-# moving by as much, is then as accurate as with an absolute error of the tolerance
+# allowed error divided by the tolerance times the scale of the motion: a state of order
+# one that moves by as much is then as accurate as with the tolerance as absolute error
 _SHARE = 2.0
-# the first step over the time in which a component moves by its own scale
+# first step relative to the time in which a component moves by its own scale
 _FIRST = 0.125
 
 
 def first_extents(lifts, jets, tinies, x) -> tuple[tuple, tuple]:
     """Return the origins of the components, and their scales before they have moved.
 
-    One that a gap depends on is measured from its start, and has the scale of that gap,
-    wherever the origin of its coordinate is; any other has its own size. With several
-    gaps the smallest counts. A gap below what can be told from zero (`tinies`) is zero.
+    A component on which a gap depends is measured from its start and has the scale of
+    that gap, wherever the origin of its coordinate is; for any other component, the
+    scale is its magnitude. With several gaps, the smallest one counts. A gap that
+    cannot be distinguished from zero (`tinies`) is zero.
     """
     origin, found = [], []
     for i, component in enumerate(x):
@@ -35,7 +36,7 @@ def first_extents(lifts, jets, tinies, x) -> tuple[tuple, tuple]:
             height, share = jnp.abs(jet.gap), jnp.abs(lift[i])
             height = jnp.where(height <= tiny, 0.0, height)
             seen = share > 0
-            # the part of the shortest way to the surface, and the way of it alone
+            # its share of the shortest path to the surface, and the path along it alone
             alone = height * square / jnp.where(seen, share, 1.0)
             near = jnp.clip(own, height * share, jnp.where(seen, alone, jnp.inf))
             least = jnp.minimum(least, jnp.where(seen, near, jnp.inf))
@@ -47,12 +48,14 @@ def first_extents(lifts, jets, tinies, x) -> tuple[tuple, tuple]:
 
 
 def scales(extents, before, after, pairs, h, per_run) -> tuple:
-    """Scale of each component in a step: how far it has moved so far, or in the step.
+    """Return the scale of each component: the distance it has moved so far, or in the
+    step.
 
-    Where a component is the rate of another (`pairs`: component to rate), it counts at
-    least what would move that one by its scale in the whole run, `per_run` being one
-    over its length (1/s); and the other at least what its rate moves it by in the
-    step of length `h` (s), as the rate's own error does.
+    If a component is the rate of another (`pairs`: component to rate), its scale is at
+    least the rate that would move the other component by its scale during the whole
+    run, where `per_run` is the inverse of the length of the run (1/s). The scale of the
+    other component is at least the distance that its rate covers in the step of length
+    `h` (s), because the error of the rate acts over the same time.
     """
     found = [
         jnp.maximum(e, jnp.abs(b - a))
@@ -65,12 +68,11 @@ def scales(extents, before, after, pairs, h, per_run) -> tuple:
 
 
 def held_scales(scale, carried, push, pairs, h) -> tuple:
-    """Scales of a step in contact: motion suppressed by the multipliers counts as
-    moved.
+    """Return the scales of a step in contact, where suppressed motion counts as motion.
 
-    Bodies at rest under forces that balance move by the rounding of these forces, which
-    is no measure of the size of their motion. `push` are the directions in which the
-    multipliers act, the accelerations of the lane's jets; `pairs` as in `scales`.
+    Bodies at rest under balanced forces move by the rounding of these forces, which is
+    not a measure of the scale of their motion. `push` are the directions in which the
+    multipliers (the accelerations of the jets) act; `pairs` is as in `scales`.
     """
     found = list(scale)
     for jet, held, direction in zip(carried.jets, carried.contact, push, strict=True):
@@ -83,7 +85,8 @@ def held_scales(scale, carried, push, pairs, h) -> tuple:
 
 
 def error_allowed(scale, before, after, tolerance, absolute) -> tuple:
-    """Error that a step may make in each component; below it is only rounding.
+    """Return the error that a step may have in each component; anything below it is
+    rounding.
 
     **Arguments:** scales, states at both ends, the relative tolerance, and the absolute
     error requested for each component, or `None` for a share of the scale.
@@ -101,7 +104,7 @@ def error_allowed(scale, before, after, tolerance, absolute) -> tuple:
 
 
 def error_norm(error, allowed):
-    """Largest error of a step over the error allowed."""
+    """Return the largest error of a step relative to the allowed error."""
     return largest(
         [
             jnp.abs(e) / jnp.where(a > 0, a, 1.0)
@@ -111,17 +114,19 @@ def error_norm(error, allowed):
 
 
 def says_nothing(effort, tolerance):
-    """Return whether the error estimate of a step, at this effort, is only rounding."""
+    """Return whether the error estimate of a step, at this error norm, is only
+    rounding.
+    """
     return effort * tolerance <= _ROUNDING
 
 
 def moved_extents(extents, origin, attempt) -> tuple:
-    """Return the scales after an attempt: the furthest that a component was from its
-    start.
+    """Return the scales after an attempt: the largest distance of each component from
+    its start.
 
-    One that has never moved takes its scale from the first attempt that moves it,
-    whatever becomes of it: relative to itself the error of a motion such as t^9 does
-    not fall with the step.
+    A component that has never moved takes its scale from the first attempt that moves
+    it, whether accepted or not: relative to itself, the error of a motion such as t^9
+    does not decrease with the step.
     """
     found = []
     for e, start, there, tried in zip(
@@ -134,11 +139,12 @@ def moved_extents(extents, origin, attempt) -> tuple:
 
 
 def first_step(extents, rates, t, longest):
-    """Return the length of the first step from `t` (s): a part of the time scale.
+    """Return the length of the first step from `t` (s): a fraction of the time scale.
 
-    The shortest in which a component moves by its scale, by any of its first three
-    `rates`; but the clock must move. (Hairer, Norsett and Wanner, Solving Ordinary
-    Differential Equations I, II.4, in a form without units)
+    The time scale is the shortest time in which a component moves by its scale due to
+    any of its first three `rates`; the step must also be long enough to change the
+    time. (Hairer, Norsett and Wanner, Solving Ordinary Differential Equations I, II.4,
+    in dimensionless form)
     """
     length = longest
     for order, rate in enumerate(rates, start=1):

@@ -5,7 +5,7 @@ import jax.numpy as jnp
 
 
 def taylor(x, rates, tau):
-    """Return the state a time `tau` (s) after `x`, to third order, by its `rates`."""
+    """Return the state a time `tau` (s) after `x`, to third order in its `rates`."""
     first, second, third = rates
     return tuple(
         x[i] + tau * (first[i] + tau * (second[i] * 0.5 + tau * third[i] * (1 / 6)))
@@ -17,14 +17,15 @@ def taylor_of_release(functions, x, rates, frame, jets, tau, contact):
     """Return the sticking motion over the short time `tau` (s) to release, to second
     order.
 
-    `rates` of the free flight from `x`, its `frame` and `jets`, and the contacts.
+    **Arguments:** `rates` of the free flight from `x`, its `frame` and `jets`, and the
+    contacts.
     """
     first, second, _ = rates
     if not functions.planar:
         return tuple(
             x[i] + tau * (first[i] + tau * second[i] / 2) for i in range(len(x))
         )
-    # F_s = F - a D: with a = 0 at release only its rate remains
+    # F_s = F - a D: with a = 0 at release, only its rate remains
     a, rate = jets[0].acceleration, jets[0].jerk
     push = frame.push[0]
     return tuple(
@@ -40,10 +41,11 @@ def taylor_of_release(functions, x, rates, frame, jets, tau, contact):
 
 def off_rounding(frame, jets, x, hit, extents):
     """Remove the rounding error of the gap from the state after an impact, and from its
-    jets. The error would accumulate over the impacts of a chatter, whose last flights
-    are lower. A gap that hardly depends on the state is left unchanged: its correction
-    would move the state far. The other gaps move along, and by more than their own
-    rounding where the time is late and the constraint that was hit moves.
+    jets. The error would accumulate over the impacts of a chatter sequence, whose last
+    flights are lower than that. A gap that hardly depends on the state is left
+    unchanged, because its correction would move the state far. The other gaps change as
+    well, by more than their own rounding if the time is large and the constraint that
+    was hit is moving.
     """
     jets = list(jets)
     for k, (direction, here) in enumerate(zip(frame.lift, hit, strict=True)):

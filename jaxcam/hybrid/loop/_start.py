@@ -8,7 +8,7 @@ from ._select import any_of
 
 
 def starts_behind(system, t, state):
-    """Return whether a state is behind some constraint; also the gaps, shape `(m,)`."""
+    """Return whether a state is behind a constraint, and the gaps, shape `(m,)`."""
     return jnp.any(least_gaps(system, t, state) < 0), gaps(system, t, state)
 
 

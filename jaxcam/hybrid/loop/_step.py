@@ -21,7 +21,7 @@ class StepEnd(NamedTuple):
 
     length: Any
     t: Any
-    # time that must not be passed (s): a breakpoint or a requested time
+    # time that must not be exceeded (s): a breakpoint or a requested time
     stop: Any
     asked: Any
     # whether the step ends there, otherwise its distance from there
@@ -32,7 +32,7 @@ class StepEnd(NamedTuple):
 
 
 class Step(NamedTuple):
-    """A completed step: the quantities at its end."""
+    """The quantities at the end of a completed step."""
 
     # the end from Runge-Kutta, and its projection onto the contact surfaces
     raw: tuple
@@ -40,9 +40,9 @@ class Step(NamedTuple):
     # the gaps, and the projection of states onto the surface
     jets: list
     frame: Frame
-    # rates of the state, of first, second and third order
+    # first, second and third time derivatives of the state
     rates: tuple
-    # error over the error allowed; scale of each component
+    # error relative to the allowed error; scale of each component
     effort: Any
     scale: tuple
 
@@ -52,7 +52,7 @@ def end_of_step(plan: Plan, carried: LoopState, rounding) -> StepEnd:
     asked = jnp.minimum(plan.t0 + (carried.stops + 1) * plan.stop_period, plan.t1)
     sides = neighbours(plan.breaks, plan.repeat, carried.t)
     stop = jnp.minimum(asked, sides[1])
-    # already in contact and moving in, or in contact and pulled away: no time passes
+    # on the surface and moving in, or in contact and pulled away: no time passes
     now = any_of(
         [
             jnp.where(c, j.acceleration > 0, (j.gap <= 0) & moves_in(j, near))
@@ -70,7 +70,7 @@ def end_of_step(plan: Plan, carried: LoopState, rounding) -> StepEnd:
 
 
 def seen_from_inside(plan: Plan, end: StepEnd):
-    """Move the times of a step inside the breakpoints on its sides."""
+    """Move the times of a step inside the adjacent breakpoints."""
     if not plan.breaks:
         return lambda t: t
     (low, high), span = end.sides, plan.t1 - plan.t0

@@ -1,4 +1,4 @@
-"""Adapt programs to JAX's tracing and XLA's compiler: speed changes, results do not.
+"""Adapt programs to JAX's tracing and XLA's compiler: only the speed changes.
 
 The only exception is `whole`, which adds missing transformations to a loop.
 """

@@ -1,7 +1,7 @@
-"""Read programs that JAX has traced.
+"""Read programs traced by JAX.
 
-Functions called for every equation are not type-checked in the tests, which would take
-a fifth longer; they take no arrays.
+Functions called for every equation take no arrays and are not type-checked in the
+tests, which would take a fifth longer.
 """
 
 import math
@@ -22,20 +22,20 @@ _LIBRARY = frozenset(
     symmetric_product triangular_solve tridiagonal tridiagonal_solve
     """.split()
 )
-# operations that the CPU backend does not write into a kernel
+# operations that the CPU backend cannot include in a kernel
 _CALLS = frozenset(
     """
     approx_top_k conv_general_dilated select_and_scatter_add select_and_gather_add sort
     top_k
     """.split()
 )
-# name of a compiled function whose own derivative only saves work
+# name of a compiled function whose custom derivative only saves work
 _SAVING = "its_derivative_only_saves_work"
 
 
 @no_type_check
 def opened(equation):
-    """Return the program inside a call that only groups, and its constants; else
+    """Return the program inside a call that only groups, and its constants; otherwise
     `None`.
     """
     if equation.primitive.name not in _GROUPS:
@@ -47,7 +47,7 @@ def opened(equation):
 
 
 def equations(jaxpr) -> Iterator:
-    """All equations of a program and of those inside it."""
+    """Yield all equations of a program and of the programs inside it."""
     for equation in jaxpr.eqns:
         yield equation
         for value in equation.params.values():
@@ -59,9 +59,9 @@ def equations(jaxpr) -> Iterator:
 
 
 def saving_jvp(function: Callable) -> jax.custom_jvp:
-    """Apply `jax.custom_jvp` for a derivative that equals that of the function at less
-    cost. A function with a different rule must be called unchanged; this function may
-    be inlined, and is then as fast as any other arithmetic.
+    """Apply `jax.custom_jvp` with a derivative that is equal to that of the function
+    but cheaper. A function with a different rule must be called unchanged, but this one
+    may be inlined and is then as fast as any other arithmetic.
     """
 
     def marked(*arguments):

@@ -1,7 +1,7 @@
 """Numbers that are known while a function is traced, and arithmetic on them.
 
-Most come from the zeros and ones of derivatives. They are computed in numpy: each other
-operation would be a program to compile.
+Most come from the zeros and ones of derivatives. They are computed in numpy, because
+otherwise each operation would be a program to compile.
 """
 
 from typing import no_type_check
@@ -30,7 +30,7 @@ _NUMPY = {
 }
 
 
-# called for every scalar: see `_jaxprs.py`
+# called for every scalar; see `_jaxprs.py`
 @no_type_check
 def is_known(element) -> bool:
     return isinstance(element, (np.generic, bool, int, float))
@@ -43,7 +43,7 @@ def join_known(elements: np.ndarray):
 
 
 def computed(equation, arrays) -> list[np.ndarray]:
-    """Return an operation on known numbers, done while tracing."""
+    """Return the result of an operation on known numbers, computed while tracing."""
     name, outputs = equation.primitive.name, equation.outvars
     params = equation.params
     with np.errstate(all="ignore"):

@@ -1,10 +1,11 @@
 """Keep shared intermediate values of a loop body in memory.
 
-The compiler fuses cheap operations into whatever uses them, and computes a shared value
-again in each of its users; in a long body such repetitions multiply until one iteration
-costs a hundred times what it should, to run and to compile. A value that the loop
-carries from iteration to iteration must exist in memory, so its users read it instead.
-This pass finds the values worth carrying. The results of the loop are not changed.
+The compiler fuses cheap operations into the operations that use them, and recomputes a
+shared value in each of its users. In a long body, such repetitions multiply until one
+iteration takes a hundred times as long as necessary, both to run and to compile. A
+value that the loop carries from iteration to iteration must exist in memory, so its
+users read it instead. This pass finds the values worth carrying. The results of the
+loop are not changed.
 """
 
 import functools
@@ -19,7 +20,7 @@ from jax.interpreters import partial_eval
 from ._jaxprs import calls_library
 
 
-# a value is kept when computing it again in its users would cost more operations
+# a value is kept if recomputing it in its users would take more operations than this
 _THRESHOLD = 100
 # operations that cost more than an addition
 _COST = {"div": 4, "sqrt": 6, "custom_jvp_call": 40, "sin": 30, "cos": 30, "pow": 40}
@@ -39,7 +40,7 @@ def _chosen(jaxpr) -> list:
     cost: dict = {}
     kept = []
     for equation in jaxpr.eqns:
-        # inputs of the body and kept values cost nothing more
+        # inputs of the body and kept values have no further cost
         price = _COST.get(equation.primitive.name, 1)
         inputs = {v for v in equation.invars if not isinstance(v, Literal)}
         price += sum(cost.get(v, 0) for v in inputs)
@@ -55,7 +56,7 @@ def _chosen(jaxpr) -> list:
 
 
 def _hoisted(jaxpr, constants):
-    """Return a program whose operations on constants alone are evaluated here."""
+    """Return a program in which operations on constants only have been evaluated."""
     known = set(jaxpr.constvars)
     early, late = [], []
     for equation in jaxpr.eqns:
@@ -82,10 +83,10 @@ def with_kept(body: Callable, carry, on: bool = True):
     """Return a loop body that also carries its shared scalars.
 
     **Arguments:** `body(carry) -> (carry, row)` and an example of the carry, scalars.
-    The row may be a pytree. Without `on` nothing is kept.
+    The row may be a pytree. Without `on`, nothing is kept.
 
     Returns:
-        The new body, on `(carry, kept)`, and the first `kept`.
+        The new body, a function of `(carry, kept)`, and the initial `kept`.
     """
     if not on:
         return functools.partial(_keeping_nothing, body), []
@@ -122,10 +123,11 @@ def _keeping_nothing(body, state):
 
 
 def without_library(function: Callable, argument):
-    """Evaluate the library calls of `function` here, if they need no argument.
+    """Evaluate the library calls of `function` in advance if they do not depend on an
+    argument.
 
-    A loop that calls one cannot be a single kernel. Other operations stay where they
-    are: within the kernel they cost less than as its arguments.
+    A loop that calls one cannot be a single kernel. Other operations are not moved:
+    within the kernel, they cost less than as its arguments.
     """
     leaves, treedef = jax.tree.flatten(argument)
 
@@ -146,9 +148,9 @@ def without_library(function: Callable, argument):
 
 
 def depend_on(value, kept):
-    """Make `value` depend on all kept scalars, which would otherwise be dropped.
+    """Make `value` depend on all kept scalars, which would otherwise be removed.
 
-    Adding 1e-300 changes no number that a count can be.
+    Adding 1e-300 does not change any possible count.
     """
     total = jnp.zeros(())
     for v in kept:

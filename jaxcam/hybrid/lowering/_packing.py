@@ -1,4 +1,4 @@
-"""Pack the arrays of a pytree into one array, since each argument of a call costs
+"""Pack the arrays of a pytree into one array, because each argument of a call takes
 time.
 """
 
@@ -11,17 +11,18 @@ import numpy as np
 
 
 class Packing(NamedTuple):
-    """The structure of a packed pytree: hashable, so that programs are found by it."""
+    """The structure of a packed pytree; it is hashable, so programs can be looked up by
+    it.
+    """
 
     structure: Any
     shapes: tuple
-    """Shape of each leaf; `None` for one that is not of 64-bit floats and stays apart.
+    """Shape of each leaf; `None` for a leaf that is not of 64-bit floats and remains
+    separate.
     """
 
     def unpacked(self, numbers, apart):
-        """Return the pytree of these numbers, `(k,)`, and of the leaves that stayed
-        apart.
-        """
+        """Return the pytree of these numbers, `(k,)`, and of the separate leaves."""
         leaves, first, rest = [], 0, iter(apart)
         for shape in self.shapes:
             if shape is None:
@@ -34,21 +35,21 @@ class Packing(NamedTuple):
 
 
 class Packed(NamedTuple):
-    """The arrays of a pytree; where lanes differ, a column of `numbers` for each."""
+    """The arrays of a pytree; if lanes differ, `numbers` has a column for each."""
 
     numbers: np.ndarray
-    """(k,) or (k, lanes)."""
+    """Shape `(k,)` or `(k, lanes)`."""
     apart: list
-    """Leaves that are no 64-bit floats, a row for each lane."""
+    """Leaves that are not 64-bit floats, with a row for each lane."""
     packing: Packing
 
     def some(self, lanes) -> tuple:
-        """Numbers and other leaves of these lanes."""
+        """Return the numbers and other leaves of some lanes."""
         return self.numbers[:, lanes], [leaf[lanes] for leaf in self.apart]
 
 
 def pack(tree, lanes: int | None = None) -> Packed:
-    """Return the arrays of a pytree packed; with `lanes` each has a row for each
+    """Return the packed arrays of a pytree; with `lanes`, each array has a row per
     lane.
     """
     leaves, structure = jax.tree.flatten(tree)

@@ -1,12 +1,12 @@
 """Rewrite a function of small arrays as arithmetic on scalars.
 
-A state of two numbers held as an array of length two makes every operation of a batch
-a pass over interleaved memory. Here a function is traced once and evaluated with one
+If a state of two numbers is an array of length two, every operation of a batch is a
+pass over interleaved memory. Here, a function is traced once and evaluated with one
 scalar for each array element, so that under `vmap` every operation is a plain
-elementwise operation over the lanes, which the compiler fuses into one kernel. Sine,
+elementwise operation over the batch, which the compiler fuses into one kernel. Sine,
 cosine and tangent are replaced by arithmetic (see `_sincos.py`).
 
-An operation that cannot be split keeps its array form: it is slower, never wrong.
+An operation that cannot be split keeps its array form, which is slower but never wrong.
 """
 
 from collections.abc import Callable
@@ -23,7 +23,7 @@ from ._known import computed, is_known, join_known
 from ._sincos import sincos
 
 
-# operations that only move elements: the permutation is found by moving indices
+# operations that only move elements; the permutation is found by moving indices
 _MOVES = frozenset(
     {
         "reshape",
@@ -54,7 +54,7 @@ def split(array) -> np.ndarray:
     shape = jnp.shape(array)
     out = np.empty(shape, dtype=object)
     for index in np.ndindex(shape):
-        # a numpy array of no dimensions becomes a number, which counts as known
+        # a zero-dimensional numpy array becomes a number, which counts as known
         whole = not shape and not isinstance(array, np.ndarray)
         out[index] = array if whole else array[index]
     return out
@@ -100,7 +100,7 @@ def scalarise(function: Callable, *example) -> Callable:
 
 
 def _constants(values) -> list[np.ndarray]:
-    """Constants of a jaxpr; those with known values become numbers."""
+    """Return the constants of a jaxpr; those with known values become numbers."""
     return [split(v if isinstance(v, Tracer) else np.asarray(v)) for v in values]
 
 
@@ -112,7 +112,7 @@ def _boxed(leaf) -> np.ndarray:
     return out
 
 
-# for every equation: see `_jaxprs.py`
+# called for every equation; see `_jaxprs.py`
 @no_type_check
 def _evaluate(jaxpr, consts, arguments, memory):
     values = {}
@@ -133,7 +133,7 @@ def _evaluate(jaxpr, consts, arguments, memory):
 def _apply(equation, inputs, memory):
     name = equation.primitive.name
     params = equation.params
-    # a rule for reverse mode only has just the body
+    # a rule for reverse mode only contains only the body
     if has_saving_rule(equation) or name == "custom_vjp_call":
         inside = params["call_jaxpr"].jaxpr, params["call_jaxpr"].consts
     else:
@@ -166,7 +166,7 @@ def _apply(equation, inputs, memory):
 
 
 def _move(equation, inputs):
-    """Find where each element goes by sending the indices the same way."""
+    """Find the destination of each element by applying the operation to indices."""
     first, others = inputs[0], [join_known(i) for i in inputs[1:]]
     name, params = equation.primitive.name, equation.params
     if name in ("reshape", "squeeze"):
@@ -241,7 +241,7 @@ def _elementwise(equation, inputs, shape, memory):
 
 
 def _scalar(equation, scalars, memory):
-    """One operation on scalars, done once for the same operands."""
+    """Evaluate an operation on scalars, once for the same operands."""
     name, params = equation.primitive.name, equation.params
     if name == "convert_element_type":
         kind = params["new_dtype"]
@@ -261,7 +261,7 @@ def _scalar(equation, scalars, memory):
     if key not in memory:
         arrays = [jnp.asarray(s) for s in scalars]
         made = sincos(arrays[0]) if turn else equation.primitive.bind(*arrays, **params)
-        # the operands are kept, so that their identities stay taken
+        # the operands are kept, so that their identities are not reused
         memory[key] = (made, scalars)
     made = memory[key][0]
     if not turn:
@@ -271,7 +271,9 @@ def _scalar(equation, scalars, memory):
 
 
 def _identity(name, scalars):
-    """Sums with zero and products with zero or one, which differentiation leaves."""
+    """Simplify sums with zero and products with zero or one, which differentiation
+    leaves.
+    """
     if len(scalars) != 2 or name not in ("add", "add_any", "sub", "mul"):
         return None
     a, b = scalars

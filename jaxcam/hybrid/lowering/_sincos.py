@@ -1,8 +1,8 @@
 """Sine and cosine in plain arithmetic.
 
-A library call inside a vectorised loop stops the compiler from keeping the loop in
-registers. These few multiplications do not, and err by some 2e-16 (absolutely) for
-|x| < 1e6; beyond that the reduction to half a turn loses digits in proportion to x.
+A library call inside a vectorised loop prevents the compiler from keeping the loop in
+registers. These few multiplications do not. Their absolute error is about 2e-16 for |x|
+< 1e6; beyond that, the reduction to half a turn loses digits in proportion to x.
 """
 
 from functools import partial
@@ -15,8 +15,8 @@ import numpy as np
 # pi in two parts, the first of 33 bits, so that a small integer times it is exact
 _PART_1 = 3.1415926534682512
 _PART_2 = 1.2154201013012384e-10
-# sine/x - 1 over x^2, and cosine - 1 + x^2/2 over x^4, minimax on |x| <= pi/2: the
-# polynomials err by 1e-18
+# (sine/x - 1) / x^2 and (cosine - 1 + x^2/2) / x^4, minimax on |x| <= pi/2: the error
+# of the polynomials is 1e-18
 _SINE = (
     -0.16666666666666666,
     0.008333333333333184,
@@ -40,9 +40,7 @@ _COSINE = (
 
 
 def _eight(c, z, z2, z4):
-    """Return a polynomial of eight coefficients in `z`; few of its steps wait for
-    another.
-    """
+    """Return a polynomial of eight coefficients in `z`, with few sequential steps."""
     low = (c[0] + c[1] * z) + (c[2] + c[3] * z) * z2
     high = (c[4] + c[5] * z) + (c[6] + c[7] * z) * z2
     return low + high * z4
@@ -50,11 +48,11 @@ def _eight(c, z, z2, z4):
 
 @jax.custom_jvp
 def sincos(x):
-    """Sine and cosine of `x` (rad, float64, any shape)."""
+    """Return the sine and cosine of `x` (rad, float64, any shape)."""
     return _arithmetic(x)
 
 
-# traced once for each shape, then copied: a loop body holds dozens of these
+# traced once for each shape, then copied: a loop body contains dozens of these
 @partial(jax.jit, inline=True)
 def _arithmetic(x):
     halves = jnp.round(x * (1 / np.pi))

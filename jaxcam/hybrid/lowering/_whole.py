@@ -1,11 +1,11 @@
 """Wrap a program as one primitive that JAX transforms as a unit.
 
 JAX's linearisation splits a program into known and linear parts, and drops unused
-results. XLA aborts if results of a loop that is compiled as one kernel
-(`_one_kernel.py`) are dropped, and no loop can be run backward. This module wraps a
-program as one primitive. `vmap` and `jvp` yield another such primitive. Linearisation
-evaluates the function, then its derivative. A gradient is built from one forward
-derivative per input.
+results. XLA aborts if results of a loop compiled as one kernel (`_one_kernel.py`) are
+dropped, and a loop cannot be run backward. This module wraps a program as one
+primitive. `vmap` and `jvp` yield another such primitive. Linearisation evaluates the
+function and then its derivative. A gradient is assembled from one forward derivative
+per input.
 """
 
 import functools
@@ -26,7 +26,8 @@ from jax.interpreters import ad, batching, mlir, partial_eval
 from ._jaxprs import fits_kernel
 
 
-# on a call: the CPU backend compiles it, and the calls inside it, as one function
+# attribute of a call: the CPU backend compiles it and the calls inside it as one
+# function
 _ONE_FUNCTION = {"inlineable": "false", "xla_cpu_small_call": "true"}
 
 
@@ -36,8 +37,8 @@ class Program(NamedTuple):
     jaxpr: ClosedJaxpr
     # whether the CPU backend compiles it as one function
     kernel: bool
-    # the program from which this one was differentiated: its inputs and outputs come
-    # first here, followed by the tangents
+    # the program of which this one is the derivative: its inputs and outputs come first
+    # here, followed by the tangents
     plain: "Program | None" = None
 
 
@@ -51,8 +52,8 @@ def whole(function: Callable, *, kernel: dict[str, str] | None = None) -> Callab
     Returns:
         A function of the same arguments with the same results (arrays and static
             leaves). It can be compiled, batched and differentiated in both modes, any
-            number of times. A gradient costs as much as a forward derivative in all
-            numbers differentiated by.
+            number of times. A gradient costs as much as forward derivatives with
+            respect to all differentiation variables.
     """
 
     def call(*arguments):
@@ -66,7 +67,7 @@ def whole(function: Callable, *, kernel: dict[str, str] | None = None) -> Callab
             kept.append(rest)
             return made
 
-        # calls take the attributes of the moment they are traced at
+        # calls take the attributes that are set when they are traced
         with set_xla_metadata(**(kernel or {})):
             closed, shape = jax.make_jaxpr(of_arrays, return_shape=True)(arrays)
         if kernel and not fits_kernel(closed.jaxpr):
@@ -87,7 +88,7 @@ def while_loop(goes_on: Callable, body: Callable, start):
 
 
 def has_program(equation) -> ClosedJaxpr | None:
-    """Return the program inside an operation that `whole` has made; else `None`."""
+    """Return the program inside an operation created by `whole`; otherwise `None`."""
     if equation.primitive is not whole_p:
         return None
     return equation.params["program"].jaxpr
@@ -138,9 +139,9 @@ def _on_cpu(*arguments, program: Program):
         arguments = jax.lax.optimization_barrier(arguments)
         return jaxpr_as_fun(program.jaxpr)(*arguments), arguments
 
-    # XLA aborts on such a call where its optimisation leaves an argument without a use,
-    # so all arguments are results too, and all results are held; and where an argument
-    # is a constant, as it becomes in a loop around the call
+    # XLA aborts on such a call if optimisation leaves an argument unused, so all
+    # arguments are also results and all results are kept; and if an argument is a
+    # constant, as it becomes in a loop around the call
     arguments = jax.lax.optimization_barrier(arguments)
     with set_xla_metadata(**_ONE_FUNCTION):
         made = jax.jit(with_arguments)(*arguments)
@@ -157,7 +158,7 @@ def _batched(program: Program, axis, mapped: list[bool], wanted: list[bool]):
     """Return the program of a batch, and which outputs have a batch: all `wanted`, and
     more.
 
-    A program and the one that it was made of agree on the outputs that they share.
+    A program and the one from which it was derived agree on their common outputs.
     """
     jaxpr, out = batch_jaxpr(program.jaxpr, axis, mapped, list(wanted))
     if program.plain is None:
@@ -257,8 +258,8 @@ def _without(program: Program, first: int) -> Program:
 
 
 def _transpose(cotangents, *arguments, program: Program):
-    """Compute cotangents of the inputs in which the program is linear, by its full
-    matrix.
+    """Compute the cotangents of the inputs in which the program is linear, from its
+    full matrix.
     """
     linear = [ad.is_undefined_primal(a) for a in arguments]
     zeros = [

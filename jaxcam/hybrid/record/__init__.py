@@ -1,4 +1,4 @@
-"""The record of a run: events, contacts, steps, and the state in between."""
+"""The record of a run: events, contacts and steps, and the state between them."""
 
 from ._assemble import assemble as assemble, Parts as Parts
 from ._events import (

@@ -14,7 +14,8 @@ from ..surface import normal_velocity
 from ._events import Contacts, Impacts, Steps
 
 
-# Numbers of velocities that programs are compiled for: the least, and the growth factor
+# Numbers of velocities for which programs are compiled: the smallest, and the growth
+# factor
 _FEWEST, _LONGER = 1024, 4
 
 
@@ -31,7 +32,7 @@ def assemble(
 ) -> Parts:
     """Sort the rows of a log into impacts, contacts and steps of fixed lengths.
 
-    With `xp=numpy` a log that is not traced is sorted without compiling anything.
+    With `xp=numpy`, a log that is not traced is sorted without compilation.
     """
     rows = log.kind.shape[0]
     max_impacts, max_contacts = sizes
@@ -60,7 +61,8 @@ def assemble(
     hit, left = (xp.where(real, speed, xp.nan) for speed in speeds)
     impacts = Impacts(t_hit, before, after, which, hit, left, number)
 
-    # a contact begins at the row after its last impact, and ends where its flag falls
+    # a contact begins in the row after its last impact and ends where its flag is
+    # cleared
     began = xp.concatenate([kept[:1], kept[1:] & ~kept[:-1]])
     fell = xp.concatenate([xp.zeros_like(kept[:1]), kept[:-1] & ~kept[1:]])
     fell = fell & (xp.arange(rows + 1) <= count)[:, None]
@@ -100,14 +102,16 @@ def _least_to_come(xp: ModuleType, values):
 
 
 def _speeds(xp: ModuleType, system, times, sides, which):
-    """Normal velocities at the constraints that were hit, on either side of impacts."""
+    """Return the normal velocities at the constraints that were hit, before or after
+    impacts.
+    """
     count = times.shape[0]
     if xp is np and not count:
         return times, times
     times, which = xp.concatenate([times, times]), xp.concatenate([which, which])
     states = xp.concatenate(sides)
     if xp is np:
-        # a few lengths only, as each is compiled
+        # only a few lengths, because each is compiled
         size = _FEWEST
         while size < 2 * count:
             size *= _LONGER

@@ -1,4 +1,4 @@
-"""The events of a trajectory, and the points between them."""
+"""The events of a trajectory, and its integration points."""
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -11,9 +11,9 @@ from ._printed import numbers, Printed, vector_text
 class Impacts(Printed):
     """The impacts of a trajectory, in order.
 
-    Under a transformation (`jit`, `vmap`, `grad`) the arrays keep a fixed length k; the
-    first `count` entries are real, later times are inf and later states NaN. While a
-    trajectory is assembled outside of transformations, they are NumPy arrays.
+    Under a transformation (`jit`, `vmap`, `grad`), the arrays have a fixed length k:
+    the first `count` entries are valid, later times are inf, and later states are NaN.
+    While a trajectory is assembled outside of transformations, they are NumPy arrays.
     """
 
     time: Float[AnyArray, " k"]
@@ -39,17 +39,18 @@ class Impacts(Printed):
 
 
 class Contacts(Printed):
-    """The intervals of sustained contact (sticking), in order; padded as `Impacts` is.
+    """The intervals of sustained contact (sticking), in order; padded like `Impacts`.
 
-    A contact that lasts beyond the run has `released` False and ends where the run
-    does.
+    A contact that lasts beyond the run has `released` False and ends at the end of the
+    run.
     """
 
     start: Float[AnyArray, " m"]
-    """Start of contact (s): the accumulation time of the chatter, or t0; shape `(m,)`.
+    """Start of the contact (s), the accumulation time of the chatter or t0; shape
+    `(m,)`.
     """
     end: Float[AnyArray, " m"]
-    """Release time (s), shape `(m,)`."""
+    """End of the contact (s), usually its release; shape `(m,)`."""
     released: Bool[AnyArray, " m"]
     """Whether the contact ended by release, shape `(m,)`."""
     constraint: Int[AnyArray, " m"]
@@ -73,7 +74,7 @@ class Contacts(Printed):
 
 
 class Steps(Printed):
-    """The points between which the motion was integrated, with their modes."""
+    """The integration points, with the modes of the motion."""
 
     time: Float[AnyArray, " s"]
     """Time of each point (s), shape `(s,)`."""
@@ -106,7 +107,7 @@ class Steps(Printed):
 
 
 def impact_table(impacts: Impacts, sentence: str) -> ShortTable:
-    """Return the times and speeds of impacts, below a sentence."""
+    """Return a table of the times and speeds of impacts below a sentence."""
     columns = (
         impacts.time,
         impacts.constraint,

@@ -12,7 +12,7 @@ from ..checks import is_traced
 class Printed(eqx.Module):
     """A result that prints as a short table instead of its arrays.
 
-    Traced values, and batches that `vmap` made, print as the module that they are.
+    Traced values, and batches created by `vmap`, are printed as ordinary modules.
     """
 
     @abc.abstractmethod
@@ -33,11 +33,11 @@ class Printed(eqx.Module):
 
 
 def vector_text(vector) -> str:
-    """Return the components of a state on one line, the first of a long one."""
+    """Return the components of a state on one line; a long state is shortened."""
     shown = [f"{float(x):.6g}" for x in vector[:6]]
     return ", ".join([*shown, "…"] if len(vector) > 6 else shown)
 
 
 def numbers(array, count) -> np.ndarray:
-    """Return the real entries of a padded array."""
+    """Return the valid entries of a padded array."""
     return np.asarray(array)[: int(count)]

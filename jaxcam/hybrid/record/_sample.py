@@ -1,4 +1,4 @@
-"""Sample the state between points by one more step of the same method."""
+"""Sample the state between points by one additional step of the same method."""
 
 import diffrax
 import equinox as eqx
@@ -16,7 +16,7 @@ from ._events import Steps
 
 
 def pad(array, fill):
-    """`array` continued to a power of two, so that few lengths are compiled."""
+    """Return `array` padded to a power of two, so that few lengths are compiled."""
     array = np.asarray(array)
     length = 64
     while length < array.shape[0]:
@@ -54,7 +54,7 @@ def sample(system, settings: Settings, steps: Steps, times):
         span = last - steps.time[0]
 
         def inside(s):
-            # no step reaches across a breakpoint, so no sample of one does
+            # no step extends across a breakpoint, so no sample of a step does
             return s if system.breakpoints is None else between(s, start, end, span)
 
         point = start, x, contact, t - start

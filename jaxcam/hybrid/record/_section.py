@@ -14,7 +14,7 @@ def crossings(trajectory, function, direction: int):
     """Find the crossings; see `Trajectory.section`."""
 
     def look(times):
-        # of a padded length, so that few lengths are compiled
+        # padded, so that few lengths are compiled
         longer = pad(times, points[0])
         values = jax.vmap(function)(longer, trajectory.at(longer))
         return np.asarray(values)[: len(times)]
@@ -22,14 +22,14 @@ def crossings(trajectory, function, direction: int):
     points = np.asarray(trajectory.steps.time)[: int(trajectory.steps.count)]
     share = np.linspace(0.0, 1.0, _PLACES + 1)
     grid = points[:-1, None] + share[None, :] * np.diff(points)[:, None]
-    # an impact belongs to the step after it: every step is searched up to just before
-    # its end
+    # an impact belongs to the step after it, so every step is searched up to just
+    # before its end
     tiny = 1e-12 * np.maximum(np.abs(points[1:]), np.diff(points))
     ends = np.maximum(points[1:] - tiny, points[:-1])
     grid = np.minimum(grid, ends[:, None])
     values = look(grid.ravel()).reshape(grid.shape)
     left, right = values[:, :-1].ravel(), values[:, 1:].ravel()
-    # a zero exactly at a place belongs to the piece that ends there
+    # a zero exactly at a point belongs to the piece that ends there
     crossed = (np.sign(left) * np.sign(right) < 0) | ((right == 0) & (left != 0))
     crossed = crossed & (np.sign(right - left) * direction >= 0)
     index = np.flatnonzero(crossed)

@@ -64,7 +64,7 @@ class Trajectory(Printed):
 
     @property
     def result(self) -> str:
-        """The reason if the run did not reach t1, otherwise the empty string."""
+        """The reason why the run did not reach t1; empty if it did."""
         return message(int(self.code))
 
     @property
@@ -81,8 +81,8 @@ class Trajectory(Printed):
     def at(self, times) -> Float[Array, "times n"]:
         """Return the state at each of `times`, after any impact there.
 
-        Each sample is one more step of the same method from the last point before it,
-        so it is as accurate as the run itself and differentiable.
+        Each sample is computed by one additional step of the same method from the last
+        point before it, so it is differentiable and as accurate as the run itself.
 
         Args:
             times: Times (s), shape `(times,)`.
@@ -91,10 +91,10 @@ class Trajectory(Printed):
             States, shape `(times, n)`.
 
         Raises:
-            ValueError: `times` is not a vector, or reaches outside [t0, t1].
+            ValueError: `times` is not a vector, or a time is outside [t0, t1].
         """
         known = not (is_traced((self, times)) or is_tracing())
-        # in numpy where it can be: jax would compile something for every new length
+        # in numpy if possible: jax would compile a program for every new length
         xp = np if known else jnp
         times = xp.asarray(times, dtype=xp.float64)
         if times.ndim != 1:
@@ -108,8 +108,8 @@ class Trajectory(Printed):
             room = 1e-12 * max(abs(float(self.t0)), abs(end))
             if not (low >= float(self.t0) - room and high <= end + room):
                 raise ValueError(
-                    f"times reach from {low:g} to {high:g} s but the trajectory covers "
-                    f"{float(self.t0):g} to {end:g} s"
+                    f"times extend from {low:g} to {high:g} s, but the trajectory "
+                    f"covers {float(self.t0):g} to {end:g} s"
                 )
         if not known:
             return sample(self.system, self.settings, self.steps, times)
@@ -137,7 +137,7 @@ class Trajectory(Printed):
         """Return the states at t0 + phase + k period.
 
         Args:
-            period: Sampling period (s); default the forcing's own.
+            period: Sampling period (s); default: that of the forcing.
             phase: Time of the first sample after t0 (s).
 
         Returns:
@@ -165,7 +165,8 @@ class Trajectory(Printed):
 
         Args:
             function: A smooth scalar function of time and state.
-            direction: Crossings that count: +1 rising, -1 falling, 0 both.
+            direction: Direction of the crossings to return: +1 rising, -1 falling, 0
+                both.
 
         Returns:
             Times (s) and states, shapes `(k,)` and `(k, n)`.

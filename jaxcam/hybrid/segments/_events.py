@@ -1,7 +1,7 @@
-"""Locate the first event in a piece of motion from diffrax by Newton's method.
+"""Locate the first event in a piece of motion computed by diffrax, by Newton's method.
 
-Each step is searched at points inside it, which are computed by separate steps;
-Newton's method then varies the length of such a step.
+Each step is checked at interior points, which are computed by separate steps; Newton's
+method then varies the length of such a step.
 """
 
 from typing import NamedTuple
@@ -23,14 +23,14 @@ class PieceEnd(NamedTuple):
 
 
 TOO_LONG = PieceEnd(-1, 0, 0.0)
-"""The step after an event was longer than the flight: try again with a shorter one."""
+"""The step after an event was longer than the flight: retry with a shorter one."""
 
 
 class Flown(NamedTuple):
-    """Points of a piece of motion: `k` times (s) and states of size `n`; and which of
-    the `m` constraints stay in contact. A level is the gap in flight, and the contact
-    pressure in contact; `tiny` is the resolution of each gap, and for a contact a part
-    of the largest level.
+    """Points of a piece of motion: `k` times (s) and states of size `n`, and which of
+    the `m` constraints stay in contact. The level is the gap in flight and the contact
+    pressure in contact; `tiny` is the resolution of each gap or, for a contact, a
+    fraction of the largest level.
     """
 
     motion: CompiledMotion
@@ -71,11 +71,9 @@ class Flown(NamedTuple):
         return min(found, key=lambda e: times[e.row] + e.length, default=None)
 
     def _crossing(self, k, curve, before, slope, tiny):
-        """Return where a level first falls below zero, seen from points in the
-        steps.
-        """
+        """Return where a level first falls below zero, based on points in the steps."""
         if before <= tiny:
-            # leaves the surface: its rate may be zero up to rounding
+            # leaves the surface: its rate may be zero to within rounding
             slope = max(slope, 0.0)
         started_on_surface = before <= tiny
         for i, (levels, rates) in enumerate(zip(*curve, strict=True)):
@@ -97,7 +95,9 @@ class Flown(NamedTuple):
         return None
 
     def _locate(self, k, i, low, high, start=None) -> PieceEnd:
-        """Newton on the length (s) from point `i`, kept between `low` and `high`."""
+        """Find the length (s) from point `i` by Newton's method, between `low` and
+        `high`.
+        """
         h = high if start is None else start
         change, span = np.inf, float(self.times[i + 1] - self.times[i])
         for _ in range(60):
@@ -117,7 +117,9 @@ class Flown(NamedTuple):
         return PieceEnd(k, i, float(h))
 
     def _bottom(self, k, i, low, high):
-        """Return where the level is lowest between two lengths, by halving its rate."""
+        """Return where the level is lowest between two lengths, by bisection of its
+        rate.
+        """
         for _ in range(50):
             middle = (low + high) / 2
             falls = self.probe(i, middle).rate[k] < 0
@@ -125,5 +127,5 @@ class Flown(NamedTuple):
         return high
 
     def probe(self, i, h):
-        """State, levels and rates a step of length `h` (s) behind point `i`."""
+        """Return state, levels and rates a step of length `h` (s) after point `i`."""
         return self.motion.probe(self.times[i], self.states[i], self.contact, h)

@@ -35,15 +35,15 @@ from ._one_step import one_step, scaled_term
 
 # attempted steps in one call of diffrax
 _BATCH = 64
-# points at which each of its steps is searched
+# points at which each of its steps is checked
 FRACTIONS = np.arange(1, 9) / 8
 
 
 class PathPoint(NamedTuple):
     """An intermediate state, and for each constraint the distance from its event.
 
-    The level is the gap of a free constraint and the pressure (minus the multiplier)
-    of one in contact; the event is where it falls through zero.
+    The level is the gap of an open constraint, and the pressure (minus the multiplier)
+    of a constraint in contact; the event is the point at which it falls through zero.
     """
 
     state: jax.Array
@@ -52,7 +52,9 @@ class PathPoint(NamedTuple):
 
 
 class Hop(NamedTuple):
-    """End of a short flight: a `PathPoint`, normal velocity, height climbed, error."""
+    """End of a short flight: a `PathPoint`, normal velocity, change in height, and
+    error.
+    """
 
     state: jax.Array
     level: jax.Array
@@ -63,7 +65,7 @@ class Hop(NamedTuple):
 
 
 class ChatterEnd(NamedTuple):
-    """The end of a chatter, and whether the series for it may be used."""
+    """The end of a chatter sequence, and whether the series for it is valid."""
 
     possible: jax.Array
     duration: jax.Array
@@ -76,7 +78,7 @@ def prepared(system):
 
 
 def _compiled(method):
-    """Compile a function once: numbers become arrays, which are not part of the
+    """Compile a function only once: numbers become arrays, which are not part of the
     program.
     """
     compiled = eqx.filter_jit(method)
@@ -89,7 +91,7 @@ def _compiled(method):
 
 
 class CompiledMotion(eqx.Module):
-    """The compiled functions: of time, state and the constraints in contact."""
+    """The compiled functions of time, state and the constraints in contact."""
 
     system: HybridSystem
     tolerance: jax.Array
@@ -101,7 +103,7 @@ class CompiledMotion(eqx.Module):
     def __init__(self, system, settings, scale):
         self.system = system
         self.scale = jnp.asarray(scale, dtype=jnp.float64)
-        # arrays, so that another value does not compile again
+        # arrays, so that another value does not trigger recompilation
         self.tolerance = jnp.asarray(settings.tolerance, dtype=jnp.float64)
         self.smallness = jnp.asarray(settings.chatter_smallness, dtype=jnp.float64)
         self.solver = settings.solver
@@ -160,12 +162,12 @@ class CompiledMotion(eqx.Module):
 
     @_compiled
     def probe(self, t, x, contact, h) -> PathPoint:
-        """Return the point a step of length `h` after `(t, x)`."""
+        """Return the point one step of length `h` after `(t, x)`."""
         return self._point(t, x, contact, h)
 
     @_compiled
     def scan(self, times, states, contact, count) -> PathPoint:
-        """Points inside the first `count` steps: `(steps, fractions, m)`."""
+        """Return points inside the first `count` steps, `(steps, fractions, m)`."""
         real = jnp.arange(times.shape[0] - 1) < count
         lengths = jnp.where(real, jnp.diff(times), 0.0)
         starts = jnp.where(real, times[:-1], times[0])
@@ -178,12 +180,14 @@ class CompiledMotion(eqx.Module):
                 jnp.asarray(FRACTIONS),
             )
 
-        # sequential: a batch takes much longer to compile
+        # sequential, because a batch takes much longer to compile
         return jax.lax.map(inside, (starts, origins, lengths))
 
     @_compiled
     def hop(self, t, x, contact, h) -> Hop:
-        """End of a short flight; height by Gauss's quadrature of the velocity."""
+        """Return the end of a short flight, with the height from Gauss quadrature of
+        the velocity.
+        """
         nodes, weights = np.polynomial.legendre.leggauss(5)
 
         def velocity_at(s):
@@ -205,7 +209,7 @@ class CompiledMotion(eqx.Module):
 
     @_compiled
     def jets(self, t, x):
-        """Gap and its first three derivatives in free flight, `(m, 4)`."""
+        """Return each gap and its first three derivatives in free flight, `(m, 4)`."""
         return jnp.stack(self._free_series(3)(t, x), axis=1)
 
     @_compiled
@@ -220,7 +224,9 @@ class CompiledMotion(eqx.Module):
 
     @_compiled
     def start_room(self, t, x):
-        """Gaps and normal velocities up to which a start is in contact, `(2, m)`."""
+        """Return the gaps and normal velocities up to which a start is in contact, `(2,
+        m)`.
+        """
         acceleration, time = normal_acceleration(self.system, t, x), self.system.period
         each = zip((gap_rounding, speed_rounding), (2, 1), strict=True)
         rounding = [(one(self.system, t, x, jnp.abs(x)), n) for one, n in each]
@@ -245,7 +251,9 @@ class CompiledMotion(eqx.Module):
 
     @_compiled
     def slopes(self, t, x, contact):
-        """Derivatives of the rates by the state, without a sign, `(n, n)`."""
+        """Return the absolute derivatives of the rates with respect to the state, `(n,
+        n)`.
+        """
         return jnp.abs(jax.jacfwd(lambda y: self._field(t, y, contact))(x))
 
     @_compiled
@@ -254,15 +262,15 @@ class CompiledMotion(eqx.Module):
 
     @_compiled
     def completion(self, t, x, contact, k, speed, incoming) -> ChatterEnd:
-        """Return the rest of the chatter on constraint `k` after a rebound at `speed`.
+        """Return the remaining chatter on constraint `k` after a rebound at `speed`.
 
-        As [`jaxcam.hybrid.surface.chatter_completion`][], for one of several
+        This is [`jaxcam.hybrid.surface.chatter_completion`][] for one of several
         constraints.
         """
         held = contact.at[k].set(True)
 
         def pressing(s, y):
-            # acceleration along the motion that the other contacts allow
+            # acceleration along the motion allowed by the other contacts
             return lie_derivative(
                 lambda r, z: normal_velocity(self.system, r, z)[k],
                 lambda r, z: self._field(r, z, contact),
@@ -335,7 +343,9 @@ class CompiledMotion(eqx.Module):
         )
 
     def _onto(self, t, x, contact):
-        """One Newton step onto gap = normal velocity = 0 where in contact."""
+        """Take one Newton step towards gap = normal velocity = 0 for constraints in
+        contact.
+        """
 
         def conditions(y):
             jet = jnp.stack(self._free_series(1)(t, y), axis=1)

@@ -7,19 +7,19 @@ import optimistix as optx
 
 
 def one_step(solver: diffrax.AbstractSolver, tolerance, field, t, x, h, scale):
-    """One step of length `h` from `(t, x)` along `field(t, x)`.
+    """Take one step of length `h` from `(t, x)` along `field(t, x)`.
 
     **Arguments:** the solver; the tolerance of the run, from which implicit solvers
-    take that of their equations; time (s), state `(n,)` and length (s, zero allowed);
-    the scale of each component, `(n,)`, positive.
+    derive the tolerance of their equations; time (s), state `(n,)` and step length (s,
+    may be zero); the scale of each component, `(n,)`, positive.
 
     Returns:
-        The state after the step and the estimate of its error, both `(n,)`.
+        The state after the step and its error estimate, both `(n,)`.
 
     Raises:
         ValueError: The solver has no error estimate.
     """
-    # time counts from t: t + h - t would lose the digits of a short step
+    # time is measured from t, because t + h - t would lose the digits of a short step
     terms = scaled_term(field, t, x, scale)
     solver = _with_root_finder(solver, 1e-2 * tolerance)
     zero = jnp.zeros_like(h)
@@ -39,11 +39,11 @@ def one_step(solver: diffrax.AbstractSolver, tolerance, field, t, x, h, scale):
 
 
 def scaled_term(field, t, x, scale) -> diffrax.ODETerm:
-    """Return the equation of motion of (state - x) / scale, `(n,)`, by the time after
+    """Return the equation of motion of (state - x) / scale, `(n,)`, in the time after
     `t`.
 
-    An absolute tolerance means the same for it in all units. Arguments of the equation
-    are handed on to `field(t, x, *args)`.
+    An absolute tolerance then has the same meaning in all units. Arguments of the
+    equation are passed on to `field(t, x, *args)`.
     """
 
     def rate(s, y, args):
@@ -54,8 +54,8 @@ def scaled_term(field, t, x, scale) -> diffrax.ODETerm:
 
 
 def _with_root_finder(solver, tolerance):
-    """Return the solver with a tolerance for its equations, as `diffeqsolve` would
-    set it.
+    """Return the solver with the tolerance for its equations that `diffeqsolve` would
+    set.
     """
     if not isinstance(solver, diffrax.AbstractImplicitSolver):
         return solver

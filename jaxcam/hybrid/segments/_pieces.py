@@ -1,13 +1,13 @@
-"""Second engine: one call of `diffrax.diffeqsolve` for each piece of motion.
+"""Second engine: one `diffrax.diffeqsolve` call for each piece of motion.
 
-A piece is flight or contact, up to the next event. Everything is arranged in plain
-Python around a few compiled functions: slower than the loop, easier to follow, open to
-implicit solvers, and a check on the loop, with which it shares only the derivatives of
-the gap and the formula for the duration of a chatter.
+A piece is flight or contact, up to the next event. The engine is written in plain
+Python around a few compiled functions. It is slower than the loop but easier to follow,
+and it supports implicit solvers. It also serves as a check of the loop, with which it
+shares only the derivatives of the gap and the formula for the duration of chatter.
 
-diffrax checks the sign of an event at the ends of its steps and locates it on an
-interpolant. A piece ends there at the latest; `_events.py` searches its steps for
-earlier events.
+diffrax checks the sign of an event function at the ends of its steps and locates the
+event on an interpolant. A piece ends there at the latest; `_events.py` searches its
+steps for earlier events.
 """
 
 import jax
@@ -21,10 +21,10 @@ from ._events import Flown, TOO_LONG
 from ._motion import CompiledMotion, prepared
 
 
-# a flight whose lambda = v |j| / a^2 is smaller is one step, not a call of diffrax
+# a flight with lambda = v |j| / a^2 below this is one step instead of a diffrax call
 _SHORT = 1e-3
-# this many consecutive impacts, each while another gap is zero up to rounding, count as
-# a joint accumulation
+# this many consecutive impacts, each while another gap is zero to within rounding,
+# count as a joint accumulation
 _MANY = 80
 
 
@@ -58,7 +58,7 @@ def simulate_segments(
 
 
 class _Engine:
-    """The state of a run. `contact` says for each constraint whether it is held."""
+    """The state of a run; `contact` tells whether each constraint is in contact."""
 
     def __init__(self, system, settings, t0, state, t1):
         self.settings = settings
@@ -82,9 +82,10 @@ class _Engine:
         # the first step of the next piece, shortened if it is too long
         self.first = np.inf
         self.fastest = 0.0
-        # released at this instant: its gap and velocity are zero, and grow
+        # released at this instant: gap and velocity are zero and growing
         self.released: int | None = None
-        # impacts in a row while another gap was closed to rounding, but not in contact
+        # consecutive impacts while another gap was closed to within rounding, but not
+        # in contact
         self.crowded = 0
         self.steps = 0
         self.rows: list[tuple] = []
@@ -101,7 +102,7 @@ class _Engine:
             return
         for k in range(len(level)):
             if self.contact[k]:
-                # rounding may leave a start at a release on either side of it
+                # rounding may put a start at a release on either side of it
                 wait = -level[k] / rate[k] if rate[k] < 0 else np.inf
                 if level[k] < 0 or wait <= 1e-15 * (self.span + abs(self.t)):
                     self._release(k, self.t, self.x)
@@ -157,7 +158,7 @@ class _Engine:
         if event is not None:
             points = event.row + 1
         elif fired:
-            # the interpolant erred: try again with shorter steps
+            # the interpolant was inaccurate: retry with shorter steps
             self.first = float(times[count - 1] - times[count - 2]) / 4
         if points > 1 or event is not None:
             self.released = None
@@ -220,7 +221,7 @@ class _Engine:
         kept = np.abs(speeds[1] - speeds[0]) <= 500 * rounding
         self.contact = self.contact & kept
         self.t, self.x = t, after
-        # an impact counts as an attempt too, so that every run ends
+        # an impact also counts as an attempt, so that every run ends
         self.steps += 1
         closed = np.asarray(self.motion.jets(t, after))[:, 0] <= self._tiny(after[None])
         closed[k] = False
@@ -282,8 +283,8 @@ class _Engine:
         return np.asarray(self.motion.rates(self.t, self.x, self.contact))
 
     def _rescale(self, first):
-        """Scale errors by the distance that each component has moved, or will move
-        in a step.
+        """Scale errors by the distance that each component has moved, or will move in a
+        step.
         """
         if self.settings.absolute is not None:
             size = np.maximum(np.abs(self.x), self.extents + np.abs(self.origin))
@@ -321,7 +322,9 @@ class _Engine:
 
 
 def _time_to_contact(jet) -> float:
-    """Smallest positive time at which the cubic through the jet is zero, else inf."""
+    """Return the smallest positive time at which the cubic through the jet is zero, or
+    inf.
+    """
     gap, velocity, acceleration, jerk = map(float, jet)
     cubic = [jerk / 6, acceleration / 2, velocity, gap]
     if velocity > 0 and abs(gap * acceleration) <= 1e-6 * velocity**2:

@@ -1,6 +1,6 @@
-"""Derive the motion relative to the constraints: gaps, contact, chatter, release.
+"""Motion relative to the constraints: gaps, contact, chatter and release.
 
-Everything is derived from the three functions that a system states.
+Everything is derived from the three functions that define a system.
 """
 
 from ._chatter import (

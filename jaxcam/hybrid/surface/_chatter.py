@@ -1,17 +1,17 @@
-"""Complete a chattering sequence by one formula.
+"""Complete a chatter sequence by a formula.
 
 After an impact with small rebound speed u the normal motion is y'' = A + B t + C y',
 where A < 0 and its rate B belong to the state without normal velocity, and C is the
-change of acceleration with normal velocity. With restitution r0 + r1 v the remaining,
-infinitely many flights last
+change of acceleration with normal velocity. With restitution r0 + r1 v, the infinitely
+many remaining flights last
 
     T = 2 u (1 + r1 u / (1 - r0^2)) / (|A| (1 - r0))
         - (4/3) B u^2 / (A^3 (1 - r0)^2) + (2/3) C u^2 / (A^2 (1 - r0)^2) + O(u^3).
 
-For C = r1 = 0 this is the expansion behind eq. (3.17) of the thesis, carried to second
-order; the small number is lambda / (1 - r0), lambda = u j / A^2. The rest of the state
-moves by the sticking field from the state P whose normal velocity is removed along the
-direction of the impulse, which is exact to the same order.
+For C = r1 = 0, this is the expansion behind eq. (3.17) of the thesis, carried to second
+order; the small parameter is lambda / (1 - r0), with lambda = u j / A^2. The rest of
+the state follows the sticking field from the state P, from which the normal velocity
+has been removed in the direction of the impulse; this is accurate to the same order.
 """
 
 from typing import NamedTuple
@@ -36,19 +36,20 @@ from ._normal import (
 def completion_time(
     speed, acceleration, rate, damping, restitution, softening: ArrayLike = 0.0
 ):
-    """Return the duration of the remaining impacts of a chatter, to second order in
-    `speed`.
+    """Return the duration of the remaining impacts of a chatter sequence, to second
+    order in `speed`.
 
     Args:
         speed: Rebound speed u > 0.
         acceleration: Normal acceleration A < 0.
-        rate: Jerk B along the flight, as in the module's formula.
-        damping: Rate C of the normal acceleration with normal velocity.
+        rate: Jerk B along the flight, as in the formula of this module.
+        damping: Derivative C of the normal acceleration with respect to normal
+            velocity.
         restitution: Coefficient of restitution r0 in the limit of slow impacts.
         softening: Slope r1 of the coefficient, r0 + r1 v.
 
     Returns:
-        Duration T in the units of u/A (thesis, eq. 3.17, carried to second order).
+        Duration T, in the units of u/A (thesis, eq. 3.17, carried to second order).
 
     Examples:
         >>> from jaxcam.hybrid.surface import completion_time
@@ -67,8 +68,8 @@ def completion_time(
 def completion_coefficients(system, t, before, after):
     """Return C and r0 of each constraint, for an impact from `before` to `after`.
 
-    Also returns the state P without normal velocity, one row for each constraint, as if
-    each of them had been hit.
+    It also returns the state P without normal velocity, one row for each constraint, as
+    if each had been hit.
     """
     velocity_before = normal_velocity(system, t, before)
     velocity_after = normal_velocity(system, t, after)
@@ -99,14 +100,16 @@ def completion_coefficients(system, t, before, after):
 
 
 class Completion(NamedTuple):
-    """The end of a chattering sequence."""
+    """The end of a chatter sequence."""
 
     time: Float[Array, ""]
     """Accumulation time (s)."""
     state: Float[Array, " n"]
-    """State there, shape `(n,)`."""
+    """State at that time, shape `(n,)`."""
     smallness: Float[Array, ""]
-    """The number lambda/(1 - r), which must be small for the completion to hold."""
+    """The parameter lambda/(1 - r), which must be small for the completion to be
+    valid.
+    """
 
 
 def chatter_completion(
@@ -123,8 +126,8 @@ def chatter_completion(
             map, error O(u^3).
 
     Returns:
-        The accumulation time (s), the state there, and lambda/(1 - r), which must be
-            small for either to be valid.
+        The accumulation time (s), the state at that time, and lambda/(1 - r), which
+            must be small for both to be valid.
 
     Raises:
         ValueError: `order` is neither 1 nor 2.
@@ -174,7 +177,7 @@ def chatter_completion(
 
 
 def _softening(system, t, point, direction, speed, restitution):
-    """r1 of r0 + r1 v, from the impact that led to this rebound."""
+    """Return r1 of r0 + r1 v, from the impact that led to this rebound."""
     bounces = restitution > 0
     approach = speed / jnp.where(bounces, restitution, 1.0)
     after = impacts(system, t, point - approach * direction)[0]

@@ -1,4 +1,4 @@
-"""Measure the coefficient of restitution of a system's impact law."""
+"""Compute the coefficient of restitution of a system's impact law."""
 
 import jax
 import jax.numpy as jnp
@@ -10,9 +10,9 @@ from ._normal import gaps, impacts, normal_velocity
 from ._rounding import speed_rounding
 
 
-# rounding of a law that is evaluated through several coordinates
+# rounding error of a law that is evaluated in several coordinates
 _ROUNDING = 1e-6
-# at this multiple of its rounding, a normal velocity gives the law to a tenth of that
+# at this multiple of its rounding error, a normal velocity gives the law accurately
 _KNOWN = 1e7
 # Newton steps from the state to the constraint
 _STEPS = 4
@@ -21,11 +21,11 @@ _STEPS = 4
 def restitutions(system: HybridSystem, t, x: Float[Array, " n"]) -> Float[Array, " m"]:
     """Return the coefficient of restitution of each constraint near a state.
 
-    The state is moved onto the constraint, and its normal velocity made negative: the
-    coefficient is minus the quotient of normal velocities after and before an impact
-    (thesis, eq. 2.27). For a state at rest on the constraint the normal velocity is
-    only rounding error, so it is replaced by a larger value; by 1 where all terms are
-    zero.
+    The state is moved onto the constraint, and its normal velocity is made negative:
+    the coefficient is minus the ratio of the normal velocities after and before an
+    impact (thesis, eq. 2.27). For a state at rest on the constraint, the normal
+    velocity is only rounding error, so it is replaced by a larger value, or by 1 if all
+    terms are zero.
     """
     number = gaps(system, t, x).shape[0]
     found = []
@@ -48,12 +48,12 @@ def restitutions(system: HybridSystem, t, x: Float[Array, " n"]) -> Float[Array,
 
 
 def check_restitution(system: HybridSystem, values) -> None:
-    """Raise `ValueError` for a coefficient outside of [0, 1]; NaN passes.
+    """Raise `ValueError` for a coefficient outside [0, 1]; NaN is accepted.
 
     Args:
         system: The system, whose `active` allows values above one.
-        values: Coefficients, shape `(m,)`, or `(lanes, m)` for lanes that differ in
-            parameters.
+        values: Coefficients, shape `(m,)`, or `(lanes, m)` for trajectories with
+            different parameters.
     """
     values = np.asarray(values)
     high = np.inf if system.active else 1.0 + _ROUNDING
@@ -61,7 +61,7 @@ def check_restitution(system: HybridSystem, values) -> None:
     if len(bad):
         which = tuple(int(k) for k in bad[0])
         at = f" at constraint {which[-1]}" if values.shape[-1] > 1 else ""
-        lane = f" in lane {which[0]}" if values.ndim > 1 else ""
+        lane = f" in trajectory {which[0]}" if values.ndim > 1 else ""
         raise ValueError(
             "Choose a coefficient of restitution between 0 and 1; it is "
             f"{float(values[which]):.6g}{at}{lane}."

@@ -1,10 +1,11 @@
 """Derive the motion normal to the constraints from the three functions of a system.
 
-Notation of the thesis: H gap, v = dH/dt normal velocity, a and j its first and second
-derivative along the field in force, W the impulse direction of x+ = x + W v (thesis,
-eq. 2.27). Here the unit direction D = W / (v_x W) is used: moving by D changes the
-normal velocity by one and leaves the gap unchanged. It does not depend on the
-restitution, and the sticking field (thesis, eqs. 2.30 and 2.31) becomes F - a D.
+The notation is that of the thesis: H is the gap, v = dH/dt the normal velocity, a and j
+are its first and second derivatives along the active field, and W is the impulse
+direction in x+ = x + W v (thesis, eq. 2.27). Here, the unit direction D = W / (v_x W)
+is used: moving by D changes the normal velocity by one and leaves the gap unchanged. It
+does not depend on the restitution, and the sticking field (thesis, eqs. 2.30 and 2.31)
+becomes F - a D.
 """
 
 from collections.abc import Callable
@@ -58,8 +59,8 @@ def impacts(system: HybridSystem, t: RealScalar, x: State) -> Float[Array, "m n"
 
 
 def lie_derivative(function: Callable, field: Callable) -> Callable:
-    """Return the rate of change of `function(t, x)` along `field`, explicit time
-    included.
+    """Return the rate of change of `function(t, x)` along `field`, including explicit
+    time.
     """
 
     def derivative(t, x):
@@ -72,8 +73,8 @@ def lie_series(function: Callable, field: Callable, order: int) -> Callable:
     """Return `function` and its rates of change along `field` up to `order`, as a
     tuple.
 
-    Each level is differentiated together with those below it, which costs less than one
-    after the other.
+    Each level is differentiated together with those below it, which costs less than
+    differentiating them one after the other.
     """
 
     def first(t, x):
@@ -140,8 +141,8 @@ def normal_acceleration(system, t, x) -> Float[Array, " m"]:
 def normal_directions(system, t, x) -> Float[Array, "m n"]:
     """Return the unit direction D of the impulse for each constraint.
 
-    It is exact where the normal velocity is zero: R(x) - x = W v vanishes with v, so W
-    is found from its derivative along the gradient of v, which changes v.
+    The result is exact if the normal velocity is zero: R(x) - x = W v vanishes with v,
+    so W follows from its derivative along the gradient of v.
 
     Args:
         system: The system.
@@ -149,7 +150,8 @@ def normal_directions(system, t, x) -> Float[Array, "m n"]:
         x: State, shape `(n,)`.
 
     Returns:
-        Directions, shape `(m, n)`; moving by one changes the normal velocity by one.
+        Directions, shape `(m, n)`; moving by one of them changes the normal velocity by
+            one.
 
     Examples:
         >>> from jaxcam.hybrid.surface import normal_directions
@@ -165,7 +167,7 @@ def normal_directions(system, t, x) -> Float[Array, "m n"]:
         _, moved = jax.jvp(
             lambda y, k=k: impacts(system, t, y)[k] - y, (x,), (gradient[k],)
         )
-        # the direction only: its length is fixed by v_x D = 1
+        # only the direction matters, because its length is fixed by v_x D = 1
         rows.append(moved / jnp.sum(gradient[k] * moved))
     return jnp.stack(rows)
 
@@ -173,8 +175,9 @@ def normal_directions(system, t, x) -> Float[Array, "m n"]:
 def contact_multipliers(system, t, x, contact: Bool[Array, " m"]) -> Float[Array, " m"]:
     """Return q with F_s = F - sum q_k D_k over the constraints in contact.
 
-    With one constraint q = a. The constraint presses while q < 0 and releases where q
-    rises through zero. Zero for constraints that are not in contact.
+    With one constraint, q = a. The contact force is compressive while q < 0, and the
+    constraint releases when q rises through zero. For constraints that are not in
+    contact, q is zero.
     """
     acceleration = normal_acceleration(system, t, x)
     if acceleration.shape[0] == 1:
@@ -259,10 +262,10 @@ def free_jet(system, t, x) -> Float[Array, "m 4"]:
 
 
 def mode_jet(system, t, x, contact: Bool[Array, " m"]) -> Float[Array, "m 4"]:
-    """Return H, v, a, j of each gap along the field in force.
+    """Return H, v, a and j of each gap along the active field.
 
-    For a constraint in contact a and j are the multiplier q and its rate, whose zero is
-    the release.
+    For a constraint in contact, a and j are the multiplier q and its rate; the zero of
+    q is the release.
     """
 
     def field(s, y):

@@ -1,4 +1,6 @@
-"""Estimate rounding errors of gaps and normal velocities, and the starts in contact."""
+"""Estimate the rounding errors of gaps and normal velocities, and detect contact at the
+start.
+"""
 
 from collections.abc import Callable
 
@@ -28,9 +30,9 @@ def speed_rounding(
 def start_room(rounding, acceleration, time):
     """Return the distance or speed up to which a start counts as in contact.
 
-    **Arguments:** the rounding error; the normal acceleration; and the time in which it
-    acts (s), squared for a distance. A start at the origin of a coordinate has no other
-    scale than that of the forced motion.
+    **Arguments:** the rounding error; the normal acceleration; and the time for which
+    it acts (s), squared for a distance. For a start at the origin of a coordinate, the
+    forced motion provides the only scale.
     """
     return 500 * rounding + 1e-12 * jnp.abs(acceleration) * time
 
@@ -45,7 +47,7 @@ def forced_time(period):
 def least_gaps(system, t, x, room: RealScalar = 1.0) -> Float[Array, " m"]:
     """Return the gaps of a start plus `room` times their resolution.
 
-    A start is in front of the constraints where none of them is negative.
+    A start is not behind any constraint if none of them is negative.
     """
     rounding = gap_rounding(system, t, x, jnp.abs(x))
     acceleration = normal_acceleration(system, t, x)
@@ -56,8 +58,8 @@ def least_gaps(system, t, x, room: RealScalar = 1.0) -> Float[Array, " m"]:
 def _rounding(function: Callable, t, x, reach):
     """Return how far rounding of `t` and `x` moves a function.
 
-    A state is right to some parts in 1e15 of its components; a time, and a phase made
-    of it, to two parts in 1e16 each.
+    State components are accurate to a few parts in 1e15; a time, and a phase computed
+    from it, to two parts in 1e16 each.
     """
     by_state = jax.jacfwd(lambda y: function(t, y))(x)
     by_time = jax.jvp(lambda s: function(s, x), (t,), (jnp.ones_like(t),))[1]

@@ -2,8 +2,8 @@
 
 A simulation from one initial state would soon diverge from the recording, because
 impacts magnify every error. Here each flight starts from its measured initial state, so
-that the residual shows the model discrepancy in that mode: in flight, on the surface,
-or in the impacts.
+the residual shows the model discrepancy in each mode: in flight, in contact or at
+impacts.
 """
 
 from collections.abc import Sequence
@@ -35,10 +35,11 @@ def compare(
         system: The model. A `CamFollower` is compared at the measured angle of its cam,
             regardless of its own speed.
         segments: The segmented recording.
-        observe: The channels as functions of the state: `{"height_m": 0}` is the first
-            component; a function of the state gives other quantities. By default the
-            segmented channel is the first component.
-        noise: Standard deviations of the channels; default measured.
+        observe: The channels as functions of the state: in `{"height_m": 0}`, the
+            number is the index of a component; a function of the state gives other
+            quantities. By default, the segmented channel is the first component.
+        noise: Standard deviations of the channels; by default measured from the
+            recording.
         clock: Time of the model at each sample (s).
 
     Returns:
@@ -88,7 +89,7 @@ def compare_case(rig: Rig, case: Sequence[Segments]) -> Comparison:
     """Compare all recordings of a cam-follower with its nominal model.
 
     Args:
-        rig: The model; change values by `rig.replace(...)`.
+        rig: The model; `rig.replace(...)` changes its values.
         case: Segments from `segment_case`.
 
     Returns:
@@ -98,8 +99,8 @@ def compare_case(rig: Rig, case: Sequence[Segments]) -> Comparison:
     for segments in case:
         if segments.drive is None:
             raise RecordingError(
-                f"{segments.recording.name}: it was cut without its drive; use "
-                f"`segment_case`, or `compare` with a system of your own."
+                f"{segments.recording.name}: the recording was segmented without its "
+                f"drive; use `segment_case`, or `compare` with a system of your own."
             )
         system = rig.system(segments.drive.speed, segments.drive.phase)
         found.append(compare(system, segments))
@@ -107,7 +108,7 @@ def compare_case(rig: Rig, case: Sequence[Segments]) -> Comparison:
 
 
 def _clock(system: HybridSystem, segments: Segments) -> Float[np.ndarray, " k"]:
-    """Return the time at which the model's cam has the recorded angle."""
+    """Return the time at which the cam of the model has the recorded angle."""
     if isinstance(system, CamFollower) and segments.drive is not None:
         speed, phase = float(system.speed), float(system.phase)
         return (segments.drive.angle - phase) / speed

@@ -1,4 +1,4 @@
-"""Represent the result of a comparison with a model, by mode."""
+"""The result of a comparison with a model, for each mode."""
 
 import dataclasses
 import math
@@ -33,7 +33,7 @@ class Residuals:
     piece: Int[np.ndarray, " k"]
     """Index of the flight, contact or impact of each value."""
     fitted: int = 0
-    """Number of parameters that were fitted to them."""
+    """Number of parameters that were fitted to the values."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -55,24 +55,24 @@ class Row:
     noise: float
     """Standard deviation of the noise, in `unit`."""
     ratio: float
-    """Residual in units of the noise: 1 if the model explains all that the sensors
-    resolve.
+    """Residual in units of the noise; 1 if the model explains everything that the
+    sensors resolve.
     """
     worst_record: str
     """Recording with the most significant mean difference over 10 ms."""
     worst_time: float
-    """Middle of these 10 ms (s)."""
+    """Midpoint of these 10 ms (s)."""
     worst_phase: float
-    """Angle of the cam within its turn at this time (rad)."""
+    """Cam angle within one turn at this time (rad)."""
     worst_score: float
-    """Significance of the difference there, in standard errors."""
+    """Significance of that difference, in standard errors."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Comparison:
     """A comparison of recordings with a model, flight by flight.
 
-    Everything is computed from `residuals`.
+    All results are computed from `residuals`.
     """
 
     residuals: tuple[Residuals, ...]
@@ -103,8 +103,8 @@ class Comparison:
         raise KeyError(f"there is no {mode!r} in this comparison; there is {there}")
 
     def table(self) -> Table:
-        """Return the residuals by mode, as a table for the terminal."""
-        table = Table(title="Recording minus model, by mode")
+        """Return the residuals of each mode as a table for the terminal."""
+        table = Table(title="Recording minus model for each mode")
         several = len({row.channel for row in self.rows}) > 1
         for heading in ("mode", "unit"):
             table.add_column(heading, no_wrap=True)
@@ -178,7 +178,7 @@ def _row(parts: list[Residuals]) -> Row:
 
 
 def _worst(parts: list[Residuals]) -> tuple[str, float, float, float]:
-    """Return the piece of 10 ms with the most significant mean."""
+    """Return the 10 ms interval with the most significant mean."""
     best = ("", float("nan"), float("nan"), 0.0)
     for part in parts:
         scaled = part.value / part.stderr
@@ -199,11 +199,11 @@ def _worst(parts: list[Residuals]) -> tuple[str, float, float, float]:
 
 
 _PLACES = {
-    "flight": "In flight {channel} departs from the model by {ratio} times the noise",
-    "contact": "In contact it departs from the cam by {ratio} times the noise",
-    "impact place": "Impacts happen off the surface by {ratio} times their error",
-    "impact speed": "Speeds after impacts differ from the law by {ratio} times their "
-    "error",
+    "flight": "In flight, {channel} differs from the model by {ratio} times the noise",
+    "contact": "In contact, it differs from the surface by {ratio} times the noise",
+    "impact place": "Impacts occur off the surface by {ratio} times their error",
+    "impact speed": "Speeds after impacts differ from the impact law by {ratio} times "
+    "their error",
 }
 
 
@@ -211,7 +211,7 @@ def _words(row: Row) -> str:
     channel = f"the {_plain_channel(row)}"
     start = _PLACES[row.mode].format(channel=channel, ratio=f"{row.ratio:.1f}")
     size = f" ({row.rms:.1e} {row.unit} rms over {row.count} {_plural(row)})"
-    # noise alone has a most significant place too, which is not reported
+    # pure noise also has a most significant place, which is not reported
     where = f", most clearly in {_place(row)}" if row.ratio > 1.15 else ""
     return start + size + where
 

@@ -1,7 +1,7 @@
-"""Fit the initial state of each flight with the model's free flight.
+"""Fit the initial state of each flight to the recording.
 
 All flights of a recording are fitted together, padded to the longest of them, in one
-compiled program that serves every recording of about that size.
+compiled program that is shared by all recordings of similar size.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -20,10 +20,10 @@ from ..cut import fit_local, padded
 
 
 Observe = Mapping[str, int | Callable[[Array], Array]]
-"""Channels as functions of the state: a component, or a function of it."""
+"""Channels as functions of the state: the index of a component, or a function."""
 
 _ITERATIONS = 8
-# Change (in units of the noise) that halving the steps may make to a flight
+# Allowed change of a flight (in units of the noise) when the steps are halved
 _STEP_ERROR = 0.01
 _MOST_SUBSTEPS = 64
 
@@ -31,8 +31,8 @@ _MOST_SUBSTEPS = 64
 class FlightFits(NamedTuple):
     """Fits of `b` flights of at most `k` samples in `c` channels.
 
-    - `state`: at each flight's first sample, shape `(b, n)`.
-    - `covariance`: of that state, from the noise alone, shape `(b, n, n)`.
+    - `state`: state at the first sample of each flight, shape `(b, n)`.
+    - `covariance`: covariance of that state due to the noise alone, shape `(b, n, n)`.
     - `residual`: recording minus model, shape `(b, c, k)`, zero where padded.
     """
 
@@ -54,8 +54,8 @@ def fit_flights(
 
     **Arguments:**
 
-    - `times` `(k,)`, `samples` `(c, k)`: of each flight; k may differ.
-    - `clocks`: time of the model at each flight's first sample (s).
+    - `times` `(k,)`, `samples` `(c, k)`: data of each flight; k may differ.
+    - `clocks`: time of the model at the first sample of each flight (s).
     - `observe`: each channel as a function of the state.
     - `noise`: standard deviation of each channel.
     - `size`: number of components of the state.
@@ -110,7 +110,8 @@ def state_at(
     size: int,
 ) -> Float[np.ndarray, "b n"]:
     """Find states whose channels have these values and rates of change, by Newton's
-    method. If they do not determine the state, it is the solution nearest to zero.
+    method. If they do not determine the state, the solution nearest to zero is
+    returned.
     """
     count = len(clock)
     clock, values, rates = padded(clock), padded(values), padded(rates)
@@ -120,12 +121,12 @@ def state_at(
 
 
 def observed(pick: int | Callable[[Array], Array], state: Array) -> Array:
-    """Return one channel of a state, a scalar."""
+    """Return one channel of a state as a scalar."""
     return state[pick] if isinstance(pick, int) else jnp.asarray(pick(state))
 
 
 def rate_of(system, picks, clock, state) -> Array:
-    """Rates of change of all channels in free flight, shape `(c,)`."""
+    """Return the rates of change of all channels in free flight, shape `(c,)`."""
     field = system.vector_field(clock, state)
     return jax.jvp(lambda x: _channels(picks, x), (state,), (field,))[1]
 
@@ -145,7 +146,7 @@ def _predict(system, picks, substeps, state, clock, time):
             t = clock + t0 + i * h
             return array_step(RK4, system.vector_field, t, x, h, unrolled=True)[0]
 
-        # unrolled if possible: an inner loop costs more than the steps
+        # unrolled if possible, because an inner loop costs more than the steps
         x1 = x0
         if substeps <= 2:
             for i in range(substeps):
@@ -220,12 +221,12 @@ def _match(system, picks, clock, values, rates, guess):
 
 
 def size_of(system: HybridSystem, observe: Observe) -> int:
-    """Number of components of the state."""
+    """Return the number of components of the state."""
     if system.state_names:
         return len(system.state_names)
     picks = [pick for pick in observe.values() if isinstance(pick, int)]
     for size in range(max(picks, default=0) + 1, 64):
-        # a field that unpacks its state accepts one size only
+        # a vector field that unpacks its state accepts only one size
         try:
             shape = jax.eval_shape(
                 lambda state: system.vector_field(jnp.asarray(0.0), state),

@@ -1,4 +1,4 @@
-"""Compute residuals of a model in each mode: in flight, in contact, at impacts."""
+"""Compute residuals of a model in each mode: in flight, in contact and at impacts."""
 
 import equinox as eqx
 import jax
@@ -28,7 +28,7 @@ def _rows(segments: Segments, flight: Flight) -> np.ndarray:
 
 
 def in_flight(system, segments, observe, noise, clock):
-    """Return the residuals of each channel in flight, with a fitted state, and
+    """Return the residuals of each channel in flight, with fitted initial states, and
     notes.
     """
     recording = segments.recording
@@ -54,8 +54,8 @@ def in_flight(system, segments, observe, noise, clock):
     if lost:
         start = segments.flights[lost[0]].start.time
         notes = [
-            f"In {recording.name} the model could not follow {len(lost)} flights, the "
-            f"first of them from {start:.3f} s; they are left out."
+            f"In {recording.name}, the model could not follow {len(lost)} flights, the "
+            f"first of them from {start:.3f} s; they are omitted."
         ]
     kept = [(k, i, rows) for k, (i, rows) in enumerate(pieces) if good[k]]
     if not kept:
@@ -115,7 +115,7 @@ def in_contact(system, segments, pick, clock) -> list[Residuals]:
 
 
 def at_impacts(system, segments, pick, clock) -> list[Residuals]:
-    """Return the positions of impacts, and the change of the approach speed."""
+    """Return the residuals of the positions of impacts and of the speeds after them."""
     found = segments.impacts
     sharp = found.time_stderr < 2 * segments.recording.interval
     if not np.any(sharp):
@@ -177,7 +177,7 @@ def _off_surface(system, pick, clock, state):
     def one(clock, state):
         gap, slope = jax.value_and_grad(lambda x: _nearest(system, clock, x))(state)
         channel = jax.grad(lambda x: observed(pick, x))(state)
-        # how much the gap changes with the channel, along the channel's own direction
+        # derivative of the gap with respect to the channel, in the channel's direction
         return gap * jnp.sum(channel**2) / jnp.sum(slope * channel)
 
     return jax.vmap(one)(jnp.asarray(clock), jnp.asarray(state))
@@ -189,8 +189,8 @@ def _nearest(system, clock, state):
 
 @eqx.filter_jit
 def _after_impact(system, pick, clock, state):
-    """Return the rate of the channel after the impact, and its derivative by the
-    rate before.
+    """Return the rate of the channel after the impact, and its derivative with respect
+    to the rate before.
     """
 
     def one(clock, state):
@@ -203,7 +203,7 @@ def _after_impact(system, pick, clock, state):
         def before(state):
             return rate_of(system, (pick,), clock, state)[0]
 
-        # along the direction of the state in which only the rate changes
+        # in the direction of the state in which only the rate changes
         direction = jax.grad(before)(state)
         size = jnp.sum(direction**2)
         value, change = jax.jvp(after, (state,), (direction / size,))

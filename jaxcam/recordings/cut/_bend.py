@@ -1,9 +1,9 @@
-"""Estimate bends of a cam, significant dents that low harmonics cannot describe.
+"""Estimate bends of a cam: significant dents that low harmonics cannot describe.
 
-A bend is a function of the cam's angle with the variances of a Gaussian process with a
-Matern kernel of order 5/2, so that it is zero where there are no data. Flights as low
-as the noise resemble a bend, but their place changes with the cam speed. So a bend is
-accepted only if it improves the prediction of one recording from the others.
+A bend is a function of the cam angle with a Gaussian process prior (Matern kernel of
+order 5/2), so it is zero where there are no data. Flights as low as the noise resemble
+a bend, but their position changes with the cam speed. A bend is therefore accepted only
+if it improves the prediction of one recording from the others.
 """
 
 from typing import NamedTuple
@@ -13,15 +13,15 @@ import numpy as np
 from jaxtyping import Array, Float
 
 
-# The highest harmonic of a bend: of a dent over a tenth of a radian it has 98 %
+# The highest harmonic of a bend: it represents 98 % of a dent over a tenth of a radian
 _HIGHEST = 32
 # number of coefficients of a bend
 WAVES = 2 * _HIGHEST + 1
-# Lengths of correlation (rad) and sizes (in units of the noise) that are tried
+# Correlation lengths (rad) and sizes (in units of the noise) to try
 _LENGTHS = (0.1, 0.2, 0.4)
 _SIZES = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0)
-# Gain of twice the log-likelihood that a bend must have: for the parameters of a
-# straight line and the number of samples, plus a term for its unknown place
+# Required gain of a bend in twice the log-likelihood: for the parameters of a straight
+# line and the number of samples, plus a term for its unknown position
 _SURE = 30.0
 
 
@@ -33,7 +33,9 @@ def waves(turned: Float[Array, "*k"]) -> Float[Array, "*k waves"]:
 
 
 def spread(length: float) -> Float[np.ndarray, " waves"]:
-    """Return the standard deviation of each coefficient of a bend of variance 1."""
+    """Return the standard deviation of each coefficient of a bend with unit
+    variance.
+    """
     orders = np.arange(_HIGHEST + 1)
     density = (1 + (orders * length) ** 2 / 5) ** -3.0
     density[1:] *= 2
@@ -44,7 +46,7 @@ def spread(length: float) -> Float[np.ndarray, " waves"]:
 class Seen(NamedTuple):
     """Information of one recording on the coefficients of a surface, about some values.
 
-    `normal` `(p, p)` and `target` `(p,)`, those of a bend last.
+    `normal` `(p, p)` and `target` `(p,)`; the coefficients of a bend come last.
     """
 
     normal: Float[np.ndarray, "p p"]
@@ -80,7 +82,7 @@ def bend_sizes(
 
 
 def _evidence(normal, target, known, pull, sizes) -> float:
-    """Return twice the log marginal likelihood, less that without a bend."""
+    """Return twice the log marginal likelihood, relative to that without a bend."""
     count = len(known)
     low = normal[:count, :count] + np.diag(known)
     across = normal[:count, count:]
@@ -93,10 +95,10 @@ def _evidence(normal, target, known, pull, sizes) -> float:
 
 
 def _foretold(records, known, pull, sizes) -> float:
-    """Return the gain of twice the log-likelihood of recordings from the bend of all
-    others.
+    """Return the gain in twice the log-likelihood of each recording with the bend of
+    all others.
 
-    The other coefficients are those of all recordings together.
+    The other coefficients are those fitted to all recordings.
     """
     count = len(known)
     normal, target = _total(records)

@@ -1,8 +1,8 @@
 """Find long stretches near the surface without impacts, which count as contact.
 
-The rule has two thresholds and a duration, so that noise alone makes no cut: a
-contact stays within four times the noise for 5 ms; a flight rises above six times the
-noise.
+The rule has two thresholds and a duration, so that noise alone does not create a
+boundary: a contact stays within four times the noise for 5 ms; a flight rises above six
+times the noise.
 """
 
 from typing import TypeAlias
@@ -16,23 +16,23 @@ from ._motion import Motion
 # First sample of a stretch, and one past its last
 Span: TypeAlias = tuple[int, int]
 
-# Gaps, in units of the noise: contact is possible below the first, flight is certain
+# Gaps in units of the noise: contact is possible below the first, and flight is certain
 # above the second
 LOW, HIGH = 4.0, 6.0
 # Seconds
 SHORTEST_CONTACT = 0.005
-# A stretch near the surface that is shorter than this (s) may be a graze
+# A stretch near the surface that is shorter than this (s) may be a grazing contact
 _GRAZE = 0.03
 # Standard errors by which a slope or a curvature must differ from zero
 SIGNIFICANT = 5.0
-# Fewest samples in a flight
+# Minimum number of samples in a flight
 SHORTEST_FLIGHT = 5
 
 
 def contact_stretches(motion: Motion) -> tuple[list[Span], list[Span]]:
-    """Lasting stretches near the surface, with lower flights between them.
+    """Return lasting stretches near the surface, including any low flights in them.
 
-    It also returns those that may be slow impacts or grazes.
+    Also return stretches that may be slow impacts or grazing contacts.
     """
     near = motion.gap < LOW * motion.noise
     # one outlier in thousands of samples is not a flight
@@ -85,8 +85,8 @@ def _grazes(motion: Motion, first: int, last: int) -> bool:
 def _bounces(motion: Motion, first: int, last: int, end: int) -> bool:
     """Return whether a short stretch near the surface is a slow impact.
 
-    The flight after an impact curves downwards from its first sample; the flight after
-    a release opens as a cubic and curves upwards.
+    The gap after an impact curves downwards from its first sample; after a release, it
+    opens as a cubic and curves upwards.
     """
     flight = motion.gap[last:end]
     if (

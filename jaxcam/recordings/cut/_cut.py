@@ -24,12 +24,12 @@ from ._segments import Boundary, Contact, Flight, Impacts
 
 
 # Standard errors by which a motion must recede from a surface for an impact to be
-# rejected; or continue into it, for several impacts
+# rejected, or continue into it for several impacts
 _SURE = 3.0
-# Samples of a flight before an impact that show its curvature
+# Samples of a flight before an impact needed to determine its curvature
 _LONG = 10
-# Largest gap of an impact: in units of the noise, and as a fraction of the largest gap.
-# It allows for a surface known only within its tolerance
+# Largest gap at an impact, in units of the noise and as a fraction of the largest gap;
+# this allows for a surface that is known only within its tolerance
 _FAR_NOISE, _FAR_GAP = 20.0, 0.25
 
 
@@ -42,7 +42,7 @@ def cut(
 
     - `sides`: the motion relative to each surface, with a positive gap; it is
       `mirrored` for a surface above the motion, and the distance for a moving body.
-    - `restitution`: expected value, for impacts too low to be observed.
+    - `restitution`: expected value, for impacts too weak to be observed.
     """
     motion = sides[0]
     resting, doubtful, marks = _places(sides)
@@ -99,7 +99,7 @@ def cut(
     ]
     contacts = settled_alike(contacts, flights)
     impacts = [
-        # an approach speed made negative by noise is unknown
+        # an approach speed that is negative due to noise is unknown
         ({**crossed[place], "side": marks.get(place, side.get(place, 0))}, number)
         for number, (_, place) in enumerate(spans)
         if place in crossed
@@ -110,7 +110,7 @@ def cut(
 
 
 def _places(sides: Sequence[Motion]):
-    """Return contacts, doubtful contacts and impacts, each with the number of its
+    """Return contacts, doubtful contacts and impacts, each with the index of its
     side.
     """
     # gaps may have different units
@@ -121,7 +121,7 @@ def _places(sides: Sequence[Motion]):
     for number, side in enumerate(sides):
         found, unsure = contact_stretches(side)
         for mark in impact_marks(side, found):
-            # next to a jump, windows show jumps of the opposite sign
+            # next to a jump, the windows show jumps of the opposite sign
             near = side.gap[mark - 1 : mark + 1]
             if number in nearest[mark - 1 : mark + 1] and np.min(near) < _reach(side):
                 marks[mark] = number
@@ -139,12 +139,14 @@ def _places(sides: Sequence[Motion]):
 
 
 def _reach(side: Motion) -> float:
-    """Return the gap above which a velocity jump belongs to no given surface."""
+    """Return the gap above which a velocity jump cannot be due to a given surface."""
     return max(_FAR_NOISE * side.noise, _FAR_GAP * float(np.max(side.gap)))
 
 
 def _leaves(found: dict) -> bool:
-    """Return whether the motion certainly left the surface of a supposed impact."""
+    """Return whether the motion was certainly leaving the surface at a supposed
+    impact.
+    """
     return found["approach"] < -_SURE * found["before_stderr"]
 
 
@@ -160,7 +162,7 @@ def _spans(count: int, resting: list[Span], marks: list[int]) -> list[Span]:
 
 
 def _crossed(motion: Motion, first: int, place: int, last: int) -> dict:
-    """Estimate an impact from the flights on both sides, which meet at its time."""
+    """Estimate an impact from the flights on both sides, which meet at that time."""
     before = motion.fit(first, place, at_end=True)
     after = motion.fit(place, last, at_end=False)
     origin = float(motion.time[place] - motion.interval / 2)
@@ -193,8 +195,8 @@ def _crossed(motion: Motion, first: int, place: int, last: int) -> dict:
 
 def _impact(found: dict) -> Boundary:
     if found["separation"] < -_SURE * found["after_stderr"]:
-        evidence = "the velocity jumps, and still leads into the surface"
-        # the windows that show a jump are as long as this on either side
+        evidence = "after a velocity jump, the motion still leads into the surface"
+        # the windows that show a jump are this long on either side
         return Boundary(found["time"], WINDOW / 2, "several impacts", evidence)
     jump = abs(found["after"] - found["before"])
     error = np.hypot(found["before_stderr"], found["after_stderr"])
@@ -214,8 +216,8 @@ def _landing(motion: Motion, place: int, before: LocalFit) -> Boundary:
     time = time + float(np.clip(shift, -limit, limit))
     stderr = min(limit, before.value_stderr(time) / -slope) if slope < 0 else limit
     evidence = (
-        f"the gap stays within {LOW:g} times the noise for "
-        f"{SHORTEST_CONTACT * 1e3:g} ms and more; approach speed {max(0, -slope):.2g}"
+        f"the gap stays within {LOW:g} times the noise for at least "
+        f"{SHORTEST_CONTACT * 1e3:g} ms; approach speed {max(0, -slope):.2g}"
     )
     return Boundary(time, float(stderr), "landing", evidence)
 
@@ -237,17 +239,17 @@ def _release(motion: Motion, first: int, last: int, end: int) -> Boundary:
 
 
 def _not_before(landing: Boundary | None, release: Boundary, latest) -> Boundary:
-    """Return the release, unless the follower may still have been landing by then.
+    """Return the release, unless the follower may still be bouncing then.
 
-    A low flight that lands on a receding surface rebounds too low to be observed. The
-    flight begins at `latest` (s) in any case.
+    The rebounds of a low flight that lands on a receding surface are too low to be
+    observed. The next flight begins at `latest` (s) in any case.
     """
     if landing is None or landing.kind != "landing":
         return release
     late = landing.time + 2 * landing.stderr
     if release.time > late:
         return release
-    evidence = "bounces too low to be seen may last until here"
+    evidence = "unobservably low bounces may last until here"
     return Boundary(min(late, latest), landing.stderr, "impact", evidence)
 
 
@@ -260,7 +262,7 @@ def _flight(sides, span, boundaries, left: set[int]) -> Flight:
     start = start if first == span[0] else _end(motion, first, hidden)
     stop = stop if last == span[1] else _end(motion, last - 1, hidden)
     height = float(np.max(motion.gap[first:last]))
-    # the threshold is passed long after release: these samples belong to the flight
+    # the threshold is exceeded long after release: these samples belong to the flight
     begin = int(np.searchsorted(motion.time, start.time))
     first = begin if span[0] in left and start is boundaries[span[0]] else first
     return Flight(start, stop, first, last, height)
@@ -287,7 +289,8 @@ def _contact(motion, span, boundaries, flights, restitution) -> Contact:
 def settling_time(flight: Flight, restitution: float) -> float:
     """Return the latest time at which the impacts after a landing have died out.
 
-    They shrink by the restitution in duration: the rest of a geometric series.
+    The durations of the flights form a geometric series with the coefficient of
+    restitution as its ratio.
     """
     landing = flight.stop
     late = landing.stderr if np.isfinite(landing.stderr) else 0.0

@@ -1,4 +1,4 @@
-"""Measure the speed of a motion, and its rate of change."""
+"""Measure typical speeds and accelerations of a motion."""
 
 import math
 from collections.abc import Sequence
@@ -12,7 +12,7 @@ from .._recording import Recording
 # Time (s) over which a speed is measured, so that noise is negligible; quantile of the
 # speeds
 _STRIDE, _SHARE = 5e-3, 0.95
-# Samples of a parabola that shows an acceleration
+# Number of samples of a parabola used to measure an acceleration
 _WINDOW = 51
 
 
@@ -31,8 +31,8 @@ def fast_speed(recordings: Sequence[Recording], channel: str) -> float:
 
 
 def usual_acceleration(recordings: Sequence[Recording], channel: str) -> float:
-    """Return the size of a channel's second derivative that one sample in ten exceeds,
-    in its units per second squared; infinite if the recordings are too short.
+    """Return the magnitude of a channel's second derivative that one sample in ten
+    exceeds, in its units per second squared; infinite if the recordings are too short.
     """
     found = []
     for recording in recordings:

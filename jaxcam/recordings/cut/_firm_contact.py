@@ -1,9 +1,10 @@
-"""Find samples in certain contact by the acceleration, without a known surface.
+"""Find samples that are certainly in contact from the acceleration, without a known
+surface.
 
-In flight the follower has the acceleration due to its spring, which the rig file states
-within its tolerances. A follower with a larger smooth acceleration is on the cam; at
-impacts the motion is not smooth. Where the spring force is small, the test is
-inconclusive.
+In flight, the follower has the acceleration due to its spring, which is known within
+the tolerances of the rig file. If the motion is smooth and has a larger acceleration,
+the follower is on the cam; at impacts, the motion is not smooth. If the spring force is
+small, the test is inconclusive.
 """
 
 import equinox as eqx
@@ -18,9 +19,10 @@ from ._contact_stretches import stretches
 from ._hidden_hops import moved
 
 
-# Half of the window in which an acceleration is measured, and the shortest contact (s)
+# Half of the window over which acceleration is measured, and the shortest contact (s)
 _HALF, _LASTS = 0.0125, 0.04
-# Standard errors of the noise, and standard deviations of the tolerances, that count
+# Significance levels, in standard errors of the noise and standard deviations of the
+# tolerances
 _BEYOND, _SPREAD = 4.0, 3.0
 # Standard deviations of the noise below which a window is smooth
 _SMOOTH = 4.0
@@ -56,7 +58,7 @@ def firm_contact(
     found[half : len(samples) - half] = smooth & (held > most + error)
     firm = np.zeros(len(samples), dtype=bool)
     for first, last in stretches(found):
-        # flights before it may be too low to be seen
+        # preceding flights may be too low to be observed
         if (last - first) * recording.interval >= _LASTS:
             firm[first + half : last] = True
     return firm

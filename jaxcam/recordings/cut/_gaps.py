@@ -1,4 +1,4 @@
-"""Segment a recording at all its gaps, from any channels."""
+"""Segment a recording at any number of gaps, computed from any channels."""
 
 from collections.abc import Sequence
 
@@ -23,19 +23,20 @@ def segment_gaps(
     drive: Drive | None = None,
     restitution: float = 0.5,
 ) -> Segments:
-    """Segment a recording at the impacts on each of its gaps, given at every sample.
+    """Segment a recording at the impacts at each gap; the gaps are given at every
+    sample.
 
-    There may be any number of bodies and surfaces; an impact on one gap cuts the motion
-    of all.
+    There may be any number of bodies and surfaces; an impact at one gap ends the flight
+    of all bodies.
 
     **Arguments:**
 
     - `recording`, and the `channel` that represents its motion in tables.
-    - `gaps`: each positive where it is open.
-    - `tolerances`: largest constant error of each gap, in its own units. Within it, the
-      gap is set to zero at the impacts.
-    - `drive`: of the system, if it has one.
-    - `restitution`: expected value, for impacts too low to be observed.
+    - `gaps`: the gaps, positive when open.
+    - `tolerances`: largest constant error of each gap, in its own units. Within this
+        tolerance, the gap is shifted to zero at the impacts.
+    - `drive`: the drive of the system, if it has one.
+    - `restitution`: expected value, for impacts too weak to be observed.
 
     **Returns:** the parts; `impacts.side` is the gap that closed, and `before` and
     `after` are its rates of change.

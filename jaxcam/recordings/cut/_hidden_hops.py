@@ -1,8 +1,8 @@
-"""Find flights that are lower than the encoder resolves.
+"""Find flights that are too low for the encoder to resolve.
 
-Just above the speed at which the valve floats, the follower lifts by a few times the
-noise once a turn. Samples of such a flight resemble contact. The rig file determines,
-within its tolerances, the phases of small spring force at which it may happen.
+Just above the valve-float speed, the follower lifts by a few times the noise once per
+turn. Samples of such a flight resemble contact. The rig file determines, within its
+tolerances, the phases of small contact force at which this may happen.
 """
 
 import dataclasses
@@ -18,22 +18,22 @@ from .._drive import Drive
 from .._rig import Quantity, Rig
 
 
-# Samples of a turn
+# Number of samples per turn
 _GRID = 720
-# Standard deviations of the tolerances that count
+# Number of standard deviations of the tolerances allowed for
 _SPREAD = 3.0
 # Largest advance (rad) of a release relative to the others
 _EARLY = 0.1
 
 
 def hop_phases(rig: Rig, speed: float) -> Bool[np.ndarray, " 720"]:
-    """Return the phases of the turn (of 720) with a possible hidden flight.
+    """Return at which of 720 phases of the turn a hidden flight is possible.
 
-    They extend from the phase at which the pressing acceleration, less three standard
-    deviations from the tolerances, allows a release, to the phase at which the chatter
-    of the next flight has ended.
+    They extend from the phase at which the contact acceleration, minus three standard
+    deviations due to the tolerances, allows a release, to the phase at which the
+    chatter after the flight has ended.
 
-    **Arguments:** `speed` of the cam (rad/s). Phase zero is the nominal cam's.
+    **Arguments:** `speed` of the cam (rad/s). Phase zero is that of the nominal cam.
     """
     nominal = _pull(rig, speed)
     change = [_pull(moved, speed) - nominal for moved in moved(rig)]
@@ -52,7 +52,9 @@ def hop_phases(rig: Rig, speed: float) -> Bool[np.ndarray, " 720"]:
 
 
 def _hop(pull: np.ndarray, step: float, restitution: float) -> int:
-    """Return the steps from a release to the next contact, at most one turn."""
+    """Return the number of steps from a release to the next contact, at most one
+    turn.
+    """
     rate = np.cumsum(pull) * step
     landed = np.flatnonzero(np.cumsum(rate) <= 0)
     if len(landed) == 0:
@@ -97,8 +99,9 @@ def may_hop(rig: Rig, drive: Drive) -> Bool[np.ndarray, " k"]:
 
 
 def pressed(rig: Rig, drive: Drive) -> Bool[np.ndarray, " k"]:
-    """Return the samples usable to fit the surface, if they are near it: those without
-    a possible hidden flight; all, if hidden flights may be anywhere.
+    """Return the samples that can be used to fit the surface if they are near it: those
+    without a possible hidden flight, or all samples if hidden flights are possible
+    everywhere.
     """
     doubtful = may_hop(rig, drive)
     return ~doubtful | doubtful.all()
@@ -107,8 +110,9 @@ def pressed(rig: Rig, drive: Drive) -> Bool[np.ndarray, " k"]:
 def sure_contact(
     doubtful: Bool[np.ndarray, " k"], releases: Int[np.ndarray, " releases"]
 ) -> Bool[np.ndarray, " k"]:
-    """Return the samples at which observed contact is certain. An uncertain stretch
-    with an observed release is certain, because its flight was observed too.
+    """Return the samples at which observed contact is certain. A stretch with possible
+    hidden flights is certain if its release was observed, because the flight was then
+    observed, too.
 
     **Arguments:** the result of `may_hop`, and the samples of observed releases.
     """
@@ -123,12 +127,12 @@ def sure_contact(
 def before_release(
     angle: Float[np.ndarray, " k"], first: int, releases: Int[np.ndarray, " releases"]
 ) -> Bool[np.ndarray, " k"]:
-    """Return the samples of a contact cut off by the recording's end at which it
-    certainly continues: those before the phase of release elsewhere in the recording,
-    because a release just before the end is not observed.
+    """For a contact truncated by the end of the recording, return the samples at which
+    it certainly continues: those before the phase of the releases elsewhere in the
+    recording, because a release just before the end is not observed.
 
-    **Arguments:** the angle that the cam has turned (rad), the first sample of the
-    contact, and the samples of observed releases.
+    **Arguments:** the cam angle (rad), the first sample of the contact, and the samples
+    of observed releases.
     """
     if not len(releases):
         return np.ones(len(angle), dtype=bool)

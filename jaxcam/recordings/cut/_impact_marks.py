@@ -1,6 +1,6 @@
-"""Find the ends of flights in impacts.
+"""Find flights that end in impacts.
 
-A jump in velocity separates two flights, however short the impact is.
+A velocity jump separates two flights, however short the contact is.
 """
 
 import numpy as np
@@ -38,7 +38,7 @@ def impact_marks(motion: Motion, resting) -> list[int]:
 
 
 def away(motion: Motion, marks: list[int], resting: list[Span]) -> list[int]:
-    """Return the marks that leave a flight on both sides."""
+    """Return the marks with a flight on both sides."""
     ends = [(-1, 0), (len(motion.time), len(motion.time) + 1)]
     kept: list[int] = []
     for mark in sorted(marks):
@@ -51,10 +51,12 @@ def away(motion: Motion, marks: list[int], resting: list[Span]) -> list[int]:
 
 
 def _hinge(motion: Motion, where, limits) -> tuple[int, float]:
-    """Find the best place of a slow impact, and the significance of its velocity jump.
+    """Find the most likely time of a slow impact, and the significance of its velocity
+    jump.
 
-    Only the velocity jumps in an impact; the acceleration hardly changes. So one cubic
-    and a hinge describe both sides, which finds jumps that two separate fits miss.
+    In an impact, only the velocity jumps; the acceleration hardly changes. A cubic with
+    a hinge therefore describes both sides and reveals jumps that two separate fits
+    miss.
     """
     reach = round(0.02 / motion.interval)
     best = (where[0], 0.0)

@@ -1,11 +1,11 @@
-"""Find impacts without a model, as upward jumps in velocity of a smooth motion."""
+"""Find impacts without a model, as upward velocity jumps of a smooth motion."""
 
 import numpy as np
 from jaxtyping import Float, Int
 from scipy.signal import find_peaks
 
 
-# Seconds on either side of a kink that are needed to detect it
+# Seconds needed on either side of a kink to detect it
 WINDOW = 0.01
 
 
@@ -19,9 +19,9 @@ def find_kinks(
 ) -> Int[np.ndarray, " kinks"]:
     """Return the index of the first sample after each jump in velocity.
 
-    Parabolas through the `window` (s) before and after each sample are compared; a
-    kink is a local maximum of the jump in slope that exceeds `threshold` of its
-    standard errors.
+    Parabolas through the `window` (s) before and after each sample are compared; a kink
+    is a local maximum of the jump in slope that exceeds `threshold` times its standard
+    error.
     """
     score = jump_score(samples, interval, noise, window)
     apart = max(1, int(window / interval / 2))
@@ -31,14 +31,14 @@ def find_kinks(
 def jump_score(
     samples: Float[np.ndarray, " k"], interval: float, noise: float, window: float
 ) -> Float[np.ndarray, " k"]:
-    """Return the jump in slope before each sample over its standard error, shape
+    """Return the jump in slope before each sample divided by its standard error, shape
     `(k,)`.
     """
     count = max(6, round(window / interval))
     score = np.zeros(len(samples))
     if len(samples) < 2 * count:
         return score
-    # time is counted from half a sample before the first sample after the boundary
+    # time is measured from half a sample before the first sample after the boundary
     offsets = (np.arange(count) + 0.5) * interval
     design = (offsets / offsets[-1])[:, None] ** np.arange(3)
     slope = np.linalg.pinv(design)[1] / offsets[-1]

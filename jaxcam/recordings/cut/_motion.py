@@ -1,4 +1,4 @@
-"""Represent one channel of a recording and the surface below it."""
+"""One channel of a recording and the surface below it."""
 
 import dataclasses
 
@@ -8,7 +8,7 @@ from jaxtyping import Float
 from ._polynomial import fit_local, LocalFit
 
 
-# Longest stretch (s) that is fitted, and fewest samples to which it is shortened
+# Longest stretch (s) that is fitted, and minimum number of samples when shortened
 _FIT_WINDOW, _FEWEST = 0.1, 16
 # Residuals (in units of the noise) above which a cubic does not follow a stretch
 _FOLLOWED = 2.0
@@ -16,9 +16,9 @@ _FOLLOWED = 2.0
 
 @dataclasses.dataclass(frozen=True)
 class Motion:
-    """Samples of a motion, their values in contact, and their noise.
+    """Samples of a motion, the values that they would have in contact, and their noise.
 
-    The motion is above the surface; `sense` is -1 where it was `mirrored` to be so.
+    The motion is above the surface; `sense` is -1 if it was `mirrored` to achieve this.
     """
 
     time: Float[np.ndarray, " k"]
@@ -30,8 +30,8 @@ class Motion:
     sense: float = 1.0
 
     def mirrored(self, contact, rate) -> "Motion":
-        """Return the motion relative to a surface above it, at `contact` and moving
-        at `rate`, both `(k,)` in the units of the samples.
+        """Return the motion relative to a surface above it, with position `contact` and
+        velocity `rate`, both `(k,)` in the units of the samples.
         """
         return dataclasses.replace(
             self, samples=-self.samples, contact=-contact, rate=-rate, sense=-1.0
@@ -43,7 +43,7 @@ class Motion:
 
     def fit(self, first: int, last: int, *, at_end: bool) -> LocalFit:
         """Fit a polynomial to one end of a flight, as far as a cubic follows it."""
-        # the samples next to an impact may be from the other side of it
+        # the samples next to an impact may belong to the other side
         inner = slice(first + 1, last - 1) if last - first > 6 else slice(first, last)
         count = max(4, round(_FIT_WINDOW / self.interval))
         every = np.arange(len(self.time))[inner]

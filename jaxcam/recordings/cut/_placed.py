@@ -1,4 +1,4 @@
-"""Shift a surface to its impacts, within its tolerance."""
+"""Shift a surface to the observed impacts, within its tolerance."""
 
 import dataclasses
 
@@ -9,18 +9,18 @@ from ._motion import Motion
 from ._polynomial import crossing, fit_local
 
 
-# Impacts further from the median place than this many standard errors do not count
+# Impacts further from the median position than this many standard errors are ignored
 _OUTLIER = 5.0
 
 
 def placed(motion: Motion, tolerance: float) -> Motion:
-    """Return the motion with its surface shifted to the jumps in velocity.
+    """Return the motion with its surface shifted to the velocity jumps.
 
     A surface error of many times the noise turns fast impacts into short contacts, or
     hides slow impacts.
 
-    **Arguments:** `tolerance` is largest error of the given position, in the units of
-    the samples, and so the largest shift.
+    **Arguments:** `tolerance` is the largest error of the given position, in the units
+    of the samples, and therefore the largest shift.
 
     **Returns:** the unchanged motion if no jump is within the tolerance.
     """
@@ -28,7 +28,7 @@ def placed(motion: Motion, tolerance: float) -> Motion:
     reach = max(6, round(WINDOW / motion.interval))
     found = []
     for kink in find_kinks(samples, motion.interval, motion.noise):
-        # the sample next to the impact may be on either side of it
+        # the sample next to the impact may belong to either side
         left = slice(max(0, kink - 1 - reach), kink - 1)
         right = slice(kink + 1, kink + 1 + reach)
         origin = float(time[kink] - motion.interval / 2)

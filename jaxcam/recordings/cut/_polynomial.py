@@ -47,11 +47,12 @@ def fit_local(
     noise: float,
     origin: float,
 ) -> LocalFit:
-    """Fit by least squares, with a degree from one to three by the number of samples.
+    """Fit by least squares, with a degree from one to three that depends on the number
+    of samples.
 
     **Arguments:**
 
-    - `noise`: standard deviation of a sample, which sets the covariance.
+    - `noise`: standard deviation of a sample, which determines the covariance.
     - `origin`: time at which the fit will be evaluated.
     """
     degree = 3 if len(time) >= 24 else 2 if len(time) >= 8 else 1
@@ -69,7 +70,8 @@ def fit_local(
 def crossing(
     before: LocalFit, after: LocalFit, time: float, reach: float
 ) -> tuple[float, float]:
-    """Return the time at which two fits meet, and its standard error (s), by Newton.
+    """Return the time at which two fits meet, found by Newton's method, and its
+    standard error (s).
 
     The search extends to `reach` (s) from `time`, where both were fitted.
     """
@@ -105,7 +107,7 @@ def measured_noise(samples: Float[np.ndarray, " k"], order: int = 3) -> float:
 def least_noise(samples: Float[np.ndarray, " k"]) -> float:
     """Return a lower bound of `measured_noise`, also valid for few samples per period.
 
-    Differences of low order contain the motion itself, those of high order do not;
-    white noise is the same in all of them.
+    Low-order differences contain the motion itself, high-order ones do not; white noise
+    contributes equally to all of them.
     """
     return min(measured_noise(samples, order) for order in range(3, 9))

@@ -10,14 +10,14 @@ from ._motion import Motion
 from ._segments import Contact, Flight
 
 
-# Samples of a flight for its extrapolation
+# Number of samples used to extrapolate a flight
 _LEAST = 12
 
 
 def clear_of_end(motion: Motion, span: Span) -> Span:
-    """Return the part of a flight certainly before an impact at the recording's end,
-    and after an impact at its beginning. So near to an end an impact affects too few
-    samples to be detected, but extrapolation of the flight predicts it.
+    """Return the part of a flight that is certainly before an impact at the end of the
+    recording, and after one at its beginning. That close to an end, an impact affects
+    too few samples to be detected, but it can be predicted by extrapolating the flight.
     """
     first, last = span
     count = len(motion.time)
@@ -44,7 +44,7 @@ def _near(motion: Motion, fit, rows):
 
 
 def settled_alike(contacts: list[Contact], flights: list[Flight]) -> list[Contact]:
-    """Give contacts with an unobserved start the settling time of the others.
+    """Assign contacts with an unobserved start the settling time of the others.
 
     A recording may begin in the middle of chatter.
     """

@@ -1,4 +1,4 @@
-"""Locate the release, which is slow, so that a threshold would always be late."""
+"""Locate the release, which is so gradual that a threshold would always be late."""
 
 import numpy as np
 from jaxtyping import Float
@@ -13,11 +13,11 @@ def release_time(
 ) -> tuple[float, float]:
     """Return the time of release and its standard error (s), from the gap around it.
 
-    At release the free body has the position, the velocity and the acceleration of the
-    surface. It leaves along that parabola while the surface bends away, so the gap
-    opens as a cubic whose size the surface itself gives. Each sample is tried as the
-    release. The sample with the least sum of squares is used; the error is the distance
-    at which the sum has grown by the noise variance.
+    At release, the free body has the position, velocity and acceleration of the
+    surface. It follows that parabola while the surface curves away, so the gap opens as
+    a cubic whose coefficient follows from the surface. Each sample is tried as the
+    release, and the one with the smallest sum of squares is used; the error is the
+    distance at which the sum has increased by the noise variance.
 
     **Arguments:**
 

@@ -19,7 +19,7 @@ from ._surface import Surface
 from ._surface_fit import fit_surface, refine_surface
 
 
-# number of refinements of the surface by the contacts of the previous segmentation
+# number of refinements of the surface, each based on the contacts found before
 _REFINED = 2
 
 
@@ -35,11 +35,11 @@ def segment_case(
 
     Args:
         recordings: A `Case`, or any recordings of the same rig.
-        rig: Its nominal geometry, tolerances and sensors.
+        rig: The rig, with nominal geometry, tolerances and sensors.
         channel: The channel of the follower.
-        surface: The cam's surface, if known; default estimated from the impacts and
-            contacts of all recordings.
-        progress: Called with the fraction done.
+        surface: The surface of the cam, if known; by default, it is estimated from the
+            impacts and contacts of all recordings.
+        progress: Called with the completed fraction.
 
     Returns:
         The segments of each recording.
@@ -96,23 +96,25 @@ def segment(
         recording: The recording.
         channel: The channel of the motion.
         contact: Value of the channel in contact at each sample, shape `(k,)` or one
-            number; the motion is above it. `None` without `upper`: the entire recording
-            is one flight.
-        contact_rate: Its rate of change; default from differences of `contact`.
-        upper: Value of the channel at a second surface above the motion, such as the
-            far one of two stops.
-        upper_rate: Its rate of change.
+            number; the motion is above it. If both this and `upper` are `None`, the
+            entire recording is one flight.
+        contact_rate: Rate of change of `contact`; by default computed from its
+            differences.
+        upper: Value of the channel at a second surface, above the motion, such as the
+            upper one of two stops.
+        upper_rate: Rate of change of `upper`.
         tolerance: Largest error of the stated position of each surface, in the units of
             the channel; within it, the surface is shifted to the impacts.
-        noise: Standard deviation of a sample; default measured from the recording.
-        restitution: Expected coefficient, for impacts too low to be observed.
+        noise: Standard deviation of a sample; by default measured from the recording.
+        restitution: Expected coefficient of restitution, for impacts too weak to be
+            observed.
 
     Returns:
         The parts. Every impact in `impacts` has a positive approach speed.
 
     Raises:
-        ValueError: A surface has not one number per sample, or the upper one is not
-            above the other.
+        ValueError: A surface does not have one number per sample, or the upper surface
+            is not above the lower one.
 
     Examples:
         >>> from jaxcam.models import BouncingBall
@@ -152,8 +154,8 @@ def segment(
         )
     if len(sides) == 2 and np.any(-sides[1].contact <= sides[0].contact):
         raise ValueError(
-            "`upper` is not above `contact` at every sample; give the surface that the "
-            "motion is above as `contact` and the one that it is below as `upper`."
+            "`upper` is not above `contact` at every sample; give the surface below "
+            "the motion as `contact` and the one above it as `upper`."
         )
     if tolerance > 0:
         sides = [placed(side, tolerance) for side in sides]

@@ -1,4 +1,4 @@
-"""Represent the parts of a recording: flights, contacts and their boundaries."""
+"""The parts of a recording: flights, contacts and their boundaries."""
 
 import dataclasses
 
@@ -20,11 +20,11 @@ class Boundary:
     """Standard error of `time` (s)."""
     kind: str
     """`"impact"` (flight to flight), `"several impacts"` (too close together to be
-    distinguished), `"landing"` (flight to contact, with impacts too low to be
+    distinguished), `"landing"` (flight to contact, with impacts too weak to be
     observed), `"release"` (contact to flight) or `"end of record"`.
     """
     evidence: str
-    """Evidence for it, as text."""
+    """Evidence for the boundary, as text."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -36,9 +36,9 @@ class Flight:
     stop: Boundary
     """The boundary at which it ends."""
     first: int
-    """First sample."""
+    """Index of the first sample."""
     last: int
-    """Sample after the last one."""
+    """Index after the last sample."""
     height: float
     """Largest distance from the surface."""
 
@@ -51,7 +51,7 @@ class Flight:
 class Contact:
     """A stretch within the noise of the surface; samples `first <= i < last`.
 
-    It begins with impacts that are too low to be observed.
+    It begins with impacts that are too weak to be observed.
     """
 
     start: Boundary
@@ -59,12 +59,13 @@ class Contact:
     stop: Boundary
     """The boundary at which it ends."""
     first: int
-    """First sample."""
+    """Index of the first sample."""
     last: int
-    """Sample after the last one."""
+    """Index after the last sample."""
     settled: float
     """Time (s) at which the impacts have decayed, estimated from the last observed
-    flight: from there to `stop` the follower is in contact with the cam."""
+    flight: from then until `stop`, the follower is in contact with the cam.
+    """
 
     @property
     def duration(self) -> float:
@@ -84,7 +85,7 @@ class Impacts:
     angle_stderr: Float[np.ndarray, " k"]
     """Standard error of its distance from the surface."""
     turned: Float[np.ndarray, " k"]
-    """Angle that the cam has turned (rad), NaN without a drive."""
+    """Angle of the cam (rad); NaN without a drive."""
     before: Float[np.ndarray, " k"]
     """Rate of change of the channel before the impact."""
     before_stderr: Float[np.ndarray, " k"]
@@ -98,11 +99,11 @@ class Impacts:
     separation: Float[np.ndarray, " k"]
     """Speed relative to the surface after the impact, positive."""
     surface_stderr: Float[np.ndarray, " k"]
-    """Standard error of the speed of the surface, common to both."""
+    """Standard error of the surface speed, common to both."""
     flight: Int[np.ndarray, " k"]
     """Index of the flight that ends here; the next one begins here."""
     side: Int[np.ndarray, " k"]
-    """Surface that was hit: 0 below the motion, 1 above it."""
+    """Surface hit by the motion: 0 below it, 1 above it."""
 
     @property
     def count(self) -> int:
@@ -110,7 +111,9 @@ class Impacts:
 
     @property
     def restitution(self) -> Float[np.ndarray, " k"]:
-        """Measured coefficient of each impact: separation over approach speed."""
+        """Measured coefficient of each impact: separation speed divided by approach
+        speed.
+        """
         return self.separation / self.approach
 
     @property
@@ -148,8 +151,8 @@ class Segments:
     noise: float
     """Standard deviation of the channel's samples."""
     clock: Float[np.ndarray, " k"]
-    """Time of the model at each sample (s): recording time, or that of a drive at
-    constant speed.
+    """Time of the model at each sample (s): the time of the recording, or the time at
+    which a drive of constant speed has the measured angle.
     """
     flights: tuple[Flight, ...]
     """The flights."""
@@ -158,19 +161,21 @@ class Segments:
     impacts: Impacts
     """The impacts between two observed flights."""
     gap: Float[np.ndarray, " k"] | None = None
-    """Distance from the nearest surface, `(k,)`, or `None` in free flight."""
+    """Distance from the nearest surface, shape `(k,)`; `None` without a surface."""
     drive: Drive | None = None
     """Measured drive of a cam-follower, from which the gap was computed."""
     surface: Surface | None = None
     """Surface of a cam-follower's cam, from which the gap was computed."""
     sure: Bool[np.ndarray, " k"] | None = None
-    """Samples at which a hidden flight is excluded, shape `(k,)`; `None`: all."""
+    """Whether a hidden flight can be excluded at each sample, shape `(k,)`; `None` for
+    all samples.
+    """
 
     def resting(self, contact: Contact) -> Bool[np.ndarray, " k"]:
         """Return the samples at which the follower is certainly in settled contact."""
         time = self.recording.time
         rows = (time >= contact.settled) & (time < contact.stop.time)
-        # a release with few samples may be placed after the contact
+        # a release with few samples may be located after the contact
         rows[contact.last :] = False
         return rows if self.sure is None else rows & self.sure
 
@@ -192,7 +197,7 @@ def _counted(number: int, noun: str) -> str:
 
 
 def no_impacts() -> Impacts:
-    """Impacts of a recording that has none."""
+    """Return the impacts of a recording that has none."""
     none = np.zeros(0)
     fields = [field.name for field in dataclasses.fields(Impacts)]
     number = none.astype(int)

@@ -1,8 +1,8 @@
-"""Represent the real cam: the nominal profile, corrected by recordings.
+"""The surface of the actual cam: the nominal profile, corrected by recordings.
 
-A real cam differs from the nominal one by millimetres, which changes the contact angle
-by tens of times the noise of an encoder. With the nominal angle, contact could not be
-distinguished from a low flight.
+The contact angle of an actual cam differs from that of the nominal cam by up to tens of
+times the noise of an encoder, even if the cam is within its tolerances. With the
+nominal contact angle, contact could not be distinguished from a low flight.
 """
 
 import equinox as eqx
@@ -20,22 +20,23 @@ from ._padding import padded
 # Deviations of a cam from its geometry: run-out, bearings, a bent shaft (rad)
 _HARMONICS = (2, 3)
 _HARMONIC_SIZE = 2e-4
-# Where their sines and a bend begin among the amplitudes
+# Index at which the sines and the bend begin among the amplitudes
 _ENDS = (len(_HARMONICS), 2 * len(_HARMONICS))
-# Error of the zero of the cam's angle, including a sensor lag of half a millisecond
-# (rad)
+# Zero error of the cam angle (rad), including a sensor lag of half a millisecond
 _PHASE_SIZE = 1e-2
-# Least tolerance given to a length (m): a rig file may state none.
+# Smallest tolerance of a length (m), because a rig file may not state one
 _LEAST_TOLERANCE = 2e-4
 
 
 class Surface(eqx.Module):
-    """Contact angle (rad) as a function of the cam's angle: geometry and harmonics."""
+    """Contact angle (rad) as a function of the cam angle, from geometry and
+    harmonics.
+    """
 
     profile: EccentricCircle
     """The eccentric circle that fits best."""
     phase: Float[Array, ""]
-    """Phase of the cam ahead of its measured angle (rad)."""
+    """Phase by which the cam leads its measured angle (rad)."""
     cosines: Float[Array, " harmonics"]
     """Cosine amplitudes of the additional harmonics 2 and 3 (rad)."""
     sines: Float[Array, " harmonics"]
@@ -47,7 +48,9 @@ class Surface(eqx.Module):
     covariance: Float[Array, " p p"]
     """Covariance of radius, eccentricity, centre, phase and amplitudes."""
     sense: float = eqx.field(static=True)
-    """-1 for a clockwise cam; the angle is counted in the sense of rotation."""
+    """-1 for a clockwise cam, otherwise 1; the cam angle increases in the sense of
+    rotation.
+    """
 
     def __call__(self, turned: Float[Array, "*k"]) -> Float[Array, "*k"]:
         order = jnp.asarray(_HARMONICS, dtype=float)
@@ -67,8 +70,8 @@ class Surface(eqx.Module):
         return np.asarray(_evaluate(self, padded(turned))[1])[: len(turned)]
 
     def slope_stderr(self, turned) -> Float[np.ndarray, " k"]:
-        """Return the standard error of `slope`, large where no impact or contact was
-        observed.
+        """Return the standard error of `slope`; it is large where no impact or contact
+        was observed.
         """
         turned = np.asarray(turned)
         rows = np.asarray(_slope_jacobian(self, vector_of(self), padded(turned)))
@@ -77,7 +80,7 @@ class Surface(eqx.Module):
 
 
 def nominal_surface(rig: Rig) -> Surface:
-    """Return the profile that the rig file states.
+    """Return the nominal profile of the rig file.
 
     Args:
         rig: The rig.
@@ -120,7 +123,8 @@ def vector_of(surface: Surface) -> np.ndarray:
 
 def with_vector(surface: Surface, vector) -> Surface:
     """Return the same surface with other coefficients."""
-    # only the sum of radius and half height is identifiable; the radius represents it
+    # only the sum of radius and half height is identifiable; it is assigned to the
+    # radius
     radius = vector[0] - surface.profile.half_height
     cosines, sines, bend = jnp.split(vector[5:], _ENDS)
     return eqx.tree_at(
@@ -141,7 +145,7 @@ def with_vector(surface: Surface, vector) -> Surface:
 
 @eqx.filter_jit
 def linearise(surface, vector, turned):
-    """Return contact angles `(k,)` and their derivatives `(k, p)` by the
+    """Return contact angles `(k,)` and their derivatives `(k, p)` with respect to the
     coefficients.
     """
     low, bend = vector[:-WAVES], vector[-WAVES:]

@@ -1,7 +1,7 @@
-"""Fit the profile of a cam to the impacts and contacts of recordings.
+"""Fit the profile of a cam to the recorded impacts and contacts.
 
-Impacts and contacts lie on the true profile. They correct the nominal profile within
-the tolerances of the rig.
+Impacts and contacts lie on the true profile. They are used to correct the nominal
+profile within the tolerances of the rig.
 """
 
 from collections.abc import Sequence
@@ -33,11 +33,11 @@ from ._surface import (
 
 # Largest gap of a hidden flight, in units of the noise
 _NEAR = 3.0
-# Samples that are averaged, and the distance behind the cam that is accepted, in
-# units of the noise: 4.5 standard errors of the mean, which noise hardly reaches
+# Number of samples that are averaged, and accepted penetration of the cam in units of
+# the noise: 4.5 standard errors of the mean, which noise hardly reaches
 _TOGETHER, _BEHIND = 9, 1.5
 # Half-widths (rad) of the band around the surface in which samples count as contact,
-# from the accuracy of the impacts alone to the noise of the encoder.
+# from the accuracy of the impacts alone to the noise of the encoder
 _BANDS = (2e-3, 1e-3, 5e-4)
 
 
@@ -47,13 +47,13 @@ def fit_surface(
     drives: Sequence[Drive] | None = None,
     channel: str = "follower_angle_rad",
 ) -> Surface:
-    """Correct the nominal profile with the impacts and contacts of some recordings.
+    """Correct the nominal profile with the impacts and contacts of recordings.
 
-    Impacts are found as jumps in velocity, without the profile, and each gives one
-    point of it: where the motion before meets the motion after. The profile through
-    those points then shows the contacts, which correct it further. Each parameter
-    stays near its nominal value by its tolerance. The result is accurate enough to
-    segment the recordings; `refine_surface` improves it to the accuracy of the data.
+    Impacts are found as velocity jumps, without the profile, and each gives one point
+    of the profile, at which the motions before and after it meet. The profile through
+    those points then reveals the contacts, which correct it further. The tolerances
+    keep each parameter near its nominal value. The result is accurate enough to segment
+    the recordings; `refine_surface` improves it to the accuracy of the data.
 
     Args:
         recordings: The recordings.
@@ -84,12 +84,12 @@ def fit_surface(
 
 
 def refine_surface(surface: Surface, rig: Rig, segments: Sequence) -> Surface:
-    """Fit the profile again, to the impacts and contacts in `Segments`.
+    """Refit the profile to the impacts and contacts in `Segments`.
 
-    Contacts count from where the unobserved impacts have died out: before, the follower
-    is above the cam on average. It is close to the cam, which counts as one rough
-    point, and never below it: otherwise a part of the cam observed only there would be
-    undetermined. A dent is included if recordings agree on it.
+    Contacts count from the time at which the unobserved impacts have died out. Before
+    that time, the follower is on average above the cam: it is close to the cam, which
+    counts as one rough point, and never below it. Otherwise, parts of the cam observed
+    only there would be undetermined. A dent is included if the recordings agree on it.
 
     Args:
         surface: The surface so far.
@@ -147,7 +147,7 @@ def _unbent(surface: Surface) -> Surface:
 
 
 def _bend(surface: Surface, rig: Rig, turned, angle, error, ends: list[int]):
-    """Largest bend that fits points of recordings that end at `ends`."""
+    """Return the most likely bend for the points of recordings that end at `ends`."""
     vector = vector_of(surface)
     misfit, rows, weight = _weighted(surface, vector, turned, angle, error)
     records = []
@@ -169,7 +169,7 @@ def _impact_points(recording, drive, channel, noise, sure):
     turned, angle, error = [], [], []
     reach = max(6, round(0.01 / interval))
     for kink in kinks:
-        # the sample next to the impact may be on either side of it
+        # the sample next to the impact may belong to either side
         left = slice(max(0, kink - 1 - reach), kink - 1)
         right = slice(kink + 1, kink + 1 + reach)
         origin = float(time[kink] - interval / 2)
@@ -182,7 +182,7 @@ def _impact_points(recording, drive, channel, noise, sure):
         angle.append(0.5 * (before.value(moment) + after.value(moment)))
         error.append(before.value_stderr(moment) + after.value_stderr(moment))
     if len(kinks) == 0:
-        # no impact in the record: either permanent contact, or no information
+        # no impact in the recording: either permanent contact, or no information
         rows = np.flatnonzero(sure)[::8]
         return drive.angle[rows], samples[rows], np.full(len(rows), 4 * noise)
     return np.array(turned), np.array(angle), np.array(error)
@@ -213,7 +213,7 @@ def _solve(
 ) -> Surface:
     """Fit by Gauss-Newton with the tolerances as prior and Huber weights of the points.
 
-    The first `equal` points lie on the profile, the others on it or above. Coefficients
+    The first `equal` points lie on the profile, the others on or above it. Coefficients
     of a bend have the prior standard deviations `bend`.
     """
     nominal = vector_of(nominal_surface(rig))
@@ -225,7 +225,7 @@ def _solve(
     for _ in range(8):
         misfit, rows, weight = _weighted(surface, vector, turned, angle, error, equal)
         pulled = rows[:, free].T * weight
-        # in units of the tolerances the matrix is well scaled
+        # in units of the tolerances, the matrix is well scaled
         normal = (pulled @ rows[:, free]) * known + np.eye(free.sum())
         target = pulled @ misfit + ((nominal - vector)[free] / sizes[free] ** 2)
         inverse = known * np.linalg.inv(normal)
@@ -239,8 +239,8 @@ def _solve(
 
 
 def _weighted(surface, vector, turned, angle, error, equal: int | None = None):
-    """Return misfits of points, their derivatives, both in units of the error, and
-    weights.
+    """Return the misfits of points and their derivatives, in units of the error, and
+    the weights.
     """
     fitted, jacobian = linearise(surface, vector, padded(turned))
     count = len(turned)

@@ -9,15 +9,16 @@ from .._errors import RecordingError
 
 
 LARGEST = 100_000_000
-"""Bytes of a table once it is inflated: ten minutes of a rig at 5 kHz, or an hour at
-800 Hz. Reading takes about ten times as much memory."""
+"""Maximum size of a decompressed table in bytes: ten minutes at 5 kHz, or an hour at
+800 Hz. Reading takes about ten times as much memory.
+"""
 MOST = 15_000_000
 """Largest number of values in a table, regardless of the file's size."""
 _GZIP = b"\x1f\x8b"
 
 
 def read_bytes(file: Path) -> bytes:
-    """Return the content of a file, without decompression.
+    """Return the content of a file without decompressing it.
 
     Raises:
         RecordingError: The path is not a file, or the file is larger than `LARGEST`.
@@ -42,12 +43,12 @@ def read_bytes(file: Path) -> bytes:
 def inflate_gzip(file: Path, raw: bytes) -> bytes:
     """Return the content of a .gz file.
 
-    **Raises:** `RecordingError` if it is not compressed, is damaged, or inflates to
-    more than `LARGEST`.
+    **Raises:** `RecordingError` if it is not compressed, is damaged, or is larger than
+    `LARGEST` when decompressed.
     """
     if not raw.startswith(_GZIP):
         raise RecordingError(
-            f"{file}: the name ends in .gz but the file is not compressed; rename it "
+            f"{file}: the name ends in .gz, but the file is not compressed; rename it "
             f"or compress it."
         )
     try:
@@ -55,13 +56,11 @@ def inflate_gzip(file: Path, raw: bytes) -> bytes:
             content = stream.read(LARGEST + 1)
     except EOFError:
         raise RecordingError(
-            f"{file}: the compressed file is truncated; copy it again from where it "
-            f"came from."
+            f"{file}: the compressed file is truncated; copy it again from its source."
         ) from None
     except (zlib.error, gzip.BadGzipFile):
         raise RecordingError(
-            f"{file}: the compressed file is damaged; copy it again from where it came "
-            f"from."
+            f"{file}: the compressed file is damaged; copy it again from its source."
         ) from None
     if len(content) > LARGEST:
         raise too_large(file)
@@ -70,7 +69,7 @@ def inflate_gzip(file: Path, raw: bytes) -> bytes:
 
 def too_large(file: Path) -> RecordingError:
     return RecordingError(
-        f"{file}: it holds more than {LARGEST // 10**6} MB or {MOST // 10**6} million "
-        f"numbers, which is too much for one table; cut it into runs of a few minutes, "
-        f"one file each."
+        f"{file}: the table has more than {LARGEST // 10**6} MB or {MOST // 10**6} "
+        f"million numbers, which is too much; divide it into files of a few minutes "
+        f"each."
     )

@@ -7,11 +7,11 @@ from .._errors import RecordingError
 from .._recording import Recording
 
 
-# Encoders and clocks disagree by much less than this with the name of the file.
+# Encoders and clocks differ from the speed in the file name by much less than this
 _SPEED_TOLERANCE = 0.05
-# The angle of the lever stays below the vertical; values in degrees exceed it.
+# The lever stays below the vertical (rad); values in degrees exceed this
 _FOLLOWER_RANGE = np.pi / 2
-# s; faster than the sampling of any encoder or gyro
+# s; shorter than the sampling interval of any encoder or gyro
 _SHORTEST = 1e-9
 
 _DEGREES = "multiply it by pi/180 or name the column `{}_deg`"
@@ -42,8 +42,7 @@ def find_gaps(
     if usual < _SHORTEST:
         raise RecordingError(
             f"{name}: samples are {usual:.3g} s apart, which is too fast for a "
-            "sensor; check "
-            f"the unit of the time."
+            "sensor; check the unit of time."
         )
     found = np.flatnonzero(steps > 1.5 * usual)
     if len(found) and gaps == "refuse":
@@ -52,8 +51,8 @@ def find_gaps(
         raise RecordingError(
             f"{name}: there is {many} in time at {time[first]:.6g} s, "
             f"{steps[first]:.4g} s long, whereas samples are {usual:.4g} s apart; read "
-            f'it with gaps="split" to use the pieces as separate recordings, or '
-            f'gaps="mend" to bridge short ones.'
+            f'the file with gaps="split" to use the pieces as separate recordings, or '
+            f'with gaps="mend" to bridge short gaps.'
         )
     return found + 1
 
@@ -68,7 +67,7 @@ def check_channels(recording: Recording) -> None:
         RecordingError: A channel is constant, or a lever angle is in degrees.
     """
     for name, samples in recording.channels.items():
-        # A force or a reference may well be constant; the motion itself may not.
+        # A force or a reference may be constant, but the motion itself may not
         if name.endswith(("_rad", "_rad_s")) and np.ptp(samples) == 0:
             raise RecordingError(
                 f"{recording.name}: the channel `{name}` is {samples[0]:g} throughout; "
@@ -85,14 +84,14 @@ def check_channels(recording: Recording) -> None:
 
 
 def check_drive(recording: Recording) -> None:
-    """Compare the cam's speed with the one in the file's name.
+    """Compare the cam speed with the one in the file name.
 
     Args:
         recording: The recording.
 
     Raises:
-        RecordingError: The speeds differ; the message names the unit that the numbers
-            suggest.
+        RecordingError: The speeds differ; the message names the unit suggested by the
+            numbers.
     """
     angle = recording.channels.get("cam_angle_rad")
     nominal = recording.nominal_speed
@@ -119,7 +118,7 @@ def check_drive(recording: Recording) -> None:
     if abs(ratio - 1) > _SPEED_TOLERANCE:
         rpm = 30 / np.pi
         raise RecordingError(
-            f"{recording.name}: the cam turns at {abs(speed) * rpm:.1f} rpm where the "
-            f"name of the file says {nominal * rpm:.1f} rpm; correct the name or the "
-            f"column `cam_angle_rad`."
+            f"{recording.name}: the cam turns at {abs(speed) * rpm:.1f} rpm, but the "
+            f"file name says {nominal * rpm:.1f} rpm; correct the name or the column "
+            f"`cam_angle_rad`."
         )

@@ -1,4 +1,4 @@
-"""Choose the columns of a file that are channels of a recording, in SI units."""
+"""Select the columns of a file that are channels of a recording, in SI units."""
 
 import dataclasses
 import math
@@ -19,8 +19,8 @@ from ._units import si
 
 
 Columns: TypeAlias = Sequence[str] | Mapping[str, str | tuple[str, float]]
-"""Names of the columns in their order, `"-"` to skip one; or channels by their names
-in the file, with an optional factor: `{"Y1": ("height_mm", -0.8)}`.
+"""Names of the columns in order, with `"-"` to skip one; or channels by their column
+name in the file, with an optional factor: `{"Y1": ("height_mm", -0.8)}`.
 """
 TIME = "time_s"
 
@@ -44,8 +44,8 @@ def read_columns(
 ) -> Chosen:
     """Return the channels of a file in SI units, for `read_recordings`.
 
-    **Arguments:** `needed` are required channels (SI names); with `only`, others are
-    not read.
+    **Arguments:** `needed` are the required channels (SI names); with `only`, no others
+    are read.
 
     **Raises:** `RecordingError`, one sentence with the fix.
     """
@@ -86,7 +86,7 @@ def column_names(file: Path, columns: Columns | None) -> tuple[str, ...]:
 def _opened(
     file: Path, columns: Columns | None
 ) -> tuple[Source, dict[str, tuple[str, float]]]:
-    """Read a file, and the new names of some columns."""
+    """Read a file and the new names of its columns."""
     if columns is None:
         return _source(file, None), {}
     if isinstance(columns, Mapping):
@@ -101,8 +101,8 @@ def require(file: Path, found: Mapping[str, object], needed: Sequence[str]) -> N
     if missing:
         raise RecordingError(
             f"{file}: the column `{missing[0]}` is missing; the file has "
-            f"{listed(found)}: say which of them it is with --columns or in [columns] "
-            f"of the rig file (columns=... in Python)."
+            f"{listed(found)}: assign it with --columns or in [columns] of the rig "
+            f"file (columns=... in Python)."
         )
 
 
@@ -129,7 +129,7 @@ def _in_order(file: Path, names) -> list[str]:
         what = f"{twice[0]!r} twice" if twice else "a column without a name"
         raise RecordingError(
             f"{file}: --columns names {what}; give each column one name, or "
-            f"{LEFT_OUT} to leave it out."
+            f"{LEFT_OUT} to skip it."
         )
     return list(names)
 
@@ -144,7 +144,7 @@ def _mapping(
         if not math.isfinite(factor) or factor == 0:
             raise RecordingError(
                 f"{file}: the factor of {shown(str(word))} is {factor:g}; give the "
-                f"number that takes it to the unit of `{name}`."
+                f"number that converts it to the unit of `{name}`."
             )
         found[source.name_of(str(word))] = (name, float(factor))
     return found
@@ -154,13 +154,13 @@ def _timed(source: Source, found: dict, rate: float | None) -> dict:
     """Return the columns with a time, computed from a rate if the file has none."""
     if rate is not None and not (math.isfinite(rate) and rate > 0):
         raise RecordingError(
-            f"{source.file}: the rate is {rate:g} samples a second; give a positive "
+            f"{source.file}: the rate is {rate:g} samples per second; give a positive "
             f"number."
         )
     if rate is not None and TIME in found:
         raise RecordingError(
-            f"{source.file} already has the time column `{TIME}`; leave out the rate, "
-            "or that column."
+            f"{source.file} already has the time column `{TIME}`; omit the rate or "
+            "that column."
         )
     rate = source.rate if rate is None else rate
     if TIME in found or rate is None or not rate > 0 or not found:
@@ -177,13 +177,13 @@ def _without_missing(source: Source, found: dict) -> Chosen:
         return Chosen(found, source.notes)
     if np.sum(whole) < 2:
         raise RecordingError(
-            f"{source.file}: no two rows have a number in each of {listed(found)}; "
-            f"name other columns."
+            f"{source.file}: fewer than two rows have a number in each of "
+            f"{listed(found)}; name other columns."
         )
     first = np.flatnonzero(~whole)[0] + 1
     note = (
         f"{source.file.name}: {lost} rows with an empty cell, the first of them row "
-        f"{first}, are left out."
+        f"{first}, are omitted."
     )
     return Chosen(
         {name: numbers[whole] for name, numbers in found.items()}, (*source.notes, note)

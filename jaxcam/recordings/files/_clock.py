@@ -8,7 +8,7 @@ from jaxtyping import Float
 _DIGITS = 9
 # Smallest number of samples to determine a clock
 _LEAST = 16
-# s; later times have no digits left for a clock
+# s; later times have too few digits left for a clock
 _LATEST = 1e6
 # In units of the last digit: rounding error of one half, plus the error of the fitted
 # line
@@ -18,8 +18,8 @@ _REACH = 0.75
 def unrounded(time: Float[np.ndarray, " k"]) -> Float[np.ndarray, " k"]:
     """Return the times (s) of a uniform clock that were rounded in the file.
 
-    At 1500 Hz and with four decimals, samples seem to be 0.6 and 0.7 ms apart in turn,
-    and neither is the time between samples. If all times lie on one uniform clock
+    At 1500 Hz with four decimals, samples appear to be alternately 0.6 and 0.7 ms
+    apart, and neither is the actual interval. If all times lie on one uniform clock
     (possibly with missing ticks) within their last digit, the times of that clock are
     returned; otherwise they are unchanged.
     """
@@ -32,8 +32,8 @@ def unrounded(time: Float[np.ndarray, " k"]) -> Float[np.ndarray, " k"]:
         return time
     near = np.abs(steps - usual) < 1.5 * digit
     ticks = np.round(steps / np.mean(steps[near]))
-    # a clock without missing ticks is tried first: with few digits per tick, rounding
-    # has the same effect
+    # a clock without missing ticks is tried first, because with few digits per tick,
+    # rounding has the same effect
     for counted in (np.ones_like(ticks), np.maximum(ticks, 1.0)):
         place = np.concatenate([[0.0], np.cumsum(counted)])
         even = np.polyval(np.polyfit(place, time, 1), place)

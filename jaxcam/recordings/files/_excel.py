@@ -18,11 +18,12 @@ def read_excel(file: Path, names: Sequence[str] | None = None) -> Source:
 
     **Arguments:** as for `read_table`.
 
-    **Raises:** `RecordingError` if that is missing, or the file is not a workbook.
+    **Raises:** `RecordingError` if `openpyxl` is missing, or the file is not a
+    workbook.
     """
     raw = read_bytes(file)
     try:
-        # pandas needs it to read workbooks, and reports it only then
+        # pandas needs it for workbooks and reports its absence only on reading
         import openpyxl  # noqa: F401  # pyright: ignore
         import pandas as pd
     except ImportError:
@@ -49,7 +50,8 @@ def read_excel(file: Path, names: Sequence[str] | None = None) -> Source:
     if len(full) != 1:
         which = f"tables on the sheets {listed(full)}" if full else "no table"
         raise RecordingError(
-            f"{file}: the workbook has {which}; save one table a file, as .xlsx or CSV."
+            f"{file}: the workbook has {which}; save one table per file, as .xlsx or "
+            "CSV."
         )
     (lines,) = full.values()
     return table_of_lines(file, kept_lines(file, lines), names)
@@ -68,12 +70,12 @@ def _refuse_bomb(file: Path, raw: bytes) -> None:
             size = sum(part.file_size for part in archive.infolist())
     except (zipfile.BadZipFile, ValueError, OSError, NotImplementedError):
         raise _none(file) from None
-    # XML takes about five bytes for one of a CSV
+    # XML takes about five bytes for each byte of a CSV file
     if size > 5 * LARGEST:
         raise too_large(file)
 
 
 def _none(file: Path) -> RecordingError:
     return RecordingError(
-        f"{file}: this is not a workbook of Excel (.xlsx); save it again, or as CSV."
+        f"{file}: this is not an Excel workbook (.xlsx); save it again, or as CSV."
     )

@@ -8,12 +8,12 @@ from ._heading import is_time, is_unit
 
 
 SEPARATORS = ("\t", ";", ",", " ")
-"""Separators of cells, the most specific first; a space stands for any white space."""
+"""Cell separators, the most specific first; a space stands for any white space."""
 COMMENTS = ("#", "%", "//")
 """Beginnings of comment lines."""
 # largest number of lines of a preamble
 _PREAMBLE = 300
-# rows that must agree to be recognised as the table
+# number of consistent rows required to recognise a table
 _ROWS = 5
 _NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eEdD][+-]?\d+)?|[+-]?(nan|inf)")
 
@@ -52,7 +52,7 @@ def form_of(lines: Sequence[str]) -> Form | None:
 
 
 def is_number(text: str) -> bool:
-    """Return whether a cell holds a number, with a point or a comma in it."""
+    """Return whether a cell contains a number, with a decimal point or comma."""
     return _NUMBER.fullmatch(text.lower()) is not None
 
 
@@ -67,8 +67,8 @@ def _first_row(lines: Sequence[str], separator: str) -> int | None:
 
 
 def _kind(line: str, separator: str) -> tuple[int, int]:
-    """Return the number of cells and of numbers in a row; none if a cell is another
-    word.
+    """Return the number of cells and of numbers in a row; zero if a cell is other
+    text.
     """
     if line.startswith(COMMENTS):
         return 0, 0
@@ -92,13 +92,13 @@ def _headed(lines: Sequence[str], separator: str, first: int) -> Form:
         if all(map(is_unit, lower)):
             names, units = above, names
         elif any(map(is_time, upper)) and not any(map(is_time, lower)):
-            # words where the first row of numbers should be
+            # text where the first row of numbers should be
             return Form(separator, above, None, names)
     for k in range((names if units is None else units) + 1, first):
         cells = cells_of(lines[k], separator)
         if lines[k].startswith(COMMENTS) or not any(map(is_number, cells)):
             continue
-        # words next to a number are a note if the separator is a space or missing
+        # text next to a number is a note if the separator is a space or missing
         note = len(cells) != width and (separator == " " or len(cells) == 1)
         if not note:
             return Form(separator, names, units, k)
@@ -113,7 +113,7 @@ def _is_head(line: str, separator: str, width: int) -> bool:
 
 
 def _is_other(line: str, separator: str, width: int) -> bool:
-    """Return whether a line names the columns of rows with other separators. With
+    """Return whether a line names the columns of rows with different separators. With
     spaces, empty cells are lost; with commas, decimal commas split numbers.
     """
     count = len(cells_of(line, separator))
@@ -123,7 +123,9 @@ def _is_other(line: str, separator: str, width: int) -> bool:
 
 
 def _is_any_head(lines: Sequence[str], place: int, separator: str) -> bool:
-    """Return whether the line above the rows has names, possibly of another number."""
+    """Return whether the line above the rows contains names, possibly a different
+    number.
+    """
     if place < 0 or separator == " ":
         return False
     count = len(cells_of(lines[place], separator))

@@ -1,9 +1,9 @@
-"""Parse the heading of a column: its name, with the unit in brackets after it."""
+"""Parse the heading of a column: its name, followed by the unit in brackets."""
 
 import re
 
 
-# unit as written -> end of a channel's name
+# unit as written -> end of a channel name
 _ENDINGS = {
     "s": "s",
     "sec": "s",
@@ -43,7 +43,7 @@ _WITH_UNIT = re.compile(r"(.+?)\s*(?:\(([^()]*)\)|\[([^\[\]]*)\]|/\s*([^\s/]+(/s
 
 
 def channel_name(heading: str, unit: str = "") -> str:
-    """Return the name of a channel with its unit at the end: `time_s` for `Time (s)`.
+    """Return the channel name, which ends with the unit: `time_s` for `Time (s)`.
 
     A heading with an unknown unit is unchanged.
 
@@ -68,7 +68,7 @@ def is_unit(cell: str) -> bool:
 
 
 def is_time(heading: str) -> bool:
-    """Return whether a heading is that of the time, by its first word."""
+    """Return whether a heading denotes the time, according to its first word."""
     return bool(re.match(r"(time|t|zeit|frame)([^a-z]|$)", heading.lower()))
 
 

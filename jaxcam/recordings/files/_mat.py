@@ -19,20 +19,20 @@ from ._source import Source
 _HDF5 = b"\x89HDF"
 # of a compressed element of a MATLAB file, and where the first element is
 _COMPRESSED, _HEADER = 15, 128
-# depth of nested structures, and series of one array, that are searched
+# maximum depth of nested structures, and number of series in one array, searched
 _DEEPEST, _MOST_SERIES = 8, 300
 
 
 def read_mat(file: Path) -> Source:
     """Return the vectors of a MATLAB file (up to version 7.2) by name.
 
-    A vector in structures has a dotted name, `run.left.angle_rad`, and its last word
-    alone if it is unique. Entries of an array of structures are numbered from 1, and so
-    are series that lie side by side in one array, along its longest axis: `marker.3`.
-    Other data are ignored.
+    A vector in nested structures has a dotted name, `run.left.angle_rad`, and also its
+    last word as a name if that is unique. Entries of an array of structures are
+    numbered from 1, as are series side by side in one array, along its longest axis:
+    `marker.3`. Other data are ignored.
 
-    **Raises:** `RecordingError` if the file is not a MATLAB file, or holds no vectors
-    of equal length.
+    **Raises:** `RecordingError` if the file is not a MATLAB file, or contains no
+    vectors of equal length.
     """
     found = _loaded(file)
     vectors: dict[str, np.ndarray] = {}
@@ -44,8 +44,8 @@ def read_mat(file: Path) -> Source:
     kept = {name: v for name, v in vectors.items() if len(v) == length}
     if not kept or length < 2:
         raise RecordingError(
-            f"{file}: there are no columns of at least two numbers in it; save a "
-            f"vector for the time (`time_s`) and one for each channel."
+            f"{file}: it contains no columns of at least two numbers; save a vector "
+            f"for the time (`time_s`) and one for each channel."
         )
     last = [name.rpartition(".")[2] for name in kept]
     short = {
@@ -96,7 +96,7 @@ def _loaded(file: Path) -> dict[str, Any]:
     raw = read_bytes(file)
     if raw[:128].startswith(b"MATLAB 7.3") or raw.startswith(_HDF5):
         raise RecordingError(
-            f"{file}: this is a MATLAB file of version 7.3; save it again with "
+            f"{file}: this is a version 7.3 MATLAB file; save it again with "
             f"`save(..., '-v7')`."
         )
     _refuse_bomb(file, raw)
@@ -106,14 +106,14 @@ def _loaded(file: Path) -> dict[str, Any]:
             warnings.simplefilter("error")
             return loadmat(io.BytesIO(raw), squeeze_me=True, struct_as_record=False)
     except Exception:
-        # a parser on a broken file raises whatever it stumbles over
+        # the parser may raise any exception for a broken file
         raise RecordingError(
             f"{file}: this is not a MATLAB file; save it again with `save(..., '-v7')`."
         ) from None
 
 
 def _refuse_bomb(file: Path, raw: bytes) -> None:
-    """Raise `RecordingError` if compressed variables are too large together."""
+    """Raise `RecordingError` if the compressed variables are too large in total."""
     order = ">" if raw[126:128] == b"MI" else "<"
     place, room = _HEADER, LARGEST
     while place + 8 <= len(raw) and room >= 0:

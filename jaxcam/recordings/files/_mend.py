@@ -1,4 +1,4 @@
-"""Repair faults of recordings: dropped samples and slips of an encoder."""
+"""Repair faults in recordings: dropped samples and encoder slips."""
 
 import dataclasses
 
@@ -9,7 +9,7 @@ from .._errors import RecordingError
 from .._recording import Recording
 
 
-# Longest gap (samples) that is bridged; the motion in it is nearly a parabola
+# Longest gap (samples) that is bridged; over it, the motion is nearly a parabola
 _BRIDGE = 4
 
 
@@ -18,7 +18,7 @@ class Mended:
     """Pieces of a repaired recording, and the repairs as text.
 
     Interpolated samples are marked in `meta["filled"]` of each piece: they keep the
-    sampling uniform, and no fit uses them.
+    sampling uniform, but no fit uses them.
     """
 
     recordings: tuple[Recording, ...]
@@ -28,17 +28,18 @@ class Mended:
 
 
 def mend(recording: Recording, *, bridge: int = _BRIDGE) -> Mended:
-    """Repair faults of the clock, an encoder or a saturated gyro in a recording.
+    """Repair faults of the clock or of an encoder in a recording, and note saturation
+    of a gyro.
 
     - Dropped samples: up to `bridge` in a row are interpolated (and marked); at a
       longer gap the recording is split.
     - An encoder (`..._rad`) that slips by whole turns is corrected.
-    - Saturated samples of a rate (`..._rad_s`) are counted; a fit whose `Sensor` has
-      that limit treats them as saturated.
+    - Saturated samples of a rate (`..._rad_s`) are counted; a fit treats them as
+        saturated if the `Sensor` has that limit.
 
     Args:
         recording: The recording.
-        bridge: Largest number of missing samples in a row that are interpolated.
+        bridge: Maximum number of consecutive missing samples to interpolate.
 
     Returns:
         A [`jaxcam.recordings.files.Mended`][].
@@ -78,14 +79,14 @@ def _unslipped(
     # change of the angle between two samples, from the neighbouring samples
     usual = np.median(steps)
     turns = np.round((steps - usual) / (2 * np.pi))
-    # across a gap at which the recording is split, the drive keeps turning
+    # the drive keeps turning across a gap at which the recording is split
     turns[np.diff(recording.time) > (bridge + 1.5) * recording.interval] = 0
     places = np.flatnonzero(turns)
     if not len(places):
         return samples
     unslipped = samples - 2 * np.pi * np.concatenate([[0.0], np.cumsum(turns)])
     if np.ptp(samples) <= 2 * np.pi and np.ptp(unslipped) > 2 * np.pi:
-        # an angle that is reset each turn is not a fault
+        # an angle that is reset every turn is not a fault
         return unslipped
     first = recording.time[places[0] + 1]
     total = (
@@ -101,7 +102,7 @@ def _unslipped(
 def _count_saturated(recording: Recording, name: str, notes) -> None:
     size = np.abs(recording.channels[name])
     at_limit = size >= np.max(size) * (1 - 1e-9)
-    # many samples of the same largest value indicate saturation
+    # many samples with the same maximum value indicate saturation
     if np.sum(at_limit) > max(3, 0.002 * len(size)):
         notes.append(
             f"{recording.name}: `{name}` is saturated at {np.max(size):.4g} in "

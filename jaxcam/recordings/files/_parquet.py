@@ -12,7 +12,8 @@ from ._source import shown, Source
 def read_parquet(file: Path) -> Source:
     """Return the columns of a Parquet file; needs the package `pyarrow`.
 
-    **Raises:** `RecordingError` if that is missing, or the file is not a Parquet file.
+    **Raises:** `RecordingError` if `pyarrow` is missing, or the file is not a Parquet
+    file.
     """
     raw = read_bytes(file)
     try:

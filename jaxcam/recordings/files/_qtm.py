@@ -1,4 +1,4 @@
-"""Read tables of Qualisys Track Manager (.tsv): coordinates of markers in mm."""
+"""Read tables from Qualisys Track Manager (.tsv): marker coordinates in mm."""
 
 import re
 from collections.abc import Sequence
@@ -30,7 +30,7 @@ def qtm_heading(
 
 
 def without_lost(columns: dict[str, pd.Series]) -> dict[str, pd.Series]:
-    """Return columns in which a lost marker, written as 0 0 0, is empty."""
+    """Return the columns with lost markers, which are written as 0 0 0, left empty."""
     found = dict(columns)
     for name in columns:
         if not name.endswith("_x_mm"):

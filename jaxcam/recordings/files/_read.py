@@ -22,7 +22,7 @@ CAM_FOLLOWER = ("cam_angle_rad", "follower_angle_rad")
 """Channels that a recording of a cam-follower rig must contain."""
 SUFFIXES = (*TEXT, ".mat", ".parquet", ".xlsx", ".xlsm")
 """Suffixes of the files of a case."""
-# text of any kind, read if a folder has no other files
+# other text files, read if a folder contains none of the above
 _LAST_RESORT = (".txt", ".dat", ".xls", ".txt.gz", ".dat.gz")
 
 
@@ -37,24 +37,23 @@ def read_recordings(
 ) -> tuple[Recording, ...]:
     """Read every recording in one file: text (plain or gz), .mat, .xlsx or .parquet.
 
-    The end of a column name is its unit. Columns in `_deg`, `_rpm`, `_ms`, `_mm` and
-    similar units are converted and renamed (`cam_angle_deg` -> `cam_angle_rad`), and so
-    are columns with the unit in brackets (`Time (ms)` -> `time_s`). One column is the
-    time.
+    Column names end with the unit. Columns in `_deg`, `_rpm`, `_ms`, `_mm` and similar
+    units are converted and renamed (`cam_angle_deg` -> `cam_angle_rad`), as are columns
+    with the unit in brackets (`Time (ms)` -> `time_s`). One column is the time.
 
     Args:
-        file: The file; `..._150.7rpm.csv` in its name is the nominal speed.
+        file: The file; a name such as `..._150.7rpm.csv` gives the nominal speed.
         channels: Required columns (SI names).
-        split: Column with the number of the run, in a file with several runs.
+        split: Column with the run number, for a file with several runs.
         gaps: `"refuse"` raises an error for a recording with missing samples, `"split"`
             cuts it into pieces, and `"mend"` repairs it: it bridges short gaps, splits
             at long gaps and corrects slips of an encoder (see `mend`). The repairs are
             listed in `meta["notes"]`.
-        columns: Names of the columns in their order, `"-"` to skip one, for
-            a file without a line of names; or a channel for each column with another
-            name, `{"Angle": "angle_deg", "Y1": ("height_m", -8e-4)}`, the second with a
-            factor. Then only named or required columns are read, and rows with an empty
-            cell in them are omitted.
+        columns: Names of the columns in order, with `"-"` to skip one, for a file
+            without a header line; or a channel for each column that has another name,
+            optionally with a factor: `{"Angle": "angle_deg", "Y1": ("height_m",
+            -8e-4)}`. In the second case, only named or required columns are read, and
+            rows with an empty cell in these are omitted.
         rate: Sampling rate of a file without a time column (Hz).
 
     Returns:
@@ -105,7 +104,7 @@ def read_recording(
     columns: Columns | None = None,
     rate: float | None = None,
 ) -> Recording:
-    r"""Read the one recording in a file.
+    r"""Read a file that contains a single recording.
 
     Args:
         file: The file.
@@ -141,7 +140,7 @@ def read_case(
     columns: Columns | None = None,
     rate: float | None = None,
 ) -> Case:
-    """Read all recordings in a folder, in the order of their names.
+    """Read all recordings in a folder, ordered by name.
 
     Files are text (CSV of any kind, `.tsv`, `.lvm`, each plain or gz), `.mat`, `.xlsx`
     or `.parquet`; if there are none of these, `.txt`, `.dat` and `.xls` are read.
@@ -149,13 +148,14 @@ def read_case(
     Args:
         folder: The folder.
         channels: Required columns (SI names); `()` for rigs other than a cam-follower.
-        split: Column with the number of the run, in a file with several runs.
-        gaps: Treatment of a recording with missing samples: `"refuse"` raises an error,
+        split: Column with the run number, for a file with several runs.
+        gaps: Handling of a recording with missing samples: `"refuse"` raises an error,
             `"split"` cuts it into pieces, `"mend"` repairs it (see `mend`).
-        columns: Names of the columns in their order, `"-"` to skip one, for
-            files without a line of names; or a channel for each column with another
-            name, `{"Angle": "angle_deg", "Y1": ("height_m", -8e-4)}`, the second with a
-            factor. Rows with an empty cell in them are omitted.
+        columns: Names of the columns in order, with `"-"` to skip one, for files
+            without a header line; or a channel for each column that has another name,
+            optionally with a factor: `{"Angle": "angle_deg", "Y1": ("height_m",
+            -8e-4)}`. In the second case, rows with an empty cell in these columns are
+            omitted.
         rate: Sampling rate of files without a time column (Hz).
 
     Returns:
@@ -175,8 +175,8 @@ def read_case(
         raise RecordingError(f"{folder}: there is no such folder; check the path.")
     if not folder.is_dir():
         raise RecordingError(
-            f"{folder}: a case is a folder of recordings, and this is a file; give "
-            "the folder that contains it."
+            f"{folder}: this is a file, but a case is a folder of recordings; give the "
+            "folder that contains it."
         )
     files = _tables(folder, SUFFIXES) or _tables(folder, _LAST_RESORT)
     if not files:
@@ -224,7 +224,7 @@ def _turning(label: str, mended: Mended) -> list[Recording]:
         cam = piece.channels.get("cam_angle_rad")
         if cam is not None and np.ptp(cam) < np.pi:
             notes.append(
-                f"{piece.name} has less than half a turn of the cam; it is omitted."
+                f"{piece.name} covers less than half a turn of the cam and is omitted."
             )
         else:
             pieces.append(piece)

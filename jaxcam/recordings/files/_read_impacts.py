@@ -1,4 +1,4 @@
-"""Read tables of impacts: one row per impact, with the speeds before and after it."""
+"""Read tables of impacts: one row per impact, with the speeds before and after."""
 
 import re
 from pathlib import Path
@@ -14,12 +14,12 @@ from ._units import unit_of
 
 _SPEED = re.compile(r"(before|after)([12]?)(_stderr)?_(m_s|rad_s)")
 
-# in addition to the speeds
+# columns in addition to the speeds
 _MORE = ("mass1_kg", "mass2_kg", "time_s")
 
 
 def is_impact_table(file: str | Path, columns: Columns | None = None) -> bool:
-    """Return whether the columns of a file are those of impacts, not of a recording.
+    """Return whether a file has the columns of an impact table, not of a recording.
 
     **Raises:** `RecordingError` if the file cannot be read.
     """
@@ -31,15 +31,15 @@ def is_impact_table(file: str | Path, columns: Columns | None = None) -> bool:
 def read_impacts(file: str | Path, *, columns: Columns | None = None) -> ImpactTable:
     r"""Read impacts from a file with one impact per row.
 
-    Columns, each with its unit at the end (`_m_s`, `_mm_s`, `_rad_s`, ...): `before`
-    and `after`, the speeds of one body along the normal of a fixed surface; or
-    `before1`, `after1`, `before2`, `after2`, the velocities of two bodies, with
+    The column names end with the unit (`_m_s`, `_mm_s`, `_rad_s`, ...). The columns are
+    `before` and `after`, the speeds of one body along the normal of a fixed surface; or
+    `before1`, `after1`, `before2` and `after2`, the velocities of two bodies, with
     `mass1_kg` and `mass2_kg` if known. `before_stderr` and `after_stderr` are standard
-    errors, `time_s` is the time; others are ignored.
+    errors, and `time_s` is the time; other columns are ignored.
 
     Args:
         file: The file.
-        columns: Names of its columns, as for `read_case`.
+        columns: Names of the columns, as for `read_case`.
 
     Returns:
         An [`jaxcam.recordings.ImpactTable`][].
@@ -91,7 +91,7 @@ def read_impacts(file: str | Path, *, columns: Columns | None = None) -> ImpactT
             row = int(np.flatnonzero(~(error > 0))[0])
             raise RecordingError(
                 f"{file}: the standard error in row {row + 1} is {error[row]:g}; give "
-                f"a positive one, or leave the column out."
+                f"a positive one, or omit the column."
             )
     return ImpactTable(
         file.name.partition(".")[0],
@@ -130,7 +130,7 @@ def _bodies(file: Path, found: dict, columns: dict) -> Bodies:
 def _speeds(file: Path, before, after, signed: bool):
     """Return approach and separation speeds of relative velocities, or of magnitudes.
 
-    **Raises:** `RecordingError`, which names a row without approach or without an
+    **Raises:** `RecordingError`, which names a row without an approach or without an
     impact.
     """
     if not signed and np.all(before >= 0) and np.all(after >= 0):
@@ -145,7 +145,7 @@ def _speeds(file: Path, before, after, signed: bool):
         if len(rows):
             more = f" (and in {len(rows) - 1} more rows)" if len(rows) > 1 else ""
             raise RecordingError(
-                f"{file}: in row {rows[0] + 1}{more} {what}; correct its signs, state "
-                "all velocities along one normal, or remove it."
+                f"{file}: in row {rows[0] + 1}{more} {what}; correct the signs, give "
+                "all velocities along the same normal, or remove the row."
             )
     return approach, separation

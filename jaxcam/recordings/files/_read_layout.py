@@ -1,4 +1,4 @@
-"""Read the file layout in a rig file: names of columns, and the sampling rate."""
+"""Read the file layout in a rig file: column names and sampling rate."""
 
 import dataclasses
 import math
@@ -16,7 +16,7 @@ LAYOUT_KEYS = ("columns", "rate")
 
 @dataclasses.dataclass(frozen=True)
 class FileLayout:
-    """Names of the columns of recordings; see `read_case` for both."""
+    """Column names and sampling rate of recordings; see `read_case`."""
 
     columns: Mapping[str, str | tuple[str, float]] | None = None
     rate: float | None = None
@@ -25,8 +25,8 @@ class FileLayout:
 def read_layout(file: Path, tables: dict[str, Any]) -> FileLayout:
     """Read `[columns]` and `rate` of a rig file.
 
-    An entry is the channel of a column, `Angle = "angle_deg"`, or also a factor:
-    `Y1 = {channel = "height_m", factor = -8e-4}`.
+    An entry gives the channel of a column, `Angle = "angle_deg"`, optionally with a
+    factor: `Y1 = {channel = "height_m", factor = -8e-4}`.
 
     **Raises:** `RigError`, one sentence that names the file and the key.
     """

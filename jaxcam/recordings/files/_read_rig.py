@@ -86,10 +86,11 @@ def _sensors(section: Section) -> Sensors:
 def read_references(
     file: Path, tables: dict[str, Any], unit: str | None
 ) -> dict[str, float]:
-    """Return the constants of forms in the table `[references]`, by name.
+    """Return the constants of missing-physics terms in the table `[references]`, by
+    name.
 
-    **Arguments:** the unit of the motion, whose rate is the unit of the speeds; `None`
-    for any.
+    **Arguments:** the unit of the motion, from which the unit of speed follows; `None`
+    allows any unit.
 
     **Raises:** `RigError` for an unknown name, or a speed that is not positive.
     """

@@ -1,4 +1,4 @@
-"""Represent all columns of a file by name."""
+"""All columns of a file, by name."""
 
 import dataclasses
 import difflib
@@ -14,9 +14,9 @@ from .._errors import RecordingError
 
 
 # Limit of plausible values in any unit, including microseconds since 1970; its fourth
-# power is still finite.
+# power is still finite
 _LARGEST_NUMBER = 1e18
-# largest number of names in a sentence
+# maximum number of names in a sentence
 _LISTED = 12
 
 
@@ -24,9 +24,9 @@ _LISTED = 12
 class Source:
     """Columns of a file, as text or as numbers.
 
-    - `columns`: by name; as text for a text file.
+    - `columns`: the columns by name; as text for a text file.
     - `headings`: their headings in the file.
-    - `rate`: samples per second, where the file states them outside the table.
+    - `rate`: samples per second, if the file gives them outside the table.
     - `notes`: remarks on omitted data.
     """
 
@@ -48,11 +48,11 @@ class Source:
         raise RecordingError(f"{self.file}: there is no column {shown(word)}; {hint}")
 
     def listed(self) -> str:
-        """Return the existing names, for a sentence."""
+        """Return the existing names for use in a sentence."""
         return listed(self.columns)
 
     def numbers(self, name: str, missing: bool = False) -> Float[np.ndarray, " k"]:
-        """Return a column as numbers; an empty cell is NaN if some may be `missing`.
+        """Return a column as numbers; with `missing`, an empty cell becomes NaN.
 
         **Raises:** `RecordingError` that names the row and the fix.
         """
@@ -76,28 +76,30 @@ class Source:
         if len(absurd):
             raise RecordingError(
                 f"{self.file}: the column {shown(name)} has {numbers[absurd[0]]:.3g} "
-                f"in row {absurd[0] + 1}, which no sensor measures; remove those rows "
-                f"or the column."
+                f"in row {absurd[0] + 1}, which no sensor can measure; remove those "
+                f"rows or the column."
             )
         return np.where(empty, np.nan, numbers)
 
 
 def listed(names: Iterable[str]) -> str:
-    """Return names for a sentence, only a few of many."""
+    """Return names for use in a sentence; a long list is shortened."""
     every = list(names)
     there = ", ".join(map(shown, every[:_LISTED])) or "none"
     return f"{there} and {len(every) - _LISTED} more" if len(every) > _LISTED else there
 
 
 def shown(text: str) -> str:
-    """Quote a piece of a file, short and without control characters."""
+    """Quote text from a file, shortened and without control characters."""
     text = text if len(text) <= 40 else f"{text[:40]}..."
     printable = "".join(c if c.isprintable() else "?" for c in text)
     return f"`{printable.replace('`', '?')}`"
 
 
 def _of_text(file: Path, name: str, column: pd.Series):
-    """Convert a column of text to numbers, NaN for other text, and flag empty cells."""
+    """Convert a column of text to numbers, with NaN for other text, and flag empty
+    cells.
+    """
     column = column.str.strip().str.replace(r'^"(.*)"$', r"\1", regex=True)
     commas = column.str.contains(",", regex=False)
     if commas.any():
@@ -105,7 +107,7 @@ def _of_text(file: Path, name: str, column: pd.Series):
         if len(both):
             raise RecordingError(
                 f"{file}: the column {shown(name)} has "
-                f"{shown(str(column.iloc[both[0]]))} in row {both[0] + 1}, with a "
+                f"{shown(str(column.iloc[both[0]]))} in row {both[0] + 1}, with both a "
                 "point and a comma; save the numbers without thousands separators."
             )
         column = column.str.replace(",", ".", regex=False)

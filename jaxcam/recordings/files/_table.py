@@ -1,4 +1,4 @@
-"""Read named columns from a text file; errors are one sentence."""
+"""Read named columns from a text file; each error message is one sentence."""
 
 import csv
 import io
@@ -27,10 +27,10 @@ def read_table(file: Path, names: Sequence[str] | None = None) -> Source:
 
     Cells are separated by tabs, semicolons, commas or spaces; numbers have a decimal
     point or comma. Names are in the line above the numbers, and units in the names or
-    in a line below; earlier lines and comments are skipped.
+    in the line below them; earlier lines and comments are skipped.
 
-    **Arguments:** `names` of the columns in their order, instead of those of the file;
-    `"-"` skips one.
+    **Arguments:** `names` of the columns in order, instead of those in the file; `"-"`
+    skips one.
 
     **Raises:** `RecordingError` for a file that is missing, empty, truncated or not a
     text table, or whose column names are invalid.
@@ -83,7 +83,9 @@ def table_of_lines(
 
 
 def _without_last(titles: list[str], rows: list[str], separator: str):
-    """Return names and rows, without a trailing separator that only one of them has."""
+    """Return names and rows, without a trailing separator present in only one of
+    them.
+    """
     count = len(cells_of(rows[0], separator))
     if count == len(titles) - 1 and not titles[-1]:
         return titles[:-1], rows
@@ -106,18 +108,18 @@ def _titles(file: Path, lines: list[str], form: Form) -> list[str]:
     """Return the names of the columns, with units at the end."""
     if form.names is None:
         count = len(cells_of(lines[form.first], form.separator))
-        where = "the first line is numbers" if form.first == 0 else "no line does so"
+        where = "the first line has numbers" if form.first == 0 else "no line does so"
         raise RecordingError(
             f"{file}: a line above the numbers must name the columns, but {where}; "
-            f"name all {count} columns in their order, as in --columns "
+            f"name all {count} columns in order, as in --columns "
             f"time_s,angle_rad (columns=[...] in Python), with {LEFT_OUT} for a "
             "skipped one."
         )
     titles = cells_of(bare(lines[form.names]), form.separator)
     if all(map(is_number, titles)):
         raise RecordingError(
-            f"{file}: the first line is numbers; it must name the columns, for example "
-            f"`time_s,cam_angle_rad,follower_angle_rad`."
+            f"{file}: the first line has numbers; it must name the columns, for "
+            f"example `time_s,cam_angle_rad,follower_angle_rad`."
         )
     units = [""] * len(titles)
     if form.units is not None:
@@ -155,7 +157,7 @@ def _kept(file: Path, titles: list[str], columns: Sequence[pd.Series]):
         if title in kept:
             raise RecordingError(
                 f"{file}: the column {shown(title)} appears twice; remove one of "
-                f"them, or name all columns in their order with --columns "
+                f"them, or name all columns in order with --columns "
                 f"(columns=[...] in Python)."
             )
         kept[title] = column
@@ -175,8 +177,8 @@ def _refuse_cut_line(file, whole, rows, separator, width, named) -> None:
     wrong = np.flatnonzero(counts != width)
     cut = len(wrong) > 0
     if not cut and not whole:
-        # No value is missing. A number that is shorter than all others in its column
-        # has lost digits; this is detectable only in a fixed format.
+        # No value is missing. A number shorter than all others in its column has lost
+        # digits; this can be detected only in a fixed format.
         last = [len(_decimals(cells_of(row, separator)[-1])) for row in rows]
         cut = len(set(last[:-1])) == 1 and last[-1] < last[0]
     if cut and (len(wrong) == 0 or wrong[0] == len(rows) - 1):
@@ -196,7 +198,7 @@ def _refuse_cut_line(file, whole, rows, separator, width, named) -> None:
                 "or name the columns present in every row with --columns"
             )
         raise RecordingError(
-            f"{file}: row {row + 1} has {counts[row]} values where {by} {width} "
+            f"{file}: row {row + 1} has {counts[row]} values, but {by} {width} "
             f"columns; {fix}."
         )
 

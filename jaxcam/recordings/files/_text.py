@@ -1,4 +1,4 @@
-"""Read the lines of a text file from any program."""
+"""Read the lines of a text file written by any program."""
 
 import csv
 import re
@@ -11,13 +11,14 @@ from ._form import is_number
 
 
 _UTF16 = b"\xff\xfe", b"\xfe\xff"
-# signature of workbooks before 2007, which often have the name of a text file
+# signature of pre-2007 workbooks, which are often named like a text file
 _OLD_EXCEL = b"\xd0\xcf\x11\xe0"
 
 
 class Lines(NamedTuple):
-    """The lines of a file that are not blank; `whole` tells whether the last one is
-    known to be complete, by a newline. `notes` are remarks on omitted data.
+    """The lines of a file that are not blank. `whole` tells whether the last one ends
+    with a newline, so that it is known to be complete; `notes` are remarks on omitted
+    data.
     """
 
     text: list[str]
@@ -54,8 +55,8 @@ def kept_lines(file: Path, every: list[str], whole: bool = True) -> Lines:
         if gap and lines and _is_row(lines[-1]) and not any(_numbers(line)):
             what = " ".join(line.split())[:40]
             notes = (
-                f"{file.name}: from line {number + 1} on there is another table "
-                f"({what}), which is left out.",
+                f"{file.name}: another table ({what}) begins in line {number + 1}; it "
+                "is omitted.",
             )
             whole = True
             break
@@ -79,8 +80,7 @@ def _is_row(line: str) -> bool:
 def _decoded(file: Path, raw: bytes) -> str:
     if raw.startswith(_OLD_EXCEL):
         raise RecordingError(
-            f"{file}: this is a workbook of an Excel before 2007; save it as .xlsx or "
-            f"as CSV."
+            f"{file}: this is a pre-2007 Excel workbook; save it as .xlsx or CSV."
         )
     try:
         if raw.startswith(_UTF16):
@@ -90,7 +90,7 @@ def _decoded(file: Path, raw: bytes) -> str:
     except UnicodeDecodeError:
         pass
     try:
-        # a degree sign or a micro of a western Windows
+        # a degree or micro sign from a Western Windows system
         text = raw.decode("cp1252") if not raw.startswith(_UTF16) else "\0"
     except UnicodeDecodeError:
         text = "\0"
@@ -106,7 +106,7 @@ def _unquoted(lines: list[str]) -> list[str]:
     """Convert lines of quoted cells to lines separated by tabs."""
     if '"' not in lines[-1] or any(line.count('"') % 2 for line in lines):
         return lines
-    # between the quotes of the last line, which is one of numbers
+    # between the quotes of the last line, which contains numbers
     mark = next((m for m in "\t;," if f'"{m}' in lines[-1] or f'{m}"' in lines[-1]), "")
     if not mark:
         return lines

@@ -9,13 +9,13 @@ from .._errors import RigError
 from .._rig import Quantity
 
 
-# largest size in bytes; a rig file has about two thousand
+# maximum size in bytes; a rig file has about two thousand
 _LARGEST = 1_000_000
 
 # largest quantity in SI units, so that products stay finite
 _LARGEST_NUMBER = 1e30
 
-# number of characters of a text repeated in messages
+# maximum number of characters of a text repeated in messages
 _LONGEST = 200
 
 
@@ -26,20 +26,22 @@ def read_tables(file: Path) -> dict[str, Any]:
     with file.open("rb") as stream:
         raw = stream.read(_LARGEST + 1)
     if len(raw) > _LARGEST:
-        raise RigError(f"{file}: this is too large for a rig; give a rig.toml.")
+        raise RigError(f"{file}: this is too large for a rig file; give a rig.toml.")
     try:
         return tomllib.loads(raw.decode("utf-8-sig"))
     except RecursionError:
-        raise RigError(f"{file}: brackets are nested too deep; remove them.") from None
+        raise RigError(
+            f"{file}: brackets are nested too deeply; remove them."
+        ) from None
     except ValueError as error:
-        # the TOML, its encoding, or an integer of thousands of digits
+        # invalid TOML, a wrong encoding, or an integer of thousands of digits
         raise RigError(f"{file}: this is not a TOML file: {error}.") from None
 
 
 class Section:
     """One table of the file, which records the keys that were read.
 
-    `within` is the name of the table that it lies in.
+    `within` is the name of the enclosing table.
     """
 
     def __init__(self, file: Path, name: str, tables: dict[str, Any], within: str = ""):
@@ -50,7 +52,7 @@ class Section:
             raise RigError(f"{file}: the table [{self.name}] is missing; add it.")
 
     def quantity(self, key: str, unit: str | None) -> Quantity:
-        """Return a number with its tolerance; a unit of `None` allows any."""
+        """Return a number with its tolerance; a unit of `None` allows any unit."""
         value, tolerance = self._parts(key, unit)
         return Quantity(self.as_number(key, value), self._tolerance(key, tolerance))
 
@@ -69,20 +71,20 @@ class Section:
     def positive(self, key: str, unit: str | None) -> float:
         number = self.quantity(key, unit).value
         if number <= 0:
-            raise self.error(key, f"is {number:g}, and must be positive")
+            raise self.error(key, f"is {number:g}, but must be positive")
         return number
 
     def count(self, key: str) -> int:
         number = self.positive(key, "")
         if number != int(number):
-            raise self.error(key, f"is {number:g}, and must be a whole number")
+            raise self.error(key, f"is {number:g}, but must be a whole number")
         return int(number)
 
     def choice(self, key: str, *choices: str) -> str:
         value, _ = self._parts(key, "")
         if value not in choices:
             quoted = " or ".join(f'"{choice}"' for choice in choices)
-            raise self.error(key, f"is {shown_value(value)}, and must be {quoted}")
+            raise self.error(key, f"is {shown_value(value)}, but must be {quoted}")
         return value
 
     def done(self) -> None:
@@ -92,13 +94,13 @@ class Section:
     def word(self, key: str) -> str:
         value, _ = self._parts(key, "")
         if not isinstance(value, str) or not value.strip():
-            raise self.error(key, f"is {shown_value(value)}, and must be a word")
+            raise self.error(key, f"is {shown_value(value)}, but must be a word")
         return value
 
     def _parts(self, key: str, unit: str | None) -> tuple[Any, Any]:
         self.read.append(key)
         if key not in self.table:
-            # a misspelt key is the usual reason, so compare with the keys that exist
+            # a misspelt key is the usual reason, so the existing keys are compared
             found = difflib.get_close_matches(key, self.table, n=1)
             hint = f"; is `{found[0]}` meant?" if found else "; add it."
             raise RigError(f"{self.file}: [{self.name}] has no `{key}`{hint}")
@@ -111,7 +113,7 @@ class Section:
         known_keys(self.file, place, entry, ("value", "tolerance", "unit"))
         if unit is not None and entry.get("unit", unit) != unit:
             found = shown_value(entry["unit"])
-            raise self.error(key, f'is given in {found}, and "{unit}" is used')
+            raise self.error(key, f'is given in {found}, but must be in "{unit}"')
         return entry["value"], entry.get("tolerance")
 
     def as_number(self, key: str, value: Any) -> float:
@@ -119,18 +121,18 @@ class Section:
         number = isinstance(value, int | float) and not isinstance(value, bool)
         if not number or not abs(value) < _LARGEST_NUMBER:
             raise self.error(
-                key, f"is {shown_value(value)}, and must be a number in SI"
+                key, f"is {shown_value(value)}, but must be a number in SI"
             )
         return float(value)
 
     def _tolerance(self, key: str, value: Any) -> float:
         tolerance = 0.0 if value is None else self.as_number(key, value)
         if tolerance < 0:
-            raise self.error(key, f"has the tolerance {tolerance:g}, below zero")
+            raise self.error(key, f"has the negative tolerance {tolerance:g}")
         return tolerance
 
     def error(self, key: str, what: str) -> RigError:
-        """Return an error that describes the fault of a key, to be raised."""
+        """Return an error to be raised that describes what is wrong with a key."""
         name = printable(key)
         return RigError(f"{self.file}: `{name}` in [{self.name}] {what}; correct it.")
 
@@ -147,13 +149,13 @@ def known_keys(file: Path, place: str, table: dict[str, Any], names) -> None:
 
 
 def printable(text: str) -> str:
-    """Shorten a foreign text for a sentence, on one line."""
+    """Shorten foreign text for use in a sentence, on one line."""
     text = "".join(c if c.isprintable() else "?" for c in text)
     return text if len(text) <= _LONGEST else f"{text[:_LONGEST]}..."
 
 
 def shown_value(value: Any) -> str:
-    """Return a value of the file for a sentence."""
+    """Return a value from the file for use in a sentence."""
     # Python does not convert an integer of thousands of digits to text
     huge = isinstance(value, int) and abs(value) > _LARGEST_NUMBER
     text = "a huge integer" if huge else repr(value)

@@ -1,4 +1,4 @@
-"""Convert columns in non-SI units; the unit is the end of a column's name."""
+"""Convert columns in non-SI units; column names end with the unit."""
 
 import math
 
@@ -36,7 +36,7 @@ _UNITS: dict[str, tuple[str, float]] = {
 def si(column: str) -> tuple[str, float]:
     """Return the name of a column in SI units and the conversion factor.
 
-    A column without a known unit keeps its name and its numbers.
+    A column without a known unit keeps its name and values.
     """
     for ending in sorted(_UNITS, key=len, reverse=True):
         if column.endswith(ending) and len(column) > len(ending):
@@ -45,7 +45,7 @@ def si(column: str) -> tuple[str, float]:
     return column, 1.0
 
 
-# ending of a channel's name -> its unit as it is written; the longest ending wins
+# ending of a channel name -> its unit as written; the longest ending wins
 _WRITTEN = {
     "_rad_s": "rad/s",
     "_rad": "rad",
@@ -62,7 +62,7 @@ _WRITTEN = {
 
 
 def unit_of(channel: str) -> str:
-    """Return the unit at the end of a channel's name: `m` for `height_m`, or
+    """Return the unit at the end of a channel name, such as `m` for `height_m`, or
     nothing.
     """
     for ending in sorted(_WRITTEN, key=len, reverse=True):
