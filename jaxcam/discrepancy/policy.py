@@ -228,6 +228,12 @@ class Policy:
     followed: int = _bounds(
         3, "maximum number of free functions and terms fitted per stage"
     )
+    hopeless: float = _bounds(
+        1.25, "ratio of the costs of a form and its curve above which a late fit ends"
+    )
+    sufficing: float = _bounds(
+        0.1, "share of the tolerated residual at which no other form is tried"
+    )
     heats: int = _bounds(
         4, "maximum number of fits of a free function until its prior converges"
     )
@@ -285,9 +291,7 @@ class Policy:
         1.2, "ratio of rms residual to noise above which a caveat is added"
     )
     decoy: float = _shows(
-        0.5,
-        "share of a function's gain that its decoy, which acts in the reverse order of "
-        "time, may reach without a caveat",
+        0.5, "share of a function's gain that its decoy may reach without a caveat"
     )
     tie: float = _shows(
         10.0,

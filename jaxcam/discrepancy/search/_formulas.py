@@ -21,10 +21,6 @@ from ._slots import emptied, Free, replaced
 
 # Number of points at which a form is compared with the sines that represent it
 _GRID = 400
-# A form that is worse than its curve by this factor after several attempts is given up
-_HOPELESS = 1.25
-# Share of the tolerated residual at which no other form is tried
-_CLEARLY = 0.1
 
 
 def formulated(
@@ -82,7 +78,7 @@ def leaves_noise(fits: FreeFits, found: Missing, small: float = 0.0) -> bool:
     """
     samples = found.problem.samples
     surplus = fits.policy.cost_errors * math.sqrt(2 * samples)
-    return found.fit.cost < samples + max(surplus, _CLEARLY * small)
+    return found.fit.cost < samples + max(surplus, fits.policy.sufficing * small)
 
 
 def _fitted(
@@ -105,7 +101,7 @@ def _fitted(
     columns = [problem.names.index(name) for name in form.coefficients]
     values = replaced(values, columns, numbers)
     point = found.fit.point._replace(values=values)
-    beaten = _HOPELESS * found.fit.cost
+    beaten = fits.policy.hopeless * found.fit.cost
     if shows_apart(one.family):
         # with disconnected pieces the fit is almost linear
         subset = Subset(apart, functions, found.names)
