@@ -78,7 +78,7 @@ def leaves_noise(fits: FreeFits, found: Missing, small: float = 0.0) -> bool:
     """
     samples = found.problem.samples
     surplus = fits.policy.cost_errors * math.sqrt(2 * samples)
-    return found.fit.cost < samples + max(surplus, fits.policy.sufficing * small)
+    return found.fit.cost < samples + max(surplus, fits.policy.enough * small)
 
 
 def _fitted(
@@ -101,7 +101,7 @@ def _fitted(
     columns = [problem.names.index(name) for name in form.coefficients]
     values = replaced(values, columns, numbers)
     point = found.fit.point._replace(values=values)
-    beaten = fits.policy.hopeless * found.fit.cost
+    beaten = fits.policy.outdone * found.fit.cost
     if shows_apart(one.family):
         # with disconnected pieces the fit is almost linear
         subset = Subset(apart, functions, found.names)

@@ -97,20 +97,17 @@ def fit_published(
 ) -> PublishedFit:
     """Fit parameters of a model to published numbers.
 
-    The method is Levenberg-Marquardt (MINPACK); far from the data, larger errors are
-    used at first.
+    The method is Levenberg-Marquardt (MINPACK), with larger errors far from the data.
 
     Args:
         model: A system, or a module that contains one, at the nominal values.
-        where: Selects the free scalars, whose nominal values are the centres of the
-            priors.
+        where: Selects the free scalars; their nominal values centre the priors.
         published: The data.
         names: Names of the free parameters.
         tolerances: Standard deviations of the priors; infinity for none.
         start: Initial values; default nominal.
         max_steps: Maximum number of evaluations for each scale of the errors.
-        progress: Called after each evaluation with its number and the cost (the sum to
-            be minimised).
+        progress: Called after each evaluation with its number and the cost.
 
     Returns:
         A [`jaxcam.fitting.published.PublishedFit`][].
