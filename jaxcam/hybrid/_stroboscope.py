@@ -107,7 +107,7 @@ def stroboscope(
         period: Sampling period (s); default the system's forcing period.
         settings: Accuracy settings; the default completes chatter as soon as the theory
             allows.
-        block: Number of trajectories advanced together; the next replaces one that ends.
+        block: Number of trajectories advanced together; each that ends is replaced.
         rows: Number of attempted steps between two checks for ended trajectories.
         max_steps: Maximum number of attempted steps per trajectory.
         workers: Number of threads; results do not depend on it.
