@@ -8,10 +8,10 @@
 
 # # A0. Two masses, two stops
 #
-# This notebook defines a system that is not among the ready-made ones: two masses in a
-# chain of springs. The first mass is driven by a force, and each mass has a stop. Wagg
-# (2004, 2005) studied such systems and found that one mass can stick to its stop while
-# the other continues to move.
+# This notebook defines a system that is not included in jaxcam: two masses in a chain
+# of springs. The first mass is driven by a force, and each mass has a stop. Wagg (2004,
+# 2005) studied such systems and found that one mass can stick to its stop while the
+# other continues to move.
 #
 # We define the system, simulate it, and look at impacts, sticking and the steady state.
 

@@ -217,8 +217,8 @@ for ball in sorted({run.name.rsplit("_drop", 1)[0] for run in drops}):
 # and the centre of the marble is known to a quarter of a pixel. The track is followed
 # from frame to frame; drops in which it is lost are omitted. The hand disturbs the
 # first arc, which therefore begins after a tenth of the height of fall. The last arc,
-# in which the bounces are too low to be distinguished, and the rest after it are
-# omitted.
+# in which the bounces are too low to be distinguished, and the samples at rest after it
+# are omitted.
 
 
 # +

@@ -175,11 +175,11 @@ with style():
     below.set_xlabel("height of the drop (m)")
 # -
 
-# Each colour marks a number of impacts. Within a colour, the lower curve is the slope
-# of the upper one. From one colour to the next the velocity jumps, because one more
-# impact occurs within the second. No derivative describes such a jump, and a finite
-# difference across it is meaningless. (Balls dropped from lower heights have tens of
-# impacts, and their derivatives are in the hundreds.)
+# Each colour stands for a number of impacts. Within a colour, the lower curve is the
+# slope of the upper one. From one colour to the next the velocity jumps, because one
+# more impact occurs within the second. No derivative describes such a jump, and a
+# finite difference across it is meaningless. (Balls dropped from lower heights have
+# tens of impacts, and their derivatives are in the hundreds.)
 
 # +
 # away from the jumps: central differences of the curve, compared with the derivative

@@ -86,8 +86,7 @@ with style():
 # proportional to the time $\tau$ from release: it is $c\tau$. Let $u$ be the rebound
 # speed and $\lambda = u/(c\tau^2)$. Each flight is then a map of $\lambda$ that depends
 # only on the coefficient of restitution $r$. The fixed point of this map is unstable.
-# If
-# $\lambda$ is below it, the chatter completes in time. If $\lambda$ is above it, the
+# If $\lambda$ is below it, the chatter completes in time. If $\lambda$ is above it, the
 # impacts are too fast: $\lambda$ grows beyond $3/8$, and the follower does not return.
 
 # +
@@ -126,8 +125,7 @@ drawn = beta_lobes(r, right, measured=(deviation[few].ravel(), simulated[few].ra
 
 # Each lobe is narrower by the factor $q$ and lower by the factor $p^2$ than the next
 # lobe outside it. The heights of the lobes therefore follow a power law with the
-# exponent
-# $\kappa = 2\ln p/\ln q$, which the simulated motion obeys over two decades.
+# exponent $\kappa = 2\ln p/\ln q$, which the simulated motion obeys over two decades.
 
 depth = np.max(np.abs(simulated), axis=1)
 exponent = np.polyfit(np.log(deviation[2:, 0]), np.log(depth[2:]), 1)[0]

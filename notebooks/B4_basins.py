@@ -69,8 +69,8 @@ for ax, name, points in zip(panels, found.names, found.orbits, strict=True):
 #
 # The uncertainty exponent is computed from the basins alone. If the error of the
 # initial state is halved, the fraction of states with an uncertain attractor falls only
-# by the factor two to the power of this exponent. The box dimension of the basin
-# boundary is two (the dimension of the plane) minus the exponent.
+# by the factor $2^\alpha$, where $\alpha$ is this exponent. The box dimension of the
+# basin boundary is two (the dimension of the plane) minus the exponent.
 
 # +
 uncertain = sweeps.uncertainty_exponent(found.attractor)

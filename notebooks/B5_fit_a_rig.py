@@ -6,7 +6,7 @@
 #       format_name: light
 # ---
 
-# # B5. Fit a rig
+# # B5. Fit the parameters of a rig
 #
 # The package contains three recordings, each of four seconds, of a cam-follower rig
 # with noisy encoders at three speeds. We fit the parameters of the spring, the cam and
