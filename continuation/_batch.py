@@ -24,7 +24,7 @@ from .special import locate, test_values
 
 @dataclass(frozen=True, eq=False)
 class Batch:
-    """Branches side by side; rows of a branch beyond its `count` are padding."""
+    """Branches stored side by side; rows of a branch beyond its `count` are padding."""
 
     states: np.ndarray
     """States, shape `(lanes, points, n)`."""
@@ -35,7 +35,7 @@ class Batch:
     count: np.ndarray
     """Number of points of each branch, shape `(lanes,)`."""
     reasons: tuple[str, ...]
-    """Reason for the end of each branch, one sentence per branch."""
+    """Reason for the end of each branch, one sentence each."""
     name: str
     """Name of the parameter."""
     _passed: Corrected
@@ -52,11 +52,12 @@ class Batch:
             A [`continuation.Branch`][].
 
         Raises:
-            ValueError: There is no such branch, or it failed at its start.
+            ValueError: There is no such branch, or it failed at the start.
         """
         if not 0 <= index < self.count.size:
             raise ValueError(
-                f"there is no lane {index}; lanes run from 0 to {self.count.size - 1}"
+                f"there is no branch {index}; the indices run from 0 to "
+                f"{self.count.size - 1}"
             )
         problem, context = self._problems(index), self._context
         rows = [
@@ -100,8 +101,8 @@ def _check_algorithm(algorithm: AbstractAlgorithm) -> None:
         )
     if algorithm.least_norm:
         raise ValueError(
-            f"{type(algorithm).__name__} corrects in no fixed plane, so that a batch "
-            "would not land on the bounds; use PseudoArclength()"
+            f"{type(algorithm).__name__} does not correct in a fixed plane, so a batch "
+            "would not end on the bounds; use PseudoArclength()"
         )
 
 
@@ -118,32 +119,32 @@ def follow_batch(
     points: int = 100,
     progress: Callable[[float], None] | None = None,
 ) -> Batch:
-    """Follow many branches in one compiled program, each with its own steps.
+    """Follow many branches in one compiled program, each with its own step lengths.
 
     Branches differ in their starts, in the values of other parameters, or both.
-    Features that need decisions in Python (transitions, admissibility, fresh
+    Features that need decisions in Python (transitions, admissibility and updated
     references) are not available.
 
     Args:
         problem: The problem.
-        states: Initial states, `(lanes, n)`.
-        where: As of [`continuation.follow`][].
-        bounds: As of [`continuation.follow`][].
+        states: Initial states, shape `(lanes, n)`, one row per branch.
+        where: As for [`continuation.follow`][].
+        bounds: As for [`continuation.follow`][].
         algorithm: Algorithm that corrects in a plane and predicts from a single point,
-            such as the tangent; default [`continuation.PseudoArclength`][].
-        parameters: The problem's parameters, each float leaf `(lanes,)` or a scalar for
-            all; default those of the problem.
-        settings: As of [`continuation.follow`][].
-        direction: 1 or -1, or `(lanes,)` of them.
-        points: Largest number of points on each branch.
-        progress: Called with the fraction of points done; a branch that ends earlier
-            counts as done.
+            for example along the tangent; default [`continuation.PseudoArclength`][].
+        parameters: Parameters of the problem; each float leaf has shape `(lanes,)` or
+            is a scalar for all branches. Default: those of the problem.
+        settings: As for [`continuation.follow`][].
+        direction: 1 or -1, or one of these for each branch, shape `(lanes,)`.
+        points: Maximum number of points on each branch.
+        progress: Called with the fraction of points completed; a branch that has ended
+            counts as complete.
 
     Returns:
-        A `Batch`; `reason` tells for each branch whether it failed.
+        A `Batch`; its `reason` tells whether a branch failed.
 
     Raises:
-        ValueError: Shapes do not fit, or the algorithm cannot run in a batch.
+        ValueError: Shapes are inconsistent, or the algorithm cannot run in a batch.
 
     Examples:
         >>> import continuation

@@ -15,15 +15,15 @@ from .step_control import measure_step
 
 
 _RUNNING, _BOUND, _SHORT, _FULL, _NO_START = range(5)
-# attempted steps of a call that reports progress, and of one that does not
+# number of attempted steps in a call that reports progress, and in one that does not
 _ROUNDS, _WHOLE = 16, np.iinfo(np.int64).max
 REASONS = (
     "running",
     "the parameter is at its bound",
-    "the step was halved down to the smallest and the corrector still failed, or the "
+    "the step was halved down to the smallest, and the corrector still failed or the "
     "branch turned too sharply",
     "the requested number of points was reached",
-    "the start is no solution, and Newton's method finds none near it",
+    "the start is not a solution, and Newton's method finds none near it",
 )
 
 
@@ -38,14 +38,14 @@ class Lane(NamedTuple):
 
 
 class Axes(eqx.Module):
-    """The parameters that differ between lanes; static."""
+    """The parameters that differ between branches (lanes); static."""
 
     tree: PyTree = eqx.field(static=True)
-    """0 for each leaf that differs, None for one that all share."""
+    """0 for each leaf that differs, None for each shared leaf."""
 
     @staticmethod
     def of(one: PyTree, given: PyTree, lanes: int) -> "Axes":
-        """Return the axes for the parameters of one lane and those given for all.
+        """Return the axes, given the parameters of one lane and those of all lanes.
 
         Raises:
             ValueError: The number of values is wrong.
@@ -58,7 +58,7 @@ class Axes(eqx.Module):
             if axis == 0 and len(many) != lanes:
                 raise ValueError(
                     f"a parameter has {len(many)} values for {lanes} branches; give "
-                    "one for each or one for all"
+                    "one for each, or one for all"
                 )
         return found
 
@@ -85,8 +85,8 @@ def follow_lanes(
     **Arguments:** the problem, and an algorithm that predicts from one point;
     parameters `given` to the problem, which differ between lanes by `axes`, and the
     `leaf` that is followed; for each lane a point `z` and the sign of its direction;
-    bounds; settings from `as_traced`; the largest number of `points`; and `progress`,
-    or None, which is called with the fraction done.
+    bounds; settings from `as_traced`; the maximum number of `points`; and `progress`,
+    which is called with the completed fraction, or None.
 
     Returns:
         The last `Lane` of each branch.
@@ -98,7 +98,7 @@ def follow_lanes(
             problem, algorithm, given, axes, leaf, lanes, low, high, s, points, rounds
         )
         if progress is not None:
-            # a branch that has ended counts as done
+            # a branch that has ended counts as complete
             done = np.where(lanes.status == _RUNNING, lanes.count / points, 1.0)
             progress(float(np.mean(done)))
     return lanes
@@ -116,7 +116,7 @@ def _begin(problem, given, axes, leaf, z, signs, low, high, s, points):
         turn = jnp.where(at.tangent[-1] * sign < 0, -1.0, 1.0)
         tangent = turn * at.tangent
         at = with_field(at, "tangent", tangent)
-        # the determinant of jacobian and tangent turns with the tangent
+        # the determinant of the Jacobian and the tangent changes sign with the tangent
         at = with_field(at, "determinant", turn * at.determinant)
         buffer = jax.tree.map(
             lambda x: jnp.zeros((points, *x.shape), x.dtype).at[0].set(x), at

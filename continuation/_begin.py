@@ -12,23 +12,23 @@ from .problem import AbstractProblem, Start
 def solved_start(
     problem: AbstractProblem, context: Context, z: np.ndarray, name: str, direction: int
 ) -> Corrected:
-    """Solve at the parameter of the start, and find the direction there."""
+    """Solve the problem at the initial parameter, and find the direction there."""
     across = np.zeros_like(z)
     across[-1] = 1.0
     at = correct(problem, context, z, across, across)
     if not at.success:
-        # more iterations need another program, compiled only on demand
+        # more iterations need another program, which is compiled only on demand
         settings = with_field(context.settings, "max_iterations", 30)
         patient = context._replace(settings=settings)
         at = correct(problem, patient, z, across, across)
     if not at.success:
-        # Newton's method fails where the derivative is singular; the start may still be
-        # a solution
+        # Newton's method fails if the derivative is singular, but the start may be a
+        # solution
         given = evaluate(problem, context, z, across)
         size = np.abs(_residual(problem, z, context.leaf)) / given.scale[:-1]
         if not np.all(size <= context.settings.tolerance):
             raise ValueError(
-                f"the start is no solution at {name} = {z[-1]:g}, and "
+                f"the start is not a solution at {name} = {z[-1]:g}, and "
                 "Newton's method finds none near it; start from a better guess "
                 f"(largest residual {_largest(size)})"
             )
@@ -52,7 +52,7 @@ def leave(
         at = correct(problem, context, guess, tangent / scale**2, tangent)
         moved = np.linalg.norm((at.z - guess) / scale)
         if at.success and moved <= step and low <= at.z[-1] <= high:
-            # the tangent has turned since the start: continue outwards
+            # the tangent has changed direction since the start: continue outwards
             outwards = evaluate(problem, context, at.z, at.z - z)
             if np.all(np.isfinite(outwards.tangent)):
                 return outwards, step

@@ -36,20 +36,20 @@ def branch(
     The other arguments are those of [`continuation.follow`][].
 
     Args:
-        problem: The problem, or a hybrid system with an orbit of it as `start`.
+        problem: The problem, or a hybrid system with one of its orbits as `start`.
         start: A state `(n,)`, a [`continuation.Start`][] or a [`continuation.Point`][].
-        where: Picks the parameter, as in `lambda parameters: parameters.speed`.
+        where: Selects the parameter, as in `lambda parameters: parameters.speed`.
         bounds: (lowest, highest) value of the parameter; the branch ends exactly there.
         algorithm: Default [`continuation.PseudoArclength`][].
         settings: Accuracy and step control.
-        direction: 1 or -1; or `"both"`, from the start towards smaller and towards
-            larger parameters, joined in order and relabelled.
-        callbacks: Called with each point as it is found: progress, saving. One that
-            returns True ends the branch.
+        direction: 1 or -1; or `"both"`, in which case the parts towards smaller and
+            larger parameters are joined in order and relabelled.
+        callbacks: Called with each point as it is found, for example to show progress
+            or to save it. If a callback returns True, the branch ends.
         out: A file to which each point is appended, for [`continuation.load_branch`][];
             the first of two directions goes to a file with `.back` before the suffix.
-        resume: Continue the run that wrote `out` where it was interrupted. The result
-            is identical to that of an uninterrupted run.
+        resume: Whether to continue the run that wrote `out` from where it was
+            interrupted. The result is identical to that of an uninterrupted run.
 
     Returns:
         A [`continuation.Branch`][].
@@ -121,16 +121,16 @@ def branch(
 
 
 def _written(path: Path, header: dict, problem: AbstractProblem) -> list[Point]:
-    """Points of an interrupted run, up to the last ordinary one."""
+    """Return the points of an interrupted run, up to the last ordinary one."""
     branch, before = read_branch(path, problem)
     different = [key for key, value in header.items() if before.get(key) != value]
     if different:
         raise ValueError(
-            f"{path} was written with other {', '.join(different)}; resume with the "
-            "same, or write to another file"
+            f"{path} was written with different {', '.join(different)}; resume with "
+            "the same, or write to another file"
         )
     points = list(branch.points)
-    # special points that follow it are found again
+    # special points after it are found again
     while points and points[-1].special:
         points.pop()
     return points

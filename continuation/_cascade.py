@@ -1,4 +1,4 @@
-"""Cascades of flips."""
+"""Period-doubling cascades."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -18,14 +18,14 @@ from .problem import AbstractProblem, Start
 from .special import FLIP
 
 
-# ordinary points that a branch of the cascade gets at least, if its length shrinks
-# no faster than the square of Feigenbaum's 2.5029
+# minimum number of ordinary points on a branch of the cascade, if its length decreases
+# no faster than by the square of Feigenbaum's 2.5029
 _POINTS = 10
 
 
 @dataclass(frozen=True, eq=False)
 class Cascade:
-    """Branches of doubled orbits, each up to its first flip."""
+    """Branches of successively period-doubled orbits, each up to its first flip."""
 
     branches: tuple[Branch, ...]
     """The branches, in order of doubling."""
@@ -42,7 +42,7 @@ class Cascade:
 
     @property
     def ratios(self) -> np.ndarray:
-        """Quotients of successive distances, shape `(flips - 2,)` (thesis,
+        """Ratios of successive distances between flips, shape `(flips - 2,)` (thesis,
         eq. 2.17).
         """
         gaps = np.diff(self.parameters)
@@ -50,7 +50,7 @@ class Cascade:
 
     @property
     def reason(self) -> str:
-        """The reason why the cascade ends."""
+        """The reason the cascade ends."""
         return self.branches[-1].reason
 
 
@@ -68,22 +68,22 @@ def cascade(
 ) -> Cascade:
     """Follow a branch to its flip, the doubled branch to its own flip, and so on.
 
-    Steps shrink with the lengths of the branches.
+    Step lengths decrease with the lengths of the branches.
 
     Args:
         problem: The problem.
         start: As for [`continuation.follow`][].
-        where: Picks the parameter.
+        where: Selects the parameter.
         bounds: (lowest, highest) value of the parameter.
         algorithm: Default [`continuation.PseudoArclength`][].
         flips: Number of flips to locate.
         settings: Accuracy and step control.
-        callbacks: Called with each point as it is found, to show progress.
-        direction: 1 to begin towards larger parameters, -1 towards smaller ones.
+        callbacks: Called with each point as it is found, for example to show progress.
+        direction: 1 to start towards larger parameters, -1 towards smaller ones.
 
     Returns:
-        A `Cascade`; it has fewer flips where a branch ends without one, and its
-            `reason` then says why.
+        A `Cascade`. If a branch ends without a flip, there are fewer flips, and
+            `reason` explains why.
 
     Raises:
         ValueError: As for [`continuation.follow`][].
@@ -120,7 +120,8 @@ def cascade(
             break
         (start,) = emanating(last, where, bounds[1] - bounds[0])
         problem = start.problem
-        # doubled branches are shorter, in state by about 2.5, in parameter by 4.7
+        # doubled branches are shorter, by about 2.5 in the state and 4.7 in the
+        # parameter
         longest = last.arclength / 2.5 / _POINTS if len(branches) > 1 else np.inf
         longest = max(min(walk.max_step, longest), 4 * walk.min_step)
         first = min(walk.step, longest / 4)

@@ -1,4 +1,4 @@
-"""Detect a branch that returns to its own start."""
+"""Detect a branch that returns to one of its own points."""
 
 from typing import Any, NamedTuple
 
@@ -12,18 +12,18 @@ from .problem import AbstractProblem
 from .special import cubic_between
 
 
-# the branch meets an earlier point if it is this close to it, in step lengths, for
-# tolerances from 1e-11 to 1e-8: errors of both points, and digits lost near a branch
-# point, where the equations are nearly singular
+# the branch meets an earlier point if it comes this close to it, in step lengths, for
+# tolerances from 1e-11 to 1e-8; this allows for the errors of both points, and for
+# digits lost near a branch point, where the equations are nearly singular
 _MISS, _LEAST, _MOST = 1e3, 1e-8, 1e-5
-# steps that must lie between a point and the return to it
+# number of steps that must lie between a point and the return to it
 _AWAY = 3.0
-# cosine between the directions in which a point is passed twice
+# minimum cosine of the angle between the directions in which a point is passed twice
 _ALIGNED = 0.9
 
 
 class Passed(NamedTuple):
-    """A point that the branch has passed, in one of its representations."""
+    """A point passed by the branch, in one of its representations."""
 
     z: np.ndarray
     tangent: np.ndarray
@@ -32,7 +32,9 @@ class Passed(NamedTuple):
 
 
 class Past:
-    """The points of a branch so far, by the family of problems that they solve."""
+    """The points of a branch so far, grouped by the family of problems that they
+    solve.
+    """
 
     def __init__(self, leaf: int):
         self.leaf = leaf
@@ -54,8 +56,8 @@ class Past:
     def near(
         self, current: Solution, following: Solution
     ) -> list[tuple[float, Passed]]:
-        """Return the points next to the step, and the fraction of the step before
-        each.
+        """Return the points near the step, and the fraction of the step at which each
+        lies.
         """
         representation = current.problem.representation
         known = self.families.get(representation.family, [])
@@ -82,10 +84,11 @@ class Past:
 def closed(
     context: Context, past: Past, current: Solution, following: Solution
 ) -> tuple[Solution, str] | None:
-    """Return the earlier point to which this step returned, and its meaning.
+    """Return the earlier point to which this step has returned, and what that means.
 
-    Solutions where the equations are regular lie on one branch only, so that a branch
-    that meets one of its points again is a closed curve, or the same curve backwards.
+    A solution at which the equations are regular lies on only one branch. If a branch
+    meets one of its points again, it is therefore a closed curve, or the same curve
+    traversed backwards.
     """
     for share, passed in past.near(current, following):
         cosine = _cosine_where_met(context, current, following, share, passed)
@@ -118,7 +121,7 @@ def _cosine_where_met(
     share: float,
     passed: Passed,
 ) -> float | None:
-    """Return the cosine between the two passing directions; None if the point is
+    """Return the cosine of the angle between the two directions; None if the point is
     missed.
     """
     scale = current.at.scale
@@ -126,7 +129,7 @@ def _cosine_where_met(
     chord = chord / np.linalg.norm(chord)
     guess = cubic_between(current.at, following.at, share) / scale
     target = passed.z / scale
-    # onto the plane in which the earlier point lies
+    # onto the plane that contains the earlier point
     guess = (guess + chord * float(chord @ (target - guess))) * scale
     at: Any = correct(current.problem, context, guess, chord / scale, chord * scale)
     allowed = min(max(_MISS * context.settings.tolerance, _LEAST), _MOST)

@@ -6,7 +6,7 @@ from ._settings import BranchSettings
 
 
 class Context(NamedTuple):
-    """The varying parameter, the scale of its changes, and the accuracy.
+    """The varying parameter, the scale of its changes and the accuracy.
 
     For a single point the bounds do not matter.
     """
@@ -14,6 +14,6 @@ class Context(NamedTuple):
     leaf: int
     """Index among the leaves of the problem's parameters."""
     width: float
-    """Width of the bounds: a change of the parameter by this much has length one."""
+    """Width of the bounds; a parameter change of this size has length one."""
     settings: BranchSettings
     bounds: tuple[float, float] = (-float("inf"), float("inf"))

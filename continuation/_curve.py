@@ -28,9 +28,9 @@ from .special import (
 )
 
 
-# its `parameters` is a property, which type checkers take for an argument
+# `parameters` is a property, which type checkers interpret as an argument
 _monitored: Any = MonitorPoints
-# a monitor below this, relative to one plus the unknowns, is taken for zero
+# a monitor below this, relative to one plus the unknowns, counts as zero
 _ZERO = 1e-7
 
 
@@ -40,11 +40,11 @@ def extended(
     bounds: tuple[float, float],
     settings: BranchSettings | None = None,
 ) -> SingularPoints | MonitorPoints:
-    """The problem whose solutions are special points like this one, the parameter that
-    `where` picks among the unknowns (at the end of the state).
+    """Return the problem whose solutions are special points like this one; the
+    parameter selected by `where` is one of its unknowns (at the end of the state).
 
     Raises:
-        ValueError: Points of this kind form no curve.
+        ValueError: Points of this kind do not form a curve.
     """
     problem = point.solved
     leaf, name = pick_one(where, problem.parameters)
@@ -58,9 +58,9 @@ def extended(
         k for k, monitor in problem.monitors().items() if monitor.kind == point.kind
     ]
     if len(same) > 1:
-        # several monitors may share a kind: choose the monitor that is zero here, and
-        # the last one if several vanish, such as the gap next to an impact without
-        # speed
+        # several monitors may have the same kind: choose the monitor that is zero here,
+        # and the last one if several are zero, such as the gap next to an impact of
+        # zero speed
         at = evaluate(problem, context, z, np.ones_like(z))
         sizes = {k: abs(float(at.monitors[k])) for k in same}
         most = max(min(sizes.values()), _ZERO * (1.0 + float(np.max(np.abs(z)))))
@@ -74,8 +74,8 @@ def extended(
             np.asarray(context.bounds),
         )
     raise ValueError(
-        f"points of kind {point.kind!r} form no curve in two parameters; folds, flips, "
-        "Neimark-Sacker and Hopf points and the zeros of a problem's monitors do"
+        f"points of kind {point.kind!r} do not form a curve in two parameters; folds, "
+        "flips, Neimark-Sacker and Hopf points and the zeros of a problem's monitors do"
     )
 
 
@@ -96,9 +96,10 @@ def curve(
     Args:
         point: A fold, flip, Neimark-Sacker or Hopf point of a branch, or a zero of a
             monitor of its problem.
-        where: Picks the two parameters. The first becomes an unknown; steps, bounds and
-            `point.parameter` are those of the second.
-        bounds: (lowest, highest) of both parameters; the curve ends exactly on them.
+        where: Selects the two parameters. The first becomes an unknown; step lengths
+            and `point.parameter` refer to the second.
+        bounds: (lowest, highest) value of both parameters; the curve ends exactly on
+            these bounds.
         algorithm: Default [`continuation.PseudoArclength`][].
         settings: Accuracy and step control.
         direction: As for [`continuation.branch`][].
@@ -107,13 +108,14 @@ def curve(
         resume: As for [`continuation.branch`][].
 
     Returns:
-        A [`continuation.Branch`][]; `point.parameters` has both parameters in the order
-            of `where`. Its special points are those of codimension two (cusp,
+        A [`continuation.Branch`][]; `point.parameters` contains both parameters in the
+            order of `where`. Its special points are those of codimension two (cusp,
             Bogdanov-Takens, zero-Hopf; generalized flip, fold-flip; 1:1, 1:2, 1:3, 1:4
             resonances) and zeros of monitors.
 
     Raises:
-        ValueError: The point forms no curve; and as for [`continuation.follow`][].
+        ValueError: The point does not form a curve, or as for
+            [`continuation.follow`][].
 
     Examples:
         >>> import continuation
@@ -135,7 +137,7 @@ def curve(
     problem = extended(point, first, bounds_1, settings)
     leaf, name = pick_one(second, problem.parameters)
     if leaf == problem.leaf:
-        raise ValueError(f"both parameters are {name}; pick two different ones")
+        raise ValueError(f"both parameters are {name}; choose two different ones")
     u = np.append(point.state, leaf_of(problem.parameters, problem.leaf))
     found = branch(
         problem, Start(problem, u), second, bounds_2, algorithm,

@@ -1,4 +1,4 @@
-"""Further solutions at one parameter value, by deflation."""
+"""Find additional solutions at one parameter value by deflation."""
 
 from collections.abc import Sequence
 
@@ -19,7 +19,9 @@ from .problem import AbstractProblem
 
 @eqx.filter_jit
 def _deflated(problem, guesses, known, count, scale, tolerance, iterations: int):
-    """Newton on G(u) prod_i (1/|u - u_i|^2 + 1), from all guesses at once."""
+    """Apply Newton's method to G(u) prod_i (1/|u - u_i|^2 + 1), from all guesses at
+    once.
+    """
 
     def one(guess):
         def equations(y):
@@ -47,22 +49,22 @@ def deflate(
     """Find solutions in addition to the known ones, at the parameters of the problem.
 
     Each solution found is divided out (Farrell, Birkisson and Funke, SIAM J. Sci.
-    Comput. 37, 2015), so that Newton's method from the same guesses must end elsewhere
-    or nowhere.
+    Comput. 37, 2015), so that Newton's method, starting from the same guesses,
+    converges to another solution or not at all.
 
     Args:
         problem: The problem.
-        guesses: States from which Newton's method begins, `(guesses, n)` or `(n,)`.
-        known: States `(n,)` of solutions that are known already.
+        guesses: Initial states for Newton's method, shape `(guesses, n)` or `(n,)`.
+        known: States `(n,)` of known solutions.
         settings: Accuracy.
-        most: Number of solutions, known ones included, at which the search ends.
-        max_iterations: Largest number of Newton iterations per guess.
+        most: Number of solutions, including the known ones, at which the search ends.
+        max_iterations: Maximum number of Newton iterations per guess.
 
     Returns:
-        The further solutions, each `(n,)`, in the order found.
+        The additional solutions, each of shape `(n,)`, in the order found.
 
     Raises:
-        ValueError: A guess or a known solution has another shape.
+        ValueError: A guess or a known solution has the wrong shape.
 
     Examples:
         >>> import continuation
@@ -90,7 +92,7 @@ def deflate(
         values, success = jax.device_get(
             _deflated(
                 problem,
-                # away from the guess: it may be a solution that is divided out
+                # away from the guess, because it may be a solution that is divided out
                 jnp.asarray(starts + 1e-6 * scale),
                 jnp.asarray(table),
                 jnp.asarray(len(solutions)),

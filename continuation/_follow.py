@@ -28,33 +28,33 @@ def follow(
     direction: int = 1,
     history: Sequence[Point] = (),
 ) -> Iterator[Point]:
-    """Follow a branch of solutions and yield its points, special points among them.
+    """Follow a branch of solutions and yield its points, including special points.
 
-    The branch ends on a bound, where it meets an earlier point of its own, where
-    doubled orbits join those of half the period, where a monitor of the problem ends it
-    and the problem knows no transition, where the smallest step fails, or after
-    `settings.max_points`; the last point gives the reason in `reason`.
+    The branch ends on a bound; at an earlier point of its own; where doubled orbits
+    join those of half the period; at the zero of a monitor that ends the problem, if
+    there is no transition to another problem; if the smallest step fails; or after
+    `settings.max_points` points. The `reason` of the last point tells which.
 
     Args:
         problem: The problem, such as [`continuation.Equilibrium`][]; or a hybrid
-            system, with an orbit of it as `start`.
-        start: A state `(n,)`, on the branch at the parameter value of the problem, or
-            near enough for Newton's method; or a [`continuation.Start`][], such as a
-            branch to switch to; or a [`continuation.Point`][], to continue from there
-            exactly as its own run did.
-        where: Picks the parameter, as in `lambda parameters: parameters.speed`.
+            system, with one of its orbits as `start`.
+        start: A state `(n,)` at the parameter value of the problem, on the branch or
+            close enough for Newton's method to converge; or a [`continuation.Start`][],
+            such as that of a branch to switch to; or a [`continuation.Point`][], from
+            which the run continues exactly as the original one did.
+        where: Selects the parameter, as in `lambda parameters: parameters.speed`.
         bounds: (lowest, highest) value of the parameter; the branch ends exactly there.
         algorithm: Default [`continuation.PseudoArclength`][].
         settings: Accuracy and step control.
-        direction: 1 to begin towards larger parameters, -1 towards smaller ones.
-        history: The points before `start`, if that is a point; predictors through
+        direction: 1 to start towards larger parameters, -1 towards smaller ones.
+        history: The points before `start`, if that is a point; predictors that use
             several points need them.
 
     Returns:
         An iterator of [`continuation.Point`][].
 
     Raises:
-        ValueError: The start is no solution, the parameter does not exist, or the
+        ValueError: The start is not a solution, the parameter does not exist, or the
             bounds are reversed or do not contain the start.
 
     Examples:
@@ -74,7 +74,7 @@ def follow(
         raise ValueError(f"direction is {direction!r}; give 1 or -1")
     context = Context(leaf, high - low, settings, (low, high))
     run = Run(context, algorithm, name, direction)
-    # the first point is computed now, so that bad input is reported here
+    # the first point is computed now, so that invalid input is reported here
     first = run.begin(begun, at, history)
     return run.points(first)
 
@@ -91,8 +91,7 @@ def checked_bounds(bounds: tuple[float, float], name: str) -> tuple[float, float
         raise ValueError(f"bounds of {name} must be finite, not ({low:g}, {high:g})")
     if low >= high:
         raise ValueError(
-            f"bounds ({low:g}, {high:g}) of {name} are the wrong way round; give "
-            "(lowest, highest)"
+            f"bounds ({low:g}, {high:g}) of {name} are reversed; give (lowest, highest)"
         )
     return low, high
 

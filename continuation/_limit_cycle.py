@@ -16,10 +16,10 @@ from .special import FLIP, flip_direction
 
 
 class LimitCycle(AbstractProblem):
-    """Periodic orbits of u' = vector_field(u, parameters), with unknown period.
+    """Periodic orbits of u' = vector_field(u, parameters) with unknown period.
 
-    The unknowns are (u(0), period); the equations are u(period) = u(0) and a phase
-    condition: u(0) lies in a plane that is renewed at each point of a branch. The
+    The unknowns are (u(0), period). The equations are u(period) = u(0) and a phase
+    condition: u(0) lies in a plane, which is updated at each point of a branch. The
     multipliers are those of the map on that plane (thesis, eq. 2.14), without the
     trivial one.
 
@@ -35,18 +35,19 @@ class LimitCycle(AbstractProblem):
     """
 
     vector_field: Callable[[Array, Any], Array]
-    """Maps a state (n,), n >= 2, and the parameters to (n,)."""
+    """Function of a state `(n,)`, n >= 2, and the parameters that returns `(n,)`."""
     parameters: PyTree
-    """Any pytree with scalar floats among its leaves."""
+    """The parameters: any pytree with scalar floats among its leaves."""
     reference: Any
-    """A state on the cycle or near it, `(n,)`, to begin with."""
+    """Initial reference: a state on or near the cycle, `(n,)`."""
     normal: Any
     """Unit normal of the plane, `(n,)`."""
     basis: Any
     """Unit vectors in the plane, `(n, n-1)`."""
     steps: int = eqx.field(static=True)
-    """Number of equal steps per period, by Dormand and Prince's method of order 8.
-    `point.observed["error"]` is their estimated error, relative to the state."""
+    """Number of equal steps per period, by the eighth-order Dormand-Prince method.
+    `point.observed["error"]` is their estimated error, relative to the state.
+    """
     stability: ClassVar[StabilityKind] = "map"
     """Multipliers on the unit circle mark bifurcations."""
     normal_forms: ClassVar[bool] = False
@@ -107,11 +108,11 @@ class LimitCycle(AbstractProblem):
     def refreshed(self, u: np.ndarray, parameters: PyTree) -> "LimitCycle":
         x = np.asarray(u[:-1], float)
         f = np.asarray(self.vector_field(jnp.asarray(x), parameters))
-        # next to a Hopf point the field vanishes, and the plane from there serves
+        # near a Hopf point the field vanishes, and the plane obtained there is used
         if np.linalg.norm(f) < 1e-6 * max(1.0, float(np.linalg.norm(x))):
             return self
         normal, basis = _plane(f)
-        # the sign continues, for the sake of test functions
+        # the sign is kept continuous for the test functions
         normal = normal * (-1.0 if normal @ np.asarray(self.normal) < 0 else 1.0)
         moved = with_field(with_field(self, "normal", normal), "basis", basis)
         return with_field(moved, "reference", x)
@@ -142,11 +143,13 @@ class LimitCycle(AbstractProblem):
 
 
 def _plane(normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Unit normal, and unit vectors (n, n-1) in the plane across it."""
+    """Return the unit normal, and unit vectors (n, n-1) in the plane perpendicular to
+    it.
+    """
     if not np.all(np.isfinite(normal)) or not np.any(normal):
         raise ValueError(
-            "the vector field vanishes at the reference: an equilibrium is no cycle; "
-            "give a state on the cycle"
+            "the vector field vanishes at the reference, which is an equilibrium and "
+            "not a cycle; give a state on the cycle"
         )
     normal = normal / np.linalg.norm(normal)
     rows = np.linalg.svd(normal[None, :])[2]
@@ -165,7 +168,7 @@ def cycle_at_hopf(
         return None
     k = int(np.argmin(np.where(upper, np.abs(values.real), np.inf)))
     q = vectors[:, k]
-    # the phase that makes real and imaginary part orthogonal
+    # the phase for which the real and imaginary parts are orthogonal
     q = q * np.exp(-0.5j * np.angle(np.sum(q * q)))
     problem = LimitCycle(vector_field, parameters, point.state, normal=q.imag)
     state = np.append(point.state, 2 * np.pi / values[k].imag)

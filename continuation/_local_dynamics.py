@@ -1,4 +1,4 @@
-"""The dynamics around a solution, whose eigenvalues decide its stability."""
+"""The local dynamics around a solution, whose eigenvalues determine its stability."""
 
 from collections.abc import Callable
 from typing import Literal, NamedTuple
@@ -11,12 +11,16 @@ StabilityKind = Literal["equilibrium", "map", "none"]
 
 
 class LocalDynamics(NamedTuple):
-    """The vector field or map around a solution whose eigenvalues are the problem's."""
+    """The vector field or map around a solution, with the eigenvalues of the
+    problem.
+    """
 
     at: Array
     """The solution, shape `(k,)`."""
     motion: Callable[[Float[Array, " k"]], Float[Array, " k"]] | None
-    """The map or vector field, `(k,)` to `(k,)`, differentiable three times. None: only
-    its Jacobian is known, and higher derivatives come from central differences."""
+    """The map or vector field, from `(k,)` to `(k,)`, three times differentiable. If it
+    is None, only the Jacobian is known, and higher derivatives are computed by central
+    differences.
+    """
     jacobian: Callable[[Float[Array, " k"]], Float[Array, "k k"]]
-    """Its Jacobian, `(k,)` to `(k, k)`."""
+    """The Jacobian, from `(k,)` to `(k, k)`."""

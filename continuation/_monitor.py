@@ -1,10 +1,10 @@
-"""The test functions that a problem adds to those of the core."""
+"""Test functions that a problem adds to the built-in ones."""
 
 import equinox as eqx
 
 
 class Monitor(eqx.Module):
-    """A test function that a problem adds, and the meaning of its zero.
+    """A test function added by a problem, and the meaning of its zero.
 
     Examples:
         >>> import continuation
@@ -15,13 +15,17 @@ class Monitor(eqx.Module):
     kind: str = eqx.field(static=True)
     """Name of the special point at its zero, such as `"grazing"`."""
     ends: bool = eqx.field(static=True, default=False)
-    """Whether the branch of this problem ends there. `AbstractProblem.transition` is
-    then asked for another problem with which to continue. The zero of such a monitor is
-    also sought ahead of the last point, when a step fails or its result is rejected; so
-    the monitor may cease to exist, or not change sign, beyond its zero. It must have a
-    nonzero slope on the near side."""
+    """Whether the branch of this problem ends at the zero. `AbstractProblem.transition`
+    then returns another problem with which to continue, if there is one. If a step
+    fails or its result is rejected, a zero of such a monitor is also searched for ahead
+    of the last point. The monitor therefore need not exist or change sign beyond its
+    zero, but it must have a nonzero slope on the near side.
+    """
     bracket: bool = eqx.field(static=True, default=False)
-    """Whether its zero is enclosed by points of the branch instead of solved for by
-    Newton's method; for values whose derivative is costly to compile."""
+    """Whether the zero is bracketed by points of the branch instead of computed by
+    Newton's method; for monitors whose derivative is costly to compile.
+    """
     vanishing: tuple[str, ...] = eqx.field(static=True, default=())
-    """Names of monitors that are zero wherever this one is, and are ignored there."""
+    """Names of monitors that are also zero whenever this one is, and are then
+    ignored.
+    """

@@ -1,4 +1,4 @@
-"""Pick the varying parameter in a tree of parameters."""
+"""Select the varying parameter in a tree of parameters."""
 
 from typing import Any
 
@@ -11,24 +11,24 @@ from jaxcam.parameters import pick as parameter_pick, Where
 
 
 def pick_one(where: Where, parameters: PyTree) -> tuple[int, str]:
-    """Index of the leaf that `where` picks, and its name.
+    """Return the index of the leaf selected by `where`, and its name.
 
     Raises:
-        ValueError: `where` picks nothing, or not a single number.
+        ValueError: `where` selects nothing, or not a single number.
     """
-    # bifurcation problems are often stated with whole numbers
+    # bifurcation problems are often written with whole numbers
     picked = parameter_pick(where, parameters, integers=True)
     if picked.several:
         raise ValueError(
-            f"where picks {', '.join(picked.names)}; a branch has one parameter, as in "
-            "`lambda p: p.speed`"
+            f"where selects {', '.join(picked.names)}, but a branch has one "
+            "parameter, as in `lambda p: p.speed`"
         )
     return picked.leaves[0], picked.names[0]
 
 
 def as_arguments(parameters: PyTree, *leaves: int) -> PyTree:
-    """Convert floats and the picked leaves to float64 arrays, the arguments of
-    programs.
+    """Convert floats and the selected leaves to float64 arrays, which are program
+    arguments.
     """
     flat, structure = jax.tree.flatten(parameters)
     for i, leaf in enumerate(flat):

@@ -18,7 +18,7 @@ from .special import (
 
 
 class Special(NamedTuple):
-    """A special point as a position of the run, and its data."""
+    """A special point as a state of the run, and its data."""
 
     current: Solution
     kind: str
@@ -45,9 +45,9 @@ def sign_changes(context: Context, current: Solution, following: Solution) -> li
 def located_between(
     context: Context, current: Solution, following: Solution, names: list[str]
 ) -> list[tuple[str, Located]]:
-    """Return the zeros of these test functions in the order in which they are passed.
+    """Return the zeros of these test functions, in the order in which they are passed.
 
-    Two functions with the same zero count once, unless a monitor ends the branch there.
+    A common zero of two functions counts once, unless a monitor ends the branch there.
     """
     monitors = current.problem.monitors()
     found: list[tuple[float, str, Located]] = []
@@ -75,7 +75,7 @@ def located_between(
 def special_here(
     context: Context, current: Solution, chord: np.ndarray, name: str, located: Located
 ) -> Special | None:
-    """Return the special point as a position of the run; None for a neutral saddle.
+    """Return the special point as a state of the run; None for a neutral saddle.
 
     `chord` points along the branch there.
     """

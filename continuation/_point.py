@@ -18,7 +18,7 @@ ORDINARY = ("start", "regular", "end")
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Point:
-    """A point of a branch; all arrays are NumPy's.
+    """A point of a branch; all arrays are NumPy arrays.
 
     Examples:
         >>> import continuation
@@ -29,7 +29,7 @@ class Point:
     """
 
     label: int
-    """Number along the branch, from 1."""
+    """Number of the point along the branch, from 1."""
     kind: str
     """`"start"`, `"regular"`, `"end"`, or the kind of special point."""
     parameter: float
@@ -46,21 +46,23 @@ class Point:
     tangent: np.ndarray
     """Direction of the branch in (state, parameter), shape `(n+1,)`."""
     scale: np.ndarray
-    """Scales by which lengths are measured here, shape `(n+1,)`."""
+    """Scales used to measure lengths at this point, shape `(n+1,)`."""
     step: float
-    """Length of the step that follows."""
+    """Length of the next step."""
     arclength: float
     """Arclength from the start."""
     iterations: int
     """Number of corrector iterations."""
     converged: bool
-    """False for a special point that could only be bracketed."""
+    """Whether the corrector converged; False for a special point that could only be
+    bracketed.
+    """
     reason: str = ""
     """Reason for the end of the branch, or a remark on a special point."""
     coefficient: float | None = None
-    """Normal-form coefficient, where there is one."""
+    """Normal-form coefficient, if there is one."""
     criticality: str = ""
-    """The meaning of its sign, such as "supercritical"."""
+    """The meaning of the sign of the coefficient, such as "supercritical"."""
     observed: dict[str, Any] = field(default_factory=dict)
     """Quantities that the problem records with each point."""
     tests: dict[str, float] = field(default_factory=dict)
@@ -71,7 +73,9 @@ class Point:
     """Values of the continuation parameters, in order: one, or two on a curve of
     special points."""
     problem: AbstractProblem | None = None
-    """The problem with its parameters here; None for a point read from a file."""
+    """The problem with its parameters at this point; None for a point read from a
+    file.
+    """
     leaf: int = -1
     """Index of the parameter among the leaves of the problem's parameters."""
 
@@ -90,19 +94,18 @@ class Point:
 
     @property
     def solved(self) -> AbstractProblem:
-        """The problem of this point; `ValueError` for a point read from a file without
-        it.
+        """Return the problem of this point; raise `ValueError` if it was read from a
+        file without one.
         """
         if self.problem is None:
             raise ValueError(
-                "this point carries no problem; read its file with "
-                "load_branch(path, problem)"
+                "this point has no problem; read its file with load_branch(path, "
+                "problem)"
             )
         return self.problem
 
     def inner(self, base: AbstractProblem, leaf: int) -> "Point":
-        """Return this point of an extended problem as a point of the problem it
-        extends.
+        """Return this point of an extended problem as a point of the original problem.
 
         Args:
             base: The problem that was extended.
@@ -122,7 +125,7 @@ class Point:
 
 
 def replace(point: Point, **changes: Any) -> Point:
-    """Return the same point with other fields."""
+    """Return the same point with some fields changed."""
     return Point(**{**point.__dict__, **changes})
 
 
@@ -144,7 +147,7 @@ class Branch:
     """
 
     points: tuple[Point, ...]
-    """All points, special ones included."""
+    """All points, including special ones."""
     name: str
     """Name of the parameter."""
     bounds: tuple[float, float]
@@ -164,7 +167,7 @@ class Branch:
         """Return the ends and the special points."""
         names = self.names or (self.name,)
         count = f"{len(self.points)} points, {len(self.special)} of them special"
-        sentence = f"Branch over {' and '.join(names)}: {count}."
+        sentence = f"Branch in {' and '.join(names)}: {count}."
         rows = []
         for point in self.points:
             if point.kind != "regular":
@@ -172,7 +175,7 @@ class Branch:
                 kind = point.kind + ("" if point.converged else " (not converged)")
                 notes = point.criticality or point.reason
                 at = [f"{value:.9g}" for value in values]
-                # at a special point stability is about to change
+                # at a special point, stability is about to change
                 word = "" if point.special else stability(point.stable)
                 rows.append((str(point.label), kind, *at, word, notes))
         headings = ("label", "kind", *names, "stability", "notes")
@@ -192,7 +195,7 @@ class Branch:
         """Return the special points of one kind.
 
         Args:
-            kind: Such as "fold" or "flip".
+            kind: The kind, such as "fold" or "flip".
 
         Returns:
             A tuple of points.
@@ -201,7 +204,7 @@ class Branch:
 
     @property
     def reason(self) -> str:
-        """The reason why the branch ends."""
+        """The reason the branch ends."""
         return self.points[-1].reason if self.points else ""
 
     @property
@@ -211,8 +214,8 @@ class Branch:
 
     @property
     def states(self) -> np.ndarray:
-        """States at all points, shape `(points, n)`; problems that change on the way
-        must keep n.
+        """States at all points, shape `(points, n)`, if n is the same along the whole
+        branch.
         """
         return np.stack([point.state for point in self.points])
 
@@ -238,7 +241,7 @@ class Branch:
 
 
 def relabelled(points: Sequence[Point]) -> tuple[Point, ...]:
-    """Return the same points, counted from 1."""
+    """Return the same points, numbered from 1."""
     return tuple(replace(point, label=i + 1) for i, point in enumerate(points))
 
 
@@ -249,7 +252,7 @@ def with_parameter(problem: Any, leaf: int, value: Any) -> Any:
 
 
 def set_parameters(problem: Any, parameters: Any) -> Any:
-    """The problem with other parameters, wherever inside it they are kept."""
+    """Return the problem with other parameters, wherever they are stored inside it."""
     names = {f.name for f in fields(problem)}
     if "parameters" in names:
         return with_field(problem, "parameters", parameters)
@@ -258,8 +261,8 @@ def set_parameters(problem: Any, parameters: Any) -> Any:
 
 
 def with_field(module: Any, name: str, value: Any) -> Any:
-    """Return a module with one field replaced; what `tree_at` does, in a tenth of
-    the time.
+    """Return a module with one field replaced, as `tree_at` does but ten times
+    faster.
     """
     new = object.__new__(type(module))
     for f in fields(module):

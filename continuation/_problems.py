@@ -1,4 +1,4 @@
-"""Define problems by plain functions."""
+"""Problems defined by plain functions."""
 
 from collections.abc import Callable
 from typing import Any, ClassVar
@@ -18,7 +18,7 @@ from .special import FLIP, flip_direction, HOPF
 class Equations(AbstractProblem):
     """Equations function(u, parameters) = 0; stability is not computed.
 
-    For example, a discretised boundary value problem.
+    An example is a discretised boundary value problem.
 
     Examples:
         >>> import continuation
@@ -29,11 +29,11 @@ class Equations(AbstractProblem):
     """
 
     function: Callable[[Array, Any], Array]
-    """Maps a state `(n,)` and the parameters to residuals `(n,)`."""
+    """Function of a state `(n,)` and the parameters that returns residuals `(n,)`."""
     parameters: PyTree
-    """Any pytree with scalar floats among its leaves."""
+    """The parameters: any pytree with scalar floats among its leaves."""
     stability: ClassVar[StabilityKind] = "none"
-    """No stability."""
+    """Stability is not computed."""
 
     def residual(self, u: Float[Array, " n"], parameters: PyTree) -> Float[Array, " n"]:
         return self.function(u, parameters)
@@ -50,9 +50,11 @@ class Equilibrium(AbstractProblem):
     """
 
     vector_field: Callable[[Array, Any], Array]
-    """Maps a state `(n,)` and the parameters to its rate `(n,)`."""
+    """Function of a state `(n,)` and the parameters that returns its rate of change
+    `(n,)`.
+    """
     parameters: PyTree
-    """Any pytree with scalar floats among its leaves."""
+    """The parameters: any pytree with scalar floats among its leaves."""
     stability: ClassVar[StabilityKind] = "equilibrium"
     """Eigenvalues on the imaginary axis mark bifurcations."""
 
@@ -68,7 +70,7 @@ class Equilibrium(AbstractProblem):
 
 
 class FixedPoint(AbstractProblem):
-    """Periodic points of the map u -> map(u, parameters), of period `period`.
+    """Points of period `period` of the map u -> map(u, parameters).
 
     Examples:
         >>> import continuation
@@ -79,12 +81,11 @@ class FixedPoint(AbstractProblem):
     """
 
     map: Callable[[Array, Any], Array]
-    """Maps a state (n,) and the parameters to (n,)."""
+    """Function of a state `(n,)` and the parameters that returns its image `(n,)`."""
     parameters: PyTree
-    """Any pytree with scalar floats among its leaves."""
+    """The parameters: any pytree with scalar floats among its leaves."""
     period: Int[Array, ""]
-    """Number of applications of the map, >= 1. All periods share one compiled program.
-    """
+    """Number of iterations of the map, >= 1. All periods share one compiled program."""
     stability: ClassVar[StabilityKind] = "map"
     """Multipliers on the unit circle mark bifurcations."""
 
@@ -126,7 +127,7 @@ class FixedPoint(AbstractProblem):
 
 
 class PeriodicPoints(AbstractRepresentation):
-    """A periodic orbit of a map is represented by any of its points."""
+    """A periodic orbit of a map can be represented by any of its points."""
 
     family: str = eqx.field(static=True)
     problem: FixedPoint
@@ -153,7 +154,7 @@ class PeriodicPoints(AbstractRepresentation):
 
 @eqx.filter_jit
 def _mapped(problem: FixedPoint, u, tangent):
-    """Return the next point of an orbit, and a deviation there."""
+    """Return the next point of an orbit and of a deviation from it."""
     return jax.jvp(lambda u: problem.map(u, problem.parameters), (u,), (tangent,))
 
 

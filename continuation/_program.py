@@ -1,4 +1,4 @@
-"""Compile one program for each structure of a problem."""
+"""Compile one program for each problem structure."""
 
 import dataclasses
 from typing import Any
@@ -18,18 +18,18 @@ from .problem import AbstractProblem
 class Corrected(eqx.Module):
     """A point on the branch and its derivatives.
 
-    Traced arrays inside programs, NumPy's outside.
+    Arrays are traced inside programs and NumPy arrays outside.
     """
 
     z: Float[Any, " n1"]
     success: Any
     iterations: Any
     jacobian: Float[Any, "n n1"]
-    """(n, n+1) derivative of the residual with respect to (state, parameter)."""
+    """Derivative of the residual with respect to (state, parameter), shape (n, n+1)."""
     linearisation: Float[Any, "k k"]
     tangent: Float[Any, " n1"]
     determinant: Any
-    """Sign and (n+1)-th root of the determinant of jacobian and tangent, scaled."""
+    """Sign and (n+1)-th root of the determinant of the Jacobian and tangent, scaled."""
     scale: Float[Any, " n1"]
     monitors: dict[str, Any]
     observed: dict[str, Any]
@@ -42,7 +42,7 @@ def residual_at(problem: AbstractProblem, leaf: int, z):
 
 
 def scale_at(problem: AbstractProblem, leaf: int, z, width):
-    """(n+1,) sizes that make z / size a vector whose norm is the length of a step."""
+    """Return sizes (n+1,) such that the norm of z / size is the length of a step."""
     parameters = with_leaf(problem.parameters, leaf, z[-1])
     u = z[:-1]
     size = problem.scale(u, parameters) * jnp.sqrt(jnp.asarray(u.size, u.dtype))
@@ -50,7 +50,9 @@ def scale_at(problem: AbstractProblem, leaf: int, z, width):
 
 
 def newton(function, y, tolerance, max_iterations: int):
-    """Root of a function, or with fewer equations the nearest one (Moore-Penrose)."""
+    """Find a root of a function; with fewer equations, the nearest one
+    (Moore-Penrose).
+    """
     solution = optx.root_find(
         lambda y, _: function(y),
         optx.Newton(rtol=tolerance, atol=tolerance),
@@ -66,7 +68,9 @@ def newton(function, y, tolerance, max_iterations: int):
 
 
 def tangent_and_determinant(jacobian, scale, old):
-    """Unit tangent along `old` (all in z), and the determinant of thesis eq. 3.33."""
+    """Return the unit tangent along `old` (all in z), and the determinant (thesis, eq.
+    3.33).
+    """
     scaled = jacobian * scale[None, :]
     old = old / scale
     last = jnp.zeros_like(old).at[-1].set(1.0)
@@ -88,13 +92,15 @@ def correct_(
     least_norm: bool,
     given: Any = False,
 ) -> Corrected:
-    """Correct `guess` and evaluate everything at the point found.
+    """Correct `guess` and evaluate all quantities at the point found.
 
-    If the guess is `given` as a solution, evaluate at the guess itself.
+    If the guess is `given` as a solution, the quantities are evaluated at the guess
+    itself.
 
     `normal` (n+1,) is the covector of the plane through the guess in which the solution
-    is sought; it is ignored with `least_norm` (Moore-Penrose). `old` gives the
-    direction of the tangent. Not compiled by itself, so that it can be batched.
+    is searched for; it is ignored with `least_norm` (Moore-Penrose). `old` gives the
+    direction of the tangent. The function is not compiled by itself, so that it can be
+    batched.
     """
     scale = scale_at(problem, leaf, guess, width)
 
@@ -112,7 +118,7 @@ def correct_(
 
 
 def _seen(problem, leaf, z, old, width, success, iterations) -> Corrected:
-    """Evaluate everything at a point that is already a solution."""
+    """Evaluate all quantities at a point that is already a solution."""
     u, p = z[:-1], z[-1]
     parameters = with_leaf(problem.parameters, leaf, p)
     jacobian, linearisation = problem.derivatives(
@@ -139,7 +145,7 @@ _correct = eqx.filter_jit(correct_)
 
 
 def _plain(at: Corrected) -> Corrected:
-    """Convert to NumPy arrays, which the host uses faster."""
+    """Convert to NumPy arrays, which are faster on the host."""
     return Corrected(
         **{
             f.name: jax.tree.map(np.asarray, getattr(at, f.name))
@@ -151,8 +157,8 @@ def _plain(at: Corrected) -> Corrected:
 def correct(
     problem, context: Context, guess, normal, old, least_norm=False, given=False
 ):
-    """Call the compiled `correct_` with numbers as arguments and NumPy arrays as
-    result.
+    """Call the compiled `correct_` with numbers as arguments; the result has NumPy
+    arrays.
     """
     return _plain(
         _correct(
@@ -171,10 +177,10 @@ def correct(
 
 
 def evaluate(problem, context: Context, z, old) -> Any:
-    """Evaluate everything at a point that is already a solution.
+    """Evaluate all quantities at a point that is already a solution.
 
-    It uses the program of `correct`, whose iterations cost less than compiling another
-    program.
+    This uses the program of `correct`, because its iterations take less time than
+    compiling another program.
     """
     return correct(problem, context, z, old, old, given=True)
 
@@ -185,7 +191,7 @@ def _solve(problem, u, tolerance, max_iterations: int):
 
     def equations(y):
         g = problem.residual(y * scale, problem.parameters)
-        # for square problems, the tolerance is relative to the units of the unknowns
+        # for square problems, the tolerance is relative to the scale of the unknowns
         return g / scale
 
     y, success, iterations = newton(equations, u / scale, tolerance, max_iterations)
@@ -194,7 +200,9 @@ def _solve(problem, u, tolerance, max_iterations: int):
 
 
 def solve(problem, u, settings, iterations: int = 30):
-    """Solve a problem from a guess at its own parameters: value, success, residual."""
+    """Solve a problem at its own parameters from a guess; return value, success and
+    residual.
+    """
     value, success, _, g = _solve(
         problem, np.asarray(u), np.asarray(settings.tolerance), iterations
     )

@@ -1,12 +1,12 @@
 """Store branches on disk: one line of JSON for each point, written immediately.
 
-Format, version 1: UTF-8 text, one JSON object per line. The first is the header, with
-`format` = "continuation branch", `version`, `parameter`, `parameters`, `leaf`,
-`bounds`, and whatever the writer adds. Each further line is a point: the fields of
-`continuation.Point` without its problem. Numbers are written so that they read back as
-the same 64-bit floats; a number that is not finite is a string; complex numbers are
-pairs; `observed` arrays carry their `shape` and `dtype`. An incomplete last line is the
-point that was being written when the run was interrupted, and is ignored.
+Format, version 1: UTF-8 text with one JSON object per line. The first is the header,
+with `format` = "continuation branch", `version`, `parameter`, `parameters`, `leaf`,
+`bounds`, and any entries added by the writer. Each further line is a point, with the
+fields of `continuation.Point` except its problem. Numbers are written such that they
+are read back as the same 64-bit floats; non-finite numbers are strings; complex numbers
+are pairs; `observed` arrays have their `shape` and `dtype`. An incomplete last line is
+a point that was being written when the run was interrupted; it is ignored.
 """
 
 import json
@@ -29,8 +29,8 @@ VERSION = 1
 class Recorder:
     """A callback that appends points to a file as they are found.
 
-    **Arguments:** `path`: the file; `header`: what goes into its first line besides the
-    format. With `after` (existing points) the file is rewritten up to them.
+    **Arguments:** `path`: the file; `header`: entries of its first line in addition to
+    the format. With `after` (existing points), the file is rewritten up to them.
     """
 
     def __init__(
@@ -51,7 +51,7 @@ class Recorder:
 
 
 def save_branch(branch: Branch, path: str | os.PathLike) -> None:
-    """Write a branch to a file that [`continuation.load_branch`][] reads.
+    """Write a branch to a file that [`continuation.load_branch`][] can read.
 
     Args:
         branch: The branch.
@@ -69,7 +69,7 @@ def save_branch(branch: Branch, path: str | os.PathLike) -> None:
 
 
 def header_of(branch: Branch, **more: Any) -> dict:
-    """Return the first line of a file, without its format."""
+    """Return the entries of the first line of a file, without the format."""
     return {
         "parameter": branch.name,
         "parameters": list(branch.names),
@@ -82,19 +82,19 @@ def header_of(branch: Branch, **more: Any) -> dict:
 def load_branch(
     path: str | os.PathLike, problem: AbstractProblem | None = None
 ) -> Branch:
-    """Read a saved branch, or the part of it that an interrupted run has written.
+    """Read a saved branch, or the part of it written by an interrupted run.
 
     Args:
         path: The file to read.
-        problem: The problem of the branch. The points then carry it, at their
-            parameters, so that they can be switched from or continued in two
-            parameters.
+        problem: The problem of the branch. It is attached to the points, with their
+            parameters, so that branches can be switched at them and they can be
+            continued in two parameters.
 
     Returns:
         A [`continuation.Branch`][].
 
     Raises:
-        ValueError: The file is not a branch, or of a later version.
+        ValueError: The file is not a branch, or has a later format version.
 
     Examples:
         >>> import continuation
@@ -121,8 +121,8 @@ def read_branch(
         raise ValueError(f"{path} is not a saved branch")
     if header.get("version") != VERSION:
         raise ValueError(
-            f"{path} has version {header.get('version')} of the format, this program "
-            f"reads version {VERSION}; read it with the program that wrote it"
+            f"{path} has version {header.get('version')} of the format, but this "
+            f"program reads version {VERSION}; read it with the program that wrote it"
         )
     try:
         leaf = int(header["leaf"])
@@ -139,7 +139,9 @@ def read_branch(
 
 
 def _attacher(problem: AbstractProblem | None, leaf: int) -> Callable:
-    """Return a function that gives the problem at a signature and a parameter value."""
+    """Return a function that gives the problem for a signature and a parameter
+    value.
+    """
     if problem is None:
         return lambda signature, value: None
     stated: AbstractProblem = set_parameters(
@@ -198,7 +200,7 @@ def _point_to_json(point: Point) -> dict:
     }
 
 
-# fields of a point that JSON holds as they are
+# fields of a point that are stored in JSON unchanged
 _TAKEN_OVER: dict[str, Any] = {
     "label": int,
     "kind": str,

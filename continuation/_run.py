@@ -1,4 +1,4 @@
-"""Run along a branch."""
+"""Follow a branch step by step."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -20,14 +20,14 @@ from .special import ahead, BRANCH_POINT, Located
 from .step_control import Refusal
 
 
-# failures in one place before an end is searched for just ahead
+# number of failures in one place before an end is searched for just ahead
 _HALVINGS = 2
-# an orbit has half the period if its halves differ by less than this, in step lengths:
-# the remainder of the square root in which they grow apart
+# an orbit has half the period if its halves differ by less than this, in step lengths;
+# their distance grows with a square root
 HALF = 1e-4
 JOINS = (
-    "the branch rejoins the orbits of half the period at their flip; beyond it, it "
-    "repeats the same orbits, shifted by half a period"
+    "the branch rejoins the orbits of half the period at their flip; beyond it, the "
+    "same orbits would be repeated, shifted by half a period"
 )
 
 
@@ -53,7 +53,7 @@ class Run:
         kind: str = "start",
         arclength: float = 0.0,
     ) -> Solution:
-        """Find the first solution; put its point into `pending` unless it is known."""
+        """Find the first solution; add its point to `pending` unless it is known."""
         if isinstance(start, Point):
             return self._resumed(problem, start, history)
         p = start.parameter
@@ -88,7 +88,7 @@ class Run:
         problem = with_parameter(problem, context.leaf, z[-1])
         problem = problem.refreshed(z[:-1], problem.parameters)
         at = evaluate(problem, context, z, start.tangent)
-        # bit-identical to the values when the point was found
+        # bit-identical to the values at the time the point was found
         at = with_field(at, "tangent", np.asarray(start.tangent))
         at = with_field(at, "scale", np.asarray(start.scale))
         passed = [p for p in history if not p.special and p.label < start.label]
@@ -109,7 +109,7 @@ class Run:
     # Stepping
 
     def points(self, current: Solution) -> Iterator[Point]:
-        """Yield the points from here on."""
+        """Yield the points from here onwards."""
         yield from self._flush()
         low, high = self.context.bounds
         outwards = current.at.tangent[-1]
@@ -141,8 +141,8 @@ class Run:
             current = self._with_fresh_references(following)
 
     def _advance(self, current: Solution) -> tuple[Solution | None, str]:
-        """Find the next point, and the reason if the branch ends there; None: it
-        ends before.
+        """Find the next point, and the reason if the branch ends there; None if it ends
+        before.
         """
         step, failures = current.step, 0
         while True:
@@ -174,7 +174,7 @@ class Run:
                     if back is not None:
                         return back
                     return following, attempted.bound
-            # a bend is no sign of an end, and long steps fail for other reasons
+            # a bend does not indicate an end, and long steps fail for other reasons
             last = step / 2 < self.context.settings.min_step
             failures += attempted.refusal is not Refusal.TURNED
             if failures > _HALVINGS or last:
@@ -182,13 +182,11 @@ class Run:
                 if over is not None:
                     return over
             if last:
-                return None, (
-                    f"the step was halved down to {step:.1e}, and still {refusal}"
-                )
+                return None, (f"the step was halved down to {step:.1e}, but {refusal}")
             step /= 2
 
     def _stations(self, current: Solution) -> list[Station]:
-        """Return the last points in the scales of the current point."""
+        """Return the last points, scaled as at the current point."""
         scale = current.at.scale
         wanted = max(self.algorithm.predictor.stations, 1)
         trail = (*current.trail, (current.at.z, current.at.tangent))[-wanted:]
@@ -207,7 +205,7 @@ class Run:
             current.arclength + length,
             trail,
         )
-        # a value of exactly zero keeps the sign, and changes it in the next step
+        # a value of exactly zero keeps the sign, which changes in the next step
         for name, value in following.tests.items():
             if value == 0:
                 before = current.tests.get(name, 0.0)
@@ -234,7 +232,7 @@ class Run:
     def _pass_events(
         self, current: Solution, following: Solution, passed: list[tuple[str, Located]]
     ):
-        """Put special points into `pending`; return the continuation if one ends the
+        """Add special points to `pending`; return the continuation if one ends the
         problem.
         """
         chord = following.at.z - current.at.z
@@ -253,7 +251,7 @@ class Run:
     def _joins(self, current: Solution, point: Point) -> bool:
         """Return whether orbits of half the period take over.
 
-        They form a separate branch, which is not followed twice.
+        They form a separate branch, which is not followed a second time.
         """
         if point.kind != BRANCH_POINT:
             return False
@@ -288,7 +286,7 @@ class Run:
         return name in monitors and monitors[name].ends
 
     def _end_ahead(self, current: Solution, step: float):
-        """Search a zero of an ending monitor just ahead of a failed step."""
+        """Search for a zero of an ending monitor just ahead of a failed step."""
         for name, monitor in current.problem.monitors().items():
             value = current.tests.get(name, np.nan)
             if not monitor.ends or not np.isfinite(value) or value == 0:
@@ -320,7 +318,7 @@ class Run:
                 problem, start, kind="regular", arclength=point.arclength
             )
         except ValueError as error:
-            return None, f"{point.kind} ends the branch; behind it, {error}"
+            return None, f"{point.kind} ends the branch; beyond it, {error}"
         return following, ""
 
     # Points
@@ -334,7 +332,7 @@ class Run:
         if type(current.problem).check is AbstractProblem.check:
             return ""
         point = self._point(current, "regular")
-        # it is only checked, and gets no label
+        # it is only checked, and has no label
         self.label -= 1
         return current.problem.check(point) or ""
 

@@ -19,19 +19,19 @@ def special_point(
 ) -> tuple[Float[Array, " n"], Float[Array, ""]]:
     """Locate a special point at other parameters; for use inside `jit` and `jvp`.
 
-    Newton's method on the extended system from `point`; the derivative comes from the
-    implicit function theorem. The parameters must be near enough to those of `point`
-    for Newton's method to converge.
+    Newton's method is applied to the extended system, starting at `point`; the
+    derivative follows from the implicit function theorem. The parameters must be close
+    enough to those of `point` for Newton's method to converge.
 
     Args:
         point: A fold, flip, Neimark-Sacker or Hopf point, or a zero of a monitor.
-        where: Picks the parameter in which it is located.
-        parameters: Parameters of the same structure as the problem's; the picked one is
-            ignored.
+        where: Selects the parameter in which the point is located.
+        parameters: Parameters with the same structure as those of the problem; the
+            selected one is ignored.
 
     Returns:
-        The state `(n,)` and the value of the picked parameter; NaN where Newton's
-            method fails.
+        The state `(n,)` and the value of the selected parameter; NaN if Newton's method
+            fails.
 
     Examples:
         >>> import continuation
@@ -58,7 +58,9 @@ def special_point(
 
 @eqx.filter_jit
 def _derivatives(problem, u, moving, fixed):
-    """(n+1, leaf...) derivative of the solution with respect to each moving leaf."""
+    """Return the derivative of the solution with respect to each moving leaf, (n+1,
+    leaf...).
+    """
 
     def residual(u, moving):
         return problem.residual(u, eqx.combine(moving, fixed))
@@ -69,19 +71,20 @@ def _derivatives(problem, u, moving, fixed):
 
 
 def sensitivity(point: Point, where: Where) -> PyTree:
-    """Return the derivative of a special point's parameter value by all other
-    parameters.
+    """Return the derivatives of a special point's parameter value with respect to all
+    other parameters.
 
-    It follows from the implicit function theorem on the extended system: d(speed at the
-    flip) / d(restitution), for example.
+    An example is d(speed at the flip) / d(restitution). The derivatives follow from the
+    implicit function theorem for the extended system.
 
     Args:
         point: As for [`continuation.special_point`][].
         where: As for [`continuation.special_point`][].
 
     Returns:
-        A tree like the problem's parameters, with the derivative by each float leaf in
-            its place; 0 for the picked one, None for leaves that are not floats.
+        A tree like the parameters of the problem, in which each float leaf is replaced
+            by the derivative with respect to it. The derivative is 0 for the selected
+            parameter and None for leaves that are not floats.
 
     Examples:
         >>> import continuation
@@ -102,7 +105,7 @@ def sensitivity(point: Point, where: Where) -> PyTree:
 
 
 def _position(moving: PyTree, parameters: PyTree, leaf: int) -> int:
-    """Return the place of a leaf among the leaves that are floats."""
+    """Return the index of a leaf among the float leaves."""
     del moving
     leaves = jax.tree.leaves(parameters)[:leaf]
     return sum(eqx.is_inexact_array(x) for x in leaves)

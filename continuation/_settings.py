@@ -1,4 +1,4 @@
-"""Define settings of path following, which do not change the branch itself."""
+"""Settings of path following, which do not change the branch itself."""
 
 import dataclasses
 
@@ -10,8 +10,9 @@ class BranchSettings(eqx.Module):
     """Accuracy and step control of a branch.
 
     Lengths along a branch are measured with the parameter in units of the width of its
-    bounds, and the state in units of `problem.scale`, root mean square over its
-    components: a step of 0.01 is a hundredth of the bounds.
+    bounds and the state in units of `problem.scale` (root mean square over its
+    components). For example, a step of 0.01 in the parameter is a hundredth of the
+    width of the bounds.
 
     Examples:
         >>> import continuation
@@ -20,12 +21,15 @@ class BranchSettings(eqx.Module):
     """
 
     tolerance: float = 1e-10
-    """Corrections smaller than this, relative to the scales, end Newton's iteration;
-    the remaining error is about the square of that."""
+    """Newton's iteration ends if the corrections, relative to the scales, are smaller
+    than this; the remaining error is about the square of it.
+    """
     max_iterations: int = 8
-    """Largest number of corrector iterations; more means a smaller step."""
+    """Maximum number of corrector iterations; if more are needed, the step is
+    reduced.
+    """
     iterations: int = 4
-    """Number of corrector iterations that the step control aims at."""
+    """Target number of corrector iterations for the step control."""
     step: float = 0.01
     """First step."""
     min_step: float = 1e-8
@@ -33,18 +37,19 @@ class BranchSettings(eqx.Module):
     max_step: float = 0.05
     """Largest step."""
     angle: float = 0.1
-    """Change of direction per step that the step control aims at (rad)."""
+    """Target change of direction per step for the step control (rad)."""
     max_angle: float = 0.35
     """Change of direction above which a step is rejected (rad)."""
     max_points: int = 1000
-    """Largest number of ordinary points on a branch."""
+    """Maximum number of ordinary points on a branch."""
     special: bool = True
     """Whether to locate and report special points."""
     localise: str = "auto"
     """Method of locating special points. `"newton"` solves the extended system, which
-    takes second derivatives of the residual; `"bracket"` takes none and encloses the
-    point between points of the branch; `"auto"` is `"bracket"` where `problem.costly`
-    is set, otherwise `"newton"`."""
+    needs second derivatives of the residual; `"bracket"` does not need them and
+    brackets the point by points of the branch; `"auto"` is `"bracket"` if
+    `problem.costly` is set, otherwise `"newton"`.
+    """
 
     def __check_init__(self):
         if not 0 < self.tolerance < 1e-2:
@@ -54,12 +59,12 @@ class BranchSettings(eqx.Module):
             )
         if not 0 < self.min_step <= self.step <= self.max_step:
             raise ValueError(
-                f"steps {self.min_step:g}, {self.step:g}, {self.max_step:g} must obey "
-                "0 < min_step <= step <= max_step"
+                f"steps {self.min_step:g}, {self.step:g}, {self.max_step:g} must "
+                "satisfy 0 < min_step <= step <= max_step"
             )
         if not 0 < self.angle <= self.max_angle < 1.5:
             raise ValueError(
-                f"angles {self.angle:g} and {self.max_angle:g} must obey "
+                f"angles {self.angle:g} and {self.max_angle:g} must satisfy "
                 "0 < angle <= max_angle < 1.5 rad"
             )
         if not 1 <= self.iterations <= self.max_iterations:
@@ -73,16 +78,17 @@ class BranchSettings(eqx.Module):
 
 
 _NOT_OF_A_BATCH = ("max_points", "special", "localise")
-"""Settings that a batch ignores: it has its own number of points; special points are
-located when one of its branches is requested."""
+"""Settings that a batch ignores. It has its own number of points, and special points
+are located when one of its branches is requested.
+"""
 
 
 def as_traced(settings: BranchSettings) -> BranchSettings:
-    """Convert settings for a batch, whose compiled program takes them unchecked.
+    """Convert settings for a batch, whose compiled program does not check them.
 
-    Numbers become arrays (not checked again) except `max_iterations`, which the
-    corrector needs as a Python integer; settings that a batch does not use have their
-    defaults. So only `max_iterations` compiles another program.
+    Numbers become arrays except `max_iterations`, which the corrector needs as a Python
+    integer; settings that a batch does not use have their defaults. Therefore only a
+    change of `max_iterations` requires another program.
     """
     unused = {name: getattr(BranchSettings, name) for name in _NOT_OF_A_BATCH}
     settings = dataclasses.replace(settings, **unused)

@@ -1,4 +1,4 @@
-"""Represent the solution that a run has reached, and convert it to a point."""
+"""The solution that a run has reached, and its conversion to a point."""
 
 from typing import NamedTuple
 

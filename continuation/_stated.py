@@ -6,12 +6,12 @@ from .problem import AbstractProblem
 
 
 def stated(problem: Any, start: Any) -> tuple[AbstractProblem, Any]:
-    """Return the problem and its start, where a system and an orbit of it may be
-    given.
+    """Return the problem and its start; a system and one of its orbits may be given
+    instead.
     """
     if isinstance(problem, AbstractProblem):
         return problem, start
-    # the core imports the code for impacts only for a system with impacts
+    # the core imports the code for impacts only if a system has impacts
     from .orbits import start_of
 
     begun = start_of(problem, start)

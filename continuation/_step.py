@@ -21,9 +21,9 @@ class StepAttempt(NamedTuple):
     at: Corrected | None
     """None if the step is rejected."""
     bound: str = ""
-    """The bound on which the step ends, as a sentence; empty if none."""
+    """The bound on which the step ends, as a sentence; empty if there is none."""
     following: float = 0.0
-    """Length of the step that follows."""
+    """Length of the next step."""
     refusal: Refusal | None = None
     """Reason for rejecting the step."""
 
@@ -37,7 +37,7 @@ def attempt_step(
     step: float,
     name: str,
 ) -> StepAttempt:
-    """Predict and correct; a step past a bound ends on the bound."""
+    """Predict and correct; a step beyond a bound ends on the bound."""
     predicted = algorithm.predictor(stations, step) * a.scale
     k, value = _first_bound(problem, context, a.z, predicted)
     if k is None:
@@ -89,7 +89,7 @@ def _judged(
 def _first_bound(
     problem: AbstractProblem, context: Context, z: np.ndarray, target: np.ndarray
 ) -> tuple[int | None, float]:
-    """Return the parameter that leaves its bounds first in the step, and the bound."""
+    """Return the parameter that leaves its bounds first, and the bound."""
     bounds = {z.size - 1: context.bounds}
     if isinstance(problem, AbstractExtended):
         low, high = problem.bounds

@@ -1,4 +1,4 @@
-"""Switch to branches that leave a special point."""
+"""Switch to other branches at a special point."""
 
 import equinox as eqx
 import jax
@@ -19,16 +19,17 @@ from .special import BRANCH_POINT, FLIP, HOPF, second
 
 
 def emanating(point: Point, where: Where, width: float = 1.0) -> tuple[Start, ...]:
-    """Return the starts of the other branches that leave a special point.
+    """Return the starts of the other branches that emanate from a special point.
 
-    From a branch point: both halves of the other branch, whose direction solves the
-    algebraic branching equation (thesis, eq. 3.37). From a flip: the doubled orbit.
-    From a Hopf point of an [`continuation.Equilibrium`][]: the limit cycle.
+    From a branch point, these are both halves of the other branch, whose direction
+    solves the algebraic branching equation (thesis, eq. 3.37); from a flip, the doubled
+    orbit; from a Hopf point of a [`continuation.Equilibrium`][], the limit cycle.
 
-    **Arguments:** `width`: of the bounds of the parameter, the unit of its directions.
+    **Arguments:** `width`: width of the parameter bounds, in which directions are
+    measured.
 
     Raises:
-        ValueError: No branch is known to leave the point.
+        ValueError: No branch is known to emanate from the point.
     """
     problem = point.solved
     leaf, _ = pick_one(where, problem.parameters)
@@ -46,8 +47,8 @@ def emanating(point: Point, where: Where, width: float = 1.0) -> tuple[Start, ..
         start = problem.transition(point, at)
     if start is None:
         raise ValueError(
-            f"no branch is known to leave a {point.kind or 'regular'} point of this "
-            "problem; branches leave branch points, flips and Hopf points"
+            f"no branch is known to emanate from a {point.kind or 'regular'} point of "
+            "this problem; branches emanate from branch points, flips and Hopf points"
         )
     return (start,)
 
@@ -60,21 +61,21 @@ def switch(
     *,
     settings: BranchSettings | None = None,
 ) -> tuple[Branch, ...]:
-    """Follow all other branches that leave a special point.
+    """Follow all other branches that emanate from a special point.
 
     Args:
         point: A branch point, a flip or a Hopf point of a branch.
-        where: Picks the parameter, as for [`continuation.follow`][].
+        where: Selects the parameter, as for [`continuation.follow`][].
         bounds: (lowest, highest) value of the parameter.
         algorithm: Default [`continuation.PseudoArclength`][].
         settings: Accuracy and step control.
 
     Returns:
-        Two branches from a branch point, one from a flip or a Hopf point. The two are
-            the same closed curve in both directions where they meet again.
+        Two branches from a branch point, or one from a flip or a Hopf point. If the two
+            branches meet again, they are the same closed curve in both directions.
 
     Raises:
-        ValueError: No branch is known to leave the point.
+        ValueError: No branch is known to emanate from the point.
 
     Examples:
         >>> import continuation
@@ -94,7 +95,7 @@ def switch(
 
 @eqx.filter_jit
 def _quadratic(problem: AbstractProblem, leaf: int, z, basis, left):
-    """left . B(basis_i, basis_j) of G(u, parameter)."""
+    """Return left . B(basis_i, basis_j) of G(u, parameter)."""
 
     def g(z):
         return problem.residual(z[:-1], with_leaf(problem.parameters, leaf, z[-1]))
@@ -108,8 +109,8 @@ def _quadratic(problem: AbstractProblem, leaf: int, z, basis, left):
 def other_direction(
     problem: AbstractProblem, context: Context, point: Point
 ) -> np.ndarray:
-    """(n+1,) direction of the branch that crosses at a simple branch point, (thesis,
-    eq. 3.37).
+    """Return the direction (n+1,) of the branch that crosses at a simple branch point
+    (thesis, eq. 3.37).
     """
     z = np.append(point.state, point.parameter)
     at = evaluate(problem, context, z, point.tangent)
@@ -121,7 +122,7 @@ def other_direction(
             jnp.asarray(left[:, -1]),
         )
     )  # fmt: skip
-    # an indefinite quadratic form in two variables is zero on two lines
+    # an indefinite quadratic form in two variables vanishes on two lines
     sizes, axes = np.linalg.eigh((form + form.T) / 2)
     if not sizes[0] < 0 < sizes[1]:
         raise ValueError(

@@ -14,17 +14,18 @@ def table(
     components: int = 3,
     shown: tuple[str, float] | None = None,
 ) -> rich.table.Table:
-    """Return a table of special points, ends and some ordinary points of a branch.
+    """Return a table of the special points, ends and some ordinary points of a branch.
 
     Args:
         branch: The branch.
-        every: Show each ordinary point whose label it divides; 0 shows none.
+        every: Show every ordinary point whose label is a multiple of this; 0 shows
+            none.
         components: Number of state components to show.
-        shown: Heading of the parameter's column and a factor, to show it in another
-            unit: `("speed (rpm)", 30 / math.pi)`.
+        shown: Heading of the parameter column and a factor to convert its unit, such as
+            `("speed (rpm)", 30 / math.pi)`.
 
     Returns:
-        A table that `rich.print` shows.
+        A table for `rich.print`.
 
     Examples:
         >>> import continuation
@@ -74,7 +75,7 @@ def _row(point: Point, parameters: int, n: int, factor: float) -> list[str]:
 class PointPrinter:
     """A callback that prints one line for each special point and each end.
 
-    With `every`, each ordinary point whose label it divides is printed too.
+    With `every`, ordinary points whose label is a multiple of it are also printed.
 
     Examples:
         >>> import continuation

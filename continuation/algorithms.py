@@ -1,4 +1,4 @@
-"""Define algorithms: predictor, corrector and step control."""
+"""Continuation algorithms: predictor, corrector and step control."""
 
 import abc
 from typing import Any, ClassVar
@@ -11,31 +11,33 @@ from .step_control import AbstractStepControl, EffortAndAngle
 
 
 class AbstractAlgorithm(eqx.Module):
-    """A predictor, the closing equation of the corrector, and the step control."""
+    """A predictor, the closing equation of the corrector and the step control."""
 
     predictor: eqx.AbstractVar[AbstractPredictor]
     """Extrapolates the branch."""
     control: eqx.AbstractVar[AbstractStepControl]
     """Step control."""
     least_norm: eqx.AbstractClassVar[bool]
-    """Whether the corrector takes the shortest corrections instead of a fixed plane."""
+    """Whether corrections have the least norm instead of lying in a fixed plane."""
 
     @abc.abstractmethod
     def normal(self, tangent: Float[Any, " n+1"]) -> Float[Any, " n+1"]:
-        """Return the normal of the corrector's plane, given the tangent; both scaled.
+        """Return the normal of the corrector's plane, given the tangent; both are
+        scaled.
 
         Args:
-            tangent: Tangent of the branch, `(n+1,)`; NumPy, or traced in a batch.
+            tangent: Tangent of the branch, `(n+1,)`; a NumPy array, or traced in a
+                batch.
 
         Returns:
-            Shape `(n+1,)`.
+            The normal, shape `(n+1,)`.
         """
 
 
 class Natural(AbstractAlgorithm):
     """Natural continuation: corrections leave one component unchanged.
 
-    See the thesis, section 3.4.3, 1.
+    See the thesis, section 3.4.3, method 1.
 
     Examples:
         >>> import continuation
@@ -44,15 +46,15 @@ class Natural(AbstractAlgorithm):
     """
 
     predictor: AbstractPredictor = Extrapolation()
-    """Default the linear extrapolation (thesis, eq. 3.40)."""
+    """Extrapolates the branch; default linear extrapolation (thesis, eq. 3.40)."""
     control: AbstractStepControl = EffortAndAngle()
-    """Step control; default by effort and angle."""
+    """Step control; by default, based on the number of iterations and the angle."""
     component: str = eqx.field(static=True, default="parameter")
-    """`"parameter"`, which stops at folds; or `"fastest"`, the component that
-    changes most, chosen at each step, which passes folds.
+    """The fixed component: `"parameter"`, which stops at folds; or `"fastest"`, the
+    component that changes most at each step, which passes folds.
     """
     least_norm: ClassVar[bool] = False
-    """Corrections leave the component unchanged."""
+    """Corrections leave one component unchanged, instead of having the least norm."""
 
     def __check_init__(self):
         if self.component not in ("parameter", "fastest"):
@@ -68,7 +70,8 @@ class Natural(AbstractAlgorithm):
 
 
 class PseudoArclength(AbstractAlgorithm):
-    """Pseudo-arclength predictor-corrector; passes folds (thesis, section 3.4.3, 2).
+    """Pseudo-arclength predictor-corrector, which passes folds (thesis, section 3.4.3,
+    method 2).
 
     Examples:
         >>> import continuation
@@ -80,7 +83,7 @@ class PseudoArclength(AbstractAlgorithm):
     predictor: AbstractPredictor = TangentPredictor()
     """Extrapolates the branch; default along the tangent."""
     control: AbstractStepControl = EffortAndAngle()
-    """Step control; default by effort and angle."""
+    """Step control; by default, based on the number of iterations and the angle."""
     least_norm: ClassVar[bool] = False
     """Corrections are orthogonal to the tangent."""
 
@@ -89,10 +92,10 @@ class PseudoArclength(AbstractAlgorithm):
 
 
 class MoorePenrose(AbstractAlgorithm):
-    """Predictor-corrector with the shortest corrections, by the Moore-Penrose inverse.
+    """Predictor-corrector with least-norm corrections from the Moore-Penrose inverse.
 
-    The corrector's plane turns with the iterate, which to first order equals
-    recomputing the tangent in each iteration (thesis, section 3.4.3, 3).
+    The corrector's plane turns with the iterate, which to first order is equivalent to
+    recomputing the tangent in each iteration (thesis, section 3.4.3, method 3).
 
     Examples:
         >>> import continuation
@@ -103,7 +106,7 @@ class MoorePenrose(AbstractAlgorithm):
     predictor: AbstractPredictor = TangentPredictor()
     """Extrapolates the branch; default along the tangent."""
     control: AbstractStepControl = EffortAndAngle()
-    """Step control; default by effort and angle."""
+    """Step control; by default, based on the number of iterations and the angle."""
     least_norm: ClassVar[bool] = True
     """Corrections have the least norm."""
 

@@ -1,4 +1,4 @@
-"""Predict the next point of a branch."""
+"""Predictors of the next point of a branch."""
 
 import abc
 from collections.abc import Sequence
@@ -12,33 +12,35 @@ from jaxcam.parameters import AnyArray
 
 
 class Station(NamedTuple):
-    """A point passed, as predictors see it: lengths are scaled."""
+    """A point passed, as used by predictors: lengths are scaled."""
 
     y: Float[AnyArray, " n+1"]
-    """(n+1,) scaled state and parameter."""
+    """Scaled state and parameter, `(n+1,)`."""
     tangent: Float[AnyArray, " n+1"]
-    """(n+1,) scaled unit tangent."""
+    """Scaled unit tangent, `(n+1,)`."""
 
 
 class AbstractPredictor(eqx.Module):
-    """Extrapolates a branch from its last points (stations), of which the last is
-    current.
+    """Extrapolates a branch from its last points (stations), of which the last is the
+    current one.
     """
 
     stations: eqx.AbstractClassVar[int]
-    """Largest number of points used."""
+    """Maximum number of points used."""
 
     @abc.abstractmethod
     def __call__(self, stations: Sequence[Station], step: Any) -> Any:
-        """(n+1,) predicted scaled state and parameter, at about `step` ahead. NumPy
-        arrays; traced ones in a batch, for predictors that take one station."""
+        """Return the predicted scaled state and parameter `(n+1,)`, about `step` ahead.
+        Arrays are NumPy arrays or, in a batch, traced arrays for predictors that use
+        one station.
+        """
 
 
 class TangentPredictor(AbstractPredictor):
     """Extrapolate along the tangent (thesis, eqs. 3.30 and 3.33)."""
 
     stations: ClassVar[int] = 1
-    """Number of points that are used."""
+    """Number of points used."""
 
     def __call__(self, stations: Sequence[Station], step: Any) -> Any:
         return stations[-1].y + step * stations[-1].tangent
@@ -48,7 +50,7 @@ class Secant(AbstractPredictor):
     """Extrapolate along the line through the last two points."""
 
     stations: ClassVar[int] = 2
-    """Number of points that are used."""
+    """Number of points used."""
 
     def __call__(self, stations: Sequence[Station], step: Any) -> Any:
         current = stations[-1]
@@ -59,15 +61,17 @@ class Secant(AbstractPredictor):
 
 
 class Extrapolation(AbstractPredictor):
-    """Step in the parameter, with the state linear in it (thesis, eq. 3.40)."""
+    """Step in the parameter, with the state a linear function of it (thesis, eq.
+    3.40).
+    """
 
     stations: ClassVar[int] = 2
-    """Number of points that are used."""
+    """Number of points used."""
 
     def __call__(self, stations: Sequence[Station], step: Any) -> Any:
         current = stations[-1]
         chord = current.tangent if len(stations) < 2 else current.y - stations[-2].y
-        # next to a fold the state is no function of the parameter
+        # near a fold, the state is not a function of the parameter
         if abs(chord[-1]) < 0.1 * np.linalg.norm(chord):
             chord = current.tangent
             return current.y + step * chord
@@ -87,9 +91,9 @@ class PolynomialPredictor(AbstractPredictor):
     """
 
     order: int = eqx.field(static=True, default=3)
-    """Degree, at least 2; lower while points are missing."""
+    """Degree, at least 2; it is lower while there are too few points."""
     stations: ClassVar[int] = 8
-    """Number of points that are used."""
+    """Number of points used."""
 
     def __check_init__(self):
         if not 2 <= self.order <= self.stations:

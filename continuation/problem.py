@@ -1,4 +1,6 @@
-"""Define a problem: a residual and its kind of stability; and the start of a branch."""
+"""Problems, defined by a residual and a kind of stability, and the start of a
+branch.
+"""
 
 import abc
 from collections.abc import Callable, Mapping
@@ -33,14 +35,15 @@ class Start(eqx.Module):
     problem: "AbstractProblem"
     """The problem to follow."""
     state: np.ndarray
-    """State on the branch or near it, shape `(n,)`."""
+    """State on or near the branch, shape `(n,)`."""
     parameter: float | None = None
     """Value of the parameter; default that of `problem.parameters`."""
     tangent: np.ndarray | None = None
-    """Direction (state, parameter) in which the branch leaves, `(n+1,)`; its length is
-    immaterial. The first point is sought in the plane across it, so that the new branch
-    at a branch point is found, not the known branch. Default: along the branch through
-    `state`, in the requested direction."""
+    """Direction (state, parameter) in which the branch leaves, `(n+1,)`; its length
+    does not matter. The first point is searched for in the plane perpendicular to it,
+    so that at a branch point the new branch is found and not the known one. Default:
+    along the branch through `state`, in the requested direction.
+    """
     step: float | None = None
     """First step; default that of the settings."""
     reason: str = eqx.field(static=True, default="")
@@ -50,36 +53,38 @@ class Start(eqx.Module):
 class AbstractProblem(eqx.Module):
     """G(u, parameters) = 0 with u of shape (n,) and G of shape (n,).
 
-    **To state a problem of your own**, subclass and give
+    **To define a problem of your own**, subclass this class and provide
 
     - `parameters`, a field: any pytree (a dict, a module, a system). Its scalar float
-      leaves can be continued in, picked with `where(parameters)`. The methods get a
-      tree of the same structure as an argument and must use that one, never the field.
-    - `stability`, a class attribute: `"equilibrium"` where eigenvalues of the
-      linearisation on the imaginary axis mark bifurcations, `"map"` if those on the
-      unit circle do (fixed points, periodic orbits), `"none"` otherwise.
+        leaves can be continuation parameters, selected with `where(parameters)`. The
+        methods receive a tree of the same structure as an argument and must use that
+        argument, never the field.
+    - `stability`, a class attribute: `"equilibrium"` if eigenvalues of the
+        linearisation on the imaginary axis mark bifurcations, `"map"` if those on the
+        unit circle do (fixed points and periodic orbits), `"none"` otherwise.
     - `residual(u, parameters)`.
 
     The other methods have defaults. **Traced** (called inside compiled programs; jax
     functions, differentiable forward): `residual`, `linearisation`, `derivatives`,
     `local_dynamics`, `seen`, `watched`, `scale`. All their non-array data must be
-    static: one program is compiled for each structure of a problem, and reused for all
-    values of arrays in it. `residual` and monitors of `ends=False` are to be smooth;
-    where an orbit does not exist return NaN, and the step is halved.
+    static: one program is compiled for each problem structure and reused for all array
+    values in it. `residual` and monitors with `ends=False` must be smooth; where an
+    orbit does not exist, return NaN, and the step is halved.
 
     **Python** (called between compiled programs with concrete arrays): `monitors`,
     `check`, `transition`, `refreshed`, `eigenvalues`, `representation`, `signature`,
     `with_signature`. They may compile their own programs.
 
-    The order of calls for a step from point a to point b: corrector; `derivatives` and
-    `seen` at b in the same program; if a monitor with `ends` changed sign, its zero is
-    located, yielded as a special point, and `transition` is asked for a `Start` (None:
-    the branch ends); otherwise `check(point b)`, and if it gives a reason, the zero of
-    an ending monitor is sought between a and b, then the step is halved, and at the
-    smallest step the branch ends with that reason. Then `refreshed` at b.
+    **Order of calls** for a step from point a to point b: first the corrector, then
+    `derivatives` and `seen` at b in the same program. If a monitor with `ends` has
+    changed sign, its zero is located and yielded as a special point, and `transition`
+    is called for a `Start` (None: the branch ends). Otherwise, `check(point b)` is
+    called. If it returns a reason, a zero of an ending monitor is searched for between
+    a and b, then the step is halved; at the smallest step, the branch ends with that
+    reason. Finally, `refreshed` is called at b.
 
-    Curves in two parameters need nothing more: the core extends the problem with
-    the condition `linearisation is singular` or `monitor = 0`.
+    Nothing else is needed for curves in two parameters: the problem is extended by the
+    condition that the linearisation is singular or that a monitor is zero.
 
     Examples:
         >>> import continuation
@@ -95,23 +100,26 @@ class AbstractProblem(eqx.Module):
     """
 
     parameters: eqx.AbstractVar[PyTree]
-    """Any pytree with scalar floats among its leaves."""
+    """The parameters: any pytree with scalar floats among its leaves."""
     stability: eqx.AbstractClassVar[StabilityKind]
     """`"equilibrium"`, `"map"` or `"none"`."""
     normal_forms: ClassVar[bool] = True
-    """Whether `local_dynamics` is available, for the coefficients of normal forms."""
+    """Whether `local_dynamics` is available for normal-form coefficients."""
     costly: ClassVar[bool] = False
-    """Whether second derivatives of `residual` take long to compile, so that special
-    points are rather enclosed than solved for; `local_dynamics` then has only a
-    Jacobian."""
+    """Whether second derivatives of `residual` take a long time to compile, so that
+    special points are bracketed rather than solved for; `local_dynamics` then has only
+    a Jacobian.
+    """
     detects: ClassVar[bool] = True
-    """Whether folds, branch points and bifurcations of `stability` are sought."""
+    """Whether to search for folds, branch points and the bifurcations of
+    `stability`.
+    """
 
     # -- equations
 
     @abc.abstractmethod
     def residual(self, u: Float[Array, " n"], parameters: PyTree) -> Float[Array, " n"]:
-        """Return G(u, parameters), zero on the branch.
+        """Return G(u, parameters), which is zero on the branch.
 
         Returns:
             Shape `(n,)`.
@@ -120,11 +128,12 @@ class AbstractProblem(eqx.Module):
     def linearisation(
         self, u: Float[Array, " n"], parameters: PyTree, jacobian: Float[Array, "n n"]
     ) -> Float[Array, "k k"]:
-        """Return the matrix whose eigenvalues decide stability.
+        """Return the matrix whose eigenvalues determine stability.
 
-        By default dG/du for equilibria, and dG/du + I for maps, right for G = f(u) - u.
-        Multiple shooting overrides this with the monodromy matrix, autonomous orbits
-        with that of the map on a section (no trivial multiplier).
+        By default, it is dG/du for equilibria and dG/du + I for maps, which is correct
+        for G = f(u) - u. Multiple shooting overrides this with the monodromy matrix,
+        and autonomous orbits with that of the map on a section (without the trivial
+        multiplier).
 
         Returns:
             Shape `(k, k)`.
@@ -137,15 +146,15 @@ class AbstractProblem(eqx.Module):
     def derivatives(
         self, u: Float[Array, " n"], p: Float[Array, ""], parameters_at: Callable
     ) -> tuple[Float[Array, "n n+1"], Float[Array, "k k"]]:
-        """Return the derivative of the residual by u and the parameter, and
-        `linearisation`.
+        """Return the derivative of the residual with respect to u and the parameter,
+        and `linearisation`.
 
-        Override it where the two share work.
+        Override it if the two share computations.
 
         Args:
             p: Value of the parameter.
-            parameters_at: `parameters_at(p)` are the parameters with the value p of the
-                one that varies.
+            parameters_at: `parameters_at(p)` are the parameters with the value p for
+                the varying one.
 
         Returns:
             Shapes `(n, n+1)` and `(k, k)`.
@@ -160,10 +169,10 @@ class AbstractProblem(eqx.Module):
     ) -> LocalDynamics:
         """Return the vector field or map around a solution.
 
-        Normal-form coefficients come from its first three derivatives; its eigenvalues
-        must be those of `linearisation`, and any number of others off the imaginary
-        axis or the unit circle. By default G, or G + u for maps. Override it together
-        with `linearisation`, or set `normal_forms` to False.
+        Normal-form coefficients are computed from its first three derivatives. Its
+        eigenvalues must be those of `linearisation`, and any others must not lie on the
+        imaginary axis or the unit circle. The default is G, or G + u for maps. Override
+        it together with `linearisation`, or set `normal_forms` to False.
 
         Returns:
             A `LocalDynamics`.
@@ -176,9 +185,9 @@ class AbstractProblem(eqx.Module):
         return LocalDynamics(u, motion, jax.jacfwd(motion))
 
     def scale(self, u: Float[Array, " n"], parameters: PyTree) -> Float[Array, " n"]:
-        """Return the scales of the components of u, by which lengths are measured.
+        """Return the scales of the components of u, in which lengths are measured.
 
-        By default 1, or the root mean square of u where that is more.
+        By default, the scale is 1, or the root mean square of u if that is larger.
 
         Returns:
             Shape `(n,)`.
@@ -190,8 +199,8 @@ class AbstractProblem(eqx.Module):
     # -- monitors
 
     def monitors(self) -> Mapping[str, Monitor]:
-        """Return the test functions of this problem by name; may depend on its
-        structure only.
+        """Return the test functions of this problem by name; they may depend only on
+        its structure.
 
         Returns:
             Monitors by name.
@@ -201,10 +210,10 @@ class AbstractProblem(eqx.Module):
     def seen(
         self, u: Float[Array, " n"], parameters: PyTree
     ) -> tuple[dict[str, Array], dict[str, Array]]:
-        """Return the values of the test functions, and further quantities to keep.
+        """Return the values of the test functions, and further quantities to store.
 
         Returns:
-            The values by the names in `monitors`, and the quantities kept in
+            The values, by the names in `monitors`, and the quantities to store in
                 `point.observed`.
         """
         del u, parameters
@@ -213,11 +222,11 @@ class AbstractProblem(eqx.Module):
     def watched(
         self, number: int | Int[Array, ""], u: Float[Array, " n"], parameters: PyTree
     ) -> Float[Array, ""]:
-        """Return one of the monitors alone, by its place in `monitors`.
+        """Return the value of a single monitor, given its index in `monitors`.
 
-        A traced number lets one program find the zeros of all of them. Where one of
-        them has `bracket`, numbers are integers. Override it where this is less
-        work than `seen`.
+        With a traced index, one program finds the zeros of all monitors. If one of them
+        has `bracket`, indices are integers. Override this if it is less work than
+        `seen`.
 
         Returns:
             A scalar.
@@ -239,30 +248,31 @@ class AbstractProblem(eqx.Module):
     def transition(self, point: Any, at: Any) -> Start | None:
         """Return the problem with which to continue from a special point.
 
-        It is called for the zero of a monitor that ends this problem: return the
-        problem beyond it (same `parameters`). It is called when a branch is switched at
-        a flip: return a problem whose solutions include this orbit run through twice,
-        its state, and the tangent (direction of the eigenvector of -1, parameter
-        component 0); at a Hopf point: the limit cycle that emerges there.
+        It is called in three cases. At the zero of a monitor that ends this problem,
+        return the problem beyond it (with the same `parameters`). When a branch is
+        switched at a flip, return a problem whose solutions include this orbit
+        traversed twice, its state, and the tangent (the eigenvector of -1, with
+        parameter component 0). At a Hopf point, return the limit cycle that emerges
+        there.
 
         Args:
             point: The [`continuation.Point`][].
-            at: The corrector's matrices and values at it: `at.linearisation`,
+            at: The corrector's matrices and values at the point: `at.linearisation`,
                 `at.jacobian`, `at.monitors`.
 
         Returns:
-            A `Start`, or None where there is no continuation.
+            A `Start`, or None if there is no continuation.
         """
         del point, at
         return None
 
     def refreshed(self, u: np.ndarray, parameters: PyTree) -> "AbstractProblem":
-        """Return the same problem with its internal references taken from this point.
+        """Return the same problem with its internal references updated at this point.
 
-        References are borders and phase conditions. They must depend on the point only,
-        not on the history, so that a resumed branch is identical; only
-        signs may be chosen by those before, and must be, where test functions depend on
-        them. Structure and shapes stay.
+        References are borders and phase conditions. They must depend only on the point
+        and not on the history, so that a resumed branch is identical. The exception is
+        signs: if test functions depend on them, they must be chosen to match the
+        previous ones. Structure and shapes must not change.
 
         Returns:
             A problem.
@@ -275,7 +285,7 @@ class AbstractProblem(eqx.Module):
     ) -> tuple[Any, str]:
         """Return the eigenvalues of `at.linearisation`, and a remark on them.
 
-        Override it where the matrix is unbounded at some points, with the limits.
+        Override it if the matrix is unbounded at some points, and return the limits.
 
         Args:
             at: The corrector's matrices and values.
@@ -294,26 +304,26 @@ class AbstractProblem(eqx.Module):
 
     @property
     def signature(self) -> str:
-        """The non-array part of this problem, as text; saved with every point."""
+        """The non-array part of this problem as text, saved with every point."""
         return ""
 
     def with_signature(self, signature: str) -> "AbstractProblem":
-        """Return the problem that has this signature, to resume a saved branch.
+        """Return the problem with this signature, to resume a saved branch.
 
         Returns:
             A problem.
 
         Raises:
-            ValueError: The signature is not one of this problem.
+            ValueError: The signature does not belong to this problem.
         """
         if signature != self.signature:
             raise ValueError(
-                f"the saved branch has signature {signature!r}, this problem "
-                f"{self.signature!r}; take it up with the problem it was made with"
+                f"the saved branch has signature {signature!r}, but this problem has "
+                f"{self.signature!r}; use the problem with which it was computed"
             )
         return self
 
 
 def jacobian_of(problem: AbstractProblem, u: Float[Array, " n"], parameters: PyTree):
-    """dG/du, shape (n, n)."""
+    """Return dG/du, shape (n, n)."""
     return jax.jacfwd(problem.residual)(u, parameters)

@@ -1,4 +1,4 @@
-"""Define the representations of one solution."""
+"""Representations of the same solution."""
 
 import abc
 
@@ -8,10 +8,11 @@ from jaxtyping import Float, PyTree
 
 
 class AbstractRepresentation(eqx.Module):
-    """Representations of the solutions of a problem, to detect equal ones.
+    """Representations of the solutions of a problem, used to detect equal solutions.
 
-    A periodic orbit can begin at several of its points, and phases count from any whole
-    period. Called between compiled programs, with NumPy arrays.
+    A periodic orbit can begin at several of its points, and phases can be measured from
+    any whole period. The methods are called between compiled programs, with NumPy
+    arrays.
     """
 
     family: eqx.AbstractVar[str]
@@ -23,15 +24,15 @@ class AbstractRepresentation(eqx.Module):
     def copies(
         self, u: np.ndarray, tangent: np.ndarray
     ) -> list[tuple[str, np.ndarray, np.ndarray]]:
-        """Return all representations of this solution, the first of them unchanged.
+        """Return all representations of this solution, starting with the unchanged one.
 
         Args:
             u: Unknowns of the equations, shape `(u,)`.
             tangent: Tangent of the branch, `(n,)`.
 
         Returns:
-            Family, state and tangent of each, both `(n,)`. A branch that meets any of
-                them again is closed.
+            The family, state `(n,)` and tangent `(n,)` of each. A branch that meets any
+                of them again is closed.
         """
 
     @abc.abstractmethod
@@ -39,7 +40,7 @@ class AbstractRepresentation(eqx.Module):
         self, states: Float[np.ndarray, "k n"], u: np.ndarray
     ) -> Float[np.ndarray, "k n"]:
         """Return the same solutions with phases and angles shifted by full turns to be
-        nearest to `u`.
+        closest to `u`.
 
         Args:
             states: Solutions, `(k, n)`.
@@ -58,12 +59,12 @@ class AbstractRepresentation(eqx.Module):
             parameters: Parameters of the problem.
 
         Returns:
-            The distance in step lengths; None where the problem has no such solutions.
+            The distance in step lengths; None if the problem has no such solutions.
         """
 
 
 class Unique(AbstractRepresentation):
-    """Each solution is one state."""
+    """Each solution has only one representation."""
 
     family: str = eqx.field(static=True)
 

@@ -11,10 +11,10 @@ from ._settings import BranchSettings
 
 
 class Refusal(enum.StrEnum):
-    """Reasons for rejecting a step, as the end of a sentence."""
+    """Reasons for rejecting a step, as parts of a sentence."""
 
     NOT_CONVERGED = "the corrector did not converge"
-    FARTHER = "the corrector went farther than the step was long"
+    FARTHER = "the correction was longer than the step"
     TURNED = "the branch turned too sharply"
 
 
@@ -36,27 +36,27 @@ class AbstractStepControl(eqx.Module):
     def refusals(
         self, measures: StepMeasures, step: Any, settings: BranchSettings
     ) -> dict[Refusal, Bool[Any, ""]]:
-        """Return for each reason to reject a step whether it holds; the first is
+        """Return whether each reason to reject a step applies; the first one is
         reported.
 
         Args:
             measures: Measures of the step.
-            step: Its length.
+            step: The step length.
             settings: Accuracy and step control.
 
         Returns:
-            A flag by `Refusal`.
+            A flag for each `Refusal`.
         """
 
     @abc.abstractmethod
     def next_step(
         self, measures: StepMeasures, step: Any, settings: BranchSettings
     ) -> Any:
-        """Return the length of the step that follows an accepted one.
+        """Return the length of the step after an accepted one.
 
         Args:
             measures: Measures of the step.
-            step: Its length.
+            step: The step length.
             settings: Accuracy and step control.
 
         Returns:
@@ -65,7 +65,8 @@ class AbstractStepControl(eqx.Module):
 
 
 class EffortAndAngle(AbstractStepControl):
-    """Adapt the step length to corrector iterations and curvature of the branch.
+    """Adapt the step length to the corrector iterations and the curvature of the
+    branch.
 
     See the thesis, section 3.4.4.
     """

@@ -79,7 +79,7 @@ def test_state_that_is_no_vector(state):
 
 
 def test_end_before_start():
-    assert "exchange them" in refusal(BouncingBall(), ABOVE, 2.0, 1.0)
+    assert "interchange them" in refusal(BouncingBall(), ABOVE, 2.0, 1.0)
 
 
 @pytest.mark.parametrize("t0, t1", [(np.nan, 1.0), (0.0, np.nan), (0.0, np.inf)])

@@ -111,7 +111,7 @@ def test_flip_and_its_doubled_orbit():
 def test_no_branch_leaves_a_fold():
     problem = continuation.Equilibrium(fold_field, {"mu": 1.0})
     branch = continuation.branch(problem, [1.0], mu, (-1.0, 1.5), direction=-1)
-    with pytest.raises(ValueError, match="branches leave branch points"):
+    with pytest.raises(ValueError, match="branches emanate from branch points"):
         continuation.switch(branch.special[0], mu, BOUNDS)
 
 

@@ -231,7 +231,7 @@ def test_zero_of_a_monitor_and_its_curve():
 
 @pytest.mark.usefixtures("unchecked_types")
 def test_curves_need_points_that_form_some(cusp_branch):
-    with pytest.raises(ValueError, match="form no curve"):
+    with pytest.raises(ValueError, match="do not form a curve"):
         continuation.curve(cusp_branch.points[0], (a, b), TWO)
     fold = cusp_branch.of_kind("fold")[0]
     with pytest.raises(ValueError, match="two different"):

@@ -141,7 +141,7 @@ def test_what_a_batch_cannot_follow_with_is_said():
     problem = continuation.Equilibrium(parabola, {"mu": 1.0})
     for algorithm, words in (
         (PseudoArclength(predictor=Secant()), "several points"),
-        (continuation.MoorePenrose(), "no fixed plane"),
+        (continuation.MoorePenrose(), "not correct in a fixed plane"),
     ):
         with pytest.raises(ValueError, match=words):
             continuation.follow_batch(problem, [[-1.0]], mu, (-1.0, 2.0), algorithm)

@@ -212,7 +212,7 @@ def test_an_inadmissible_point_is_reported_and_not_returned():
     [
         ([0.5], lambda p: p["speed"], (1.0, 4.0), "does not exist"),
         ([0.5], lambda p: p, (1.0, 4.0), "parameters as they are"),
-        ([0.5], mu, (4.0, 1.0), "wrong way round"),
+        ([0.5], mu, (4.0, 1.0), "are reversed"),
         ([0.5], mu, (1.0, np.inf), "finite"),
         ([0.5], mu, 4.0, "two numbers"),
         ([0.5], mu, (2.5, 4.0), "outside the bounds"),

@@ -80,7 +80,7 @@ def test_branch_goes_on_behind_the_interruption_with_ever_fewer_impacts():
     kinds = ["interruption of chattering", "fold", "grazing"]
     assert [p.kind for p in special] == kinds
     assert all(p.converged for p in special)
-    (taken,) = [p for p in points if "taken up" in p.reason]
+    (taken,) = [p for p in points if "continued with" in p.reason]
     # close behind the interruption, not at it
     assert 0 < taken.parameter - special[0].parameter < 0.01
     behind = points[points.index(taken) :]

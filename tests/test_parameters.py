@@ -71,7 +71,7 @@ def test_a_pick_travels_between_processes():
         ("inner.points", "inner.points is not one number"),
         ("count", "count is not one number"),
         ("on", "on is not one number"),
-        ((lambda s: (s.speed, s.inner.radius), "speed"), "pick several"),
+        ((lambda s: (s.speed, s.inner.radius), "speed"), "selects several"),
     ],
 )
 def test_what_is_no_parameter_is_refused_with_the_names_of_those_that_are(where, says):

@@ -119,7 +119,7 @@ def test_a_file_without_a_line_of_names(tmp_path):
     (only,) = read_recordings(file, columns=["-", "angle_deg"], rate=100.0)
     np.testing.assert_allclose(only.time, TIME)
     np.testing.assert_allclose(only["angle_rad"], np.deg2rad(ANGLE))
-    with pytest.raises(RecordingError, match="row 1 has 2 values where --columns"):
+    with pytest.raises(RecordingError, match="row 1 has 2 values, but --columns"):
         read_recordings(file, columns=["time_s", "angle_rad", "force_N"])
     for names in (["time_s", "time_s"], ["-", "-"], ["time_s", ""]):
         with pytest.raises(RecordingError, match="give each column one name"):

@@ -281,7 +281,7 @@ def test_what_is_wrong_is_said(tmp_path, old, new, words):
         (
             "    teeth",
             "    def __check_init__(self): 1 / 0\n    teeth",
-            "cannot be made",
+            "cannot be created",
         ),
     ],
 )

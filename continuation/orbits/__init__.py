@@ -1,4 +1,4 @@
-"""Define periodic orbits of hybrid systems as continuation problems."""
+"""Periodic orbits of hybrid systems as continuation problems."""
 
 from ._periodic import periodic_orbits as periodic_orbits, start_of as start_of
 from ._periodic_orbit import periodic_orbit as periodic_orbit

@@ -1,10 +1,10 @@
 """Find orbits with finitely many impacts beyond the interruption of chatter.
 
-Their deviation from the orbit that sticks, as it leaves the impacts near release, is
-one number x > 0, and the parameter at which they are periodic is a continuous function
-of it that ends at the interruption for x = 0. So these orbits form one branch that
-begins at the interruption; towards it their number of impacts grows, by one at each
-grazing. The branch is therefore started at a small distance from the interruption and
+After the impacts near release, the deviation of such an orbit from the sticking orbit
+is described by one number x > 0. The parameter at which the orbit is periodic is a
+continuous function of x, with the interruption at x = 0. These orbits therefore form
+one branch that begins at the interruption; towards it, the number of impacts grows by
+one at each grazing. The branch is started at a small distance from the interruption and
 followed away from it.
 """
 
@@ -27,17 +27,17 @@ from ..problem import Start
 from ._shooting import ImpactingOrbits
 
 
-# impacts from release to release of the first orbit
+# number of impacts of the first orbit from release to release
 _MOST = 48
 # ratio of its slowest to its fastest rebound; slower impacts would be below the
 # tolerance
 _SLOWEST = 1e-3
-# distances that are tried, as powers of 2 of the width of the bounds
+# distances to try: the width of the bounds times powers of 2
 _NEAREST, _TRIALS = -40, 4
 
 
 def orbit_behind(point: Any, periods: int) -> Start | None:
-    """Return the orbit with finitely many impacts behind an interruption, or None.
+    """Return the orbit with finitely many impacts beyond an interruption, or None.
 
     `point` is the interruption, with the tangent in the direction of the branch; the
     orbit repeats after `periods` forcing periods.
@@ -69,7 +69,8 @@ def _is_none(leaf):
 
 @eqx.filter_jit
 def _from_release(parameters: HybridSystem, leaf: int, values, periods: int):
-    """Impacts of the motion that starts at release, at each value of the parameter.
+    """Return the impacts of the motion that starts at release, for each parameter
+    value.
 
     Returns:
         Phases and states `(k, _MOST, 3)`, the number that belong to the orbit (0 if it
@@ -92,7 +93,7 @@ def _from_release(parameters: HybridSystem, leaf: int, values, periods: int):
         mine = jnp.arange(_MOST) < orbit.impacts
         fastest = jnp.max(jnp.where(mine, speeds, 0.0))
         slowest = jnp.min(jnp.where(mine, speeds, jnp.inf)) / fastest
-        # margin is NaN where contact comes earlier
+        # the margin is NaN if contact occurs earlier
         finite = jnp.isfinite(orbit.margin) & (orbit.margin > 0)
         return rows, jnp.where(finite, orbit.impacts, 0), slowest
 
@@ -103,7 +104,7 @@ def _closed_up(
     periods: int, point: Any, value: float, rows, sense: float, width: float
 ) -> Start | None:
     """Return the periodic orbit near the motion from release, and its tangent."""
-    # a JAX array: its period is evaluated outside of a program
+    # a JAX array, because its period is evaluated outside of a program
     moved = jnp.asarray(value, jnp.float64)
     parameters = with_leaf(point.problem.parameters, point.leaf, moved)
     count = len(rows)
@@ -124,8 +125,8 @@ def _closed_up(
         return None
     if not np.all(np.isfinite(at.tangent)):
         return None
-    # x grows where the parameter does for multipliers below one, and where it falls for
-    # those above: the others are next to zero
+    # x grows with the parameter for a multiplier below one, and with its decrease for
+    # one above; the other multipliers are close to zero
     one = np.eye(at.linearisation.shape[0])
     away = sense * float(np.sign(np.linalg.det(one - at.linearisation)))
     tangent = at.tangent * (away or 1.0)
@@ -135,7 +136,7 @@ def _closed_up(
         float(at.z[-1]),
         tangent,
         reason=(
-            f"taken up with {count} impacts; between here and the interruption lie "
-            "infinitely many grazings, each with one impact more"
+            f"continued with {count} impacts; between here and the interruption lie "
+            "infinitely many grazings, each with one more impact"
         ),
     )

@@ -1,4 +1,4 @@
-"""Define the representations of an orbit with impacts."""
+"""Representations of an orbit with impacts."""
 
 from typing import Any
 
@@ -10,7 +10,7 @@ from ._run_twice import away_from_half, rotations
 
 
 class ImpactSequences(AbstractRepresentation):
-    """An orbit with m impacts may start at any of them; m of the unknowns are impact
+    """An orbit with m impacts can start at any of them; m of the unknowns are impact
     times.
     """
 
@@ -34,7 +34,7 @@ class ImpactSequences(AbstractRepresentation):
         problem = self.problem
         if not (problem.periods and problem.constraints):
             return states
-        # a motion repeats after whole periods of the forcing
+        # a motion repeats after whole forcing periods
         phases = np.zeros(u.size)
         phases[:: 1 + problem.dimension] = 1.0
         return states + np.round(u[0] - states[:, :1]) * phases

@@ -19,7 +19,7 @@ from ._signature import with_impact, without_impact
 from ._watched import Watched, watched_of
 
 
-# distance at which the sign of a slope is taken, of unknowns of size one
+# distance at which the sign of a slope is determined, for unknowns of size one
 _NUDGE = 1e-6
 
 
@@ -35,10 +35,10 @@ def _lowest(problem, u, parameters):
 def orbit_grazing(problem: Any, point: Any) -> Start | None:
     """Return the orbit at a grazing, with the impact of zero speed removed or inserted.
 
-    `problem` is one of `ImpactingOrbits`, and so is that of the start.
+    `problem` is an `ImpactingOrbits`, and so is the problem of the start.
 
-    The branch continues with the new sequence of impacts in the direction in which the
-    gap that was zero opens, or the new impact gains speed.
+    The branch continues with the new impact sequence in the direction in which the gap
+    that was zero opens, or the new impact gains speed.
     """
     u = jnp.asarray(point.state)
     parameters = point.problem.parameters
@@ -50,7 +50,8 @@ def orbit_grazing(problem: Any, point: Any) -> Start | None:
     zero = min(values, key=values.__getitem__)
     speeds = [w for w in values if w.what == "speed"]
     slowest = min(speeds, key=values.__getitem__, default=zero)
-    # next to an impact without speed the gap has its minimum too: the impact goes
+    # next to an impact of zero speed, the gap also has its minimum: the impact is
+    # removed
     if values[slowest] <= 1e-7 * (1.0 + float(jnp.max(jnp.abs(u)))):
         zero = slowest
     number = zero.number

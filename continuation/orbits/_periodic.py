@@ -1,4 +1,4 @@
-"""Find the continuation problem that a given orbit solves."""
+"""Find the continuation problem solved by a given orbit."""
 
 from typing import Any
 
@@ -23,26 +23,27 @@ def periodic_orbits(
     periods: int | None = None,
     beyond: bool = False,
 ) -> Start:
-    """Return the family of periodic orbits that an orbit belongs to, and its place on
-    it.
+    """Return the family of periodic orbits to which an orbit belongs, and its position
+    on it.
 
-    The problem is chosen by the motion: [`continuation.ImpactingOrbits`][] with the
-    impacts of the orbit, or [`continuation.StickingOrbits`][] where it sticks.
+    The problem depends on the motion: [`continuation.ImpactingOrbits`][] with the
+    impacts of the orbit, or [`continuation.StickingOrbits`][] if it sticks.
 
     Args:
         system: The system.
-        orbit: From [`continuation.periodic_orbit`][]; or a guess of its state, or None,
-            with `period` or `periods`, as taken there.
+        orbit: An orbit from [`continuation.periodic_orbit`][]; or an initial guess of
+            its state, or None, together with `period` or `periods` as for that
+            function.
         period: As for [`continuation.periodic_orbit`][].
         periods: As for [`continuation.periodic_orbit`][].
-        beyond: For an orbit that sticks, whether to continue past the interruption of
-            its chattering with the orbits that have finitely many impacts.
+        beyond: For an orbit that sticks, whether to continue beyond the interruption of
+            its chatter with the orbits that have finitely many impacts.
 
     Returns:
         A [`continuation.Start`][], for [`continuation.follow`][].
 
     Raises:
-        ValueError: As for `periodic_orbit`; and for an orbit that sticks without
+        ValueError: As for `periodic_orbit`, or for an orbit that sticks without
             forcing.
 
     Examples:
@@ -62,8 +63,8 @@ def periodic_orbits(
     if orbit.sticks:
         if number == 0:
             raise ValueError(
-                "this orbit sticks without forcing; only orbits that stick once in "
-                "some forcing periods can be followed"
+                "this orbit sticks without forcing; only orbits that stick once in a "
+                "number of forcing periods can be followed"
             )
         problem, state = on_release(system, number, beyond)
         return Start(problem, state)
@@ -79,5 +80,5 @@ def start_of(system: Any, start: Any) -> Start:
         return periodic_orbits(system, start)
     raise ValueError(
         "give the orbit to start from, found with continuation.periodic_orbit(system, "
-        "guess, period), or None for the one that the motion settles on"
+        "guess, period), or None for the one to which the motion converges"
     )

@@ -1,4 +1,4 @@
-"""Find one periodic orbit from a guess, or from the settled motion."""
+"""Find one periodic orbit from a guess, or from the steady-state motion."""
 
 import warnings
 
@@ -22,16 +22,15 @@ from ._shooting import ImpactingOrbits
 
 
 _TURNS, _LOOKED = 400, 64
-"""Periods until transients are expected to have decayed, and periods examined after
-them.
+"""Number of periods after which transients should have decayed, and of periods examined
+after that.
 """
 _SAME = 1e-7
-"""Motions are called equal when they differ by less than this, relative to their size.
-"""
+"""Two motions are equal if they differ by less than this, relative to their size."""
 _SAME_TIME = 1e-9
-"""Times are equal that differ by less than this of the period."""
+"""Two times are equal if they differ by less than this fraction of the period."""
 _CLOSED = 1e-9
-"""A gap counts as closed below this, relative to its size."""
+"""A gap below this, relative to its size, counts as closed."""
 
 
 def periodic_orbit(
@@ -45,29 +44,30 @@ def periodic_orbit(
 ) -> Orbit:
     """Find a periodic orbit near a guess, stable or not, with any number of impacts.
 
-    The impacts of the motion from the guess give the equations of multiple shooting;
-    where that fails, or the motion sticks, Newton's method is applied to the
-    motion over one period itself. The solution is run once more through the event
-    loop, which must return to it.
+    The impacts of the motion from the guess define the equations of multiple shooting;
+    if that fails, or the motion sticks, Newton's method is applied to the motion over
+    one period. Finally, the solution is simulated with the event loop, which must
+    return to it.
 
     Args:
         system: A [`jaxcam.hybrid.HybridSystem`][], forced or not.
-        guess: State at `t0`, shape `(n,)`. By default the state in which the motion has
-            settled after some hundred forcing periods (a stable orbit).
-        period: Period of the orbit (s); for a system without forcing a guess of it.
-        periods: Instead of `period`, the number of forcing periods in it. By default it
-            is 1; without a guess, it is detected.
+        guess: State at `t0`, shape `(n,)`. By default, the state to which the motion
+            has converged after some hundred forcing periods (on a stable orbit).
+        period: Period of the orbit (s); for a system without forcing, an initial guess.
+        periods: Period of the orbit in forcing periods, instead of `period`. The
+            default is 1; without a guess, the number is detected.
         t0: Time of the guess (s).
         settings: Accuracy of the runs; default a tolerance of 1e-12.
 
     Returns:
-        A [`variational.Orbit`][] with `.state` at `.time` (t0, unless that is the time
-            of an impact), `.period` (s), `.impacts`, `.contacts`, `.multipliers`.
+        A [`variational.Orbit`][] with `.state` at `.time` (`t0`, unless that is the
+            time of an impact), `.period` (s), `.impacts`, `.contacts` and
+            `.multipliers`.
 
     Raises:
-        ValueError: The period is not a multiple of the forcing's, the motion does not
-            settle on a periodic orbit, or no orbit is found near the guess; the message
-            gives the reason.
+        ValueError: The period is not a multiple of the forcing period, the motion does
+            not converge to a periodic orbit, or no orbit is found near the guess; the
+            message gives the reason.
 
     Examples:
         >>> import continuation
@@ -94,8 +94,8 @@ def periodic_orbit(
         if orbit is None:
             raise ValueError(
                 f"no periodic orbit of period {length:g} s was found near the guess: "
-                f"{why}; and by Newton's method on the motion: {later}. Try a guess "
-                "closer to it (one from a simulation), or another period"
+                f"{why}; Newton's method on the motion: {later}. Try a guess closer to "
+                "the orbit (for example from a simulation), or another period"
             )
     return orbit
 
@@ -104,8 +104,8 @@ def _periods(base: float | None, period, periods) -> int:
     """Return the number of forcing periods; 0 without forcing."""
     if base is not None and isinstance(period, int | np.integer):
         warnings.warn(
-            f"period={period} is taken as forcing periods; write periods={period}, or "
-            f"period={period}.0 for seconds",
+            f"period={period} is interpreted as forcing periods; write "
+            f"periods={period}, or period={period}.0 for seconds",
             stacklevel=3,
         )
         period, periods = None, period
@@ -126,8 +126,8 @@ def _periods(base: float | None, period, periods) -> int:
     if number < 1 or abs(float(period) / base - number) > 1e-6 * number:
         raise ValueError(
             f"period is {float(period):g} s, which is {float(period) / base:.6g} "
-            f"forcing periods of {base:g} s; an orbit lasts a whole number of them. "
-            "Give that number as `periods`"
+            f"forcing periods of {base:g} s, but must be a whole number of them; give "
+            "that number as `periods`"
         )
     return number
 
@@ -136,8 +136,8 @@ def _counted(base: float | None, period, periods) -> int:
     """Return the number of forcing periods, if it is given."""
     if base is None:
         raise ValueError(
-            "this system has no forcing whose periods could be counted; give a guess "
-            "of the orbit's period in seconds, as `period`"
+            "this system has no forcing; give a guess of the orbit's period in "
+            "seconds, as `period`"
         )
     if period is not None:
         raise ValueError("give period (s) or periods (of the forcing), not both")
@@ -147,19 +147,18 @@ def _counted(base: float | None, period, periods) -> int:
 
 
 def _settled(system, base, number: int, free: bool, t0):
-    """State and period of the motion after many periods."""
+    """Return the state and period of the motion after many periods."""
     if base is None:
         raise ValueError(
-            "without forcing there is nothing to settle on in steps; give a guess of "
-            "the state"
+            "a system without forcing needs an initial guess; give a guess of the state"
         )
     start = _somewhere(system, t0)
     run = stroboscope(system, start, _TURNS + _LOOKED, t0=float(t0))
     states = run.states[0, _TURNS:]
     if run.code[0] or not np.all(np.isfinite(states)):
         raise ValueError(
-            "the run that should settle on an orbit did not end; give a guess of the "
-            "state"
+            "the run that should converge to an orbit did not reach its end; give a "
+            "guess of the state"
         )
     when = float(t0) + (_TURNS + _LOOKED) * base
     moved = np.asarray(component_sizes(system, when, states[-1], base))
@@ -169,9 +168,9 @@ def _settled(system, base, number: int, free: bool, t0):
             return states[-1], n
     sought = f"up to {_LOOKED // 2}" if free else f"{number}"
     raise ValueError(
-        f"after {_TURNS} forcing periods the motion has not settled on an orbit of "
-        f"{sought} of them: it is chaotic, settles slowly, or has another period. Give "
-        "a guess of the state, or other values of the parameters"
+        f"after {_TURNS} forcing periods, the motion has not converged to an orbit of "
+        f"{sought} of them: it is chaotic, converges slowly, or has another period. "
+        "Give a guess of the state, or other parameter values"
     )
 
 
@@ -198,7 +197,7 @@ def _somewhere(system, t0):
 
 
 def _dimension(system) -> int:
-    """Return the number of states of a system that does not name them."""
+    """Return the number of states of a system without state names."""
     for n in range(1, 65):
         try:
             shape = jax.eval_shape(
@@ -217,8 +216,8 @@ def _by_shooting(system, guess, length, number, t0, settings):
     if not bool(turn.successful):
         return None, turn.result
     if int(turn.contacts.count):
-        # contact erases the past: either the next period is the orbit, or no orbit is
-        # near
+        # contact removes all memory of the past: either the next period is the orbit,
+        # or no orbit is near
         state = turn.final
         for _ in range(3):
             orbit, why = _confirmed(system, state, float(t0), length, settings)
@@ -232,7 +231,8 @@ def _by_shooting(system, guess, length, number, t0, settings):
         orbit, why = _with_impacts_of(system, turn, number, start, settings)
         if orbit is not None:
             return orbit, None
-    # an impact at the ends is counted twice, or not at all: begin within a flight
+    # an impact at the ends would be counted twice or not at all, so begin within a
+    # flight
     if not count:
         turn = simulate(system, guess, t0, start + 2 * length, settings=settings)
         if not bool(turn.successful) or not int(turn.impacts.count):
@@ -247,7 +247,7 @@ def _by_shooting(system, guess, length, number, t0, settings):
 
 def _with_impacts_of(system, turn, number, t0, settings):
     """Return the orbit with the impacts of one period from `t0`, or the reason for
-    none.
+    failure.
     """
     try:
         equations, u = seed(system, turn, number)
@@ -268,7 +268,7 @@ def _with_impacts_of(system, turn, number, t0, settings):
 
 
 def _touches(system, state, t0, length) -> bool:
-    """Return whether a gap is closed, up to rounding."""
+    """Return whether a gap is closed, to within rounding."""
     t0 = jnp.asarray(t0)
     sizes = gap_sizes(system, t0, state, jnp.asarray(length))
     return bool(jnp.any(gaps(system, t0, state) <= _CLOSED * sizes))
@@ -289,7 +289,7 @@ def _by_flow(system, guess, length, number, t0, settings):
 @eqx.filter_jit
 def _root(system, guess, t0, length, settings):
     sizes = component_sizes(system, t0, guess, length)
-    # a component that stays zero has no size
+    # a component that remains zero has no size
     sizes = jnp.where(sizes > 0, sizes, 1.0)
 
     def moved(y, _):
@@ -303,21 +303,21 @@ def _root(system, guess, t0, length, settings):
 
 
 def _at(equations: Shooting, u, system, t0):
-    """Return state of an orbit at `t0` (in the first flight without forcing), time,
-    period.
+    """Return the state of an orbit at `t0` (without forcing, in the first flight), the
+    time and the period.
     """
     u = jnp.asarray(u)
     starts, ends = map(np.asarray, equations.flights(u, system))
     length = float(equations.period(u, system))
     if equations.periods == 0:
         t0 = starts[0, 0] + (ends[0] - starts[0, 0]) / 2
-    # the latest start of a flight at or before t0, some periods away
+    # the latest start of a flight at or before t0, shifted by whole periods
     same = _SAME_TIME * length
     ago = np.mod(t0 + same - starts[:, 0], length) - same
     last = int(np.argmin(ago))
     begin = starts[last, 0]
     if ago[last] < same:
-        # t0 is the time of an impact: half a flight later
+        # t0 is the time of an impact, so half a flight later is used
         time = begin + (ends[last] - begin) / 2
         t0 = t0 + (time - begin)
     else:
@@ -327,7 +327,9 @@ def _at(equations: Shooting, u, system, t0):
 
 
 def _confirmed(system, state, time, length, settings):
-    """The orbit through a state, once the event loop has returned to it."""
+    """Return the orbit through a state, after checking that the event loop returns to
+    it.
+    """
     try:
         return orbit_of(system, state, length, time, settings=settings), None
     except ValueError as error:

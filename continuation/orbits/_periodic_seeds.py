@@ -1,4 +1,4 @@
-"""Find starting orbits from many states of a sweep or a recording."""
+"""Find initial orbits from many states of a sweep or a recording."""
 
 import numpy as np
 from jaxtyping import ArrayLike, Float
@@ -22,9 +22,9 @@ def orbits_near(
 ) -> tuple[Orbit, ...]:
     """Return the distinct periodic orbits found from many guesses.
 
-    The guesses are states at one phase of the forcing: the last points of a sweep, the
-    attractors of a basin, or the samples of a recording (angles and their derivatives)
-    taken once a period.
+    The guesses are states at one phase of the forcing, such as the last points of a
+    sweep, the attractors found with their basins, or the samples of a recording (angles
+    and their derivatives) taken once per period.
 
     Args:
         system: The system.
@@ -33,15 +33,15 @@ def orbits_near(
         periods: As for [`continuation.periodic_orbit`][].
         t0: As for [`continuation.periodic_orbit`][].
         settings: As for [`continuation.periodic_orbit`][].
-        same: Orbits count as equal where their states at `t0` differ by less than this,
+        same: Two orbits are equal if their states at `t0` differ by less than this,
             relative to [`jaxcam.hybrid.sizes.component_sizes`][].
 
     Returns:
         The orbits in the order in which they were found. Guesses from which Newton's
-            method fails are left out, so there may be none.
+            method fails are omitted, so there may be none.
 
     Raises:
-        ValueError: `states` has another shape.
+        ValueError: `states` has the wrong shape.
 
     Examples:
         >>> import continuation

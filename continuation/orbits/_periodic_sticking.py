@@ -1,4 +1,4 @@
-"""Define orbits that stick once in n periods by their release point."""
+"""Orbits that stick once in n periods, defined by their release point."""
 
 from collections.abc import Mapping
 from typing import Any, ClassVar
@@ -35,29 +35,30 @@ from ._shooting import ImpactingOrbits
 CHATTER = "chatter margin"
 """Names of the monitors."""
 DETACHMENT = "jerk at release"
-# Runge-Kutta steps of order eight in a part of one forcing period
+# number of eighth-order Runge-Kutta steps in a part of one forcing period
 _STEPS = 64
 
 
 class StickingOrbits(AbstractProblem):
     """P(inf, n): the orbit that leaves contact, chatters, and sticks every n periods.
 
-    While it sticks it follows the constraint, so its state at release is independent of
-    the past: the time t and the state x at which gap, normal velocity and normal
-    acceleration are zero. Those are the equations; the unknowns, shape `(3,)`, are the
-    phase of release (time in forcing periods) and the state there. All multipliers are
-    zero. Two monitors decide where the orbit exists:
+    While it sticks, it follows the constraint, so its state at release is independent
+    of the past: it is given by the time t and the state x at which gap, normal velocity
+    and normal acceleration are zero. These are the equations; the unknowns, shape
+    `(3,)`, are the phase of release (time in forcing periods) and the state there. All
+    multipliers are zero. Two monitors determine where the orbit exists:
 
-    - the margin of [`variational.chatter_accumulation`][], zero where the impacts
-      accumulate exactly at the n-th release. The sticking time itself falls
-      to zero there like a power and does not change sign (thesis, section 3.5.1); the
-      margin is smooth.
+    - the margin of [`variational.chatter_accumulation`][], which is zero if the impacts
+        accumulate exactly at the n-th release. There, the sticking time itself falls to
+        zero like a power and does not change sign (thesis, section 3.5.1), but the
+        margin is smooth.
     - the rate of change of the contact acceleration at release, relative to the forcing
-      period. It is zero where release and the next return to contact coincide:
-      beyond, contact never ends; this is the detachment (valve float).
+        period. It is zero if release and the next return to contact coincide, which is
+        the detachment point (valve float); beyond it, contact never ends.
 
-    Past the first one a branch continues with [`continuation.ImpactingOrbits`][] if
-    `beyond` is set; each number of impacts is then a program to compile.
+    Beyond a zero of the first monitor, a branch continues with
+    [`continuation.ImpactingOrbits`][] if `beyond` is set; a program must then be
+    compiled for each number of impacts.
 
     Examples:
         >>> import continuation
@@ -73,14 +74,14 @@ class StickingOrbits(AbstractProblem):
     normal_forms: ClassVar[bool] = False
     """No normal-form coefficients are computed."""
     detects: ClassVar[bool] = False
-    """No folds, branch points or flips are sought."""
+    """Folds, branch points and flips are not searched for."""
 
     parameters: HybridSystem
     """A system with a period, two states and one constraint."""
     periods: int = eqx.field(static=True, default=1)
-    """Number n of forcing periods from release to the release after contact."""
+    """Number n of forcing periods from release to the next release after contact."""
     beyond: bool = eqx.field(static=True, default=False)
-    """Whether to continue past an interruption; otherwise it ends the branch."""
+    """Whether to continue beyond an interruption; otherwise, it ends the branch."""
 
     def residual(self, u, parameters) -> Float[Array, "3"]:
         system = parameters.prepared()
@@ -94,7 +95,7 @@ class StickingOrbits(AbstractProblem):
         return jnp.concatenate(rows)
 
     def linearisation(self, u, parameters, jacobian) -> Float[Array, "2 2"]:
-        """Return zeros: sticking removes every deviation.
+        """Return zeros, because sticking removes every deviation.
 
         Args:
             u: Unknowns of the equations, shape `(u,)`.
@@ -124,8 +125,9 @@ class StickingOrbits(AbstractProblem):
     def seen(self, u, parameters):
         """Return the monitors and the observed quantities.
 
-        Observed: period, release, accumulation and sticking time (s), number of
-        impacts; the states at whole forcing periods, `(periods, 2)`.
+        The observed quantities are the period, the release, accumulation and sticking
+        times (s), the number of impacts, and the states at whole forcing periods,
+        `(periods, 2)`.
 
         Args:
             u: Unknowns of the equations, shape `(u,)`.
@@ -155,11 +157,11 @@ class StickingOrbits(AbstractProblem):
     def check(self, point: Any) -> str | None:
         value = point.tests.get(CHATTER, np.nan)
         if np.isfinite(value) and value < 0:
-            return "chattering does not come to its end before contact is released"
+            return "chatter is not completed before the release"
         if np.isnan(value) and self.periods > 1:
-            return f"the motion comes to contact before period {self.periods}, or never"
+            return f"contact begins before period {self.periods}, or never"
         if point.tests.get(DETACHMENT, 1.0) < 0:
-            return "contact is made, not released, at this zero of its acceleration"
+            return "contact begins, rather than ends, at this zero of its acceleration"
         return None
 
     def transition(self, point: Any, at: Any) -> Start | None:
@@ -171,7 +173,7 @@ class StickingOrbits(AbstractProblem):
     @property
     def signature(self) -> str:
         if self.periods == 1:
-            return "sticks once a period"
+            return "sticks once per period"
         return f"sticks once in {self.periods} periods"
 
     def with_signature(self, signature: str) -> AbstractProblem:
@@ -183,7 +185,7 @@ class StickingOrbits(AbstractProblem):
 
 
 def _stroboscopic(system, turn: ChatterOrbit, periods: int) -> Float[Array, "m n"]:
-    """States at the first whole periods after release."""
+    """Return the states at the first whole periods after release."""
     period = system.period
     first = jnp.ceil(turn.frame.release / period)
 
@@ -192,7 +194,7 @@ def _stroboscopic(system, turn: ChatterOrbit, periods: int) -> Float[Array, "m n
         point = next_impact(system, time, state, speed, 2 * period)
         return (time, state), (point.time, point.state, point.speed), point.found
 
-    # a complete sequence has no end, but then `end` comes before it accumulates
+    # a complete sequence has no end, but `end` is then before its accumulation
     begin = (turn.frame.release, turn.frame.state)
     start = (begin, (*begin, jnp.zeros(())), jnp.asarray(True))
 
@@ -214,8 +216,8 @@ def _stroboscopic(system, turn: ChatterOrbit, periods: int) -> Float[Array, "m n
 def on_release(
     system: HybridSystem, periods: int = 1, beyond: bool = False
 ) -> tuple[StickingOrbits, np.ndarray]:
-    """Return the problem of the orbit that sticks once in so many periods, and its
-    unknowns.
+    """Return the problem of the orbit that sticks once in this number of periods, and
+    its unknowns.
 
     Raises:
         ValueError: Contact never ends, or never begins.
@@ -224,7 +226,7 @@ def on_release(
     if not bool(jnp.isfinite(frame.release)):
         raise ValueError(
             "this system has no release from contact in its period, so no orbit sticks "
-            "for a part of it; check the parameters"
+            "for part of it; check the parameters"
         )
     phase = float(frame.release) / float(system.period)  # pyright: ignore
     problem = StickingOrbits(system, periods, beyond)

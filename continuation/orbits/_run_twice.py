@@ -1,4 +1,4 @@
-"""Represent an orbit from another impact on, or traversed twice."""
+"""Represent an orbit starting from another impact, or traversed twice."""
 
 from typing import Any
 
@@ -11,7 +11,7 @@ def run_twice(problem: Any, u, deviation) -> tuple[np.ndarray, np.ndarray]:
     deviations.
     """
     if not problem.constraints:
-        # the state at time zero only
+        # only the state at time zero
         return u, deviation
     shape = (len(problem.constraints), 1 + problem.dimension)
     first, moved = u.reshape(shape).copy(), deviation.reshape(shape).copy()
@@ -22,7 +22,7 @@ def run_twice(problem: Any, u, deviation) -> tuple[np.ndarray, np.ndarray]:
     period, first[0, 0] = first[0, 0], 0.0
     second = first + np.eye(1, shape[1])
     rows = np.concatenate([first, second])
-    # time counts from the first impact, which must not move
+    # time is measured from the first impact, which must not move
     change[:, 0] -= change[0, 0]
     rows[:, 0] /= 2
     change[:, 0] /= 2
@@ -35,7 +35,7 @@ def rotations(
 ) -> Float[np.ndarray, "m u"]:
     """Return the orbit starting at each of its m impacts.
 
-    **Arguments:** `rate`: `u` is a derivative of the unknowns along a branch.
+    **Arguments:** `rate`: whether `u` is a derivative of the unknowns along a branch.
     """
     m = len(problem.constraints)
     turn = 0.0 if rate else float(max(problem.periods, 1))
@@ -44,7 +44,7 @@ def rotations(
         rows = np.array(u, float).reshape(m, 1 + problem.dimension)
         length = rows[0, 0]
         if not problem.periods:
-            # the place of the first phase is taken by the period
+            # the period takes the place of the first phase
             rows[0, 0] = 0.0
         rows = np.roll(rows, -k, axis=0)
         rows[m - k :, 0] += turn
@@ -56,8 +56,8 @@ def rotations(
 
 
 def away_from_half(problem: Any, u, parameters) -> float | None:
-    """Return the distance of the halves of an orbit, in step lengths; None where
-    unequal.
+    """Return the distance between the halves of an orbit in step lengths; None if their
+    impacts differ.
     """
     m, periods = len(problem.constraints), problem.periods
     hits = problem.constraints

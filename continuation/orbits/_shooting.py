@@ -1,4 +1,4 @@
-"""Define periodic orbits with impacts as a continuation problem."""
+"""Periodic orbits with impacts as a continuation problem."""
 
 from collections.abc import Mapping
 from typing import Any, ClassVar
@@ -24,11 +24,11 @@ from ._watched import Watched, watched_of
 class ImpactingOrbits(AbstractProblem):
     """Periodic orbits of a hybrid system with a known sequence of impacts.
 
-    The unknowns and equations are those of [`variational.orbits.Shooting`][]: for each
-    impact its phase (time in forcing periods) and the state after it, shape
-    `(m (1 + n),)`. Without impacts they are the state at time zero, shape `(n,)`. For a
-    system without forcing the first phase is zero, its place is taken by the period
-    (s), and phases count periods of the orbit.
+    The unknowns and equations are those of [`variational.orbits.Shooting`][]. For each
+    impact, the unknowns are its phase (time in forcing periods) and the state after it,
+    with total shape `(m (1 + n),)`. Without impacts, they are the state at time zero,
+    shape `(n,)`. For a system without forcing, the first phase is zero, the period (s)
+    takes its place, and phases are in periods of the orbit.
 
     Examples:
         >>> import continuation
@@ -43,24 +43,24 @@ class ImpactingOrbits(AbstractProblem):
     stability: ClassVar[StabilityKind] = "map"
     """Multipliers on the unit circle mark bifurcations."""
     costly: ClassVar[bool] = True
-    """Second derivatives take long to compile."""
+    """Second derivatives take a long time to compile."""
 
     parameters: HybridSystem
     """The [`jaxcam.hybrid.HybridSystem`][]."""
     constraints: tuple[int, ...] = eqx.field(static=True)
-    """Constraint that each impact hits, in order."""
+    """Constraint hit by each impact, in order."""
     periods: int = eqx.field(static=True)
-    """Forcing periods until the orbit repeats; 0 for a system without forcing."""
+    """Number of forcing periods after which the orbit repeats; 0 without forcing."""
     dimension: int = eqx.field(static=True)
     """Number of states n."""
     steps: int = eqx.field(static=True, default=32)
-    """Runge-Kutta steps of order eight in each flight."""
+    """Number of eighth-order Runge-Kutta steps in each flight."""
 
     def __check_init__(self):
         if self.periods == 0 and not self.constraints:
             raise ValueError(
-                "an orbit without forcing and without impacts has no Poincare "
-                "section; follow it as a smooth boundary value problem"
+                "an orbit without forcing and impacts has no Poincare section; follow "
+                "it as a smooth limit cycle"
             )
 
     @staticmethod
@@ -86,15 +86,15 @@ class ImpactingOrbits(AbstractProblem):
         return self.equations.residual(u, parameters)
 
     def linearisation(self, u, parameters, jacobian) -> Float[Array, "k k"]:
-        """Return the monodromy matrix, of the state just after the first impact.
+        """Return the monodromy matrix for the state just after the first impact.
 
-        Without forcing, that of the return map to the constraint.
+        Without forcing, it is that of the return map to the constraint.
 
         Args:
             u: Unknowns of the equations, shape `(u,)`.
 
         Returns:
-            Shape `(k, k)`.
+            The matrix, shape `(k, k)`.
         """
         if not self.constraints:
             return jacobian + jnp.eye(self.dimension)
@@ -109,7 +109,8 @@ class ImpactingOrbits(AbstractProblem):
     def local_dynamics(self, u, parameters) -> LocalDynamics:
         """Return the map from the first impact to the one a period later.
 
-        It acts on its phase and the state after it, without forcing on the state alone.
+        It acts on the phase of the impact and the state after it, or only on the state
+        if there is no forcing.
 
         Args:
             u: Unknowns of the equations, shape `(u,)`.
@@ -121,7 +122,7 @@ class ImpactingOrbits(AbstractProblem):
         return LocalDynamics(at, None, jacobian)
 
     def derivatives(self, u, p, parameters_at):
-        """Return both from one Jacobian of each flight.
+        """Return both derivatives from one Jacobian of each flight.
 
         Args:
             u: Unknowns of the equations, shape `(u,)`.
@@ -144,7 +145,7 @@ class ImpactingOrbits(AbstractProblem):
         def monitor(one: Watched) -> Monitor:
             if one.what == "gap":
                 return Monitor("grazing", ends=True)
-            # so are the gaps of the flights next to an impact without speed
+            # so are the gaps of the flights next to an impact of zero speed
             beside = ((one.number - 1) % m, one.number)
             names = tuple(Watched("gap", k).name for k in beside)
             return Monitor("grazing", ends=True, vanishing=names)
@@ -160,9 +161,9 @@ class ImpactingOrbits(AbstractProblem):
     def seen(self, u, parameters):
         """Return the monitors and the observed quantities.
 
-        Observed: period (s); time (s) and state after the first impact; integration
-        error; the scale of the gaps, in their units; with forcing, the states at
-        whole forcing periods, `(periods, n)`.
+        The observed quantities are the period (s), the time (s) and state after the
+        first impact, the integration error, the scale of the gaps in their units and,
+        with forcing, the states at whole forcing periods, `(periods, n)`.
 
         Args:
             u: Unknowns of the equations, shape `(u,)`.
@@ -194,7 +195,7 @@ class ImpactingOrbits(AbstractProblem):
     def refused(self, monitors, observed) -> str | None:
         """Return the reason why a solution is not admissible, or None.
 
-        A curve of grazing orbits does not check the monitor that is zero along it.
+        On a curve of grazing orbits, the monitor that is zero along it is not checked.
 
         Returns:
             A sentence, or None.
@@ -246,16 +247,16 @@ class ImpactingOrbits(AbstractProblem):
 
     @property
     def representation(self) -> "ImpactSequences":
-        """The representations of an orbit: one starting from each of its impacts."""
+        """The representations of an orbit, one starting at each of its impacts."""
         return ImpactSequences(self.sequence(self.constraints), self)
 
     def sequence(self, constraints: tuple[int, ...]) -> str:
         """Return the name of the family of orbits with these impacts, in this order.
 
         Returns:
-            Text.
+            The name.
         """
-        # two numbers of steps differ by the error of the integration
+        # results for two numbers of steps differ by the integration error
         return f"impacts {constraints} periods {self.periods}"
 
     @property

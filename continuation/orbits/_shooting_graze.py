@@ -17,25 +17,25 @@ from .._eigenvalues import eigenvalues_of
 from ._watched import Watched
 
 
-# speed below which an impact counts as a grazing, relative to one plus the largest
-# component of the state: a located grazing is below it, and a matrix divided by that
-# speed contains only rounding errors
+# speed below which an impact counts as grazing, relative to one plus the largest
+# component of the state: a located grazing point is below it, and a matrix divided by
+# that speed contains only rounding errors
 _NO_SPEED = 1e-8
 ONE = (
-    "an impact has no speed here: one multiplier is infinite, the limit from orbits "
-    "that make this impact"
+    "an impact has zero speed here: one multiplier is infinite, which is the limit "
+    "for orbits with this impact"
 )
 NONE = (
-    "the multipliers have no limit here: {}; those of the points next to it tell the "
-    "two sides apart"
+    "the multipliers have no limit here: {}; see those of the neighbouring points on "
+    "either side"
 )
 
 
 def multipliers_of(
     equations: Shooting, u: np.ndarray, parameters: Any, at: Any
 ) -> tuple[Any, str]:
-    """Return multipliers (k,), the largest modulus first, and a sentence if one is
-    not finite or unknown.
+    """Return the multipliers (k,), largest modulus first, and a sentence if one is
+    infinite or unknown.
     """
     m = len(equations.constraints)
     speeds = np.array([float(at.monitors[Watched("speed", k).name]) for k in range(m)])
@@ -45,15 +45,16 @@ def multipliers_of(
         return eigenvalues_of(at.linearisation), ""
     unknown = np.full(at.linearisation.shape[0], np.nan, complex)
     if slow.size > 1:
-        return unknown, NONE.format(f"{slow.size} impacts have no speed")
+        return unknown, NONE.format(f"{slow.size} impacts have zero speed")
     regular, singular = _parts(
         equations, jnp.asarray(u), parameters, jnp.asarray(int(slow[0]))
     )
     found = multipliers_at_grazing(np.asarray(regular), np.asarray(singular))
     if not np.all(np.isfinite(found[1:])):
-        return unknown, NONE.format("the graze is not a simple one")
+        return unknown, NONE.format("the grazing is not simple")
     if not equations.periods:
-        # without forcing a shift in time is a deviation that stays: multiplier one
+        # without forcing, a time shift is a deviation that persists, with multiplier
+        # one
         finite = np.flatnonzero(np.isfinite(found))
         trivial = finite[np.argmin(np.abs(found[finite] - 1.0))]
         found = np.delete(found, trivial)

@@ -7,9 +7,7 @@ from variational.orbits import flown, Shooting
 
 
 def without_impact(equations: Shooting, u, parameters, number: int):
-    """Return the equations without impact `number`, and the state that leaves it
-    out.
-    """
+    """Return the equations and the state without impact `number`."""
     hits, periods = equations.constraints, equations.periods
     rows = np.array(u).reshape(len(hits), -1)
     hits = hits[:number] + hits[number + 1 :]
@@ -29,7 +27,7 @@ def without_impact(equations: Shooting, u, parameters, number: int):
 def with_impact(
     equations: Shooting, u, parameters, flight: int, time: float, which: int
 ):
-    """Return the equations with another impact, on `which`, at `time` (s) of a
+    """Return the equations with an additional impact on `which` at `time` (s) in a
     flight.
     """
     u = jnp.asarray(u)
@@ -54,7 +52,9 @@ def _with(equations: Shooting, constraints, steps: int | None = None) -> Shootin
 
 
 def _renumbered(periods, rows, number):
-    """Remove one row; without forcing, time counts from the first remaining row."""
+    """Remove one row; without forcing, time is measured from the first remaining
+    row.
+    """
     if periods or number:
         return np.delete(rows, number, axis=0)
     period, later = rows[0, 0], rows[1:].copy()

@@ -1,4 +1,4 @@
-"""Define monitors of orbits with impacts: gaps of flights and speeds of impacts."""
+"""Monitors of orbits with impacts: gaps in flights and speeds of impacts."""
 
 from typing import Literal, NamedTuple
 
@@ -12,7 +12,7 @@ class Watched(NamedTuple):
 
     @property
     def name(self) -> str:
-        """The monitor's name."""
+        """The name of the monitor."""
         kind = "gap of flight" if self.what == "gap" else "speed of impact"
         return f"{kind} {self.number}"
 

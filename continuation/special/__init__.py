@@ -1,4 +1,4 @@
-"""Detect and locate special points of a branch; compute their normal forms."""
+"""Detect and locate special points of a branch, and compute their normal forms."""
 
 from ._extended import AbstractExtended as AbstractExtended, varied as varied
 from ._locate import (

@@ -1,4 +1,4 @@
-"""Compute second compound matrices, singular where a pair of eigenvalues is
+"""Compute second compound matrices, which are singular if a pair of eigenvalues is
 critical.
 """
 
@@ -8,15 +8,15 @@ from jaxtyping import Array, Float
 
 
 def pairs(n: int) -> tuple[np.ndarray, np.ndarray]:
-    """Indices i < j of the n(n-1)/2 pairs."""
+    """Return the indices i < j of the n(n-1)/2 pairs."""
     return np.triu_indices(n, k=1)
 
 
 def additive(a: Float[Array, "n n"]) -> Float[Array, "m m"]:
-    """Return twice the bialternate product of A and I, with eigenvalues l_i + l_j, i <
-    j.
+    """Return twice the bialternate product of A and I, which has eigenvalues l_i + l_j,
+    i < j.
 
-    Kuznetsov, Elements of Applied Bifurcation Theory, section 10.2.
+    See Kuznetsov, Elements of Applied Bifurcation Theory, section 10.2.
     """
     i, j = pairs(a.shape[0])
     one = jnp.eye(a.shape[0], dtype=a.dtype)
@@ -29,15 +29,15 @@ def additive(a: Float[Array, "n n"]) -> Float[Array, "m m"]:
 
 
 def multiplicative(a: Float[Array, "n n"]) -> Float[Array, "m m"]:
-    """Return the bialternate product of A with itself: eigenvalues are l_i l_j, i <
-    j.
+    """Return the bialternate product of A with itself, which has eigenvalues l_i l_j, i
+    < j.
     """
     i, j = pairs(a.shape[0])
     return a[np.ix_(i, i)] * a[np.ix_(j, j)] - a[np.ix_(i, j)] * a[np.ix_(j, i)]
 
 
 def plane(w: Float[Array, " m"], n: int) -> Float[Array, "n n"]:
-    """Return the antisymmetric matrix of a vector over pairs; its range is their
+    """Return the antisymmetric matrix of a vector indexed by pairs; its range is their
     plane.
     """
     i, j = pairs(n)

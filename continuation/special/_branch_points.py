@@ -1,4 +1,4 @@
-"""Compute branch points as regular solutions of a larger problem."""
+"""Compute branch points as regular solutions of an extended problem."""
 
 from typing import Any, ClassVar
 
@@ -16,21 +16,21 @@ from .._program import evaluate, residual_at, solve
 from ..problem import AbstractProblem, jacobian_of, StabilityKind
 
 
-# displacement for the second derivatives of the correction, of unknowns of size one:
-# their error only slows the iteration, which takes the equations themselves exactly
+# displacement for the second derivatives in the correction, for unknowns of size one:
+# their error only slows the iteration, in which the equations themselves are exact
 _DISPLACED = 2.0**-15
-# slack that the error of an integration may leave
+# slack that may remain because of integration errors
 _SLACK = 1e-10
-# corrections that are tried
+# maximum number of corrections
 _MOST = 30
 
 
 class BranchPoints(AbstractProblem):
-    """Simple branch points: unknowns (u, parameter, slack, left null vector).
+    """Simple branch points, with the unknowns (u, parameter, slack, left null vector).
 
-    G + slack psi = 0, psi' G_u = 0, psi' G_p = 0, psi' psi = 1: 2 n + 2 equations,
-    whose solution is regular where two branches cross at an angle (Kuznetsov, section
-    10.2).
+    The 2 n + 2 equations are G + slack psi = 0, psi' G_u = 0, psi' G_p = 0 and psi' psi
+    = 1. The solution is regular if two branches cross at an angle (Kuznetsov, Elements
+    of Applied Bifurcation Theory, section 10.2).
     """
 
     base: AbstractProblem
@@ -62,7 +62,7 @@ class BranchPoints(AbstractProblem):
         return jnp.concatenate([sizes, jnp.reshape(self.width, (1,)), ones])
 
 
-# its `parameters` is a property, which type checkers take for an argument
+# `parameters` is a property, which type checkers interpret as an argument
 _crossing: Any = BranchPoints
 
 
@@ -70,7 +70,7 @@ def solved_crossing(
     problem: AbstractProblem, context: Context, guess
 ) -> tuple[np.ndarray, bool]:
     """Find the branch point near z = (u, parameter) by Newton's method with second
-    derivatives, and whether it succeeded.
+    derivatives; also return whether it succeeded.
     """
     at = _at(problem, context, guess)
     if not np.all(np.isfinite(at.jacobian)):
@@ -86,16 +86,17 @@ def solved_crossing(
 def differenced_crossing(
     problem: AbstractProblem, context: Context, guess
 ) -> tuple[np.ndarray, bool]:
-    """Find the branch point with differences of Jacobians, by the corrector's program.
+    """Find the branch point from differences of Jacobians, using the corrector's
+    program.
 
-    The second derivatives are taken once; convergence is linear, and fast near the
-    branch point, where bracketing ends because the equations are singular.
+    The second derivatives are computed only once. Convergence is linear, and fast near
+    the branch point, where bracketing ends because the equations are singular.
     """
     guess = np.asarray(guess, float)
     at = _at(problem, context, guess)
     if not np.all(np.isfinite(at.jacobian)):
         return guess, False
-    # rows and columns scaled as in the corrector
+    # rows and columns are scaled as in the corrector
     n, scale = guess.size - 1, np.asarray(at.scale)
     rows = scale[:-1, None]
 
@@ -128,7 +129,9 @@ def differenced_crossing(
 
 
 def _solves(slack, context: Context) -> bool:
-    """Return whether the point solves the equations, and not only those with slack."""
+    """Return whether the point solves the original equations, not only those with
+    slack.
+    """
     return bool(abs(slack) <= max(context.settings.tolerance, _SLACK))
 
 

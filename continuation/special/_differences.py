@@ -6,7 +6,7 @@ import numpy as np
 
 
 STEPS = 8
-"""Distances, each half of the one before."""
+"""Distances, each half of the previous one."""
 
 
 def along(
@@ -14,15 +14,16 @@ def along(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Compute the first and second derivative of a matrix along a direction.
 
-    Central differences at distances that are halved, extrapolated to zero as often as
-    that still helps (Ridders, Advances in Engineering Software 4, 1982): with Jacobians
-    right to rounding, about 1e-12 of the first and 1e-9 of the second is lost.
+    The method is central differences at successively halved distances, extrapolated to
+    zero as long as that reduces the error (Ridders, Advances in Engineering Software 4,
+    1982). With Jacobians accurate to rounding, the relative error is about 1e-12 for
+    the first derivative and 1e-9 for the second.
 
-    **Arguments:** `matrices` takes displacements `(k, n)` to matrices `(k, n, m)`;
-    `direction` is the largest displacement (n,) to be used.
+    **Arguments:** `matrices` maps displacements `(k, n)` to matrices `(k, n, m)`;
+    `direction` is the largest displacement `(n,)`.
 
     Returns:
-        Two matrices; NaN where the extrapolation does not settle to a part in a
+        Two matrices; NaN if the extrapolation does not converge to a part in a
             thousand.
     """
     shares = 0.5 ** np.arange(STEPS)
@@ -36,7 +37,9 @@ def along(
 
 
 def _limit(values: np.ndarray) -> np.ndarray:
-    """Return the limit of values at distances h, h/2, ..., even in the distance."""
+    """Return the limit of values at distances h, h/2, ..., which are even in the
+    distance.
+    """
     best, error = np.full_like(values[0], np.nan), np.inf
     row = [values[0]]
     for value in values[1:]:

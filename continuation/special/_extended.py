@@ -12,15 +12,18 @@ from ..problem import AbstractProblem, jacobian_of, StabilityKind
 
 
 class AbstractExtended(AbstractProblem):
-    """Unknowns (u, parameter): the equations of a problem and one condition more."""
+    """The equations of a problem and one more condition, with unknowns (u,
+    parameter).
+    """
 
     base: eqx.AbstractVar[AbstractProblem]
     leaf: eqx.AbstractVar[int]
     bounds: eqx.AbstractVar[Array]
-    """(2,) of the parameter that is an unknown here: the branch ends exactly on them.
+    """Bounds `(2,)` of the parameter that is an unknown; the branch ends exactly on
+    them.
     """
     width: eqx.AbstractVar[Array]
-    """Between these."""
+    """Bounds of the parameter that is an unknown."""
     stability: ClassVar[StabilityKind] = "none"
     normal_forms: ClassVar[bool] = False
     detects: ClassVar[bool] = False
@@ -30,7 +33,7 @@ class AbstractExtended(AbstractProblem):
         return self.base.parameters
 
     def inside(self, u, parameters):
-        """Unknowns and parameters of the problem inside."""
+        """Return the unknowns and parameters of the inner problem."""
         return u[:-1], with_leaf(parameters, self.leaf, u[-1])
 
     def linearisation(self, u: Float[Array, " n"], parameters: PyTree, jacobian):
@@ -57,6 +60,8 @@ class AbstractExtended(AbstractProblem):
 
 
 def varied(problem: AbstractProblem, z) -> tuple[float, ...]:
-    """Return values of the varying parameters at z = (u, parameter): two on a curve."""
+    """Return the values of the varying parameters at z = (u, parameter); two on a
+    curve.
+    """
     first = (float(z[-2]),) if isinstance(problem, AbstractExtended) else ()
     return *first, float(z[-1])

@@ -21,7 +21,7 @@ from ._test_functions import (
 )
 
 
-# their `parameters` is a property, which type checkers take for an argument
+# `parameters` is a property, which type checkers interpret as an argument
 _singular: Any = SingularPoints
 
 
@@ -36,8 +36,8 @@ class Located(NamedTuple):
 def singular_points(
     problem: AbstractProblem, kind: str, context: Context, z: np.ndarray
 ) -> SingularPoints:
-    """Return the extended problem of a kind of special point, with borders from near
-    it.
+    """Return the extended problem for a kind of special point, with borders computed
+    near it.
     """
     m = matrix_at(problem, kind, context.leaf, z)
     border = np.zeros(m.shape[0])
@@ -54,7 +54,7 @@ def singular_points(
 
 
 def _newton(problem, name: str, context: Context, guess: np.ndarray):
-    """Apply Newton's method to the extended system: (z, success)."""
+    """Apply Newton's method to the extended system; return (z, success)."""
     if name == BRANCH_POINT:
         return solved_crossing(problem, context, guess)
     if name in problem.monitors():
@@ -75,8 +75,9 @@ def locate(
 ) -> Located:
     """Locate the zero of a test function between points a and b of a branch.
 
-    Newton on the extended system, from the secant's estimate; where that fails or
-    leaves the bracket, the bracket is shrunk with points of the branch first.
+    Newton's method is applied to the extended system, starting from the secant
+    estimate. If it fails or leaves the bracket, the bracket is first reduced with
+    points of the branch.
     """
     low, high = (a.z, values[0]), (b.z, values[1])
     guess = cubic_between(a, b, values[0] / (values[0] - values[1]))
@@ -100,7 +101,7 @@ def locate(
         middle = correct(problem, context, guess, chord / a.scale, a.tangent)
         if not middle.success or not _inside(middle.z, low[0], high[0], a.scale):
             if name == BRANCH_POINT:
-                # the equations are singular there, and the corrector fails first
+                # the equations are singular there, so the corrector fails first
                 return _between_branches(problem, context, a, b, guess)
             reason = "the branch could not be computed between two of its points"
             return Located(guess, False, reason)
@@ -116,7 +117,9 @@ def locate(
         if name == BRANCH_POINT:
             return _between_branches(problem, context, a, b, guess)
         return Located(guess, True, "")
-    return Located(guess, False, "Newton on the extended system did not converge")
+    return Located(
+        guess, False, "Newton's method on the extended system did not converge"
+    )
 
 
 def _between_branches(
@@ -139,7 +142,7 @@ def _between_branches(
 
 
 def _next_guess(low, high, attempt: int) -> np.ndarray:
-    """Alternate secant and bisection."""
+    """Alternate between secant and bisection."""
     share = 0.5
     if attempt % 3 != 2:
         share = abs(low[1]) / (abs(low[1]) + abs(high[1]))
@@ -148,7 +151,7 @@ def _next_guess(low, high, attempt: int) -> np.ndarray:
 
 
 def cubic_between(a: Corrected, b: Corrected, share: float) -> np.ndarray:
-    """Cubic through two points and their tangents."""
+    """Return a point on the cubic through two points and their tangents."""
     if not np.isfinite(share):
         share = 0.5
     chord = b.z - a.z
@@ -178,8 +181,9 @@ def ahead(
 ) -> Located | None:  # fmt: skip
     """Find the zero of a monitor within `reach` ahead of a point of the branch, if any.
 
-    For monitors that do not change sign or end the branch: the solution may not exist
-    at or beyond the zero, which is approached from this side, level by level.
+    This is for monitors that do not change sign, or that end the branch: the solution
+    may not exist at or beyond the zero, which is approached from this side, level by
+    level.
     """
     z, level, failures = a.z, value, 0
 
@@ -211,7 +215,7 @@ def ahead(
 
 
 def pair_is_complex(problem, kind: str, context: Context, z: np.ndarray, at) -> bool:
-    """Return whether a critical pair is complex; otherwise the point is a neutral
+    """Return whether a critical pair is complex; otherwise, the point is a neutral
     saddle.
     """
     if kind not in (HOPF, NEIMARK_SACKER):

@@ -1,4 +1,4 @@
-"""Compute points at which a monitor is zero as solutions of a larger problem."""
+"""Compute points at which a monitor is zero as solutions of an extended problem."""
 
 from typing import Any, ClassVar
 
@@ -16,7 +16,7 @@ from ._extended import AbstractExtended
 
 
 class MonitorPoints(AbstractExtended):
-    """Points (u, parameter) on a branch where a monitor of the problem is zero."""
+    """Points (u, parameter) on a branch at which a monitor of the problem is zero."""
 
     base: AbstractProblem
     name: str = eqx.field(static=True)
@@ -51,10 +51,10 @@ class MonitorPoints(AbstractExtended):
 
 
 class MonitorLevel(AbstractProblem):
-    """The point (u, parameter) on a branch where a monitor has a given value.
+    """The point (u, parameter) on a branch at which a monitor has a given value.
 
-    The index of the monitor is an array, so that one program finds the zeros of all,
-    unless the derivatives of a monitor are costly.
+    The index of the monitor is an array, so that one program can find the zeros of all
+    monitors, unless the derivatives of a monitor are costly.
     """
 
     base: AbstractProblem
@@ -82,14 +82,14 @@ class MonitorLevel(AbstractProblem):
         return jnp.concatenate([sizes, jnp.reshape(self.width, (1,))])
 
 
-# its `parameters` is a property, which type checkers take for an argument
+# `parameters` is a property, which type checkers interpret as an argument
 _level: Any = MonitorLevel
 
 
 def monitor_level(
     problem: AbstractProblem, name: str, context: Context, level: float = 0.0
 ) -> MonitorLevel:
-    """Return the problem of the point where a monitor has this value."""
+    """Return the problem of finding the point at which a monitor has this value."""
     monitors = problem.monitors()
     number: Any = list(monitors).index(name)
     if not any(monitor.bracket for monitor in monitors.values()):

@@ -17,7 +17,7 @@ from ._multilinear import second, third
 from ._test_functions import FLIP, FOLD, has_own_dynamics, HOPF, NEIMARK_SACKER
 
 
-# largest displacement for differences, of a component of a state or phase
+# largest displacement of a component of a state or phase for differences
 _REACH = 2.0**-7
 
 
@@ -50,9 +50,9 @@ def _parts(x: Any):
 
 
 class _Derivatives:
-    """The derivatives A, B, C of a problem at a point, also for complex arguments.
+    """The derivatives A, B and C of a problem at a point, also for complex arguments.
 
-    They come from nested differentiation, or from differences of Jacobians if the
+    They are computed by nested differentiation, or from differences of Jacobians if the
     problem sets `costly`.
     """
 
@@ -71,7 +71,7 @@ class _Derivatives:
         y = jax.eval_shape(
             lambda u: self.problem.local_dynamics(u, self.parameters).at, self.u
         )
-        # as many as differences take, so that it is the same program
+        # as many as for differences, so that the same program is used
         return self._jacobians(np.zeros((2 * STEPS + 1, y.size)))[0]
 
     def b(self, x, y, of_residual: bool = False):
@@ -101,7 +101,7 @@ class _Derivatives:
 
     def _c(self, a, b, c) -> np.ndarray:
         if self.problem.costly:
-            # polarised, as differences are along one line
+            # polarised, because differences are along one line
             if np.array_equal(a, b):
                 return self._along(a)[1] @ c
             return (self._along(a + b)[1] - self._along(a - b)[1]) @ c / 4
@@ -129,7 +129,9 @@ class _Derivatives:
         return np.asarray(_jacobians(self.problem, self.parameters, self.u, moves))
 
     def _residual_jacobians(self, moves: np.ndarray) -> np.ndarray:
-        """Use the program of the corrector, which is already compiled."""
+        """Return Jacobians from the program of the corrector, which is already
+        compiled.
+        """
         n, one = moves.shape[1], np.ones_like(self.z)
         return np.stack(
             [
@@ -161,18 +163,18 @@ def _adjoint(matrix: np.ndarray, q: np.ndarray) -> np.ndarray:
 
 
 def null_vectors(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Unit right and left null vectors of a nearly singular matrix."""
+    """Return the unit right and left null vectors of a nearly singular matrix."""
     left, _, right = np.linalg.svd(matrix)
     return right[-1].conj(), left[:, -1]
 
 
 def flip_direction(linearisation: np.ndarray) -> np.ndarray:
-    """Unit eigenvector of the multiplier -1."""
+    """Return the unit eigenvector of the multiplier -1."""
     return null_vectors(linearisation + np.eye(linearisation.shape[0]))[0]
 
 
 def fold_form(d: _Derivatives, at: Corrected) -> tuple[float | None, str]:
-    """Return coefficient a of x' = a x^2 or x -> x + a x^2, and the side of the
+    """Return the coefficient a of x' = a x^2 or x -> x + a x^2, and the side of the
     branch.
     """
     n, jacobian, problem = at.jacobian.shape[0], at.jacobian, d.problem
@@ -182,7 +184,7 @@ def fold_form(d: _Derivatives, at: Corrected) -> tuple[float | None, str]:
     if slope == 0 or not np.isfinite(bending):
         return None, ""
     side = "larger" if -bending / slope > 0 else "smaller"
-    words = f"the branch lies at {side} parameters"
+    words = f"the branch lies at {side} parameter values"
     if problem.stability == "none":
         return None, words
     if has_own_dynamics(problem):
@@ -196,8 +198,8 @@ def fold_form(d: _Derivatives, at: Corrected) -> tuple[float | None, str]:
 
 
 def flip_form(d: _Derivatives, at: Corrected) -> tuple[float | None, str]:
-    """Return coefficient c of x -> -x + c x^3; positive: the doubled orbit is
-    stable.
+    """Return the coefficient c of x -> -x + c x^3; if it is positive, the doubled orbit
+    is stable.
     """
     a = d.a(at)
     one = np.eye(a.shape[0])
@@ -209,7 +211,7 @@ def flip_form(d: _Derivatives, at: Corrected) -> tuple[float | None, str]:
 
 
 def hopf_form(d: _Derivatives, at: Corrected) -> tuple[float | None, str]:
-    """Return the first Lyapunov coefficient; negative: the limit cycle is stable."""
+    """Return the first Lyapunov coefficient; if negative, the limit cycle is stable."""
     a = d.a(at)
     one = np.eye(a.shape[0])
     pair = _critical_pair(a, lambda values: np.abs(values.real))
@@ -229,8 +231,8 @@ def hopf_form(d: _Derivatives, at: Corrected) -> tuple[float | None, str]:
 
 
 def neimark_sacker_form(d: _Derivatives, at: Corrected) -> tuple[float | None, str]:
-    """Return the real part of the cubic coefficient; negative: stable invariant
-    curve.
+    """Return the real part of the cubic coefficient; if it is negative, the invariant
+    curve is stable.
     """
     a = d.a(at)
     one = np.eye(a.shape[0])

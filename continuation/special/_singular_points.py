@@ -1,4 +1,4 @@
-"""Compute points with a singular matrix as regular solutions of a larger problem."""
+"""Compute points with a singular matrix as regular solutions of an extended problem."""
 
 from typing import ClassVar
 
@@ -23,7 +23,7 @@ from ._multilinear import second, third
 from ._test_functions import FLIP, FOLD, has_own_dynamics, HOPF, NEIMARK_SACKER
 
 
-# pairs of eigenvalues other than a critical one are watched up to this dimension
+# pairs of eigenvalues other than the critical one are monitored up to this dimension
 _LARGEST_FOR_PAIRS = 8
 
 
@@ -56,12 +56,13 @@ def matrix_at(problem, kind: str, leaf: int, z) -> np.ndarray:
 
 
 class SingularPoints(AbstractExtended):
-    """Points (u, parameter) on a branch where a matrix is singular.
+    """Points (u, parameter) on a branch at which a matrix is singular.
 
-    G = 0 and g = 0, where [[M, b], [c', 0]] (v, g) = (0, 1) (Govaerts, Numerical
-    Methods for Bifurcations of Dynamical Equilibria, 2000): M = dG/du for a fold, A + I
-    for a flip, bialternate products for a pair of eigenvalues. One equation and one
-    unknown more than the problem has, and regular at simple special points.
+    The equations are G = 0 and g = 0, where [[M, b], [c', 0]] (v, g) = (0, 1)
+    (Govaerts, Numerical Methods for Bifurcations of Dynamical Equilibria, 2000). M is
+    dG/du for a fold, A + I for a flip, and a bialternate product for a pair of
+    eigenvalues. There is one more equation and one more unknown than in the problem,
+    and the system is regular at simple special points.
     """
 
     base: AbstractProblem
@@ -91,7 +92,7 @@ class SingularPoints(AbstractExtended):
         return jnp.concatenate([self.base.residual(inner, inside), g[None]])
 
     def null_vectors(self, u, parameters):
-        """Unit right and left null vectors of the singular matrix."""
+        """Return the unit right and left null vectors of the singular matrix."""
         m = self._matrix(u, parameters)
         right = self._bordered(m, False)[:-1]
         left = self._bordered(m, True)[:-1]
@@ -101,7 +102,8 @@ class SingularPoints(AbstractExtended):
         base = set_parameters(self.base, parameters)
         m = matrix_at(base, self.kind, self.leaf, u)
         left, _, right = np.linalg.svd(m)
-        # signs are continued, so that test functions of null vectors are continuous
+        # signs are kept continuous, so that test functions of null vectors are
+        # continuous
         b = left[:, -1] * (-1.0 if left[:, -1] @ np.asarray(self.b) < 0 else 1.0)
         c = right[-1] * (-1.0 if right[-1] @ np.asarray(self.c) < 0 else 1.0)
         return with_field(with_field(self, "b", b), "c", c)
@@ -200,11 +202,11 @@ class SingularPoints(AbstractExtended):
 
 
 def flip_coefficient(motion, u, a, right, left):
-    """Coefficient c of the flip's normal form x -> -x + c x^3, times left . right and
-    the determinant of A - I.
+    """Return the coefficient c of the flip normal form x -> -x + c x^3, times left .
+    right and the determinant of A - I.
 
-    Kuznetsov, section 5.4. The factors keep it finite at 1:2 resonances and fold-flips,
-    where c has poles.
+    See Kuznetsov, section 5.4. The factors keep the result finite at 1:2 resonances and
+    fold-flips, where c has poles.
     """
     one = jnp.eye(a.shape[0], dtype=a.dtype)
     bqq = second(motion, u, right, right)

@@ -1,4 +1,4 @@
-"""Evaluate test functions, which change sign at special points."""
+"""Evaluate the test functions, which change sign at special points."""
 
 from typing import Any
 
@@ -16,7 +16,7 @@ FLIP = "flip"
 NEIMARK_SACKER = "Neimark-Sacker"
 HOPF = "Hopf"
 _HUGE = 1e100
-"""Stands for an infinite eigenvalue in products."""
+"""Represents an infinite eigenvalue in products."""
 
 
 def kinds(problem: AbstractProblem) -> tuple[str, ...]:
@@ -34,11 +34,12 @@ def has_own_dynamics(problem: AbstractProblem) -> bool:
 
 
 def test_values(problem: AbstractProblem, leaf: int, at: Corrected) -> dict[str, float]:
-    """Values of all test functions at a point.
+    """Return the values of all test functions at a point.
 
-    Test functions of eigenvalues are symmetric, products over all eigenvalues or pairs
-    (such as the determinant of a bialternate product), so no single eigenvalue has to
-    be tracked. Only their signs are used; the size is that of the smallest factor.
+    Test functions of eigenvalues are symmetric: they are products over all eigenvalues
+    or pairs (such as the determinant of a bialternate product), so no single eigenvalue
+    has to be tracked. Only their signs are used; the magnitude is that of the smallest
+    factor.
     """
     values = {name: float(value) for name, value in at.monitors.items()}
     wanted = kinds(problem)
@@ -47,7 +48,7 @@ def test_values(problem: AbstractProblem, leaf: int, at: Corrected) -> dict[str,
         values[FOLD] = float(at.tangent[-1] / at.scale[-1])
     if FLIP in wanted or HOPF in wanted:
         eigenvalues, _ = eigenvalues_at(problem, leaf, at)
-        # only signs count, and that of an infinite multiplier is known
+        # only signs matter, and that of an infinite multiplier is known
         huge = np.isinf(eigenvalues)
         eigenvalues = np.where(huge, np.sign(eigenvalues.real) * _HUGE, eigenvalues)
         i, j = pairs(eigenvalues.size)
@@ -71,7 +72,7 @@ def _product(factors: np.ndarray) -> float:
 def eigenvalues_at(
     problem: AbstractProblem, leaf: int, at: Corrected
 ) -> tuple[Any, str]:
-    """Return eigenvalues at a point of a branch, and a remark on them."""
+    """Return the eigenvalues at a point of a branch, and a remark on them."""
     parameters = with_leaf(problem.parameters, leaf, np.asarray(at.z[-1]))
     return problem.eigenvalues(at.z[:-1], parameters, at)
 
