@@ -132,10 +132,10 @@ class Policy:
     )
     drive_wander: float = _decides(
         0.75,
-        "multiple of the drive's frequency below which its variations are wandering",
+        "multiple of the drive's frequency below which its variations are speed drift",
     )
     drive_degree: int = _decides(
-        5, "degree of the polynomial for the wandering near the ends"
+        5, "degree of the polynomial for the speed drift near the ends"
     )
     drive_orders: tuple[float, ...] = _decides(
         (1.25, 1.4, 1.6, 1.75, 2.25, 2.4, 2.6, 2.75),

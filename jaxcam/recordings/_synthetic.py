@@ -19,7 +19,7 @@ _FINER = 256
 
 
 class Wandering(HybridSystem):
-    """A driven system whose drive speed wanders slowly, as in real drives.
+    """A driven system whose drive speed drifts slowly, as in real drives.
 
     The drive turns at `speed (1 + depth w)` with w = 0.7 cos(2 pi 0.31 t) + 0.3 cos(2
     pi 0.87 t): two slow harmonics with incommensurate frequencies.
@@ -34,7 +34,7 @@ class Wandering(HybridSystem):
     base: HybridSystem
     """The system."""
     depth: float = 2e-4
-    """Relative amplitude of the wandering."""
+    """Relative amplitude of the speed drift."""
     speed: Callable[[Any], Array] = eqx.field(
         default=lambda system: system.speed, static=True
     )

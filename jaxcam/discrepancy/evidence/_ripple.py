@@ -1,9 +1,9 @@
 """Detect ripple of the drive speed in its encoder signal.
 
 `w (1 + eps cos(phi - psi))` shifts the angle by `eps sin(phi - psi)` to first order. A
-real drive also wanders slowly: variations slower than three quarters of its rotation
+real drive also drifts slowly: variations slower than three quarters of its rotation
 frequency are fitted freely (by cosines over the length of the recording) and are not
-ripple. The leakage of the wandering into the harmonic is estimated from the spectrum at
+ripple. The leakage of the drift into the harmonic is estimated from the spectrum at
 non-harmonic multiples of the rotation frequency.
 """
 
@@ -35,7 +35,7 @@ class Ripple:
     psi_stderr: float
     """Standard error of `psi`."""
     gain: float
-    """Gain in twice the log-likelihood, beyond the leakage of the wandering."""
+    """Gain in twice the log-likelihood, beyond the leakage of the speed drift."""
     p_value: float
     """Probability of such a gain without ripple."""
     count: int
