@@ -12,11 +12,11 @@ from ._options import JsonFile
 def demo(
     case: Annotated[
         Path | None,
-        typer.Option(metavar="DIR", help="A folder of recordings, one CSV per run."),
+        typer.Option(metavar="CASE", help="A folder of recordings, one CSV per run."),
     ] = None,
     rig: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="The rig file; default DIR/rig.toml."),
+        typer.Option(metavar="FILE", help="The rig file; default CASE/rig.toml."),
     ] = None,
     gaps: Annotated[
         str,

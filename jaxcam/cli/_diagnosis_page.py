@@ -94,7 +94,7 @@ def _before_and_after(found: Diagnosis) -> list[str]:
         "<h2>Error on held-out flights</h2>",
         f"<p>The error is {factor * found.heldout_before:.3g} {unit} with the "
         f"textbook model and {factor * found.heldout_after:.3g} with the missing "
-        "effects; the noise and rounding of the sensor are "
+        "effects; the noise and rounding of the sensor amount to "
         f"{factor * found.noise_floor:.3g}.</p>",
     ]
     if found.misfit:
@@ -124,7 +124,8 @@ def _alternatives(found: Diagnosis) -> list[str]:
     return [
         "<h2>Other explanations</h2>",
         table_html(("terms", "BIC", "reason for rejection"), rows, text=(0, 2)),
-        '<p class="note">BIC minus that of the verdict.</p>',
+        '<p class="note">The column BIC gives the BIC of each one minus that of '
+        "the verdict.</p>",
     ]
 
 
@@ -139,13 +140,13 @@ def _left_over(found: Diagnosis) -> list[str]:
         )
         for one in found.left_after
     ]
-    headings = ("form", "where", "gain", "threshold", "left")
+    headings = ("form", "where", "gain", "threshold", "significant")
     return [
         "<h2>Remaining structure in the residuals</h2>",
         table_html(headings, rows, text=(0, 1)),
-        '<p class="note">Gain in twice the log-likelihood if each of these free '
-        "functions were added to the model, and the required gain, which follows "
-        "from the error rate and the number of coefficients.</p>",
+        '<p class="note">The gain is the increase in twice the log-likelihood if '
+        "the free function were added to the model. The threshold follows from the "
+        "false-alarm rate and the number of coefficients.</p>",
     ]
 
 

@@ -107,6 +107,7 @@ Gaps: TypeAlias = Annotated[
     str,
     typer.Option(
         metavar="NAME",
-        help="Faulty recordings: mend (dropped samples, slips), refuse or split.",
+        help="Faulty recordings: mend (dropped samples, encoder slips), refuse or "
+        "split.",
     ),
 ]

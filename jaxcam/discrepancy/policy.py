@@ -206,7 +206,7 @@ class Policy:
         2, "maximum number of free functions for unknown physics; 0: none"
     )
     elements: int = _bounds(
-        0, "maximum number of resonances, relaxations and hystereses, 0 or 1"
+        0, "maximum number of elements with an internal state, 0 or 1"
     )
     function_lengths: tuple[float, ...] = _bounds(
         (0.05, 0.1, 0.2, 0.4, 0.8, 1.6),
@@ -226,7 +226,7 @@ class Policy:
     followed: int = _bounds(
         3, "maximum number of free functions and terms fitted per stage"
     )
-    outdone: float = _bounds(1.25, "multiple of its curve's cost that ends a late form")
+    outdone: float = _bounds(1.25, "multiple of the curve's cost that a form must beat")
     enough: float = _bounds(0.1, "share of the tolerated residual that ends the search")
     heats: int = _bounds(
         4, "maximum number of fits of a free function until its prior converges"

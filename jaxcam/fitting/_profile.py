@@ -16,7 +16,7 @@ class Profile:
     """The profile likelihood of one parameter.
 
     The cost is below 3.84 inside the 95 % interval; `interval` is interpolated, and
-    infinite on a side without a value of higher cost.
+    infinite on a side where the cost does not reach this value.
     """
 
     name: str
@@ -39,7 +39,7 @@ class Profile:
     def _crossing(self, order, none: float) -> float:
         order = list(order)
         for a, b in zip(order, order[1:]):
-            # the root of the cost is closer to a straight line than the cost
+            # the square root of the cost is more nearly linear than the cost
             low, high = (np.sqrt(max(self.cost[k], 0.0)) for k in (a, b))
             level = np.sqrt(3.84)
             if low <= level < high:
@@ -135,12 +135,12 @@ def excess_cost(
     others fitted.
 
     This cost defines the joint confidence region of d parameters of a nonlinear model:
-    values are inside if it is below the quantile of the chi-square distribution with d
-    degrees of freedom, `found.ellipse(names).limit`. The example continues that of
-    [`jaxcam.fitting.fit`][].
+    values are inside if their cost is below the quantile of the chi-square distribution
+    with d degrees of freedom, `found.ellipse(names).limit`. The example continues that
+    of [`jaxcam.fitting.fit`][].
 
     Args:
-        found: The fit, in which all these parameters were free.
+        found: The fit, in which all parameters in `values` were free.
         values: Values by name.
         weights: Weight of each piece of the data; use the same value as for `found`.
         prior: Whether tolerances count as prior knowledge; use the value used for
@@ -179,7 +179,7 @@ def _require_shared(found: Fit, name: str) -> None:
 
 
 def _known(problem, name: str, values):
-    """Return the prior knowledge of a parameter, as a cost of its values."""
+    """Return the contribution of the prior to the cost, at given values."""
     parameter = problem.parameter(name)
     nominal = parameter.nominal
     if nominal is None:

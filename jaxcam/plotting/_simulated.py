@@ -10,9 +10,10 @@ from ..recordings.against_model import Comparison
 def simulated_channel(
     comparison: Comparison, recording: Recording, channel: str
 ) -> Float[np.ndarray, " k"]:
-    """Return the simulated channel at the samples of the recording; NaN elsewhere.
+    """Return the simulated channel at the samples of the recording.
 
-    A comparison keeps the differences in flight and in contact, each at its sample.
+    A comparison contains differences only at samples in flight and in contact; the
+    other samples are NaN.
 
     **Raises:** `ValueError` if the recording is not in the comparison.
     """

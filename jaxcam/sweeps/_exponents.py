@@ -25,7 +25,7 @@ class Exponents(NamedTuple):
 
     @property
     def chaotic(self) -> np.ndarray:
-        """Return whether the exponent is positive by three standard errors."""
+        """Return whether the exponent is more than three standard errors above zero."""
         return self.largest > 3 * self.stderr
 
 
@@ -44,7 +44,8 @@ def largest_exponents(
         section: The section, as for [`jaxcam.sweeps.diagram`][].
         states: Settled states, shape `(lanes, n)`; rows that are NaN stay NaN.
         turns: Number of periods averaged, at least 16.
-        where: As for a section; motions of one second parameter are computed together.
+        where: As for a section; motions with the same value of the second
+            parameter are computed together.
         values: As for a section.
         progress: Called with the fraction done.
 

@@ -148,8 +148,8 @@ def decoy_explains(share: float) -> Caveat:
     """Caveat: a function that acts at the wrong times explains much as well."""
     return Caveat(
         Reason.DECOY,
-        "A function of the same variables that acts in the reverse order of time would "
-        f"explain {share:.0%} of what it explains, so these recordings hardly show on "
+        "The same function evaluated along the time-reversed motion would explain "
+        f"{share:.0%} of what it explains, so these recordings hardly show on "
         "which variables it depends. Record motions that repeat less.",
     )
 

@@ -1,4 +1,7 @@
-"""Linearise each piece and joint of one recording about a point."""
+"""Linearise each piece and joint of one recording about a point.
+
+A joint is the condition that connects a piece with the one before it.
+"""
 
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -43,7 +46,7 @@ class LinearPieces(NamedTuple):
     """Pieces and joints of one recording, before summation.
 
     The first `n` of `a = n + m` columns are the state at the beginning of the piece,
-    the others are the parameters.
+    and the others are the parameters.
     """
 
     information: Float[Array, "k a a"]
@@ -208,8 +211,8 @@ def rested(model: Model, guess, start, step, angle, rate, place):
 
 
 def rested_all(model: Model, pieces: Pieces, extras: Extras):
-    """Return the samples of all pieces in contact of one record, shape `(kc, n, m,
-    c)`.
+    """Return the samples of all pieces in contact of one recording, shape `(kc,
+    n, m, c)`.
     """
     if not len(pieces.rest_exists):
         return jnp.zeros(pieces.rested.value.shape)
@@ -238,9 +241,9 @@ def joint_inputs(pieces: Pieces):
 
 
 def joint(model: Model, reach, before, state, t, angle, rate, kind):
-    """Return state and gap in one vector `(n + 1,)` for any kind of joint."""
+    """Return the mismatches in state and gap at a joint of any kind, `(n + 1,)`."""
     inner = jnp.concatenate([*_flat(flight_joint(before, state))])
-    # without an impact, its search must not affect the derivatives
+    # without an impact, the search for one must not affect the derivatives
     hit = kind == IMPACT
     found = impact_joint(model, before, state, t, angle, rate, reach)
     outer = jnp.concatenate([*_flat(found)])
