@@ -75,7 +75,7 @@ def test_a_pick_travels_between_processes():
     ],
 )
 def test_what_is_no_parameter_is_refused_with_the_names_of_those_that_are(where, says):
-    with pytest.raises(ValueError, match="inner.radius|pick several") as caught:
+    with pytest.raises(ValueError, match="inner.radius|selects several") as caught:
         pick(where, Outer())
     assert says in str(caught.value)
 

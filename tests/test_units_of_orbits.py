@@ -139,4 +139,4 @@ def test_penetration_is_judged_beside_the_size_of_gaps(size):
 
     assert refusal(-1e-10, -1e-10) is None
     assert "falls to" in refusal(-1e-8, 0.0)
-    assert "moves away" in refusal(0.0, -1e-8)
+    assert "motion is away" in refusal(0.0, -1e-8)

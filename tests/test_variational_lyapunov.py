@@ -75,7 +75,7 @@ def test_what_does_not_fit_is_refused():
         variational.lyapunov_spectrum(system, [-0.9, 0.0], 10)
     with pytest.raises(ValueError, match="together"):
         variational.lyapunov_spectrum(system, [-0.9, 0.0], values=LANES)
-    with pytest.raises(ValueError, match="every lane"):
+    with pytest.raises(ValueError, match="every motion"):
         variational.lyapunov_spectrum(
             system, jnp.zeros((3, 2)), where=lambda s: s.omega, values=LANES
         )

@@ -1,4 +1,4 @@
-"""Compute derivatives of trajectories: saltation and monodromy matrices,
+"""Compute derivatives of trajectories: saltation matrices, monodromy matrices and
 multipliers.
 """
 

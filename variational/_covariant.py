@@ -16,7 +16,8 @@ from ._tangent_lanes import orthonormal
 
 
 class CovariantVectors(eqx.Module):
-    """Covariant directions at the start of each period, fastest growing first.
+    """Covariant directions at the start of each period, in order of decreasing growth
+    rate.
 
     One period maps `vectors[k, :, j]` to a multiple of `vectors[k + 1, :, j]`.
     """
@@ -24,12 +25,13 @@ class CovariantVectors(eqx.Module):
     state: Float[Array, "turns n"]
     """State at the start of each period, shape `(turns, n)`."""
     vectors: Float[Array, "turns n n"]
-    """Unit vectors, one per column, shape `(turns, n, n)`; NaN where the motion ever
-    sticks."""
+    """Unit vectors, one per column, shape `(turns, n, n)`; NaN if the motion sticks at
+    any time.
+    """
     local: Float[Array, "turns n"]
-    """Growth rate of each vector in the period (1/s), shape `(turns, n)`."""
+    """Growth rate of each vector in each period (1/s), shape `(turns, n)`."""
     code: Array
-    """0 if every period was finished, otherwise an index into `RESULTS`."""
+    """0 if every period was completed, otherwise an index into `RESULTS`."""
 
     @property
     def exponents(self) -> Float[Array, " n"]:
@@ -40,7 +42,7 @@ class CovariantVectors(eqx.Module):
 
     @property
     def angle(self) -> Float[Array, " turns"]:
-        """The smallest angle between two of the vectors (rad), shape `(turns,)`; 0 at a
+        """The smallest angle between two vectors (rad), shape `(turns,)`; 0 at a
         tangency.
         """
         size = jnp.abs(jnp.einsum("kij,kil->kjl", self.vectors, self.vectors))
@@ -58,28 +60,28 @@ def covariant_vectors(
     transient: int = 100,
     settings: Settings | None = None,
 ) -> CovariantVectors:
-    """Compute the covariant Lyapunov vectors along a motion, impacts included.
+    """Compute the covariant Lyapunov vectors along a motion, including impacts.
 
-    Forwards, an orthonormal frame is carried by the derivative M of each period, M Q =
-    Q' R; backwards, vectors are carried inside it by the inverses of the R, under which
-    they converge to the covariant directions (Ginelli et al., Physical Review Letters
-    99, 130601, 2007). For a periodic orbit they are the eigenvectors of the monodromy
-    matrix. The function is pure; it may be compiled and batched with `vmap` over states
-    and parameters.
+    Forwards in time, an orthonormal frame is propagated by the derivative M of each
+    period, M Q = Q' R. Backwards, vectors in this frame are propagated by the inverses
+    of the matrices R, under which they converge to the covariant directions (Ginelli et
+    al., Physical Review Letters 99, 130601, 2007). For a periodic orbit, these are the
+    eigenvectors of the monodromy matrix. The function is pure: it can be compiled, and
+    batched with `vmap` over states and parameters.
 
     Args:
         system: The system.
         state: State at `t0`, shape `(n,)`.
-        turns: Number of periods returned. `transient` others precede them, in which the
-            motion settles and the frame converges; as many follow, from which the
-            vectors converge backwards.
+        turns: Number of periods returned. They are preceded by `transient` periods, in
+            which transients decay and the frame converges, and followed by as many,
+            over which the vectors converge backwards.
         t0: Start time (s).
         transient: Number of periods before and after those returned.
         settings: Accuracy of the run; default a tolerance of 1e-12.
 
     Returns:
         A `CovariantVectors`. Sticking removes every deviation, so a motion that sticks
-            has no such directions, and all of them are NaN.
+            has no such directions, and all vectors are NaN.
 
     Raises:
         ValueError: The system has no period, or a number of periods is invalid.
@@ -116,7 +118,7 @@ def covariant_vectors(
 @eqx.filter_jit
 def _vectors(system, state, t0, settings, turns: int, transient: int):
     n = state.shape[0]
-    # each period begins at the same phase, so its time need not grow
+    # each period begins at the same phase, so time need not grow
     period: Any = system.period
 
     def turn(x):
@@ -131,7 +133,7 @@ def _vectors(system, state, t0, settings, turns: int, transient: int):
         return (after, new), (x, frame, new.T @ moved, code)
 
     def backwards(inner, triangle):
-        # of the frame after a period, its vectors before it
+        # vectors in the frame after a period are mapped to those before it
         solved = jax.scipy.linalg.solve_triangular(triangle, inner)
         growth = 1 / jnp.linalg.norm(solved, axis=0, keepdims=True)
         solved = solved * growth
@@ -142,7 +144,7 @@ def _vectors(system, state, t0, settings, turns: int, transient: int):
     _, (states, frames, triangles, codes) = jax.lax.scan(
         forwards, start, None, length=count
     )
-    # ones above the diagonal keep every vector out of smaller subspaces
+    # ones above the diagonal, so that no vector lies in a smaller subspace
     upper = jnp.triu(jnp.ones((n, n)))
     upper = upper / jnp.linalg.norm(upper, axis=0, keepdims=True)
     _, (inner, growth) = jax.lax.scan(

@@ -1,4 +1,6 @@
-"""Propagate a deviation through an event: impact, start of contact, release."""
+"""Propagate a deviation through an event: an impact, a start of contact, or a
+release.
+"""
 
 from collections.abc import Callable
 
@@ -27,11 +29,12 @@ def impact_of(system: HybridSystem, constraint) -> Callable:
 
 
 def completed_law(system: HybridSystem, constraint) -> Callable:
-    """Return the law of an impact together with all later ones of its chatter.
+    """Return the combined law of an impact and all later impacts of its chatter
+    sequence.
 
-    The state after it is the combination of the states before and after the impact that
-    has no normal velocity: to second order in the speed, the rest of the sequence takes
-    negligible time.
+    The state after it is the linear combination of the states before and after the
+    impact that has zero normal velocity; to second order in the speed, the duration of
+    the rest of the sequence is negligible.
     """
     impact = impact_of(system, constraint)
 
@@ -54,7 +57,8 @@ def field_of(system: HybridSystem, contact: Bool[Array, " m"] | None) -> Callabl
 def event_crossing(
     law: Callable, gap: Callable, field_before: Callable, field_after: Callable, t, x
 ) -> tuple[Float[Array, "n n"], Float[Array, " n"], Float[Array, " n"], Array]:
-    """R_x, w = F+ - R_t - R_x F-, the normal H_x, and the speed v of the gap.
+    """Return R_x, w = F+ - R_t - R_x F-, the normal H_x, and the rate of change v of
+    the gap.
 
     The derivative of the flow across the event is R_x + w H_x / v.
     """
@@ -69,11 +73,12 @@ def event_crossing(
 def onto_contact(
     system: HybridSystem, t, x, contact: Bool[Array, " m"]
 ) -> Float[Array, " n"]:
-    """Take one Newton step onto gap = normal velocity = 0 for constraints in contact.
+    """Take one Newton step towards gap = normal velocity = 0 for constraints in
+    contact.
 
-    At a state in contact it changes nothing, but its derivative projects deviations
-    onto those allowed by contact: the rank falls by two for each constraint, and the
-    dependence of the contact state on the parameters remains.
+    A state in contact is not changed, but the derivative of the step projects
+    deviations onto those allowed by contact: the rank falls by two for each constraint,
+    while the dependence of the contact state on the parameters remains.
     """
     values = gaps(system, t, x)
     normals = jax.jacfwd(lambda y: gaps(system, t, y))(x)
@@ -89,11 +94,12 @@ def onto_contact(
 def contact_projector(
     system: HybridSystem, t, x, contact: Bool[Array, " m"]
 ) -> Float[Array, "n n"]:
-    """Return the derivative of `onto_contact`: exactly zero for two states in
-    contact.
+    """Return the derivative of `onto_contact`, which is exactly zero for a system of
+    two states in contact.
     """
     out = jax.jacfwd(lambda y: onto_contact(system, t, y, contact))(x)
     if x.shape[0] == 2:
-        # zero exactly; rounding divided by a small impact speed would not be zero
+        # exactly zero, because rounding divided by a small impact speed would not be
+        # zero
         out = jnp.where(jnp.any(contact), jnp.zeros_like(out), out)
     return out

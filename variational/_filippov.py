@@ -1,4 +1,4 @@
-"""Differentiate motions that cross a surface or slide on it."""
+"""Differentiate motions of Filippov systems, which cross a surface or slide on it."""
 
 import equinox as eqx
 import jax
@@ -16,15 +16,15 @@ def filippov_saltation(
 ) -> Float[Array, "n n"]:
     """Return the saltation matrix of a switch of a Filippov system.
 
-    With F- and F+ the fields in force before and after, at a crossing and where sliding
-    begins,
+    With F- and F+ the active fields before and after, the matrix at a crossing and at
+    the start of sliding is
 
         S = I + (F+ - F-) H_x / (H_t + H_x F-).
 
-    Where sliding begins its rank falls by one: the deviation is projected onto the
-    surface. Where sliding ends one field has become tangent, F+ = F-, and S is the
-    identity. (R. I. Leine, H. Nijmeijer, Dynamics and Bifurcations of Non-Smooth
-    Mechanical Systems, 2004, chapter 7)
+    At the start of sliding, its rank falls by one, because the deviation is projected
+    onto the surface. At the end of sliding, one field has become tangent, F+ = F-, and
+    S is the identity. (R. I. Leine, H. Nijmeijer, Dynamics and Bifurcations of
+    Non-Smooth Mechanical Systems, 2004, chapter 7)
 
     Args:
         system: The system.
@@ -56,12 +56,13 @@ def filippov_saltation(
 
 
 def filippov_monodromy(trajectory: FilippovTrajectory) -> Float[Array, "n n"]:
-    """Return the derivative of the state at the end of a run by that at its start.
+    """Return the derivative of the state at the end of a run with respect to that at
+    its start.
 
-    It is the product of the flows' derivatives between switches and the saltation
-    matrices at the switches. Over one period of a periodic motion its eigenvalues are
-    the Floquet multipliers; each stretch of sliding contributes a zero. A start that
-    slides is varied along the surface only.
+    It is the product of the derivatives of the flow between switches and the saltation
+    matrices at the switches. Over one period of a periodic motion, its eigenvalues are
+    the Floquet multipliers, and each sliding interval contributes a zero multiplier. If
+    the run starts in sliding, the start is varied only along the surface.
 
     Args:
         trajectory: A run of [`jaxcam.filippov.simulate_filippov`][].

@@ -1,4 +1,4 @@
-"""Integrate one flight (or one contact interval) with its deviations."""
+"""Integrate one flight (or one contact interval) and its variational equations."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -10,17 +10,19 @@ from jaxtyping import Array, Float
 from jaxcam.hybrid.runge_kutta import adaptive_steps, DOPRI8
 
 
-# of the end state and of the entries of the matrix, relative and absolute
+# relative and absolute tolerance of the end state and the matrix entries
 TOLERANCE = 1e-14
 
 
 class LinearisedFlight(NamedTuple):
-    """The end of a flight and its derivatives by the start."""
+    """The end of a flight and its derivatives with respect to the start."""
 
     state: Float[Array, " n"]
-    """(n,) state at the end."""
+    """State at the end, (n,)."""
     matrix: Float[Array, "n columns"]
-    """(n, n + q): by the state at the start, then by the q parameters."""
+    """Derivatives (n, n + q) with respect to the initial state, then the q
+    parameters.
+    """
     log_volume: Float[Array, ""]
     """Logarithm of the determinant of the first n columns (Liouville)."""
 
@@ -30,8 +32,8 @@ def fly_linearised(
 ) -> LinearisedFlight:
     """Integrate the motion and its variational equations from `t0` to `t1`.
 
-    **Arguments:** `field(parameters, t, x)`, smooth on the interval; there is no event
-    detection.
+    **Arguments:** `field(parameters, t, x)`, which must be smooth on the interval;
+    there is no event detection.
     """
     n, q = x.shape[0], parameters.shape[0]
 

@@ -1,15 +1,16 @@
-"""Derive the local map of a grazing orbit: discontinuity mappings and square-root map.
+"""The local map of a grazing orbit: discontinuity mappings and the square-root map.
 
-At a graze the gap has a minimum of zero: H = v = 0 and a > 0. A neighbour whose gap
-would reach the depth d = -min H > 0 hits with the speed sqrt(2 a d), which the impact
-changes by (1 + r) sqrt(2 a d) in the direction D of the impulse (v_x D = 1). All else
-being of higher order, the flow is that of the system without the wall, after the map
+At a grazing point, the gap has a minimum of zero: H = v = 0 and a > 0. A neighbouring
+motion whose gap would reach the depth d = -min H > 0 hits the constraint with the speed
+sqrt(2 a d), which the impact changes by (1 + r) sqrt(2 a d) in the direction D of the
+impulse (v_x D = 1). All other effects are of higher order, so the flow is that of the
+system without the constraint, after the map
 
     z -> z + b sqrt(d(z)),   b = (1 + r) sqrt(2 a) D,   d(z) = -(H_x z + H_mu mu).
 
 It is the zero-time discontinuity mapping of di Bernardo, Budd and Champneys (Physica D
-160, 2001); on the section v = 0 the vector is b - F v_x b / a. Composed with the
-derivative N of one period it is the local map z -> N (z + b sqrt(d)) + N_mu mu.
+160, 2001); on the section v = 0, the vector is b - F v_x b / a. The composition with
+the derivative N of one period is the local map z -> N (z + b sqrt(d)) + N_mu mu.
 """
 
 import equinox as eqx
@@ -40,12 +41,11 @@ from .orbits import (
 
 
 class GrazingForm(eqx.Module):
-    """The leading-order map of a neighbourhood of a grazing orbit.
+    """The leading-order map in the neighbourhood of a grazing orbit.
 
-    Deviations z, shape `(n,)`, are those of the state at the time of the graze, from
-    the orbit of the unchanged system; mu, shape `(q,)`, is the change of the
-    parameters. The map is that of M. di Bernardo, C. J. Budd, A. R. Champneys, Physica
-    D 160, 2001.
+    z, shape `(n,)`, is the deviation of the state at the time of grazing from the orbit
+    of the unchanged system; mu, shape `(q,)`, is the change of the parameters. The map
+    is that of M. di Bernardo, C. J. Budd, A. R. Champneys, Physica D 160, 2001.
 
     Examples:
         >>> from jaxcam.models import ImpactOscillator
@@ -61,43 +61,45 @@ class GrazingForm(eqx.Module):
     state: Float[Array, " n"]
     """State at that time, shape `(n,)`."""
     clearance: Float[Array, ""]
-    """Gap there: zero at the graze, positive short of it."""
+    """Gap at that time: zero for a grazing orbit, positive before grazing."""
     acceleration: Float[Array, ""]
-    """Acceleration of the gap there, positive."""
+    """Acceleration of the gap at that time, positive."""
     restitution: Float[Array, ""]
-    """Coefficient of restitution there."""
+    """Coefficient of restitution at that time."""
     normal: Float[Array, " n"]
     """Gradient H_x of the gap, shape `(n,)`."""
     normal_parameters: Float[Array, " q"]
-    """Derivative H_mu of the gap by the parameters, shape `(q,)`."""
+    """Derivative H_mu of the gap with respect to the parameters, shape `(q,)`."""
     zero_time: Float[Array, " n"]
     """The vector b of the zero-time discontinuity mapping, shape `(n,)`."""
     section: Float[Array, " n"]
     """The vector b of the discontinuity mapping of the section v = 0, shape `(n,)`."""
     matrix: Float[Array, "n n"]
-    """Derivative N of one period from `time` on, without the graze, shape `(n, n)`."""
+    """Derivative N of one period starting at `time`, without the impact, shape `(n,
+    n)`.
+    """
     matrix_parameters: Float[Array, "n q"]
-    """Derivative N_mu of that period by the parameters, shape `(n, q)`."""
+    """Derivative N_mu of that period with respect to the parameters, shape `(n, q)`."""
 
     @property
     def multipliers(self) -> Complex[Array, " n"]:
-        """Multipliers of the orbit without contact, shape `(n,)`."""
+        """Multipliers of the orbit without the impact, shape `(n,)`."""
         return eigenvalues(self.matrix)
 
     @property
     def coefficient(self) -> Float[Array, ""]:
-        """The gap H_x N b at the next pass for a unit square root."""
+        """The change H_x N b of the next smallest gap for a unit square root."""
         return self.normal @ self.matrix @ self.zero_time
 
     def depth(self, z: Float[Array, " n"], mu=None) -> Float[Array, ""]:
-        """Return the depth to which the gap of a deviation would go without an impact.
+        """Return the penetration depth that a deviation would have without an impact.
 
         Args:
             z: Deviation of the state, shape `(n,)`.
             mu: Change of the parameters, shape `(q,)`; default none.
 
         Returns:
-            The depth; negative without an impact.
+            The depth; negative if there is no impact.
         """
         shift = 0.0 if mu is None else self.normal_parameters @ mu
         return -(self.clearance + self.normal @ z + shift)
@@ -133,8 +135,9 @@ class GrazingForm(eqx.Module):
     def penetration(self, mu=None) -> Float[Array, ""]:
         """Return the parameter mu of Nordmark's map, [`variational.nordmark_map`][].
 
-        It is the depth of the orbit that would pass through the wall, over the square
-        of the coefficient; defined only where the coefficient is positive.
+        It is the depth of the orbit that would pass through the constraint, divided by
+        the square of the coefficient. It is defined only if the coefficient is
+        positive.
 
         Args:
             mu: Change of the parameters, shape `(q,)`; default none.
@@ -157,14 +160,14 @@ def grazing_form(
     where: Where | None = None,
     constraint: int = 0,
 ) -> GrazingForm:
-    """Compute the square-root map of an orbit that grazes a constraint, or almost does.
+    """Compute the square-root map of an orbit that grazes a constraint or nearly does.
 
     Args:
         system: The system.
         orbit: A periodic orbit whose gap has a smooth minimum near zero; it may have
             other impacts.
-        where: Picks the parameters mu, one or a tuple; default none.
-        constraint: Index of the constraint that is grazed.
+        where: Selects the parameters mu, one or a tuple; default none.
+        constraint: Index of the grazed constraint.
 
     Returns:
         A [`variational.GrazingForm`][].
@@ -197,7 +200,7 @@ def grazing_form(
 
 
 def _lowest(system, orbit: Orbit, constraint):
-    """Time and state at which the gap has its smallest smooth minimum."""
+    """Return time and state at which the gap has its smallest smooth minimum."""
     t0, t1 = float(orbit.time), float(orbit.time + orbit.period)
     turn = simulate(system, orbit.state, t0, t1, tolerance=1e-12)
     pieces = orbit.pieces
@@ -211,8 +214,8 @@ def _lowest(system, orbit: Orbit, constraint):
     best = int(np.argmin(heights))
     if not np.isfinite(heights[best]):
         raise ValueError(
-            "the gap of this orbit has no smooth minimum; give an orbit that grazes, "
-            "or one just short of it"
+            "the gap of this orbit has no smooth minimum; give an orbit that grazes or "
+            "nearly does"
         )
     return jnp.asarray(times[best]), jnp.asarray(states[best])
 

@@ -1,7 +1,7 @@
 """Compute Lyapunov exponents of a motion with impacts.
 
-The event loop runs without derivatives; those of its steps are taken from its log
-afterwards, all at once, and multiplied in order.
+The event loop runs without derivatives. Afterwards, the derivatives of all steps in its
+log are computed at once and multiplied in order.
 """
 
 from collections.abc import Callable
@@ -22,24 +22,25 @@ from ._tangent_lanes import Carried, first_frames, next_rows, ROWS
 
 
 class LyapunovSpectrum(eqx.Module):
-    """Lyapunov exponents (1/s), one set per batch element if there are several."""
+    """Lyapunov exponents (1/s), with one set per motion if there are several."""
 
     exponents: Float[Array, "*lanes n"]
     """Exponents, largest first, shape `(n,)` or `(lanes, n)`."""
     stderr: Float[Array, "*lanes n"]
-    """Standard error of each, from the scatter of blocks of consecutive periods."""
-    impact_rate: Float[Array, "*lanes"]
-    """Impacts per second."""
-    local: Float[Array, "*lanes turns n"]
-    """Finite-time exponents, each over one period, shape `(turns, n)`."""
-    state: Float[Array, "*lanes n"]
-    """State at the end, from which to continue, shape `(n,)`."""
-    turn: Float[Array, "*lanes"] | Float[Array, "1"]
-    """Length of a period (s); shape `(1,)` where it is the same for all batch elements.
+    """Standard error of each exponent, from the scatter of blocks of consecutive
+    periods.
     """
+    impact_rate: Float[Array, "*lanes"]
+    """Mean number of impacts per second."""
+    local: Float[Array, "*lanes turns n"]
+    """Finite-time exponents over each period, shape `(turns, n)`."""
+    state: Float[Array, "*lanes n"]
+    """Final state, from which the computation can be continued, shape `(n,)`."""
+    turn: Float[Array, "*lanes"] | Float[Array, "1"]
+    """Length of a period (s); shape `(1,)` if it is the same for all motions."""
     code: Array
-    """0 if every period was finished, otherwise an index into `RESULTS`, with NaN
-    exponents.
+    """0 if every period was completed; otherwise an index into `RESULTS`, and the
+    exponents are NaN.
     """
 
     @property
@@ -67,31 +68,32 @@ def lyapunov_spectrum(
     max_steps: int = 10_000_000,
     progress: Callable[[float], None] | None = None,
 ) -> LyapunovSpectrum:
-    """Compute all Lyapunov exponents, impacts included, by repeated orthogonalisation.
+    """Compute all Lyapunov exponents, including impacts, by repeated
+    orthonormalisation.
 
-    Steps are differentiated one by one, with saltation matrices at events, and their
-    product is applied to a frame that is orthonormalised repeatedly (Benettin et
-    al., Meccanica 15, 1980; for impacts Mueller, Chaos, Solitons and Fractals 5, 1995).
+    Each step is differentiated, with saltation matrices at events, and the product is
+    applied to a frame that is orthonormalised repeatedly (Benettin et al., Meccanica
+    15, 1980; for impacts Mueller, Chaos, Solitons and Fractals 5, 1995).
 
     Args:
         system: The system.
         state: Initial state, shape `(n,)`, or `(lanes, n)` for many motions at once.
-        turns: Number of periods that are averaged, after the transient.
-        t0: Start (s).
+        turns: Number of periods to average over, after the transient.
+        t0: Start time (s).
         transient: Number of periods before the average.
-        turn: Length of a period (s); default the forcing's own.
-        where: Picks the parameter that differs between motions.
+        turn: Length of a period (s); default: the forcing period.
+        where: Selects the parameter that differs between motions.
         values: Value of that parameter in each motion, shape `(lanes,)`.
         settings: Accuracy of the run; default a tolerance of 1e-12.
         blocks: Number of blocks for the standard error.
-        max_steps: Budget of attempted steps per motion.
-        progress: Called with the fraction of periods done.
+        max_steps: Maximum number of attempted steps per motion.
+        progress: Called with the fraction of periods completed.
 
     Returns:
-        A `LyapunovSpectrum`; minus infinity where the motion sticks.
+        A `LyapunovSpectrum`; exponents are minus infinity if the motion sticks.
 
     Raises:
-        ValueError: Shapes do not fit, or there is no period.
+        ValueError: Shapes are inconsistent, or there is no period.
 
     Examples:
         >>> from jaxcam.models import ImpactOscillator
@@ -116,11 +118,13 @@ def lyapunov_spectrum(
         raise ValueError("this system has no forcing period; pass turn=... in seconds")
     if not 2 <= blocks <= turns:
         raise ValueError(
-            f"{turns} turns cannot be split into {blocks} blocks; give at least two "
-            "blocks, and as many turns"
+            f"{turns} turns cannot be divided into {blocks} blocks; give at least two "
+            "blocks, and at least as many turns"
         )
     if (where is None) != (values is None):
-        raise ValueError("give where and values together, one value for each lane")
+        raise ValueError(
+            "give where and values together, with one value for each motion"
+        )
     system = as_arrays(system)
     settings = as_arrays(settings)
     state = real_array(state)
@@ -164,7 +168,8 @@ def _in_turn(some: Callable, batched, states):
     """Call `some(batched, states)` for one block of lanes after another, and
     concatenate.
 
-    Blocks have equal sizes, so that one program serves all; the last lane pads them.
+    Blocks have equal sizes, so that one program suffices; they are padded with the last
+    lane.
     """
     lanes = states.shape[0]
     count = -(-lanes // _BLOCK)
@@ -175,7 +180,7 @@ def _in_turn(some: Callable, batched, states):
     parts = [
         some(jax.tree.map(lambda leaf, k=k: leaf[k], batched), states[k]) for k in order
     ]
-    # all share one period length if nothing else differs
+    # all have the same period length if nothing else differs
     alike = parts[0].turn.shape[0] == 1
     whole = jax.tree.map(lambda *leaves: jnp.concatenate(leaves)[:lanes], *parts)
     return eqx.tree_at(lambda m: m.turn, whole, parts[0].turn) if alike else whole
@@ -194,7 +199,7 @@ class _Seen:
 
     @property
     def share(self) -> float:
-        """Return the fraction of periods done, over all lanes."""
+        """Return the fraction of periods completed, over all lanes."""
         # the first is the start of the run
         done, most = self._filled - 1, self.logs.shape[1] - 1
         return float(np.mean(np.minimum(done, most))) / most
@@ -218,7 +223,8 @@ class _Seen:
 def _summary(seen: _Seen, carry: Carried, length, transient, blocks):
     length = np.asarray(length)
     with np.errstate(invalid="ignore"):
-        # the difference of two infinities: the motion stuck before and in this period
+        # the difference of two infinities: the motion stuck before and during this
+        # period
         local = np.diff(seen.logs[:, transient:], axis=1) / length[:, None, None]
     stuck = np.isneginf(seen.logs[:, transient + 1 :])
     local = np.where(stuck & np.isnan(local), -np.inf, local)
@@ -249,13 +255,13 @@ def _lanes(system, state, where, values):
         return None, system, jnp.atleast_2d(state)
     values = jnp.asarray(values, dtype=jnp.float64)
     if values.ndim != 1:
-        raise ValueError(f"values has shape {values.shape}; pass one for each lane")
+        raise ValueError(f"values has shape {values.shape}; pass one for each motion")
     if state.ndim == 1:
         state = jnp.broadcast_to(state, (values.shape[0], state.shape[0]))
     if state.shape[0] != values.shape[0]:
         raise ValueError(
-            f"{state.shape[0]} states and {values.shape[0]} values; give one of each "
-            "for every lane"
+            f"there are {state.shape[0]} states and {values.shape[0]} values; give one "
+            "of each for every motion"
         )
     one = pick(where, system)
     picked = one.replaced(jax.tree.map(lambda _: False, system), True)
@@ -263,7 +269,8 @@ def _lanes(system, state, where, values):
     return batched, shared, state
 
 
-# lanes in one program: their logs stay in the cache, and waiting times are short
+# number of lanes in one program, so that their logs fit into the cache and waiting
+# times are short
 _BLOCK = 128
 
 
@@ -284,7 +291,7 @@ def _turn(batched, shared, length):
 
 @eqx.filter_jit
 def _restitutions(batched, shared, t0, states):
-    """Return coefficients of restitution, (lanes, m)."""
+    """Return the coefficients of restitution, (lanes, m)."""
 
     def one(batched, state):
         return restitutions(eqx.combine(batched, shared), t0, state)

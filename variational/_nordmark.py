@@ -1,16 +1,16 @@
-"""The one-dimensional square-root map near grazing, and its windows."""
+"""The one-dimensional square-root map near grazing, and its periodic windows."""
 
 import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Float
 
 
 def nordmark_map(x: ArrayLike, mu: ArrayLike, lam: ArrayLike) -> Float[Array, "..."]:
-    """Return sqrt(mu - x) + lam mu where x <= mu, and lam x elsewhere.
+    """Return sqrt(mu - x) + lam mu for x <= mu, and lam x otherwise.
 
-    This is the limit of [`variational.GrazingForm`][] where one multiplier `lam` in (0,
-    1) dominates the others: x is the gap at the graze less that of the orbit that would
-    pass through the wall, and mu its depth, both over the square of the coefficient
-    (Nordmark, Journal of Sound and Vibration 145, 1991).
+    This is the limit of [`variational.GrazingForm`][] if one multiplier `lam` in (0, 1)
+    dominates the others: x is the smallest gap minus that of the orbit that would pass
+    through the constraint, and mu is the depth of that orbit, both divided by the
+    square of the coefficient (Nordmark, Journal of Sound and Vibration 145, 1991).
 
     Args:
         x: Scaled gap, any shape.
@@ -32,24 +32,24 @@ def nordmark_map(x: ArrayLike, mu: ArrayLike, lam: ArrayLike) -> Float[Array, ".
 
 
 def nordmark_window(lam: float, period: int) -> tuple[float, float]:
-    """Return the interval of mu in which the orbit with one impact per `period` is
-    stable.
+    """Return the interval of mu in which the orbit with one impact per `period`
+    iterations is stable.
 
         3 lam^(2m-2) / (4 (1 - lam^m)) < mu < lam^(2m-4) (1 - lam) / (1 - lam^(m-1))^2
 
-    At the upper end the orbit grazes, at the lower one it loses stability by a flip
+    At the upper end, the orbit grazes; at the lower end, it loses stability in a flip
     (Chin, Ott, Nusse and Grebogi, Physical Review E 50, 1994). If the lower bound is
-    not below the upper one there is no window.
+    not below the upper one, there is no window.
 
     Args:
         lam: Dominant multiplier, between 0 and 1.
         period: Number m of iterations between impacts, at least 2.
 
     Returns:
-        Lower and upper bound of mu.
+        Lower and upper bounds of mu.
 
     Raises:
-        ValueError: Lam lies outside (0, 1), or the period is below 2.
+        ValueError: `lam` is outside (0, 1), or the period is below 2.
 
     Examples:
         >>> from variational import nordmark_window
@@ -60,7 +60,9 @@ def nordmark_window(lam: float, period: int) -> tuple[float, float]:
     if not 0 < lam < 1:
         raise ValueError(f"lam is {lam:g}; windows are known for 0 < lam < 1")
     if period < 2:
-        raise ValueError(f"period is {period}; give the number of turns, 2 or more")
+        raise ValueError(
+            f"period is {period}; give the number of iterations, 2 or more"
+        )
     m = period
     low = 3 * lam ** (2 * m - 2) / (4 * (1 - lam**m))
     high = lam ** (2 * m - 4) * (1 - lam) / (1 - lam ** (m - 1)) ** 2

@@ -10,9 +10,9 @@ from jax.flatten_util import ravel_pytree
 def with_one_jacobian(
     function: Callable, finish: Callable = lambda by_each: by_each
 ) -> Callable:
-    """Wrap `function` so that its derivative is one full Jacobian times the direction.
+    """Wrap `function` so that its derivative is the full Jacobian times the direction.
 
-    The cost of a chain of flights is then proportional to their number, not to its
+    The cost for a chain of flights is then proportional to their number instead of its
     square. The result can be differentiated again, unless `finish`, which receives the
     Jacobian, raises an error.
 

@@ -19,13 +19,13 @@ def poincare_derivative(
 ) -> Float[Array, "n n"]:
     """Return the derivative of the Poincare map at a point of a periodic motion.
 
-    It is the monodromy matrix, projected onto the section along the flow (thesis,
-    eq. 2.14). It has one eigenvalue zero, in the direction of the flow, and the
+    It is the monodromy matrix projected onto the section along the flow (thesis, eq.
+    2.14). Its eigenvalues are zero, in the direction of the flow, and the nontrivial
     multipliers of the orbit.
 
     Args:
         field: Vector field of an autonomous system, `field(state)`.
-        section: Smooth scalar function of the state, zero on the section.
+        section: Smooth scalar function of the state that is zero on the section.
         state: A state on the section and on the orbit, shape `(n,)`.
         period: Period of the orbit (s).
         tolerance: Relative error allowed per step.

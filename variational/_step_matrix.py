@@ -48,17 +48,17 @@ def step_matrix(
     point: StepStart,
     row: LogRow,
 ) -> Float[Array, "n n"]:
-    """Return the derivative of one step and of its final event; the identity for no
-    step.
+    """Return the derivative of one step and its final event; the identity if there is
+    no step.
 
-    The step length is that of the run, so the derivative needs no step control.
+    The step length is that of the run, so no step control is needed for the derivative.
     """
     n = functions.n
     taken = row.kind != float(RowKind.NOTHING)
     h = jnp.where(taken, row.t - point.t, 0.0)
 
     def inside(t):
-        # steps end at breakpoints, and see the field on one side of them
+        # steps end at breakpoints, and use the field on one side of them
         return t if system.breakpoints is None else between(t, point.t, row.t, h)
 
     def end(*x):

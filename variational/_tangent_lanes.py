@@ -25,14 +25,14 @@ class Carried(NamedTuple):
 
 # rows of the log between two checks from Python
 ROWS = 256
-# the widest vectors that the machine has; XLA is shy of them by default
+# the widest vectors of the machine, which XLA avoids by default
 _WIDE: dict[str, Any] = {"compiler_options": {"xla_cpu_prefer_vector_width": 512}}
 
 
 def _plan(system, length, t0, turns, settings) -> Plan:
     length = system.period if length is None else length
     end = t0 + turns * length
-    # shorter in contact, where the tangent is carried along
+    # shorter in contact, where the tangent is propagated together with the state
     plan = Plan.of(system, settings, t0, end, period=length, stop_period=length)
     return plan._replace(longest_step=jnp.minimum(plan.longest_step, length / 8))
 
@@ -81,7 +81,7 @@ def next_rows(batched, shared, length, t0, turns, settings, carry: Carried):
         taken = kind != float(RowKind.NOTHING)
         started = after
         if not functions.planar:
-            # the motion after a chatter starts without normal velocity
+            # the motion after a chatter sequence starts with zero normal velocity
             rest = jax.vmap(lambda s, y, k: completed_law(system, k)(s, y))
             at_rest = (kind == float(RowKind.LAST_IMPACT))[:, None]
             started = jnp.where(at_rest, rest(t, before, side), after)
@@ -120,12 +120,12 @@ def next_rows(batched, shared, length, t0, turns, settings, carry: Carried):
 def orthonormal(matrix: Float[Array, "n n"]):
     """Orthonormalise columns (Gram-Schmidt); return them and the previous lengths.
 
-    A column of zeros stays zero.
+    A column of zeros remains zero.
     """
     columns, lengths = [], []
     for k in range(matrix.shape[0]):
         column = matrix[:, k]
-        # twice is enough
+        # two passes are enough
         for _ in range(2):
             for earlier in columns:
                 column = column - jnp.sum(earlier * column) * earlier

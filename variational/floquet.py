@@ -1,4 +1,4 @@
-"""Compute multipliers of a periodic orbit, and test functions of bifurcations."""
+"""Compute the multipliers of a periodic orbit, and test functions for bifurcations."""
 
 import equinox as eqx
 import jax
@@ -28,10 +28,12 @@ class Stability(eqx.Module):
     """The product of mu_i mu_j - 1 over i < j, times `scale`: zero at a Neimark-Sacker
     bifurcation."""
     scale: Float[Array, ""]
-    """A factor between 0 and 1 that vanishes with the slowest impact speed v as M grows
-    like 1/v: the least of v / (v + |a| period), with a the acceleration of the gap."""
+    """A factor between 0 and 1 that vanishes with the slowest impact speed v, as M
+    grows like 1/v: the smallest value of v / (v + |a| period), with a the acceleration
+    of the gap.
+    """
     reason: str = eqx.field(static=True)
-    """Reason why some multipliers must be zero, else the empty string."""
+    """Reason why some multipliers must be zero; otherwise empty."""
 
     @property
     def stable(self) -> bool:
@@ -55,8 +57,9 @@ def floquet_multipliers(
         settings: Accuracy of "flow"; default a tolerance of 1e-12.
 
     Returns:
-        Multipliers, shape `(n,)`, complex. Zero if the orbit sticks, because contact
-            fixes gap and normal velocity regardless of their previous values.
+        Multipliers, shape `(n,)`, complex. At least two are zero if the orbit sticks,
+            because contact sets gap and normal velocity to zero regardless of their
+            previous values.
 
     Examples:
         >>> import continuation, variational
@@ -80,11 +83,12 @@ def _multipliers(system, state, pieces, sticks):
 
 
 def stability(system: HybridSystem, orbit: Orbit) -> Stability:
-    """Return multipliers, eigenvectors and test functions of a periodic orbit.
+    """Return the multipliers, eigenvectors and test functions of a periodic orbit.
 
-    The test functions are formed from the multipliers (Kuznetsov, Elements of Applied
-    Bifurcation Theory, section 10.2) and multiplied by the impact speed, so that they
-    stay bounded where an impact becomes a graze, and change sign only at a bifurcation.
+    The test functions are computed from the multipliers (Kuznetsov, Elements of Applied
+    Bifurcation Theory, section 10.2) and multiplied by a factor proportional to the
+    impact speed, so that they remain bounded when an impact becomes grazing, and change
+    sign only at a bifurcation.
 
     Args:
         system: The system.
@@ -143,11 +147,11 @@ test_functions.__test__ = False  # pyright: ignore[reportFunctionMemberAccess]
 
 
 def impact_scale(system: HybridSystem, orbit: Orbit) -> Float[Array, ""]:
-    """Return the least of v / (v + |a| period) over the impacts outside chatter; else
-    1.
+    """Return the smallest v / (v + |a| period) over the impacts outside chatter, or 1
+    if there are none.
 
-    v is the speed of an impact and a the acceleration of the gap just before it, so
-    that |a| period / v is about the largest entry of its saltation matrix.
+    Here v is the speed of an impact and a the acceleration of the gap just before it;
+    |a| period / v is approximately the largest entry of its saltation matrix.
 
     Args:
         system: The system.
@@ -185,11 +189,11 @@ def _reason(orbit: Orbit) -> str:
     n = orbit.state.shape[0]
     if n == 2:
         return (
-            "All multipliers are zero because the orbit sticks: in contact gap and "
-            "normal velocity are zero whatever they were, and two states have nothing "
-            "else."
+            "All multipliers are zero because the orbit sticks: in contact, gap and "
+            "normal velocity are zero regardless of their previous values, and they "
+            "determine both states."
         )
     return (
-        "At least two multipliers are zero because the orbit sticks: in contact gap "
-        "and normal velocity are zero whatever they were."
+        "At least two multipliers are zero because the orbit sticks: in contact, gap "
+        "and normal velocity are zero regardless of their previous values."
     )

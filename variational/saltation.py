@@ -1,4 +1,4 @@
-"""Propagate deviations through events: impact, start of contact, release."""
+"""Propagate deviations through events: impacts, starts of contact and releases."""
 
 import equinox as eqx
 import jax
@@ -24,11 +24,11 @@ def saltation_matrix(
 ) -> Float[Array, "n n"]:
     """Return the saltation matrix, which maps a deviation across an impact.
 
-    With F-, F+ the vector field before and after, R the impact law and H the gap,
+    With F- and F+ the vector field before and after, R the impact law and H the gap,
 
         S = R_x + (F+ - R_t - R_x F-) H_x / (H_t + H_x F-),
 
-    explicit time included, so that moving constraints need no extra terms (M. di
+    which includes explicit time, so that moving constraints need no extra terms (M. di
     Bernardo, C. J. Budd, A. R. Champneys, P. Kowalczyk, Piecewise-smooth Dynamical
     Systems, 2008, chapter 2).
 
@@ -40,11 +40,12 @@ def saltation_matrix(
         constraint: Index of the constraint that is hit.
 
     Returns:
-        Shape `(n, n)`. It grows like one over the impact speed near grazing.
+        The matrix, shape `(n, n)`. Near grazing, it grows like the inverse of the
+            impact speed.
 
     Raises:
         ValueError: The normal velocity is not negative, so there is no impact; inside
-            `jit` the matrix is infinite there.
+            `jit`, the matrix is infinite instead.
 
     Examples:
         >>> from jaxcam.models import BouncingBall
@@ -57,21 +58,21 @@ def saltation_matrix(
     if not isinstance(parts.speed, Tracer) and not float(parts.speed) < 0:
         raise ValueError(
             f"the normal velocity is {float(parts.speed):g}, so there is no impact; "
-            "give the state just before it, and for a graze use "
-            "saltation_parts: the matrix is regular + singular / speed"
+            "give the state just before an impact, or use saltation_parts for "
+            "grazing: the matrix is regular + singular / speed"
         )
     return parts.matrix
 
 
 class SaltationParts(eqx.Module):
-    """S = regular + singular / speed; both parts stay bounded at a graze."""
+    """S = regular + singular / speed; both parts are bounded at grazing."""
 
     regular: Float[Array, "n n"]
     """The bounded part, shape `(n, n)`."""
     singular: Float[Array, "n n"]
     """The part divided by the speed, of rank one, shape `(n, n)`."""
     speed: Float[Array, ""]
-    """Normal velocity before the impact, zero at a graze."""
+    """Normal velocity before the impact; zero at grazing."""
 
     @property
     def matrix(self) -> Float[Array, "n n"]:
@@ -80,15 +81,14 @@ class SaltationParts(eqx.Module):
 
     @property
     def limit(self) -> Float[Array, "n n"]:
-        """The limit of S times the speed at the graze, shape `(n, n)`."""
+        """The limit of S times the speed at grazing, shape `(n, n)`."""
         return self.singular + self.speed * self.regular
 
 
 def saltation_parts(
     system: HybridSystem, t, state_before: Float[Array, " n"], constraint: int = 0
 ) -> SaltationParts:
-    """Split a saltation matrix into its bounded part and the part that grows at
-    grazing.
+    """Split a saltation matrix into a bounded part and a part that grows near grazing.
 
     Args:
         system: The system.
@@ -118,14 +118,14 @@ def saltation_parts(
 def saltation_into_contact(
     system: HybridSystem, t, state_before: Float[Array, " n"], constraint: int = 0
 ) -> Float[Array, "n n"]:
-    """Map a deviation before an impact to one of the contact that follows it.
+    """Map a deviation before an impact to a deviation in the contact that follows.
 
-    This is for an impact from which contact begins at once: a plastic one, or one deep
-    in a chatter whose remaining impacts are completed analytically. The law leaves no
-    normal velocity, and the field after it is that of contact (thesis, eq. 2.30). The
-    rank falls by two, because gap and normal velocity are zero from then on whatever
-    they were: with two states nothing is left, and a motion that sticks has forgotten
-    its past.
+    This is for an impact after which contact begins immediately: a plastic impact, or
+    one in a chatter sequence whose remaining impacts are completed analytically. The
+    normal velocity after it is zero, and the field is that of contact (thesis, eq.
+    2.30). The rank falls by two, because gap and normal velocity are then zero
+    regardless of their previous values; in a system with two states, all deviations are
+    removed, and the motion has no memory of its past.
 
     Args:
         system: The system.
@@ -156,11 +156,11 @@ def saltation_into_contact(
 def saltation_at_release(
     system: HybridSystem, t, state: Float[Array, " n"], constraint: int = 0
 ) -> Float[Array, "n n"]:
-    """Map a deviation in contact to one of the flight after release.
+    """Map a deviation in contact to a deviation in the flight after release.
 
-    At release the contact field and the free field are equal, so the deviation is
-    unchanged. The matrix is the identity on the motions in contact, and zero on the
-    directions that contact has removed.
+    At release, the contact field and the free field are equal, so the deviation is
+    unchanged. The matrix is the identity for deviations allowed by contact, and zero in
+    the directions that contact has removed.
 
     Args:
         system: The system.
@@ -182,11 +182,11 @@ def event_map(
 ) -> Float[Array, " n"]:
     """Map a state near an impact to the state after it, both at the same time t.
 
-    The motion is continued from `x` to its impact, before or after `t`, the impact law
-    is applied, and the motion is followed back to `t` (the discontinuity mapping of di
+    The motion is continued from `x` to its impact, before or after `t`; the impact law
+    is applied; and the motion is followed back to `t` (the discontinuity mapping of di
     Bernardo et al., Piecewise-smooth Dynamical Systems, 2008, chapter 2). Flights are
-    Taylor series of third order, and the impact is located by three Newton steps, so
-    that values and derivatives up to the third are exact at a state on the surface.
+    third-order Taylor series, and the impact is located by three Newton steps, so
+    values and derivatives up to third order are exact at a state on the surface.
 
     Args:
         system: The system.
@@ -224,9 +224,9 @@ def saltation_second(
 ) -> Float[Array, "n n n"]:
     """Return the second derivative of the flow across an impact, for normal forms.
 
-    The change of a deviation d is S d + (1/2) d B d + O(|d|^3), and `B[i, j, k]` is
-    returned. It is computed by nested forward differentiation of
-    [`variational.event_map`][], and grows like one over the cube of the impact speed.
+    A deviation d becomes S d + (1/2) d B d + O(|d|^3), and `B[i, j, k]` is returned. It
+    is computed by nested forward differentiation of [`variational.event_map`][], and
+    grows like the inverse cube of the impact speed.
 
     Args:
         system: The system.

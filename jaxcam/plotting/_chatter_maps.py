@@ -1,4 +1,4 @@
-"""Draw the maps of chattering theory: lambda-map, and lobes with their scales."""
+"""Draw the maps of chatter theory: lambda-map, and lobes with their scales."""
 
 import numpy as np
 from matplotlib.axes import Axes

@@ -30,7 +30,7 @@ def chattering_picture(
     period: float,
     most: float | None = None,
 ) -> Figure:
-    """Draw the chattering region D and the grazing manifold (thesis, Figures 6.2 and
+    """Draw the chatter region D and the grazing manifold (thesis, Figures 6.2 and
     6.4).
 
     Args:

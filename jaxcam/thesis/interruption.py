@@ -1,4 +1,4 @@
-"""Find the interruption of complete chattering of the rig."""
+"""Find the interruption of complete chatter of the rig."""
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -27,7 +27,7 @@ _MOVED = 0.01
 
 @remembered
 def interruption(system: CamFollower) -> CamFollower:
-    """Return the rig at the speed of the interruption of its complete chattering.
+    """Return the rig at the speed of the interruption of its complete chatter.
 
     Raises:
         ValueError: The interruption is not within 66 rpm of the thesis' speed.

@@ -1,4 +1,4 @@
-"""Analyse complete and interrupted chatter, and chatter over a period, by maps."""
+"""Analyse complete and interrupted chatter, and chatter over a period, using maps."""
 
 from ._adding import adding_thresholds as adding_thresholds
 from ._beta_map import (

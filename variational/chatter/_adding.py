@@ -16,23 +16,24 @@ from ._scalar import check_chatter_system
 def adding_thresholds(
     system: HybridSystem, where: Where, interruption, beyond, count: int = 8
 ) -> Float[Array, " count"]:
-    """Return parameter values at which the orbit from release grazes and loses an
+    """Return the parameter values at which the orbit from release grazes and loses an
     impact.
 
-    Past the interruption the motion that starts at release has finitely many impacts
+    Beyond the interruption, the motion that starts at release has finitely many impacts
     before the next release. Their number falls by one where one of them grazes; these
-    values approach the interruption with the factor q of
+    parameter values converge to the interruption by the factor q of
     [`variational.scaling_law`][].
 
     Args:
         system: As in [`variational.chatter_interruption`][].
         where: As in [`variational.chatter_interruption`][].
-        interruption: The parameter value at which complete chattering ends.
-        beyond: A value on the interrupted side; thresholds between the two are found.
+        interruption: The parameter value at which complete chatter ends.
+        beyond: A value on the interrupted side; thresholds between it and
+            `interruption` are found.
         count: Number of thresholds.
 
     Returns:
-        Shape `(count,)`, in the parameter's unit, farthest first.
+        The values in the unit of the parameter, farthest first, shape `(count,)`.
 
     Examples:
         >>> from jaxcam.models import ImpactOscillator
@@ -56,7 +57,7 @@ def _impacts(along: Line, value):
 
 @eqx.filter_jit
 def _thresholds(along: Line, near, far, numbers):
-    """Bisect on the number of impacts, which is an integer and falls with distance."""
+    """Bisect on the number of impacts, an integer that falls with distance."""
 
     def one(number):
         def halve(carry):

@@ -1,4 +1,4 @@
-"""Compute the deviation left by an interrupted chattering sequence, beta(lambda)."""
+"""Compute the deviation left by an interrupted chatter sequence, beta(lambda)."""
 
 import equinox as eqx
 import jax
@@ -11,19 +11,19 @@ from ._lambda_map import hop_ratio, lambda_map, LAMBDA_MAX
 from ._scaling_law import scaling_law
 
 
-# largest number of impacts; lambda - lambda_bar grows by 1/q at each (q: thesis, eq.
-# 6.49)
+# maximum number of impacts; lambda - lambda_bar grows by 1/q at each (thesis, eq. 6.49)
 _IMPACTS = 4000
 
 
 class BetaMap(eqx.Module):
-    """The deviation left by a chattering sequence after its last impact.
+    """The deviation left by a chatter sequence after its last impact.
 
-    An impact at time tau < 0 from release with rebound speed v has the coordinate
-    lambda = v / (c tau^2), where c is the rate of the relative acceleration at release
-    (thesis, eqs. 6.28 and 6.84); the next impact is at time h(lambda) tau (eq. 6.33).
-    Let tau* be the time of the first impact from release. At the section time tau_P
-    after release (eqs. 6.54 and 6.94) the motion after the last impact has
+    An impact at time tau < 0 relative to release, with rebound speed v, has the
+    coordinate lambda = v / (c tau^2), where c is the rate of the relative acceleration
+    at release (thesis, eqs. 6.28 and 6.84); the next impact is at time h(lambda) tau
+    (eq. 6.33). Let tau* be the time of the first impact relative to release. At the
+    section time tau_P after release (eqs. 6.54 and 6.94), the motion after the last
+    impact has
 
         velocity = c (tau_P^2 / 2 + beta tau*^2),
         gap = c (tau_P^3 / 6 + beta tau*^2 tau_P + gamma tau*^3).
@@ -34,9 +34,11 @@ class BetaMap(eqx.Module):
     the impacts before it (thesis, eqs. 6.33 and 6.43).
     """
     gamma: Float[Array, "..."]
-    """P^3 (1/3 - lambda) at the last impact, the term that thesis eq. 6.55 omits."""
+    """P^3 (1/3 - lambda) at the last impact, the term omitted in the thesis, eq.
+    6.55.
+    """
     impacts: Int[Array, "..."]
-    """Number of impacts that follow the first."""
+    """Number of impacts after the first."""
 
 
 def beta_parts(lam, r) -> BetaMap:
@@ -47,9 +49,9 @@ def beta_parts(lam, r) -> BetaMap:
         r: Coefficient of restitution in (0, 1), broadcast against `lam`.
 
     Returns:
-        A [`variational.chatter.BetaMap`][]. Zero up to lambda_bar, the fixed point of
-            the lambda-map (thesis, eq. 6.45), where chattering completes before release
-            (`impacts` is then 0).
+        A [`variational.chatter.BetaMap`][]. It is zero up to lambda_bar, the fixed
+            point of the lambda-map (thesis, eq. 6.45), where chatter is completed
+            before release (`impacts` is then 0).
     """
     lam, r = jnp.broadcast_arrays(
         jnp.asarray(lam, jnp.float64), jnp.asarray(r, jnp.float64)
@@ -62,7 +64,7 @@ def beta_parts(lam, r) -> BetaMap:
 
 
 def beta_map(lam, r) -> Float[Array, "..."]:
-    """Return beta(lambda): the deviation left by an interrupted chattering sequence.
+    """Return beta(lambda): the deviation left by an interrupted chatter sequence.
 
     Args:
         lam: Coordinate lambda of the first impact, dimensionless, >= 0, any shape.
@@ -70,8 +72,9 @@ def beta_map(lam, r) -> Float[Array, "..."]:
 
     Returns:
         Beta, dimensionless (thesis, eq. 6.97): 0 up to lambda_bar, then lobes between
-            square-root corners, each 1/q wider and 1/p^2 higher than the one before,
-            with the scales p and q of [`variational.scaling_law`][] (eq. 6.49).
+            square-root corners, each wider by 1/q and higher by 1/p^2 than the previous
+            one, with the scales p and q of [`variational.scaling_law`][] (thesis, eq.
+            6.49).
 
     Examples:
         >>> from variational import beta_map
@@ -92,7 +95,7 @@ def _one(lam, r, bar):
 
     start = (lam, jnp.ones_like(lam), jnp.asarray(0))
     lam, scale, count = while_loop(goes_on, hop, start)
-    # between 1/3 and 3/8 one more impact follows, after release
+    # between 1/3 and 3/8, one more impact follows after release
     after = (lam >= 1 / 3) & (lam <= LAMBDA_MAX)
     safe = jnp.where(after, lam, 0.35)
     end = jnp.where(after, lambda_map(safe, r), lam)

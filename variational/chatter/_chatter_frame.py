@@ -1,4 +1,4 @@
-"""Compute the release from sticking, and the coordinates of chattering around it."""
+"""Compute the release from sticking, and the coordinates of chatter around it."""
 
 import equinox as eqx
 import jax
@@ -19,24 +19,27 @@ from ._beta_map import beta_parts
 from ._scalar import check_chatter_system
 
 
-# samples of the contact acceleration over a period, to find where contact is impossible
+# number of samples of the contact acceleration per period, to find where contact is
+# impossible
 _SAMPLES = 256
 
 
 class ChatterFrame(eqx.Module):
-    """Release point and scales of the chattering that ends there.
+    """Release point, and scales of the chatter that ends there.
 
-    Times in the methods are those of the system; tau is time less `release`.
+    Times in the methods are those of the system; tau is the time minus `release`.
     """
 
     release: Float[Array, ""]
-    """Time of release (s), phi_alpha of the thesis counted as a time."""
+    """Time of release (s); phi_alpha of the thesis, expressed as a time."""
     state: Float[Array, " n"]
-    """State there, shape `(n,)`."""
+    """State at release, shape `(n,)`."""
     jerk: Float[Array, ""]
-    """Rate c of the relative acceleration there, > 0 (thesis, eqs. 6.76 and 6.112)."""
+    """Rate c of the relative acceleration at release, > 0 (thesis, eqs. 6.76 and
+    6.112).
+    """
     restitution: Float[Array, ""]
-    """Coefficient of restitution of slow impacts there."""
+    """Coefficient of restitution of slow impacts at release."""
 
     def coordinate(self, time, speed) -> Float[Array, "..."]:
         """Return lambda = v / (c tau^2) of an impact (thesis, eqs. 6.84 and 6.98).
@@ -46,13 +49,14 @@ class ChatterFrame(eqx.Module):
             speed: Rebound speed v.
 
         Returns:
-            Dimensionless, in the broadcast shape.
+            Lambda, dimensionless, in the broadcast shape.
         """
         tau = time - self.release
         return speed / (self.jerk * tau * tau)
 
     def gradient(self, time, speed) -> Float[Array, "2"]:
-        """Return C = (C1, C2): derivatives of lambda by rebound speed and time.
+        """Return C = (C1, C2), the derivatives of lambda with respect to rebound speed
+        and time.
 
         Args:
             time: Time of the impact (s).
@@ -69,13 +73,13 @@ class ChatterFrame(eqx.Module):
         """Return gap and normal velocity at a section after the last impact.
 
         Args:
-            time: Time of an impact before release (s).
-            speed: Its rebound speed.
+            time: Time of the last impact before release (s).
+            speed: Rebound speed of that impact.
             section: Time of the section, after release (s).
 
         Returns:
-            Shape `(2,)` (thesis, eqs. 6.94-6.96); unlike thesis eq. 6.55 the term of
-                order tau*^3 is kept.
+            Shape `(2,)` (thesis, eqs. 6.94-6.96); unlike in eq. 6.55, the term of order
+                tau*^3 is retained.
         """
         tau, after = time - self.release, section - self.release
         parts = beta_parts(self.coordinate(time, speed), self.restitution)
@@ -85,15 +89,17 @@ class ChatterFrame(eqx.Module):
 
 
 def chatter_frame(system: HybridSystem, time=0.0) -> ChatterFrame:
-    """Return release point and scales of chattering; differentiable in the parameters.
+    """Return the release point and the scales of chatter, differentiable in the
+    parameters.
 
     Args:
         system: A system with two states, one constraint and a period.
-        time: The release returned is the first at or after this time (s), of the
-            stretch of contact that ends before the contact acceleration is greatest.
+        time: The first release at or after this time (s) is returned; it belongs to the
+            contact that ends before the maximum of the contact acceleration.
 
     Returns:
-        A [`variational.chatter.ChatterFrame`][]; NaN where the period has no release.
+        A [`variational.chatter.ChatterFrame`][]; NaN if there is no release in the
+            period.
 
     Raises:
         ValueError: The system has no period.
@@ -120,8 +126,8 @@ def prepared_frame(system, time) -> ChatterFrame:
     period = system.period
     grid = time + period * jnp.linspace(0.0, 1.0, _SAMPLES, endpoint=False)
     push = contact_acceleration(system, grid, jnp.zeros(2))
-    # at the largest contact acceleration nothing sticks: the release is the last one
-    # before
+    # nothing sticks at the largest contact acceleration: the release is the last one
+    # before it
     found = release_point(system, grid[jnp.argmax(push)])
     release = found.time + jnp.where(found.time < time, period, jnp.zeros_like(period))
 
@@ -136,7 +142,7 @@ def frame_at(system, release, state) -> ChatterFrame:
     def suppressed(t, x):
         return normal_acceleration(system, t, x)[0]
 
-    # by jvp, not grad: the same program is differentiated again
+    # by jvp instead of grad, because the same program is differentiated again
     _, jerk = jax.jvp(
         suppressed,
         (release, state),
@@ -151,19 +157,20 @@ def frame_at(system, release, state) -> ChatterFrame:
 
 
 def parameter_incidence(system: HybridSystem, where: Where, time=0.0) -> ChatterFrame:
-    """Return the derivatives of the release point and its scales by a parameter.
+    """Return the derivatives of the release point and the scales with respect to a
+    parameter.
 
-    `release` is then the rate of change of the time of release, `jerk` that of c
+    In the result, `release` is the derivative of the release time and `jerk` that of c
     (thesis, eqs. 6.114 and 6.115, where they are estimated from perturbed simulations).
 
     Args:
         system: A system with two states, one constraint and a period.
-        where: Picks the parameter.
+        where: Selects the parameter.
         time: As in [`variational.chatter_frame`][].
 
     Returns:
-        A [`variational.chatter.ChatterFrame`][] of derivatives, in units of the frame
-            over the parameter's.
+        A [`variational.chatter.ChatterFrame`][] of derivatives, in the units of the
+            frame divided by that of the parameter.
     """
     system = as_arrays(system)
     along = unit_tangent(where, system)

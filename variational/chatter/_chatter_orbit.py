@@ -24,32 +24,36 @@ from ._scalar import check_chatter_system
 from ._scaling_law import scaling_law
 
 
-# largest number of impacts in the search
+# maximum number of impacts in the search
 _IMPACTS = 2000
-# lambda/(1 - r) below which the completion of second order is exact to 1e-12
+# lambda/(1 - r) below which the second-order completion is accurate to 1e-12
 _SMALL = 1e-6
-# time from release, over the period, below which rounding determines the next event
+# time to release, relative to the period, below which rounding determines the next
+# event
 _NEAR = 1e-12
 
 
 class ChatterOrbit(eqx.Module):
-    """The motion from release to contact, and the accumulation of its chattering."""
+    """The motion from release to contact, and the accumulation of its chatter."""
 
     frame: ChatterFrame
-    """The release from which it starts; releases follow a period apart."""
+    """The release from which it starts; successive releases are one period apart."""
     accumulation: Float[Array, ""]
-    """Time at which the impacts accumulate (s); NaN if they do not before the last
-    release."""
+    """Time at which the impacts accumulate (s); NaN if they do not accumulate before
+    the last release.
+    """
     complete: Bool[Array, ""]
-    """Whether they accumulate in the last of the given periods and not before."""
+    """Whether they accumulate in the last of the given periods, and not earlier."""
     margin: Float[Array, ""]
-    """Signed distance from the interruption in the last period: zero where accumulation
-    and release coincide, negative where chattering is complete, smooth in the
-    parameters except where an earlier impact grazes; NaN for a period without impact,
-    or where contact comes in an earlier one."""
+    """Signed distance from the interruption in the last period. It is zero if
+    accumulation and release coincide, negative if chatter is complete, and smooth in
+    the parameters except where an earlier impact grazes. It is NaN for a period without
+    impacts, or if contact occurs in an earlier period.
+    """
     impacts: Int[Array, ""]
-    """Number of impacts listed: of a complete sequence those until the completion map
-    takes over, of an interrupted one all."""
+    """Number of impacts listed: for a complete sequence, those before the analytical
+    completion; for an interrupted sequence, all.
+    """
 
 
 class _Search(NamedTuple):
@@ -59,15 +63,15 @@ class _Search(NamedTuple):
     state: Float[Array, " n"]
     speed: Float[Array, ""]
     found: Bool[Array, ""]
-    # whether the remaining sequence is complete, up to rounding
+    # whether the remaining sequence is complete, to within rounding
     settled: Bool[Array, ""]
     # number of the period, from 1, whose end is the next release
     turn: Int[Array, ""]
-    # time from that release, of this impact and of the one before
+    # times of this impact and of the previous one, relative to that release
     tau: Float[Array, ""]
     tau_before: Float[Array, ""]
     count: Int[Array, ""]
-    # lambda and number, in its period, of the impact that the margin is taken from
+    # lambda and number (in its period) of the impact that defines the margin
     taken: Float[Array, ""]
     rank: Int[Array, ""]
     here: Int[Array, ""]
@@ -76,15 +80,16 @@ class _Search(NamedTuple):
 def chatter_accumulation(
     system: HybridSystem, time=0.0, periods: int = 1
 ) -> ChatterOrbit:
-    """Compute where the chattering of an orbit that sticks once per period accumulates.
+    """Compute where the chatter of an orbit that sticks once per period accumulates.
 
-    Sticking erases the past: the orbit leaves the release point without relative
-    velocity, so only the motion from there matters. It is interrupted where
-    `accumulation` reaches the last release; `margin` is the smooth form of that
-    equation. With K the coordinate in which the lambda-map is multiplication by 1/q
-    ([`variational.koenigs`][]), q^k K(lambda_k) is the same for every impact k of the
-    last period up to terms of order q^k tau_k, and it is zero at the interruption. The
-    function is pure; it may be compiled, batched and differentiated forward.
+    Sticking removes all memory of the past: the orbit leaves the release point with
+    zero relative velocity, so only the motion from there matters. The chatter is
+    interrupted if `accumulation` reaches the last release; `margin` is a smooth form of
+    that condition. With K the coordinate in which the lambda-map is a multiplication by
+    1/q ([`variational.koenigs`][]), q^k K(lambda_k) is the same for every impact k of
+    the last period, up to terms of order q^k tau_k, and is zero at the interruption.
+    The function is pure: it can be compiled, batched and differentiated in forward
+    mode.
 
     Args:
         system: A system with two states, one constraint and a period.
@@ -126,7 +131,7 @@ def orbit_from(system, frame: ChatterFrame, periods: int = 1) -> ChatterOrbit:
     half = law.lambda_bar / 2
 
     def coordinate(tau, speed):
-        # after release there is none: use an invalid number
+        # there is none after release: use an invalid number
         early = tau < -_NEAR * period
         safe = jnp.where(early, tau, -period)
         return early, speed / (frame.jerk * safe * safe)
@@ -136,7 +141,7 @@ def orbit_from(system, frame: ChatterFrame, periods: int = 1) -> ChatterOrbit:
         return s.found & ~s.settled & before & (s.count < _IMPACTS)
 
     def hop(s):
-        # a flight that misses the wall near release may return a period later
+        # a flight that misses the constraint near release may return a period later
         point = next_impact(system, s.time, s.state, s.speed, 2 * period)
         since = point.time - frame.release
         passed = jnp.floor(jax.lax.stop_gradient(since) / period).astype(s.turn.dtype)
@@ -190,8 +195,8 @@ def orbit_from(system, frame: ChatterFrame, periods: int = 1) -> ChatterOrbit:
     margin = koenigs(s.taken, law.lambda_bar, restitution, law.q) * jnp.exp(
         s.rank.astype(jnp.float64) * jnp.log(law.q)
     )
-    # an impact after release belongs to the sequence if it comes as soon as the
-    # lambda-map predicts: within half of the time left at the previous impact
+    # an impact after release belongs to the sequence if it occurs as early as the
+    # lambda-map predicts: within half of the time to release at the previous impact
     local = s.found & (s.tau < jnp.abs(s.tau_before))
     listed = jnp.where(complete | local, s.count, s.count - 1)
     return ChatterOrbit(

@@ -1,17 +1,18 @@
-"""Compute the one-dimensional map of a period of a chattering orbit, by local theory.
+"""Compute the one-dimensional map over a period of a chattering orbit, from local
+theory.
 
-At the interruption a period consists of Theta, a smooth map from a section after
-release to an impact D* of the chattering sequence (at time tau* from release), followed
-by beta. All motions leave beta along one direction B, so one number determines them:
-epsilon = tau*^2 beta, which at release is a relative velocity c epsilon. With A the
-derivative of Theta, C that of lambda and mu the distance of the parameter from the
-interruption,
+At the interruption, the map over a period consists of Theta, a smooth map from a
+section after release to an impact D* of the chatter sequence (at time tau* relative to
+release), followed by beta. After beta, all motions lie along one direction B, so one
+number determines them: epsilon = tau*^2 beta, which at release is a relative velocity c
+epsilon. With A the derivative of Theta, C that of lambda, and mu the distance of the
+parameter from the interruption,
 
     epsilon' = tau*^2 beta(lambda_bar + C A B epsilon + lambda_mu mu),
 
-where the deviation is first mapped to an earlier impact at which it is small, since it
-grows linearly only in the coordinate K of [`variational.koenigs`][]. The thesis (eqs.
-6.104 and 6.116) leaves out tau*^2; its K_beta appears to stand for it.
+where the deviation is first mapped to an earlier impact at which it is small, because
+it grows linearly only in the coordinate K of [`variational.koenigs`][]. The thesis
+(eqs. 6.104 and 6.116) omits tau*^2; its K_beta appears to represent it.
 """
 
 import equinox as eqx
@@ -38,24 +39,25 @@ from ._section_turn import (
 )
 
 
-# deviation of lambda up to which K and lambda - lambda_bar agree within rounding
+# deviation of lambda up to which K and lambda - lambda_bar are equal to within rounding
 _LINEAR = 1e-8
 
 
 class ComposedMap(eqx.Module):
-    """Local theory of one period around the interruption of complete chattering."""
+    """Local theory of one period around the interruption of complete chatter."""
 
     frame: ChatterFrame
-    """The frame whose release lies between the section at the start of the period and
-    the next."""
+    """The frame whose release is between the sections at the start and end of the
+    period.
+    """
     section: Float[Array, ""]
     """Time of the section at the end of the period (s)."""
     state: Float[Array, "2"]
-    """State there of the orbit that sticks until release, shape `(2,)`."""
+    """State, at that section, of the orbit that sticks until release, shape `(2,)`."""
     relative: Float[Array, "2"]
     """Gap and normal velocity of that state, shape `(2,)`."""
     time: Float[Array, ""]
-    """Time of D* on the orbit from release (s)."""
+    """Time of the impact D* on the orbit from release (s)."""
     speed: Float[Array, ""]
     """Rebound speed of D*."""
     lam: Float[Array, ""]
@@ -63,42 +65,53 @@ class ComposedMap(eqx.Module):
     lambda_bar: Float[Array, ""]
     """Fixed point of the lambda-map."""
     matrix: Float[Array, "2 2"]
-    """A: rebound speed and time of D* by the state at the section, shape `(2, 2)`
-    (thesis, eq. 6.107)."""
+    """A: derivatives of rebound speed and time of D* with respect to the state at the
+    section, shape `(2, 2)` (thesis, eq. 6.107).
+    """
     vector: Float[Array, "2"]
-    """B: state at the section by epsilon, shape `(2,)` (thesis, eq. 6.103)."""
+    """B: derivative of the state at the section with respect to epsilon, shape `(2,)`
+    (thesis, eq. 6.103).
+    """
     relative_vector: Float[Array, "2"]
-    """Gap and velocity at the section by epsilon, shape `(2,)` (thesis, eq. 6.103)."""
+    """Derivatives of gap and velocity at the section with respect to epsilon, shape
+    `(2,)` (thesis, eq. 6.103).
+    """
     covector: Float[Array, "2"]
-    """C: lambda by rebound speed and time of D*, shape `(2,)` (thesis, eq. 6.100)."""
+    """C: derivatives of lambda with respect to rebound speed and time of D*, shape
+    `(2,)` (thesis, eq. 6.100).
+    """
     by_parameter: Float[Array, ""]
-    """Lambda by the parameter (thesis, eq. 6.114)."""
+    """Derivative of lambda with respect to the parameter (thesis, eq. 6.114)."""
     incidence: Float[Array, ""]
-    """Change of lambda - lambda_bar with the parameter, D* moving with the orbit."""
+    """Derivative of lambda - lambda_bar with respect to the parameter, with D* moving
+    with the orbit.
+    """
     drift: Float[Array, "2"]
-    """Change of gap and velocity at the section with the parameter, epsilon = 0, shape
-    `(2,)` (thesis, eq. 6.115)."""
+    """Derivatives of gap and velocity at the section with respect to the parameter, at
+    epsilon = 0, shape `(2,)` (thesis, eq. 6.115).
+    """
 
     @property
     def tau(self) -> Float[Array, ""]:
-        """Time of D* from release, < 0."""
+        """Time of D* relative to release, < 0."""
         return self.time - self.frame.release
 
     @property
     def feedback(self) -> Float[Array, ""]:
-        """C A B: derivative of the next lambda by epsilon."""
+        """C A B: derivative of the next lambda with respect to epsilon."""
         return self.covector @ self.matrix @ self.vector
 
     def __call__(self, epsilon, parameter=0.0) -> Float[Array, "..."]:
         """Return epsilon of the next period (thesis, eqs. 6.109 and 6.116).
 
-        **Arguments:** `epsilon`, in the unit of time squared; `parameter`, its distance
-        from the interruption; broadcast.
+        **Arguments:** `epsilon`, in the unit of time squared; `parameter`, the distance
+        of the parameter from the interruption; they are broadcast.
         """
         return self._left(self.feedback * epsilon + self.incidence * parameter)
 
     def at_section(self, speed=0.0, time=0.0) -> Float[Array, "... 2"]:
-        """Return gap and velocity at the section after D* is moved (thesis, eq. 6.104).
+        """Return gap and velocity at the section after a change of D* (thesis, eq.
+        6.104).
 
         Args:
             speed: Change of the rebound speed of D*.
@@ -112,7 +125,7 @@ class ComposedMap(eqx.Module):
         return self._section(self.tau**2 * parts.beta, 0.0)
 
     def along_parameter(self, parameter) -> Float[Array, "... 2"]:
-        """Return gap and velocity at the section of the orbit from release.
+        """Return gap and velocity, at the section, of the orbit from release.
 
         Args:
             parameter: Distance of the parameter from the interruption, any shape.
@@ -125,9 +138,9 @@ class ComposedMap(eqx.Module):
     def _left(self, deviation):
         """Return epsilon for a deviation that grew over all the impacts before D*.
 
-        It is linear in the coordinate K only, so beta is evaluated n impacts earlier,
-        where the deviation is small and K is lambda - lambda_bar; there tau is larger
-        by p^-n.
+        The growth is linear only in the coordinate K, so beta is evaluated n impacts
+        earlier, where the deviation is small, K is lambda - lambda_bar, and tau is
+        larger by p^-n.
         """
         law = scaling_law(self.frame.restitution)
         deviation = jnp.asarray(deviation, jnp.float64)
@@ -148,16 +161,17 @@ class ComposedMap(eqx.Module):
 def composed_map(
     system: HybridSystem, where: Where, rank: int, phase=0.0
 ) -> ComposedMap:
-    """Compose beta with the rest of the period, all derivatives by differentiation.
+    """Compose beta with the rest of the period; all derivatives are computed
+    automatically.
 
     Args:
         system: The system at the interruption ([`variational.chatter_interruption`][]).
         where: Picks the parameter.
-        rank: Number of the impact D* after release, from 0. The later it is, the better
-            the lambda-map describes the following impacts, and the smaller the
-            deviations for which A and C are linear: they move D* by much less than
-            tau*.
-        phase: Phase of the section, in periods, in the flight after release.
+        rank: Number of the impact D* after release, counted from 0. The later D* is,
+            the better the lambda-map describes the following impacts, but the smaller
+            are the deviations for which A and C are linear: they must change the time
+            of D* by much less than tau*.
+        phase: Phase of the section, in periods; it must be in the flight after release.
 
     Returns:
         A [`variational.chatter.ComposedMap`][].
@@ -186,12 +200,12 @@ def _compose(along, value, rank, phase) -> ComposedMap:
         frame = prepared_frame(moved, jnp.asarray(phase * period, jnp.float64))
         zero = jnp.zeros(())
         point = impact_after(moved, frame.release, frame.state, zero, 0.0, rank)
-        # the orbit starts at the frame's release: a period later than D*
+        # the orbit starts at the release of the frame, a period later than D*
         return moved, frame, point.time - period, point.speed
 
     def section_of(moved, frame, velocity):
-        """Return derivatives of state, gap and velocity at the section by the
-        velocity left at release.
+        """Return derivatives of state, gap and velocity at the section with respect to
+        the velocity at release.
         """
         direction = normal_directions(moved, frame.release, frame.state)[0]
         start = frame.state + velocity * direction
@@ -244,7 +258,8 @@ def _compose(along, value, rank, phase) -> ComposedMap:
 def simulated_at_section(
     system: HybridSystem, composed: ComposedMap, speed
 ) -> SectionArrival:
-    """Compute by the exact motion the result that `ComposedMap.at_section` predicts.
+    """Compute the exact motion for which `ComposedMap.at_section` is the local
+    prediction.
 
     Args:
         system: The system at the interruption.
@@ -271,9 +286,10 @@ def simulated_at_section(
 def simulated_by_parameter(
     system: HybridSystem, where: Where, changes, phase=0.0
 ) -> SectionArrival:
-    """Follow the orbit from release over a period at other values of the parameter.
+    """Follow the orbit from release over a period at other parameter values.
 
-    [`variational.chatter.ComposedMap.along_parameter`][] predicts the result.
+    [`variational.chatter.ComposedMap.along_parameter`][] is the local prediction of the
+    result.
 
     Args:
         system: The system at the interruption.

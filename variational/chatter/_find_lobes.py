@@ -1,4 +1,6 @@
-"""Sample the map around the interruption and find its lobes by the impact number."""
+"""Sample the map around the interruption, and find its lobes from the number of
+impacts.
+"""
 
 from collections.abc import Callable
 
@@ -14,34 +16,34 @@ from ._scalar import check_chatter_system
 from ._section_turn import section_turn
 
 
-# states that are followed together
+# number of states that are followed together
 _ROW = 32
-# largest number of rows that narrow a bracket: it ends earlier at two neighbouring
+# maximum number of rows used to narrow a bracket; it ends earlier at two neighbouring
 # floats
 _PASSES = 12
 
 
 class Lobes(eqx.Module):
-    """Lobes of the stroboscopic map, found by the number of impacts in a period."""
+    """Lobes of the stroboscopic map, identified by the number of impacts per period."""
 
     corners: np.ndarray
     """Ends of the lobes, where the motion grazes, farthest first, shape `(k + 1,)`."""
     values: np.ndarray
-    """The map at the corners, shape `(k + 1,)`."""
+    """Values of the map at the corners, shape `(k + 1,)`."""
     points: np.ndarray
     """Points of each lobe, from its outer corner inwards, shape `(k, samples)`."""
     images: np.ndarray
-    """The map at these points, shape `(k, samples)`."""
+    """Values of the map at these points, shape `(k, samples)`."""
     slopes: np.ndarray
     """Slope of the map at these points, shape `(k, samples)`."""
     accumulation: float
     """Point at which the lobes accumulate."""
     limit: float
-    """The map at the accumulation."""
+    """Value of the map at the accumulation point."""
     scan: np.ndarray
     """Points of the sampled map, shape `(n,)`."""
     scanned: np.ndarray
-    """The map at these points, shape `(n,)`."""
+    """Values of the map at these points, shape `(n,)`."""
     impacts: np.ndarray
     """Number of impacts at these points, shape `(n,)`."""
 
@@ -60,19 +62,21 @@ def find_lobes(
 ) -> Lobes:
     """Sample the stroboscopic map around the interruption and find its lobes.
 
-    A lobe ends where the number of impacts changes, to rounding (thesis, eq. 5.1).
+    A lobe ends where the number of impacts changes; the ends are located to within
+    rounding (thesis, eq. 5.1).
 
     Args:
-        system: As for [`variational.chatter_frame`][], near the interruption.
+        system: A system as for [`variational.chatter_frame`][], near the interruption.
         state: State at time `phase` x period on the sticking orbit, shape `(2,)`.
-        deviations: Deviations of `component`, `(n,)`, across the accumulation.
+        deviations: Deviations of `component`, shape `(n,)`, on both sides of the
+            accumulation.
         phase: Phase of the section, in periods.
         component: Component of the state that deviates.
-        direction: Direction along which the state deviates, shape `(2,)`; default
-            `component` alone. A map to iterate needs `ComposedMap.vector`.
+        direction: Direction along which the state deviates, shape `(2,)`; default: only
+            `component`. A map to be iterated needs `ComposedMap.vector`.
         samples: Number of points sampled in each lobe.
-        most: Largest number of lobes.
-        progress: Called with the fraction done, relative to `most` lobes.
+        most: Maximum number of lobes.
+        progress: Called with the completed fraction, relative to `most` lobes.
 
     Returns:
         The [`variational.chatter.Lobes`][].
@@ -101,10 +105,10 @@ def find_lobes(
     scanned, _, impacts, stuck = turn(scan)
     if np.all(stuck) or not np.any(stuck):
         raise ValueError(
-            "The deviations stay on one side of the interruption: chattering is "
-            "complete for all of them or for none. Take a wider range of both signs."
+            "The deviations stay on one side of the interruption: chatter is complete "
+            "for all of them or for none. Use a wider range with both signs."
         )
-    # outwards from the last period that sticks
+    # outwards from the last motion that sticks
     edge = np.flatnonzero(np.diff(stuck.astype(int)))[0]
     inner, outer = (edge, edge + 1) if stuck[edge] else (edge + 1, edge)
     bottom, top = _bisect(turn, float(scan[inner]), float(scan[outer]), lambda n, s: s)
@@ -139,7 +143,7 @@ def _rows(states: int) -> int:
 
 
 class _Rows:
-    """Evaluates the map of many states in rows of equal length, with one program."""
+    """Evaluates the map for many states in rows of equal length, with one program."""
 
     def __init__(self, program: Callable, total: int, progress: Callable | None):
         self._program, self._total, self._progress = program, total, progress
@@ -177,7 +181,7 @@ def _corners(turn, accumulation, farthest, most: int) -> np.ndarray:
     if len(corners) < 3:
         raise ValueError(
             "Fewer than two lobes were found; widen the deviations on the side of "
-            "interrupted chattering."
+            "interrupted chatter."
         )
     return corners
 

@@ -1,10 +1,10 @@
-"""Integrate free flight with state, normal velocity and gap.
+"""Integrate free flight together with its normal velocity and gap.
 
-Gap and normal velocity are integrated from the surface, next to the state:
-z' = v, v' = a, from the speed that the impact leaves, where a is the normal
-acceleration of free flight. They keep their relative accuracy where the gap computed
-from the state has lost it, so impacts after flights of height 1e-12 are as accurate as
-high ones.
+Gap and normal velocity are integrated together with the state: z' = v, v' = a, starting
+at the surface with the rebound speed, where a is the normal acceleration in free
+flight. They retain their relative accuracy when the gap computed from the state has
+lost it, so impacts after flights of height 1e-12 are as accurate as those after high
+flights.
 """
 
 import jax.numpy as jnp
@@ -16,7 +16,7 @@ from jaxcam.hybrid.surface import normal_acceleration
 
 
 TOLERANCE = 1e-14
-"""Error of a step, relative to one plus the state."""
+"""Allowed error of a step, relative to one plus the state."""
 
 
 def runge_kutta_step(rates, s, y, h):
@@ -38,7 +38,7 @@ def flight_rates(system: HybridSystem, time: ArrayLike = 0.0):
 
 
 def on_flight(state, speed, height: ArrayLike = 0.0):
-    """Return the integrated rates: state, normal velocity and gap."""
+    """Return the integrated quantities: state, normal velocity and gap."""
     beside = jnp.stack([jnp.asarray(b, jnp.float64) for b in (speed, height)])
     return jnp.concatenate([state, beside])
 
@@ -55,7 +55,7 @@ def fly(system: HybridSystem, time, state, speed, duration, height: ArrayLike = 
         height: Gap at the start.
 
     Returns:
-        State `(n,)`, gap and normal velocity at the end; the gap keeps its relative
+        State `(n,)`, gap and normal velocity at the end; the gap retains its relative
             accuracy if the flight starts on the surface.
     """
     rates = flight_rates(system, jnp.asarray(time, jnp.float64))

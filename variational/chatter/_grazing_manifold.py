@@ -1,4 +1,4 @@
-"""Compute pre-images and images of grazing impacts, and the chattering region."""
+"""Compute pre-images and images of grazing impacts, and the chatter region."""
 
 import equinox as eqx
 import jax
@@ -17,7 +17,7 @@ from ._scaling_law import scaling_law
 
 
 class ImpactCurve(eqx.Module):
-    """Points in the plane of impact time and rebound speed; NaN if there is none."""
+    """Points in the plane of impact time and rebound speed; NaN where there is none."""
 
     time: Float[Array, "..."]
     """Times of the impacts (s)."""
@@ -26,40 +26,42 @@ class ImpactCurve(eqx.Module):
 
 
 class GrazingManifold(eqx.Module):
-    """Impacts that lead to, or follow from, an impact without speed (thesis,
-    eq. 6.16).
+    """Impacts that lead to, or follow from, an impact of zero speed (thesis, eq.
+    6.16).
     """
 
     grazing: Float[Array, " points"]
     """Times outside contact at which the motion grazes, shape `(points,)`."""
     before: ImpactCurve
-    """S^1..S^n, impacts whose n-th successor grazes, shape `(n, points)` (thesis,
-    eqs. 6.13 and 6.15)."""
+    """S^1..S^n: S^k contains the impacts whose k-th successor grazes, shape `(n,
+    points)` (thesis, eqs. 6.13 and 6.15).
+    """
     after: ImpactCurve
-    """W^1..W^n, the n-th successors of grazing impacts, shape `(n, points)` (thesis,
-    eqs. 6.14 and 6.15)."""
+    """W^1..W^n: W^k contains the k-th successors of grazing impacts, shape `(n,
+    points)` (thesis, eqs. 6.14 and 6.15).
+    """
 
 
 def grazing_manifold(
     system: HybridSystem, n: int = 4, points: int = 200, horizon: float = 2.0
 ) -> GrazingManifold:
-    """Return pre-images S^k and images W^k of the line of impacts without speed.
+    """Return the pre-images S^k and images W^k of the line of impacts of zero speed.
 
-    The line is taken where the constraint would release, outside the sticking set Z: a
-    motion that grazes there touches the constraint from outside (thesis,
-    eqs. 6.13-6.16).
+    The line is restricted to times outside the sticking set Z, at which the constraint
+    would release: a motion that grazes there touches the constraint from outside
+    (thesis, eqs. 6.13-6.16).
 
     Args:
-        system: A system with two states, one constraint and a period; restitution above
-            zero.
+        system: A system with two states, one constraint, a period and a positive
+            coefficient of restitution.
         n: Number of pre-images and of images.
         points: Number of points on the line.
         horizon: Longest flight, in periods.
 
     Returns:
-        A [`variational.chatter.GrazingManifold`][]; times are not taken modulo the
-            period. A point of S^k whose flight would have started inside an earlier
-            impact is NaN.
+        A [`variational.chatter.GrazingManifold`][]; times are not reduced modulo the
+            period. A point of S^k whose flight would have started behind the constraint
+            is NaN.
 
     Raises:
         ValueError: The system has no period.
@@ -79,7 +81,7 @@ def grazing_manifold(
 def _manifold(system, n, points, horizon) -> GrazingManifold:
     grid = system.period * jnp.linspace(0.0, 1.0, 4 * points, endpoint=False)
     push = contact_acceleration(system, grid, jnp.zeros(2))
-    # all times without contact, spread evenly, wherever in the period they lie
+    # all times without contact, evenly distributed, wherever they are in the period
     order = jnp.argsort(push <= 0, stable=True)
     count = jnp.sum(push > 0)
     picks = order[(jnp.arange(points) * count) // points]
@@ -114,24 +116,24 @@ def _manifold(system, n, points, horizon) -> GrazingManifold:
 def chattering_region(
     system: HybridSystem, points: int = 64, impacts: int = 16, near: float = 1e-3
 ) -> ImpactCurve:
-    """Return the upper boundary of the region D in which chattering is complete.
+    """Return the upper boundary of the region D in which chatter is complete.
 
     The boundary C consists of impacts whose sequence accumulates exactly at release.
-    Close to release it is the parabola of lambda_bar; from there it is continued
-    backwards by the impact map, under which it is invariant (thesis, eqs. 6.20 and
+    Close to release, it is the parabola with lambda_bar; from there, it is continued
+    backwards with the impact map, under which it is invariant (thesis, eqs. 6.20 and
     6.91).
 
     Args:
-        system: A system with two states, one constraint and a period; restitution above
-            zero.
-        points: Number of points on each piece between an impact and the one before.
+        system: A system with two states, one constraint, a period and a positive
+            coefficient of restitution.
+        points: Number of points on each piece between an impact and the previous one.
         impacts: Number of pieces.
-        near: Time from release, in periods, at which the parabola is used; its relative
-            error there is of that order, and the backward map reduces it.
+        near: Time before release, in periods, at which the parabola is used; its
+            relative error there is of that order, and the backward map reduces it.
 
     Returns:
         An [`variational.chatter.ImpactCurve`][], shape `(impacts * points,)`, ordered
-            backwards in time from release; D lies between it and speed zero.
+            backwards in time from release; D lies between the curve and zero speed.
 
     Raises:
         ValueError: The system has no period.

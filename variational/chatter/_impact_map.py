@@ -1,4 +1,6 @@
-"""Map one impact to the next, exact to rounding for arbitrarily slow impacts."""
+"""Map one impact to the next, accurate to rounding even for arbitrarily slow
+impacts.
+"""
 
 import equinox as eqx
 import jax
@@ -16,7 +18,7 @@ from ._impact_search import frozen, longest_step, search_step, take_off
 from ._scalar import one_constraint
 
 
-# attempts, at most
+# maximum number of attempts
 _MOST_STEPS = 4096
 _GAUSS, _GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(8)
 _GAUSS, _GAUSS_WEIGHTS = (_GAUSS + 1) / 2, _GAUSS_WEIGHTS / 2
@@ -28,11 +30,13 @@ class ImpactPoint(eqx.Module):
     time: Float[Array, "..."]
     """Time of the impact (s)."""
     state: Float[Array, "... n"]
-    """State after it, shape `(n,)`."""
+    """State after the impact, shape `(n,)`."""
     speed: Float[Array, "..."]
-    """Normal velocity after it, > 0, more accurate than computed from the state."""
+    """Normal velocity after the impact, > 0, more accurate than if computed from the
+    state.
+    """
     approach: Float[Array, "..."]
-    """Normal velocity before it, < 0."""
+    """Normal velocity before the impact, < 0."""
     found: Bool[Array, "..."]
     """Whether there was an impact before the horizon."""
 
@@ -40,17 +44,17 @@ class ImpactPoint(eqx.Module):
 def next_impact(
     system: HybridSystem, time, state, speed, horizon, height: ArrayLike = 0.0
 ) -> ImpactPoint:
-    """Return the next impact of a motion that leaves the surface, and the state after
+    """Return the next impact of a motion that leaves the surface, with the state after
     it.
 
-    The function is pure; it may be compiled, batched and differentiated forward, also
-    twice.
+    The function is pure: it can be compiled, batched and differentiated in forward
+    mode, up to twice.
 
     Args:
         system: A system with one constraint, already `prepared`.
         time: Time of the start (s).
         state: State on the surface, after an impact or at release, shape `(n,)`.
-        speed: Normal velocity there, >= 0 (0 at release).
+        speed: Normal velocity at the start, >= 0 (0 at release).
         horizon: Longest flight time (s).
         height: Gap at the start, > 0 for a motion already in flight; `speed` may then
             have either sign.
@@ -74,7 +78,7 @@ def next_impact(
     f, _ = while_loop(searching, look, (start, 0))
     rates = flight_rates(system)
 
-    # the last steps of Newton's method carry first and second derivatives
+    # the last steps of Newton's method carry the first and second derivatives
     def newton(_, carry):
         _, _, length = carry
         end, _ = runge_kutta_step(rates, f.time, f.y, length)
@@ -96,11 +100,11 @@ def next_impact(
 
 
 def rebound_speed(system: HybridSystem, time, before, approach):
-    """Return the speed after an impact, to the relative accuracy of the speed before
+    """Return the speed after an impact, with the relative accuracy of the speed before
     it.
 
-    The difference of two nearly equal velocities is inaccurate for slow impacts, for
-    which the law is integrated from the impact of zero speed.
+    For slow impacts, the difference of two nearly equal velocities would be inaccurate,
+    so the law is integrated from the impact of zero speed.
     """
     direction = normal_directions(system, time, before)[0]
     rest = before - approach * direction
@@ -118,19 +122,20 @@ def rebound_speed(system: HybridSystem, time, before, approach):
 
 
 def impact_map(system: HybridSystem, time, speed, *, horizon=None):
-    """Map time and rebound speed of an impact to those of the next: P_I.
+    """Map the time and rebound speed of an impact to those of the next (the map P_I).
 
-    It is exact; thesis eq. 6.10 is its first order at small speed. The rebound speed is
-    the normal velocity after the impact; the thesis' v is that before it.
+    The map is exact; eq. 6.10 of the thesis is its first-order approximation at small
+    speeds. The rebound speed is the normal velocity after the impact; v in the thesis
+    is that before it.
 
     Args:
         system: A system with two states and one constraint.
         time: Time of the impact (s).
-        speed: Rebound speed, >= 0, in the units of the gap over time.
+        speed: Rebound speed, >= 0, in units of the gap per unit of time.
         horizon: Longest flight time (s); default one period.
 
     Returns:
-        Time and rebound speed of the next impact; NaN where there is none.
+        Time and rebound speed of the next impact; NaN if there is none.
 
     Examples:
         >>> from jaxcam.models import BouncingBall
@@ -157,10 +162,11 @@ def _impact_map(system, time, speed, horizon):
 
 
 def impact_jacobian(system: HybridSystem, time, speed) -> Float[Array, "2 2"]:
-    """Return the derivative of P_I by time and rebound speed.
+    """Return the derivative of the impact map P_I with respect to time and rebound
+    speed.
 
     Its determinant is r^2 v0/v1 times the change of phase volume in flight; it is
-    singular where the next impact grazes, v1 = 0 (thesis, eqs. 6.11-6.12).
+    singular if the next impact grazes, v1 = 0 (thesis, eqs. 6.11-6.12).
 
     Args:
         system: The system.
@@ -190,7 +196,7 @@ def surface_state(system: HybridSystem, time, speed, guess=None):
         system: A system with two states and one constraint.
         time: Time (s).
         speed: Normal velocity, a scalar.
-        guess: State from which Newton's method starts; default zeros.
+        guess: Initial guess for Newton's method; default zeros.
 
     Returns:
         State, shape `(2,)`.

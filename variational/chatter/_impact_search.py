@@ -1,10 +1,10 @@
 """Search for the next impact, one Runge-Kutta step at a time.
 
-It is separate from the event loop of `jaxcam.hybrid`, because it computes gaps to their
-own relative accuracy and can be differentiated twice. One step is the same program
+This is separate from the event loop of `jaxcam.hybrid`, because it computes gaps with
+high relative accuracy and can be differentiated twice. A step is the same program
 whether it searches for the next impact, lands on it or finds the lowest point of a
-flight; so a loop over steps compiles quickly, and its forward derivative is that of the
-motion at fixed step lengths, corrected at the impact.
+flight, so a loop over steps compiles quickly. Its forward derivative is that of the
+motion with fixed step lengths, corrected at the impact.
 """
 
 from typing import NamedTuple
@@ -19,20 +19,20 @@ from jaxcam.hybrid.surface import normal_acceleration
 from ._free_flight import flight_rates, on_flight, runge_kutta_step, TOLERANCE
 
 
-# a minimum of the gap is searched for within one step, which must not hold two
+# a minimum of the gap is searched for within one step, which must not contain two
 _STEPS_PER_PERIOD = 16
-# change of a landing step, over the flight and over the time in which the
-# acceleration would stop the fall, after which one more step is exact
+# change of a landing step, relative to the flight and to the time in which the
+# acceleration would stop the approach, after which one more step is exact
 _LAST_CHANGE = 1e-3
-# steps towards a landing or a lowest point, before the last is taken for it
+# maximum number of steps towards a landing or a lowest point; the last one is then used
 _LANDINGS, _LOWERINGS = 100, 12
 
-# length of the first step, in speeds over accelerations: slightly beyond the impact
+# length of the first step, in units of speed / acceleration: slightly beyond the impact
 _BEHIND = 2.2
 
 _SEARCH, _LAND, _LAST, _BOTTOM = range(4)
 frozen = jax.lax.stop_gradient
-"""Lengths of steps and decisions carry no derivative."""
+"""Step lengths and decisions carry no derivative."""
 
 
 class SearchState(NamedTuple):
@@ -40,32 +40,32 @@ class SearchState(NamedTuple):
 
     time: Float[Array, ""]
     y: Float[Array, " n+2"]
-    """State, normal velocity and gap; the last two are integrated separately from
-    the last impact on, so that low flights are as accurate as high ones.
+    """State, normal velocity and gap; the last two are integrated separately, starting
+    at the last impact, so that low flights are as accurate as high ones.
     """
     since: Float[Array, ""]
     """Time of the last impact."""
     length: Float[Array, ""]
     """Length of the next step."""
     longest: Float[Array, ""]
-    """Largest length of a step."""
+    """Longest step."""
     mode: Int[Array, ""]
     low: Float[Array, ""]
-    """Lengths before and beyond the point that is searched for."""
+    """Step lengths before and beyond the point that is searched for."""
     high: Float[Array, ""]
     tries: Int[Array, ""]
-    """Steps for the same purpose."""
+    """Number of steps for the same purpose."""
     rises: Bool[Array, ""]
     """Whether the flight has just passed its lowest point."""
 
     @property
     def searches(self) -> Bool[Array, ""]:
-        """Return whether no impact is in sight yet."""
+        """Return whether no impact has been found yet."""
         return self.mode == _SEARCH
 
     @property
     def lands(self) -> Bool[Array, ""]:
-        """Return whether the next step ends in the impact, up to one correction."""
+        """Return whether the next step ends at the impact, to within one correction."""
         return (self.mode == _LAST) | ((self.mode == _LAND) & (self.tries >= _LANDINGS))
 
 
@@ -74,7 +74,7 @@ def take_off(
 ) -> SearchState:
     """Start a flight from an impact, from release, or at a `height`.
 
-    `longest` is the largest step.
+    `longest` is the longest step.
     """
     longest, time = frozen(longest), jnp.asarray(time, jnp.float64)
     pull = -frozen(normal_acceleration(system, time, state)[0])
@@ -96,7 +96,9 @@ def take_off(
 
 
 def longest_step(system: HybridSystem, horizon=jnp.inf) -> Float[Array, ""]:
-    """Return the longest step: within the horizon, and a part of the forcing period."""
+    """Return the longest step: within the horizon, and a fraction of the forcing
+    period.
+    """
     if system.period is None:
         return jnp.asarray(horizon, jnp.float64)
     part = jnp.asarray(system.period, jnp.float64) / _STEPS_PER_PERIOD
@@ -111,7 +113,7 @@ def search_step(
     rates = flight_rates(system)
     end, wrong = runge_kutta_step(rates, f.time, f.y, f.length)
     rate = rates(f.time + f.length, end)
-    # the landing moves with the motion: zero, but for its derivative
+    # zero, except for the derivative, because the landing moves with the motion
     late = end[-1] / jnp.where(frozen(end[-2]) < 0, end[-2], -jnp.inf)
     lands = f.lands
     there = end - late * rate
@@ -130,7 +132,9 @@ def search_step(
 
 
 def _next(f: SearchState, end, wrong, rate) -> tuple[SearchState, Bool[Array, ""]]:
-    """Return purpose and length of the next step, and whether this one is taken."""
+    """Return the purpose and length of the next step, and whether this one is
+    accepted.
+    """
     size = jnp.max(jnp.abs(wrong) / (TOLERANCE * (1 + jnp.abs(end))))
     fall, rise, gap, pull = frozen(f.y[-2]), end[-2], end[-1], rate[-2]
     searches, bottoms = f.mode == _SEARCH, f.mode == _BOTTOM
@@ -151,8 +155,8 @@ def _next(f: SearchState, end, wrong, rate) -> tuple[SearchState, Bool[Array, ""
     least = jnp.minimum(elapsed * jnp.abs(pull), jnp.abs(rise))
     close = landing & falls & (jnp.abs(change * pull) <= _LAST_CHANGE * least)
 
-    # the lowest point of a flight that may have gone below the surface within the step,
-    # between a time at which it falls and one at which it rises
+    # the lowest point of a flight that may have passed below the surface within the
+    # step, between a time at which the gap decreases and one at which it increases
     dips = searches & good & ~f.rises & (fall < 0) & (rise > 0) & (gap > 0)
     share = fall / jnp.where(dips, fall - rise, 1.0)
     low = jnp.where(bottoms & ~enters & (rise < 0), f.length, jnp.where(dips, 0.0, low))

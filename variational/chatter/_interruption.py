@@ -1,9 +1,9 @@
-"""Find the parameter value at which complete chattering ends at the release point.
+"""Find the parameter value at which complete chatter ends at the release point.
 
-The orbit that sticks once per period starts each period at release without relative
-velocity, so its interruption is one scalar equation, accumulation = release + period.
-As it stands the equation is not smooth (the difference falls like a power between 1/2
-and 1), so its smooth form is solved, `ChatterOrbit.margin`, by Newton's method inside a
+The orbit that sticks once per period starts each period at release with zero relative
+velocity, so its interruption is given by one scalar equation, accumulation = release +
+period. This equation is not smooth (the difference falls like a power between 1/2 and
+1), so its smooth form `ChatterOrbit.margin` is solved, by Newton's method within a
 bracket.
 """
 
@@ -25,9 +25,10 @@ _ITERATIONS = 200
 
 
 class Line(eqx.Module):
-    """A system along one parameter: all other data, and the place of the parameter.
+    """A one-parameter family of systems: all other data, and the index of the
+    parameter.
 
-    A pytree, so one compiled program serves every choice of parameter.
+    It is a pytree, so one compiled program is used for every choice of parameter.
     """
 
     base: HybridSystem
@@ -40,8 +41,8 @@ class Line(eqx.Module):
 
 
 def line(system: HybridSystem, where: Where) -> Line:
-    """Return the systems that differ from `system` in the parameter that `where`
-    picks.
+    """Return the systems that differ from `system` in the parameter selected by
+    `where`.
     """
     system = as_arrays(system)
     picked = pick(where, system)
@@ -52,16 +53,16 @@ def line(system: HybridSystem, where: Where) -> Line:
 
 
 class Interruption(eqx.Module):
-    """The parameter value at which complete chattering ends at the release point."""
+    """The parameter value at which complete chatter ends at the release point."""
 
     value: Float[Array, ""]
     """The parameter, in its own unit."""
     converged: Bool[Array, ""]
-    """Whether the bracket was closed to rounding."""
+    """Whether the bracket was reduced to rounding error."""
     ends: Float[Array, "2"]
     """Margin at the two ends of the bracket, shape `(2,)`."""
     slope: Float[Array, ""]
-    """Derivative of the margin by the parameter at `value`."""
+    """Derivative of the margin with respect to the parameter at `value`."""
     turns: Int[Array, ""]
     """Number of evaluations of one period."""
 
@@ -71,13 +72,14 @@ def interruption_in(
 ) -> Interruption:
     """Find the interruption between two values of a parameter; for use inside `jit`.
 
-    Safeguarded Newton on the margin. The value is forward-differentiable in every other
-    parameter of the system (implicit function theorem). Nothing is raised: `converged`
-    is false where the margin does not change sign.
+    Safeguarded Newton's method is applied to the margin. The value can be
+    differentiated in forward mode with respect to every other parameter of the system
+    (implicit function theorem). No error is raised; `converged` is false if the margin
+    does not change sign.
 
     Args:
         system: A system with two states, one constraint and a period.
-        where: Picks the parameter.
+        where: Selects the parameter.
         low: Lower end of the bracket.
         high: Upper end of the bracket.
         periods: Number of forcing periods in one period of the orbit.
@@ -96,7 +98,7 @@ def _margin(along: Line, value, periods: int):
 
 
 def _slope(along: Line, value, periods: int):
-    """Return the margin and its derivative by the parameter."""
+    """Return the margin and its derivative with respect to the parameter."""
 
     def margin(value):
         return _margin(along, value, periods)
@@ -111,7 +113,7 @@ def _solve(along: Line, low, high, *, periods: int) -> Interruption:
 
 @_solve.def_jvp
 def _solve_jvp(primals, tangents, *, periods: int):
-    """Apply the implicit function theorem: margin(value, parameters) stays zero."""
+    """Apply the implicit function theorem: margin(value, parameters) remains zero."""
     along, low, high = primals
     moved, _, _ = tangents
     found = _solve(along, low, high, periods=periods)
@@ -187,29 +189,29 @@ def chatter_interruption(
     bracket: tuple[float, float],
     periods: int = 1,
 ) -> Float[Array, ""]:
-    """Find the parameter value at which complete chattering ends at the release point.
+    """Find the parameter value at which complete chatter ends at the release point.
 
-    There the impacts of the orbit that sticks once in `periods` forcing periods
-    accumulate exactly at release: on one side the orbit is periodic and sticks, on the
-    other it does not stick then and is followed by lobes of periodic windows and chaos
+    There, the impacts of the orbit that sticks once in `periods` forcing periods
+    accumulate exactly at release. On one side, the orbit is periodic and sticks; on the
+    other side, it no longer sticks, and there are lobes with periodic windows and chaos
     (thesis, section 5.4 and chapter 6).
 
     Args:
         system: A system with two states, one constraint and a period.
-        where: Picks the parameter: `lambda system: system.speed`, or `"speed"`.
-        bracket: Two values of the parameter, with complete chattering at one and
-            interrupted chattering at the other. With several periods, near the
-            interruption: elsewhere contact may come earlier, which counts as
-            interrupted too.
+        where: Selects the parameter: `lambda system: system.speed`, or `"speed"`.
+        bracket: Two values of the parameter, with complete chatter at one and
+            interrupted chatter at the other. With several periods, both should be close
+            to the interruption, because elsewhere contact may occur earlier, which also
+            counts as interrupted.
         periods: Number of forcing periods in one period of the orbit.
 
     Returns:
-        The value, in the parameter's unit; forward-differentiable in the other
-            parameters.
+        The value, in the unit of the parameter; it can be differentiated in forward
+            mode with respect to the other parameters.
 
     Raises:
-        ValueError: The bracket holds no interruption (checked where the values are
-            known).
+        ValueError: The bracket contains no interruption (checked only outside
+            transformations).
 
     Examples:
         >>> from jaxcam.models import ImpactOscillator
@@ -231,12 +233,12 @@ def _require(found: Interruption, low, high) -> None:
         return
     ends = np.asarray(found.ends)
     if np.all(ends < 0):
-        state = "chattering is complete at both ends"
+        state = "chatter is complete at both ends"
     elif np.all(ends > 0):
-        state = "chattering is interrupted, or does not occur, at both ends"
+        state = "chatter is interrupted, or does not occur, at both ends"
     else:
-        state = "the motion has no release from sticking in it"
+        state = "there is no release from sticking in it"
     raise ValueError(
-        f"No interruption of chattering between {float(low):g} and {float(high):g}: "
-        f"{state}. Give a bracket with complete chattering at one end only."
+        f"No interruption of chatter between {float(low):g} and {float(high):g}: "
+        f"{state}. Give a bracket with complete chatter at only one end."
     )

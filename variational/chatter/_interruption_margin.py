@@ -20,11 +20,12 @@ from ._scaling_law import scaling_law
 
 
 _MAX_STEPS = 100_000
-# lambda/(1 - r) below which the rest of the sequence is certain to be complete
+# lambda/(1 - r) below which the rest of the sequence is certainly complete
 _SMALL = 1e-6
 # contribution to the margin below which later impacts are omitted
 _ENOUGH = 1e-16
-# time from release, over the period, below which rounding determines the next event
+# time to release, relative to the period, below which rounding determines the next
+# event
 _NEAR = 1e-12
 
 
@@ -35,8 +36,8 @@ class _Sequence(NamedTuple):
     turn: Int[Array, ""]
     """Number of the period, from 1, whose end is the next release."""
     tau: Float[Array, ""]
-    """Time from that release and speed of the impact that defines the margin, and
-    its number in its period.
+    """Time (relative to that release), speed, and number in its period of the impact
+    that defines the margin.
     """
     speed: Float[Array, ""]
     rank: Int[Array, ""]
@@ -48,17 +49,18 @@ def interruption_margin(
 ) -> Float[Array, ""]:
     """Return the signed distance from interruption of an orbit that sticks once.
 
-    The margin of [`variational.chatter_accumulation`][], to the same accuracy: zero
-    where the impacts accumulate at the last release, negative where they do before.
-    Impacts too near to that release to matter are omitted, and the derivative takes one
-    run along the motion for any number of directions.
+    It is the margin of [`variational.chatter_accumulation`][], with the same accuracy:
+    zero if the impacts accumulate at the last release, negative if they accumulate
+    earlier. Impacts too close to that release to matter are omitted, and the derivative
+    needs only one run along the motion for any number of directions.
 
     **Arguments:** a system with two states, one constraint and a period, already
-    `prepared`; its release; `periods` from there to the last release. Pure; may be
-    compiled, batched and differentiated forward, once.
+    `prepared`; its release; `periods` from there to the last release. The function is
+    pure: it can be compiled, batched, and differentiated once in forward mode.
 
     Returns:
-        NaN for a last period without impact, or where contact comes earlier.
+        The margin; NaN if there is no impact in the last period, or if contact occurs
+            earlier.
 
     Raises:
         ValueError: It is differentiated twice.
@@ -78,9 +80,9 @@ def _last(slope):
 def _last_jvp(primals, tangents):
     del primals, tangents
     raise ValueError(
-        "interruption_margin can be differentiated once only; for second derivatives "
-        "differentiate variational.chatter_accumulation(...).margin, or take "
-        "differences of first ones"
+        "interruption_margin can be differentiated only once; for second derivatives, "
+        "differentiate variational.chatter_accumulation(...).margin, or use "
+        "differences of first derivatives"
     )
 
 
@@ -106,7 +108,7 @@ def _margin(system, frame: ChatterFrame, *, periods: int) -> Float[Array, ""]:
 
     def goes_on(carry):
         flight, said, count = carry
-        # a flight that misses the wall near release may return a period later
+        # a flight that misses the constraint near release may return a period later
         waits = flight.time - flight.since < 2 * period
         return ~said.over & waits & (count < _MAX_STEPS)
 
@@ -141,7 +143,7 @@ def _heard(system, frame, periods: int, s: _Sequence, f: SearchState) -> _Sequen
     rank, here = jnp.where(new, -1, s.rank), jnp.where(new, 0, s.here)
     # the last impact before release that is not far below lambda_bar
     takes = early & last & ((lam >= law.lambda_bar / 2) | (rank < 0))
-    # later impacts change terms of order q^k tau_k only
+    # later impacts only change terms of order q^k tau_k
     rest = jnp.exp(here.astype(jnp.float64) * jnp.log(law.q)) * jnp.abs(tau)
     return _Sequence(
         over=settled | (last & (~early | (rest <= _ENOUGH * period))),

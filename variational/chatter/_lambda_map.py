@@ -1,9 +1,9 @@
-"""Compute the map of low-velocity impacts close to release, in the coordinate lambda.
+"""Compute the map of low-velocity impacts close to release in the coordinate lambda.
 
-Close to the release point of sticking the relative acceleration is c tau, with tau the
-time from release and c the jerk there. An impact at tau < 0 that leaves with speed v
-has lambda = v / (c tau^2); the next one is at h(lambda) tau with f(lambda) (thesis,
-eqs. 6.28-6.37).
+Close to the release point of sticking, the relative acceleration is c tau, with tau the
+time relative to release and c the jerk at release. An impact at tau < 0 with rebound
+speed v has lambda = v / (c tau^2); the next one is at h(lambda) tau and has f(lambda)
+(thesis, eqs. 6.28-6.37).
 """
 
 import jax.numpy as jnp
@@ -13,8 +13,8 @@ from jaxcam.hybrid.lowering import while_loop
 
 
 LAMBDA_MAX = 3 / 8
-"""Largest lambda for which the motion returns (thesis, eq. 6.47); above 1/3 it
-returns after release.
+"""Largest lambda for which the motion returns (thesis, eq. 6.47); above 1/3, it returns
+after release.
 """
 
 
@@ -26,28 +26,29 @@ def _root(lam):
 
 
 def hop_ratio(lam) -> Float[Array, "..."]:
-    """Return h(lambda): time from release at the next impact over that at this one.
+    """Return h(lambda), the ratio of the times, relative to release, of the next impact
+    and this one.
 
     Args:
-        lam: Dimensionless, any shape, between 0 and 3/8.
+        lam: Coordinate lambda, dimensionless, any shape, between 0 and 3/8.
 
     Returns:
-        h, between 1 and -1/2 (thesis, eq. 6.33); negative where the next impact comes
-            after release; NaN above 3/8, where there is none.
+        h, between 1 and -1/2 (thesis, eq. 6.33); negative if the next impact is after
+            release; NaN above 3/8, where there is no next impact.
     """
     return (3 * _root(lam) - 1) / 2
 
 
 def lambda_map(lam, r) -> Float[Array, "..."]:
-    """Return f(lambda): the coordinate of the next impact (thesis, eqs. 6.36 and 6.89).
+    """Return f(lambda), the coordinate of the next impact (thesis, eqs. 6.36 and 6.89).
 
     Args:
-        lam: Dimensionless, any shape, between 0 and 3/8.
+        lam: Coordinate lambda, dimensionless, any shape, between 0 and 3/8.
         r: Coefficient of restitution of slow impacts, broadcast against `lam`.
 
     Returns:
-        f, with a pole at 1/3 where the next impact falls on release; NaN above 3/8,
-            where the motion does not return.
+        f, with a pole at 1/3, where the next impact is exactly at release; NaN above
+            3/8, where the motion does not return.
 
     Examples:
         >>> from variational import lambda_map, scaling_law
@@ -56,15 +57,15 @@ def lambda_map(lam, r) -> Float[Array, "..."]:
         True
     """
     s = _root(lam)
-    # 3 s (1 - s) = 8 lambda s / (1 + s) keeps all digits of a small lambda
+    # 3 s (1 - s) = 8 lambda s / (1 + s) retains all digits of a small lambda
     return 8 * r * lam * s / ((1 + s) * (3 * s - 1) ** 2)
 
 
 def lambda_inverse(lam, r) -> Float[Array, "..."]:
-    """Return the coordinate of the impact before: f(lambda_inverse(lam, r)) = lam.
+    """Return the coordinate of the previous impact: f(lambda_inverse(lam, r)) = lam.
 
     Args:
-        lam: Dimensionless, >= 0.
+        lam: Coordinate lambda, dimensionless, >= 0.
         r: Coefficient of restitution.
 
     Returns:
@@ -83,14 +84,15 @@ def lambda_inverse(lam, r) -> Float[Array, "..."]:
 
 
 def koenigs(lam, lambda_bar, r, q) -> Float[Array, ""]:
-    """Return the coordinate in which the lambda-map is multiplication.
+    """Return the coordinate in which the lambda-map is a multiplication.
 
-    K(f(lambda)) = K(lambda)/q; K is the limit of (f^-n(lambda) - lambda_bar) q^-n: zero
-    at lambda_bar, with slope one; negative where chattering completes before release,
-    positive where it does not (G. Koenigs' linearisation of a map at a fixed point).
+    It satisfies K(f(lambda)) = K(lambda)/q, and is the limit of (f^-n(lambda) -
+    lambda_bar) q^-n. K is zero at lambda_bar, with slope one; it is negative if chatter
+    is completed before release, and positive otherwise (G. Koenigs' linearisation of a
+    map at a fixed point).
 
     Args:
-        lam: A scalar, dimensionless, >= 0.
+        lam: Coordinate lambda, a dimensionless scalar >= 0.
         lambda_bar: Fixed point, as in [`variational.scaling_law`][].
         r: Coefficient of restitution of slow impacts.
         q: Scale, as in [`variational.scaling_law`][].
@@ -111,7 +113,7 @@ def koenigs(lam, lambda_bar, r, q) -> Float[Array, ""]:
 
     def back(carry):
         deviation, scaled, count = carry
-        # f^-1 of lambda_bar + deviation less lambda_bar, without cancellation
+        # f^-1(lambda_bar + deviation) - lambda_bar, without cancellation
         lam = lambda_bar + deviation
         root = jnp.sqrt(9 * r * r + 24 * r * lam)
         bottom = 18 * lam + 6 * r

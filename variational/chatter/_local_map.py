@@ -1,4 +1,4 @@
-"""Fit and iterate the map of thesis section 5.4, with lobes around the interruption."""
+"""Fit and iterate the map with lobes around the interruption (thesis, section 5.4)."""
 
 import equinox as eqx
 import jax
@@ -21,13 +21,13 @@ class LocalMap(eqx.Module):
     delta_x: Float[Array, ""]
     """Width of the first lobe; x_1 = x_0 - width."""
     coefficients: Float[Array, " n"]
-    """Coefficients c_0..c_n of thesis eq. 5.3, in powers of x - x_0."""
+    """Coefficients c_0..c_n in powers of x - x_0 (thesis, eq. 5.3)."""
     root: Float[Array, ""]
-    """Coefficient d of the root in thesis eq. 5.3."""
+    """Coefficient d of the root (thesis, eq. 5.3)."""
     x_0: Float[Array, ""]
     """Right end of the first lobe."""
     p_0: Float[Array, ""]
-    """The map at `x_0`."""
+    """Value of the map at `x_0`."""
 
     @property
     def x_inf(self) -> Float[Array, ""]:
@@ -36,7 +36,7 @@ class LocalMap(eqx.Module):
 
     @property
     def alpha_inf(self) -> Float[Array, ""]:
-        """The map at the accumulation and beyond it (thesis, eq. 5.5)."""
+        """Value of the map at and beyond the accumulation point (thesis, eq. 5.5)."""
         return self.p_0 + self.delta_pi / (1 - jnp.exp(self.Q))
 
     def lobe(self, x) -> Float[Array, "..."]:
@@ -54,10 +54,10 @@ class LocalMap(eqx.Module):
         return smooth + self.root * jnp.sqrt(jnp.abs(self.delta_x) * inside)
 
     def __call__(self, x) -> Float[Array, "..."]:
-        """Evaluate the map: constant beyond the accumulation, else lobe j (thesis, eq.
-        5.4).
+        """Evaluate the map: constant beyond the accumulation, otherwise lobe j (thesis,
+        eq. 5.4).
 
-        It is NaN outside the first lobe, which the fit does not cover.
+        It is NaN outside the first lobe, where the fit is not valid.
         """
         width = 1 - jnp.exp(self.M)
         # sum of beta_k up to j - 1, solved for j
@@ -75,11 +75,11 @@ class LocalMap(eqx.Module):
 
 
 def fit_local_map(lobes: Lobes) -> LocalMap:
-    """Fit thesis eqs. 5.2-5.5: scales by lines through logarithms, one lobe by eq. 5.3.
+    """Fit the scales by lines through logarithms, and one lobe (thesis, eqs. 5.2-5.5).
 
-    The cubic with a root passes through both ends of the first lobe and matches the
-    sampled slope at its points of slope 1, 0 and -1; a slope that the lobe does not
-    reach is replaced by the nearest.
+    The cubic with a square root (thesis, eq. 5.3) passes through both ends of the first
+    lobe and matches the sampled slope at its points of slope 1, 0 and -1; a slope that
+    the lobe does not reach is replaced by the nearest one.
 
     Args:
         lobes: The sampled lobes.
@@ -133,10 +133,10 @@ def iterate_local_map(
 
     Args:
         local: The fitted map.
-        shifts: Shifts in the units of x, shape `(k,)`; the map of x is that of x +
-            shift.
+        shifts: Shifts in the units of x, shape `(k,)`; the shifted map is the map at x
+            + shift.
         turns: Number of iterations.
-        keep: Number of last iterates to keep.
+        keep: Number of final iterates to keep.
 
     Returns:
         Iterates, shape `(k, keep)`.

@@ -15,10 +15,10 @@ _NEWTON = 8
 
 
 class Reversed(HybridSystem):
-    """A system whose motion at time t is that of `forward` at -t.
+    """A system whose motion at time t is that of `forward` at time -t.
 
-    Its impacts undo those of `forward`: the speed is divided by the restitution. For
-    one constraint, and restitution above zero.
+    Its impacts reverse those of `forward`: the speed is divided by the coefficient of
+    restitution, which must be positive. There must be only one constraint.
 
     Examples:
         >>> from jaxcam.models import BouncingBall

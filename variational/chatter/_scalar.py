@@ -1,4 +1,4 @@
-"""Handle scalar gaps and gap vectors of length one of single-constraint systems."""
+"""Handle single-constraint systems whose gap is a scalar or a vector of length one."""
 
 import jax.numpy as jnp
 
@@ -11,13 +11,11 @@ def one_constraint(value, ndim: int):
 
 
 def check_chatter_system(system: HybridSystem) -> None:
-    """Raise `ValueError` for a system without the period that chattering theory
-    needs.
-    """
+    """Raise `ValueError` for a system without the period that chatter theory needs."""
     if system.period is None:
         raise ValueError(
-            "this system has no forcing period; chattering that ends at a release "
-            "needs one"
+            "this system has no forcing period, which is needed for chatter that ends "
+            "at a release"
         )
 
 

@@ -1,4 +1,4 @@
-"""Compute the scales of the lobes at the interruption of complete chattering."""
+"""Compute the scales of the lobes at the interruption of complete chatter."""
 
 import equinox as eqx
 import jax
@@ -9,28 +9,29 @@ from jaxtyping import Array, Float
 
 
 class ScalingLaw(eqx.Module):
-    """Fixed point of the lambda-map and the scales that follow from it."""
+    """Fixed point of the lambda-map, and the scales that follow from it."""
 
     lambda_bar: Float[Array, "..."]
     """Fixed point: impacts with this lambda accumulate exactly at release (thesis,
     eq. 6.45)."""
     p: Float[Array, "..."]
-    """h(lambda_bar): each impact is closer to release by this factor."""
+    """h(lambda_bar), the factor by which each impact is closer to release."""
     q: Float[Array, "..."]
-    """1 / f'(lambda_bar): each lobe is closer to lambda_bar by this factor (thesis,
-    eq. 6.49)."""
+    """1 / f'(lambda_bar), the factor by which each lobe is closer to lambda_bar
+    (thesis, eq. 6.49).
+    """
     kappa: Float[Array, "..."]
     """Exponent of the envelope |beta| <= |lambda - lambda_bar|^kappa (thesis,
     eq. 6.53)."""
 
 
 def scaling_law(r) -> ScalingLaw:
-    """Return the scales p, q and the exponent kappa at the interruption of chattering.
+    """Return the scales p and q and the exponent kappa at the interruption of chatter.
 
-    With s = sqrt(1 - 8 lambda / 3) the fixed point of thesis eq. 6.36 is a root of
-    9 s^3 + 3 s^2 - (5 + 8 r) s + 1 in (1/3, 1); the other positive root has p < 0: it
-    stands for an impact after release and is not a fixed point of a motion. Then
-    p = (3 s - 1)/2 and 1/q = (1 + s)^2/(4 s^2 p).
+    With s = sqrt(1 - 8 lambda / 3), the fixed point of the map in the thesis, eq. 6.36,
+    is a root of 9 s^3 + 3 s^2 - (5 + 8 r) s + 1 in (1/3, 1). The other positive root
+    has p < 0: it corresponds to an impact after release and is not a fixed point of a
+    motion. Then p = (3 s - 1)/2 and 1/q = (1 + s)^2/(4 s^2 p).
 
     Args:
         r: Coefficient of restitution of slow impacts, any shape.
@@ -39,7 +40,7 @@ def scaling_law(r) -> ScalingLaw:
         A [`variational.chatter.ScalingLaw`][], dimensionless, in the shape of `r`.
 
     Raises:
-        ValueError: r lies outside (0, 1) (checked where its value is known).
+        ValueError: r is outside (0, 1) (checked only outside transformations).
 
     Examples:
         >>> from variational import scaling_law
@@ -51,8 +52,8 @@ def scaling_law(r) -> ScalingLaw:
         values = np.asarray(r)
         if not np.all((values > 0) & (values < 1)):
             raise ValueError(
-                f"r is {r}; give a coefficient of restitution between 0 and 1, both "
-                "excluded: without rebound, or without loss, nothing accumulates"
+                f"r is {r}; give a coefficient of restitution strictly between 0 and "
+                "1, because impacts do not accumulate without rebound or without loss"
             )
     r = jnp.asarray(r, dtype=jnp.float64)
 
@@ -61,7 +62,8 @@ def scaling_law(r) -> ScalingLaw:
         slope = (27 * s + 6) * s - (5 + 8 * r)
         return s - value / slope
 
-    # the cubic is convex here: from s = 1 Newton descends onto the largest root
+    # the cubic is convex here, so Newton's method from s = 1 converges to the largest
+    # root
     s = jax.lax.fori_loop(0, 64, newton, jnp.ones_like(r))
     p = (3 * s - 1) / 2
     q = 4 * s * s * p / ((1 + s) * (1 + s))

@@ -1,4 +1,4 @@
-"""Map a section to the next, impact by impact, through chattering and sticking."""
+"""Map one section to the next, impact by impact, through chatter and sticking."""
 
 from typing import NamedTuple
 
@@ -19,7 +19,7 @@ from ._scalar import check_chatter_system, scalar_gap
 
 
 _IMPACTS = 2000
-# the remaining impacts of a complete sequence then change the next period below
+# the remaining impacts of a complete sequence then change the next period by less than
 # rounding
 _SMALL = 1e-12
 
@@ -30,11 +30,13 @@ class SectionArrival(eqx.Module):
     state: Float[Array, "... n"]
     """State, shape `(n,)`."""
     gap: Float[Array, "..."]
-    """Gap there, more accurate than computed from the state."""
+    """Gap at the section, more accurate than if computed from the state."""
     velocity: Float[Array, "..."]
-    """Normal velocity there, more accurate than computed from the state."""
+    """Normal velocity at the section, more accurate than if computed from the state."""
     impacts: Int[Array, "..."]
-    """Number of impacts; for a complete sequence those before it became negligible."""
+    """Number of impacts; for a complete sequence, those before the rest is
+    negligible.
+    """
     stuck: Bool[Array, "..."]
     """Whether the motion stuck."""
 
@@ -58,13 +60,13 @@ def to_section(
 ) -> SectionArrival:
     """Follow a motion, impact by impact, to the time `section`.
 
-    A sequence that becomes negligible before release has completed: the motion
-    continues from the release point of `frame`.
+    A sequence that becomes negligible before release counts as completed, and the
+    motion continues from the release point of `frame`.
 
     Args:
         system: The system, already `prepared`.
-        frame: The frame whose release lies between the start and the section.
-        start: The start, of which time, state and speed are used.
+        frame: The frame whose release is between the start and the section.
+        start: The start; its time, state and speed are used.
         section: Time of the section (s).
         height: Gap at the start, > 0 in flight.
 
@@ -113,12 +115,12 @@ def to_section(
 
 
 def section_turn(system: HybridSystem, state, phase=0.0) -> SectionArrival:
-    """Apply the stroboscopic map through chattering: state at a phase to that a period
-    later.
+    """Apply the stroboscopic map through chatter, from the state at a phase to that one
+    period later.
 
-    It is exact to rounding for any number and speed of impacts, unlike a
-    simulation that completes chattering near its interruption (thesis, eq. 5.1). The
-    function is pure; it may be compiled, batched and differentiated forward.
+    It is accurate to rounding for any number and speed of impacts, unlike a simulation
+    that completes chatter near its interruption (thesis, eq. 5.1). The function is
+    pure: it can be compiled, batched and differentiated in forward mode.
 
     Args:
         system: A system with two states, one constraint and a period.
@@ -149,7 +151,7 @@ def _turn(system, state, phase) -> SectionArrival:
 
 
 def flight_start(system, time, state):
-    """Return a state off the surface as the start of a flight, and its gap."""
+    """Return a state off the surface as the start of a flight, with its gap."""
     state = jnp.asarray(state, jnp.float64)
     speed = normal_velocity(system, time, state)[0]
     yes = jnp.asarray(True)
@@ -165,10 +167,9 @@ def release_impacts(system: HybridSystem, count: int, time=0.0) -> ImpactPoint:
         time: As in [`variational.chatter_frame`][].
 
     Returns:
-        A [`variational.chatter.ImpactPoint`][] with a leading axis of impacts. Its
-            times are those of the period that starts at the release of
-            `chatter_frame(system, time)`; `found` is false from the first flight on
-            that does not return.
+        A [`variational.chatter.ImpactPoint`][] with a leading axis of impacts. The
+            times are in the period that starts at the release of `chatter_frame(system,
+            time)`; `found` is false from the first flight that does not return.
     """
     check_chatter_system(system)
     return _from_release(as_arrays(system), count, jnp.asarray(time, jnp.float64))
@@ -198,7 +199,7 @@ def _following(system, time, state, speed, height, count) -> ImpactPoint:
 def impact_after(system, time, state, speed, height, rank) -> ImpactPoint:
     """Return impact number `rank`, from 0, after a start on or off the surface.
 
-    `rank` may be an array: one program serves all.
+    `rank` may be an array, so that one program is used for all ranks.
     """
     start = ImpactPoint(time, state, speed, -speed, jnp.asarray(True))
 
@@ -215,7 +216,7 @@ def impact_after(system, time, state, speed, height, rank) -> ImpactPoint:
 
 
 def section_to_impact(system: HybridSystem, state, phase, rank) -> ImpactPoint:
-    """Map a state at a section to an impact after it: Theta of thesis eq. 6.105.
+    """Map a state at a section to a later impact (the map Theta; thesis, eq. 6.105).
 
     Args:
         system: A system with two states, one constraint and a period.

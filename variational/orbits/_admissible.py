@@ -12,8 +12,8 @@ from jaxcam.hybrid import HybridSystem
 from ._shooting import Shooting
 
 
-# error of a zero gap or speed from rounding and the equations' tolerance, relative to
-# the size of gaps: a lower gap is a penetration
+# error of a zero gap or speed due to rounding and the tolerance of the equations,
+# relative to the size of gaps: a lower gap is a penetration
 _ROUNDING = 1e-9
 # largest error of the flights for which the gaps are reliable
 _ERROR = 1e-9
@@ -30,27 +30,27 @@ def inadmissible(
 ) -> str | None:
     """Return the reason why a solution is not admissible, or None.
 
-    **Arguments:** lowest gap of each flight and approach speed of each impact, by their
-    numbers, the error of the flights and the size of gaps, as in
+    **Arguments:** lowest gap of each flight and approach speed of each impact, by
+    index, the error of the flights and the size of the gaps, as in
     [`variational.orbits.Seen`][]; period (s); Runge-Kutta steps in a flight.
     """
     room = _ROUNDING * float(gap_size)
     for k, value in gaps.items():
         if not value >= -room:
             return (
-                f"the gap falls to {value:.1e} within flight {k}: the orbit would go "
+                f"the gap falls to {value:.1e} within flight {k}: the orbit would pass "
                 "through the constraint"
             )
     for k, value in speeds.items():
         if not value >= -room * 2 * math.pi / float(period):
             return (
-                f"impact {k} moves away from its constraint: the orbit would have to "
-                "start its flight inside it"
+                f"at impact {k}, the motion is away from the constraint: the flight "
+                "would have to come from behind it"
             )
     if not float(error) < _ERROR:
         return (
-            f"{steps} steps in a flight leave an error of {float(error):.0e}; state "
-            "the problem with more steps"
+            f"with {steps} steps in a flight, the error is {float(error):.0e}; use "
+            "more steps in the problem"
         )
     return None
 

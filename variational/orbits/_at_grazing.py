@@ -1,4 +1,4 @@
-"""Compute multipliers of an orbit at a grazing, as limits from the impacting side."""
+"""Compute the multipliers of an orbit at grazing, as limits from the impacting side."""
 
 from typing import Any
 
@@ -9,19 +9,20 @@ from jaxtyping import Complex, Float
 def multipliers_at_grazing(
     regular: Float[np.ndarray, "n n"], singular: Float[np.ndarray, "n n"]
 ) -> Complex[np.ndarray, " n"]:
-    """Return eigenvalues of regular + singular / speed for speed -> 0 from below.
+    """Return the eigenvalues of regular + singular / speed for speed -> 0 from below.
 
-    Next to a grazing the monodromy matrix is of this form, its second part of rank one,
-    b c' (saltation_parts, times the flights and the other impacts). One multiplier
-    grows like c'b / speed; the others tend to the eigenvalues of the first part on the
-    plane c'x = 0, projected onto it along b.
+    Near grazing, the monodromy matrix has this form, and its second part has rank one,
+    b c' (from `saltation_parts`, multiplied by the matrices of the flights and the
+    other impacts). One multiplier grows like c'b / speed; the others tend to the
+    eigenvalues of the first part restricted to the plane c'x = 0, projected onto it
+    along b.
 
     **Arguments:** both parts, shape `(n, n)`; the speed is the normal velocity before
     the impact, below zero.
 
     Returns:
-        Shape `(n,)`: plus or minus infinity and the n - 1 limits, the largest modulus
-            first; all NaN where c'b = 0, so that the growth is of another order.
+        Shape `(n,)`: plus or minus infinity and the n - 1 limits, largest modulus
+            first; all NaN if c'b = 0, because the growth is then of a different order.
     """
     n = regular.shape[0]
     unknown = np.full(n, np.nan, complex)
@@ -29,7 +30,7 @@ def multipliers_at_grazing(
         return unknown
     _, sizes, right = np.linalg.svd(singular)
     growth = float(np.trace(singular))
-    # tolerance for a cancelled growth
+    # tolerance for growth that cancels
     if not abs(growth) > 1e-9 * sizes[0]:
         return unknown
     plane = right[1:].T

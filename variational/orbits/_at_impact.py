@@ -13,7 +13,7 @@ from jaxcam.hybrid.surface import gaps, impacts, normal_acceleration, normal_vel
 from ._gap_sizes import gap_sizes
 
 
-# rounding error of a zero gap or speed, relative to their sizes
+# rounding error of a zero gap or speed, relative to its scale
 _ZERO = 1e-11
 
 
@@ -22,16 +22,16 @@ class ImpactStart(NamedTuple):
 
     constraint: int
     after: np.ndarray
-    """(n,) state just after it."""
+    """State just after the impact, (n,)."""
     window: float
-    """S, within which an impact of the same constraint is the same one."""
+    """Time (s) within which an impact at the same constraint is the same impact."""
 
 
 def start_at_impact(system: HybridSystem, t, state, period) -> ImpactStart | None:
-    """Return the impact at `state`, or None if no constraint is touched with a
+    """Return the impact at `state`, or None if no constraint is touched with a nonzero
     speed.
     """
-    # as arrays: numbers would be compiled in
+    # as arrays, because numbers would be compiled into the program
     t, period = (jnp.asarray(x, dtype=jnp.float64) for x in (t, period))
     gap, speed, fall, after, size = map(np.asarray, _look(system, t, state, period))
     closed = np.abs(gap) <= _ZERO * size
@@ -60,7 +60,7 @@ def _look(system, t, state, period):
 
 @eqx.filter_jit
 def after_and_speeds(system, time, before, sides):
-    """Return states after impacts, and normal velocities before and after."""
+    """Return the states after impacts, and the normal velocities before and after."""
 
     def one(t, x, side):
         after = impacts(system, t, x)[side]

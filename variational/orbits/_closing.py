@@ -1,8 +1,8 @@
 """Refine the impacts of a periodic orbit to the accuracy of its parameters.
 
-A run that locates its impacts loses digits at slow impacts: an error d of the
-position changes an impact speed v by about a d / v. As the solution of the shooting
-equations the impacts are as well conditioned as the orbit itself, whatever their speed.
+A run that locates its impacts loses digits at slow impacts: an error d of the position
+changes an impact speed v by about a d / v. As a solution of the shooting equations, the
+impacts are as well conditioned as the orbit itself, regardless of their speed.
 """
 
 from typing import NamedTuple
@@ -19,7 +19,7 @@ from .._flight import fly_linearised
 from ._links import landed, matrix_of
 
 
-# of Newton's method, which starts from a run that has almost closed
+# iterations of Newton's method, which starts from a run that has almost closed
 _STEPS = 4
 
 
@@ -27,11 +27,11 @@ class Knots(NamedTuple):
     """The impacts of a period in order, and the errors of the flights between them."""
 
     rows: Float[np.ndarray, "k n1"]
-    """(k, n + 1) time (s) and state just after."""
+    """Time (s) and state just after each impact, (k, n + 1)."""
     before: Float[np.ndarray, "k n"]
-    """(k, n) state just before."""
+    """State just before each impact, (k, n)."""
     miss: float
-    """Largest closing error of a flight before the first step, relative to the
+    """Largest closing error of a flight before the first Newton step, relative to the
     scale.
     """
 
@@ -45,11 +45,11 @@ def close(
 ) -> Knots:
     """Refine the impacts of an orbit without contact; unchanged if that fails.
 
-    `scale` is the size with which a gap and the components of a state are compared.
-    The states before impacts are those on arrival of the flights.
+    `scale` is the size to which gaps and state components are relative. The states
+    before impacts are those at the ends of the flights.
 
-    Flights use adaptive steps, so that programs differ only by the number of impacts,
-    padded to a power of two.
+    Flights use adaptive steps, so programs differ only in the number of impacts, which
+    is padded to a power of two.
     """
     number = len(rows)
     length = 1
@@ -58,7 +58,7 @@ def close(
     fill = np.minimum(np.arange(length), number - 1)
     real = np.arange(length) < number
     following = np.where(real, (np.arange(length) + 1) % number, np.arange(length))
-    # as an array: a number would be compiled in
+    # as an array, because a number would be compiled into the program
     span = np.asarray(period, dtype=float)
     made = _newton(system, rows[fill], sides[fill], real, following, span, scale)
     improved, arrived, misses = map(np.asarray, made)
@@ -72,7 +72,7 @@ def close(
 @eqx.filter_jit
 def _newton(system, rows, sides, real, following, period, scale):
     system = system.prepared()
-    # the last real row is followed by the first one, a period later
+    # the last valid row is followed by the first one, a period later
     wraps = jnp.where(real & (following <= jnp.arange(len(rows))), period, 0.0)
 
     def one(start, end, which, is_real):
@@ -99,7 +99,7 @@ def _newton(system, rows, sides, real, following, period, scale):
         links, _, miss = linear(rows)
         matrix = matrix_of(links, following, real=real)
         if system.period is None:
-            # any shift in time is a solution: use the smallest change
+            # any time shift is a solution, so the smallest change is used
             step = jnp.linalg.lstsq(matrix, miss.ravel())[0]
         else:
             step = jnp.linalg.solve(matrix, miss.ravel())
@@ -108,7 +108,7 @@ def _newton(system, rows, sides, real, following, period, scale):
     def judged(rows):
         _, before, miss = linear(rows)
         size = jnp.abs(miss) / scale[None, :]
-        # a component that is always zero has no size
+        # a component that is always zero has no scale
         return before, jnp.max(jnp.where(miss == 0, 0.0, size))
 
     rows = jnp.asarray(rows)

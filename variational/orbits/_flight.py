@@ -1,8 +1,8 @@
 """Integrate one free flight of known length, with a cheap derivative.
 
-The event loop finds out when a flight ends; here its duration is an unknown of the
-equations, so that a fixed number of Runge-Kutta steps suffices and the end depends
-smoothly on everything, also where the flight grazes or passes through a constraint.
+The event loop determines when a flight ends. Here, the duration is an unknown of the
+equations, so a fixed number of Runge-Kutta steps suffices, and the end depends smoothly
+on all variables even if the flight grazes or passes through a constraint.
 """
 
 import jax.numpy as jnp
@@ -17,8 +17,7 @@ from .._one_jacobian import with_one_jacobian
 def flight_nodes(
     system: HybridSystem, t0, x0: Float[Array, " n"], t1, steps: int
 ) -> tuple[Float[Array, " steps"], Float[Array, "steps n"], Float[Array, ""]]:
-    """Integrate free flight from `x0` at `t0` to `t1` (s) in equal steps of order
-    eight.
+    """Integrate free flight from `x0` at `t0` to `t1` (s) in equal eighth-order steps.
 
     Returns:
         The times and states at the ends of the steps, and the sum of the error
@@ -33,8 +32,8 @@ def flight_nodes(
 def flight_end(system: HybridSystem, t0, x0, t1, *, steps: int) -> Float[Array, " n"]:
     """Return the state at `t1` (s) after free flight from `x0` at `t0`.
 
-    Its forward derivative is one small Jacobian per flight, for any number of
-    directions. It can be differentiated again.
+    Its forward derivative needs one small Jacobian per flight for any number of
+    directions, and can be differentiated again.
     """
     return _end(system, t0, x0, t1, steps=steps)
 

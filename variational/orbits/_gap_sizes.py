@@ -17,8 +17,8 @@ def gap_sizes(
 ) -> Float[Array, " m"]:
     """Return the scale of each gap, in its units.
 
-    It is the largest change of the gap if each component of the state changes by
-    [`jaxcam.hybrid.sizes.component_sizes`][].
+    It is the largest change of the gap when each state component changes by its size
+    ([`jaxcam.hybrid.sizes.component_sizes`][]).
 
     **Arguments:** time (s), state `(n,)`, and the period of the motion (s).
 

@@ -1,7 +1,7 @@
-"""Represent a periodic orbit by its impacts, smooth in every parameter.
+"""Periodic orbits represented by their impacts, as smooth functions of all parameters.
 
-The number of impacts is given, so no events have to be found, as needed for a fit to
-published numbers.
+The number of impacts is given, so no events have to be detected; this is needed for
+fits to published numbers.
 """
 
 import equinox as eqx
@@ -18,18 +18,18 @@ from ._shooting import Shooting
 
 
 class ImpactOrbit(eqx.Module):
-    """A periodic orbit with impacts and without sustained contact."""
+    """A periodic orbit with impacts but without sustained contact."""
 
     times: Float[Array, " k"]
-    """Times of the impacts of one period of the orbit (s), increasing, shape `(k,)`."""
+    """Times of the impacts in one period of the orbit (s), increasing, shape `(k,)`."""
     states: Float[Array, "k n"]
     """State just after each impact, shape `(k, n)`."""
     constraints: tuple[int, ...] | None = eqx.field(static=True, default=None)
-    """Constraint that each impact hits; default the first."""
+    """Constraint hit by each impact; default the first."""
     periods: int = eqx.field(static=True, default=1)
     """Number of forcing periods after which the orbit repeats."""
     steps: int = eqx.field(static=True, default=32)
-    """Runge-Kutta steps of order 8 in each flight."""
+    """Number of eighth-order Runge-Kutta steps in each flight."""
 
     @property
     def number(self) -> int:
@@ -55,7 +55,7 @@ class ImpactOrbit(eqx.Module):
         return jnp.concatenate([phases[:, None], self.states], axis=1).ravel()
 
     def moved(self, unknowns: Float[Array, " u"], system: HybridSystem):
-        """Return the orbit of the same kind with other unknowns.
+        """Return an orbit of the same kind with other unknowns.
 
         Args:
             unknowns: Unknowns of the equations, shape `(u,)`.
@@ -72,15 +72,15 @@ class ImpactOrbit(eqx.Module):
 def impact_orbit(system: HybridSystem, guess: ImpactOrbit) -> ImpactOrbit:
     """Return the periodic orbit near `guess`, differentiable in every parameter.
 
-    Whether its flights stay clear of the constraints is not checked; see
+    Penetration of the constraints is not checked; see
     [`variational.orbits.clearance`][].
 
     Args:
         system: The system.
-        guess: An orbit near the one sought.
+        guess: An orbit near the desired one.
 
     Returns:
-        A [`variational.orbits.ImpactOrbit`][], NaN where there is none near the guess.
+        A [`variational.orbits.ImpactOrbit`][]; NaN if there is none near the guess.
 
     Examples:
         >>> from jaxcam.models import ImpactOscillator
@@ -101,15 +101,15 @@ def impact_orbit(system: HybridSystem, guess: ImpactOrbit) -> ImpactOrbit:
 def orbit_monodromy(system: HybridSystem, orbit: ImpactOrbit) -> Float[Array, "n n"]:
     """Return the monodromy matrix of an orbit, starting just after the first impact.
 
-    Product of flight transition matrices and saltation matrices, in the order of the
-    motion.
+    It is the product of the transition matrices of the flights and the saltation
+    matrices, in the order of the motion.
 
     Args:
         system: The system.
         orbit: The periodic orbit.
 
     Returns:
-        Shape `(n, n)`. Its eigenvalues are the Floquet multipliers.
+        The matrix, shape `(n, n)`. Its eigenvalues are the Floquet multipliers.
     """
     return monodromy_of(orbit.shooting, orbit.unknowns(system), system)
 
@@ -159,10 +159,10 @@ def orbit_determinant(system: HybridSystem, orbit: ImpactOrbit) -> Float[Array, 
 
 
 def clearance(system: HybridSystem, orbit: ImpactOrbit) -> Float[Array, ""]:
-    """Return the minimum admissibility margin: positive for a physical orbit.
+    """Return the minimum admissibility margin, which is positive for a physical orbit.
 
-    The least of the approach and rebound speeds of its impacts, the durations of its
-    flights, and the lowest gap within each flight.
+    It is the smallest of the approach and rebound speeds of the impacts, the durations
+    of the flights, and the lowest gaps within the flights.
 
     Args:
         system: The system.

@@ -1,4 +1,6 @@
-"""Find roots by Newton's method, with derivatives by the implicit function theorem."""
+"""Find roots by Newton's method, with derivatives from the implicit function
+theorem.
+"""
 
 from collections.abc import Callable
 
@@ -18,20 +20,21 @@ def implicit_root(
 ) -> Float[Array, " n"]:
     """Find the root of `residual` near `guess`, with exact derivatives.
 
-    Newton's method, with steps halved until the residual falls. The derivative with
-    respect to everything that `residual` closes over comes from the implicit function
-    theorem. It works under `jit`, `vmap`, `jvp` and `vjp`.
+    The method is Newton's, with steps halved until the residual decreases. The
+    derivative with respect to everything that `residual` closes over follows from the
+    implicit function theorem. The function works under `jit`, `vmap`, `jvp` and `vjp`.
 
     Args:
-        residual: Function whose root is sought, shape `(n,)` to `(n,)`.
+        residual: Function whose root is to be found, from shape `(n,)` to `(n,)`.
         guess: Start of the iteration, shape `(n,)`.
 
     Returns:
-        Shape `(n,)`; NaN where Newton's method does not converge.
+        The root, shape `(n,)`; NaN if Newton's method does not converge.
     """
 
     def newton(function, start):
-        # one call site, since tracing and compiling the residual takes most of the time
+        # a single call site, because tracing and compiling the residual takes most of
+        # the time
         def twice(x):
             value = function(x)
             return value, value
@@ -54,7 +57,7 @@ def implicit_root(
             better = here < best
             following = jnp.linalg.solve(jacobian, value)
             limit = 1e-13 * (1 + jnp.max(jnp.abs(trial)))
-            # at rounding level the residual stops falling
+            # at rounding level, the residual stops decreasing
             settled = (jnp.max(jnp.abs(share * change)) <= limit) & (count > 0)
             small = jnp.max(jnp.abs(following)) <= limit
             done = (better & small) | (settled & (best <= _ROUNDING))

@@ -1,8 +1,9 @@
-"""Compute flights with their final impacts, and all derivatives of the orbit.
+"""Compute flights with their final impacts, and all derivatives of an orbit.
 
-One Jacobian of each flight, by the state at its start, gives the matrix of the shooting
-equations, the derivative of one impact by another, and the monodromy matrix, also as a
-regular part and one that grows where an impact becomes a graze.
+One Jacobian of each flight with respect to its initial state gives the matrix of the
+shooting equations, the derivative of one impact with respect to another, and the
+monodromy matrix, which can also be split into a regular part and a part that grows as
+an impact becomes grazing.
 """
 
 from collections.abc import Callable
@@ -19,26 +20,28 @@ from ._flight import flight_nodes
 from ._shooting import Shooting
 
 
-# evaluations of Newton's method for a landing time that is known to a part in a hundred
+# Newton iterations for a landing time that is known to a part in a hundred
 _EVALUATIONS = 5
 
 
 class Link(NamedTuple):
-    """A flight and the impact at its end: gap there, state after it, derivatives."""
+    """A flight and the impact at its end: gap, state after the impact, and
+    derivatives.
+    """
 
     value: Float[Array, " 1+n"]
-    """(1 + n,) gap on arrival, and the state that the impact leaves."""
+    """Gap on arrival and state after the impact, (1 + n,)."""
     by_start: Float[Array, "1+n 1+n"]
-    """(1 + n, 1 + n) by time (s) and state at the start."""
+    """Derivatives with respect to initial time (s) and state, (1 + n, 1 + n)."""
     by_end: Float[Array, " 1+n"]
-    """(1 + n,) by the time of arrival (s)."""
+    """Derivatives with respect to the time of arrival (s), (1 + n,)."""
     field: Float[Array, " n"]
-    """(n,) field after the impact."""
+    """Vector field after the impact, (n,)."""
 
     @property
     def by_impact(self) -> Float[Array, "k k"]:
-        """Return the derivative of time and state of the impact by those at the
-        start.
+        """Return the derivative of time and state of the impact with respect to those
+        at the start.
         """
         sooner = -self.by_start[0] / self.by_end[0]
         moved = self.by_start[1:] + jnp.outer(self.by_end[1:], sooner)
@@ -46,9 +49,9 @@ class Link(NamedTuple):
 
     @property
     def parts(self) -> tuple[Float[Array, "n n"], Float[Array, "n n"], Array]:
-        """Return the derivative of the state by that at the start, each at its own
-        time, as regular + singular / speed; the speed is the normal velocity on
-        arrival.
+        """Return the derivative of the final state with respect to the initial state,
+        each at its own time, as regular + singular / speed; the speed is the normal
+        velocity on arrival.
         """
         left = jnp.outer(self.field - self.by_end[1:], self.by_start[0, 1:])
         return self.by_start[1:, 1:], left, self.by_end[0]
@@ -57,8 +60,8 @@ class Link(NamedTuple):
 def landed(
     system: HybridSystem, start, time, which, before, by_state: Float[Array, "n n"]
 ) -> Link:
-    """Return the link of a flight from a row (time, state), given its end and
-    derivative by the state.
+    """Return the link of a flight from a row (time, state), given its end and the
+    derivative with respect to the state.
     """
 
     def arrive(t, x):
@@ -78,8 +81,8 @@ def landed(
 
 
 def link(system: HybridSystem, start, time, which, steps: int) -> Link:
-    """Return the flight from a row (time, state) to `time` (s), and the impact
-    there.
+    """Return the flight from a row (time, state) to `time` (s), with the impact at its
+    end.
     """
 
     def flown(x):
@@ -91,11 +94,12 @@ def link(system: HybridSystem, start, time, which, steps: int) -> Link:
 
 
 def matrix_of(links: Link, following, sign: Any = 1.0, real: Any = True):
-    """Return the derivative of all equations (gap, next state - state left) by all
-    rows.
+    """Return the derivative of all equations (gap, next state - state after impact)
+    with respect to all rows.
 
     **Arguments:** links `(m, ...)`; the index of the row after each; factors of the
-    entries by that row; which rows are real, others having the identity.
+    entries for that row; which rows are valid, the others being replaced by the
+    identity.
 
     Returns:
         Shape `(m (1 + n), m (1 + n))`, times in s.
@@ -129,10 +133,10 @@ def links_of(shooting: Shooting, u, system: HybridSystem) -> Link:
 def product_of_links(
     links: Link, number: Int[Array, ""] | None = None
 ) -> tuple[Float[Array, "n n"], Float[Array, "n n"]]:
-    """Return the monodromy matrix, of the state just after the first impact.
+    """Return the monodromy matrix for the state just after the first impact.
 
-    With `number` as two matrices, regular + singular / approach speed of that impact;
-    both are bounded where it is a grazing.
+    With `number`, it is returned as two matrices, regular + singular / approach speed
+    of that impact, which are both bounded if the impact is grazing.
     """
     regular, singular, speed = jax.vmap(lambda one: one.parts)(links)
     whole = jax.vmap(lambda a, b, v: a + b / v)(regular, singular, speed)
@@ -147,8 +151,8 @@ def product_of_links(
 
 
 def monodromy_of(shooting: Shooting, u, system: HybridSystem) -> Float[Array, "n n"]:
-    """Return the derivative of the state one period after the first impact by that
-    there.
+    """Return the derivative of the state one period after the first impact with respect
+    to the state at that impact.
     """
     return product_of_links(links_of(shooting, u, system))[0]
 
@@ -158,7 +162,7 @@ def antiperiodic(shooting: Shooting, u, system: HybridSystem) -> Float[Array, "u
     period.
 
     It is singular at a flip, where its null vector is the deviation of the doubled
-    orbit. The first column belongs to the first phase, also without forcing.
+    orbit. The first column belongs to the first phase, even without forcing.
     """
     if not shooting.constraints:
         return jax.jacfwd(shooting.residual)(u, system) + 2 * jnp.eye(u.size)
@@ -172,8 +176,8 @@ def antiperiodic(shooting: Shooting, u, system: HybridSystem) -> Float[Array, "u
 def equations_and_monodromy(
     shooting: Shooting, u, p, system_at: Callable
 ) -> tuple[Float[Array, "u u+1"], Float[Array, "n n"]]:
-    """Return the derivative of the equations by unknowns and parameter, and the
-    monodromy matrix.
+    """Return the derivative of the equations with respect to unknowns and parameter,
+    and the monodromy matrix.
 
     For orbits with impacts; the system is `system_at(p)`.
     """
@@ -216,14 +220,16 @@ def equations_and_monodromy(
         )[1]
         by_p = by_p + by_unit * rate
     else:
-        # the place of the first phase is taken by the period
+        # the period takes the place of the first phase
         whole = whole.at[:, 0].set(flip * by_unit.reshape(-1))
     by_p = flip * by_p.reshape(-1)
     return jnp.append(whole, by_p[:, None], axis=1), product_of_links(links)[0]
 
 
 def _column_scale(shooting: Shooting, u, system) -> Float[Array, "1 u"]:
-    """Return the factors from derivatives by times (s) to those by phases."""
+    """Return the factors from derivatives with respect to times (s) to those with
+    respect to phases.
+    """
     unit = shooting.period(u, system) / max(shooting.periods, 1)
     row = jnp.ones(1 + shooting.dimension).at[0].set(unit)
     return jnp.tile(row, len(shooting.constraints))[None, :]
@@ -233,7 +239,7 @@ def return_map(shooting: Shooting, u, system: HybridSystem, matrix):
     """Return the derivative of the return map to the first constraint, from the
     monodromy matrix.
 
-    In coordinates on the surface, k = n - 1.
+    It is in coordinates on the surface, with k = n - 1.
     """
     starts, _ = shooting.segments(u, system)
     t, x = starts[0, 0], starts[0, 1:]
@@ -249,11 +255,11 @@ def return_map(shooting: Shooting, u, system: HybridSystem, matrix):
 def around_the_period(shooting: Shooting, u, system: HybridSystem):
     """Return the Jacobian of the map from the first impact to that a period later.
 
-    Its variables are (phase, state); without forcing the state, without impacts the
-    state at time zero.
+    Its variables are (phase, state); without forcing, only the state; without impacts,
+    the state at time zero.
 
     Returns:
-        The Jacobian as a function of a point near the orbit's own, and that.
+        The Jacobian as a function of a point, and the point on the orbit.
     """
     if not shooting.constraints:
         return jax.jacfwd(lambda x: shooting.residual(x, system) + x), u

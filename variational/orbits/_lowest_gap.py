@@ -10,7 +10,8 @@ from jaxcam.hybrid.surface import gaps, normal_acceleration, normal_velocity
 from ._flight import flight_end, flight_nodes
 
 
-# halvings that find the lowest point on a polynomial, to start Newton's method from
+# number of bisections to find the lowest point of a polynomial, as a start for Newton's
+# method
 _HALVINGS = 20
 
 
@@ -26,16 +27,16 @@ def lowest_times(
 ) -> tuple[Float[Array, " m"], Float[Array, " m"]]:
     """Return the time and value of the lowest minimum of each gap within a flight.
 
-    A minimum lies where the normal velocity rises through zero; the ends of the flight,
-    where it starts and ends in contact, do not count. With `whole_turn` the flight is a
-    closed orbit and its lowest point counts wherever it is.
+    At a minimum, the normal velocity rises through zero; the ends of the flight, which
+    are on the constraint, do not count. With `whole_turn`, the flight is a closed
+    orbit, and its lowest point counts wherever it is.
 
     **Arguments:** time and state `(1 + n,)` at the start, time at the end (s); `nodes`
-    of the flight where they are known.
+    of the flight, if they are known.
 
     Returns:
-        Times (s) and gaps, one for each constraint; where a gap has no minimum, the end
-            of the flight and the largest gap on it.
+        Times (s) and gaps, one for each constraint; if a gap has no minimum, the end of
+            the flight and the largest gap in it.
     """
     t0 = start[0]
     nodes = nodes_of(system, start, end, steps) if nodes is None else nodes
@@ -60,7 +61,7 @@ def lowest_times(
         node_t, node_x = times[k], states[k]
 
         def newton(_, found):
-            # the gap belongs to the time before its last change, which is rounding
+            # the gap is that before the last change of the time, which is rounding
             s, _ = found
             x = flight_nodes(system, node_t, node_x, node_t + s, 1)[1][-1]
             v = normal_velocity(system, node_t + s, x)[which]
@@ -87,13 +88,13 @@ def gap_or_speed(
     hit: Int[Array, " m"] | None,
     steps: int,
 ) -> Float[Array, ""]:
-    """Return the lowest gap of flight `number`, or from m on the approach speed of an
-    impact.
+    """Return the lowest gap of flight `number`, or for `number` >= m the approach speed
+    of an impact.
 
-    One integration serves both, so that one small program is sufficient. It is
+    One integration is used for both, so one small program is sufficient. The result is
     differentiable: the time of a minimum has no first-order effect, so the derivative
-    is that of the gap at a fixed time. `hit` are the constraints that end the flights;
-    None for a closed orbit without impacts.
+    is that of the gap at a fixed time. `hit` are the constraints at which the flights
+    end, or None for a closed orbit without impacts.
     """
     m = ends.shape[0]
     landed = number >= m
@@ -114,13 +115,14 @@ def gap_or_speed(
 
 
 def _rise(speeds, changes):
-    """Return the place at which a velocity rises through zero in each step, by a cubic.
+    """Return where a velocity rises through zero in each step, from a cubic.
 
-    Also within the same step: a low flight may be shorter than a step.
+    A fall and a rise within the same step are included, because a low flight may be
+    shorter than a step.
 
     Returns:
-        The fraction of the step, the relative distance covered up to there, and whether
-            there is such a rise; `(steps, m)` each.
+        The fraction of the step, the relative distance covered up to that point, and
+            whether there is such a rise; `(steps, m)` each.
     """
     a, b = speeds[:-1], speeds[1:]
     p, q = changes[:-1], changes[1:]

@@ -1,4 +1,4 @@
-"""Compute the derivative of the flow over a period by two methods that must agree."""
+"""Compute the derivative of the flow over a period by two independent methods."""
 
 from typing import Literal
 
@@ -24,11 +24,13 @@ def monodromy(
     method: Method = "product",
     settings: Settings | None = None,
 ) -> Float[Array, "n n"]:
-    """Return the monodromy matrix: derivative of the state after one period.
+    """Return the monodromy matrix, the derivative of the state after one period with
+    respect to the initial state.
 
     Args:
         system: The system.
-        orbit: From [`variational.orbit_of`][] or `continuation.periodic_orbit`.
+        orbit: The orbit, from [`variational.orbit_of`][] or
+            `continuation.periodic_orbit`.
         method: "product" multiplies the transition matrices of the flights and the
             saltation matrices of the recorded events; "flow" differentiates the event
             loop. The first is accurate at every impact speed; the second loses one
@@ -59,15 +61,16 @@ def turn_derivative(
     method: Method = "product",
     settings: Settings | None = None,
 ) -> TurnDerivative:
-    """Return the derivatives of one period by state, period, phase and parameters.
+    """Return the derivatives of the state after one period with respect to state,
+    period, phase and parameters.
 
-    The forcing's period does not follow the parameters: add `period` times its own
-    derivative where it should.
+    The period is held fixed when the parameters change; if the forcing period depends
+    on them, add `period` times its derivative.
 
     Args:
         system: The system.
         orbit: The periodic orbit.
-        where: Picks a parameter of the system, or several, as for
+        where: Selects one or more parameters of the system, as for
             [`jaxcam.parameters.pick`][]; default none.
         method: As for [`variational.monodromy`][].
         settings: Accuracy of "flow"; default a tolerance of 1e-12.

@@ -10,14 +10,14 @@ def eigenvalues(
 ) -> Complex[Array, " n"]:
     """Return the eigenvalues of a real matrix, largest modulus first.
 
-    Near grazing the entries grow like one over the impact speed while the determinant
-    stays bounded. For n = 2 the larger root of mu^2 - trace mu + det is computed
-    without cancellation and the smaller one as det over it, so that both are accurate
-    where `determinant` is known better than from the entries.
+    Near grazing, the entries grow like the inverse of the impact speed, while the
+    determinant remains bounded. For n = 2, the larger root of mu^2 - trace mu + det is
+    computed without cancellation, and the smaller one is det divided by it, so that
+    both are accurate if `determinant` is known more accurately than from the entries.
 
     Args:
         matrix: A real matrix, shape `(n, n)`.
-        determinant: Its determinant, if known more accurately.
+        determinant: Determinant of the matrix, if known more accurately.
 
     Returns:
         Shape `(n,)`, complex.

@@ -1,4 +1,4 @@
-"""Find orbits with one impact per period without a simulation."""
+"""Find orbits with one impact per period without simulation."""
 
 import equinox as eqx
 import jax
@@ -17,23 +17,25 @@ _PHASES, _SPEEDS = 12, 8
 def one_impact_orbits(system: HybridSystem, state) -> list[ImpactOrbit]:
     """Find the orbits with one impact per forcing period, stable or not.
 
-    Newton's method starts from a grid of impacts: phases over one period, and rebound
-    speeds around the one that a body thrown against the mean acceleration of contact
-    needs to return after one period.
+    Newton's method starts from a grid of impacts: phases in one period, and rebound
+    speeds around the speed at which a body under the mean contact acceleration returns
+    after one period.
 
     Args:
         system: A system with a `period`, two states and one constraint.
         state: A state near its surface, shape `(2,)`.
 
     Returns:
-        The admissible orbits, with impacts in the first period, in the order of the sum
-            of their multipliers, so that a saddle comes last. The list may be empty.
+        The admissible orbits, with impacts in the first period, ordered by the sum of
+            their multipliers, so that a saddle is last. The list may be empty.
 
     Raises:
         ValueError: The system has no period.
     """
     if system.period is None:
-        raise ValueError("One impact a period needs a system with a `period`.")
+        raise ValueError(
+            "Orbits with one impact per period need a system with a `period`."
+        )
     orbits, clear, traces = jax.device_get(_search(system, jnp.asarray(state)))
     found: list[ImpactOrbit] = []
     scale = float(np.max(np.abs(orbits.states[clear > 0]), initial=0.0))
@@ -41,7 +43,7 @@ def one_impact_orbits(system: HybridSystem, state) -> list[ImpactOrbit]:
         if not clear[k] > 0:
             break
         orbit = jax.tree.map(lambda leaf, k=k: jnp.asarray(leaf[k]), orbits)
-        # the same orbit is found from many starts, to rounding error
+        # the same orbit is found from many starts, to within rounding error
         near = [
             np.max(np.abs(np.asarray(orbit.states - other.states))) < 1e-8 * scale
             for other in found

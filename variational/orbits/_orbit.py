@@ -1,4 +1,4 @@
-"""A periodic orbit: one period of the motion, its events and its monodromy matrix."""
+"""Periodic orbits: one period of the motion, its events and its monodromy matrix."""
 
 from typing import NamedTuple
 
@@ -23,7 +23,7 @@ from ._turn_derivative import by_product, flown
 
 
 class Event(NamedTuple):
-    """One event of an orbit: "impact", "stick" or "release", and which constraint."""
+    """One event of an orbit: "impact", "stick" or "release", with its constraint."""
 
     kind: str
     """"impact", "stick" or "release"."""
@@ -47,21 +47,22 @@ class Orbit(Printed):
     time: Float[Array, ""]
     """Start of the period (s)."""
     period: Float[Array, ""]
-    """Period of the orbit (s): several forcing periods for a subharmonic."""
+    """Period of the orbit (s); several forcing periods for a subharmonic orbit."""
     impacts: Impacts
     """The impacts of one period."""
     contacts: Contacts
     """The intervals of sustained contact in one period."""
     closure: Float[Array, ""]
-    """Largest deviation of the given state after one period."""
+    """Largest deviation from the given state after one period."""
     monodromy: Float[Array, "n n"]
     """Derivative of the state after one period with respect to `state`, shape `(n, n)`.
     """
     determinant: Float[Array, ""]
-    """Determinant of the monodromy matrix, computed flight by flight and impact by
-    impact."""
+    """Determinant of the monodromy matrix, computed as a product over flights and
+    impacts.
+    """
     pieces: TurnPieces
-    """The period cut at its events."""
+    """The period, divided at its events."""
     sticks: bool = eqx.field(static=True)
     """Whether the orbit has sustained contact."""
 
@@ -89,7 +90,7 @@ class Orbit(Printed):
     def signature(self) -> tuple[Event, ...]:
         """Events of one period, in order.
 
-        For a completed chatter it lists the impacts up to the completion.
+        For completed chatter, only the impacts up to the completion are listed.
         """
         return signature_of(self.impacts, self.contacts)
 
@@ -103,28 +104,29 @@ def orbit_of(
     settings: Settings | None = None,
     closure: float = 1e-6,
 ) -> Orbit:
-    """Return the periodic orbit through `state` at `t0`, from one run over its period.
+    """Return the periodic orbit through `state` at `t0`, from a simulation of one
+    period.
 
-    The impacts of an orbit without contact are then refined as a boundary value
-    problem, so that the impacts and the multipliers are accurate at every impact speed.
+    For an orbit without contact, the impacts are then refined as a boundary value
+    problem, so that the impacts and multipliers are accurate at every impact speed.
 
     Args:
         system: The system.
-        state: A state to which the motion returns, shape `(n,)`. At an impact it may be
-            the state before or after; the orbit then starts halfway through its first
-            flight, because the flow jumps at an impact and has no derivative from
-            there.
-        period: Period (s); default the forcing's own.
+        state: A state to which the motion returns, shape `(n,)`. At an impact, it may
+            be the state before or after the impact; the orbit then starts in the middle
+            of its first flight, because the flow jumps at an impact and has no
+            derivative there.
+        period: Period (s); default: the forcing period.
         t0: Time of `state` (s).
         settings: Accuracy of the run; default a tolerance of 1e-12.
-        closure: Deviation after one period that is allowed, relative to
+        closure: Allowed deviation after one period, relative to
             [`jaxcam.hybrid.sizes.component_sizes`][].
 
     Returns:
         A [`variational.Orbit`][] with its monodromy matrix.
 
     Raises:
-        ValueError: The run fails, or the state does not return.
+        ValueError: The simulation fails, or the motion does not return to the state.
 
     Examples:
         >>> from jaxcam.models import BouncingBall
@@ -190,16 +192,14 @@ def orbit_of(
 def _check_closure(miss, closure, period) -> None:
     if not miss <= closure:
         raise ValueError(
-            f"this state does not return: after {period:g} s it misses by "
-            f"{miss:.1e}; give a state and period closer to the orbit, or find it with "
-            "continuation.periodic_orbit"
+            f"the motion does not return to this state: after {period:g} s, it differs "
+            f"by {miss:.1e}; give a state and period closer to the orbit, or find it "
+            "with continuation.periodic_orbit"
         )
 
 
 def _knots(system, impacts: Impacts, start: ImpactStart | None, t0, period, scale):
-    """Return the impacts as a boundary value problem, and the constraints that they
-    hit.
-    """
+    """Return the impacts as a boundary value problem, and the constraints hit."""
     time, after = np.asarray(impacts.time), np.asarray(impacts.after)
     sides = np.asarray(impacts.constraint)
     if start is not None:

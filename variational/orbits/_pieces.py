@@ -1,4 +1,4 @@
-"""Cut a period of an orbit at its events, in arrays of a few fixed lengths."""
+"""Divide a period of an orbit at its events, into arrays of a few fixed lengths."""
 
 import equinox as eqx
 import numpy as np
@@ -8,7 +8,7 @@ from jaxcam.hybrid.record import Contacts, Impacts
 
 
 NOTHING, IMPACT, LAST_IMPACT = 0, 1, 2
-"""End of a piece: nothing (its mode may change), an impact, or the impact at which a
+"""End of a piece: no event (but the mode may change), an impact, or the impact at which
 chatter is completed.
 """
 
@@ -16,7 +16,8 @@ chatter is completed.
 class TurnPieces(eqx.Module):
     """Pieces of flight or contact, each with the event at its end.
 
-    Pieces beyond the last event are padding without duration. Kept as numpy arrays.
+    Pieces beyond the last event are padding of zero duration. The arrays are NumPy
+    arrays.
     """
 
     start: Float[np.ndarray, " k"]
@@ -24,10 +25,10 @@ class TurnPieces(eqx.Module):
     kind: Int[np.ndarray, " k"]
     constraint: Int[np.ndarray, " k"]
     before: Float[np.ndarray, "k n"]
-    """(k, n) state before the event."""
+    """State before the event, (k, n)."""
     contact: Bool[np.ndarray, "k m"]
-    """(k, m) constraints in contact in the piece, and in the one after; only for
-    constraints that are hit or touched.
+    """Constraints in contact during the piece and (`contact_after`) the next piece, (k,
+    m); only for constraints that are hit or touched.
     """
     contact_after: Bool[np.ndarray, "k m"]
 
@@ -52,7 +53,8 @@ def cut_turn(
         end = float(contacts.end[k]) if bool(contacts.released[k]) else np.inf
         earlier = np.flatnonzero((time[:number] <= begin) & (which[:number] == side))
         if begin > t0 and len(earlier):
-            # contact counts from the last impact on: the others take no time
+            # contact counts from the last listed impact, because the others take no
+            # time
             kind[earlier[-1]] = LAST_IMPACT
             begin = time[earlier[-1]]
         spans.append((begin, end, side))

@@ -25,11 +25,13 @@ class Product(NamedTuple):
     """The derivative over a period, and estimates of its accuracy."""
 
     state: Float[Array, " n"]
-    """(n,) state at the end."""
+    """State at the end, (n,)."""
     matrix: Float[Array, "n columns"]
-    """(n, n + q): by the state at the start, then by the q parameters."""
+    """Derivatives (n, n + q) with respect to the initial state, then the q
+    parameters.
+    """
     determinant: Float[Array, ""]
-    """Determinant of the first n columns, from flights and impacts one by one."""
+    """Determinant of the first n columns, as a product over flights and impacts."""
     condition: Float[Array, ""]
     """Relative error of the first n columns for a relative error of one in each factor.
     """
@@ -42,10 +44,11 @@ def product_of(
     pieces: TurnPieces,
     sticks: bool,
 ) -> Product:
-    """Multiply transition matrices of the flights and saltation matrices between.
+    """Multiply the transition matrices of the flights and the saltation matrices
+    between them.
 
-    **Arguments:** `build(parameters)` gives the system; the state at the start of the
-    first piece; whether any piece is one of contact (static).
+    **Arguments:** `build(parameters)` returns the system; the state at the start of the
+    first piece; whether any piece is in contact (static).
     """
     n, q = state.shape[0], parameters.shape[0]
     pieces = with_all_constraints(build(parameters), pieces, state)
@@ -97,12 +100,14 @@ def with_all_constraints(system, pieces: TurnPieces, state) -> TurnPieces:
 
 
 def _compose(outer, inner, n):
-    """Apply the chain rule to matrices [by state | by parameters]."""
+    """Apply the chain rule to matrices of derivatives [state | parameters]."""
     return (outer[:, :n] @ inner).at[:, n:].add(outer[:, n:])
 
 
 def _held(build, parameters, t, x, contact):
-    """Return the derivative of the projection onto contact, by state and parameters."""
+    """Return the derivative of the projection onto contact with respect to state and
+    parameters.
+    """
     by_state = contact_projector(build(parameters), t, x, contact)
     by_parameter = jax.jacfwd(lambda p: onto_contact(build(p), t, x, contact))(
         parameters
@@ -112,7 +117,8 @@ def _held(build, parameters, t, x, contact):
 
 def _event(build, parameters, piece: TurnPieces, x, sticks):
     """Return the derivative across the event of a piece, the state after it, and the
-    determinant of the derivative."""
+    determinant of the derivative.
+    """
     n = x.shape[0]
     plain = _across(build, parameters, piece, impact_of, sticks)
     nothing = (jnp.eye(n, n + parameters.shape[0]), x, jnp.ones(()))
@@ -150,7 +156,8 @@ def _across(build, parameters, piece: TurnPieces, law_of, sticks):
     law_p = jax.jacfwd(lambda p: law(p)(t, x))(parameters)
     by_parameter = law_p + jnp.outer(share, jax.jacfwd(height)(parameters))
     landed = law(parameters)(t, x)
-    # the law keeps the gap, so its component across the surface is the change of speed
+    # the law preserves the gap, so its component normal to the surface is the change of
+    # speed
     rate, slope = jax.grad(gap_of(system, side), argnums=(0, 1))(t, landed)
     speed_after = rate + slope @ after(t, landed)
     change = jnp.linalg.det(law_x) * speed_after / jnp.where(hit, speed, 1.0)
@@ -162,7 +169,7 @@ def _select(condition, yes, no):
 
 
 def _condition(factors, earlier, matrix):
-    """Sum over the factors of |later| |factor| |earlier| / |product|."""
+    """Return the sum over the factors of |later| |factor| |earlier| / |product|."""
 
     def back(later, factor):
         return later @ factor, later

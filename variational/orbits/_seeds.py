@@ -1,4 +1,4 @@
-"""Read the unknowns of the shooting equations from a known motion."""
+"""Obtain the unknowns of the shooting equations from a known motion."""
 
 from typing import TYPE_CHECKING
 
@@ -21,12 +21,12 @@ if TYPE_CHECKING:
 
 
 _STEPS = (16, 32, 64, 128, 256)
-"""Available numbers of steps, and the error allowed in a flight."""
+"""Available numbers of steps, and the allowed error of a flight."""
 _ALLOWED = 1e-12
 
 
 def steps_for(system: HybridSystem, starts, ends) -> int:
-    """Return the number of steps of each flight for an error of about 1e-12.
+    """Return the number of steps per flight needed for an error of about 1e-12.
 
     **Arguments:** times and states `(m, 1 + n)` at the starts, times `(m,)` of the
     ends.
@@ -41,8 +41,8 @@ def steps_for(system: HybridSystem, starts, ends) -> int:
             return steps
     if not wrong < 1e-9:
         raise ValueError(
-            f"{_STEPS[-1]} steps of order eight leave an error of {wrong:.0e} in a "
-            "flight; the vector field is stiff or not smooth there"
+            f"with {_STEPS[-1]} eighth-order steps, the error of a flight is "
+            f"{wrong:.0e}; the vector field is stiff or not smooth there"
         )
     return _STEPS[-1]
 
@@ -61,8 +61,8 @@ def seed(
 
     Args:
         system: The system.
-        motion: An orbit, or a run over one period of it, near it.
-        periods: Number of forcing periods in it; 0 without forcing.
+        motion: An orbit, or a run over one period near it.
+        periods: Number of forcing periods in the motion; 0 without forcing.
 
     Returns:
         The equations, and the unknowns, shape `(u,)`.

@@ -1,12 +1,13 @@
-"""Set up multiple shooting: one segment per flight, impact times among the unknowns.
+"""Multiple shooting with one segment per flight and the impact times as unknowns.
 
-An orbit with m impacts is the list of its impacts: time t_k and state x_k just after
-each. With phi the free flight and H, R gap and law of the constraint that is hit,
+An orbit with m impacts is given by the times t_k and the states x_k just after each
+impact. With phi the free flight and H and R the gap and impact law of the constraint
+that is hit,
 
     H(t_{k+1}, phi(t_{k+1}; t_k, x_k)) = 0,
     x_{k+1} = R(t_{k+1}, phi(t_{k+1}; t_k, x_k)),
 
-closed by t_{m+1} = t_1 + n T, x_{m+1} = x_1. Nothing in these equations divides by an
+closed by t_{m+1} = t_1 + n T, x_{m+1} = x_1. These equations contain no division by an
 impact speed, so they are as regular at grazing as elsewhere. Their solutions continue
 beyond it as motions through the constraint, which `seen` detects.
 """
@@ -30,10 +31,11 @@ class Seen(NamedTuple):
     """Admissibility of a solution of the shooting equations, and its flights."""
 
     gaps: Float[Array, " flights"]
-    """Lowest gap inside each flight, or of the entire orbit without impacts, shape
-    `(m,)`."""
+    """Lowest gap within each flight, or in the entire orbit if there are no impacts,
+    shape `(m,)`.
+    """
     speeds: Float[Array, " m"]
-    """Approach speed of each impact, positive where it is physical, shape `(m,)`."""
+    """Approach speed of each impact, positive if it is physical, shape `(m,)`."""
     error: Float[Array, ""]
     """Estimated error of the flights, relative to 1 + |x|."""
     gap_size: Float[Array, ""]
@@ -41,37 +43,38 @@ class Seen(NamedTuple):
     times: Float[Array, "flights nodes"]
     """Times at the ends of all steps (s), shape `(flights, 1 + steps)`."""
     states: Float[Array, "flights nodes n"]
-    """States there, shape `(flights, 1 + steps, n)`."""
+    """States at these times, shape `(flights, 1 + steps, n)`."""
 
 
 class Shooting(eqx.Module):
     """The equations of a periodic orbit with a known sequence of impacts.
 
     The unknowns u are, for each impact, its phase (time in forcing periods) and the
-    state after it: shape `(m (1 + n),)`. Without impacts they are the state at time
-    zero, shape `(n,)`. For a system without forcing the first phase is zero, its place
-    is taken by the period (s), and phases count periods of the orbit (multiple
+    state after it: shape `(m (1 + n),)`. Without impacts, they are the state at time
+    zero, shape `(n,)`. For a system without forcing, the first phase is zero, the
+    period (s) takes its place, and phases are in periods of the orbit (multiple
     shooting; thesis, eq. 3.42).
     """
 
     constraints: tuple[int, ...] = eqx.field(static=True)
-    """Constraint that each impact hits, in order."""
+    """Constraint hit by each impact, in order."""
     periods: int = eqx.field(static=True)
-    """Forcing periods until the orbit repeats; 0 for a system without forcing."""
+    """Number of forcing periods after which the orbit repeats; 0 without forcing."""
     dimension: int = eqx.field(static=True)
     """Number of states n."""
     steps: int = eqx.field(static=True, default=32)
-    """Runge-Kutta steps of order eight in each flight."""
+    """Number of eighth-order Runge-Kutta steps in each flight."""
 
     def residual(self, u, system: HybridSystem) -> Float[Array, " u"]:
-        """Return the residual: gap at each impact, and the mismatch of its law.
+        """Return the residual: the gap at each impact, and the mismatch of the impact
+        law.
 
         Args:
             u: Unknowns of the equations, shape `(u,)`.
             system: The system.
 
         Returns:
-            Shape `(u,)`, zero for an orbit.
+            The residual, shape `(u,)`; zero for an orbit.
         """
         if not self.constraints:
             end = self.period(u, system)
@@ -102,7 +105,7 @@ class Shooting(eqx.Module):
         return jnp.asarray(self.periods * system.period, dtype=jnp.float64)
 
     def segments(self, u, system: HybridSystem):
-        """Return starts and ends of the flights: times (s) and states.
+        """Return the starts and ends of the flights: times (s) and states.
 
         Args:
             u: Unknowns of the equations, shape `(u,)`.
@@ -120,7 +123,7 @@ class Shooting(eqx.Module):
         return starts * scale[None, :], ends * scale[None, :]
 
     def flights(self, u, system: HybridSystem):
-        """Return starts and end times of all flights.
+        """Return the starts and end times of all flights.
 
         Args:
             u: Unknowns of the equations, shape `(u,)`.
@@ -178,10 +181,10 @@ class Shooting(eqx.Module):
     # -- admissibility
 
     def seen(self, u, system: HybridSystem) -> Seen:
-        """Return lowest gaps, approach speeds and error, from one integration of the
+        """Return lowest gaps, approach speeds and the error from one integration of the
         flights.
 
-        For derivatives use `gap_or_speed`.
+        For derivatives, use `gap_or_speed`.
 
         Args:
             u: Unknowns of the equations, shape `(u,)`.
@@ -236,7 +239,7 @@ class Shooting(eqx.Module):
         return gap_or_speed(system, starts, ends, number, hit, self.steps)
 
     def stroboscopic(self, u, system: HybridSystem, seen: Seen):
-        """Return the states at time zero and each forcing period after it.
+        """Return the states at time zero and at each later forcing period.
 
         Args:
             u: Unknowns of the equations, shape `(u,)`.

@@ -1,7 +1,8 @@
-"""Compute special points of orbits with impacts: fold, flip, graze, detachment.
+"""Compute special points of orbits with impacts: fold, flip, grazing and detachment.
 
-Each point is the root of a smooth system of equations in which the parameter is one
-more unknown, so that it can be differentiated with respect to all the others.
+Each point is the root of a smooth system of equations in which the parameter is an
+additional unknown, so that it can be differentiated with respect to all other
+parameters.
 """
 
 from collections.abc import Callable
@@ -21,13 +22,14 @@ from ._shooting import Shooting
 
 
 class SpecialPoint(eqx.Module):
-    """A special value of a parameter, and the orbit there."""
+    """A special value of a parameter, and the orbit at this value."""
 
     parameter: Float[Array, ""]
     """Value of the parameter, in its own unit."""
     orbit: ImpactOrbit
-    """The impacts of the orbit, after its graze if it has one; for a detachment the
-    time and state of the contact."""
+    """The impacts of the orbit, after the grazing point if it has one; for a
+    detachment, the time and state of the contact.
+    """
 
 
 def _where(
@@ -36,7 +38,7 @@ def _where(
     guess: ImpactOrbit,
     test: Callable[[Shooting, Any, HybridSystem], Float[Array, ""]],
 ) -> SpecialPoint:
-    """Find orbit and parameter for which `test(equations, unknowns, system)` is
+    """Find the orbit and parameter for which `test(equations, unknowns, system)` is
     zero.
     """
     shooting = guess.shooting
@@ -62,12 +64,12 @@ def orbit_where(
 
     Args:
         system: The system, with the parameter near the point.
-        where: Picks the parameter.
+        where: Selects the parameter.
         guess: The orbit near the point.
         test: Function of the matrix of [`variational.orbits.orbit_monodromy`][].
 
     Returns:
-        The parameter and the orbit; NaN where Newton's method does not converge.
+        The parameter and the orbit; NaN if Newton's method does not converge.
 
     Examples:
         >>> from jaxcam.models import ImpactOscillator
@@ -91,11 +93,11 @@ def fold_of_orbit(
 
     Args:
         system: The system, with the parameter near the fold.
-        where: Picks the parameter.
+        where: Selects the parameter.
         guess: The orbit near the fold.
 
     Returns:
-        The parameter and the orbit; NaN where Newton's method does not converge.
+        The parameter and the orbit; NaN if Newton's method does not converge.
 
     Examples:
         >>> from jaxcam.models import ImpactOscillator
@@ -120,11 +122,11 @@ def flip_of_orbit(
 
     Args:
         system: The system, with the parameter near the flip.
-        where: Picks the parameter.
+        where: Selects the parameter.
         guess: The orbit near the flip.
 
     Returns:
-        The parameter and the orbit; NaN where Newton's method does not converge.
+        The parameter and the orbit; NaN if Newton's method does not converge.
 
     Examples:
         >>> from jaxcam.models import ImpactOscillator
@@ -147,22 +149,22 @@ def graze_of_orbit(
 ) -> SpecialPoint:
     """Find the parameter value at which a periodic orbit grazes.
 
-    The value is differentiable in all other parameters. A graze is an impact without
-    speed; the square-root singularity of a grazing bifurcation belongs to the orbits
-    beyond it, not to the graze. It is not checked that the gap has a minimum there and
-    is open elsewhere; see [`jaxcam.hybrid.surface.normal_acceleration`][].
+    The value is differentiable with respect to all other parameters. Grazing is an
+    impact of zero speed; the square-root singularity of a grazing bifurcation belongs
+    to the orbits beyond it, not to the grazing orbit. The function does not check that
+    the gap has a minimum there and is open elsewhere; see
+    [`jaxcam.hybrid.surface.normal_acceleration`][].
 
     Args:
-        system: The system, with the parameter near the graze.
-        where: Picks the parameter.
-        guess: The graze first, then the impacts of the orbit in the order in which they
-            follow it, up to one period later; the graze alone for an orbit without
-            impacts. Its `constraints` say which constraint is touched, and which are
-            hit.
+        system: The system, with the parameter near grazing.
+        where: Selects the parameter.
+        guess: The grazing point, followed by the impacts of the orbit in order, up to
+            one period later; only the grazing point for an orbit without impacts.
+            `constraints` gives the constraint that is touched, then those that are hit.
 
     Returns:
-        The parameter and the orbit, which begins with the graze; NaN where Newton's
-            method does not converge.
+        The parameter and the orbit, which begins with the grazing point; NaN if
+            Newton's method does not converge.
 
     Examples:
         >>> from jaxcam.models import ImpactOscillator
@@ -191,18 +193,18 @@ def detachment(
 ) -> SpecialPoint:
     """Find the parameter value at which sustained contact is first lost.
 
-    The acceleration that contact suppresses touches zero there: gap, normal velocity,
-    acceleration and jerk vanish together (thesis, eqs. 2.30-2.32).
+    At this value, the acceleration suppressed by contact just reaches zero: gap, normal
+    velocity, acceleration and jerk vanish together (thesis, eqs. 2.30-2.32).
 
     Args:
         system: The system, with the parameter near the detachment.
-        where: Picks the parameter.
+        where: Selects the parameter.
         t: Time near the weakest contact (s).
         state: State near the weakest contact, shape `(2,)`.
         constraint: Index of the constraint.
 
     Returns:
-        The parameter, time and state; NaN where Newton's method does not converge.
+        The parameter, time and state; NaN if Newton's method does not converge.
 
     Examples:
         >>> from jaxcam.models import ImpactOscillator
@@ -225,10 +227,11 @@ def detachment(
 def release_near(
     system: HybridSystem, t, state: Float[Array, " 2"], *, constraint: int = 0
 ) -> tuple[Float[Array, ""], Float[Array, " 2"]]:
-    """Return time and state of the release from contact near `t` and `state`.
+    """Return the time and state of the release from contact near `t` and `state`.
 
-    It is the root of gap, normal velocity and acceleration, differentiable in all
-    parameters. [`jaxcam.hybrid.surface.release_point`][] finds a place to start from.
+    It is the root of gap, normal velocity and acceleration, and is differentiable with
+    respect to all parameters. [`jaxcam.hybrid.surface.release_point`][] provides an
+    initial guess.
 
     Args:
         system: The system.
@@ -237,7 +240,7 @@ def release_near(
         constraint: Index of the constraint.
 
     Returns:
-        Time of release (s) and state there, shape `(2,)`.
+        Time (s) and state at release, shape `(2,)`.
 
     Examples:
         >>> from jaxcam.models import ImpactOscillator

@@ -19,25 +19,29 @@ class TurnDerivative(eqx.Module):
     """Derivatives of the state at the end of one period."""
 
     state: Float[Array, "n n"]
-    """Derivative by the state at the start, shape `(n, n)`: the monodromy matrix of a
-    periodic orbit."""
+    """Derivative with respect to the initial state, shape `(n, n)`: the monodromy
+    matrix of a periodic orbit.
+    """
     period: Float[Array, " n"]
-    """Derivative by the period, that is, by the time at which it ends, shape `(n,)`."""
+    """Derivative with respect to the period, that is, to the end time, shape `(n,)`."""
     phase: Float[Array, " n"]
-    """Derivative by the time of the start, at the same length, shape `(n,)`."""
+    """Derivative with respect to the start time at fixed period, shape `(n,)`."""
     parameters: Float[Array, "n q"]
-    """Derivative by the parameters picked, at the same times, shape `(n, q)`."""
+    """Derivative with respect to the selected parameters at fixed times, shape `(n,
+    q)`.
+    """
     determinant: Float[Array, ""]
-    """Determinant of `state`; zero where the motion sticks."""
+    """Determinant of `state`; zero if the motion sticks."""
     condition: Float[Array, ""]
-    """Relative error of `state` per relative error in each flight and saltation matrix.
+    """Relative error of `state` per relative error in each flight and saltation
+    matrix.
     """
     sticks: bool = eqx.field(static=True)
-    """Whether there is sustained contact, which erases the past."""
+    """Whether there is sustained contact, which removes all memory of the past."""
 
 
 def picked(system, where: Pick | None) -> Float[Array, " q"]:
-    """Return the picked parameters as one vector."""
+    """Return the selected parameters as one vector."""
     if where is None:
         return jnp.zeros(0)
     leaves = jax.tree.leaves(where(system))
@@ -45,7 +49,7 @@ def picked(system, where: Pick | None) -> Float[Array, " q"]:
 
 
 def builder(system, where: Pick | None) -> Callable:
-    """Return the function from a parameter vector to the prepared system."""
+    """Return the function that creates the prepared system from a parameter vector."""
 
     def build(values):
         if where is None:
@@ -79,7 +83,7 @@ def by_product(system, values, where, state, pieces: TurnPieces, sticks):
 
 @eqx.filter_jit
 def flown(system, t0, state, t1) -> Float[Array, " n"]:
-    """Return the end of a flight without events."""
+    """Return the final state of a flight without events."""
     system = system.prepared()
     return fly_linearised(
         lambda _, t, x: system.vector_field(t, x), jnp.zeros(0), t0, state, t1

@@ -1,4 +1,4 @@
-"""Compute the parameter at which complete chattering is interrupted, for a fit."""
+"""Compute the parameter at which complete chatter is interrupted, for a fit."""
 
 from collections.abc import Callable
 from typing import Any
@@ -19,7 +19,7 @@ def interruption_of_chattering(
     *,
     periods: int = 1,
 ) -> Float[Array, ""]:
-    """Return the parameter value at which complete chattering ends at the release
+    """Return the parameter value at which complete chatter ends at the release
     point.
 
     This is [`variational.chatter_interruption`][] for use in a fit: it can be
@@ -31,7 +31,7 @@ def interruption_of_chattering(
         system: A system with two states, one constraint and a period.
         where: Selects the parameter.
         bracket: Two values of the parameter, well to either side of the published one,
-            with complete chattering at only one of them.
+            with complete chatter at only one of them.
         periods: Number of forcing periods from release to the release after sticking.
 
     Returns:

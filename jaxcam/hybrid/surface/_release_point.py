@@ -1,4 +1,4 @@
-"""Find the release from sticking, the start of a period with complete chattering."""
+"""Find the release from sticking, the start of a period with complete chatter."""
 
 import equinox as eqx
 import jax

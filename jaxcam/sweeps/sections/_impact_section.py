@@ -18,7 +18,7 @@ from ._system_section import AbstractSystemSection
 class ImpactSection(AbstractSystemSection):
     """Impact section: states just after each impact, with its time.
 
-    A chattering sequence is listed up to the impact after which it is completed
+    A chatter sequence is listed up to the impact after which it is completed
     analytically; set `Settings(chatter_depth=...)` to list more.
 
     Examples:

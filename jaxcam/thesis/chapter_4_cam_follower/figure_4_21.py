@@ -1,4 +1,4 @@
-"""Figure 4.21: interruption of chattering."""
+"""Figure 4.21: interruption of chatter."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Table 5.3: constants of the local map at the interruption of chattering.
+"""Table 5.3: constants of the local map at the interruption of chatter.
 
 The polynomial is compared by its value in the middle of the first lobe: its printed
 coefficients multiply powers of 0.34 rad and cancel to a part in a million.

@@ -1,4 +1,4 @@
-"""The grazing manifold and the chattering region, drawn in Figures 6.2 and 6.4."""
+"""The grazing manifold and the chatter region, drawn in Figures 6.2 and 6.4."""
 
 from typing import NamedTuple
 

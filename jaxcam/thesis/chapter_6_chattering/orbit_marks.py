@@ -66,7 +66,7 @@ def _cam_velocity(run, times):
 
 
 def draw_marks(system: CamFollower, close: bool = False) -> Figure:
-    """Draw the orbit with its marks; `close`: around the end of its chattering."""
+    """Draw the orbit with its marks; `close`: around the end of its chatter."""
     drawn, gap, rate, times, gaps, rates, period = _marked(system)
     gap, gaps = 1e3 * gap, 1e3 * gaps
     figure = plt.figure(figsize=(9.6, 5.2))

@@ -1,4 +1,4 @@
-"""One chattering sequence of the rig, and its orbit."""
+"""One chatter sequence of the rig, and its orbit."""
 
 from typing import NamedTuple
 

@@ -1,4 +1,4 @@
-"""Table 6.1: the end of chattering just below its interruption.
+"""Table 6.1: the end of chatter just below its interruption.
 
 The relative coordinates of the two contact points are not compared: they are zero, and
 the printed values are the thesis' integration error.
