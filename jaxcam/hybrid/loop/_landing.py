@@ -69,15 +69,13 @@ def land(
         flown.constraint,
     )
     x = select(lands, after, made.x)
-    hit = [lands & (flown.constraint == k) for k in range(len(made.jets))]
     mode = _kept_contacts(functions, carried, lands, seen, landed, x)
     mode = mode + tuple(
-        negative ^ crossed
-        for negative, crossed in zip(
-            carried.mode[functions.m :], hit[functions.m :], strict=True
-        )
+        carried.mode[k] ^ (lands & (flown.constraint == k))
+        for k in range(functions.m, functions.m + functions.k)
     )
     jets = functions.jets(seen, x, mode)
+    hit = [lands & (flown.constraint == k) for k in range(len(jets))]
     strikes, slides = lands, False
     if functions.k:
         strikes = any_of(hit[: functions.m])
